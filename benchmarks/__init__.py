@@ -1,1 +1,1 @@
-"""What WebMap costs, measured against others and against other ways to do it."""
+"""Measures the costs of WebMap, compared with other libraries and methods."""

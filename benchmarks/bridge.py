@@ -1,9 +1,9 @@
-"""What a frame from a robot costs: ``webmap.Bridge`` against roslibpy.
+"""The cost of a frame from a robot: ``webmap.Bridge`` compared with roslibpy.
 
-Both listen in a process of their own to the same player in another. roslibpy hands
-out dicts and lists; WebMap hands out typed messages and numpy arrays, so it does more
-for what it costs. WebMap asks for scans in CBOR, which roslibpy cannot read; the third
-contender is WebMap with a bridge that has JSON alone.
+Each listens in its own process to the same player in another process. roslibpy returns
+dicts and lists; WebMap returns typed messages and numpy arrays, so it does more work.
+WebMap requests scans in CBOR, which roslibpy cannot read; the third contender is WebMap
+with a bridge that only has JSON.
 """
 
 import json
@@ -19,7 +19,7 @@ COUNTS = {ODOM: 10_000, SCAN: 2_000}
 
 
 def listening(client: str, topic: str, count: int) -> Callable[[], Figures]:
-    """Return a run of one client that hears ``count`` frames."""
+    """Return a run of one client that receives ``count`` frames."""
 
     def run() -> Figures:
         module = [sys.executable, "-m"]

@@ -1,5 +1,5 @@
-// A circle for each dot, moved by attributes, as the library of 2012 drew scans. It is
-// spared the wire: the numbers are made here, before the clock runs.
+// A circle for each dot, moved by attributes, as the library of 2012 drew scans. There
+// is no network: the numbers are made here, before the measurement starts.
 "use strict";
 
 const SVG = "http://www.w3.org/2000/svg";

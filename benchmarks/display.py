@@ -20,7 +20,7 @@ class Display:
     """A running display process."""
 
     url: str
-    """Where the page is, token and all."""
+    """Address of the page, including the token."""
 
     process: psutil.Process
 
@@ -32,7 +32,7 @@ class Display:
 
 @contextmanager
 def display(robots: int, beams: int) -> Iterator[Display]:
-    """Start the fleet on a free port, and end it."""
+    """Start the fleet on a free port, and end it afterwards."""
     with tempfile.TemporaryDirectory() as state:
         environment = os.environ | {
             "FLEET_ROBOTS": str(robots),

@@ -1,9 +1,9 @@
-"""Main-thread time in Chromium: WebMap's page against a circle for each dot.
+"""Main-thread time in Chromium: WebMap's page compared with a circle for each dot.
 
 Two hundred robots with scans of 360 points at 10 Hz and poses at 20 Hz. Both draw at
-most 20 frames a second, each in one animation frame; a page that cannot keep up draws
-fewer. WebMap's side includes the socket, the decoding and the acknowledgement; the
-other is spared all that.
+most 20 frames a second, each in one animation frame; a page that is too slow draws
+fewer. WebMap's time includes the socket, the decoding and the acknowledgement; the
+other page has none of these.
 """
 
 import shutil
@@ -20,7 +20,7 @@ ROBOTS = 200
 BEAMS = 360
 CIRCLES = Path(__file__).parent / "circles.js"
 
-# A page acknowledges each frame that it has drawn; that is how they are counted.
+# A page acknowledges each drawn frame; the acknowledgements are counted.
 COUNT_FRAMES = """
 globalThis.framesDrawn = 0;
 const send = WebSocket.prototype.send;
@@ -30,7 +30,7 @@ WebSocket.prototype.send = function (data) {
 };
 """
 
-# What is outside the window is not drawn, and would look cheap.
+# Elements outside the window are not drawn, so they would cost too little.
 OUT_OF_SIGHT = """
 [...document.querySelectorAll("svg circle[r='0.3']")].filter((model) => {
   const { left, top, right, bottom } = model.getBoundingClientRect();
@@ -48,7 +48,7 @@ FIGURES = {
 
 @contextmanager
 def browser_page() -> Iterator[Page]:
-    """Open a page in a Chromium of its own."""
+    """Open a page in a separate Chromium."""
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
             executable_path=shutil.which("chromium"),
@@ -61,7 +61,7 @@ def browser_page() -> Iterator[Page]:
 
 
 def wait_for_frames(page: Page, count: int = 5) -> None:
-    """Wait until the page draws; asked from outside, since it may not use eval."""
+    """Wait until the page draws; polled from outside, because it may not use eval."""
     for _ in range(600):
         if page.evaluate("globalThis.framesDrawn") > count:
             return
@@ -70,7 +70,7 @@ def wait_for_frames(page: Page, count: int = 5) -> None:
 
 
 def measure(page: Page, seconds: float) -> Figures:
-    """Return the figures for each frame drawn while the page runs on."""
+    """Return the figures for each frame that the page draws meanwhile."""
     wait_for_frames(page)
     if hidden := page.evaluate(OUT_OF_SIGHT):
         raise RuntimeError(f"{hidden} robots are outside the window")
@@ -119,7 +119,7 @@ def circle_page(robots: int, seconds: float) -> Callable[[], Figures]:
 
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
-    """Compare the two ways of drawing."""
+    """Compare the two drawing methods."""
     robots, seconds = (20, 2.0) if quick else (ROBOTS, 10.0)
     contenders = [
         Contender("WebMap", webmap_page(robots, seconds)),

@@ -1,7 +1,7 @@
-"""A program for ``webmap run``: robots that move and scan, with no ROS behind them.
+"""A program for ``webmap run``: robots that move and scan, without ROS.
 
-What they do was computed before, so that what is measured is the scene, the wire and
-the sockets. ``FLEET_ROBOTS`` and ``FLEET_BEAMS`` say how many there are of each.
+Their data is computed in advance, so that only the scene, the wire and the sockets are
+measured. ``FLEET_ROBOTS`` and ``FLEET_BEAMS`` are the numbers of robots and beams.
 """
 
 import math
@@ -17,10 +17,10 @@ ROBOTS = int(os.environ.get("FLEET_ROBOTS", "200"))
 BEAMS = int(os.environ.get("FLEET_BEAMS", "360"))
 
 TICK = 0.05
-"""Seconds between two poses of a robot; its scans come half as often."""
+"""Seconds between two poses of a robot; scans come half as often."""
 
 STEPS = 40
-"""After how many ticks everything repeats."""
+"""Ticks after which everything repeats."""
 
 
 class Mover:
@@ -55,13 +55,13 @@ fleet = [Mover(number) for number in range(ROBOTS)]
 
 
 def step(number: int) -> None:
-    """Move everything, in the model's thread."""
+    """Move all robots, in the model's thread."""
     for mover in fleet:
         mover.step(number)
 
 
 def drive() -> None:
-    """Ask for a step at each tick, from a thread that only keeps time."""
+    """Request a step at each tick, from a thread that only keeps time."""
     due = time.monotonic()
     number = 0
     while True:

@@ -1,4 +1,4 @@
-"""Frames as rosbridge sends them: full digits, escaped slashes, null for no reading."""
+"""Frames as rosbridge sends them: all digits, escaped slashes, null for no reading."""
 
 import json
 import math
@@ -13,7 +13,7 @@ SCAN = "/robot_0/base_scan"
 TYPES = {ODOM: "nav_msgs/Odometry", SCAN: "sensor_msgs/LaserScan"}
 
 VARIANTS = 50
-"""How many frames differ, so that nothing can be learned by heart."""
+"""Number of different frames, so that caching has no effect."""
 
 
 def header(number: int, frame: str) -> dict[str, Any]:

@@ -1,8 +1,8 @@
-"""Paired runs: A B A B, medians, ratios, a table for people and JSON for the rest.
+"""Paired runs: A B A B, medians, ratios, a table for people and JSON for programs.
 
-A figure by itself says more about the machine than about the code. So the contenders
-of a comparison run in turn, round after round, and what counts is the ratio within a
-round: whatever slowed the machine down slowed both.
+A single figure depends more on the machine than on the code. Therefore the contenders
+of a comparison run in turn, round after round, and only the ratio within a round
+counts: a slow machine slows both.
 """
 
 import json
@@ -15,25 +15,25 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 Figures = dict[str, float]
-"""What one run measured, by name; the name ends in its unit, such as ``"cpu (us)"``."""
+"""Figures of one run by name; the name ends in its unit, such as ``"cpu (us)"``."""
 
 RESULTS = Path(__file__).parent / "results"
 
 
 @dataclass(frozen=True, slots=True)
 class Contender:
-    """One way to do the work."""
+    """One method to do the work."""
 
     name: str
-    """What the table calls it."""
+    """Its name in the table."""
 
     run: Callable[[], Figures]
-    """Do the work once, in a process of its own where that matters."""
+    """Do the work once, in a separate process if necessary."""
 
 
 @dataclass(slots=True)
 class Comparison:
-    """What the contenders measured; the first one is what the others are held to."""
+    """The figures of the contenders; the first one is the reference of the others."""
 
     title: str
     runs: dict[str, list[Figures]] = field(default_factory=dict)
@@ -43,7 +43,7 @@ class Comparison:
         return statistics.median(run[figure] for run in self.runs[name])
 
     def ratios(self, name: str, figure: str) -> list[float]:
-        """Return this contender's figure by the first one's, round by round."""
+        """Return this contender's figure divided by the first one's, round by round."""
         first = next(iter(self.runs.values()))
         pairs = zip(self.runs[name], first, strict=True)
         return [run[figure] / base[figure] for run, base in pairs if base[figure]]
@@ -68,7 +68,7 @@ class Comparison:
         return f"{text} ({middle:.2f} x, {low:.2f} to {high:.2f})"
 
     def as_dict(self) -> dict[str, object]:
-        """Return everything that was measured, and the medians and ratios."""
+        """Return all figures, with medians and ratios."""
         figures = list(next(iter(self.runs.values()))[0])
         return {
             "title": self.title,
@@ -79,9 +79,9 @@ class Comparison:
 
 
 def compare(title: str, contenders: Sequence[Contender], rounds: int) -> Comparison:
-    """Let the contenders run in turn, ``rounds`` times.
+    """Run the contenders in turn, ``rounds`` times.
 
-    Every other round goes the other way round, so that none always follows the same.
+    Every other round has the opposite order, so that no contender always runs second.
 
     Raises:
         ValueError: If ``rounds`` is less than 1, or there is no contender.
@@ -98,7 +98,7 @@ def compare(title: str, contenders: Sequence[Contender], rounds: int) -> Compari
 
 
 def machine() -> dict[str, object]:
-    """Return what the figures depend on besides the code."""
+    """Return the properties of the machine that affect the figures."""
     return {
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.release()}",

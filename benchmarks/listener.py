@@ -1,8 +1,8 @@
-"""One client that listens to the player and says what each frame cost it.
+"""One client that listens to the player and reports the cost of each frame.
 
 Run as ``python -m benchmarks.listener CLIENT PORT TOPIC COUNT``; prints JSON. The cost
 is the processor time of this whole process, all threads, from the first frame of the
-measured part to the last, by the number of frames between.
+measured part to the last, divided by the number of frames.
 """
 
 import asyncio
@@ -22,7 +22,7 @@ WARM = 200
 
 
 class Meter:
-    """Counts frames and knows when all have come."""
+    """Counts frames up to a given number."""
 
     def __init__(self, count: int) -> None:
         self.count = count
@@ -41,7 +41,7 @@ class Meter:
             self.done.set()
 
     def figures(self) -> dict[str, float]:
-        """Return what was measured."""
+        """Return the figures of the run."""
         frames = self.count - WARM
         return {
             "cpu a frame (us)": self._cpu / frames * 1e6,
@@ -50,7 +50,7 @@ class Meter:
 
 
 def listen_with_roslibpy(port: int, topic: str, meter: Meter) -> None:
-    """Take the messages as roslibpy gives them: dicts, not even turned to arrays."""
+    """Receive messages as roslibpy gives them: dicts, without conversion to arrays."""
     import roslibpy
 
     def on_message(message: dict[str, Any]) -> None:
@@ -68,7 +68,7 @@ def listen_with_roslibpy(port: int, topic: str, meter: Meter) -> None:
 def listen_with_webmap(
     port: int, topic: str, meter: Meter, encoding: "Encoding | None"
 ) -> None:
-    """Take the messages as WebMap's own modules do: typed, the ranges an array."""
+    """Receive messages like WebMap's own modules: typed, with ranges as an array."""
     asyncio.run(_listen_with_webmap(port, topic, meter, encoding))
 
 

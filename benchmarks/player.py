@@ -1,7 +1,7 @@
-"""A stand-in for a rosbridge that sends one subscriber frames as fast as it reads.
+"""Imitates a rosbridge that sends frames to one subscriber as fast as it reads.
 
-Run as ``python -m benchmarks.player COUNT``; prints its port. It speaks only as much
-of the protocol as a subscription needs.
+Run as ``python -m benchmarks.player COUNT``; prints its port. It implements only the
+part of the protocol that a subscription needs.
 """
 
 import asyncio
@@ -16,13 +16,13 @@ from websockets.exceptions import ConnectionClosed
 from benchmarks.frames import TYPES, cbor_frames, json_frames
 
 BATCH = 64
-"""Frames between two looks at whether anything else wants to run."""
+"""Frames after which the event loop runs other tasks."""
 
 
 async def play(
     link: ServerConnection, frames: Sequence[str | bytes], count: int
 ) -> None:
-    """Send ``count`` frames, then wait until the client goes."""
+    """Send ``count`` frames, then wait until the client disconnects."""
     for number, frame in enumerate(itertools.islice(itertools.cycle(frames), count)):
         await link.send(frame)
         if number % BATCH == 0:

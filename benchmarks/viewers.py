@@ -1,7 +1,7 @@
-"""What viewers cost the display process: one against twenty.
+"""The costs of viewers for the display process: one viewer compared with twenty.
 
 Fifty robots with scans of 360 points at 10 Hz and poses at 20 Hz. The viewers are in
-a process of their own and draw nothing.
+a separate process and draw nothing.
 """
 
 import json
@@ -17,7 +17,7 @@ BEAMS = 360
 
 
 def watched_by(viewers: int, seconds: float) -> Callable[[], Figures]:
-    """Return a run with so many viewers."""
+    """Return a run with a number of viewers."""
 
     def run() -> Figures:
         with display(ROBOTS, BEAMS) as shown:

@@ -1,7 +1,7 @@
-"""Viewers that draw nothing: they take frames and acknowledge them, like a page.
+"""Viewers that draw nothing: they receive and acknowledge frames, like a page.
 
 Run as ``python -m benchmarks.watchers URL COUNT SECONDS``. Prints ``ready`` when all
-have got a frame, then JSON with what they received in the seconds after that.
+have received a frame, then JSON with the data received in the seconds after that.
 """
 
 import asyncio
@@ -28,7 +28,7 @@ class Watcher:
         self.first = asyncio.Event()
 
     async def watch(self, name: str) -> None:
-        """Say hello, then acknowledge frame after frame."""
+        """Send hello, then acknowledge frame after frame."""
         container = {"webmap_container": [1200, 900]}
         hello = {"op": "hello", "page": name, "url": "/", "width": 1200, "height": 900}
         await self.link.send(json.dumps(hello | {"containers": container}))
@@ -42,7 +42,7 @@ class Watcher:
 
 
 async def open_link(url: str, name: str) -> ClientConnection:
-    """Open ``/scene`` as a browser of its own would, with a key for the token."""
+    """Open ``/scene`` like a separate browser, with a key for the token."""
     async with httpx.AsyncClient(follow_redirects=True) as client:
         page = (await client.get(url)).raise_for_status().text
     key = re.search(r'name="webmap-key" content="([^"]+)"', page)
@@ -58,7 +58,7 @@ async def open_link(url: str, name: str) -> ClientConnection:
 
 
 async def main(url: str, count: int, seconds: float) -> None:
-    """Watch with ``count`` viewers and say what they received."""
+    """Watch with ``count`` viewers and print the received amounts."""
     watchers = []
     tasks = []
     for number in range(count):

@@ -1,6 +1,6 @@
 """Draw the floor plan that comes with the simulator: ``python tools/draw_floor.py``.
 
-A map_server image, which is also the picture behind the robots: dark walls and slate
+A map_server image, which is also the picture under the robots: dark walls and slate
 furniture count as occupied, white and pale tints as free, the grey outside as unknown.
 Lengths are metres, x to the right and y up, from the middle of the building.
 """
@@ -15,8 +15,8 @@ DATA = Path(__file__).parents[1] / "src" / "webmap" / "sim" / "data"
 RESOLUTION = 0.05
 LEFT, BOTTOM, WIDTH, HEIGHT = -21.0, -13.5, 42.0, 27.0
 
-# map_server looks at the mean of the three: below 89 is occupied, above 205 free,
-# and 205 itself unknown.
+# map_server uses the mean of the three: below 89 is occupied, above 205 is free, and
+# 205 itself is unknown.
 OUTSIDE = (203, 205, 207)
 WALL = (38, 43, 52)
 FURNITURE = (70, 84, 104)
@@ -61,7 +61,7 @@ class Sheet:
         self._draw.ellipse((left, top, right - 1, bottom - 1), fill)
 
     def swing(self, x: float, y: float, radius: float, start: float) -> None:
-        """Draw a door that stands open at ``start`` degrees, and how it closes."""
+        """Draw a door that is open at ``start`` degrees, and its swing."""
         left, top = self._pixel(x - radius, y + radius)
         right, bottom = self._pixel(x + radius, y - radius)
         box = (left, top, right - 1, bottom - 1)
@@ -87,7 +87,7 @@ THIN, THICK, DOOR = 0.2, 0.25, 1.2
 def wall_across(
     sheet: Sheet, y: float, x0: float, x1: float, doors: Iterable[float] = ()
 ) -> None:
-    """Draw a wall along x, with doors in the middle of the given places."""
+    """Draw a wall along x, with doors centered at the given positions."""
     sheet.box(x0, y - THIN / 2, x1, y + THIN / 2, WALL)
     for x in doors:
         sheet.box(x - DOOR / 2, y - THIN / 2, x + DOOR / 2, y + THIN / 2, FLOOR)
@@ -96,14 +96,14 @@ def wall_across(
 def wall_up(
     sheet: Sheet, x: float, y0: float, y1: float, doors: Iterable[float] = ()
 ) -> None:
-    """Draw a wall along y, with doors in the middle of the given places."""
+    """Draw a wall along y, with doors centered at the given positions."""
     sheet.box(x - THIN / 2, y0, x + THIN / 2, y1, WALL)
     for y in doors:
         sheet.box(x - THIN / 2, y - DOOR / 2, x + THIN / 2, y + DOOR / 2, FLOOR)
 
 
 def desk(sheet: Sheet, x: float, y: float, chair: float) -> None:
-    """Draw a desk of 1.6 by 0.8 m and its chair, ``chair`` metres above its middle."""
+    """Draw a desk of 1.6 by 0.8 m and its chair, ``chair`` metres above its center."""
     sheet.box(x - 0.8, y - 0.4, x + 0.8, y + 0.4, FURNITURE)
     sheet.disc(x, y + chair, 0.25, SOFT)
 
@@ -118,7 +118,7 @@ def table(sheet: Sheet, x: float, y: float, radius: float) -> None:
 
 
 def floors(sheet: Sheet) -> None:
-    """Fill the building with its floors, and put the outer wall around it."""
+    """Fill the building with its floors, and draw the outer wall around it."""
     sheet.box(-20, -12.5, 20, 12.5, WALL)
     sheet.box(-20 + THICK, -12.5 + THICK, 20 - THICK, 12.5 - THICK, FLOOR)
     sheet.box(-19.75, -1.25, 7, 1.25, CORRIDOR)
@@ -154,7 +154,7 @@ def walls(sheet: Sheet) -> None:
 
 
 def doors(sheet: Sheet) -> None:
-    """Draw the doors' swings into the rooms; they are hints, and free."""
+    """Draw the doors' swings into the rooms; they count as free."""
     for x in (-17.2, -11.5, -2.4, 4.4):
         sheet.swing(x - DOOR / 2, 1.32, DOOR, 90)
     for x in (-15.8, -9.2, -2.6, 3.9):

@@ -28,7 +28,7 @@ because each topic uses the robot's network."""
 
 
 def page() -> str:
-    """Return the whole page; the part above the mark is not changed."""
+    """Return the whole page; the part above the mark is unchanged."""
     head = PAGE.read_text("utf-8").partition(MARK)[0]
     layers = [each for each in declarations() if each.built_in]
     rows = ["| layer | draws | switch |", "|---|---|---|"]
@@ -105,7 +105,7 @@ def _described(declared: Declaration) -> str:
 
 
 def option_doc(layer: type, option: str) -> str:
-    """Return the docstring of an option, of the layer's class or a base class."""
+    """Return the docstring of an option, from the layer's class or a base class."""
     for each in layer.__mro__:
         if option in inspect.get_annotations(each):
             found = _docs_of(each).get(option)

@@ -1,9 +1,9 @@
-"""Run pytest, and run the tests that failed a second time, alone.
+"""Run pytest, and run the failed tests a second time, alone.
 
-A browser that shares two cores with another one may be held up for seconds where a
-test allows for less, and a shared machine may stop for a moment. So a few tests that
-fail get a second look. What fails then too has failed, and what passes is named: it
-waits for too little, which is to be mended. A proof of safety gets no second look.
+A browser that shares two cores with another one may be delayed by seconds, longer than
+a test allows, and a shared machine may stop for a moment. So if only a few tests fail,
+they run again. A test that fails again has failed; one that passes is listed: its
+waiting time is too short and must be corrected. A safety test does not run again.
 
 Usage: pytest_beside.py JOBS [PYTEST ARGUMENT...]
 """
@@ -14,20 +14,20 @@ import sys
 import pytest
 
 BY_FILE = ("--dist", "loadfile", "--no-loadscope-reorder")
-"""Workers take whole files, in order. Otherwise xdist begins with the files that have
-most tests."""
+"""Workers run whole files, in order. Otherwise xdist starts with the files that have
+the most tests."""
 
 MOST = 10
-"""More failures than that are no accident and get no second look."""
+"""With more failures than this, no test runs again."""
 
 
 class Failed:
-    """A plugin of pytest that notes which tests have failed.
+    """A plugin of pytest that records the failed tests.
 
     Attributes:
         tests: Their ids, each once.
-        uncollected: Whether there is anything that could not be collected.
-        unsafe: Whether a test with the mark ``safety`` is among them.
+        uncollected: Whether anything could not be collected.
+        unsafe: Whether a test with the mark ``safety`` has failed.
 
     """
 
@@ -37,13 +37,13 @@ class Failed:
         self.unsafe = False
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Take what became of a part of a test."""
+        """Record the result of a part of a test."""
         if report.failed:
             self.tests[report.nodeid] = None
             self.unsafe = self.unsafe or "safety" in report.keywords
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
-        """Take what became of a file."""
+        """Record the result of collecting a file."""
         self.uncollected = self.uncollected or report.failed
 
 
@@ -51,11 +51,11 @@ def main(jobs: str, *arguments: str) -> int:
     """Run the tests.
 
     Args:
-        jobs: How many of them run at once, as pytest-xdist's ``-n`` takes it.
-        *arguments: Options of pytest and the tests that are meant.
+        jobs: Number of parallel workers, in the form of pytest-xdist's ``-n``.
+        *arguments: Options of pytest and the tests to run.
 
     Returns:
-        pytest's exit status: of the first run, or of the second look.
+        pytest's exit status: of the first run, or of the second.
 
     """
     failed = Failed()

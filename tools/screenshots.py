@@ -73,7 +73,7 @@ PICTURES = [
 
 @contextmanager
 def running(*arguments: str) -> Iterator[str]:
-    """Run a command of WebMap and give the address that it prints."""
+    """Run a command of WebMap and yield the address that it prints."""
     command = [sys.executable, "-m", "webmap", *arguments, "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -89,20 +89,20 @@ def running(*arguments: str) -> Iterator[str]:
 
 @contextmanager
 def demo(robots: int = 6) -> Iterator[str]:
-    """Run the demo and give its page's address."""
+    """Run the demo and yield its page's address."""
     with running("demo", "--no-browser", "--robots", str(robots)) as url:
         yield url
 
 
 @contextmanager
 def nothing() -> Iterator[str]:
-    """Run nothing, for pictures that each start a demo of their own."""
+    """Run nothing, for pictures that each start their own demo."""
     yield ""
 
 
 @contextmanager
 def everything() -> Iterator[str]:
-    """Run robots that drive about, show all that they say, and give the address."""
+    """Run moving robots, show all their topics, and yield the address."""
     with (
         running("sim", "--robots", "2", "--wander", "--seed", "3") as bridge,
         running("view", bridge, "--no-browser", "--stops-within", "0.25") as url,
@@ -129,7 +129,7 @@ def open_page(browser: Browser, picture: Picture, url: str) -> Page:
 
 
 def take_layers(browser: Browser, picture: Picture, url: str) -> None:
-    """Switch everything on, look closely at a robot, and take the picture."""
+    """Switch all layers on, zoom in on a robot, and take the picture."""
     page = open_page(browser, picture, url)
     for selector in (
         ".posearray > .arrow[d]",
@@ -141,7 +141,7 @@ def take_layers(browser: Browser, picture: Picture, url: str) -> None:
         )
     page.locator(".webmap-layers > summary").dispatch_event("click")
     page.get_by_label("Costmaps").dispatch_event("click")
-    # The one of the whole map would lie over everything.
+    # The costmap of the whole map would cover everything.
     page.get_by_label("global_costmap/costmap").dispatch_event("click")
     page.locator(".occupancy-grid.costmap > image[href]").nth(1).wait_for(
         state="attached"
@@ -158,20 +158,19 @@ def take_layers(browser: Browser, picture: Picture, url: str) -> None:
         state="attached"
     )
     page.wait_for_timeout(2000)
-    # A machine that is busy with other things shows old data and complaints: wait for
-    # a moment in which it is not.
+    # A busy machine shows stale data and warnings: wait until there are none.
     page.wait_for_function(CALM, polling=200)
     page.screenshot(path=picture.file)
     page.context.close()
 
 
 def take(browser: Browser, picture: Picture, url: str) -> None:
-    """Drive a robot as an operator does, and take the picture meanwhile."""
+    """Drive a robot like an operator, and take the picture meanwhile."""
     page = open_page(browser, picture, url)
     page.locator('.robot[data-name="Robot 1"] .hit').click()
     page.locator("#card h2", has_text="Robot 1").wait_for(state="attached")
     if picture.phone:
-        # A closer look: on a small screen the whole floor is small.
+        # Zoom in: on a small screen the whole floor is small.
         page.locator("[data-act=follow]").dispatch_event("click")
         following = page.locator("[data-act=follow][aria-pressed=true]")
         following.wait_for(state="attached")
@@ -227,7 +226,7 @@ def show_request(page: Page, browser: Browser, picture: Picture, url: str) -> No
 
 
 def show_phone(page: Page, browser: Browser, picture: Picture, url: str) -> None:
-    """Look at a robot closely, and hold the stick."""
+    """Zoom in on a robot, and hold the stick."""
     page.locator("[data-act=follow]").dispatch_event("click")
     page.locator("[data-act=follow][aria-pressed=true]").wait_for(state="attached")
     for _ in range(3):
@@ -252,7 +251,7 @@ STEPS: dict[str, Callable[[Page, Browser, Picture, str], None]] = {
     "request": show_request,
     "phone": show_phone,
 }
-"""What each picture of the operator's manual shows, after ``ROBOT`` was selected."""
+"""The actions for each picture of the operator's manual, after selecting ``ROBOT``."""
 
 PICTURES += [Picture("manual", step=step, phone=step == "phone") for step in STEPS]
 
@@ -273,7 +272,7 @@ def take_manual(browser: Browser, picture: Picture, url: str) -> None:
 
 
 def drive(page: Page) -> None:
-    """Hold a key until the robot is in motion; the page before may still hold it."""
+    """Hold a key until the robot moves; the previous page may still have control."""
     driving = page.locator('.webmap-teleop[data-state="driving"]')
     for _ in range(10):
         page.keyboard.down("w")

@@ -1,4 +1,4 @@
-"""The advanced tutorial: own models, an own kind of robot, own HTML and CSS, a log.
+"""The advanced tutorial: models, a class of robots, HTML and CSS of your own, a log.
 
 Start the simulator and then this::
 
@@ -11,7 +11,7 @@ from webmap import svg
 
 
 def circle_model(radius):
-    """Return a circle with a line that shows which way the robot is facing."""
+    """Return a circle with a line that shows the heading of the robot."""
     return svg.g(
         svg.circle(cx=0, cy=0, r=radius),
         svg.line(x1=0, y1=0, x2=radius, y2=0),
@@ -19,7 +19,7 @@ def circle_model(radius):
 
 
 class StageRobot(webmap.Robot):
-    """A robot of the simulator: its number says all its topics."""
+    """A robot of the simulator; its number determines all its topics."""
 
     def __init__(self, name, index, bridge):
         super().__init__(name, circle_model(0.2))
@@ -48,7 +48,7 @@ def main(page):
     map = webmap.Map(page.element("webmap_container"), 700, 500)
     map.add_module("MouseViewControl")
 
-    # Show the selected robot in the span that the HTML has for it.
+    # Show the name of the selected robot in a span of the HTML.
     map.add_module("ShowSelected", page.element("selected"))
 
     map.add_module("Teleop", 1.0, 1.5)

@@ -17,7 +17,7 @@ robot.set_tf(bridge, base_frame="robot_0/base_link")
 robot.set_twist_topic(bridge, "/robot_0/cmd_vel", stops_within=0.25)
 robot.set_move_topic(bridge, "/robot_0/move_base_simple/goal")
 
-# What belongs to the robot. Where each sensor sits on it is known from /tf.
+# Layers of the robot. The pose of each sensor on the robot is known from /tf.
 robot.add_module("LaserScanner", bridge, "/robot_0/base_scan", max_dots=None)
 robot.add_module("PointCloud", bridge, "/robot_0/points", z_min=0.1, colour_by="z")
 robot.add_module("Range", bridge, "/robot_0/sonar")
@@ -38,13 +38,13 @@ def main(page):
     map.add_module("MouseViewControl")
     map.add_module("Teleop", 1.0, 1.5)
 
-    # What belongs to the map. The local costmap lies in the frame of odometry.
+    # Layers of the map. The local costmap is in the frame of odometry.
     map.add_module("OccupancyGrid", bridge, "/map")
     costmap = "/robot_0/move_base/local_costmap/costmap"
     map.add_module("OccupancyGrid", bridge, costmap, palette="costmap", map_frame="map")
     map.add_module("Markers", bridge, "/robot_0/markers")
 
-    # Each viewer switches them on and off.
+    # Each viewer switches layers on and off.
     map.add_module("LayerSwitches")
     map.add_robot(robot)
     map.fit(-21, -13.5, 42, 27)

@@ -19,8 +19,8 @@ class ShowName:
         self.element = element
         self.default_msg = default_msg
 
-        # Show the selection once when the module is made. Otherwise the element
-        # would stay empty until the selection changes.
+        # Show the selection when the module is made. Otherwise the element would stay
+        # empty until the selection changes.
         self.on_select()
 
     def destroy(self):

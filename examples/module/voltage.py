@@ -1,4 +1,4 @@
-"""The layer tutorial: the voltage of a robot's battery, written beside the robot.
+"""The layer tutorial: the voltage of a robot's battery, next to the robot.
 
 Start the simulator and then this::
 
@@ -11,12 +11,12 @@ import webmap
 
 @webmap.layer("sensor_msgs/BatteryState", kind="voltage", switch="Voltages", most=1)
 class Voltage(webmap.RobotLayer):
-    """The voltage of the battery, beside the robot."""
+    """The voltage of the battery, next to the robot."""
 
     frame = "robot"
 
     size: webmap.options.Metres = 0.3
-    """How high the letters are, in metres."""
+    """Height of the letters, in metres."""
 
     def build(self):
         """Make the text, half a metre to the right of the robot."""

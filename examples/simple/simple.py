@@ -8,7 +8,7 @@ Start a rosbridge on the robot, or the simulator in its place, and then this::
 
 import webmap
 
-# The link to the robot's ROS system. It opens when WebMap runs, and again whenever
+# The connection to the robot's ROS system. It opens when WebMap runs, and again after
 # it was lost, so topics can be set at once.
 bridge = webmap.Bridge("ws://localhost:9090")
 bridge.on_open(lambda: print("Connection established."))

@@ -27,7 +27,7 @@ COMMANDS = {
 }
 
 ANSWERING = ("check", "discover", "doctor")
-"""Commands whose exit status is an answer: an interrupted one has not given it."""
+"""Commands whose exit status is an answer; an interrupted one has no answer."""
 
 INTERRUPTED = 128 + signal.SIGINT
 
@@ -70,25 +70,25 @@ def cli() -> None:
     webmap check FILE.toml         what is wrong in a fleet file
     webmap sim                     the simulator and its rosbridge alone
 
-    What serves (demo, view, play, run, sim) prints one line when it is ready, logs to
-    standard error, and ends on Ctrl+C.
+    The commands that serve (demo, view, play, run, sim) print one line when they are
+    ready, log to standard error, and end on Ctrl+C.
     """
 
 
 def _told() -> str | None:
-    """Return which command was asked for."""
+    """Return the name of the command on the command line."""
     return next((word for word in sys.argv[1:] if word in COMMANDS), None)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Take SIGTERM for Ctrl+C, until a server takes both for itself."""
+    """Handle SIGTERM like Ctrl+C, until a server installs handlers for both."""
     raise KeyboardInterrupt
 
 
 def main() -> None:
-    """Run the command line; what is wrong is said in one sentence, with exit code 2."""
+    """Run the command line; report an error in one sentence, with exit code 2."""
     signal.signal(signal.SIGTERM, _interrupt)
-    # A shell has what it starts in the background ignore this one.
+    # A shell makes processes that it starts in the background ignore SIGINT.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         cli(standalone_mode=False)
@@ -101,7 +101,7 @@ def main() -> None:
         said = error.format_message().rstrip(".").replace("\n", " ")
         echo(f"Error: {said} (see '{path} --help').", err=True)
         sys.exit(2)
-    except ConfigError as error:  # of a fleet file it has a line for each mistake
+    except ConfigError as error:  # a fleet file has one line for each mistake
         echo(f"Error: {error}", err=True, lines=True)
         sys.exit(2)
     except (WebMapError, OSError) as error:

@@ -1,4 +1,4 @@
-"""``webmap check FILE``: whether a fleet file is right."""
+"""``webmap check FILE``: validates a fleet file."""
 
 from pathlib import Path
 
@@ -12,10 +12,10 @@ from webmap.cli.options import verbose_option
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @verbose_option
 def check(file: Path) -> None:
-    """Read a fleet file as ``webmap run`` does, and say what is wrong in it.
+    """Validate a fleet file as webmap run reads it, and list its mistakes.
 
-    No robot is reached. Every mistake is named with its line; the exit code is 2 if
-    there is one.
+    No connection is opened. Every mistake is shown with its line; the exit code is 2
+    if there is one.
     """
     from webmap.fleet.made import prepare
 

@@ -1,4 +1,4 @@
-"""``webmap demo``: the simulator, and the console on it."""
+"""``webmap demo``: runs the simulator and the console for its robots."""
 
 import sys
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 READY = "rosbridge is ready at "
 USAGE = 2
-"""What a command ends with that has said in one sentence what is wrong."""
+"""Exit status of a command that has reported an error in one sentence."""
 
 
 @click.command()
@@ -46,8 +46,8 @@ def demo(
 ) -> None:
     """Show simulated robots, to try everything without a robot.
 
-    The simulator is a process of its own behind a rosbridge, so the demo takes the
-    same road as real robots.
+    The simulator is a separate process behind a rosbridge, so the demo uses the same
+    code as real robots.
     """
     import webmap
     from webmap import console
@@ -74,14 +74,14 @@ def demo(
 
 
 def demo_robot(bridge: "Bridge", index: int, dialect: str = "ros1") -> "Robot":
-    """Return one of the simulator's robots, with what helps to see what it does.
+    """Return one of the simulator's robots, with modules that show its behavior.
 
-    More of what it says would hide the map; ``webmap view`` shows all of it.
+    Drawing all its topics would hide the map; ``webmap view`` draws all of them.
 
     Args:
-        bridge: The simulator's.
-        index: Which of them, from 0.
-        dialect: Which ROS the simulator plays, ``"ros1"`` or ``"ros2"``.
+        bridge: The simulator's bridge.
+        index: Number of the robot, from 0.
+        dialect: The ROS that the simulator imitates, ``"ros1"`` or ``"ros2"``.
 
     """
     import webmap
@@ -124,7 +124,7 @@ def demo_robot(bridge: "Bridge", index: int, dialect: str = "ros1") -> "Robot":
 
 
 def _give_up(status: int) -> NoReturn:
-    """End the command, in words if the simulator has not found any itself."""
+    """End the command, with an error if the simulator has reported none."""
     if status == USAGE:
         sys.exit(USAGE)
     raise ConfigError(f"the simulator ended with status {status} before it was ready")
@@ -132,12 +132,12 @@ def _give_up(status: int) -> NoReturn:
 
 @contextmanager
 def simulator(*arguments: object) -> Iterator[str]:
-    """Run ``webmap sim`` beside this process and give its rosbridge's URL.
+    """Run ``webmap sim`` as a child process and yield the URL of its rosbridge.
 
-    It ends with this process, however that ends, since its standard input does.
+    It ends with this process, however that ends, because its standard input closes.
 
     Raises:
-        ConfigError: If it does not come up.
+        ConfigError: If it does not start.
 
     """
     with child_process("webmap", "sim", "--with-parent", *arguments) as started:

@@ -1,4 +1,4 @@
-"""``webmap discover URL``: which robots are behind a rosbridge, and why."""
+"""``webmap discover URL``: lists the robots behind a rosbridge, with reasons."""
 
 import asyncio
 import sys
@@ -18,9 +18,9 @@ from webmap.cli.options import one_bridge, topics_option, verbose_option, wait_o
 def discover(
     url: tuple[str, ...], toml: bool, wait: float, topics: dict[str, str] | None
 ) -> None:
-    """Print which robots are behind rosbridges, their topics, and why.
+    """List the robots behind rosbridges, their topics, and the rule for each topic.
 
-    Nothing is driven and nothing is changed. The exit code is 1 if no robot is found.
+    Nothing is moved or changed. The exit code is 1 if no robot is found.
 
     \b
     webmap discover ws://robot:9090
@@ -37,7 +37,7 @@ def discover(
     found = asyncio.run(find(urls, wait=wait, topics=topics))
     if toml:
         text = fleet_toml([(one.label, one.url, one.findings) for one in found])
-        click.echo(text, nl=False)  # not cut, and escaped as TOML has it
+        click.echo(text, nl=False)  # not shortened, and escaped as TOML requires
     for one in found:
         if one.trouble is not None:
             echo(one.why, err=True)

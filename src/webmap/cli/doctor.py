@@ -1,4 +1,4 @@
-"""``webmap doctor URL``: what would be in the way of driving."""
+"""``webmap doctor URL``: shows what prevents driving."""
 
 import asyncio
 import sys
@@ -73,12 +73,12 @@ def doctor(
     stop_test: str | None,
     yes: bool,
 ) -> None:
-    """Look at a rosbridge and the robots behind it, and say what to do.
+    """Diagnose a rosbridge and the robots behind it, and suggest what to do.
 
-    The robots are those that are found by their topics, unless --robot, --set or a
-    fleet file in place of URL says otherwise.
+    The robots are found by their topics, unless --robot, --set or a fleet file in
+    place of URL configures them.
 
-    Nothing is driven, published or changed, unless --stop-test is given. The exit code
+    Nothing is moved, published or changed, unless --stop-test is given. The exit code
     is 1 if anything is wrong.
     """
     if stop_test is not None and (robots or settings):

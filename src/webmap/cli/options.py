@@ -1,4 +1,4 @@
-"""Options that several commands have."""
+"""Options of several commands."""
 
 import logging
 import math
@@ -18,12 +18,12 @@ PORT = click.IntRange(0, 65535)
 
 
 class Finite(click.FloatRange):
-    """Numbers of a range, and neither infinity nor what is no number."""
+    """Type of an option: a finite number within a range."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> Any:
-        """Return the number that a text says."""
+        """Return the number in a text."""
         number = super().convert(value, param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value} is not a finite number.", param, ctx)
@@ -37,11 +37,11 @@ wait_option = click.option(
     show_default=True,
     help="Seconds to wait for a rosbridge that cannot be reached.",
 )
-"""How long a command waits for a rosbridge."""
+"""How long a command waits for a rosbridge, as an option."""
 
 
 def web_options(command: F) -> F:
-    """Add where the web interface listens, and what opens it."""
+    """Add the options of the web interface: its address and the browser."""
     for option in (
         click.option(
             "--insecure-lan",
@@ -86,11 +86,11 @@ verbose_option = click.option(
 
 
 def simulator_options(*, robots: str, dialect: str) -> Callable[[F], F]:
-    """Return what adds how many robots there are, where they start, and which ROS.
+    """Return a decorator that adds the number of robots, their start and the ROS.
 
     Args:
-        robots: What is said of ``--robots``, which is None if it was not said.
-        dialect: What is said of ``--dialect``.
+        robots: Help text of ``--robots``, which is None if the option is not given.
+        dialect: Help text of ``--dialect``.
 
     """
 
@@ -121,7 +121,7 @@ def simulator_options(*, robots: str, dialect: str) -> Callable[[F], F]:
 # The option --topics.
 
 LARGEST = 4 << 20
-"""Characters of a list of topics; it may come through a pipe, which may have no end."""
+"""Most characters of a list of topics; input from a pipe may never end."""
 
 _LINE = re.compile(
     r"(?:\*\s+)?(?P<topic>/\S*?):?\s+\[?(?P<type>[A-Za-z]\w*(?:/\w+){1,2})"
@@ -139,15 +139,15 @@ def parse_topics(text: str, source: str = "the list") -> dict[str, str]:
     """Return types by topic.
 
     Args:
-        text: One topic on each line, with its type after it: ``/odom
-            nav_msgs/Odometry``. The type may stand in brackets, as ``ros2 topic list
-            -t`` and ``rostopic list -v`` print it. Empty lines and what follows a
-            ``#`` are left out.
-        source: Where it comes from, for errors.
+        text: One topic on each line, followed by its type: ``/odom
+            nav_msgs/Odometry``. The type may be in brackets, as ``ros2 topic list
+            -t`` and ``rostopic list -v`` print it. Empty lines and text after a
+            ``#`` are ignored.
+        source: Where the list comes from, for errors.
 
     Raises:
-        ConfigError: If a line is none of that, a topic has two types, or there is
-            nothing at all.
+        ConfigError: If a line has another form, a topic has two types, or the list
+            is empty.
 
     """
     topics: dict[str, str] = {}
@@ -204,7 +204,7 @@ topics_option = click.option(
 
 
 def one_bridge(urls: Sequence[str], topics: dict[str, str] | None) -> None:
-    """Refuse a list of topics for more than one bridge.
+    """Refuse a list of topics for several bridges.
 
     Raises:
         UsageError: If there are several bridges and a list.

@@ -1,4 +1,4 @@
-"""``webmap play FILE``: a recording on the map."""
+"""``webmap play FILE``: plays a recording on the map."""
 
 import contextlib
 import math
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from webmap import Bridge, Map
 
 POSITION = re.compile(r".*: (\d+\.\d) of ")
-"""Where in the recording the replay is, in seconds."""
+"""Matches the position in the recording, in seconds, in the replay's status."""
 
 
 @click.command(short_help="Show a recording: a bag of ROS 1 or ROS 2.")
@@ -59,11 +59,11 @@ def play(
     no_browser: bool,
     insecure_lan: bool,
 ) -> None:
-    """Show a recording on the map, at its pace.
+    """Show a recording on the map, at its own speed.
 
-    A FILE is a bag of ROS 1 (.bag), the folder of a bag of ROS 2, or one file of it
+    A FILE is a bag of ROS 1 (.bag), the folder of a bag of ROS 2, or one of its files
     (.mcap, .db3); several bags of ROS 1 are played as one. Nothing in a recording can
-    be driven. It needs rosbags: pip install "webmap[bags]".
+    be driven. This command needs rosbags: pip install "webmap[bags]".
 
     \b
     webmap play office.bag
@@ -100,9 +100,9 @@ def play(
 
 @contextlib.contextmanager
 def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
-    """Run a replay beside this process; give its rosbridge's URL, and what restarts it.
+    """Run a replay as a child process; yield its rosbridge's URL and a restart call.
 
-    It ends with this process, however that ends, since its standard input does.
+    It ends with this process, however that ends, because its standard input closes.
 
     Raises:
         ConfigError: If the recording cannot be played.
@@ -118,7 +118,7 @@ def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
             raise ConfigError("the replay did not start; what it said is above")
 
         def begin_anew() -> None:
-            try:  # past the buffer, which would keep it and fail once more at the end
+            try:  # unbuffered: a buffer would keep the line and fail again at exit
                 os.write(started.stdin.fileno(), b"again\n")
             except (OSError, ValueError):
                 echo("The replay has ended: nothing is played", err=True)
@@ -127,7 +127,7 @@ def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
 
 
 def once(call: Callable[[], None]) -> Callable[[], None]:
-    """Return what calls something the first time that it is called."""
+    """Return a function that calls another one on its first call only."""
     left = [call]
     return lambda: left.pop()() if left else None
 
@@ -137,13 +137,13 @@ class _String(msgspec.Struct):
 
 
 class RecordingLine:
-    """Says beside the product's name what is played, and where in it; a map module.
+    """Shows the file and the position of a replay next to the title; a map module.
 
     Args:
         map: The map.
         bridge: The bridge to the replay.
-        topic: Where the replay says it, in words.
-        opened: Called when a page is there.
+        topic: Topic on which the replay publishes its position as text.
+        opened: Called when a page is open.
 
     """
 
@@ -151,7 +151,7 @@ class RecordingLine:
         self, map: "Map", bridge: "Bridge", topic: str, opened: Callable[[], object]
     ) -> None:
         self._map = map
-        self._at = math.inf  # it begins anew when the first page opens
+        self._at = math.inf  # the replay restarts when the first page opens
         self._title = map.page.element("title")
         bridge.subscribe(topic, self._show, "std_msgs/String", decode=_String)
         opened()
@@ -162,6 +162,6 @@ class RecordingLine:
         if found is None:
             return
         before, self._at = self._at, float(found[1])
-        if self._at < before:  # a new round: robots are where they were at its begin
+        if self._at < before:  # a new round: the robots are back at their start
             for robot in self._map.robots:
                 robot.expect_jump()

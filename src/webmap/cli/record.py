@@ -1,4 +1,4 @@
-"""``webmap record URL``: what is behind a rosbridge, in a bag."""
+"""``webmap record URL``: records the topics behind a rosbridge into a bag."""
 
 import sys
 from pathlib import Path
@@ -51,9 +51,9 @@ def record(
 ) -> None:
     """Record the topics behind a rosbridge into a bag.
 
-    The bag is one of the ROS that the robot runs: a .bag file, or a folder with an
-    MCAP file. Topics that appear later are recorded too. Nothing is driven. It needs
-    rosbags: pip install "webmap[bags]".
+    The bag has the format of the robot's ROS: a .bag file, or a folder with an MCAP
+    file. Topics that appear later are recorded too. Nothing is moved. This command
+    needs rosbags: pip install "webmap[bags]".
 
     \b
     webmap record ws://robot:9090

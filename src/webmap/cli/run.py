@@ -1,4 +1,4 @@
-"""``webmap run FILE``: a page of one's own in Python, or a fleet file in TOML."""
+"""``webmap run FILE``: serves a Python script's pages or a fleet file in TOML."""
 
 import runpy
 import sys
@@ -16,9 +16,9 @@ from webmap.cli.options import web_options
 def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) -> None:
     """Serve the pages that FILE.py makes, or the fleet that FILE.toml describes.
 
-    A script makes pages with @webmap.page and may call webmap.run() itself; what is
-    said here comes before what it says there. A fleet file says which bridges, robots
-    and modules there are; webmap check FILE.toml says what is wrong in it.
+    A script makes pages with @webmap.page and may call webmap.run() itself; the
+    options of this command override the arguments of that call. A fleet file lists
+    bridges, robots and modules; webmap check FILE.toml shows its mistakes.
     """
     from webmap.server import application
 

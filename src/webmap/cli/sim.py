@@ -1,4 +1,4 @@
-"""``webmap sim``: the simulator and its rosbridge."""
+"""``webmap sim``: runs the simulator and its rosbridge."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""``webmap view URL``: the robots behind a rosbridge."""
+"""``webmap view URL``: shows the robots behind a rosbridge."""
 
 import click
 
@@ -85,9 +85,9 @@ def view(
 ) -> None:
     """See and drive the robots behind one rosbridge or several.
 
-    URL is a rosbridge's: ws://robot:9090. The robots behind it are found by their
-    topics, also those that appear later; --show says which are used. Say with --set
-    what is guessed wrongly, or with --robot what a robot has.
+    URL is the address of a rosbridge: ws://robot:9090. The robots behind it are found
+    by their topics, also those that appear later; --show lists the topics in use.
+    Correct a wrong guess with --set, or list a robot's topics with --robot.
 
     \b
     webmap view ws://robot:9090

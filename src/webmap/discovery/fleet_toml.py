@@ -1,4 +1,4 @@
-"""What was found, as a fleet file to keep and to correct."""
+"""Writes the findings as a fleet file to keep and to correct."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -28,11 +28,11 @@ REMARKED = {
     "goal": ("move", "topic"),
     "cancel": ("move", "cancel_topic"),
 }
-"""Roles whose rule is written behind their topic, and the key of the topic."""
+"""Roles with a remark about their rule, and the key of their topic."""
 
 
 class Remarks:
-    """What is said of a fleet file's values besides them."""
+    """The remarks about a fleet file's values."""
 
     def __init__(self) -> None:
         self.behind: dict[Way, str] = {}
@@ -43,8 +43,8 @@ def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
     """Return a fleet file.
 
     Args:
-        found: For each bridge its name, its address and what is behind it. The names
-            of all robots differ, as :func:`unique_names` makes them.
+        found: The name, the address and the findings of each bridge. The names of all
+            robots differ, as :func:`unique_names` makes them.
 
     """
     remarks = Remarks()
@@ -70,7 +70,7 @@ def _add_shared(
     modules: list[ModuleConfig],
     remarks: Remarks,
 ) -> None:
-    """Add what robots share, each once for its bridge: maps, and modules of the map."""
+    """Add the maps and map modules that robots share, each once for its bridge."""
     taken: set[str] = set()
     for robot in findings.robots:
         for layer in findings.layers.get(robot.namespace, Layers()).drawn:
@@ -94,7 +94,7 @@ def _add_shared(
 def _robot(
     robot: FoundRobot, bridge: str, findings: Findings, way: Way, remarks: Remarks
 ) -> dict[str, Any]:
-    """Return a robot as plain data, and note why each of its topics was chosen."""
+    """Return a robot as plain data, and note the rule of each of its topics."""
     config = robot.config(bridge)
     behind = remarks.behind
     for role in ("pose", *REMARKED):
@@ -125,7 +125,7 @@ def _robot(
         *robot.notes,
     )
     data = config.to_dict()
-    # Of these a person sees what is chosen, also where that is what goes unsaid.
+    # The file states these values even if they are the defaults.
     if "tf" in data:
         data["tf"] = {"quiet": not robot.tf_alone, **data["tf"]}
     if robot.action is not None:
@@ -143,7 +143,7 @@ def _with_layers(
     way: Way,
     remarks: Remarks,
 ) -> RobotConfig:
-    """Return a robot with all that ``webmap view`` draws of it."""
+    """Return a robot with all layers that ``webmap view`` draws of it."""
     layers = findings.layers.get(robot.namespace, Layers()).drawn
     config = config.with_part("modules", [TRAIL, *config.modules])
     config = with_layers(config, layers, robot.namespace)

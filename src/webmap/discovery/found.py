@@ -1,4 +1,4 @@
-"""What discovery says: robots, their topics, and why it thinks so."""
+"""The results of discovery: robots, their topics, and the rules that chose them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,17 +36,17 @@ Role: TypeAlias = Literal[
     "cloud",
     "tf",
 ]
-"""What a topic is to a robot."""
+"""The purpose of a topic for a robot."""
 
 ROLES: tuple[Role, ...] = get_args(Role)
-"""Every role, in the order in which they are shown."""
+"""Every role, in display order."""
 
 
 ACTIONS = {
     "/_action/feedback": "nav2_msgs/action/NavigateToPose",
     "/goal": "move_base_msgs/MoveBaseAction",
 }
-"""The topics by which actions are known, without the action's name, and their types."""
+"""Ends of topic names that identify actions, and the types of the actions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,34 +54,34 @@ class FoundLayer:
     """A topic that can be drawn."""
 
     kind: str
-    """What the layer calls such a topic."""
+    """The layer's name for such a topic."""
 
     topic: str
     type: str
     """The type as the bridge spells it."""
 
     rule: str = ""
-    """The rule, in words."""
+    """The rule, as text."""
 
 
 class Layers(NamedTuple):
-    """What can be drawn of one robot, the best first."""
+    """The drawable topics of one robot, the best first."""
 
     drawn: tuple[FoundLayer, ...] = ()
     left_out: tuple[FoundLayer, ...] = ()
-    """What could be drawn too, but for its number."""
+    """Drawable topics beyond the number that is drawn."""
 
 
 @dataclass(frozen=True, slots=True)
 class Guess:
-    """One topic that fits a role, and the rule that says so."""
+    """One topic that fits a role, with its rule."""
 
     topic: str
     type: str
     """The type as the bridge spells it."""
 
     rule: str
-    """The rule, in words."""
+    """The rule, as text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,41 +90,41 @@ class FoundRobot:
 
     name: str
     namespace: str
-    """Where its topics are: ``/robot_0``; empty for a robot without a prefix."""
+    """Namespace of its topics: ``/robot_0``; empty for a robot without a prefix."""
 
     guesses: Mapping[Role, tuple[Guess, ...]] = field(default_factory=dict)
-    """What fits each role, the best first."""
+    """The topics that fit each role, the best first."""
 
     notes: tuple[str, ...] = ()
-    """What a person should know about these guesses, in sentences."""
+    """Remarks for a person about these guesses, in sentences."""
 
     base_frame: str = ""
-    """The frame of its base, as it was heard; empty if it was not."""
+    """The frame of its base, as received; empty if none was."""
 
     root_frame: str = ""
-    """The frame that its base can be drawn in: a map, or where odometry begins."""
+    """The frame that its base can be drawn in: a map, or the start of odometry."""
 
     above: tuple[str, ...] = ()
-    """The frames that its base hangs from, the nearest first."""
+    """The parent frames of its base, the nearest first."""
 
     def first(self, role: Role) -> Guess | None:
-        """Return the best guess for a role, None if nothing fits."""
+        """Return the best guess for a role, None if no topic fits."""
         found = self.guesses.get(role, ())
         return found[0] if found else None
 
     def topic(self, role: Role) -> str:
-        """Return the best topic for a role, empty if nothing fits."""
+        """Return the best topic for a role, empty if no topic fits."""
         found = self.first(role)
         return "" if found is None else found.topic
 
     def type_of(self, role: Role) -> str:
-        """Return the type of the best topic for a role, empty if it is not known."""
+        """Return the type of the best topic for a role, empty if unknown."""
         found = self.first(role)
         return "" if found is None else found.type
 
     @property
     def action(self) -> tuple[str, str] | None:
-        """The name and the type of the action that goals go to, if there is one."""
+        """The name and the type of the action for goals, if there is one."""
         found = self.first("action")
         if found is None:
             return None
@@ -140,7 +140,7 @@ class FoundRobot:
 
     @property
     def tf_alone(self) -> bool:
-        """Whether nothing but its frames tells where it is."""
+        """Whether its frames are the only source of its pose."""
         return self.topic("tf") != "" and not (
             self.topic("odometry") or self.topic("pose")
         )
@@ -152,7 +152,7 @@ class FoundRobot:
             return None
         return TfConfig(
             namespace=self.tf_namespace,
-            # Many robots have odometry, frames and no map: that is no mistake.
+            # Many robots have odometry, frames and no map: that is not a mistake.
             quiet=not self.tf_alone,
             base_frame=self.base_frame or None,
             map_frame=(self.tf_alone and self.root_frame) or self.map_frame,
@@ -160,14 +160,14 @@ class FoundRobot:
 
     @property
     def map_frame(self) -> str:
-        """The frame of the map that it moves in, as its frames have it."""
+        """The frame of the map that it moves in, from its frames."""
         return self.root_frame if WORLD.match(self.root_frame) else MAP
 
     def config(self, bridge: str) -> RobotConfig:
-        """Return the robot as its best topics configure it.
+        """Return the configuration of the robot with its best topics.
 
         Args:
-            bridge: The name or the address of the bridge that it is behind.
+            bridge: The name or the address of the robot's bridge.
 
         """
         scan, plan = self.topic("scan"), self.topic("plan")
@@ -213,14 +213,14 @@ class FoundRobot:
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What is behind one bridge."""
+    """The robots and layers behind one bridge."""
 
     robots: tuple[FoundRobot, ...] = ()
     dialect: Literal["ros1", "ros2"] | None = None
-    """Which ROS names its types so; None if there is no telling."""
+    """The ROS that uses these type names; None if unknown."""
 
     notes: tuple[str, ...] = ()
-    """What holds for all of it, in sentences."""
+    """Remarks about the bridge, in sentences."""
 
     layers: Mapping[str, Layers] = field(default_factory=dict)
-    """What is drawn of each robot, and what is left out, by its namespace."""
+    """The layers drawn and left out of each robot, by its namespace."""

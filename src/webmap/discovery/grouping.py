@@ -1,8 +1,8 @@
 """Which namespaces are robots.
 
-A robot is a namespace in which something says where it is or takes velocity. A
-namespace with only one of the two inside another robot's is a part of that one: a
-camera with odometry of its own, or an input of a velocity mux.
+A robot is a namespace with a topic for the pose or for the velocity. A namespace with
+only one of the two inside another robot's namespace is a part of that robot: a camera
+with its own odometry, or an input of a velocity mux.
 """
 
 from collections import Counter
@@ -11,7 +11,7 @@ from collections.abc import Container, Iterable
 from webmap.discovery.rules import Match
 
 MOVING = ("odometry", "pose", "velocity")
-"""Roles of which one makes a namespace a robot's."""
+"""Roles of which each makes a namespace a robot."""
 
 
 def robot_namespaces(matches: Iterable[Match]) -> tuple[str, ...]:
@@ -22,7 +22,7 @@ def robot_namespaces(matches: Iterable[Match]) -> tuple[str, ...]:
             half = "velocity" if each.role == "velocity" else "place"
             halves.setdefault(each.namespace, set()).add(half)
     outer = {space: nearest(space, halves) for space in halves}
-    # How many have the same half and nothing else in the same robot.
+    # Counts the namespaces in the same robot with exactly the same half.
     alike = Counter((outer[space], *sorted(has)) for space, has in halves.items())
     kept = set(halves)
     for space in sorted(halves, key=_depth, reverse=True):
@@ -30,7 +30,7 @@ def robot_namespaces(matches: Iterable[Match]) -> tuple[str, ...]:
         if around is None or len(has) == 2:
             continue
         alone = alike[(around, *sorted(has))] == 1
-        # Several that only take velocity are inputs; several places may be a fleet.
+        # Several that only take velocity are inputs; several with poses may be a fleet.
         if alone or (len(halves[around]) == 2 and has == {"velocity"}):
             kept.discard(space)
             halves[around] |= has
@@ -38,9 +38,9 @@ def robot_namespaces(matches: Iterable[Match]) -> tuple[str, ...]:
 
 
 def nearest(name: str, namespaces: Container[str]) -> str | None:
-    """Return the innermost of the namespaces that a name is in, None if none.
+    """Return the innermost of the namespaces that contain a name, None if none.
 
-    All names are in the empty namespace, but for the empty one itself.
+    All names are in the empty namespace, except the empty one itself.
     """
     while name:
         name = name.rpartition("/")[0]
@@ -50,7 +50,7 @@ def nearest(name: str, namespaces: Container[str]) -> str | None:
 
 
 def inside(name: str, namespace: str) -> bool:
-    """Tell whether a name lies in a namespace; all of them lie in the empty one."""
+    """Return whether a name is in a namespace; all names are in the empty one."""
     return name.startswith(namespace + "/")
 
 

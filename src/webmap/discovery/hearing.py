@@ -1,4 +1,4 @@
-"""Listening to frames for a moment: before a robot is shown, and now and then after."""
+"""Listens to frames for a short time: before a robot is shown, and repeatedly later."""
 
 import asyncio
 import weakref
@@ -13,10 +13,10 @@ from webmap.ros.messages import TFMessage
 from webmap.ros.names import is_topic
 
 SECONDS = 0.8
-"""How long it listens: a robot that moves sends its frames ten times a second."""
+"""How long to listen: a robot that moves sends its frames ten times a second."""
 
 QUEUE = 100
-"""Messages that the bridge may hold back; each one counts."""
+"""Queue length in the bridge; no message may be lost."""
 
 MOST_TOPICS = 100
 
@@ -35,13 +35,13 @@ def frame_topics(topics: Mapping[str, str]) -> list[str]:
 
 
 class LateFrames:
-    """Listens to frames for a moment now and then, and keeps what it heard.
+    """Listens to frames for a short time, repeatedly, and keeps the results.
 
-    So a robot of which there is nothing but ``/tf`` is found when it comes, at a
-    fraction of what it would cost to listen all the time.
+    This finds a robot that has only ``/tf`` when it appears, at a fraction of the cost
+    of a permanent subscription.
 
     Args:
-        bridge: The link that the frames come over; what others hear of it is shared.
+        bridge: The bridge; its subscriptions are shared with other users.
 
     """
 
@@ -52,7 +52,7 @@ class LateFrames:
     async def listen(
         self, topics: Mapping[str, str], *, seconds: float = SECONDS
     ) -> Trees:
-        """Listen for a moment, and return all that was heard up to now.
+        """Listen for a short time, and return all frames received up to now.
 
         Args:
             topics: Types by topic, as the bridge lists them.
@@ -89,7 +89,7 @@ _late: weakref.WeakKeyDictionary[Bridge, LateFrames] = weakref.WeakKeyDictionary
 
 
 def late_frames(bridge: Bridge) -> LateFrames:
-    """Return what listens to the frames of a bridge; the same for all who ask."""
+    """Return the listener for the frames of a bridge; each bridge has one."""
     if bridge not in _late:
         _late[bridge] = LateFrames(bridge)
     return _late[bridge]
@@ -98,7 +98,7 @@ def late_frames(bridge: Bridge) -> LateFrames:
 async def hear_frames(
     url: str, topics: Mapping[str, str], *, seconds: float = SECONDS
 ) -> Trees:
-    """Return the frames behind a bridge; none if it is silent.
+    """Return the frames behind a bridge; none if it does not answer.
 
     Args:
         url: The bridge's address.
@@ -112,6 +112,6 @@ async def hear_frames(
         try:
             await bridge.open()
         except BridgeClosed:
-            # It was there a moment ago; who connects next reports that it is away.
+            # It answered a moment ago; the next connection reports that it is gone.
             return Trees()
         return await LateFrames(bridge).listen(topics, seconds=seconds)

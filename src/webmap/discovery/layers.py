@@ -1,8 +1,8 @@
-"""Which topics can be drawn on a map besides what a robot is driven by.
+"""Which topics can be drawn on a map besides those that are used for driving.
 
-Layers declare which topics they draw. The first kind that fits a topic counts. A robot
-gets so many topics of a kind at the most, the best first, since each costs its link
-something.
+Layers declare which topics they draw. The first kind that fits a topic is used. The
+number of topics of a kind is limited for each robot, the best first, because each
+costs bandwidth.
 """
 
 import inspect
@@ -22,18 +22,18 @@ from webmap.modules.declaration import Declaration, FoundTopic, TopicKind, decla
 from webmap.ros.names import is_topic, normalise_topic, split_type
 
 TRAIL = ModuleConfig(name="Trail", options={"length": 10.0})
-"""Where a robot was, which is drawn of every robot."""
+"""The path of a robot in the past, drawn for every robot."""
 
 
 Place: TypeAlias = tuple[float, int, int, int]
-"""The rank of a layer, and the numbers of its kind, of the kind's type and pattern."""
+"""The rank of a layer, and the indices of its kind, of the kind's type and pattern."""
 
 Order: TypeAlias = tuple[Place, bool, str]
-"""The place of a rule, whether the topic is no robot's own, and the topic."""
+"""The place of a rule, whether the topic is shared by robots, and the topic."""
 
 
 def find_layers(topics: Mapping[str, str], robots: Iterable[str]) -> dict[str, Layers]:
-    """Return what is drawn of each robot, and what is left out.
+    """Return the layers drawn and left out of each robot.
 
     Args:
         topics: Types by topic, in either dialect.
@@ -57,7 +57,7 @@ def find_layers(topics: Mapping[str, str], robots: Iterable[str]) -> dict[str, L
 
 
 def drawn_otherwise(topics: Mapping[str, str]) -> set[str]:
-    """Return the topics that layers draw which do not come with WebMap."""
+    """Return the topics that are drawn by layers from outside WebMap."""
     layers = _foreign_first(declarations())
     found = ((topic, _match(topic, type, layers)) for topic, type in topics.items())
     kinds = _kinds(layers)
@@ -69,12 +69,12 @@ def drawn_otherwise(topics: Mapping[str, str]) -> set[str]:
 
 
 def is_own(topic: str, namespace: str) -> bool:
-    """Return whether a topic is a robot's own, and not one that robots may share."""
+    """Return whether a topic belongs to one robot and is not shared."""
     return namespace != "" and inside(topic, namespace)
 
 
 def role_of(layer: FoundLayer) -> str:
-    """Return which role a topic may have that is drawn so; empty if none."""
+    """Return the role of the topics of such a layer; empty if none."""
     return declared_kind(layer.kind)[1].role
 
 
@@ -96,7 +96,7 @@ def _kinds(layers: Iterable[Declaration]) -> dict[str, tuple[Declaration, TopicK
 
 
 def _foreign_first(layers: Iterable[Declaration]) -> list[Declaration]:
-    """Return layers that do not come with WebMap before the others.
+    """Return layers from outside WebMap before the built-in ones.
 
     They may draw some topics of a type better.
     """
@@ -124,7 +124,7 @@ def _match(
 
 
 def _owners(topic: str, kind: TopicKind, spaces: Mapping[str, object]) -> list[str]:
-    """Return whose a topic is: the innermost robot's, or the only one's."""
+    """Return the owners of a topic: the innermost robot's, or the only robot's."""
     owner = nearest(topic, spaces)
     if owner is not None:
         return [owner]
@@ -151,14 +151,14 @@ class Drawing:
     """A module that draws one topic of a robot."""
 
     module: str
-    """Its name; it takes a bridge and the topic first."""
+    """Its name; its first arguments are a bridge and the topic."""
 
     options: dict[str, Any] = field(default_factory=dict)
     of_maps: bool = False
-    """Whether it is a module of maps, which a robot brings along by ``OnMaps``."""
+    """Whether it is a module of maps, which a robot adds through ``OnMaps``."""
 
     shared: bool = False
-    """Whether it is nobody's own, and lies on the map once for all robots."""
+    """Whether it belongs to no robot and is drawn once on the map for all robots."""
 
 
 def drawing(
@@ -167,14 +167,14 @@ def drawing(
     frames: Mapping[str, Any] | None,
     number: int = 1,
 ) -> Drawing:
-    """Return what draws a layer of a robot.
+    """Return the module that draws a layer of a robot.
 
     Args:
         layer: The layer.
-        namespace: The robot's: ``/robot_0``, or empty.
+        namespace: The robot's namespace: ``/robot_0``, or empty.
         frames: ``map_frame`` and ``namespace`` of the robot's frames; None if it has
             none.
-        number: Which of the robot's layers of this class it is, from 1.
+        number: Number of this layer among the robot's layers of this class, from 1.
 
     """
     declared, kind = declared_kind(layer.kind)
@@ -196,14 +196,14 @@ def topic_of(module: ModuleConfig) -> str:
 def with_layers(
     config: RobotConfig, layers: Iterable[FoundLayer], namespace: str
 ) -> RobotConfig:
-    """Return a robot with more of its topics drawn, each once.
+    """Return a robot with more layers, each topic once.
 
-    What robots share is left out.
+    Topics that robots share are left out.
 
     Args:
         config: The robot.
-        layers: What is drawn of it.
-        namespace: The robot's: ``/robot_0``, or empty.
+        layers: The layers to add.
+        namespace: The robot's namespace: ``/robot_0``, or empty.
 
     """
     frames = None if config.tf is None else msgspec.structs.asdict(config.tf)

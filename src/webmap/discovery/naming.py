@@ -1,4 +1,4 @@
-"""Names of robots behind several bridges, so that no two are the same."""
+"""Unique names for robots behind several bridges."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,10 +11,10 @@ from webmap.discovery.found import Findings
 def unique_names(
     found: Sequence[tuple[str, Findings]],
 ) -> list[Findings]:
-    """Return the findings with a bridge's name behind names that others have too.
+    """Return the findings, with a bridge's name added to names that are not unique.
 
     Args:
-        found: For each bridge its name and what is behind it.
+        found: The name and the findings of each bridge.
 
     """
     often = Counter(
@@ -34,11 +34,11 @@ def unique_names(
 
 
 def free_name(wanted: str, taken: set[str]) -> str:
-    """Return a name that nobody has, and take it.
+    """Return a name that is not taken, and add it to the taken ones.
 
     Args:
-        wanted: What a number is put behind, if need be.
-        taken: What :func:`same_name` makes of each name.
+        wanted: The name; a number is appended if it is taken.
+        taken: The taken names, as :func:`same_name` returns them.
 
     """
     name, number = wanted, 1

@@ -1,4 +1,4 @@
-"""What is new since the last look: robots, and topics and frames of robots."""
+"""News since the last look: new robots, and new topics and frames of robots."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -8,26 +8,26 @@ from webmap.discovery.found import ROLES, Findings, FoundRobot, Guess, Role
 
 @dataclass(frozen=True, slots=True)
 class News:
-    """A robot that is new, or one that has more than before."""
+    """A new robot, or one with more topics or frames than before."""
 
     robot: FoundRobot
-    """All that is known of it now: what is in use stays, what is new comes besides."""
+    """All that is known of it: topics in use stay, new ones are added."""
 
     roles: tuple[Role, ...] = ()
-    """What it has more than before; empty for a robot that is new."""
+    """Its additional roles; empty for a new robot."""
 
     moved: bool = False
-    """Whether it is known to move in other frames than before."""
+    """Whether its frames differ from those before."""
 
 
 class Newcomers:
-    """Says once what is new, when it has settled.
+    """Reports each news once, when it is stable.
 
-    The topics of a robot that is being switched on come one by one. So news is told
-    when two looks in a row say the same of the robot, and not before. A topic that
-    goes, or a better one that comes, is no news: what is in use stays in use. Of
-    cameras all are used, so each one more is news. Frames are news as
-    :func:`leads_further` has it, and else they stay as well.
+    The topics of a robot that starts appear one by one. Therefore news is reported
+    only when two consecutive looks find the same topics of the robot. A topic that
+    disappears, or a better one that appears, is no news: a topic in use stays in use.
+    All cameras are used, so each new one is news. Frames are news if
+    :func:`leads_further` is true, and else stay as they are.
 
     Args:
         known: Robots that are there already.
@@ -39,7 +39,7 @@ class Newcomers:
         self._seen: dict[str, FoundRobot] = {}
 
     def look(self, findings: Findings) -> list[News]:
-        """Take what is there now, and return what is new and settled."""
+        """Process the newest findings, and return the stable news."""
         before, self._seen = self._seen, {}
         news = []
         for robot in findings.robots:
@@ -58,11 +58,11 @@ class Newcomers:
 
 
 def _merged(robot: FoundRobot, known: FoundRobot) -> FoundRobot:
-    """Return a robot with what is known of it, and with what is new besides."""
+    """Return a robot with its known topics and the new ones added."""
     guesses = {**robot.guesses, **known.guesses}
     if "camera" in guesses:
         guesses["camera"] = _all_cameras(robot, known)
-    # A pose may be silent while the robot stands; what else tells its place is not.
+    # A pose topic may be silent while the robot does not move; other sources are not.
     framed = known.tf_namespace is not None and known.base_frame != ""
     if "pose" not in known.guesses and (known.topic("odometry") or framed):
         guesses.pop("pose", None)
@@ -72,11 +72,11 @@ def _merged(robot: FoundRobot, known: FoundRobot) -> FoundRobot:
 
 
 def leads_further(robot: FoundRobot, known: FoundRobot) -> bool:
-    """Tell whether the frames of a robot lead further up than those known of it.
+    """Return whether a robot's frames lead further up than the known ones.
 
-    They do if none were known, or if what was their root hangs from the new one, as
-    ``odom`` hangs from ``map`` once a robot knows where it is. What was not heard for
-    a while, and a root beside the known one, change nothing.
+    They do if none were known, or if the known root has become a child of the new
+    root, as ``odom`` of ``map`` once a robot has localized itself. Frames that were
+    not received for some time, and a root unrelated to the known one, change nothing.
     """
     if not known.root_frame:
         return robot.root_frame != ""
@@ -87,7 +87,7 @@ def leads_further(robot: FoundRobot, known: FoundRobot) -> bool:
 
 
 def with_frames_of(robot: FoundRobot, known: FoundRobot) -> FoundRobot:
-    """Return a robot with the frames that are known of it."""
+    """Return a robot with the frames of another one."""
     return replace(
         robot,
         base_frame=known.base_frame,
@@ -104,7 +104,7 @@ def _more(robot: FoundRobot, known: FoundRobot) -> tuple[Role, ...]:
 
 
 def _all_cameras(robot: FoundRobot, known: FoundRobot) -> tuple[Guess, ...]:
-    """Return the cameras that are known, and then those that are new."""
+    """Return the known cameras, followed by the new ones."""
     before = known.guesses.get("camera", ())
     topics = {guess.topic for guess in before}
     more = robot.guesses.get("camera", ())

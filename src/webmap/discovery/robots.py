@@ -1,4 +1,4 @@
-"""From topics with types to robots."""
+"""Derives robots from topics with types."""
 
 import ipaddress
 from collections import Counter
@@ -15,10 +15,10 @@ from webmap.discovery.tf_robots import Base, Trees, owners
 from webmap.ros.names import is_topic, is_type
 
 SHARED: tuple[Role, ...] = ("map", "tf")
-"""Roles that a topic without a namespace has for every robot."""
+"""Roles that a topic without a namespace fills for every robot."""
 
 DRAWN_ONLY: tuple[Role, ...] = ("scan", "plan", "map", "costmap", "cloud")
-"""Roles of topics that are drawn and nothing else, so that a layer may take them."""
+"""Roles of topics that are only drawn, so that a layer may take them."""
 
 DIRECTION = (
     "A list of topics does not say who publishes and who subscribes: a topic may be "
@@ -29,13 +29,13 @@ DIRECTION = (
 def discover(
     topics: Mapping[str, str], host: str = "robot", trees: Trees | None = None
 ) -> Findings:
-    """Return the robots whose topics and frames these are.
+    """Return the robots that these topics and frames belong to.
 
     Args:
         topics: Types by topic, in either dialect, as ``Bridge.topics()`` gives them.
-            What is no name of a topic is left out.
-        host: What a robot without a namespace is called.
-        trees: What was heard of frames, if anything was.
+            Invalid topic names are ignored.
+        host: Name of a robot without a namespace.
+        trees: The frames that were received, if any.
 
     """
     topics = {name: type.strip() for name, type in topics.items() if is_topic(name)}
@@ -67,9 +67,9 @@ def discover(
 
 
 def host_name(url: str) -> str:
-    """Return what a robot without a namespace behind a bridge is called.
+    """Return the name of a robot without a namespace behind a bridge.
 
-    The first part of the host's name; "robot" if there is only an address.
+    It is the first part of the host's name, or "robot" if the host is an IP address.
     """
     host = urlsplit(url).hostname or "robot"
     try:
@@ -81,7 +81,7 @@ def host_name(url: str) -> str:
 
 
 def _packed(matches: Sequence[Match]) -> list[Match]:
-    """Return all but the raw pictures of cameras that send the same ones compressed."""
+    """Return the topics without raw pictures that also come compressed."""
     there = {each.topic for each in matches if each.role == "camera"}
     return [
         each
@@ -91,7 +91,7 @@ def _packed(matches: Sequence[Match]) -> list[Match]:
 
 
 def _with_frames(matches: Iterable[Match], robots: Sequence[str]) -> set[str]:
-    """Return the namespaces that have frames of their own and are in no robot."""
+    """Return the namespaces that have their own frames and belong to no robot."""
     known = {space for space in robots if space}
     return {
         each.namespace
@@ -104,7 +104,7 @@ def _with_frames(matches: Iterable[Match], robots: Sequence[str]) -> set[str]:
 
 
 def _owned(spaces: Sequence[str], matches: Iterable[Match]) -> dict[str, list[Match]]:
-    """Return what belongs to each robot, the best first."""
+    """Return the topics of each robot, the best first."""
     mine: dict[str, list[Match]] = {space: [] for space in spaces}
     shared = []
     for each in matches:
@@ -123,13 +123,13 @@ def _owned(spaces: Sequence[str], matches: Iterable[Match]) -> dict[str, list[Ma
 
 def _rank(each: Match, space: str) -> tuple[int, int, int, str]:
     place, parts, name = each.rank
-    # What is the robot's own comes before what is everybody's, or a part's of it.
+    # The robot's own topics come before those of its parts and shared ones.
     strange = 0 if each.namespace == space else 1 if inside(each.topic, space) else 2
     return (strange, place, parts, name)
 
 
 def _twists(spaces: Sequence[str], topics: Mapping[str, str]) -> dict[str, list[str]]:
-    """Return what in each robot may be a step of velocity on its way to the base."""
+    """Return topics of each robot that may be inner steps of its velocity."""
     found: dict[str, list[str]] = {space: [] for space in spaces}
     for name, type in sorted(topics.items()):
         if is_type(type, *VELOCITY) and INNER_VELOCITY.search(name):
@@ -208,9 +208,9 @@ def _robot_notes(robot: FoundRobot, twists: Sequence[str]) -> tuple[str, ...]:
 
 
 def _names(spaces: Sequence[str], bases: Mapping[str, Base], host: str) -> list[str]:
-    """Return a name for each namespace: its last part, where that is enough.
+    """Return a name for each namespace: its last part, if that is unique.
 
-    Without a namespace it is what the name of its base's frame begins with.
+    Without a namespace, the name is the prefix of its base frame.
     """
     framed = bases[""].prefix.rpartition("/")[2] if "" in bases else ""
     last = [space.rpartition("/")[2] or framed or host for space in spaces]

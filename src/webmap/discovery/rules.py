@@ -1,9 +1,9 @@
 """The rules: which types and names of topics fit which role.
 
-A rule holds a pattern for the end of a topic's name. What stands before the end is
-the robot's namespace. Between both may stand names of parts of a robot, such as a
-controller's, which are no robots of their own. Rules of one role are in order: the
-first that fits says how good the topic is.
+A rule has a pattern for the end of a topic's name. The part before the end is the
+robot's namespace. Between the two there may be names of parts of a robot, such as a
+controller's, which are no robots. Rules of one role are in order: the first match
+determines the rank of the topic.
 """
 
 import re
@@ -22,7 +22,7 @@ PARTS = (
     r"(?:global|local)_costmap|visual_slam|slam_toolbox|rtabmap|webmap|"
     r"cmd_vel_mux|yocs_cmd_vel_mux|ekf[^/]*|odometry"
 )
-"""Names that are parts of a robot and never a robot, as a pattern."""
+"""Pattern of names that are parts of a robot and never a robot."""
 
 ODOMETRY = ("nav_msgs/Odometry",)
 POSES = ("geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/PoseStamped")
@@ -36,10 +36,10 @@ DEPTH = (
     r"/(?:depth(?:_registered|_image[^/]*)?|aligned_depth[^/]*|image_depth[^/]*|"
     r"compressedDepth|zstd)(?:/|\Z)"
 )
-"""Parts of names of pictures that are no colours: how far away things are.
+"""Pattern in names of pictures that show depth instead of color.
 
-A camera that is only called after its kind, such as ``depth_camera``, has colours too.
-What is packed by zstd is no picture that a browser shows.
+A camera named after its kind, such as ``depth_camera``, has color pictures too.
+Browsers cannot show pictures compressed with zstd.
 """
 
 
@@ -49,16 +49,16 @@ class Rule:
 
     role: Role
     types: tuple[str, ...]
-    """Names of types without a dialect."""
+    """Names of types, without a dialect."""
 
     tail: str
-    """A pattern for the end of the name, without the slash before it."""
+    """Pattern for the end of the name, without the slash before it."""
 
     words: str
     """Why such a topic fits, for people."""
 
     unless: str = r"(?!)"
-    """A pattern that must be found nowhere in the name."""
+    """Pattern that must not occur anywhere in the name."""
 
 
 RULES: tuple[Rule, ...] = (
@@ -151,7 +151,7 @@ RULES: tuple[Rule, ...] = (
 )
 
 INNER_VELOCITY = re.compile(r"cmd_vel|velocity|teleop")
-"""What is left of a Twist's name that may be a step on the way to the base."""
+"""Pattern of other Twist names that may be inner steps on the path to the base."""
 
 
 class Match(NamedTuple):
@@ -159,7 +159,7 @@ class Match(NamedTuple):
 
     role: Role
     rank: tuple[int, int, str]
-    """The smaller, the better: the rule's place, parts before the name, the name."""
+    """Smaller is better: the rule's place, the parts before the name, the name."""
 
     namespace: str
     topic: str
@@ -168,7 +168,7 @@ class Match(NamedTuple):
 
 
 def match(topic: str, type: str) -> Match | None:
-    """Return which role a topic fits, None if none."""
+    """Return the role that a topic fits, None if none."""
     try:
         plain = str(split_type(type))
     except ConfigError:
@@ -184,7 +184,7 @@ def match(topic: str, type: str) -> Match | None:
     return None
 
 
-# The namespace is as short as can be, so that parts of a robot are not taken for it.
+# The shortest namespace matches, so that parts of a robot do not count as robots.
 _COMPILED = tuple(
     (
         rule,

@@ -1,16 +1,16 @@
-"""Robots as the trees of frames show them; rules without I/O."""
+"""Robots in the trees of frames; rules without I/O."""
 
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 Parents = Mapping[str, str]
-"""For each frame the one that it is told in."""
+"""Parent of each frame."""
 
 BASE = re.compile(
     r"(?P<prefix>(?:.*[/_])?)(?:base_footprint|base_link)\Z|(?P<space>(?:.*/)?)base\Z"
 )
-"""What the frame of a robot's base is called, after a prefix of its own."""
+"""Names of the frame of a robot's base, after a prefix of the robot."""
 
 WORLD = re.compile(r"(?:.*[/_])?(?:map|world|earth)\Z")
 MAP = "map"
@@ -19,10 +19,10 @@ MAP = "map"
 ODOM = re.compile(r"(?:.*[/_])?odom(?:_[^/]*|etry)?\Z")
 
 MOST = 200
-"""Robots that are taken from the frames of one bridge."""
+"""Most robots that are found in the frames of one bridge."""
 
 MOST_FRAMES = 4096
-"""Frames of one namespace that are kept; of more, those heard of longest ago go."""
+"""Most frames of one namespace that are kept; beyond it the oldest are dropped."""
 
 _AT_ONCE = 512
 
@@ -33,20 +33,20 @@ class Base:
 
     frame: str
     root: str
-    """The frame that it can be drawn in: the map, or where its odometry begins."""
+    """The frame that it can be drawn in: the map, or the start of its odometry."""
 
     namespace: str = ""
-    """Of the topic that tells of it."""
+    """Namespace of the topic with its frames."""
 
     prefix: str = ""
-    """Before the name of the base, without what parts them."""
+    """The prefix of the base's name, without the separator."""
 
     above: tuple[str, ...] = ()
-    """What it hangs from, the nearest first."""
+    """Its parent frames, the nearest first."""
 
     @property
     def space(self) -> str:
-        """The namespace in which its other topics are likely to be."""
+        """The likely namespace of its other topics."""
         name = re.sub(r"[^A-Za-z0-9_/]", "_", self.prefix)
         if not name or self.namespace.endswith(f"/{name}"):
             return self.namespace
@@ -55,16 +55,16 @@ class Base:
 
 @dataclass(slots=True)
 class Trees:
-    """What was told of frames, by the namespace of the topic that told it."""
+    """The received frames, by the namespace of their topic."""
 
     parents: dict[str, dict[str, str]] = field(default_factory=dict)
-    """Of each namespace; the frame that was heard of longest ago is the first."""
+    """Parents of frames, by namespace; the frame received longest ago is first."""
 
     def take(self, namespace: str, parent: str, child: str) -> None:
-        """Note that one frame was told in another.
+        """Store the parent of a frame.
 
-        What detects things may name a new frame for each, so there is an end to them:
-        see :data:`MOST_FRAMES`. Bases, and what they hang from, are kept longest.
+        A detector may publish a new frame for each object, so the number is limited:
+        see :data:`MOST_FRAMES`. Bases and their parents are kept longest.
         """
         parent, child = parent.strip().strip("/"), child.strip().strip("/")
         if parent and child:
@@ -75,7 +75,7 @@ class Trees:
             known[child] = parent
 
     def bases(self) -> tuple[Base, ...]:
-        """Return the robots in the trees, sorted by where they are."""
+        """Return the robots in the trees, sorted by namespace and frame."""
         found = [
             base
             for namespace, parents in self.parents.items()
@@ -87,7 +87,7 @@ class Trees:
 def bases(parents: Parents, namespace: str = "") -> Iterable[Base]:
     """Return the bases of robots that move in a map or from where they started.
 
-    A base that hangs from another is a part of that one, such as an arm's.
+    A base below another base is a part of that robot, such as an arm's.
     """
     for frame in parents:
         found = BASE.match(frame)
@@ -105,20 +105,20 @@ def bases(parents: Parents, namespace: str = "") -> Iterable[Base]:
 
 
 def _forget_some(known: dict[str, str]) -> None:
-    """Forget the frames heard of longest ago; many at once, as this looks at all."""
+    """Drop the oldest frames; many at once, because this function visits all."""
     kept: set[str] = set()
     for frame in known:
         if BASE.match(frame):
             kept.update((frame, *_above(frame, known)))
     others = [frame for frame in known if frame not in kept]
     if len(others) < _AT_ONCE:
-        others = list(known)  # That many bases are no robots.
+        others = list(known)  # That many bases are not robots.
     for frame in others[:_AT_ONCE]:
         del known[frame]
 
 
 def _above(frame: str, parents: Parents) -> list[str]:
-    """Return what a frame hangs from, up to the root; a loop ends it."""
+    """Return the parents of a frame, up to the root or the start of a loop."""
     chain = [frame]
     while chain[-1] in parents and parents[chain[-1]] not in chain:
         chain.append(parents[chain[-1]])
@@ -128,10 +128,10 @@ def _above(frame: str, parents: Parents) -> list[str]:
 def owners(
     found: Iterable[Base], spaces: Iterable[str]
 ) -> tuple[dict[str, Base], list[Base]]:
-    """Return whose base each one is, and those that are of robots not known yet.
+    """Return the bases of known robots by namespace, and the bases of new robots.
 
-    The only base is that of the only robot, if both are without a namespace: drivers
-    of one robot often have a prefix for their frames and none for their topics.
+    A single base belongs to a single robot if both have no namespace: the frames of
+    one robot often have a prefix while its topics have none.
 
     Args:
         found: The bases.
@@ -149,7 +149,7 @@ def owners(
     if known == ("",) and not mine and len(new) == 1 and not new[0].namespace:
         mine[""] = new.pop()
     if len(known) > 1 and "" not in known:
-        # Frames without a prefix may be anybody's.
+        # Frames without a prefix may belong to any of the robots.
         new = [base for base in new if base.space]
     return mine, new
 

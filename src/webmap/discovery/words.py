@@ -1,4 +1,4 @@
-"""What was found, as a table for a terminal."""
+"""The findings as a table for a terminal."""
 
 from webmap.base.outside_text import escaped
 from webmap.discovery.found import ROLES, Findings, FoundRobot, Layers, Role
@@ -27,7 +27,7 @@ ONE: tuple[Role, ...] = (
     "initialpose",
     "tf",
 )
-"""Roles of which a robot uses the best topic alone; of the others all are drawn."""
+"""Roles of which a robot uses the best topic only; all topics of others are drawn."""
 
 OVERRULE = (
     "Wrong? Say it to webmap view, one topic with --set ROBOT.ROLE=TOPIC or a robot "
@@ -37,7 +37,7 @@ OVERRULE = (
 
 
 def report(url: str, findings: Findings) -> str:
-    """Return all that was found behind a bridge, for people."""
+    """Return all findings of a bridge, for people."""
     number = len(findings.robots)
     lines = [
         f"{url}: {DIALECTS[findings.dialect]}, "
@@ -52,7 +52,7 @@ def report(url: str, findings: Findings) -> str:
 
 
 def robot_table(robot: FoundRobot) -> list[str]:
-    """Return one robot's topics, one a line, with the rule that chose each."""
+    """Return one robot's topics, one on each line, with their rules."""
     where = f"in {robot.namespace}" if robot.namespace else "without a namespace"
     rows = [
         (
@@ -74,7 +74,7 @@ def robot_table(robot: FoundRobot) -> list[str]:
     ]
     missing = [role for role in ROLES if role not in robot.guesses]
     if robot.action is not None and "cancel" in missing:
-        missing.remove("cancel")  # an action takes cancels itself
+        missing.remove("cancel")  # an action receives cancels itself
     if missing:
         lines.append(f"  not found: {', '.join(missing)}")
     lines += [f"  note: {note}" for note in robot.notes]
@@ -82,16 +82,16 @@ def robot_table(robot: FoundRobot) -> list[str]:
 
 
 def layer_table(robot: FoundRobot, findings: Findings) -> list[str]:
-    """Return what is drawn of a robot that was found."""
+    """Return the layers of a robot that was found, as a table."""
     return drawn_table(robot.namespace, findings.layers.get(robot.namespace, Layers()))
 
 
 def drawn_table(namespace: str, layers: Layers) -> list[str]:
-    """Return what is drawn of a robot, one topic a line, by which module and rule.
+    """Return the layers of a robot, one topic on each line, with module and rule.
 
     Args:
-        namespace: The robot's.
-        layers: What is drawn of it, and what is left out.
+        namespace: The robot's namespace.
+        layers: The layers drawn and left out.
 
     """
     rows = [
@@ -117,12 +117,12 @@ def _use(robot: FoundRobot, role: Role, place: int) -> str:
     if role not in ONE or len(robot.guesses[role]) == 1:
         return ""
     if role == "pose" and robot.first("odometry") is not None:
-        return ""  # a note says so
+        return ""  # a note explains it
     return ", not used" if place else ", used"
 
 
 def in_one_line(robot: FoundRobot) -> str:
-    """Return a robot with the topics that are used, for a log."""
+    """Return a robot with the topics in use, for a log."""
     said = [f"{role} {robot.topic(role)}" for role in USED if robot.topic(role)]
     if robot.tf_alone and robot.base_frame:
         said.insert(0, f"frame {robot.base_frame}")

@@ -1,4 +1,4 @@
-"""The robots that ``webmap doctor`` looks at, where somebody configured them."""
+"""The robots that ``webmap doctor`` checks, if a person configured them."""
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -12,23 +12,23 @@ from webmap.discovery.found import ROLES, FoundRobot, Role
 from webmap.ros.names import normalise_url
 
 Meant: TypeAlias = Callable[[Findings], Sequence[MeantRobot]]
-"""From what was found behind a bridge to the robots as they were configured."""
+"""Returns the robots as they were configured, from the findings of a bridge."""
 
 
 def bridges_of(
     given: Sequence[str], robots: Sequence[str], settings: Sequence[str]
 ) -> list[tuple[str, Meant]]:
-    """Return each bridge to look at, and what was said of the robots behind it.
+    """Return each bridge to check, with the settings for the robots behind it.
 
     Args:
         given: The addresses of bridges, or one fleet file.
-        robots: Those of ``--robot``, as they were written.
-        settings: Those of ``--set``, as they were written.
+        robots: The values of ``--robot``.
+        settings: The values of ``--set``.
 
     Raises:
         UsageError: If ``--robot`` or ``--set`` is given with several bridges, or with
-            a fleet file, which says all of it.
-        ConfigError: If something of it cannot be meant.
+            a fleet file, which has these settings itself.
+        ConfigError: If a setting does not fit the robots.
         OSError: If the file cannot be read.
 
     """
@@ -94,17 +94,17 @@ def _said(url: str, robots: Sequence[str], settings: Sequence[str]) -> Meant:
 
 
 def _of_told(robot: FoundRobot) -> MeantRobot:
-    """Return a robot of ``--robot``; what else it has is as it was found."""
+    """Return a robot of ``--robot``; its other roles are as discovery found them."""
     from webmap.fleet.overrides import TOLD
 
     roles: list[Role] = ["pose", *TOLD]
     if not robot.topic("odometry"):
-        roles.append("tf")  # it is drawn by frames only where odometry says which
+        roles.append("tf")  # drawn by frames only if odometry names the frame
     return MeantRobot(robot.name, _topics(robot, roles))
 
 
 def _of_found(robot: FoundRobot, there: FoundRobot) -> MeantRobot:
-    """Return what was said better of a robot that was found."""
+    """Return the roles of a found robot that the settings change."""
     roles = [r for r in ROLES if robot.guesses.get(r) != there.guesses.get(r)]
     topics = _topics(robot, roles)
     return MeantRobot(robot.name, topics, robot.base_frame, found_as=there.name)

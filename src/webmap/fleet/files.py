@@ -18,17 +18,17 @@ from webmap.features.labels.label_store import label_file, read_labels
 from webmap.features.tiles.tile_source import open_tiles
 
 MOST_PIXELS = 1 << 26
-"""Pixels of a picture: a browser has four bytes for each."""
+"""Most pixels of a picture: a browser uses four bytes for each."""
 
 PICTURES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".svg", ".tif", ".tiff")
-"""Names that end so are the picture of a floor plan, given in place of its YAML."""
+"""Suffixes of pictures; such a file in place of a YAML file is a common mistake."""
 
 NEEDED = ("name", "x", "y")
-"""What every label says."""
+"""The required keys of a label."""
 
 
 def check_floor(floor: Path, mistakes: Mistakes) -> None:
-    """Note what is wrong with a floor plan."""
+    """Note the mistakes of a floor plan."""
     from webmap.console.floor import load_floor
 
     if floor.suffix.lower() in PICTURES:
@@ -45,7 +45,7 @@ def check_floor(floor: Path, mistakes: Mistakes) -> None:
 def check_images(
     images: Sequence[ImageConfig], folder: Path, mistakes: Mistakes
 ) -> list[tuple[str, float, float, float, float]]:
-    """Return pictures as ``Map.add_image`` takes them; what is none is noted."""
+    """Return pictures as ``Map.add_image`` takes them; note files that are none."""
     found = []
     for index, image in enumerate(images):
         file = folder / image.file
@@ -62,13 +62,13 @@ def check_images(
 def publish_picture(
     picture: PictureConfig, folder: Path, way: Way, mistakes: Mistakes
 ) -> str:
-    """Return the URL that pages load the picture of a robot from.
+    """Return the URL from which pages load the picture of a robot.
 
     Args:
         picture: The picture.
-        folder: What its file is looked for from.
-        way: The way to it.
-        mistakes: Where what is wrong goes; there is no URL then.
+        folder: Folder to which its file is relative.
+        way: The keys that lead to it.
+        mistakes: Receives the mistakes; there is no URL then.
 
     """
     try:
@@ -80,12 +80,12 @@ def publish_picture(
 
 
 def label_options(places: Any, folder: Path, mistakes: Mistakes) -> dict[str, Any]:
-    """Return the arguments of ``Labels``; what is wrong is noted.
+    """Return the arguments of ``Labels``; note the mistakes.
 
     Args:
         places: Tables of labels, or the name of a file with them.
-        folder: What the file is looked for from.
-        mistakes: Where every mistake goes.
+        folder: Folder to which the file is relative.
+        mistakes: Receives the mistakes.
 
     """
     if not isinstance(places, str):
@@ -110,7 +110,7 @@ def _check_label(label: Any, way: Way, mistakes: Mistakes) -> None:
     try:
         read_labels([label], "")
     except ConfigError as error:
-        # It was read as the first of a list; the file may have it elsewhere.
+        # The label was read as item 0 of a list; its index in the file may differ.
         _, *inner = getattr(error, "way", (0,))
         mistakes.add((*way, *inner), getattr(error, "words", str(error)))
 
@@ -118,13 +118,13 @@ def _check_label(label: Any, way: Way, mistakes: Mistakes) -> None:
 def tile_options(
     tiles: TilesConfig, folder: Path, mistakes: Mistakes
 ) -> dict[str, Any]:
-    """Return the arguments of ``TileLayer``; tiles that are not there are noted."""
+    """Return the arguments of ``TileLayer``; note missing tiles."""
     options = msgspec.to_builtins(tiles)
     source = options.pop("source")
     try:
         datum = (options.pop("latitude"), options.pop("longitude"))
         LocalPlane(*datum, options.get("east", 0.0))
-        # What names a host is refused as it stands, before it is taken for a file.
+        # A source with a host is refused as written, before it is used as a path.
         found = open_tiles(source if "://" in source else folder / source)
         close = getattr(found, "close", None)
         if close is not None:
@@ -136,10 +136,10 @@ def tile_options(
 
 
 def picture_file(file: Path) -> tuple[bytes, str]:
-    """Return what is in a file that browsers can show, and its media type.
+    """Return the contents of a file that browsers can show, and its media type.
 
     Raises:
-        ConfigError: If there is no such file, or it is no picture.
+        ConfigError: If there is no such file, or it is not a picture.
 
     """
     from webmap.server.files import IMAGES, MEDIA_TYPES, Published
@@ -149,7 +149,7 @@ def picture_file(file: Path) -> tuple[bytes, str]:
         raise ConfigError(
             f"{str(file)!r} is no picture: its name must end in {' '.join(known)}"
         )
-    published = Published()  # says what is wrong with the file as a file
+    published = Published()  # raises errors of the file itself
     found = published.image(published.publish_image(file).removeprefix(IMAGES))
     if found.media_type.startswith("image/svg"):
         _check_svg(file, found.data)
@@ -170,7 +170,7 @@ def _check_pixels(file: Path, data: bytes) -> None:
         with Image.open(io.BytesIO(data)) as image:
             width, height = image.size
             image.verify()
-    except Exception as error:  # each form of picture has errors of its own
+    except Exception as error:  # each picture format has its own errors
         raise ConfigError(
             f"{str(file)!r} is no picture that can be read: expected what its suffix "
             f"{file.suffix} says, whole; got {_in_words(error)}"

@@ -1,4 +1,4 @@
-"""What is behind several bridges, asked all at once."""
+"""Queries several bridges at once for the robots behind them."""
 
 import asyncio
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ TELL = (
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What is behind one bridge, or why nobody knows."""
+    """The robots behind one bridge, or why they are unknown."""
 
     url: str
     label: str
@@ -31,7 +31,7 @@ class Found:
     findings: Findings
     trouble: BridgeError | None = None
     topics: Mapping[str, str] = field(default_factory=dict)
-    """Types by topic, if the bridge said them or somebody else did."""
+    """Types by topic, as listed by the bridge or given by the user."""
 
     @property
     def why(self) -> str:
@@ -50,14 +50,14 @@ class Found:
 async def find(
     urls: Sequence[str], *, wait: float, topics: Mapping[str, str] | None = None
 ) -> list[Found]:
-    """Return what is behind each bridge; no two robots have one name.
+    """Return the robots behind each bridge; all their names differ.
 
-    Says on standard error that a bridge is waited for.
+    Prints on standard error that it waits for a bridge.
 
     Args:
         urls: The bridges' addresses.
-        wait: How long to wait for one that cannot be reached, in seconds.
-        topics: Types by topic, where a bridge cannot be asked for them.
+        wait: How long to wait for an unreachable bridge, in seconds.
+        topics: Types by topic, if the bridge does not list them.
 
     """
     if topics is None:

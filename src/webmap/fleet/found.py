@@ -1,4 +1,4 @@
-"""The robots behind bridges, found or told, as the console takes them."""
+"""The robots behind bridges, found or given by hand, for the console."""
 
 import asyncio
 from collections.abc import Mapping, Sequence
@@ -27,22 +27,22 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class FoundFleet:
-    """The robots that were found, and what is known when it is looked again."""
+    """The robots that were found, and the data for later searches."""
 
     told: list[Candidate]
-    """Robots that were told by hand; the console has them already."""
+    """Robots that were given by hand; the console has them already."""
 
     robots: list[Candidate] = field(default_factory=list)
     """Robots that were found."""
 
     behind: "dict[Bridge, Found]" = field(default_factory=dict)
-    """What was found behind each bridge, before anybody said anything."""
+    """The findings of each bridge, before any settings."""
 
     overruling: Overruling = field(default_factory=Overruling)
-    """What was said of robots."""
+    """The settings of robots."""
 
     def table(self, *, grid: bool, as_told: bool) -> str:
-        """Return what the page would use and draw, and why, for people.
+        """Return the topics that the page uses and draws, with reasons, for people.
 
         Args:
             grid: Whether the robots' own maps are shown under them.
@@ -79,13 +79,13 @@ class FoundFleet:
         as_told: bool = False,
         topics: Mapping[str, str] | None = None,
     ) -> None:
-        """Show what was found, what comes later, and all that can be drawn of it.
+        """Show the robots found now and later, and all their topics that can be drawn.
 
         Args:
-            console: The console, which has been opened with the robots that were told.
+            console: The console, opened with the robots that were given by hand.
             grid: Whether the robots' own maps are shown under them.
             as_told: Whether only the given topics of robots given by hand are drawn.
-            topics: Types by topic, where a bridge cannot be asked for them.
+            topics: Types by topic, if a bridge does not list them.
 
         """
         shown = ShownRobots(console, self.overruling, told=self.told, grid=grid)
@@ -107,7 +107,7 @@ class FoundFleet:
 
 
 _services: list[object] = []
-"""What runs as long as the process does; nobody else holds it."""
+"""Objects that live as long as the process; this list keeps them alive."""
 
 
 def find_fleet(
@@ -118,18 +118,18 @@ def find_fleet(
     topics: Mapping[str, str] | None = None,
     overruling: Overruling | None = None,
 ) -> FoundFleet:
-    """Return the robots behind bridges, and say on standard error what was found.
+    """Return the robots behind bridges, and print the findings on standard error.
 
     Args:
         bridges: The bridges.
-        told: Robots that were told by hand; each takes the place of one found.
-        wait: How long to wait for a bridge that cannot be reached, in seconds.
-        topics: Types by topic, where the bridge cannot be asked for them.
-        overruling: What was said of robots.
+        told: Robots that were given by hand; each replaces one that is found.
+        wait: How long to wait for an unreachable bridge, in seconds.
+        topics: Types by topic, if the bridge does not list them.
+        overruling: The settings of robots.
 
     Raises:
-        ConfigError: If something was said of a robot that there is not, or a person
-            gave it the name of another.
+        ConfigError: If a setting names a robot that does not exist, or gives a robot
+            the name of another one.
 
     """
     overruling = overruling or Overruling()
@@ -165,14 +165,14 @@ def find_fleet(
 def told_fleet(
     bridges: Sequence["Bridge"], told: Sequence[Candidate], *, wait: float
 ) -> FoundFleet:
-    """Return robots that were told, with what is behind their bridges besides.
+    """Return robots that were given by hand, with the findings of their bridges.
 
-    Says on standard error if a bridge does not tell that.
+    Prints on standard error if a bridge does not list its topics.
 
     Args:
         bridges: The bridges.
         told: The robots.
-        wait: How long to wait for a bridge that cannot be reached, in seconds.
+        wait: How long to wait for an unreachable bridge, in seconds.
 
     """
     found = asyncio.run(find([bridge.url for bridge in bridges], wait=wait))
@@ -187,7 +187,7 @@ def told_fleet(
 
 
 def _typed(robot: FoundRobot, topics: Mapping[str, str]) -> FoundRobot:
-    """Return a robot with the type of its velocity, if the topics behind it tell it."""
+    """Return a robot with the type of its velocity topic, if the bridge lists it."""
     velocity = robot.first("velocity")
     if velocity is None or velocity.type or not is_topic(velocity.topic):
         return robot
@@ -200,7 +200,7 @@ def _typed(robot: FoundRobot, topics: Mapping[str, str]) -> FoundRobot:
 
 
 def _told_table(robot: FoundRobot) -> list[str]:
-    """Return what was said of a robot, one topic a line."""
+    """Return the given topics of a robot, one on each line."""
     said = [(role, guess) for role in TOLD for guess in robot.guesses.get(role, ())]
     return [
         f"  {role:<11} {guess.topic}{f'  {guess.type}' if guess.type else ''}"

@@ -36,7 +36,7 @@ log = logging.getLogger("webmap.cli")
 
 
 class MapModule(NamedTuple):
-    """A module of the map, with what it gets."""
+    """A module of the map, with its arguments."""
 
     name: str
     args: tuple[Any, ...]
@@ -45,7 +45,7 @@ class MapModule(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ReadyFleet:
-    """A file that is right, with everything in it made."""
+    """A valid fleet file, with all its objects made."""
 
     fleet: FleetConfig
     bridges: dict[str, "Bridge"]
@@ -56,17 +56,17 @@ class ReadyFleet:
     images: list[tuple[str, float, float, float, float]]
     """Pictures as ``Map.add_image`` takes them."""
     others: list[MapModule]
-    """The modules of the map that the file names."""
+    """Further modules of the map that the file lists."""
 
 
 def prepare(file: Path) -> ReadyFleet:
-    """Make everything that a file says; no link is opened yet.
+    """Make all objects of a fleet file, without opening a connection.
 
     Logs a warning if other users can read a password in it.
 
     Raises:
-        ConfigError: If anything in it is wrong; every mistake is named with its line.
-        OSError: If it cannot be read.
+        ConfigError: If the file has mistakes; each is listed with its line.
+        OSError: If the file cannot be read.
 
     """
     text, mistakes = read_text(file), Mistakes()
@@ -116,14 +116,14 @@ def make_robots(
     folder: Path,
     mistakes: Mistakes,
 ) -> list["Robot"]:
-    """Return the robots of a file; what a robot or a module refuses is noted.
+    """Return the robots of a file; note what a robot or a module refuses.
 
     Args:
-        fleet: What the file says.
+        fleet: The configuration in the file.
         bridges: Its bridges, by name.
-        folder: The file's own, in which the robots' pictures are looked for.
-        mistakes: Where what is wrong goes. Parts of robots that were wrong before are
-            left out, so that mistakes in other parts are found too.
+        folder: The file's folder, to which the robots' pictures are relative.
+        mistakes: Receives the mistakes. Parts of robots with known mistakes are left
+            out, so that mistakes in other parts are found too.
 
     """
     wrong: dict[object, list[Way]] = {}
@@ -148,7 +148,7 @@ def make_robots(
 
 
 def _without(config: RobotConfig, wrong: list[Way]) -> RobotConfig | None:
-    """Return a robot without its wrong parts; None if no robot can be made of it."""
+    """Return a robot without its wrong parts; None if no robot remains."""
     plain = RobotConfig(name=config.name)
     for way in wrong:
         key = str(way[2]) if len(way) > 2 else "name"
@@ -165,13 +165,13 @@ def check_modules(
     folder: Path,
     mistakes: Mistakes,
 ) -> list[MapModule]:
-    """Return the modules of the map; what one does not take is noted.
+    """Return the modules of the map; note arguments that a module refuses.
 
     Args:
-        modules: What the file says.
+        modules: The modules in the file.
         bridges: Its bridges, by name.
-        folder: The file's own, in which the maps of ``MapFile`` are looked for.
-        mistakes: Where what is wrong goes.
+        folder: The file's folder, to which the maps of ``MapFile`` are relative.
+        mistakes: Receives the mistakes.
 
     """
     found = []
@@ -195,7 +195,7 @@ def check_modules(
 def _map_file(
     module: ModuleConfig, folder: Path, way: Way, mistakes: Mistakes
 ) -> tuple[tuple[Any, ...], dict[str, Any]]:
-    """Return the arguments of a map from disk, which is read to see that it is one."""
+    """Return the arguments of a map file, which is read to check that it is a map."""
     options = dict(module.options)
     name, *others = [options.pop("file")] if "file" in options else module.args
     inner: Way = ("options", "file") if "file" in module.options else ("args", 0)
@@ -208,7 +208,7 @@ def _map_file(
 
 
 def open_fleet(ready: ReadyFleet) -> None:
-    """Make the console with these robots the page at ``/``."""
+    """Serve the console with these robots at ``/``."""
     options = {"title": ready.fleet.title} if ready.fleet.title else {}
     bridges = list(ready.bridges.values())
     shown = console.open_console(bridges, [], floor=ready.floor, **options)
@@ -221,7 +221,7 @@ def open_fleet(ready: ReadyFleet) -> None:
 
 
 def show_scenery(shown: console.Console, ready: ReadyFleet) -> None:
-    """Show on a console what lies under its robots."""
+    """Show the images and maps under the robots on a console."""
     for image in ready.images:
         shown.add_image(*image)
     for grid in ready.fleet.map:
@@ -233,6 +233,6 @@ def show_scenery(shown: console.Console, ready: ReadyFleet) -> None:
 
 
 def restore(robots: "list[Robot]") -> None:
-    """Align robots as people did on a page, where the file says nothing newer."""
+    """Restore alignments that people set on a page, unless the file has newer ones."""
     for robot in robots:
         store.restore(robot)

@@ -1,4 +1,4 @@
-"""Settings of a person that replace guesses of discovery, one topic at a time."""
+"""A person's settings that replace guesses of discovery, one topic at a time."""
 
 import difflib
 from collections.abc import Iterable, Sequence
@@ -31,11 +31,11 @@ RULE = "said with --set"
 USED: tuple[str, ...] = tuple(
     role for role in ROLES if role not in ("pose", "costmap", "cloud")
 )
-"""Roles of which a robot on the page uses the best topic."""
+"""Roles of which a robot on the page uses the best topic only."""
 
 WORDS = ("name", "base", "velocity_type")
-"""What is said of a robot besides its topics: its name, the frame of its base, and the
-type of what drives it."""
+"""Keys of settings that are no topics: the robot's name, the frame of its base, and
+the type of its velocity topic."""
 
 TOLD: tuple[Role, ...] = (
     "odometry",
@@ -50,33 +50,34 @@ TOLD: tuple[Role, ...] = (
 """Roles that a robot of ``--robot`` can have."""
 
 MOTION: tuple[Role, ...] = ("velocity", "goal", "action", "cancel", "initialpose")
-"""Roles by which a robot is told something."""
+"""Roles by which a robot receives something."""
 
 MOST_CAMERAS = 4
-"""Cameras of one robot that are shown; they are only asked while somebody looks."""
+"""Most cameras shown of one robot; they are subscribed only while a page shows
+them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One thing that a person says of a robot."""
+    """One setting of a robot."""
 
     text: str
-    """As it was written."""
+    """The setting as written."""
 
     robot: str
     key: str
     """A role, or one of ``WORDS``."""
 
     values: tuple[str, ...]
-    """Topics, or the one word; none if the robot does without."""
+    """Topics, or one value; empty if the robot has none of that role."""
 
 
 def parse_setting(text: str) -> Setting:
-    """Read a setting as a person writes it on the command line.
+    """Read a setting from the command line.
 
     Args:
-        text: ``ROBOT.ROLE=TOPIC``. Nothing behind the sign says that the robot does
-            without; several cameras stand with commas between them.
+        text: ``ROBOT.ROLE=TOPIC``. An empty value means that the robot has none;
+            several cameras are separated by commas.
 
     Raises:
         ConfigError: If the text is not of that form.
@@ -118,11 +119,11 @@ def parse_setting(text: str) -> Setting:
 
 
 class Overruling:
-    """What a command line says of robots, and the robots that it is about.
+    """The settings of a command line, and the robots that they apply to.
 
     Args:
-        settings: What was said of one robot each, in the order in which it was.
-        stops_within: Seconds within which every base stops by itself, if known.
+        settings: Settings of one robot each, in their order on the command line.
+        stops_within: Command timeout of every base, in seconds, if known.
 
     """
 
@@ -134,11 +135,11 @@ class Overruling:
         self._robots: dict[tuple[str, str], str] = {}
 
     def config(self, url: str, robot: FoundRobot) -> RobotConfig:
-        """Return a robot as it is shown.
+        """Return the configuration of a robot as it is shown.
 
         Args:
-            url: The bridge that it is behind.
-            robot: The robot, with what was said of it.
+            url: The bridge that the robot is behind.
+            robot: The robot, with the settings applied.
 
         """
         config = robot.config(url)
@@ -150,10 +151,10 @@ class Overruling:
         return config.with_part("cameras", cameras)
 
     def tell(self, robots: Sequence[Candidate]) -> list[Candidate]:
-        """Return robots of ``--robot`` with what else was said of them.
+        """Return robots of ``--robot`` with their further settings applied.
 
         Raises:
-            ConfigError: If such a robot cannot have what was said.
+            ConfigError: If a setting is not possible for such a robot.
 
         """
         told: list[Candidate] = []
@@ -175,12 +176,12 @@ class Overruling:
     def apply(
         self, url: str, robot: FoundRobot, dialect: str | None = None
     ) -> FoundRobot:
-        """Return a robot that was found with what was said of it.
+        """Return a robot that was found with its settings applied.
 
         Args:
-            url: The bridge that it is behind.
-            robot: As it was found; it is known again by its namespace.
-            dialect: That of the bridge, ``"ros1"`` or ``"ros2"``, if it is known.
+            url: The bridge that the robot is behind.
+            robot: The robot as found; it is identified by its namespace.
+            dialect: Dialect of the bridge, ``"ros1"`` or ``"ros2"``, if known.
 
         """
         place = (url, robot.namespace)
@@ -191,7 +192,7 @@ class Overruling:
         return _overruled(robot, settings, dialect)
 
     def fixed(self, url: str, robot: FoundRobot) -> frozenset[str]:
-        """Return the roles of a robot that no topic that comes later may have."""
+        """Return the roles of a robot that later topics may not take."""
         known = self._robots.get((url, robot.namespace), robot.name)
         return frozenset(setting.key for setting in self._of(known))
 
@@ -199,9 +200,9 @@ class Overruling:
         """Return the layers of a robot, without topics that --set gave another role.
 
         Args:
-            url: The bridge that it is behind.
-            findings: What was found there.
-            robot: As it was found, before anybody said anything.
+            url: The bridge that the robot is behind.
+            findings: The findings of that bridge.
+            robot: The robot as found, before any settings.
 
         """
         fixed = self.fixed(url, robot)
@@ -216,14 +217,14 @@ class Overruling:
         return Layers(tuple(kept), others)
 
     def names(self, name: str) -> bool:
-        """Tell whether a person said that a robot is called so."""
+        """Return whether a setting gives a robot this name."""
         return any(
             setting.key == "name" and same_name(setting.values[0]) == same_name(name)
             for setting in self._settings
         )
 
     def findings(self, url: str, findings: Findings) -> Findings:
-        """Return what is behind a bridge with what was said of it."""
+        """Return the findings of a bridge with the settings applied."""
         robots = tuple(
             self.apply(url, robot, findings.dialect) for robot in findings.robots
         )
@@ -233,12 +234,12 @@ class Overruling:
         """Return a sentence for each setting whose robot is not there yet.
 
         Args:
-            names: The robots that were found or told, as they are called without
-                any setting.
-            all_known: Whether every bridge was asked, so that nobody is missing.
+            names: The robots that were found or given, by their names without any
+                setting.
+            all_known: Whether every bridge has answered, so that no robot is missing.
 
         Raises:
-            ConfigError: If nobody is missing, and still there is no such robot.
+            ConfigError: If every bridge has answered and there is no such robot.
 
         """
         known = list(names)
@@ -263,10 +264,10 @@ class Overruling:
 
 
 class Watched(Overruling):
-    """Has no settings, so that every robot stays as discovery found it.
+    """No settings: every robot stays as discovery found it.
 
     Args:
-        name: What a robot is called that has no name of its own.
+        name: Name of a robot that has no name of its own.
 
     """
 
@@ -277,12 +278,12 @@ class Watched(Overruling):
     def apply(
         self, url: str, robot: FoundRobot, dialect: str | None = None
     ) -> FoundRobot:
-        """Return a robot that was found without all that would move it.
+        """Return a robot that was found without everything that could move it.
 
         Args:
-            url: The bridge that it is behind.
-            robot: As it was found.
-            dialect: That of the bridge.
+            url: The bridge that the robot is behind.
+            robot: The robot as found.
+            dialect: Dialect of the bridge.
 
         """
         guesses = {
@@ -292,14 +293,15 @@ class Watched(Overruling):
         return replace(robot, guesses=guesses, name=name)
 
     def fixed(self, url: str, robot: FoundRobot) -> frozenset[str]:
-        """Return the roles that no topic that comes later may have."""
+        """Return the roles that later topics may not take."""
         return frozenset(MOTION)
 
 
 def shared_map(found: FoundRobot) -> str:
     """Return the map that robots share, or that --set names; empty if there is none.
 
-    It is shown before anything else of the robot. A map of its own comes with it.
+    It is shown before anything else of the robot. A robot's own map comes with the
+    robot.
     """
     guess = found.first("map")
     if guess is None:
@@ -312,7 +314,7 @@ def shared_map(found: FoundRobot) -> str:
 def _overruled(
     robot: FoundRobot, settings: Sequence[Setting], dialect: str | None
 ) -> FoundRobot:
-    """Return a robot with what was said of it."""
+    """Return a robot with its settings applied."""
     guesses = dict(robot.guesses)
     dialect = dialect or _dialect(robot)
     for setting in settings:
@@ -327,10 +329,10 @@ def _overruled(
             if said:
                 guesses[role] = said
             if role == "odometry":
-                # No other source of its place is meant then.
+                # The setting excludes every other source of the pose.
                 guesses.pop("pose", None)
     for setting in settings:
-        # Of the topic that is used in the end, whatever was said first.
+        # Applies to the final topic, whatever the order of the settings.
         if setting.key == "velocity_type" and guesses.get("velocity"):
             first, *others = guesses["velocity"]
             rule = f"{first.rule}, its type {RULE}".removeprefix(", ")
@@ -352,7 +354,7 @@ def _guesses(
 ) -> tuple[Guess, ...]:
     types = {guess.topic: guess.type for guess in found}
     if role == "action":
-        # The dialect tells which of the actions it is, as nothing else does.
+        # Only the dialect distinguishes the two kinds of actions.
         tail = next(
             tail for tail in ACTIONS if (tail == "/goal") == (dialect == "ros1")
         )

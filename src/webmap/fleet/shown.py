@@ -1,4 +1,4 @@
-"""The robots that ``webmap view`` shows, and how they change by what is found."""
+"""The robots that ``webmap view`` shows, and how findings change them."""
 
 import logging
 from collections.abc import Iterable, Mapping, Sequence
@@ -43,24 +43,24 @@ PARTS: Mapping[Role, str] = {
     "camera": "cameras",
     "tf": "tf",
 }
-"""Roles that a robot which is shown takes up, and the part of the configuration."""
+"""Roles that a shown robot can gain later, and their part of the configuration."""
 
 
 @dataclass(slots=True, eq=False)
 class ShownRobot:
-    """A robot that is shown, whether it was found or told."""
+    """A robot that is shown, found or given by hand."""
 
     bridge: "Bridge"
     found: FoundRobot
     robot: "Robot"
     config: RobotConfig
-    """What it is configured with by now."""
+    """Its configuration now."""
 
     topics: set[str] = field(default_factory=set)
-    """What was drawn of it, or was said not to be drawn."""
+    """Topics that are drawn, or that were reported as not drawn."""
 
     def change(self, config: RobotConfig) -> Mistakes:
-        """Configure the robot anew by what differs; return what is wrong."""
+        """Configure the parts of the robot that differ; return the mistakes."""
         old, self.config = self.config, config
         with no_scope():
             return apply(self.robot, old, config, {self.bridge.url: self.bridge})
@@ -73,20 +73,20 @@ class ShownRobot:
         return {way[0] for way, _ in mistakes}
 
     def news_of_topics(self, topics: Iterable[str]) -> list[str]:
-        """Return the topics that are named for the first time."""
+        """Return the topics that are new since the last call."""
         new = [topic for topic in topics if topic not in self.topics]
         self.topics.update(new)
         return new
 
     def move(self, tf: TfConfig | None, frame: str) -> str:
-        """Draw the robot in the frames that are known of it now.
+        """Draw the robot in its newest known frames.
 
         Args:
             tf: The frames that it is drawn by.
-            frame: The frame of its map, in which goals and its place are told.
+            frame: The frame of its map, used for its goals and its initial pose.
 
         Returns:
-            What is new, in a sentence for people; empty if all was so already.
+            What is new, in a sentence for people; empty if nothing changed.
 
         """
         config, before = self.config, self.robot.tf
@@ -108,12 +108,12 @@ class ShownRobot:
 
 
 class ShownRobots:
-    """Robots that are found, made and shown as they come.
+    """Makes and shows robots when they are found.
 
     Args:
-        console: Where they are shown.
-        overruling: What was said of robots better than it is guessed.
-        told: Robots that were told by hand; each takes the place of one found.
+        console: The console that shows them.
+        overruling: Settings that replace guesses.
+        told: Robots that were given by hand; each replaces one that is found.
         grid: Whether the robots' own maps are shown under them.
 
     """
@@ -143,7 +143,7 @@ class ShownRobots:
         return self._places.get((bridge, namespace))
 
     def add(self, robot: Candidate) -> None:
-        """Make one more robot, with what was found of it, and show it."""
+        """Make and show one more robot, with its findings."""
         bridge, found = robot
         self._show_map(robot)
         self._names.add(same_name(found.name))
@@ -156,21 +156,21 @@ class ShownRobots:
         self._console.add(made)
 
     def came(self, news: News, bridge: "Bridge") -> None:
-        """Show news, and say so on standard error.
+        """Show news, and report it on standard error.
 
-        A newcomer whose name is taken has its bridge behind the name. A robot that was
-        told by hand is no news.
+        If the name of a new robot is taken, the name of its bridge is added. A robot
+        that was given by hand is no news.
 
         Args:
-            news: What is new.
-            bridge: The bridge that it is behind.
+            news: The news.
+            bridge: The bridge that the robot is behind.
 
         """
         robot = Candidate(bridge, self.overruling.apply(bridge.url, news.robot))
         self._show_map(robot)
         if news.roles or news.moved:
             shown = self.get(bridge, robot.found.namespace)
-            if shown is not None:  # else it was told by hand, with all that it has
+            if shown is not None:  # else it was given by hand, with all its topics
                 for sentence in self._update(shown, robot.found, news):
                     notify(sentence)
             return
@@ -186,14 +186,14 @@ class ShownRobots:
     def draw(
         self, shown: ShownRobot, layers: Iterable[FoundLayer], namespace: str
     ) -> None:
-        """Draw what is new among the topics of a robot, and its trail.
+        """Draw the new topics of a robot, and its trail.
 
-        What robots share is drawn once for all. What cannot be drawn is logged.
+        A topic that robots share is drawn once. What cannot be drawn is logged.
 
         Args:
             shown: The robot.
-            layers: What is drawn of it.
-            namespace: The one that its own topics are in.
+            layers: Its layers.
+            namespace: The namespace of its own topics.
 
         """
         found = {layer.topic: layer for layer in layers}
@@ -229,10 +229,10 @@ class ShownRobots:
             self._console.add_grid(robot.bridge, topic)
 
     def _update(self, shown: ShownRobot, found: FoundRobot, news: News) -> list[str]:
-        """Change a robot by what is found of it now, and return what is new of it.
+        """Change a robot by its newest findings, and return sentences about the news.
 
-        What is drawn already as one of its layers is not drawn once more. All else
-        stays as it is: a change of what moves the robot would end its lease.
+        A topic that is already drawn as a layer is not drawn again. Everything else
+        stays as it is: a change of a topic that moves the robot would end its lease.
         """
         bridge = shown.bridge
         fixed = self.overruling.fixed(bridge.url, news.robot)

@@ -1,4 +1,4 @@
-"""Robots that are told by hand, and what else they have behind their bridges."""
+"""Robots that are given by hand, and their other topics behind the bridges."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,7 +21,7 @@ FORM = "NAME:ODOM:CMD_VEL:SCAN, as in Bob:/odom:/cmd_vel:/scan"
 APART = "names differ by more than case and Unicode form"
 
 TOLD: tuple[Role, ...] = ("odometry", "velocity", "scan")
-"""What the form has a place for."""
+"""The roles in a value of ``--robot``."""
 
 WHERE: tuple[Role, ...] = ("odometry", "pose")
 
@@ -29,7 +29,7 @@ _PART = re.compile(PARTS)
 
 
 class Candidate(NamedTuple):
-    """A robot, found or told, and the bridge that it is behind."""
+    """A robot, found or given by hand, and the bridge that it is behind."""
 
     bridge: "Bridge"
     found: FoundRobot
@@ -37,7 +37,7 @@ class Candidate(NamedTuple):
     def is_also(self, other: "Candidate") -> bool:
         """Return whether two candidates are one robot.
 
-        They are if they have a name, an odometry topic or a velocity topic in common.
+        They are if their names, odometry topics or velocity topics are equal.
         """
         if self.bridge is not other.bridge:
             return False
@@ -50,16 +50,16 @@ class Candidate(NamedTuple):
 
 
 def parse_robot(text: str, bridges: Sequence["Bridge"]) -> Candidate:
-    """Read a robot as a person writes it on the command line.
+    """Read a robot from the command line.
 
     Args:
         text: ``NAME:ODOM:CMD_VEL:SCAN``; topics may be empty, and empty ones at the
-            end left out. ``2@`` before the name says that the robot is behind the
-            second bridge.
-        bridges: The bridges there are.
+            end may be left out. ``2@`` before the name means that the robot is behind
+            the second bridge.
+        bridges: All bridges.
 
     Raises:
-        ConfigError: If the text is not of that form, or there is no such bridge.
+        ConfigError: If the text has another form, or there is no such bridge.
 
     """
     number, _, rest = (
@@ -79,10 +79,10 @@ def parse_robot(text: str, bridges: Sequence["Bridge"]) -> Candidate:
 
 
 def check_name(name: str, where: str) -> None:
-    """Refuse a name that cannot stand in a list.
+    """Refuse a name that does not fit into a list.
 
     Raises:
-        ConfigError: If it has more than a line, or is very long.
+        ConfigError: If it has more than one line, or is very long.
 
     """
     if not is_name(name):
@@ -92,7 +92,7 @@ def check_name(name: str, where: str) -> None:
 
 
 def set_twice(name: str) -> ConfigError:
-    """Return the refusal of a ``--set`` by which two robots would have one name."""
+    """Return the error for a ``--set`` that gives two robots the same name."""
     return ConfigError(f"--set: two robots would be called {name!r}; {APART}")
 
 
@@ -100,12 +100,12 @@ def told_robots(texts: Iterable[str], bridges: Sequence["Bridge"]) -> list[Candi
     """Return the robots of ``--robot``.
 
     Args:
-        texts: As they were written.
-        bridges: The bridges there are.
+        texts: The values of ``--robot``.
+        bridges: All bridges.
 
     Raises:
-        ConfigError: If one is not of the right form, or two are taken for one: by
-            their names, or by what they are driven with.
+        ConfigError: If one has another form, or two have the same name or the same
+            velocity topic.
 
     """
     told: list[Candidate] = []
@@ -136,24 +136,24 @@ def _differ(robot: Candidate, other: Candidate, text: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """What can be drawn of a robot that was told."""
+    """The drawable topics of a robot that was given by hand."""
 
     found: FoundRobot | None
-    """The same robot as discovery has it, if it does."""
+    """The same robot as discovery found it, if it did."""
 
     namespace: str
     layers: Layers
 
 
 def offer(told: FoundRobot, topics: Mapping[str, str], findings: Findings) -> Offer:
-    """Return what can be drawn of a robot that was told.
+    """Return the drawable topics of a robot that was given by hand.
 
-    Scans are as they were said, so no other one is among it.
+    Scans are only those that were given, so the result has none.
 
     Args:
         told: The robot.
         topics: Types by topic, behind its bridge.
-        findings: What discovery makes of those.
+        findings: The findings of the bridge.
 
     """
     found = same_robot(told, findings.robots)
@@ -168,7 +168,8 @@ def offer(told: FoundRobot, topics: Mapping[str, str], findings: Findings) -> Of
 def same_robot(told: FoundRobot, robots: Iterable[FoundRobot]) -> FoundRobot | None:
     """Return the found robot that is the one given by hand.
 
-    One of its topics says so, also one that is not the best of its role; else its name.
+    They are the same if one of the found topics is given, also one that is not the
+    best of its role; else by name.
     """
     there = tuple(robots)
     for robot in there:
@@ -180,9 +181,9 @@ def same_robot(told: FoundRobot, robots: Iterable[FoundRobot]) -> FoundRobot | N
 
 
 def namespace_of(told: FoundRobot) -> str:
-    """Return the namespace that the topics of a robot have in common.
+    """Return the common namespace of a robot's topics.
 
-    Names of parts of a robot at its end belong to the part.
+    Names of robot parts at its end belong to the part.
     """
     spaces = [_plain(topic).split("/")[1:-1] for topic in _said(told)]
     common: list[str] = []
@@ -213,5 +214,5 @@ def _has(robot: FoundRobot, roles: tuple[Role, ...], topic: str) -> bool:
 def _plain(topic: str) -> str:
     try:
         return normalise_topic(topic)
-    except ConfigError:  # the robot itself will say so
+    except ConfigError:  # the robot itself reports the error
         return topic

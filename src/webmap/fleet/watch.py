@@ -1,4 +1,4 @@
-"""Looking again and again what is behind a bridge: robots and what is drawn of them."""
+"""Queries a bridge periodically for new robots and for topics to draw."""
 
 import asyncio
 import logging
@@ -27,22 +27,22 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.cli")
 
 PERIOD = 5.0
-"""Seconds between two looks for robots."""
+"""Seconds between two searches for robots."""
 
 SOON, LATER = 1.0, 15.0
-"""Seconds between two looks for what is drawn: until something was found, and from then
-on."""
+"""Seconds between two searches for topics to draw: until some are found, and after
+that."""
 
 LONGEST = 60.0
-"""Seconds between two looks at a bridge that does not answer: each costs a call."""
+"""Seconds between two queries to a bridge that does not answer; each costs a call."""
 
 
 class Looking(ABC):
-    """Takes the topics behind a bridge now and then; a service of the process.
+    """Queries the topics behind a bridge periodically; a service of the process.
 
     Args:
         bridge: The bridge.
-        topics: Types by topic, where the bridge cannot be asked for them.
+        topics: Types by topic, if the bridge does not list them.
 
     """
 
@@ -57,18 +57,18 @@ class Looking(ABC):
     @property
     @abstractmethod
     def period(self) -> float:
-        """Seconds between two looks from now on."""
+        """Seconds until the next query."""
 
     @abstractmethod
     async def take(self, topics: dict[str, str]) -> None:
-        """Make something of the types by topic."""
+        """Process the types by topic."""
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begin to look."""
+        """Start the queries."""
         self._task = loop.create_task(self._look_on())
 
     async def stop(self) -> None:
-        """Look no more."""
+        """Stop the queries."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait([self._task])
@@ -97,14 +97,14 @@ class Looking(ABC):
 
 
 class LookingForRobots(Looking):
-    """Looks again and again which robots are behind a bridge.
+    """Searches periodically for robots behind a bridge.
 
-    Their topics tell, and the frames that are heard for a moment at each look.
+    It uses their topics and the frames received for a short time at each search.
 
     Args:
         bridge: The bridge.
         known: The robots that are shown already.
-        came: Called with what is new.
+        came: Called with the news.
 
     """
 
@@ -121,13 +121,13 @@ class LookingForRobots(Looking):
         self._came = came
 
     async def take(self, topics: dict[str, str]) -> None:
-        """Tell what is new among the robots."""
+        """Report new robots and new topics of robots."""
         trees = await late_frames(self.bridge).listen(topics)
         found = discover(topics, host_name(self.bridge.url), trees)
         for news in self._newcomers.look(found):
             try:
                 self._came(news, self.bridge)
-            except Exception:  # the others are news now and never again
+            except Exception:  # the other news is reported only once
                 log.exception(
                     "%s: what is new of %s is not shown",
                     self.bridge.url,
@@ -136,13 +136,13 @@ class LookingForRobots(Looking):
 
 
 class LookingForLayers(Looking):
-    """Looks again and again what can be drawn of the robots behind a bridge.
+    """Searches periodically for topics to draw of the robots behind a bridge.
 
     Args:
         bridge: The bridge.
-        shown: The robots that are found and shown; more may come.
-        told: Those that were told by hand, of which more is drawn than was told.
-        topics: Types by topic, where the bridge cannot be asked for them.
+        shown: The robots that are found and shown; more may be added.
+        told: Robots given by hand, of which more is drawn than the given topics.
+        topics: Types by topic, if the bridge does not list them.
 
     """
 
@@ -162,13 +162,13 @@ class LookingForLayers(Looking):
 
     @property
     def period(self) -> float:
-        """Seconds between two looks from now on."""
+        """Seconds until the next query."""
         return LATER if self._has_drawn else SOON
 
     async def take(self, topics: dict[str, str]) -> None:
-        """Draw what is new among the topics behind the bridge."""
+        """Draw the new topics behind the bridge."""
         frames = late_frames(self.bridge)
-        if self._told:  # they hear them anyway, once they are drawn by them
+        if self._told:  # robots drawn by frames receive them anyway
             await frames.listen(topics)
         url, said = self.bridge.url, self._shown.overruling
         behind = discover(topics, host_name(url), frames.trees)
@@ -183,11 +183,11 @@ class LookingForLayers(Looking):
             self._draw(robot, layers, space, _cameras_left_out(robot, one))
 
     def _take_told(self, topics: dict[str, str], behind: Findings) -> None:
-        """Draw what is new of the robots that were told by hand."""
+        """Draw the new topics of the robots that were given by hand."""
         taken: set[str] = set()
         for robot in self._told:
             offered = offer(robot.found, topics, behind)
-            if offered.namespace in taken:  # what is in it is drawn once
+            if offered.namespace in taken:  # the topics of a namespace are drawn once
                 self._draw(robot, Layers(), offered.namespace)
                 continue
             taken.add(offered.namespace)
@@ -195,7 +195,7 @@ class LookingForLayers(Looking):
             self._draw(robot, offered.layers, offered.namespace)
 
     def _place(self, robot: "ShownRobot", offered: Offer) -> None:
-        """Draw a robot in the frame of the map, as one that was found is."""
+        """Draw a robot in the frame of the map, like a found robot."""
         found, known = offered.found, self._placed.get(robot)
         if (
             found is None
@@ -218,12 +218,12 @@ class LookingForLayers(Looking):
         namespace: str,
         cameras: Sequence[str] = (),
     ) -> None:
-        """Draw what is new, and say once what is left out, which costs the link much.
+        """Draw new topics, and report once those left out because of their data rate.
 
         Args:
             robot: The robot.
             layers: Its layers.
-            namespace: The one that its own topics are in.
+            namespace: The namespace of its own topics.
             cameras: Topics of cameras that are left out.
 
         """
@@ -239,13 +239,13 @@ class LookingForLayers(Looking):
 
 
 def on_page(layers: Layers, grid: bool) -> Layers:
-    """Return the layers without maps, where a floor plan is in their place."""
+    """Return the layers, without maps if a floor plan replaces them."""
     drawn = [layer for layer in layers.drawn if grid or role_of(layer) != "map"]
     return Layers(tuple(drawn), layers.left_out)
 
 
 def _cameras_left_out(robot: "ShownRobot", found: FoundRobot) -> list[str]:
-    """Return the topics of cameras that are not shown, since there are enough."""
+    """Return the topics of cameras beyond the number that is shown."""
     shown = {camera.topic for camera in robot.config.cameras}
     if len(shown) < MOST_CAMERAS:
         return []

@@ -1,4 +1,4 @@
-"""Goals: ROS 1's move_base action by topics, and ROS 2's navigate_to_pose."""
+"""Goals: ROS 1's move_base action through topics, and ROS 2's navigate_to_pose."""
 
 import uuid
 from collections.abc import Callable
@@ -17,7 +17,7 @@ _ACTIONLIB_STATUS = {
 }
 _REJECTED = 5
 _KEPT = 5.0
-"""Seconds for which a goal that ended stays in the status, as actionlib does."""
+"""Seconds for which an ended goal stays in the status, as in actionlib."""
 
 
 class _Tracked:
@@ -33,7 +33,7 @@ class _Tracked:
 
 
 class ActionlibServer:
-    """Takes goals and cancels by topic, and says how they go."""
+    """Receives goals and cancels by topic, and publishes their progress."""
 
     def __init__(self, node: Node, index: int, prefix: str) -> None:
         self.node = node
@@ -43,7 +43,7 @@ class ActionlibServer:
         self._made = 0
 
     def start(self) -> None:
-        """Advertise and subscribe the topics."""
+        """Advertise and subscribe to the topics."""
         graph, owner, name = self.node.graph, self.node, "/robots"
         kind = "move_base_msgs/MoveBaseAction"
         for part, type_name in (
@@ -107,13 +107,13 @@ class ActionlibServer:
         wanted, stamp = publication.message["id"], publication.message["stamp"]
         before = _seconds(stamp)
         for tracked in self._goals:
-            # An empty id and a stamp: all goals up to then. Neither: all goals.
+            # An empty id with a stamp: all goals up to it. No stamp: all goals.
             everything = not wanted and not before
             earlier = before and _seconds(tracked.goal_id["stamp"]) <= before
             if everything or earlier or (wanted and tracked.goal_id["id"] == wanted):
                 self._cancel(tracked)
         if not wanted and not before:
-            # What came by the simple topic ends too.
+            # A goal from the simple topic ends too.
             self.node.world.navigators[self.index].cancel("canceled")
 
     def _cancel(self, tracked: _Tracked) -> None:
@@ -160,7 +160,7 @@ OnResult = Callable[[int, dict[str, Any]], None]
 
 
 class NavigateToPose:
-    """Takes goals from sockets, each with a handle that only its sender has."""
+    """Receives goals from sockets, each with a handle for its sender only."""
 
     type = "nav2_msgs/NavigateToPose"
 
@@ -171,7 +171,7 @@ class NavigateToPose:
         self._running: dict[bytes, _Handle] = {}
 
     def start(self) -> None:
-        """Put the action and its cancel service into the graph."""
+        """Register the action and its cancel service in the graph."""
         self.node.graph.actions[self.action] = self
         self.node.graph.serve(
             self.node,
@@ -191,7 +191,7 @@ class NavigateToPose:
     def send_goal(
         self, goal: dict[str, Any], on_feedback: OnFeedback, on_result: OnResult
     ) -> GoalHandle:
-        """Drive to a goal; the one before ends as canceled."""
+        """Drive to a goal; the previous one ends as canceled."""
         handle = _Handle(self, on_feedback, on_result, self.node.world.now)
         target = self.node.target(goal["pose"], self.index)
         if target is None:
@@ -203,7 +203,7 @@ class NavigateToPose:
         return handle
 
     def forget(self, handle: "_Handle") -> None:
-        """Let go of a goal that ended."""
+        """Remove an ended goal."""
         self._running.pop(handle.uuid, None)
 
     def _on_cancel(self, request: dict[str, Any], respond: Respond) -> None:
@@ -218,7 +218,7 @@ class NavigateToPose:
         if not chosen:
             code = _ERROR_REJECTED if wanted == _NOBODY else _ERROR_UNKNOWN_GOAL
         if wanted == _NOBODY:
-            # What came by a topic ends too.
+            # A goal from a topic ends too.
             self.node.world.navigators[self.index].cancel("canceled")
         for handle in chosen:
             handle.cancel()

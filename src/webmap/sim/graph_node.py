@@ -1,4 +1,4 @@
-"""A ROS node of the simulator: a world, and the graph that its topics are in."""
+"""A ROS node of the simulator: a world, and the graph with its topics."""
 
 import logging
 from collections.abc import Callable
@@ -20,8 +20,8 @@ class Node:
     Args:
         world: The robots.
         graph: The ROS graph with their topics.
-        tilted: Whether their lasers hang upside down, and they have a depth camera
-            whose cloud is in its optical frame.
+        tilted: Whether their lasers are mounted upside down, and they have a depth
+            camera whose cloud is in its optical frame.
 
     """
 
@@ -34,7 +34,7 @@ class Node:
         """Called five times a second: the actions report the state of their goals."""
 
     def target(self, pose_stamped: dict[str, Any], index: int) -> Pose | None:
-        """Return a goal in the map's frame; None if it is in no frame we know."""
+        """Return a goal in the map's frame; None if its frame is unknown."""
         at = read_pose(pose_stamped["pose"])
         frame = pose_stamped["header"]["frame_id"].strip("/")
         robot = self.world.robots[index]
@@ -50,9 +50,9 @@ class Node:
         self.graph.publish(self, topic, message)
 
     def advertise(self, topic: str, type_name: str, *, latch: bool = False) -> None:
-        """Let this node publish on a topic."""
+        """Advertise a topic of this node."""
         self.graph.advertise(self, topic, type_name, node=NODE, latch=latch)
 
     def subscribe(self, topic: str, type_name: str, callback: Deliver) -> None:
-        """Let this node hear a topic."""
+        """Subscribe this node to a topic."""
         self.graph.subscribe(self, topic, callback, type_name, node=NODE)

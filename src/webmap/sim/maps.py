@@ -1,4 +1,4 @@
-"""Floor plans in the form of ROS's map_server: a YAML file and an image."""
+"""Floor plans in the format of ROS's map_server: a YAML file and an image."""
 
 import math
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ FREE, OCCUPIED, UNKNOWN = 0, 100, -1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorPlan:
-    """A grid of cells as ``nav_msgs/OccupancyGrid`` has it."""
+    """A grid of cells, as in ``nav_msgs/OccupancyGrid``."""
 
     occupancy: NDArray[np.int8]
     """Of shape (rows, columns), the lowest row first: 0 to 100, or -1 unknown."""
@@ -33,17 +33,17 @@ class FloorPlan:
     """The lower edge of the first row, in metres."""
 
     image: Path | None = None
-    """The file it was read from."""
+    """The file that it was read from."""
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Return the row and the column that hold a point, perhaps outside."""
+        """Return the row and the column of a point, which may be outside."""
         return (
             math.floor((y - self.y) / self.resolution),
             math.floor((x - self.x) / self.resolution),
         )
 
     def center(self, row: int, column: int) -> tuple[float, float]:
-        """Return the middle of a cell, in metres."""
+        """Return the center of a cell, in metres."""
         return (
             self.x + (column + 0.5) * self.resolution,
             self.y + (row + 0.5) * self.resolution,
@@ -54,10 +54,10 @@ def load_map(path: Path | str) -> FloorPlan:
     """Return the floor plan of a map_server YAML file.
 
     Args:
-        path: Of the YAML file. Its image must lie in the same folder or below.
+        path: The YAML file. Its image must be in the same folder or below.
 
     Raises:
-        ConfigError: If a file is missing, or says something that makes no map.
+        ConfigError: If a file is missing or invalid.
 
     """
     path = Path(path)

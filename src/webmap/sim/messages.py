@@ -1,4 +1,4 @@
-"""What the simulated robots say, as ROS messages in one dialect."""
+"""The messages of the simulated robots, in one dialect of ROS."""
 
 import math
 from typing import Any
@@ -25,18 +25,18 @@ _DISCHARGING, _LITHIUM_ION, _GOOD = 2, 2, 1
 
 
 class Messages:
-    """Builds messages; headers are numbered by topic where the dialect does.
+    """Builds messages; headers are numbered by topic if the dialect numbers them.
 
     Args:
-        dialect: Of the graph.
-        nan: Whether covariances carry a NaN, as some drivers' do.
+        dialect: The dialect of the graph.
+        nan: Whether covariances contain a NaN, as with some drivers.
 
     """
 
     def __init__(self, dialect: Dialect, *, nan: bool = False) -> None:
         self.dialect = dialect
         self.mounted = {"base_laser": mount(0.0, LASER_HEIGHT)}
-        """Frames of sensors, and where they are on the base."""
+        """Frames of sensors, and their poses on the base."""
         self._covariance = _COVARIANCE.copy()
         if nan:
             self._covariance[1] = math.nan
@@ -89,7 +89,7 @@ class Messages:
         }
 
     def battery(self, topic: str, stamp: float, robot: Robot) -> Message:
-        """Return ``sensor_msgs/BatteryState``; NaN is what nobody measures."""
+        """Return ``sensor_msgs/BatteryState``; unmeasured values are NaN."""
         nothing = np.empty(0, np.float32)
         return {
             "header": self.dialect.header(topic, stamp, f"{robot.frames}base_link"),
@@ -111,7 +111,7 @@ class Messages:
         }
 
     def path(self, topic: str, stamp: float, points: list[Point]) -> Message:
-        """Return ``nav_msgs/Path`` in the map's frame, headed from point to point."""
+        """Return ``nav_msgs/Path`` in the map's frame; each pose points to the next."""
         header = self.dialect.header(topic, stamp, "map")
         poses = []
         for i, (x, y) in enumerate(points):
@@ -127,13 +127,13 @@ class Messages:
     def transforms(
         self, topic: str, stamp: float, robots: list[Robot], believed: list[Pose]
     ) -> Message:
-        """Return ``tf2_msgs/TFMessage`` with each robot's map to odom to base.
+        """Return ``tf2_msgs/TFMessage`` of each robot from map to odom to base.
 
         Args:
-            topic: It goes out on.
+            topic: The topic of the message.
             stamp: In seconds.
             robots: The robots.
-            believed: Where each takes itself to be on the map.
+            believed: The estimated pose of each robot on the map.
 
         """
         found = []
@@ -151,7 +151,7 @@ class Messages:
     def static_transforms(
         self, topic: str, stamp: float, robots: list[Robot]
     ) -> Message:
-        """Return where the sensors sit on the base."""
+        """Return the transforms of the sensors on the base."""
         return {
             "transforms": [
                 self._transform(
@@ -183,9 +183,9 @@ class Messages:
         """Return ``nav_msgs/OccupancyGrid``.
 
         Args:
-            topic: It goes out on.
+            topic: The topic of the message.
             stamp: In seconds.
-            frame: That it lies in.
+            frame: The frame of the grid.
             cells: Of shape (rows, columns), the lowest row first.
             resolution: The side of a cell, in metres.
             place: Its lower left corner, in metres.
@@ -224,7 +224,7 @@ def pose(at: Pose) -> Message:
 
 
 def read_pose(message: Message) -> Pose | None:
-    """Return a ``geometry_msgs/Pose`` in the plane; None unless it is finite."""
+    """Return a ``geometry_msgs/Pose`` in the plane; None if it is not finite."""
     position, turn = message["position"], message["orientation"]
     rotation = Quaternion(turn["x"], turn["y"], turn["z"], turn["w"])
     at = Pose(position["x"], position["y"], rotation.yaw)
@@ -232,16 +232,16 @@ def read_pose(message: Message) -> Pose | None:
 
 
 def vector(x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Message:
-    """Return ``geometry_msgs/Vector3``, which ``Point`` is like."""
+    """Return ``geometry_msgs/Vector3``, which has the fields of ``Point``."""
     return {"x": x, "y": y, "z": z}
 
 
 def quaternion(yaw: float) -> Message:
-    """Return ``geometry_msgs/Quaternion`` of a turn about z, in radians."""
+    """Return ``geometry_msgs/Quaternion`` of a rotation about z, in radians."""
     turn = Quaternion.from_yaw(yaw)
     return {"x": turn.x, "y": turn.y, "z": turn.z, "w": turn.w}
 
 
 def float32(value: float) -> float:
-    """Return the nearest value that the message's field can hold."""
+    """Return the nearest value that a float32 field can store."""
     return float(np.float32(value))

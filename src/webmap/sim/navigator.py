@@ -1,4 +1,4 @@
-"""A robot's own driver: plans a path to a goal, follows it, and may be stopped."""
+"""A robot's own navigation: plans a path to a goal, follows it, and can be stopped."""
 
 import itertools
 import math
@@ -28,7 +28,7 @@ Discs = Sequence[tuple[float, float, float]]
 
 
 class GoalState(Enum):
-    """How a goal goes."""
+    """State of a goal."""
 
     ACTIVE = "active"
     SUCCEEDED = "succeeded"
@@ -37,7 +37,7 @@ class GoalState(Enum):
 
 
 class Goal:
-    """A pose to drive to, in the map's frame, and who hears of its end."""
+    """A pose to drive to, in the map's frame, and a callback for its end."""
 
     def __init__(
         self, pose: Pose, on_end: Callable[["Goal"], None] | None = None
@@ -49,7 +49,7 @@ class Goal:
         self._on_end = on_end
 
     def end(self, state: GoalState, text: str) -> None:
-        """Close the goal, once."""
+        """End the goal, once."""
         if self.state is GoalState.ACTIVE:
             self.state, self.text = state, text
             if self._on_end:
@@ -64,11 +64,11 @@ class Navigator:
         self.planner = planner
         self.goal: Goal | None = None
         self.path: list[Point] = []
-        """What it follows, in the map's frame; empty without a path."""
+        """The path that it follows, in the map's frame; empty without a path."""
         self.path_changes = 0
-        """Grows with every new path, and when one ends."""
+        """Increases with every new path, and when one ends."""
         self.recoveries = 0
-        """How often it got stuck on the way to its goal and looked for another way."""
+        """How often it got stuck on the path to its goal and planned again."""
         self._search: Iterator[list[Point] | None] | None = None
         self._plans = 0
         self._next = 0
@@ -78,7 +78,7 @@ class Navigator:
         self._patience = self._random.uniform(*_PATIENCE)
 
     def send(self, goal: Goal) -> None:
-        """Drive to a goal, instead of what it drove to before."""
+        """Drive to a goal, which replaces the previous one."""
         self.cancel("another goal came")
         self.goal = goal
         self.recoveries = 0
@@ -101,10 +101,10 @@ class Navigator:
 
     @property
     def steers_to(self) -> Point | None:
-        """Where it steers to, in the map's frame; None without a path.
+        """The point that it steers to, in the map's frame; None without a path.
 
-        It is on the way to the next corner, and never farther ahead than what a
-        controller looks at.
+        The point is on the line to the next corner, and at most at the look-ahead
+        distance.
         """
         if not self.path:
             return None
@@ -115,16 +115,16 @@ class Navigator:
 
     @property
     def must_plan(self) -> bool:
-        """Whether it has a goal and looks for a way to it."""
+        """Whether it has a goal and no path yet."""
         return self.goal is not None and not self.path
 
     def step(self, dt: float, discs: Discs, *, may_plan: bool = True) -> None:
-        """Go on with the goal.
+        """Continue the goal.
 
         Args:
             dt: Seconds since the last step.
             discs: The other robots, as x, y and radius.
-            may_plan: Whether a slice of the search for a path may be done.
+            may_plan: Whether it may do one slice of the search for a path.
 
         """
         if self.goal is None:
@@ -147,7 +147,7 @@ class Navigator:
                 return
             self._plans += 1
             radius = self.robot.options.radius
-            # Who is close cannot be planned around, only waited for.
+            # A robot that is very close cannot be avoided by planning, only by waiting.
             others = [
                 (x, y, r + radius + _KEEP_OFF)
                 for x, y, r in discs
@@ -178,7 +178,7 @@ class Navigator:
         if self.robot.travelled - self._planned_at > _PROGRESS:
             self._plans = 0
         if self._stuck_for > self._patience:
-            # Two that meet must not step aside, and aside again, like mirrors.
+            # Random, so that two robots that meet do not avoid each other in step.
             self._patience = self._random.uniform(*_PATIENCE)
             self.recoveries += 1
             self._set_path([])
@@ -194,7 +194,7 @@ class Navigator:
         corner = self.path[self._next]
         bearing = math.atan2(corner[1] - pose.y, corner[0] - pose.x)
         error = normalize_angle(bearing - pose.yaw)
-        # Slow enough at the corner to turn there, not beyond it.
+        # Slow down before the corner, to turn there and not beyond it.
         speed = min(_CRUISE, 0.2 + 1.2 * math.dist(here, corner))
         if abs(error) > _TURN_FIRST or self._must_wait(here, corner, discs):
             speed = 0.0
@@ -209,7 +209,7 @@ class Navigator:
             self._next += 1
 
     def _must_wait(self, here: Point, corner: Point, discs: Discs) -> bool:
-        """Whether another robot stands on the next metre of the way."""
+        """Whether another robot is on the next metre of the path."""
         way = math.dist(here, corner)
         x, y = corner[0] - here[0], corner[1] - here[1]
         for disc_x, disc_y, radius in discs:

@@ -18,10 +18,10 @@ from webmap.sim.world import World
 log = logging.getLogger("webmap.sim")
 
 IMAGE = "camera/image_raw"
-"""What the camera's image is called, below the robot's name."""
+"""Name of the camera's image topic, in the robot's namespace."""
 
 CAMERA = f"{IMAGE}/compressed"
-"""The topic of its pictures, which come as JPEG only."""
+"""Topic of its pictures, which come as JPEG only."""
 
 STEP = 0.025
 """Seconds of one step of the world."""
@@ -33,17 +33,17 @@ _SLOW_EVERY = 40
 
 
 class RobotsNode(Node):
-    """Publishes what robots do, and makes them do what they are told.
+    """Publishes the topics of robots, and passes commands to them.
 
     Args:
         world: The robots.
-        graph: Where their topics are.
-        twist: ``Twist`` or ``TwistStamped``, what ``cmd_vel`` takes.
-        quirks: Of the server, for the services that may hang.
+        graph: The graph with their topics.
+        twist: ``Twist`` or ``TwistStamped``, the type of ``cmd_vel``.
+        quirks: Quirks of the server, for the services that may hang.
         extras: Whether robots have more than odometry, a scan, a battery, a camera
             and plans.
-        tilted: Whether their lasers hang upside down, and they have a depth camera
-            whose cloud is in its optical frame.
+        tilted: Whether their lasers are mounted upside down, and they have a depth
+            camera whose cloud is in its optical frame.
 
     """
 
@@ -70,7 +70,7 @@ class RobotsNode(Node):
             self.messages.mounted[depth.FRAME] = depth.MOUNTED
 
     def start(self) -> None:
-        """Advertise, subscribe and serve everything."""
+        """Advertise topics, subscribe to topics and serve services."""
         self._publish_fixed()
         self.advertise("/tf", "tf2_msgs/TFMessage")
         for index, robot in enumerate(self.world.robots):
@@ -110,7 +110,7 @@ class RobotsNode(Node):
         )
 
     def step(self) -> None:
-        """Let the world go on by one step, and publish what is due."""
+        """Advance the world by one step, and publish the messages that are due."""
         self.world.step(STEP)
         self._steps += 1
         if self._steps % _ODOMETRY_EVERY == 0:
@@ -129,7 +129,7 @@ class RobotsNode(Node):
             self._feeds.publish(self._steps)
 
     def believed(self, index: int) -> Pose:
-        """Return where a robot takes itself to be on the map."""
+        """Return the estimated pose of a robot on the map."""
         if self._feeds is None:
             return self.world.robots[index].pose
         return self._feeds.localizations.believed(index)

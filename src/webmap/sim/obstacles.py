@@ -1,4 +1,4 @@
-"""What stands in the way, on a grid: solid cells, and how far they are."""
+"""Obstacles on a grid: solid cells, and the distances to them."""
 
 import math
 
@@ -12,21 +12,21 @@ _FARTHEST = 120
 
 
 class Obstacles:
-    """The solid cells of a floor plan, as rays and bases meet them."""
+    """The solid cells of a floor plan, for rays and bases."""
 
     def __init__(self, plan: FloorPlan) -> None:
         self.plan = plan
         self.solid: NDArray[np.bool_] = plan.occupancy >= _SOLID_FROM
         self.free: NDArray[np.bool_] = (plan.occupancy >= 0) & ~self.solid
         self.steps = chebyshev_distance(self.solid, _FARTHEST)
-        """For each cell, how many cells away the nearest solid one is."""
+        """For each cell, the distance to the nearest solid one, in cells."""
 
     def near(self, distance: float) -> NDArray[np.bool_]:
         """Return the cells that are within ``distance`` metres of a solid one."""
         return dilate(self.solid, distance / self.plan.resolution)
 
     def touches(self, x: float, y: float, radius: float) -> bool:
-        """Whether a disc overlaps a solid cell, or lies beyond the plan."""
+        """Return whether a disc overlaps a solid cell, or is beyond the plan."""
         size = self.plan.resolution
         row, column = self.plan.cell(x, y)
         rows, columns = self.solid.shape
@@ -40,7 +40,7 @@ class Obstacles:
         hit_rows, hit_columns = np.nonzero(window)
         if not len(hit_rows):
             return False
-        # From the disc's middle to the nearest point of each solid square.
+        # From the disc's center to the nearest point of each solid square.
         low_x = self.plan.x + (hit_columns + left) * size
         low_y = self.plan.y + (hit_rows + top) * size
         away_x = np.maximum(np.maximum(low_x - x, x - low_x - size), 0)
@@ -68,7 +68,7 @@ def chebyshev_distance(solid: NDArray[np.bool_], farthest: int) -> NDArray[np.in
 
 
 def dilate(solid: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
-    """Return the cells whose middle is within ``radius`` cells of a solid one's."""
+    """Return the cells whose center is within ``radius`` cells of a solid one's."""
     rows, columns = solid.shape
     reach = min(math.floor(radius), rows - 1)
     grown = np.zeros_like(solid)

@@ -1,4 +1,4 @@
-"""Paths around obstacles: A* on a coarse grid, then the corners that matter."""
+"""Paths around obstacles: A* on a coarse grid, then only the necessary corners."""
 
 import heapq
 import math
@@ -21,9 +21,9 @@ class Planner:
 
     Args:
         obstacles: The floor plan's solid cells.
-        radius: Of the base, in metres.
-        margin: What it keeps off walls beyond its radius, in metres.
-        coarsening: Cells of the plan that make a side of one cell of the search.
+        radius: Radius of the base, in metres.
+        margin: Distance to walls beyond its radius, in metres.
+        coarsening: Number of cells of the plan along a side of a cell of the search.
 
     """
 
@@ -42,7 +42,7 @@ class Planner:
         self._cost = np.where(comfort, _CLEARANCE_COST, 1.0)
 
     def reachable(self, x: float, y: float) -> NDArray[np.bool_]:
-        """Return the cells of the search that a base at a place can get to."""
+        """Return the cells of the search that a base can reach from a point."""
         rows, columns = self.blocked.shape
         width = columns + 2
         waiting = np.pad(~self.blocked, 1).ravel().tolist()
@@ -60,7 +60,7 @@ class Planner:
         return seen.reshape(rows + 2, width)[1:-1, 1:-1]
 
     def center(self, row: int, column: int) -> Point:
-        """Return the middle of a cell of the search, in metres."""
+        """Return the center of a cell of the search, in metres."""
         return (
             self.plan.x + (column + 0.5) * self.size,
             self.plan.y + (row + 0.5) * self.size,
@@ -72,15 +72,15 @@ class Planner:
         goal: Point,
         discs: Sequence[tuple[float, float, float]] = (),
     ) -> Iterator[list[Point] | None]:
-        """Look for a path, a slice of work at a time.
+        """Search for a path, a slice of work at a time.
 
         Args:
-            start: Where the base is, in metres.
-            goal: Where it shall go.
-            discs: Other things in the way, as x, y and radius with this base's own.
+            start: Position of the base, in metres.
+            goal: Position to reach, in metres.
+            discs: Other obstacles, as x, y and radius plus this base's radius.
 
         Yields:
-            None while the search goes on; at last the path, from ``start`` to
+            None while the search continues; finally the path, from ``start`` to
             ``goal``, or an empty list if there is none.
 
         """
@@ -89,7 +89,7 @@ class Planner:
         if not self._holds(last) or not self._holds(first) or blocked[last]:
             yield []
             return
-        # A base that stands too near a wall may leave it.
+        # A base too close to a wall may drive away from it.
         free = ~blocked
         free[first] = True
         for cells in _a_star(free, self._cost, first, last):
@@ -104,7 +104,7 @@ class Planner:
             yield self._straighten(points, free)
 
     def cell(self, x: float, y: float) -> tuple[int, int]:
-        """Return the row and column of the search that hold a place."""
+        """Return the row and column of the search of a point."""
         return (
             math.floor((y - self.plan.y) / self.size),
             math.floor((x - self.plan.x) / self.size),
@@ -131,7 +131,7 @@ class Planner:
         return blocked
 
     def _straighten(self, points: list[Point], free: NDArray[np.bool_]) -> list[Point]:
-        """Return the path without the points that a straight line makes needless."""
+        """Return the path without the points that a straight line can replace."""
         kept = [points[0]]
         at = 0
         while at < len(points) - 1:
@@ -150,7 +150,7 @@ class Planner:
         columns = ((xs - self.plan.x) / self.size).astype(np.intp)
         rough = self._cost[rows, columns] > 1
         clear = free[rows, columns].all()
-        # Along a wall the longer way that A* chose is the better one.
+        # Along a wall the longer path of A* is better.
         return bool(clear and rough.sum() <= 4 + count // 3)
 
 
@@ -169,7 +169,7 @@ def _a_star(
     last: tuple[int, int],
 ) -> Iterator[list[tuple[int, int]] | None]:
     """Yield None after each slice of work, then the cells of the path, if any."""
-    # Flat lists with a blocked rim: indices need no checks, and lists beat arrays.
+    # Flat lists with a blocked border: no bounds checks, and faster than arrays.
     width = free.shape[1] + 2
     open_cells = np.pad(free, 1).ravel().tolist()
     costs = np.pad(cost, 1, constant_values=1.0).ravel().tolist()

@@ -47,40 +47,40 @@ async def run_simulator(
     """Run a simulator until SIGINT, SIGTERM, or ``stop`` is set.
 
     Args:
-        robots: How many, called ``robot_0`` and so on.
-        port: To listen on; 0 lets the kernel choose.
-        seed: Of everything random: the same seed gives the same places.
+        robots: Number of robots, called ``robot_0`` and so on.
+        port: Port to listen on; 0 lets the kernel choose.
+        seed: Seed of everything random: the same seed gives the same positions.
         map: A map_server YAML file; None for the floor that comes with the package.
-        dialect: Whose type names and times the server speaks.
-        twist: What the robots take on ``cmd_vel``.
-        robot_timeout: Seconds without a command until a base stops by itself; None
-            for a bad one that never does.
-        drift: How wrong odometry grows, in metres a metre.
-        nan: Whether scans and covariances hold some NaN.
+        dialect: The dialect of the server's type names and times.
+        twist: The type of ``cmd_vel``.
+        robot_timeout: Command timeout of the bases, in seconds; None for a base that
+            never stops by itself.
+        drift: Growth of the odometry error, in metres per metre.
+        nan: Whether scans and covariances contain some NaN.
         quirks: ``real``, ``polite``, or one of them with changes; see
             :func:`webmap.ros.rosbridge.server.quirks.parse_quirks`.
-        wander: Whether robots that nobody commands drive to random places.
+        wander: Whether robots without commands drive to random places.
         flat: Whether the only robot has its topics without a prefix: ``/odom``.
         extras: Whether robots have costmaps, clouds, footprints, particles, sonars,
-            fixes, markers, diagnostics and logs too. They cost nothing while nobody
-            subscribes.
-        tilted: Whether their lasers hang upside down and, with ``extras``, they have a
-            depth camera whose cloud is in its optical frame.
+            fixes, markers, diagnostics and logs too. They cost nothing without
+            subscribers.
+        tilted: Whether their lasers are mounted upside down and, with ``extras``, they
+            have a depth camera whose cloud is in its optical frame.
         host: The address to listen on.
         refuse_nan: Whether the bases ignore a twist with NaN or infinity.
-        http_camera: Port of the cameras over HTTP, as web_video_server has them; 0
-            lets the kernel choose, None for no such server.
+        http_camera: Port of the cameras over HTTP, like web_video_server; 0 lets the
+            kernel choose, None for no such server.
         on_http_camera: Called with the URL of the first robot's stream, before
             ``on_ready``.
         on_ready: Called with the URL once clients can connect.
         stop: Ends the run when it is set.
 
     Raises:
-        ConfigError: If the map or an option makes no sense, a port is in use, or the
-            address is not this machine's.
+        ConfigError: If the map or an option is invalid, a port is in use, or the
+            address does not belong to this machine.
 
     """
-    # Heavy, and needed by nobody who only imports the name.
+    # Slow to import, and not needed to import this module.
     from webmap.ros.rosbridge.server.dialect import Dialect
     from webmap.ros.rosbridge.server.encode import Encoder
     from webmap.ros.rosbridge.server.graph import Graph
@@ -135,7 +135,7 @@ async def run_simulator(
 
 @contextlib.contextmanager
 def _said_in_words(host: str, port: int) -> Iterator[None]:
-    """Have a port that cannot be listened on be one sentence."""
+    """Turn the error of a port that cannot be opened into one sentence."""
     try:
         yield
     except OSError as error:
@@ -172,7 +172,7 @@ async def _turn_the_clock(node: "RobotsNode", stop: asyncio.Event) -> None:
 
 @contextlib.contextmanager
 def signals_set(stop: asyncio.Event) -> Iterator[None]:
-    """Let SIGINT and SIGTERM end the run, where this thread may say so."""
+    """Let SIGINT and SIGTERM end the run, if this is the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -189,6 +189,6 @@ def signals_set(stop: asyncio.Event) -> Iterator[None]:
 
 
 def end_with_stdin(stop: asyncio.Event) -> None:
-    """Set ``stop`` when standard input ends: whoever started this process is gone."""
+    """Set ``stop`` when standard input ends: the parent process is gone."""
     loop = asyncio.get_running_loop()
     end_with_parent(lambda: loop.call_soon_threadsafe(stop.set))

@@ -1,6 +1,6 @@
-"""A differential-drive base: how it moves, and when it stops by itself.
+"""A differential-drive base: its motion and its command timeout.
 
-One that has a ``z_max`` also moves upward and downward, as an aerial robot does.
+A base with a ``z_max`` also moves upward and downward, like an aerial robot.
 """
 
 import math
@@ -19,10 +19,10 @@ _LOWEST_CHARGE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class BaseOptions:
-    """What a base can do."""
+    """The properties of a base."""
 
     radius: float = 0.25
-    """Of its round footprint, in metres."""
+    """Radius of its round footprint, in metres."""
 
     v_max: float = 1.2
     """Metres per second, forward and backward."""
@@ -40,13 +40,13 @@ class BaseOptions:
     """Radians per second squared."""
 
     timeout: float | None = 0.25
-    """Seconds without a command until it stops by itself; None for a bad robot."""
+    """Seconds without a command until it stops by itself; None if it never does."""
 
     refuse_nan: bool = True
     """Whether a twist with NaN or infinity is ignored, as a good driver does."""
 
     drift: float = 0.0
-    """How wrong the odometry grows: metres (and half as many radians) a metre."""
+    """Growth of the odometry error: metres (and half as many radians) per metre."""
 
 
 class Robot:
@@ -56,37 +56,37 @@ class Robot:
         self, name: str, pose: Pose, options: BaseOptions, seed: int = 0
     ) -> None:
         self.name = name
-        """Empty if it is alone in its ROS system and its names have no prefix."""
+        """Empty if it is the only robot and its names have no prefix."""
         self.topics = f"/{name}" if name else ""
-        """What the names of its topics begin with."""
+        """Prefix of its topics."""
         self.frames = f"{name}/" if name else ""
-        """What the names of its frames begin with."""
+        """Prefix of its frames."""
         self.options = options
         self.pose = pose
         """True pose in the map's frame."""
         self.height = 0.0
-        """Metres above the floor, which odometry tells without an error."""
+        """Metres above the floor, which odometry reports without error."""
         self.odometry = pose
-        """Where its odometry thinks it is."""
+        """Pose by its odometry."""
         self.twist = _STILL
         """True velocity."""
         self.charge = 0.94 - 0.07 * (seed % 7)
-        """Of the battery, 0 to 1."""
+        """Charge of the battery, 0 to 1."""
         self.autonomous: Twist | None = None
-        """What its own planner wants, if it drives itself."""
+        """Velocity from its own navigation, if that is active."""
         self.bumped = False
-        """Whether something stopped it in the last step."""
+        """Whether an obstacle stopped it in the last step."""
         self.travelled = 0.0
-        """Metres on the wheels since the start."""
+        """Metres driven since the start."""
         self._command: Twist | None = None
         self._commanded_at = 0.0
         self._random = Random(seed)  # noqa: S311 - a simulation's noise
 
     def command(self, twist: Twist, now: float) -> bool:
-        """Take a velocity command; return False if it was refused.
+        """Accept a velocity command; return False if it was refused.
 
         Args:
-            twist: What the base shall do.
+            twist: The velocity.
             now: Seconds on the world's clock.
 
         """
@@ -97,23 +97,23 @@ class Robot:
         return True
 
     def release(self) -> None:
-        """Forget the client's command, so that the planner may drive."""
+        """Drop the client's command, so that the navigation may drive."""
         self._command = None
 
     def stop(self) -> None:
-        """Command zero, until somebody commands anew."""
+        """Stop until the next command."""
         self._command = None
         self.autonomous = None
 
     def step(
         self, dt: float, now: float, is_blocked: Callable[[float, float], bool]
     ) -> None:
-        """Move on by ``dt`` seconds.
+        """Advance by ``dt`` seconds.
 
         Args:
             dt: The length of the step, in seconds.
             now: The world's clock at its end.
-            is_blocked: Whether the base cannot stand at a place of the map.
+            is_blocked: Returns whether an obstacle blocks the base at a position.
 
         """
         wanted = self._wanted(now)
@@ -123,7 +123,7 @@ class Robot:
         wz = _towards(before.wz, wanted.wz, limits.w_max, limits.turn_acceleration * dt)
         vz = _towards(before.vz, wanted.vz, limits.z_max, limits.acceleration * dt)
         self.height += (before.vz + vz) / 2 * dt
-        # The mean of a ramp: a command of 1 m/s for 1 s makes 1 m, ramps included.
+        # The mean of a ramp: a command of 1 m/s for 1 s moves 1 m, ramps included.
         ahead = (before.vx + vx) / 2 * dt
         turn = (before.wz + wz) / 2 * dt
         target = self.pose @ _arc(ahead, turn)
@@ -171,7 +171,7 @@ def _towards(now: float, wanted: float, limit: float, change: float) -> float:
 
 
 def _arc(ahead: float, turn: float) -> Pose:
-    """Return where a base gets that goes ``ahead`` metres while it turns."""
+    """Return the pose after ``ahead`` metres with a constant turn."""
     if abs(turn) < 1e-9:
         return Pose(ahead, 0.0, turn)
     radius = ahead / turn

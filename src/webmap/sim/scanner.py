@@ -1,4 +1,4 @@
-"""A planar laser scanner, by exact ray casting on the grid."""
+"""A planar laser scanner, with exact ray casting on the grid."""
 
 import math
 from collections.abc import Sequence
@@ -17,19 +17,19 @@ _NAN_SHARE = 0.03
 
 @dataclass(frozen=True, slots=True)
 class ScannerOptions:
-    """What a scanner measures."""
+    """The properties of a scanner."""
 
     beams: int = 360
     """Rays of one sweep, over the full circle from -pi, counter-clockwise."""
 
     range_min: float = 0.1
-    """The shortest range, in metres; nearer things give -inf (REP 117)."""
+    """The shortest range, in metres; nearer obstacles give -inf (REP 117)."""
 
     range_max: float = 8.0
-    """The longest range, in metres; where nothing is nearer, the range is inf."""
+    """The longest range, in metres; without a nearer obstacle the range is inf."""
 
     nan: bool = False
-    """Whether a few rays of each sweep fail, with NaN."""
+    """Whether a few rays of each sweep are NaN."""
 
 
 class Scanner:
@@ -45,7 +45,7 @@ class Scanner:
 
     @property
     def angle_increment(self) -> float:
-        """The angle between neighbouring rays, in radians."""
+        """The angle between adjacent rays, in radians."""
         return math.tau / self.options.beams
 
     def sweep(
@@ -56,8 +56,8 @@ class Scanner:
         """Return the ranges seen from each pose.
 
         Args:
-            poses: Of the scanners, in the map's frame.
-            discs: For each pose, the round things in sight as x, y and radius in
+            poses: Poses of the scanners, in the map's frame.
+            discs: For each pose, the round obstacles in range as x, y and radius in
                 metres.
 
         Returns:
@@ -98,21 +98,21 @@ def cast_rays(
     along_y: NDArray[np.float64],
     farthest: float,
 ) -> NDArray[np.float64]:
-    """Return how far each ray goes until it meets a solid cell's edge.
+    """Return the length of each ray up to the edge of a solid cell.
 
-    A ray leaps over the largest empty square around its cell, so that it passes every
-    cell it must and no more; the result is exact to the edges of the cells.
+    A ray jumps over the largest empty square around its cell, so it visits only the
+    necessary cells; the result is exact to the edges of the cells.
 
     Args:
         obstacles: The grid.
-        xs: Where the rays begin, in metres.
-        ys: The same, along y.
+        xs: Start of the rays along x, in metres.
+        ys: Start of the rays along y, in metres.
         along_x: Their directions, of length 1.
         along_y: The same, along y.
-        farthest: Where to give up, in metres.
+        farthest: Greatest length, in metres.
 
     Returns:
-        Distances in metres; inf where nothing was met.
+        Distances in metres; inf for rays without a hit.
 
     """
     plan, steps = obstacles.plan, obstacles.steps
@@ -123,7 +123,7 @@ def cast_rays(
     result = np.full(xs.shape, np.inf)
     left = np.arange(len(xs))
     gone = np.zeros(len(xs))
-    # A ray along an axis meets the other axis' edges only beyond everything.
+    # A ray along an axis meets the edges of the other axis beyond all limits.
     along_x = np.where(np.abs(along_x) < _TINY, _TINY, along_x)
     along_y = np.where(np.abs(along_y) < _TINY, _TINY, along_y)
     per_x, per_y = 1 / along_x, 1 / along_y
@@ -137,7 +137,7 @@ def cast_rays(
         clear = np.zeros(len(left), np.int16)
         clear[inside] = steps[row[inside], column[inside]]
         hit = inside & (clear == 0)
-        # The last nudge went past the edge: take it back.
+        # The last nudge passed the edge: subtract it.
         result[left[hit]] = np.maximum(gone[hit] - _NUDGE, 0)
         on = inside & ~hit
         left, gone, clear = left[on], gone[on], clear[on]
@@ -160,16 +160,16 @@ def shade(
     y: float,
     radius: float,
 ) -> None:
-    """Shorten the ranges that meet a disc first.
+    """Shorten the ranges of rays that hit a disc first.
 
     Args:
         ranges: In metres, of shape (rays,); changed in place.
         along_x: The rays' directions, of length 1.
         along_y: The same, along y.
-        pose: Where the rays begin.
-        x: The disc's middle, in metres.
+        pose: Start of the rays.
+        x: The disc's center, in metres.
         y: The same, along y.
-        radius: Of the disc, in metres.
+        radius: Radius of the disc, in metres.
 
     """
     to_x, to_y = x - pose.x, y - pose.y

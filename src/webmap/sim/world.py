@@ -1,4 +1,4 @@
-"""The simulated building: robots that move, see and bump, one step at a time."""
+"""The simulated building: robots that move, measure and collide, step by step."""
 
 import io
 import math
@@ -25,14 +25,14 @@ FIELD = math.radians(80)
 
 _FARTHEST = 30.0
 _EYE, _WALL_TOP, _ROBOT = 0.4, 2.4, 0.5
-"""Heights above the floor in metres: of the camera, of a wall, of a robot."""
+"""Heights above the floor in metres: camera, wall, robot."""
 
 _CEILING, _FLOOR = np.array([214, 219, 226]), np.array([124, 118, 108])
 _WALL, _BODY = np.array([196, 204, 214]), np.array([32, 92, 196])
 
 
 class Camera:
-    """A pinhole camera at the front of a robot, that looks along its x."""
+    """A pinhole camera at the front of a robot, looking along its x."""
 
     def __init__(self, obstacles: Obstacles) -> None:
         self.obstacles = obstacles
@@ -44,11 +44,11 @@ class Camera:
     def jpeg(
         self, pose: Pose, robots: Sequence[tuple[float, float, float]] = ()
     ) -> bytes:
-        """Return what is seen from a pose.
+        """Return the picture from a pose as JPEG.
 
         Args:
-            pose: Of the camera, in the map's frame.
-            robots: What else stands there, as x, y and radius in metres.
+            pose: Pose of the camera, in the map's frame.
+            robots: The other robots, as x, y and radius in metres.
 
         """
         file = io.BytesIO()
@@ -65,7 +65,7 @@ class Camera:
         reach = cast_rays(
             self.obstacles, pose.x * ones, pose.y * ones, along_x, along_y, _FARTHEST
         )
-        # Along the axis, not along the ray, so that a flat wall is flat.
+        # Along the axis instead of along the ray, so that a flat wall looks flat.
         depth = np.minimum(reach, _FARTHEST) * np.cos(self._bearings)
         shown = self._background()
         self._paint(shown, depth, _WALL_TOP, _WALL)
@@ -87,7 +87,7 @@ class Camera:
         height: float,
         colour: NDArray[np.int_],
     ) -> None:
-        """Paint, over what is behind it, something that stands on the floor."""
+        """Paint an object on the floor over the objects behind it."""
         near = np.maximum(depth, 0.05)
         top = -(height - _EYE) / near * self._focal
         foot = _EYE / near * self._focal
@@ -99,7 +99,7 @@ class Camera:
     def _disc(
         self, pose: Pose, x: float, y: float, radius: float, behind: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return how deep a round thing is in each column; inf where it is not."""
+        """Return the depth of a round object in each column; inf outside of it."""
         ahead = math.cos(pose.yaw) * (x - pose.x) + math.sin(pose.yaw) * (y - pose.y)
         left = math.cos(pose.yaw) * (y - pose.y) - math.sin(pose.yaw) * (x - pose.x)
         depth = np.full(WIDTH, np.inf)
@@ -117,7 +117,7 @@ _REST = 2.0
 
 @dataclass(frozen=True, slots=True)
 class WorldOptions:
-    """What the world is made with."""
+    """The options of a world."""
 
     robots: int = 2
     seed: int = 1
@@ -130,7 +130,7 @@ class WorldOptions:
 
 
 class World:
-    """Robots on a floor plan. Time goes on only in :meth:`step`.
+    """Robots on a floor plan. Time advances only in :meth:`step`.
 
     Raises:
         ConfigError: If the plan has no room for so many robots.
@@ -162,7 +162,7 @@ class World:
         self._idle_since = [0.0 for _ in self.robots]
 
     def step(self, dt: float) -> None:
-        """Let ``dt`` seconds go by."""
+        """Advance the world by ``dt`` seconds."""
         self.now += dt
         planning = self._next_to_plan()
         for i, robot in enumerate(self.robots):
@@ -172,9 +172,9 @@ class World:
             self._wander()
 
     def command(self, index: int, twist: Twist) -> bool:
-        """Give a robot a client's velocity command; return False if it was refused.
+        """Send a client's velocity command to a robot; return False if it was refused.
 
-        A command that moves ends the robot's goal; one of zero only holds it still.
+        A nonzero command ends the robot's goal; a zero command only stops the robot.
         """
         robot = self.robots[index]
         taken = robot.command(twist, self.now)
@@ -189,7 +189,7 @@ class World:
         self.navigators[index].send(goal)
 
     def stop(self, index: int) -> None:
-        """Stop a robot, its goal included."""
+        """Stop a robot and end its goal."""
         self.navigators[index].cancel("stopped")
         self.robots[index].stop()
         self._idle_since[index] = self.now
@@ -203,7 +203,7 @@ class World:
         ]
 
     def sweep(self, indices: Sequence[int]) -> NDArray[np.float32]:
-        """Return what the scanners of some robots measure, a row each."""
+        """Return the ranges of the scanners of some robots, one row for each."""
         reach = self.options.scanner.range_max + self.options.base.radius
         poses = [self.robots[i].pose for i in indices]
         discs = [
@@ -217,11 +217,11 @@ class World:
         return self.scanner.sweep(poses, discs)
 
     def look(self, index: int) -> bytes:
-        """Return what the camera of a robot sees, as JPEG."""
+        """Return the picture of a robot's camera, as JPEG."""
         return self.camera.jpeg(self.robots[index].pose, self.others(index))
 
     def _next_to_plan(self) -> int:
-        """Return whose search goes on: one at a time, to its end, then the next's."""
+        """Return the robot whose search continues: one at a time, each to its end."""
         waiting = [i for i, n in enumerate(self.navigators) if n.must_plan]
         if waiting and self._planning not in waiting:
             later = [i for i in waiting if i > self._planning]
@@ -264,7 +264,7 @@ class World:
                     continue
                 if reachable is None:
                     seen = self.planner.reachable(x, y)
-                    # The first robot must not be shut in a closet.
+                    # The first robot must not start in a closed room.
                     if seen.sum() < 0.3 * (~self.planner.blocked).sum():
                         continue
                     reachable = seen
@@ -275,7 +275,7 @@ class World:
         return poses
 
     def _open_heading(self, x: float, y: float) -> float:
-        """Return the heading with the longest free way."""
+        """Return the heading with the longest free distance."""
         yaws = np.arange(8) * math.tau / 8 - math.pi
         ones = np.ones(8)
         ways = cast_rays(

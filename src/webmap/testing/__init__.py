@@ -1,8 +1,8 @@
-"""What WebMap's promises about motion are tested with, for modules of others too.
+"""Test tools for WebMap's promises about motion, also for modules of other packages.
 
-A :class:`WitnessRobot` notes what it is told and when, a :class:`FaultProxy` spoils the
-way to it, :func:`check_invariants` says in sentences what must not have happened, and a
-:class:`Sentinel` knows how late the machine itself was in the same seconds.
+A :class:`WitnessRobot` records its commands with times, a :class:`FaultProxy` adds
+network faults, :func:`check_invariants` reports violations in sentences, and a
+:class:`Sentinel` measures how late the machine itself was in the same seconds.
 """
 
 from webmap.testing.invariants import Bounds, Quiet, check_invariants

@@ -1,7 +1,7 @@
-"""What must hold for all that a robot was told, whatever failed meanwhile. No I/O.
+"""The invariants of all velocities that a robot received, despite any fault. No I/O.
 
-Each rule reads the velocities that came, oldest first, and says in sentences where it
-was broken; times in them are seconds since the first velocity.
+Each rule checks the received velocities, oldest first, and reports violations in
+sentences; times in them are seconds since the first velocity.
 """
 
 import itertools
@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from webmap.testing.log import Told
 
 BREATH = 0.5
-"""Seconds without a velocity that part two activities."""
+"""Seconds without a velocity that separate two activities."""
 
 RAMP_INTERVAL = 0.1
-"""The longest time that speeding up may count between two velocities, in seconds."""
+"""Longest time of acceleration that counts between two velocities, in seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """The limits that all velocities keep."""
+    """The limits of all velocities."""
 
     v_max: float = math.inf
     """Metres per second."""
@@ -32,13 +32,13 @@ class Bounds:
     """Metres per second upward and downward."""
 
     a_max: float | None = None
-    """Metres per second squared when speeding up; None if that is not limited."""
+    """Metres per second squared when speeding up; None for no limit."""
 
     zeros: float = 0.5
-    """Seconds for which zeros go on after a stop; then there is silence."""
+    """Seconds for which zeros are sent after a stop; after that nothing is sent."""
 
     late: int = 0
-    """How many moving velocities a link that was cut may have kept and deliver late."""
+    """Most nonzero velocities that a cut connection may deliver late."""
 
     slack: float = 0.1
     """Seconds by which the machine may have been late in all of this."""
@@ -46,7 +46,7 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class Quiet:
-    """A stretch of time in which nothing may move the robot."""
+    """A period in which nothing may move the robot."""
 
     begin: float
     end: float
@@ -55,20 +55,20 @@ class Quiet:
 
 @dataclass(frozen=True, slots=True)
 class Story:
-    """What was done to the robot while the velocities came.
+    """The events at the robot while the velocities came.
 
     Times are seconds of the monotonic clock.
     """
 
     quiet: Sequence[Quiet] = ()
     handovers: Sequence[float] = ()
-    """When another driver got the robot."""
+    """When another operator got control of the robot."""
 
     unreachable: Sequence[tuple[float, float]] = ()
-    """When nothing could be said to the robot, however much it was wanted."""
+    """When nothing could be sent to the robot."""
 
     causes: Sequence[float] = ()
-    """When zeros may begin anew: a STOP, or a link that came back."""
+    """When zeros may start again: a STOP, or a new connection."""
 
 
 def check_invariants(
@@ -80,15 +80,15 @@ def check_invariants(
     unreachable: Sequence[tuple[float, float]] = (),
     causes: Sequence[float] = (),
 ) -> list[str]:
-    """Return what is wrong with the velocities that a robot was told, in sentences.
+    """Return the violations in the velocities that a robot received, in sentences.
 
     Args:
         log: The velocities, oldest first. The last activity must be over.
         bounds: The limits.
-        quiet: Stretches in which nothing may move the robot, as after a fault.
-        handovers: When another driver got the robot, in seconds of the monotonic clock.
-        unreachable: When nothing could be said to the robot.
-        causes: When zeros may begin anew: a STOP, or a link that came back.
+        quiet: Periods in which nothing may move the robot, such as after a fault.
+        handovers: When another operator got control, in seconds of the monotonic clock.
+        unreachable: When nothing could be sent to the robot.
+        causes: When zeros may start again: a STOP, or a new connection.
 
     """
     told = list(log)
@@ -120,7 +120,7 @@ def _limits(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
 
 
 def _quiet(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
-    """Nothing moves the robot while nothing may."""
+    """Nothing moves the robot in a quiet period."""
     for quiet in story.quiet:
         moving = [t for t in log if quiet.begin < t.at < quiet.end and not t.is_zero]
         if moving:
@@ -133,10 +133,10 @@ def _quiet(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
 
 
 def _last_is_zero(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
-    """The last velocity of any activity is zero.
+    """The last velocity of every activity is zero.
 
-    If the robot could not be reached then, the first one that reaches it is, but for
-    the few that the link had taken before.
+    If the robot was unreachable then, the first velocity that reaches it later is
+    zero, except for the few that the connection had already buffered.
     """
     for index, told in enumerate(log):
         following = log[index + 1] if index + 1 < len(log) else None
@@ -155,7 +155,7 @@ def _last_is_zero(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Fin
 
 
 def _handovers(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
-    """Between two drivers there is a zero."""
+    """There is a zero between two operators."""
     for at in story.handovers:
         before = [t for t in log if t.at <= at]
         after = [t for t in log if t.at > at]
@@ -166,7 +166,7 @@ def _handovers(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Findin
 
 
 def _silence(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
-    """Zeros end by themselves, so that other writers are left in peace."""
+    """Zeros end after a limited time, so that other programs can publish."""
     begun = -math.inf
     was_moving = True
     for told in log:
@@ -183,7 +183,7 @@ def _silence(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]
 
 
 def _ramp(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
-    """Speeding up keeps to the acceleration; slowing down need not."""
+    """Speeding up is within the acceleration; slowing down is not limited."""
     if bounds.a_max is None:
         return
     before, at = 0.0, -math.inf

@@ -1,4 +1,4 @@
-"""What a witness noted: every message with the time when it came."""
+"""The log of a witness: every message with its time of arrival."""
 
 import math
 from bisect import bisect_left
@@ -16,13 +16,13 @@ class Heard:
     """Seconds of the monotonic clock."""
 
     link: int
-    """Which of the WebSockets it came on, counted from 1."""
+    """Number of its WebSocket, counted from 1."""
 
     message: dict[str, Any]
 
     @property
     def op(self) -> Any:
-        """What the client wants, as ``publish``."""
+        """The operation of the message, such as ``publish``."""
         return self.message.get("op")
 
     @property
@@ -33,7 +33,7 @@ class Heard:
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """One velocity that the robot was told."""
+    """One velocity that the robot received."""
 
     at: float
     """Seconds of the monotonic clock."""
@@ -43,18 +43,18 @@ class Told:
 
     @property
     def is_zero(self) -> bool:
-        """Whether it says to stand still."""
+        """Whether it stops the robot."""
         return self.twist.is_zero
 
     @property
     def speed(self) -> float:
-        """Metres per second, whatever the direction."""
+        """Metres per second, in any direction."""
         return self.twist.speed
 
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """How the wheels turned at a time."""
+    """The velocity of the wheels at a time."""
 
     at: float
     twist: Twist
@@ -62,14 +62,14 @@ class Moved:
 
 @dataclass
 class WitnessLog:
-    """All that a witness noted, oldest first; may be read while it grows."""
+    """All records of a witness, oldest first; may be read while it grows."""
 
     heard: list[Heard] = field(default_factory=list)
     told: list[Told] = field(default_factory=list)
     moved: list[Moved] = field(default_factory=list)
 
     def of(self, op: str, topic: str | None = None) -> list[Heard]:
-        """Return the messages of a kind."""
+        """Return the messages with an operation, and with a topic if given."""
         return [
             heard
             for heard in list(self.heard)
@@ -77,15 +77,15 @@ class WitnessLog:
         ]
 
     def first_zero(self, since: float) -> float | None:
-        """Return when the first zero came after ``since``."""
+        """Return the time of the first zero after ``since``."""
         return next((t.at for t in _from(self.told, since) if t.is_zero), None)
 
     def moving_since(self, since: float, until: float = math.inf) -> list[Told]:
-        """Return the velocities that move, of those that came in a stretch of time."""
+        """Return the nonzero velocities of a period."""
         return [t for t in _from(self.told, since) if t.at < until and not t.is_zero]
 
     def standstill(self, since: float, slow: float = 0.01) -> float | None:
-        """Return when the wheels came to rest after ``since``, and stayed so.
+        """Return when the wheels came to rest after ``since`` and stayed at rest.
 
         Args:
             since: Seconds of the monotonic clock.
@@ -105,9 +105,9 @@ Noted = TypeVar("Noted", Told, Moved)
 
 
 def _from(noted: list[Noted], since: float) -> list[Noted]:
-    """Return what was noted from a time on.
+    """Return the records since a time.
 
-    A log grows for as long as a robot lives, and is asked again and again by who waits
-    for something, in the process of the witness: what is old must cost nothing.
+    A log grows for the lifetime of a robot, and waiting tests read it repeatedly in the
+    process of the witness: old records must cost nothing.
     """
     return noted[bisect_left(noted, since, key=lambda one: one.at) :]

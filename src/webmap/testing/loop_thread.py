@@ -1,4 +1,4 @@
-"""An event loop in a thread, so that a test that blocks can drive what runs in it."""
+"""An event loop in a thread, for tests that block."""
 
 import asyncio
 import gc
@@ -11,10 +11,10 @@ T = TypeVar("T")
 
 
 class LoopThread:
-    """Runs an event loop beside the thread of a test.
+    """Runs an event loop in a separate thread of a test.
 
     Args:
-        name: Of the thread.
+        name: Name of the thread.
 
     """
 
@@ -41,7 +41,7 @@ class LoopThread:
         return self.call(work())
 
     def end(self) -> None:
-        """Cancel what still runs, and end the loop and its thread."""
+        """Cancel all tasks, and end the loop and its thread."""
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(10)
 
@@ -49,14 +49,14 @@ class LoopThread:
         asyncio.set_event_loop(self._loop)
         try:
             self._loop.run_forever()
-            for _ in range(3):  # a connection taken just now makes a task only then
+            for _ in range(3):  # a connection accepted just now creates its task later
                 self._cancel_all()
                 self._loop.run_until_complete(_settle())
             self._loop.run_until_complete(self._loop.shutdown_asyncgens())
         finally:
             self._loop.close()
             with warnings.catch_warnings():
-                # A connection that was being made when all ended may be left over.
+                # A connection that was being opened at the end may remain.
                 warnings.simplefilter("ignore", ResourceWarning)
                 gc.collect()
 
@@ -70,6 +70,6 @@ class LoopThread:
 
 
 async def _settle() -> None:
-    """Let transports that were closed say so and close their sockets."""
+    """Let closed transports report it and close their sockets."""
     for _ in range(5):
         await asyncio.sleep(0)

@@ -1,4 +1,4 @@
-"""A TCP proxy on the loopback address that does to a link what networks do."""
+"""A TCP proxy on the loopback address that imitates network faults."""
 
 import asyncio
 import contextlib
@@ -12,9 +12,9 @@ from typing import Literal
 from webmap.testing.loop_thread import LoopThread
 
 Way = Literal["up", "down", "both"]
-"""``up`` is from the client to the server behind the proxy, ``down`` the other way."""
+"""``up``: from the client to the server behind the proxy; ``down``: the opposite."""
 
-# The kernel's "linger 0": closing drops unsent bytes and resets the connection.
+# Linger 0: closing drops unsent bytes and resets the connection.
 _LINGER = struct.pack("ii", 1, 0)
 
 Stream = tuple[asyncio.StreamReader, asyncio.StreamWriter]
@@ -22,22 +22,22 @@ Stream = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """How one direction of a link treats its bytes."""
+    """The properties of one direction of a link."""
 
     latency: float = 0.0
-    """Seconds that every byte is late."""
+    """Seconds by which every byte is delayed."""
 
     jitter: float = 0.0
-    """Seconds that may be added to the latency, at random, keeping the order."""
+    """Most seconds that are added to the latency at random, in order."""
 
     bandwidth: float | None = None
     """Bytes a second; None for no limit."""
 
     slice_size: int | None = None
-    """Bytes of a piece, into which what is written is cut; None to leave it whole."""
+    """Bytes of the pieces into which a write is cut; None for no cutting."""
 
     slice_gap: float = 0.0
-    """Seconds between two pieces of what was written at once."""
+    """Seconds between two pieces of one write."""
 
     def __post_init__(self) -> None:
         for name in ("latency", "jitter", "slice_gap"):
@@ -49,11 +49,11 @@ class Shape:
 
 
 class Shaper:
-    """Says when each byte of one direction is due; never out of order.
+    """Computes when each byte of one direction is due; never out of order.
 
     Args:
-        shape: How the link is from now on; may be changed at any time.
-        seed: Of the jitter.
+        shape: The properties of the link; may be changed at any time.
+        seed: Seed of the jitter.
 
     """
 
@@ -64,7 +64,7 @@ class Shaper:
         self._free_at = float("-inf")
 
     def take(self, data: bytes, now: float) -> list[tuple[float, bytes]]:
-        """Return the pieces of what came in at ``now``, each with when it is due."""
+        """Return the pieces of data received at ``now``, each with its due time."""
         pieces = []
         for number, piece in enumerate(self._cut(data)):
             begun = now + number * self.shape.slice_gap
@@ -85,7 +85,7 @@ class Shaper:
 
 
 class Direction:
-    """What holds for one direction of all links."""
+    """The state of one direction, for all links."""
 
     def __init__(self, seed: int) -> None:
         self.shape = Shape()
@@ -95,10 +95,10 @@ class Direction:
 
 
 class FaultProxy:
-    """Passes bytes on until it is told to hold, delay, cut or reset them.
+    """Passes bytes on, and holds, delays, cuts or resets them on request.
 
-    It runs in a thread of its own and is used as a context manager, so that a test may
-    block. A port that the kernel chooses is at ``proxy.port``.
+    It runs in its own thread and is a context manager, so a test may block. The kernel
+    chooses the port, ``proxy.port``.
 
     Args:
         port: The port of the server behind it, on the loopback address.
@@ -121,11 +121,11 @@ class FaultProxy:
         self.end()
 
     def end(self) -> None:
-        """Drop every link and listen no more."""
+        """Drop every link and stop listening."""
 
         async def end() -> None:
             self._server.close()
-            await asyncio.sleep(0.01)  # for what was accepted in this very moment
+            await asyncio.sleep(0.01)  # for connections that were accepted just now
             for link in list(self._links):
                 link.reset()
             for writer in self._writers:
@@ -148,7 +148,7 @@ class FaultProxy:
     # Faults; each takes effect before the call returns.
 
     def shape(self, shape: Shape, way: Way = "both") -> None:
-        """Delay, slow down or cut up what comes from now on."""
+        """Delay, slow down or cut up all data from now on."""
 
         def change() -> None:
             for direction in self._choose(way):
@@ -157,7 +157,7 @@ class FaultProxy:
         self._thread.do(change)
 
     def hold(self, way: Way = "both") -> None:
-        """Let no byte through, and lose none: the link looks alive."""
+        """Hold all bytes without losing any: the link looks alive."""
 
         def hold() -> None:
             for direction in self._choose(way):
@@ -166,7 +166,7 @@ class FaultProxy:
         self._thread.do(hold)
 
     def release(self, way: Way = "both") -> None:
-        """Let what was held through, all at once, as TCP does after a stall."""
+        """Pass on all held bytes at once, as TCP does after a stall."""
 
         def release() -> None:
             for direction in self._choose(way):
@@ -175,7 +175,7 @@ class FaultProxy:
         self._thread.do(release)
 
     def reset(self) -> None:
-        """Reset every link (RST) to both of its ends; new ones are taken."""
+        """Reset every link (RST) at both ends; new ones are accepted."""
 
         def reset() -> None:
             for link in list(self._links):
@@ -184,7 +184,7 @@ class FaultProxy:
         self._thread.do(reset)
 
     def half_close(self, way: Literal["up", "down"]) -> None:
-        """End one direction of every link in good order; the other goes on."""
+        """Close one direction of every link cleanly; the other continues."""
 
         def close() -> None:
             for link in list(self._links):
@@ -193,12 +193,12 @@ class FaultProxy:
         self._thread.do(close)
 
     def refuse(self, refusing: bool = True) -> None:
-        """Reset every link that is made from now on, or take them again."""
+        """Reset every new link from now on, or accept them again."""
         self._refusing = refusing
 
     @property
     def links(self) -> int:
-        """How many links go through the proxy now."""
+        """Number of links through the proxy now."""
         return len(self._links)
 
     def _accept(
@@ -240,7 +240,7 @@ class _Link:
         }
 
     async def run(self) -> None:
-        """Pass bytes until both directions have ended, or one with an error."""
+        """Pass bytes on until both directions have ended, or one has failed."""
         try:
             async with asyncio.TaskGroup() as group:
                 for pump in self._pumps.values():
@@ -257,7 +257,7 @@ class _Link:
         for writer in self._writers:
             _reset(writer)
         if self._task is not None:
-            self._task.cancel()  # it may wait for a link that is held
+            self._task.cancel()  # it may wait for a held link
 
     def half_close(self, way: str) -> None:
         self._pumps[way].finish()
@@ -281,7 +281,7 @@ class _Pump:
         self._ended = False
 
     def finish(self) -> None:
-        """End this direction; what still comes for it is dropped."""
+        """End this direction and drop its remaining bytes."""
         self._ended = True
         self._waiting.clear()
         self._more.set()
@@ -294,7 +294,7 @@ class _Pump:
             self._shaper.shape = self._direction.shape
             self._waiting.extend(self._shaper.take(data, loop.time()))
             self._more.set()
-            # A held link takes no more either, so that the sender's buffers fill.
+            # A held link stops reading too, so that the sender's buffers fill.
             await self._direction.flowing.wait()
         self._ended = True
         self._more.set()
@@ -313,7 +313,7 @@ class _Pump:
             if (early := due - loop.time()) > 0:
                 await asyncio.sleep(early)
             await self._direction.flowing.wait()
-            if self._waiting:  # not thrown away meanwhile
+            if self._waiting:  # not dropped in the meantime
                 self._writer.write(self._waiting.popleft()[1])
                 await self._writer.drain()
 

@@ -1,4 +1,4 @@
-"""How late this machine runs a thread that wants to run, second by second."""
+"""The scheduling delay of this machine, second by second."""
 
 import threading
 import time
@@ -6,10 +6,11 @@ from bisect import bisect_left
 
 
 class Sentinel:
-    """Measures scheduler jitter while a test measures something else.
+    """Measures scheduling delay while a test measures something else.
 
-    A bound on a busy machine is the promise plus what the machine itself was late in
-    the same seconds; this thread asks to be woken every 5 ms and notes when it was.
+    A time limit on a busy machine is the promised limit plus the delay of the machine
+    in the same seconds; this thread sleeps for 5 ms at a time and records how late it
+    wakes.
     """
 
     PERIOD = 0.005
@@ -31,22 +32,22 @@ class Sentinel:
         self._thread.join(5)
 
     def worst(self, since: float, until: float | None = None) -> float:
-        """Return the longest delay in a stretch of the monotonic clock, in seconds."""
+        """Return the longest delay in a period of the monotonic clock, in seconds."""
         until = time.monotonic() if until is None else until
         return max((late for _, late in self._between(since, until)), default=0.0)
 
     def stolen(self, since: float, until: float | None = None) -> float:
-        """Return how long in a stretch a thread that was ready had to wait, in all.
+        """Return the total waiting time of a ready thread in a period, in seconds.
 
-        What goes through several threads and processes waits in each of them, so this
-        is what a busy machine can add to a way from end to end. A wake that is up to
-        1 ms late is an idle machine's and does not count.
+        Data that passes several threads and processes waits in each of them, so this is
+        the time that a busy machine can add from end to end. A wake that is at most
+        1 ms late is normal on an idle machine and does not count.
         """
         until = time.monotonic() if until is None else until
         return sum(late for _, late in self._between(since, until) if late > 0.001)
 
     def _between(self, since: float, until: float) -> list[tuple[float, float]]:
-        """Return the wakes that were due in a stretch, each with how late it was."""
+        """Return the wakes that were due in a period, each with its delay."""
         first = bisect_left(self._late, (since, 0.0))
         return [(at, late) for at, late in self._late[first:] if at <= until + late]
 

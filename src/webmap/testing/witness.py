@@ -1,4 +1,4 @@
-"""A robot that notes what it is told, with a base that stops by itself, or does not."""
+"""A robot that records its commands, with or without a command timeout."""
 
 import asyncio
 import contextlib
@@ -26,14 +26,14 @@ class Socket:
         self.number = number
         self.connection = connection
         self.topics: dict[str, int] = {}
-        """What it subscribed to, and how often."""
+        """Number of subscriptions to each topic."""
 
 
 class WitnessBridge:
-    """A rosbridge server that hands every message on before it does anything with it.
+    """A rosbridge server that reports every message before it processes it.
 
-    The messages of one socket are dealt with in order, as rosbridge does it, so that
-    one that hangs holds up all behind it while pings are still answered.
+    The messages of one socket are processed in order, as in rosbridge, so one that
+    hangs delays all later ones while pings are still answered.
 
     Args:
         hear: Called with the number of the socket and the message.
@@ -42,13 +42,14 @@ class WitnessBridge:
 
     def __init__(self, hear: Hear) -> None:
         self.answers_services = True
-        """Otherwise a call hangs, and all that comes behind it on its socket."""
+        """Whether calls are answered; else they hang, with all later messages of the
+        socket."""
         self.goals_block = False
         """Whether a goal runs on its socket's input thread until it ends."""
         self.types: dict[str, str] = {}
-        """The topics that rosapi tells of, with their types."""
+        """The topics that rosapi lists, with their types."""
         self.publishers: dict[str, list[str]] = {}
-        """The nodes that rosapi names as publishers of a topic."""
+        """The nodes that rosapi lists as publishers of a topic."""
         self.port = 0
         self._hear = hear
         self._sockets: dict[int, Socket] = {}
@@ -57,19 +58,19 @@ class WitnessBridge:
         self._unblocked = asyncio.Event()
 
     async def start(self) -> None:
-        """Listen; on the port of before, if there was one."""
+        """Listen; on the previous port, if there was one."""
         self._server = await serve(
             self._serve,
             "127.0.0.1",
             self.port,
             compression=None,
-            ping_interval=None,  # as rosbridge: pings are off unless asked for
-            max_queue=None,  # a handler that hangs must not keep pongs from leaving
+            ping_interval=None,  # like rosbridge: pings are off by default
+            max_queue=None,  # a handler that hangs must not delay pongs
         )
         self.port = next(iter(self._server.sockets)).getsockname()[1]
 
     async def stop(self) -> None:
-        """Drop every link without a word and listen no more."""
+        """Drop every connection without a close frame and stop listening."""
         if self._server is None:
             return
         server, self._server = self._server, None
@@ -80,7 +81,7 @@ class WitnessBridge:
         await server.wait_closed()
 
     def unblock(self) -> None:
-        """Let what hangs go on."""
+        """Release the calls and goals that hang."""
         self._unblocked.set()
         self._unblocked = asyncio.Event()
 
@@ -156,24 +157,24 @@ def _read(frame: str | bytes) -> Iterator[dict[str, Any]]:
 
 
 STEP = 0.01
-"""Seconds between two looks of the base at the clock."""
+"""Seconds between two steps of the base."""
 
 ODOMETRY_EVERY = 5
-"""Steps between two odometry messages, which makes 20 a second."""
+"""Steps between two odometry messages, which gives 20 a second."""
 
 
 class WitnessRobot:
-    """A base behind a rosbridge of its own, in a thread of its own.
+    """A base behind its own rosbridge, in its own thread.
 
-    Used as a context manager. What it is told stands in :attr:`log`, with the time of
-    the monotonic clock, which all processes of one machine share. Its brakes are good:
-    it follows a command within a few hundredths of a second, so that the times in the
-    log are those of what it was told.
+    Used as a context manager. All its commands are in :attr:`log`, with the time of the
+    monotonic clock, which all processes of one machine share. It has good brakes: it
+    follows a command within a few hundredths of a second, so that the times in the log
+    are those of the commands.
 
     Args:
         timeout: Seconds without a command until the base stops by itself; None for a
-            bad one that never does.
-        obeys: Whether it does what it is told.
+            base that never does.
+        obeys: Whether it follows commands.
         flies: Whether it moves upward and downward; it is a differential base if not.
         goals_block: Whether a goal runs on its socket's input thread.
 
@@ -226,7 +227,7 @@ class WitnessRobot:
 
     @property
     def port(self) -> int:
-        """Where its rosbridge listens, on the loopback address."""
+        """Port of its rosbridge, on the loopback address."""
         return self._bridge.port
 
     @property
@@ -236,11 +237,11 @@ class WitnessRobot:
 
     @property
     def velocity(self) -> Twist:
-        """How the wheels turn now."""
+        """Velocity of the wheels now."""
         return self._base.twist
 
     def kill_bridge(self) -> None:
-        """End its rosbridge without a word; the base lives on, on its own."""
+        """End its rosbridge without a close frame; the base keeps running."""
         self._thread.call(self._bridge.stop())
 
     def restart_bridge(self) -> None:
@@ -248,7 +249,7 @@ class WitnessRobot:
         self._thread.call(self._bridge.start())
 
     def unblock(self) -> None:
-        """Let calls and goals that hang go on."""
+        """Release calls and goals that hang."""
         self._thread.do(self._bridge.unblock)
 
     def answers_services(self, answers: bool) -> None:
@@ -256,7 +257,7 @@ class WitnessRobot:
         self._bridge.answers_services = answers
 
     def publish(self, topic: str, message: dict[str, Any]) -> None:
-        """Publish something to whoever subscribed to it."""
+        """Publish a message to all subscribers of a topic."""
         self._thread.call(self._bridge.publish(topic, message))
 
     def _hear(self, link: int, message: dict[str, Any]) -> None:
@@ -308,7 +309,7 @@ class WitnessRobot:
 
 
 def _twist(message: Any) -> Twist:
-    """Read a Twist or a TwistStamped; what is no number is NaN, so that it is seen."""
+    """Read a Twist or a TwistStamped; a value that is not a number becomes NaN."""
     inner = message.get("twist", message) if isinstance(message, dict) else {}
     linear, angular = inner.get("linear") or {}, inner.get("angular") or {}
     (vx, vy, vz), (wx, wy, wz) = (

@@ -4,11 +4,11 @@ import { FOLDER } from "./constants.js";
 export const BASE = new URL("..", import.meta.url);
 
 /**
- * Resolve an address that the server gave for a file of the page.
+ * Resolve an address from the server to a file of the page.
  *
- * @param {string} address Ours begin with "/_webmap/", whatever the server is under.
- * @param {string | URL} base What other addresses are relative to.
- * @returns {string | null} null if it leads to another origin.
+ * @param {string} address WebMap's own begin with "/_webmap/", under every prefix.
+ * @param {string | URL} base The base of other addresses.
+ * @returns {string | null} null if it is on another origin.
  */
 export function resolve(address, base) {
   const ours = address.startsWith(FOLDER);

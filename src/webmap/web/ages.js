@@ -3,12 +3,12 @@
 /**
  * @typedef {object} Age
  * @property {number | null} measured Milliseconds of the display's clock; null: never.
- * @property {number} limit Seconds after which the data counts as old.
- * @property {boolean} shown Whether the age is the element's text.
- * @property {boolean | null} stale Whether it was old when last looked at.
+ * @property {number} limit Seconds after which the data is stale.
+ * @property {boolean} shown Whether the element shows the age as text.
+ * @property {boolean | null} stale Whether the data was stale at the last update.
  */
 
-/** Milliseconds between two looks. */
+/** Milliseconds between two updates. */
 const PERIOD = 250;
 
 /**
@@ -23,10 +23,10 @@ function formatAge(seconds) {
   return `${Math.round(seconds / 3600)} h`;
 }
 
-/** Counts how old things are, whether the display is there or not. */
+/** Shows the ages of data, with or without a connection to the display. */
 export class Ages {
   /**
-   * @param {DisplayClock} clock
+   * @param {() => void} onStale Called when data became stale, or fresh again.
    * @param {() => void} onStale Called when something became old, or fresh again.
    */
   constructor(clock, onStale) {
@@ -46,7 +46,7 @@ export class Ages {
   set(item, measured) {
     const age = this._of(item);
     age.measured = measured;
-    // What looks old and is fresh again is not kept waiting.
+    // Stale data that becomes fresh again is updated immediately.
     if (age.stale !== false) this._urgent.add(item);
   }
 
@@ -66,7 +66,7 @@ export class Ages {
     this._urgent.delete(item);
   }
 
-  /** Show at once what cannot wait for the next look. */
+  /** Update urgent items immediately. */
   flush() {
     if (this._urgent.size === 0) return;
     this._show(this._urgent);
@@ -102,7 +102,7 @@ export class Ages {
 }
 
 /**
- * @param {Item} item
+ * @returns {boolean} Whether the data became stale, or fresh again.
  * @param {Age} age
  * @param {number | null} now The display's clock, in seconds.
  * @returns {boolean} Whether it became old, or fresh again.
@@ -120,15 +120,15 @@ function showAge(item, age, now) {
 }
 
 /**
- * Tells the display's monotonic clock from the frames that it sends.
+ * Computes the display's monotonic clock from the frames that it sends.
  *
- * A frame cannot come before it was sent, so of all frames the one that came quickest
- * tells best; that one is forgotten slowly, since two clocks drift. Whatever a frame
- * was late counts as age of what is in it.
+ * A frame cannot arrive before it was sent, so the fastest frame gives the best
+ * estimate. The estimate is forgotten slowly, because the two clocks drift. The delay
+ * of a frame counts as age of its data.
  */
 export class DisplayClock {
   constructor() {
-    /** @type {number | null} Seconds that this page's clock is ahead. */
+    /** @type {number | null} Seconds by which this page's clock is ahead. */
     this._ahead = null;
     this._then = 0;
   }
@@ -144,14 +144,14 @@ export class DisplayClock {
     this._then = received;
   }
 
-  /** Forget what was heard, because another display may answer next. */
+  /** Forget the estimate, because another display may answer next. */
   reset() {
     this._ahead = null;
   }
 
   /**
    * @param {number} now This page's clock, in seconds.
-   * @returns {number | null} The display's clock, in seconds; null if never heard.
+   * @returns {number | null} The display's clock, in seconds; null if unknown.
    */
   at(now) {
     return this._ahead === null ? null : now - this._ahead;

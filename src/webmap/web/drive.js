@@ -11,26 +11,26 @@ import { Session } from "./motion/session.js";
 /** @typedef {import('./motion/stream.js').Command} Command */
 /** @typedef {{x: number, y: number, yaw: number}} Pose Metres and radians. */
 
-/** Commands carry the state of the hands this often, in ms. */
+/** Milliseconds between two answers with the state of the inputs. */
 const PERIOD = 50;
 
 /**
- * This page's line to the gate: who drives what, the operator's hands, goals, STOP.
+ * This page's connection to the gate: control, inputs, goals, STOP.
  *
  * One per page, however many maps it shows. It sends the *state* of the inputs at
- * 20 Hz while it holds a lease, from a timer of the page itself: a worker's timer would
- * go on when the page is hidden or hangs. No method moves a robot by itself but
- * {@link Drive#goal}; see `motion/pilot.js` for when the hands do.
+ * 20 Hz while it has control, from a timer of the page itself: a worker's timer would
+ * continue when the page is hidden or hangs. Only {@link Drive#goal} moves a robot
+ * without inputs; see `motion/pilot.js` for when inputs move it.
  *
- * What is decided is decided in `motion/`; here are the clock, the timer, the socket and
- * the page's events.
+ * `motion/` makes all decisions; this file has the clock, the timer, the socket and the
+ * page's events.
  */
 export class Drive {
   /**
    * @param {string | URL} baseUrl The address under which the server has `drive`.
-   * @param {{id?: string, releaseAfter?: number}} [options] `id`: the page's own, by
-   *     which the server knows its `scene` and `drive` as one. `releaseAfter`: a lease
-   *     that is not used for so long is given back, in ms.
+   * @param {{id?: string, releaseAfter?: number}} [options] `id`: the page's own id,
+   *     by which the server matches its `scene` and `drive`. `releaseAfter`: unused
+   *     control is released after this time, in ms.
    */
   constructor(baseUrl, options = {}) {
     const now = performance.now();
@@ -56,7 +56,7 @@ export class Drive {
     this._line.mind(now);
   }
 
-  /** The state of the link: may commands arrive, and do they? */
+  /** The state of the connection: may commands arrive, and do they? */
   get state() {
     return this._session.state;
   }
@@ -67,36 +67,36 @@ export class Drive {
   }
 
   /**
-   * The newest word of the gate on each robot.
+   * The newest report of the gate on each robot.
    * @returns {ReadonlyMap<string, RobotReport>}
    */
   get robots() {
     return this._pilot.robots;
   }
 
-  /** What the operator should know of the chosen robot and of the hands. */
+  /** The state of the chosen robot and of the inputs, for the operator. */
   get status() {
     return { link: this.state, connection: this.connection, ...this._pilot.status };
   }
 
-  /** Who asks for robots. */
+  /** The requests for control. */
   get requests() {
     return this._session.asking.requests(performance.now());
   }
 
-  /** What became of the STOPs of this page. */
+  /** The results of this page's STOPs. */
   get verdicts() {
     return this._session.verdicts(performance.now());
   }
 
-  /** Show no more what became of the STOPs until now. */
+  /** Stop showing the results of the STOPs until now. */
   dismissVerdicts() {
     this._session.stopping.dismiss();
   }
 
   /**
-   * How long it took a robot the last time from the first command to motion, in ms; null
-   * before that.
+   * The last time from the first command to motion of a robot, in ms; null before the
+   * first.
    *
    * @param {string} robot
    */
@@ -105,55 +105,55 @@ export class Drive {
   }
 
   /**
-   * Listen.
+   * Add a listener.
    *
    * @template {keyof News} K
    * @param {K} kind
    * @param {(news: News[K]) => void} fn
-   * @returns {() => void} Stops listening.
+   * @returns {() => void} Removes the listener.
    */
   on(kind, fn) {
     return this._listeners.on(kind, fn);
   }
 
-  // Hands ----------------------------------------------------------------------
+  // Inputs ---------------------------------------------------------------------
 
   /**
-   * Say what an input asks for. One input owns the motion at a time.
+   * Set the axes of an input. Only one input drives at a time.
    *
    * @param {string} source
-   * @param {Partial<Axes> | null} axes Null when the input is gone.
+   * @param {Partial<Axes> | null} axes null if the input is gone.
    * @param {{fresh?: boolean}} [how] See {@link Hands#set}.
    */
   setInput(source, axes, how) {
     const { hands } = this._session;
     const was = hands.pressed;
     hands.set(source, axes, performance.now(), how);
-    // A release must not wait for the next step, nor should a press.
+    // A release and a press are sent immediately.
     if (was !== hands.pressed) this._step();
   }
 
   /**
-   * Say that the operator goes by the picture of a robot's camera: while it is older
-   * than a second, the robot does not move.
+   * Note that the operator drives by the picture of a robot's camera: while the picture
+   * is older than a second, the robot does not move.
    *
    * @param {string} robot
-   * @param {() => number} age How old the picture is that the page shows now, in ms.
-   * @returns {() => void} The operator goes by it no more.
+   * @param {() => number} age Age of the picture that the page shows now, in ms.
+   * @returns {() => void} Ends this.
    */
   goBy(robot, age) {
     return this._pilot.pictures.goBy(robot, age);
   }
 
-  /** Forget what is held and go neutral at once: for inputs that are in doubt. */
+  /** Discard all inputs and go neutral immediately: for inputs that may be wrong. */
   doubt() {
     this._doubt(false);
   }
 
-  // Leases ---------------------------------------------------------------------
+  // Control --------------------------------------------------------------------
 
   /**
-   * Choose the robot that a press drives. The one driven before is let go of.
+   * Choose the robot to drive. Control of the previous one is released.
    *
    * @param {string | null} robot
    */
@@ -161,18 +161,18 @@ export class Drive {
     this._send(this._pilot.choose(robot, performance.now()));
   }
 
-  /** @param {string} robot Ask for its lease. Whatever is pressed now does not move it. */
+  /** @param {string} robot Take control. Inputs that are active now do not move it. */
   take(robot) {
     this._send(this._pilot.take(robot, performance.now()));
   }
 
-  /** @param {string} robot Give its lease back, neutral first. */
+  /** @param {string} robot Release control, neutral first. */
   release(robot) {
     this._send(this._pilot.release(robot, performance.now()));
   }
 
   /**
-   * Ask the holder of a robot for it. Whatever is pressed when it comes does not move it.
+   * Request control. Inputs that are active when it is granted do not move the robot.
    *
    * @param {string} robot
    */
@@ -180,25 +180,25 @@ export class Drive {
     this._send(this._pilot.ask(robot));
   }
 
-  /** @param {string} robot Hand it to the one who asks for it, neutral first. */
+  /** @param {string} robot Hand control over to the requester, neutral first. */
   grant(robot) {
     this._send(this._pilot.grant(robot, performance.now()));
   }
 
-  /** @param {string} robot Keep it, although somebody asks for it. */
+  /** @param {string} robot Keep control in spite of a request. */
   deny(robot) {
     this._send([{ op: "deny", robot }]);
   }
 
   /**
    * @param {string} robot
-   * @returns {boolean} Whether this page may send it somewhere without asking anybody.
+   * @returns {boolean} Whether this page has control.
    */
   holds(robot) {
     return this._pilot.epoch(robot) !== null;
   }
 
-  /** @param {string} robot Whose lease goes on being needed, if this page has it. */
+  /** @param {string} robot Keep control longer, if this page has it. */
   keep(robot) {
     this._send(this._pilot.keep(robot, performance.now()));
   }
@@ -206,7 +206,7 @@ export class Drive {
   // Goals ----------------------------------------------------------------------
 
   /**
-   * Send a robot to a place, and take its lease for that when it is free.
+   * Send a robot to a goal; if control is free, take it for that.
    *
    * @param {string} robot
    * @param {Pose} pose In the robot's goal frame.
@@ -218,7 +218,7 @@ export class Drive {
   }
 
   /**
-   * Tell a robot where it is, and take its lease for that moment when it is free.
+   * Set a robot's pose; if control is free, take it for that moment.
    *
    * @param {string} robot
    * @param {Pose} pose In the robot's goal frame.
@@ -230,7 +230,7 @@ export class Drive {
     if (taken) this.release(robot);
   }
 
-  /** @param {string} robot Take its goal back. */
+  /** @param {string} robot Cancel its goal. */
   cancel(robot) {
     this._send([{ op: "cancel", robot }]);
   }
@@ -238,16 +238,16 @@ export class Drive {
   // STOP -----------------------------------------------------------------------
 
   /**
-   * Stop a robot, or all: "*". Needs no lease, and is heard whoever drives.
+   * Stop a robot, or all: "*". Works without control.
    *
-   * Without a connection it is the first thing said on the next one: a stop that comes
-   * late is still a stop.
+   * Without a connection it is the first message on the next one: a late stop is still
+   * a stop.
    *
    * @param {string} robot
-   * @returns {boolean} Whether it has left this page.
+   * @returns {boolean} Whether it was sent now.
    */
   stop(robot) {
-    // Nothing may come before this: whatever else a STOP means here follows it.
+    // The first message: everything else that a STOP causes here comes after it.
     const left = this._line.open;
     if (left) this._line.send({ op: "stop", robot });
     this._session.stopped(robot, left, performance.now());
@@ -256,9 +256,9 @@ export class Drive {
   }
 
   /**
-   * End a STOP. Moves nothing, and gives nobody the robot.
+   * End a STOP. Moves nothing, and gives control to no operator.
    *
-   * The gate refuses it if somebody pressed STOP since then.
+   * The gate refuses it if STOP was pressed again since then.
    *
    * @param {string} robot
    * @param {string} stop The identity of the STOP that the operator saw: `stop.id` of
@@ -270,7 +270,7 @@ export class Drive {
   }
 
   /**
-   * Let a robot that this page holds creep, and find out how soon it stops by itself.
+   * Run a stop test of a robot that this page controls: the robot moves slowly.
    *
    * @param {string} robot
    */
@@ -279,7 +279,7 @@ export class Drive {
     this._send([{ op: "stop-test", robot }]);
   }
 
-  /** End for good: neutral, leases back, connection closed. */
+  /** End: neutral, control released, connection closed. */
   close() {
     this._doubt(true);
     clearInterval(this._timer);
@@ -298,7 +298,7 @@ export class Drive {
     this._listeners.tell("drop", null);
   }
 
-  /** The page was frozen or stored away; its connection may be dead or not ours. */
+  /** Reconnect after the page was frozen or stored: the connection may be dead. */
   _renew() {
     this._pilot.doubt(performance.now(), { drop: true });
     this._listeners.tell("drop", null);

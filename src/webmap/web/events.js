@@ -7,11 +7,11 @@ import { FLAG } from "./opcodes.js";
 /**
  * @typedef {object} Listening
  * @property {number | undefined} owner Flags, if the element's owner listens.
- * @property {number | undefined} viewer Flags, if somebody listens on this page only.
+ * @property {number | undefined} viewer Flags, if only this page listens.
  * @property {(event: Event) => void} handler
  */
 
-/** The events of one element that somebody listens to, one DOM listener for each. */
+/** The events that are listened to on one element, with one DOM listener for each. */
 export class Listeners {
   /**
    * @param {Item} item
@@ -24,7 +24,7 @@ export class Listeners {
     this._kinds = new Map();
   }
 
-  /** @param {Map<string, number>} listening What the element's owner listens to. */
+  /** @param {Map<string, number>} listening The events of the element's owner. */
   setOwner(listening) {
     for (const kind of new Set([...this._kinds.keys(), ...listening.keys()])) {
       this._set(kind, { owner: listening.get(kind) });
@@ -33,13 +33,13 @@ export class Listeners {
 
   /**
    * @param {string} kind
-   * @param {number | undefined} flags undefined to listen no more.
+   * @param {number | undefined} flags undefined to stop listening.
    */
   setViewer(kind, flags) {
     this._set(kind, { viewer: flags });
   }
 
-  /** Listen to nothing any more. */
+  /** Stop listening to all events. */
   clear() {
     for (const [kind, { handler }] of this._kinds) {
       this._item.element.removeEventListener(kind, handler);
@@ -77,7 +77,7 @@ export class Listeners {
         this._hear(kind, event);
       },
     };
-    // Not passive, because the flags may come to ask for preventDefault.
+    // Not passive: the flags may require preventDefault later.
     this._item.element.addEventListener(kind, listening.handler, { passive: false });
     this._kinds.set(kind, listening);
     return listening;
@@ -86,8 +86,8 @@ export class Listeners {
 
 /**
  * @param {Event} event
- * @returns {Record<string, string | number | boolean>} What the server is told of it,
- *     without what is as it is most of the time.
+ * @returns {Record<string, string | number | boolean>} The description for the server,
+ *     without default values.
  */
 export function describe(event) {
   /** @type {Record<string, string | number | boolean>} */
@@ -124,10 +124,10 @@ function describeInput(target) {
   return {};
 }
 
-/** Of these only the newest is told, once for each time that the page is drawn. */
+/** Of these, only the newest is sent, once for each drawing of the page. */
 const FREQUENT = new Set(["mousemove", "pointermove", "wheel", "input"]);
 
-/** Tells the server of events. */
+/** Sends events to the server. */
 export class Reports {
   /**
    * @param {(message: object) => void} send

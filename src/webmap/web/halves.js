@@ -3,29 +3,29 @@ import { BASE, resolve } from "./addresses.js";
 /** @typedef {import('./map.js').MapCanvas} MapCanvas */
 
 /**
- * The browser's half of a module, as its default export gives it.
+ * The browser half of a module, from its default export.
  *
  * @typedef {object} Half
- * @property {(message: any) => void} [receive] Takes what the other half sends.
- * @property {() => void} destroy Undoes everything that the half did.
+ * @property {(message: any) => void} [receive] Handles messages of the other half.
+ * @property {() => void} destroy Reverts everything that the half did.
  */
 
 /**
  * @typedef {object} Attached
  * @property {MapCanvas} canvas
- * @property {Half | null} half null until the module has come.
- * @property {unknown[]} waiting Messages that came before the module.
+ * @property {Half | null} half null until the module is loaded.
+ * @property {unknown[]} waiting Messages that came before the module was loaded.
  */
 
 /**
  * @typedef {object} HalvesPage
- * @property {(message: object) => void} send Tells the server.
- * @property {(text: string) => void} notice Tells the viewer and the server.
- * @property {() => Promise<unknown>} ready What must be there before any module.
- * @property {() => void} onStyles Called when a style sheet has come.
+ * @property {(message: object) => void} send Sends to the server.
+ * @property {(text: string) => void} notice Shows to the viewer, sends to the server.
+ * @property {() => Promise<unknown>} ready Resolves when modules may be loaded.
+ * @property {() => void} onStyles Called when a style sheet was loaded.
  */
 
-/** The browser's halves of modules: loaded, attached, and taken away again. */
+/** Loads, attaches and detaches the browser halves of modules. */
 export class Halves {
   /** @param {HalvesPage} page */
   constructor(page) {
@@ -50,7 +50,7 @@ export class Halves {
     this._attached.set(instance, attached);
     if (css) this._addStyle(css);
     this._load(attached, instance, module, options).catch((error) => {
-      // What a module imports is not asked for again by every browser.
+      // Not every browser loads a failed import of a module again.
       const hint = error instanceof TypeError ? " Reload the page to try again." : "";
       this._page.notice(`Module ${module} failed: ${error}.${hint}`);
     });
@@ -66,7 +66,7 @@ export class Halves {
     const url = resolve(module, BASE);
     if (url === null) throw new Error("it is on another server");
     const [code] = await Promise.all([importOf(url), this._page.ready()]);
-    // It may have been taken away while it was on its way.
+    // It may have been detached while it was loading.
     if (this._attached.get(instance) !== attached) return;
     const { send } = this._page;
     /** @param {object} data */
@@ -94,7 +94,7 @@ export class Halves {
     if (attached) this._try(() => attached.half?.destroy());
   }
 
-  /** @param {MapCanvas} canvas All modules of this map go. */
+  /** @param {MapCanvas} canvas Detach all modules of this map. */
   detachFrom(canvas) {
     for (const [instance, attached] of [...this._attached].reverse()) {
       if (attached.canvas === canvas) this.detach(instance);
@@ -123,23 +123,23 @@ export class Halves {
   }
 }
 
-/** Milliseconds to wait before a module that could not be had is asked for again. */
+/** Milliseconds before each new attempt to load a module. */
 const AGAIN = [200, 1000];
 
 /**
- * By what address each module was had, as by another it would be another module.
+ * The address under which each module was loaded: another address is another module.
  * @type {Map<string, string>}
  */
 const had = new Map();
 
 /**
- * Import a module, and ask for it again if it cannot be had: over a bad link a page would
- * otherwise be without its STOP button until it is loaded anew.
+ * Import a module, and try again if it cannot be loaded: over a bad link a page would
+ * otherwise have no STOP button until it is reloaded.
  *
  * @param {string} url
  * @param {(url: string) => Promise<any>} [load]
  * @returns {Promise<any>}
- * @throws {TypeError} If it cannot be had; whatever else it raises itself.
+ * @throws {TypeError} If it cannot be loaded; also any error of the module itself.
  */
 export async function importOf(url, load = (address) => import(address)) {
   const known = had.get(url);
@@ -151,8 +151,8 @@ export async function importOf(url, load = (address) => import(address)) {
       had.set(url, address);
       return module;
     } catch (error) {
-      // A module that came and is wrong would be wrong again; of a TypeError it cannot
-      // be told whose it is.
+      // A loaded module that throws would throw again; the origin of a TypeError is
+      // unknown.
       if (!(error instanceof TypeError) || tries >= AGAIN.length) throw error;
       await new Promise((done) => setTimeout(done, AGAIN[tries]));
     }
@@ -161,7 +161,7 @@ export async function importOf(url, load = (address) => import(address)) {
 
 /**
  * @param {string} url
- * @param {number} tries How often it could not be had; a browser keeps that by address.
+ * @param {number} tries Failed attempts; a browser caches failures by address.
  */
 function asked(url, tries) {
   if (tries === 0) return url;

@@ -7,11 +7,11 @@ import { BOOLEAN_ATTRIBUTES } from "./opcodes.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const BOOLEANS = new Set(BOOLEAN_ATTRIBUTES);
-/** What a hand changes; its attribute tells only what it was at first. */
+/** Changed by the viewer; the attribute has only the initial value. */
 const PROPERTIES = new Set(["value", "checked", "selected", "open"]);
 const DOT_SIZE = 0.05;
 
-/** Makes matrices and transforms; elements need not be in the document for that. */
+/** Makes matrices and transforms; elements need not be in the document. */
 const maker = document.createElementNS(SVG, "svg");
 
 /**
@@ -34,11 +34,11 @@ export class Item {
     this.id = id;
     this.element = element;
     this.parent = parent;
-    /** @type {Map<number, Item | Text>} What the server put into it. */
+    /** @type {Map<number, Item | Text>} The children from the server. */
     this.children = new Map();
-    /** @type {ChildNode | null} What goes before the server's children, if anything. */
+    /** @type {ChildNode | null} The node before the server's children, if any. */
     this.anchor = null;
-    /** @type {ChildNode | null} What goes after everything of the server's. */
+    /** @type {ChildNode | null} The node after all of the server's children. */
     this.tail = null;
     /** @type {string[]} */
     this._classes = [];
@@ -46,7 +46,7 @@ export class Item {
     this._matrix = null;
     /** @type {SVGTransform | null} */
     this._transform = null;
-    /** @type {string | null} The transform, where it was given as text. */
+    /** @type {string | null} The transform, if it was given as text. */
     this._text = null;
     /** @type {{unit: number, points: Int16Array} | null} */
     this._dots = null;
@@ -93,7 +93,7 @@ export class Item {
     } else element.setAttribute(name, address);
   }
 
-  /** @param {string} names What Python gave; what a page added itself stays. */
+  /** @param {string} names Classes from Python; classes that a page added stay. */
   setClasses(names) {
     const classes = names.split(" ").filter(Boolean);
     const { classList } = this.element;
@@ -134,7 +134,7 @@ export class Item {
    * @param {number} f
    */
   _place(a, b, c, d, e, f) {
-    // The same matrix is used again and again: nothing is allocated at a tick.
+    // The matrix is reused, so that a tick allocates nothing.
     const matrix = (this._matrix ??= maker.createSVGMatrix());
     matrix.a = a;
     matrix.b = b;
@@ -161,7 +161,7 @@ export class Item {
     this._transform = null;
     this._text = value;
     const { element } = this;
-    // Chromium does not remove an attribute that was only ever set through its list.
+    // Chromium does not remove an attribute that was only set through its list.
     if (element instanceof SVGGraphicsElement) element.transform.baseVal.clear();
     if (value === null) element.removeAttribute("transform");
     else element.setAttribute("transform", value);
@@ -169,7 +169,7 @@ export class Item {
   }
 
   /**
-   * Take points to draw as dots; {@link drawDots} draws them.
+   * Store points as dots; {@link drawDots} draws them.
    *
    * @param {number} unit Metres in one unit of `points`.
    * @param {Int16Array} points
@@ -178,7 +178,7 @@ export class Item {
     const scaled = this._dots?.unit === unit;
     this._dots = { unit, points };
     if (scaled) return;
-    // The list is made anew, so that there is one scale at its end.
+    // The list is rebuilt, so that there is one scale at its end.
     if (this._transform) this._startTransform(this._transform.matrix);
     else if (this._text !== null) this._setTransform(this._text);
     else this._place(1, 0, 0, 1, 0, 0);
@@ -192,9 +192,9 @@ export class Item {
   }
 
   /**
-   * Read how large dots are, which makes the browser work out styles.
+   * Read the size of dots, which makes the browser compute styles.
    *
-   * @returns {boolean} Whether it is another size than before.
+   * @returns {boolean} Whether the size has changed.
    */
   readDotSize() {
     const text = getComputedStyle(this.element).getPropertyValue("--dot-size");
@@ -208,7 +208,7 @@ export class Item {
     return this._dotSize !== null;
   }
 
-  /** Draw the points as squares, in whole units: quick to write and quick to fill. */
+  /** Draw the points as squares, in whole units: fast to write and to fill. */
   drawDots() {
     if (!this._dots) return;
     const { unit, points } = this._dots;
@@ -222,14 +222,14 @@ export class Item {
     this.element.setAttribute("d", d);
   }
 
-  /** Take the element off the page. */
+  /** Remove the element from the page. */
   release() {
     if (this.element !== document.body) this.element.remove();
   }
 
   /**
-   * @param {string} seconds What `data-age` says.
-   * @param {string | null} text What the element says, if it shows the age.
+   * @param {string} seconds The value of `data-age`.
+   * @param {string | null} text The element's text, if it shows the age.
    */
   showAge(seconds, text) {
     const { element } = this;
@@ -240,7 +240,7 @@ export class Item {
   }
 }
 
-/** An element of the user's own page, with what was there kept to put it back. */
+/** An element of the user's own page, with its original state to restore it. */
 export class BoundItem extends Item {
   /**
    * @param {number} id
@@ -264,7 +264,7 @@ export class BoundItem extends Item {
     super.setAttribute(name, value);
   }
 
-  /** Drop what the page had in the element. */
+  /** Remove the page's own children of the element. */
   empty() {
     while (this.anchor) {
       const before = this.anchor.previousSibling;
@@ -274,7 +274,7 @@ export class BoundItem extends Item {
   }
 
   /**
-   * Put back what the page had, but for what it had in the element.
+   * Restore the page's own attributes, but not its own children.
    *
    * @override
    */
@@ -285,12 +285,12 @@ export class BoundItem extends Item {
   }
 }
 
-/** Everything that is drawn as dots, and when it must be drawn again. */
+/** All elements that are drawn as dots, and when to redraw them. */
 export class Dots {
   constructor() {
     /** @type {Set<Item>} */
     this._all = new Set();
-    /** @type {Set<Item>} Those with new points. */
+    /** @type {Set<Item>} Items with new points. */
     this._undrawn = new Set();
     this._restyled = false;
   }
@@ -312,13 +312,13 @@ export class Dots {
     this._undrawn.delete(item);
   }
 
-  /** Styles may give other sizes now. */
+  /** Note that styles may give other sizes now. */
   restyle() {
     this._restyled = true;
   }
 
   draw() {
-    // All sizes are read before anything is drawn: styles are worked out once.
+    // All sizes are read before drawing: styles are computed once.
     for (const item of this._restyled ? this._all : this._undrawn) {
       if (!this._restyled && item.knowsDotSize) continue;
       if (item.readDotSize()) this._undrawn.add(item);
@@ -329,21 +329,21 @@ export class Dots {
   }
 }
 
-/** Milliseconds after which a load that never tells its end holds up the next no more. */
+/** Milliseconds after which a load that has not ended no longer delays the next one. */
 const PATIENCE = 5000;
 
 /**
- * Has an image load one address at a time: the newest, once the one before is there.
+ * Loads one address of an image at a time: the newest, when the previous has loaded.
  *
- * A browser gives up a load for the next. An image that changes more quickly than it
- * loads would never be drawn; so it shows fewer of its versions, but each whole.
+ * A browser cancels a load for the next one. An image that changes faster than it loads
+ * would never be drawn; this shows fewer of its versions, but each completely.
  */
 class Loading {
   /** @param {SVGImageElement | HTMLImageElement} element */
   constructor(element) {
     this._element = element;
     this._busy = false;
-    /** @type {[string, string] | null} The attribute and address to load next. */
+    /** @type {[string, string] | null} The attribute and the address to load next. */
     this._next = null;
     this._patience = 0;
     element.addEventListener("load", () => this._done());
@@ -351,7 +351,7 @@ class Loading {
   }
 
   /**
-   * @param {string} name The attribute that holds the address.
+   * @param {string} name The attribute with the address.
    * @param {string} address
    */
   show(name, address) {
@@ -359,7 +359,7 @@ class Loading {
     else this._load(name, address);
   }
 
-  /** Load nothing more: the address was taken away. */
+  /** Load nothing more: the address was removed. */
   cancel() {
     this._next = null;
     this._done();
@@ -370,7 +370,7 @@ class Loading {
    * @param {string} address
    */
   _load(name, address) {
-    // The same address again is no new load, and would tell no end.
+    // The same address again is not loaded, so no event would report its end.
     if (this._element.getAttribute(name) === address) return;
     this._busy = true;
     this._patience = window.setTimeout(() => this._done(), PATIENCE);

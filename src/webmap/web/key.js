@@ -2,15 +2,16 @@ import { BASE } from "./addresses.js";
 import { CODE, KEY, PAGE_ID, PROTOCOL } from "./constants.js";
 
 /**
- * The storage belongs to one origin, so a server on another port of the same host, which
- * receives our cookie, cannot read the key. WebMap may lie under several prefixes there.
+ * The storage belongs to one origin, so a server on another port of the same host,
+ * which receives WebMap's cookie, cannot read the key. WebMap may have several prefixes
+ * there.
  */
 const NAME = `webmap key ${BASE.pathname}`;
 
-/** The key as this page was given it; a browser may keep its storage closed. */
+/** The key of this page; a browser may block its storage. */
 let given = "";
 
-/** Keep the key that the server handed to this page, and clean the address bar. */
+/** Store the key that the server sent to this page, and clean the address bar. */
 export function takeKey() {
   const element = document.querySelector(`meta[name="${KEY}"]`);
   if (element instanceof HTMLMetaElement) {
@@ -19,7 +20,7 @@ export function takeKey() {
     try {
       localStorage.setItem(NAME, given);
     } catch {
-      // This page works until it is left.
+      // The key works until the page is left.
     }
   }
   const url = new URL(location.href);
@@ -28,7 +29,7 @@ export function takeKey() {
   history.replaceState(history.state, "", url);
 }
 
-/** @returns {string} The newest key, which another tab may have been given. */
+/** @returns {string} The newest key, which another tab may have received. */
 function key() {
   try {
     return localStorage.getItem(NAME) ?? given;
@@ -37,20 +38,20 @@ function key() {
   }
 }
 
-/** @param {() => void} fn Called when another tab is given a new key. */
+/** @param {() => void} fn Called when another tab receives a new key. */
 export function onSignIn(fn) {
   addEventListener("storage", (event) => {
     if (event.key === NAME) fn();
   });
 }
 
-/** @returns {string[]} What a socket offers: a page can set no header of it but this. */
+/** @returns {string[]} Subprotocols: the only header that a page can set. */
 export function protocols() {
   return key() ? [PROTOCOL, key()] : [PROTOCOL];
 }
 
 /**
- * Ask why a socket was refused, which a browser does not tell a page.
+ * Ask the server why a socket was refused: a browser does not report the reason.
  *
  * @returns {Promise<string>} A sentence; empty if the server gives no reason.
  */
@@ -66,10 +67,10 @@ export async function whyRefused() {
 }
 
 /**
- * Take the name by which this page's maps are found again after a reload.
+ * Take the name that identifies this page's maps after a reload.
  *
- * It lies in the session's storage only while the page is being left: a tab that is
- * duplicated would else take the name along, and two pages cannot have one.
+ * It is in the session storage only while the page is being left: a duplicated tab
+ * would else copy the name, and two pages cannot have the same name.
  *
  * @param {string} path
  * @returns {string}
@@ -97,7 +98,7 @@ function take(entry) {
     sessionStorage.removeItem(entry);
     return name && new RegExp(PAGE_ID).test(name) ? name : null;
   } catch {
-    // A browser may keep its storage closed; a reload then starts anew.
+    // A browser may block its storage; a reload then has a new name.
     return null;
   }
 }

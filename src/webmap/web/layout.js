@@ -12,40 +12,40 @@ import {
 /** @typedef {import('./view.js').Matrix} Matrix */
 
 /**
- * What an operator's layout of a page is: what is seen of the map, what is switched on,
- * which panels are open and where the camera is. Nothing of it concerns a robot: no
- * selection, no lease, no goal; a file that has more than this is refused.
+ * An operator's layout of a page: the visible part of the map, the layers that are
+ * switched on, the open panels and the place of the camera. It has nothing about a
+ * robot: no selection, no control, no goal; a file with more than this is refused.
  *
  * @typedef {object} Place
- * @property {number} x What is in the middle of the map, in metres.
+ * @property {number} x The middle of the map, in metres.
  * @property {number} y
  * @property {number} pixels_per_metre
- * @property {number} turn_rad How far the map is turned, counter-clockwise.
+ * @property {number} turn_rad Rotation of the map, counter-clockwise.
  *
  * @typedef {{open: boolean, shown: Record<string, boolean>}} Layers
  * @typedef {{open: boolean, least: string}} Log
  * @typedef {{dock: 'side' | 'below' | 'float', x: number, y: number}} Camera
  *
- * @typedef {object} Layout A part that is not there is left as it is.
+ * @typedef {object} Layout A missing part is left unchanged.
  * @property {Place} [view]
  * @property {Layers} [layers]
  * @property {Log} [log]
  * @property {Camera} [camera]
  */
 
-/** What this program writes, and the only one that it reads. */
+/** The version that this program writes, and the only one that it reads. */
 export const VERSION = 1;
 
-/** Bytes of a file, at the most. */
+/** Most bytes of a file. */
 export const MOST_BYTES = 64 * 1024;
 
-/** Characters of a layer's name, and of what was got as a message shows it. */
+/** Most characters of a layer's name, and of a wrong value in an error message. */
 const LONGEST_NAME = 300;
 const LONGEST_GOT = 40;
 
-/** @typedef {(value: unknown, path: string) => any} Check Throws if it is not right. */
+/** @typedef {(value: unknown, path: string) => any} Check Throws if it is invalid. */
 
-/** Why a layout was not taken: what was got, what was expected, what to do. */
+/** Why a layout was refused: the value, the expected value, what to do. */
 export class LayoutRefused extends Error {}
 
 /**
@@ -108,7 +108,7 @@ function table(value, path) {
 }
 
 /**
- * @param {Record<string, Check>} parts All of which must be there.
+ * @param {Record<string, Check>} parts All are required.
  * @returns {Check}
  */
 function whole(parts) {
@@ -166,8 +166,8 @@ const PARTS = {
 };
 
 /**
- * @param {unknown} value What was kept of a view.
- * @returns {Place | null} null if it is none.
+ * @param {unknown} value A stored view.
+ * @returns {Place | null} null if it is invalid.
  */
 export function asPlace(value) {
   try {
@@ -178,8 +178,8 @@ export function asPlace(value) {
 }
 
 /**
- * @param {number} bytes Of a file, before it is read.
- * @throws {LayoutRefused} If that is more than any layout has.
+ * @param {number} bytes Size of a file, before it is read.
+ * @throws {LayoutRefused} If the file is too large for a layout.
  */
 export function checkSize(bytes) {
   if (bytes <= MOST_BYTES) return;
@@ -190,11 +190,11 @@ export function checkSize(bytes) {
 }
 
 /**
- * Read the text of a file, strictly: all of it is right, or nothing is taken.
+ * Read the text of a file, strictly: if any part is invalid, all of it is refused.
  *
  * @param {string} text
  * @returns {Layout}
- * @throws {LayoutRefused} With a sentence for the one who chose the file.
+ * @throws {LayoutRefused} With a sentence for the person who chose the file.
  */
 export function readLayout(text) {
   checkSize(new TextEncoder().encode(text).length);
@@ -246,15 +246,15 @@ export function writeLayout(layout) {
 
 /** @typedef {{width: number, height: number}} Size Pixels. */
 
-/** How much of its size a view may be skewed by rounding. */
+/** Greatest skew of a view by rounding, relative to its size. */
 const ROUNDING = 1e-6;
 
 /**
- * Say what is seen without saying on how large a screen.
+ * Describe the visible part of the map independently of the screen size.
  *
  * @param {Matrix} view
  * @param {Size} size
- * @returns {Place | null} null if the view is skewed or mirrored, which no hand does.
+ * @returns {Place | null} null if the view is skewed or mirrored, which no viewer does.
  */
 export function placeOf(view, { width, height }) {
   const scale = scaleOf(view);
@@ -267,7 +267,7 @@ export function placeOf(view, { width, height }) {
 /**
  * @param {Place} place
  * @param {Size} size
- * @returns {Matrix} The view with that place in its middle.
+ * @returns {Matrix} The view with that place in the middle.
  */
 export function viewOf({ x, y, pixels_per_metre: k, turn_rad }, { width, height }) {
   const [across, down] = [width / 2, height / 2];
@@ -277,18 +277,18 @@ export function viewOf({ x, y, pixels_per_metre: k, turn_rad }, { width, height 
 }
 
 /**
- * What one module of a page adds to a layout.
+ * The part of a layout that belongs to one module of a page.
  *
  * @template T
  * @typedef {object} Part
  * @property {() => T} read
- * @property {(value: T) => void} write Takes what was read from a file, and checked.
- * @property {() => void} reset Makes it as it was found.
+ * @property {(value: T) => void} write Applies a value from a file, already checked.
+ * @property {() => void} reset Restores the initial state.
  */
 
 /** @typedef {Exclude<keyof Layout, 'view'>} Name */
 
-/** The parts of a map's layout, each from the module that has it, if that is there. */
+/** The parts of a map's layout, each from the module that owns it, if present. */
 export class LayoutParts {
   constructor() {
     /** @type {Map<Name, Part<any>>} */
@@ -299,7 +299,7 @@ export class LayoutParts {
    * @template {Name} K
    * @param {K} name
    * @param {Part<Required<Layout>[K]>} part
-   * @returns {() => void} Takes it away.
+   * @returns {() => void} Removes the part.
    */
   add(name, part) {
     this._parts.set(name, part);
@@ -308,33 +308,33 @@ export class LayoutParts {
     };
   }
 
-  /** @returns {Layout} How everything is. */
+  /** @returns {Layout} The current layout. */
   read() {
     return Object.fromEntries([...this._parts].map(([name, part]) => [name, part.read()]));
   }
 
-  /** @param {Layout} layout What of it this page has is taken. */
+  /** @param {Layout} layout Only the parts that this page has are applied. */
   write(layout) {
     for (const [name, part] of this._parts) {
       if (layout[name] !== undefined) part.write(layout[name]);
     }
   }
 
-  /** Make everything as it was found. */
+  /** Restore the initial state. */
   reset() {
     for (const part of this._parts.values()) part.reset();
   }
 }
 
-/** Where the last views are kept in this browser. */
+/** Key of the last views in this browser's storage. */
 const KEPT = "webmap.views";
 
-/** Addresses whose view is kept, at the most; the one that was seen longest ago goes. */
+/** Most addresses with a stored view; beyond it the oldest is dropped. */
 const MOST = 32;
 
 /**
  * @param {string} address
- * @returns {Place | null} How that page was seen last; null if that is not known.
+ * @returns {Place | null} The last view of that page; null if unknown.
  */
 export function keptView(address) {
   const views = all();
@@ -351,7 +351,7 @@ export function keepView(address, place) {
   try {
     localStorage.setItem(KEPT, JSON.stringify(Object.fromEntries(entries.slice(-MOST))));
   } catch {
-    // Without storage the page begins as it was found.
+    // Without storage the page starts in its initial state.
   }
 }
 
@@ -361,6 +361,6 @@ function all() {
     const value = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
     return typeof value === "object" && value !== null && !Array.isArray(value) ? value : {};
   } catch {
-    return {}; // storage may be forbidden, or hold what is not ours
+    return {}; // storage may be blocked, or contain other data
   }
 }

@@ -1,10 +1,10 @@
 import { FOR_GOOD } from "./constants.js";
 import { onSignIn, protocols } from "./key.js";
 
-/** Milliseconds before a lost link is tried again: at first, and at the most. */
+/** Milliseconds before a lost connection is opened again: first and longest wait. */
 const FIRST_WAIT = 250;
 const LONGEST_WAIT = 5000;
-/** Milliseconds for which a link may be opened before it is given up: likewise. */
+/** Milliseconds in which a connection must open: first and longest limit. */
 const FIRST_PATIENCE = 5000;
 const LONGEST_PATIENCE = 20_000;
 
@@ -13,10 +13,10 @@ const LONGEST_PATIENCE = 20_000;
  * @property {() => void} opened
  * @property {(data: ArrayBuffer) => void} received
  * @property {(reason: string, forGood: boolean) => void} closed
- * @property {() => void} refused It was not even opened; `closed` has been called.
+ * @property {() => void} refused It did not open; `closed` has been called.
  */
 
-/** A WebSocket that comes back by itself; what cannot be sent now is not sent. */
+/** A WebSocket that reconnects; a message without a connection is dropped. */
 export class Link {
   /**
    * @param {() => URL} address
@@ -26,7 +26,7 @@ export class Link {
     this._address = address;
     this._events = events;
     this._wait = FIRST_WAIT;
-    /** When opening it began. */
+    /** When opening started. */
     this._since = 0;
     this._patience = FIRST_PATIENCE;
     /** @type {WebSocket | null} */
@@ -47,35 +47,35 @@ export class Link {
     return this._socket?.readyState === WebSocket.CONNECTING;
   }
 
-  /** Give up what is being opened for long, as its network may be gone, and try again. */
+  /** Give up a connection that takes too long to open, and try again. */
   look() {
     if (!this.opens || performance.now() - this._since < this._patience) return;
-    // A network that is merely slow is given more time each time.
+    // A slow network gets more time at each attempt.
     this._patience = Math.min(this._patience * 2, LONGEST_PATIENCE);
     this.renew();
   }
 
-  /** @param {object} message Goes out now or not at all. */
+  /** @param {object} message Sent now or not at all. */
   send(message) {
     if (this.isOpen) this._socket?.send(JSON.stringify(message));
   }
 
-  /** The other side speaks sense, so the next loss is tried again at once. */
+  /** The server works: after the next loss, reconnect immediately. */
   settle() {
     this._wait = FIRST_WAIT;
     this._patience = FIRST_PATIENCE;
   }
 
-  /** Give the link up and try again. */
+  /** Close the connection and open a new one. */
   renew() {
     const socket = this._socket;
     if (!socket) return;
-    // A dead link takes its time to close; nobody waits for that.
+    // A dead connection takes long to close: do not wait for it.
     this._lost(socket, "no answer", 1006);
     socket.close();
   }
 
-  /** Give the link up for good. */
+  /** Close the connection for good. */
   end() {
     const socket = this._socket;
     this._socket = null;
@@ -124,7 +124,7 @@ export class Link {
   }
 
   _hurry() {
-    // What was begun on another network may never end.
+    // A connection that was started on another network may never open.
     if (this.opens) this.renew();
     if (this._timer === undefined) return;
     clearTimeout(this._timer);

@@ -20,13 +20,13 @@ import {
 /** @typedef {import('./wire.js').ViewState} ViewState */
 
 /**
- * What a map asks of the page that it is on.
+ * The services that a map needs from its page.
  *
  * @typedef {object} Surroundings
- * @property {(report: object) => void} send Tells the server.
+ * @property {(report: object) => void} send Sends to the server.
  * @property {(id: number) => Element | null} find The element of a mounted fragment.
- * @property {() => import('./drive.js').Drive} drive The page's one line to the gate.
- * @property {() => number | null} clock The display's clock in seconds, if it was heard.
+ * @property {() => import('./drive.js').Drive} drive The page's connection to the gate.
+ * @property {() => number | null} clock The display's clock in seconds, if known.
  */
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -34,22 +34,22 @@ const SVG = "http://www.w3.org/2000/svg";
 /**
  * A map on the page: an `<svg>` whose world group shows metres, x right and y up.
  *
- * The browser owns the view. Programs send operations, hands use {@link setView};
- * whatever it is, the server gets to know it afterwards.
+ * The browser owns the view. Programs send operations, viewers use {@link setView}; the
+ * server is informed afterwards.
  */
 export class MapCanvas {
   /**
-   * @param {number} id The server's name of the `<svg>`.
+   * @param {number} id The server's id of the `<svg>`.
    * @param {SVGSVGElement} svg
    * @param {SVGGElement} world
-   * @param {{width: number, height: number}} size Pixels; 0 to fill what it is in.
+   * @param {{width: number, height: number}} size Pixels; 0 to fill the container.
    * @param {Surroundings} surroundings
    */
   constructor(id, svg, world, size, surroundings) {
     this.id = id;
-    /** The root of everything that the map shows; screen pixels. */
+    /** The root of the whole map; screen pixels. */
     this.svg = svg;
-    /** What is in metres goes in here. */
+    /** The group for content in metres. */
     this.world = world;
     this._surroundings = surroundings;
     /** @type {SVGGElement | null} */
@@ -65,11 +65,11 @@ export class MapCanvas {
     this._reports = new ViewReports(() => this._report());
     this._dragEnd = new DragEnd();
     this._session = 0;
-    /** What modules add to the viewer's layout of the page. */
+    /** The parts of the viewer's layout that modules own. */
     this.layout = new LayoutParts();
-    /** Whether hands chose the view, rather than programs. */
+    /** Whether the viewer chose the view, and not a program. */
     this.byHand = false;
-    /** Whether the view is that of this page before its link broke, or a reload. */
+    /** Whether the view was restored after a reconnection or a reload. */
     this.restored = false;
     this._matrix = svg.createSVGMatrix();
     this._pictures = new FarPictures(world);
@@ -105,12 +105,12 @@ export class MapCanvas {
     this._observer.observe(this.svg);
   }
 
-  /** The element that the map was put into. */
+  /** The element that contains the map. */
   get element() {
     return this.svg.parentElement;
   }
 
-  /** A group beside the world, in pixels, for what lies over the map. */
+  /** A group next to the world, in pixels, for content over the map. */
   get overlay() {
     if (!this._overlay?.isConnected) {
       this._overlay = document.createElementNS(SVG, "g");
@@ -120,14 +120,14 @@ export class MapCanvas {
     return this._overlay;
   }
 
-  /** The page's one line to the gate; see `drive.js`. */
+  /** The page's connection to the gate; see `drive.js`. */
   get drive() {
     return this._surroundings.drive();
   }
 
   /**
-   * The display's monotonic clock now, in seconds: what tells the age of anything that
-   * the display has stamped. null while it was never heard.
+   * The display's monotonic clock now, in seconds: for the age of anything that the
+   * display has stamped. null while it is unknown.
    */
   get clock() {
     return this._surroundings.clock();
@@ -139,7 +139,7 @@ export class MapCanvas {
   }
 
   /**
-   * Show the world another way, by hand: what only moves the view ends following.
+   * Set the view for the viewer; a view that is only shifted ends following.
    *
    * @param {Matrix} view
    */
@@ -152,8 +152,8 @@ export class MapCanvas {
   }
 
   /**
-   * @param {(view: Matrix) => void} fn Called whenever the view is another.
-   * @returns {() => void} What ends that.
+   * @param {(view: Matrix) => void} fn Called when the view changes.
+   * @returns {() => void} Removes the listener.
    */
   onView(fn) {
     this._onView.add(fn);
@@ -180,7 +180,7 @@ export class MapCanvas {
 
   /**
    * @param {{clientX: number, clientY: number}} event
-   * @returns {Point} Where it happened, in pixels from the map's left and top.
+   * @returns {Point} Its position, in pixels from the map's left and top.
    */
   pointOf(event) {
     const matrix = this.svg.getScreenCTM()?.inverse();
@@ -194,15 +194,15 @@ export class MapCanvas {
   }
 
   /**
-   * @param {(selected: string | null) => void} fn Called when another is selected.
-   * @returns {() => void} What ends that.
+   * @param {(selected: string | null) => void} fn Called when the selection changes.
+   * @returns {() => void} Removes the listener.
    */
   onSelect(fn) {
     this._onSelect.add(fn);
     return () => this._onSelect.delete(fn);
   }
 
-  /** Swallow the click with which the browser ends a drag; call it when one ends. */
+  /** Suppress the click that ends a drag in the browser; call at the end of a drag. */
   suppressNextClick() {
     this._dragEnd.note(performance.now());
   }
@@ -229,10 +229,10 @@ export class MapCanvas {
   // For the scene --------------------------------------------------------------
 
   /**
-   * Take up what the server knows of the map.
+   * Restore the state of the map from the server.
    *
    * @param {ViewState} state
-   * @param {ViewState | undefined} kept What this page knew before it was told anew.
+   * @param {ViewState | undefined} kept The state on this page before the reset.
    */
   restore(state, kept) {
     this._session = state.session;
@@ -254,7 +254,7 @@ export class MapCanvas {
   }
 
   /**
-   * @param {number} number Counts operations, so that none is applied twice.
+   * @param {number} number Number of the operation, so that none is applied twice.
    * @param {string} operation
    * @param {number[]} args
    */
@@ -282,9 +282,9 @@ export class MapCanvas {
   }
 
   /**
-   * A frame has been applied: keep up with what is followed, and tell the server.
+   * Finish a frame: update the followed view, and inform the server.
    *
-   * @param {boolean} reselected Whether another robot may be selected.
+   * @param {boolean} reselected Whether the selected robot may have changed.
    */
   settle(reselected) {
     const shift = this._following.shift(this._followedPlace());
@@ -293,7 +293,7 @@ export class MapCanvas {
     this._reports.settle();
   }
 
-  /** Leave the elements alone from now on. */
+  /** Stop changing the elements. */
   destroy() {
     this._ends?.abort();
     this._observer?.disconnect();
@@ -304,7 +304,7 @@ export class MapCanvas {
     this._onSelect.clear();
   }
 
-  // Its own affairs ------------------------------------------------------------
+  // Private --------------------------------------------------------------------
 
   /** @param {Matrix} view */
   _change(view) {
@@ -340,7 +340,7 @@ export class MapCanvas {
     return this.width > 0 && this.height > 0;
   }
 
-  /** @returns {Point | null} Where the followed element is, in the map's pixels. */
+  /** @returns {Point | null} Position of the followed element, in the map's pixels. */
   _followedPlace() {
     if (!this.following) return null;
     const element = this._surroundings.find(this.following);
@@ -357,7 +357,7 @@ export class MapCanvas {
     for (const fn of [...this._onSelect]) fn(selected);
   }
 
-  /** Tell the server of the view, soon and not too often. */
+  /** Report the view to the server, soon and not too often. */
   reportSoon() {
     this._reports.soon();
   }
@@ -393,11 +393,11 @@ export function contentSize(element) {
   return { width: Math.max(0, width - across), height: Math.max(0, height - down) };
 }
 
-/** Milliseconds for which the click that ends a drag may keep us waiting. */
+/** Most milliseconds between the end of a drag and its click. */
 const CLICK_PATIENCE = 500;
 
 /**
- * Tells the click with which the browser ends a drag from one that somebody meant.
+ * Distinguishes the click with which the browser ends a drag from a real click.
  *
  * Times are in milliseconds of one clock.
  */
@@ -406,25 +406,25 @@ export class DragEnd {
     this._at = -Infinity;
   }
 
-  /** @param {number} now A drag ended. */
+  /** @param {number} now Time at which a drag ended. */
   note(now) {
     this._at = now;
   }
 
-  /** Something was pressed: the next click is its own. */
+  /** Note a new press: the next click belongs to it. */
   forget() {
     this._at = -Infinity;
   }
 
   /**
-   * @param {number} detail Of the click: how many there were in a row; 0 from a key.
+   * @param {number} detail Of the click: number of clicks in a row; 0 from a key.
    * @param {number} now
-   * @returns {boolean} Whether the click is the end of a drag, and means nothing.
+   * @returns {boolean} Whether the click only ends a drag.
    */
   swallows(detail, now) {
     const waited = now - this._at;
     this.forget();
-    // A click without a pointer comes from a key and ends no drag.
+    // A click without a pointer comes from a key and never ends a drag.
     return detail !== 0 && waited <= CLICK_PATIENCE;
   }
 }

@@ -11,21 +11,21 @@ import { MapCanvas } from "./map.js";
  * @property {Item} item The `<svg>`.
  * @property {number} world The id of the world group.
  * @property {{width: number, height: number}} size
- * @property {MapCanvas | null} canvas null until the world is there.
+ * @property {MapCanvas | null} canvas null until the world exists.
  */
 
 /** The maps on the page. */
 export class Maps {
   /**
    * @param {(svg: Element) => Surroundings} surroundings
-   * @param {(canvas: MapCanvas) => void} onEnd Called before a map goes.
+   * @param {(canvas: MapCanvas) => void} onEnd Called before a map is removed.
    */
   constructor(surroundings, onEnd) {
     this._surroundings = surroundings;
     this._onEnd = onEnd;
     /** @type {Map<number, Place>} */
     this._places = new Map();
-    /** @type {Map<string, ViewState>} How maps were seen that may come again. */
+    /** @type {Map<string, ViewState>} Views of removed maps, to restore them. */
     this._kept = new Map();
   }
 
@@ -38,7 +38,7 @@ export class Maps {
    * @param {Mount} mount
    * @param {Item} item The `<svg>`.
    * @param {number} world The id of the world group.
-   * @param {{width: number, height: number}} size Pixels; 0 to fill what it is in.
+   * @param {{width: number, height: number}} size Pixels; 0 to fill the container.
    */
   add(mount, item, world, size) {
     this.end(item);
@@ -47,7 +47,7 @@ export class Maps {
 
   /**
    * @param {number} svg
-   * @returns {MapCanvas | null} The map, made as soon as its elements are there.
+   * @returns {MapCanvas | null} The map, made as soon as its elements exist.
    */
   get(svg) {
     const place = this._places.get(svg);
@@ -77,12 +77,12 @@ export class Maps {
     this._kept.delete(key);
   }
 
-  /** @param {boolean} reselected Whether another robot may be selected. */
+  /** @param {boolean} reselected Whether the selected robot may have changed. */
   settle(reselected) {
     for (const svg of this._places.keys()) this.get(svg)?.settle(reselected);
   }
 
-  /** @param {Item} item What may be a map goes. */
+  /** @param {Item} item An item that is removed and may be a map. */
   end(item) {
     const place = this._places.get(item.id);
     if (place?.item !== item) return;

@@ -1,14 +1,14 @@
 import { BoundItem, Item, createElement } from "./item.js";
 import { PLACE } from "./opcodes.js";
 
-/** A fragment at one place of the page. */
+/** A fragment at one position of the page. */
 export class Mount {
   /**
    * @param {number} id
    * @param {number} fragment
    * @param {Mount | null} within
-   * @param {number} under The element of `within` that takes the root.
-   * @param {number} order Below 0 it is behind that element's own children.
+   * @param {number} under The element of `within` that contains the root.
+   * @param {number} order Below 0 the root is behind that element's own children.
    */
   constructor(id, fragment, within, under, order) {
     this.id = id;
@@ -22,12 +22,12 @@ export class Mount {
     this.items = new Map();
     /** @type {Map<number, {text: Text, host: Item}>} */
     this._texts = new Map();
-    /** @type {Map<number, Mount[]>} What is mounted under each element, in order. */
+    /** @type {Map<number, Mount[]>} The mounts under each element, in order. */
     this._guests = new Map();
     within?._welcome(this);
   }
 
-  // What is mounted under what ---------------------------------------------------
+  // Mounts ---------------------------------------------------------------------
 
   /** @param {Mount} guest */
   _welcome(guest) {
@@ -38,20 +38,20 @@ export class Mount {
 
   /**
    * @param {number} id
-   * @returns {Mount[]} What is mounted under that element, in order.
+   * @returns {Mount[]} The mounts under that element, in order.
    */
   _guestsOf(id) {
     return this._guests.get(id) ?? [];
   }
 
-  /** Take leave of what this is mounted under. */
+  /** Remove this mount from its parent mount. */
   leave() {
     const others = this.within?._guestsOf(this.under).filter((guest) => guest !== this);
     if (others?.length) this.within?._guests.set(this.under, others);
     else this.within?._guests.delete(this.under);
   }
 
-  /** Put the root where it belongs, if that is there already. */
+  /** Insert the root at its position, if the parent element exists already. */
   _place() {
     const host = this.within?.items.get(this.under);
     if (host && this.root) {
@@ -61,7 +61,7 @@ export class Mount {
 
   /**
    * @param {Item} host
-   * @returns {ChildNode | null} What comes after the root.
+   * @returns {ChildNode | null} The node after the root.
    */
   _nextNode(host) {
     const behind = this.order < 0;
@@ -107,7 +107,7 @@ export class Mount {
 
   /**
    * @param {number} id
-   * @param {HTMLElement} element One of the user's own page.
+   * @param {HTMLElement} element An element of the user's own page.
    * @returns {Item}
    */
   bind(id, element) {
@@ -167,10 +167,10 @@ export class Mount {
   }
 
   /**
-   * Take an element or a text off the page.
+   * Remove an element or a text from the page.
    *
    * @param {number} id
-   * @param {(item: Item) => void} onGone Called for each element that goes.
+   * @param {(item: Item) => void} onGone Called for each removed element.
    */
   remove(id, onGone) {
     const known = this._texts.get(id);
@@ -179,7 +179,7 @@ export class Mount {
     else if (item) this._removeItem(item, onGone);
   }
 
-  /** @param {(item: Item) => void} onGone Called for each element that goes. */
+  /** @param {(item: Item) => void} onGone Called for each removed element. */
   removeRoot(onGone) {
     if (this.root) this._removeItem(this.root, onGone);
   }
@@ -200,7 +200,7 @@ export class Mount {
    */
   _removeItem(item, onGone) {
     for (const id of [...item.children.keys()].reverse()) this.remove(id, onGone);
-    // What others mounted here may come back with another element of this id.
+    // Mounts under this element stay for a later element with the same id.
     for (const guest of this._guestsOf(item.id)) guest.root?.element.remove();
     onGone(item);
     item.parent?.children.delete(item.id);
@@ -219,8 +219,8 @@ function nodeOf(child) {
 
 /**
  * @param {Item} host
- * @param {Mount[]} guests What is mounted under it, in order.
- * @returns {ChildNode | null} What comes first of the server's own children.
+ * @param {Mount[]} guests The mounts under it, in order.
+ * @returns {ChildNode | null} The first of the server's own children.
  */
 function firstNode(host, guests) {
   let before = host.anchor;
@@ -232,8 +232,8 @@ function firstNode(host, guests) {
 
 /**
  * @param {Item} host
- * @param {Mount[]} guests What is mounted under it, in order.
- * @returns {ChildNode | null} What comes after the last of the server's own children.
+ * @param {Mount[]} guests The mounts under it, in order.
+ * @returns {ChildNode | null} The node after the last of the server's own children.
  */
 function endNode(host, guests) {
   const next = guests.find((guest) => guest.order >= 0 && guest._isIn(host));

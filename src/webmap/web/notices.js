@@ -1,17 +1,17 @@
-/** How long a failure that was dismissed is not shown again, in milliseconds. */
+/** Milliseconds for which a dismissed failure is not shown again. */
 const SILENCE = 60_000;
-/** How long what was mended is still shown: it can be read, and does not flicker. */
+/** Milliseconds for which a solved problem stays visible, to be readable. */
 const LINGER = 2000;
-/** How many failures are shown; the others are counted. */
+/** Most failures that are shown; the others are counted. */
 const SHOWN = 3;
-/** How many failures are kept at all. */
+/** Most failures that are kept. */
 const KEPT = 50;
-/** How often it is looked whether they cover something by now, in milliseconds. */
+/** Milliseconds between two checks whether notices cover something. */
 const LOOK_PERIOD = 1000;
-/** What is to be pressed, and what is to be read beside it. */
+/** Controls and panels that notices must not cover. */
 const TOOLS = "button, summary, input, select, textarea, a[href], .webmap-panel";
 
-/** Sentences for the viewer, in a corner of the page; text, whatever is in it. */
+/** Sentences for the viewer, in a corner of the page; always plain text. */
 export class Notices {
   constructor() {
     /** @type {HTMLElement | null} */
@@ -22,9 +22,9 @@ export class Notices {
     this._shown = new Map();
     /** When each failure was dismissed. @type {Map<string, number>} */
     this._dismissed = new Map();
-    /** What was mended and goes soon. @type {Map<string, number>} */
+    /** Solved problems that are removed soon. @type {Map<string, number>} */
     this._leaving = new Map();
-    /** What it was when they were placed. */
+    /** The layout of the page when the notices were placed. */
     this._seen = "";
     addEventListener("resize", () => this._place());
     setInterval(() => this._place(), LOOK_PERIOD);
@@ -32,7 +32,7 @@ export class Notices {
 
   /**
    * Show a failure until it is dismissed; the same one is shown once, and not again
-   * in the minute after it was dismissed.
+   * within a minute after it was dismissed.
    *
    * @param {string} text
    */
@@ -44,12 +44,12 @@ export class Notices {
   }
 
   /**
-   * Show what fails until it is mended, in place of what was said of it before; never
-   * again once it was dismissed. The server gives it another number when it fails anew
-   * long after it was mended.
+   * Show a problem until it is solved, in place of its previous text; never again after
+   * it was dismissed. The server gives it another number when it occurs again long
+   * after it was solved.
    *
    * @param {number} number
-   * @param {string} text Empty if it is mended.
+   * @param {string} text Empty if it is solved.
    */
   problem(number, text) {
     const key = problemKey(number);
@@ -61,7 +61,7 @@ export class Notices {
     if (!this._dismissed.has(key)) this.show(key, text, "alert");
   }
 
-  /** Take back every problem that is not told again soon. */
+  /** Remove every problem that is not reported again soon. */
   doubtProblems() {
     for (const key of this._shown.keys()) if (isProblem(key)) this._leave(key);
   }
@@ -134,7 +134,7 @@ export class Notices {
     return this._box;
   }
 
-  /** A page full of failures tells no more than its newest, and how many there are. */
+  /** Show only the newest failures, and the number of the others. */
   _limit() {
     const failures = [...this._shown].filter(([, notice]) => isFailure(notice));
     for (const [key] of failures.slice(0, -KEPT)) {
@@ -144,7 +144,7 @@ export class Notices {
     this._place();
   }
 
-  /** Lie over the map and over none of its tools, fewer of them where there is no room. */
+  /** Place the notices over the map but over no tool; show fewer if space is short. */
   _place() {
     const area = this._shown.size > 0 && this._box ? mapOnScreen() : null;
     const tools = area && this._box ? toolsBeside(this._box) : [];
@@ -160,7 +160,7 @@ export class Notices {
   /**
    * @param {Box | null} area
    * @param {Box[]} tools
-   * @returns {boolean} Whether there was room, or nothing to go by.
+   * @returns {boolean} Whether there was room, or the layout is unknown.
    */
   _lay(area, tools) {
     const box = this._box;
@@ -177,7 +177,7 @@ export class Notices {
     return place !== null;
   }
 
-  /** @param {number} count Of how many failures more than the number is shown. */
+  /** @param {number} count Number of failures to show. */
   _show(count) {
     const failures = [...this._shown.values()].filter(isFailure);
     const others = Math.max(0, failures.length - count);
@@ -199,7 +199,7 @@ function isFailure(notice) {
 
 /**
  * @param {HTMLElement} box
- * @returns {DOMRect[]} Where everything is that notices must not cover.
+ * @returns {DOMRect[]} The boxes that notices must not cover.
  */
 function toolsBeside(box) {
   return [...document.querySelectorAll(TOOLS)]
@@ -222,7 +222,7 @@ function mapOnScreen() {
 /** @param {Element} element */
 function isVisible(element) {
   const { width, height } = element.getBoundingClientRect();
-  // What is folded away has a size too.
+  // A collapsed element has a size too.
   const shown = element.checkVisibility?.({ visibilityProperty: true }) ?? true;
   return shown && width > 0 && height > 0;
 }
@@ -247,18 +247,18 @@ function isProblem(key) {
  * @property {number} bottom
  */
 
-/** How far notices stay from what they must not cover, in pixels. */
+/** Distance between notices and elements that they must not cover, in pixels. */
 export const GAP = 16;
-/** How wide notices are at the least and at the most, in pixels. */
+/** Least and greatest width of notices, in pixels. */
 const LEAST = 240;
 const MOST = 704;
 
 /**
- * Where notices cover nothing that is to be pressed: as high up as they can be.
+ * Return the highest place where notices cover no control.
  *
- * @param {Box} area Where they may be, in pixels of the window, as everything here.
- * @param {Box[]} taken What must not be covered.
- * @param {(width: number) => number} heightOf How high they are if they are so wide.
+ * @param {Box} area The area for notices, in pixels of the window, like all values.
+ * @param {Box[]} taken The boxes that must not be covered.
+ * @param {(width: number) => number} heightOf Returns their height for a width.
  * @returns {{left: number, top: number, width: number} | null} null if there is no room.
  */
 export function freePlace(area, taken, heightOf) {
@@ -279,7 +279,7 @@ export function freePlace(area, taken, heightOf) {
  */
 function placeAt(top, area, taken, heightOf) {
   let bottom = top;
-  // Beside something there is less room, and what is narrower is higher.
+  // Next to a box there is less width, and narrower notices are higher.
   for (let tries = 0; tries < 4; tries += 1) {
     const beside = taken.filter((box) => box.top < bottom + GAP && box.bottom > top - GAP);
     const [left, right] = widestSpan(area, beside);
@@ -296,7 +296,7 @@ function placeAt(top, area, taken, heightOf) {
 /**
  * @param {Box} area
  * @param {Box[]} taken
- * @returns {[number, number]} The widest part from left to right that nothing takes.
+ * @returns {[number, number]} The widest free part from left to right.
  */
 function widestSpan(area, taken) {
   /** @type {[number, number]} */

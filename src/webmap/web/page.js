@@ -19,15 +19,15 @@ import { VersionError } from "./wire.js";
 
 /** @typedef {import('./drive.js').Drive} Drive */
 
-/** Milliseconds without a word from the server until the page says so, and acts. */
+/** Milliseconds without a message until the page shows it, and until it reconnects. */
 const SILENT = 3000;
 const DEAD = 10_000;
-/** The server says something at least every second, so this is often enough. */
+/** Milliseconds between two checks; the server sends at least every second. */
 const LOOK_PERIOD = 500;
-/** Frames in a row that may fail before the page gives up asking for new ones. */
+/** Frames in a row that may fail before the page stops requesting new ones. */
 const FAILURES = 3;
 
-/** One open page: its link to the display, the scene that it shows, its notices. */
+/** One open page: its connection to the display, its scene, its notices. */
 export class Page {
   constructor() {
     takeKey();
@@ -75,7 +75,7 @@ export class Page {
   }
 
   /**
-   * The page's one line to the gate, made when a module first asks for it.
+   * The page's connection to the gate, made at its first use by a module.
    *
    * @returns {Drive}
    */
@@ -90,7 +90,7 @@ export class Page {
   }
 
   /**
-   * Tell the server; nothing is kept for later.
+   * Send to the server; dropped without a connection.
    *
    * @param {object} message
    */
@@ -99,7 +99,7 @@ export class Page {
   }
 
   /**
-   * Tell the viewer and the server of something that did not work.
+   * Report a failure to the viewer and to the server.
    *
    * @param {string} text
    */
@@ -108,7 +108,7 @@ export class Page {
     this.send({ op: "trouble", text: text.slice(0, LONGEST_TEXTS.trouble) });
   }
 
-  // The link -------------------------------------------------------------------
+  // The connection -------------------------------------------------------------
 
   _opened() {
     this._heard = performance.now();
@@ -149,7 +149,7 @@ export class Page {
     this._disconnected(`${what} ${forGood ? "Reload the page." : "Reconnecting…"}`);
   }
 
-  /** The server answers, but lets this page open no socket: say what to do. */
+  /** Ask why the server refuses a socket to this page, and show what to do. */
   async _askWhy() {
     const why = await whyRefused();
     if (why && !this._link.isOpen) this._disconnected(why);
@@ -158,16 +158,16 @@ export class Page {
   /** @param {string} text */
   _disconnected(text) {
     const { classList } = document.documentElement;
-    // Who drives goes by the picture: a press that began on a live one ends with it.
+    // The operator drives by the picture: end all inputs when it stops updating.
     if (!classList.contains("disconnected")) this._drive?.doubt();
     classList.add("disconnected");
     this.notices.show("link", text);
   }
 
-  /** Notice a link that is open and says nothing. */
+  /** Detect an open connection that receives nothing. */
   _look() {
     this._link.look();
-    // A hidden page draws nothing, so that the server rightly stops talking to it.
+    // A hidden page draws nothing, so the server stops sending to it.
     if (document.hidden || this._frames.length > 0) this._heard = performance.now();
     const silent = performance.now() - this._heard;
     if (silent < SILENT || !this._link.isOpen) return;
@@ -187,7 +187,7 @@ export class Page {
   /**
    * @param {ArrayBuffer} data
    * @param {number} received
-   * @returns {boolean} Whether the page understood.
+   * @returns {boolean} Whether the frame was valid.
    */
   _apply(data, received) {
     try {

@@ -12,27 +12,27 @@ import { readFrame } from "./wire.js";
 /** @typedef {import('./wire.js').Sink} Sink */
 /** @typedef {import('./wire.js').ViewState} ViewState */
 
-/** How many images that cannot be loaded are told of. */
+/** Most images that cannot be loaded and are reported. */
 const MOST_LOST = 20;
 
 /**
- * What the scene asks of the page that it is on.
+ * The services that the scene needs from its page.
  *
  * @typedef {object} ScenePage
- * @property {(message: object) => void} send Tells the server.
- * @property {(text: string) => void} notice Tells the viewer and the server.
- * @property {(text: string) => void} error Shows what the server says.
- * @property {(number: number, text: string) => void} problem Shows what fails until it
- *     is mended, which no text says.
- * @property {() => void} doubtProblems Everything that still fails is told again now.
+ * @property {(message: object) => void} send Sends to the server.
+ * @property {(text: string) => void} notice Shows to the viewer, sends to the server.
+ * @property {(text: string) => void} error Shows an error of the server.
+ * @property {(number: number, text: string) => void} problem Shows a problem until it
+ *     is solved; an empty text means solved.
+ * @property {() => void} doubtProblems All unsolved problems are reported again now.
  * @property {(mount: number, item: Item, kind: string, event: Event) => void} hear
- *     Takes an event.
- * @property {() => import('./drive.js').Drive} drive The page's one line to the gate.
+ *     Handles an event.
+ * @property {() => import('./drive.js').Drive} drive The page's connection to the gate.
  * @property {import('./halves.js').Halves} halves
  */
 
 /**
- * The scene on this page: applies frames to the document, whole ones at a time.
+ * The scene on this page: applies complete frames to the document.
  *
  * @implements {Sink}
  */
@@ -51,7 +51,7 @@ export class Scene {
     this._mounts = new Map();
     /** @type {Map<number, Set<Mount>>} The mounts of each fragment. */
     this._fragments = new Map();
-    /** @type {Iterable<Mount>} Where the records of elements go. */
+    /** @type {Iterable<Mount>} The mounts that records of elements apply to. */
     this._targets = [];
     /** @type {WeakMap<Item, Listeners>} */
     this._listeners = new WeakMap();
@@ -59,17 +59,17 @@ export class Scene {
     this._heard = new WeakMap();
     this._reselected = false;
     this._onGone = this._onGone.bind(this);
-    /** @type {Set<string>} The paths of images that could not be loaded. */
+    /** @type {Set<string>} Paths of images that could not be loaded. */
     this._lost = new Set();
-    // Such an error does not bubble, but is heard on its way down.
+    // Such an error does not bubble, but it can be captured.
     document.addEventListener("error", ({ target }) => this._onLost(target), true);
   }
 
-  /** @param {EventTarget | null} target Could not be loaded. */
+  /** @param {EventTarget | null} target An element that could not be loaded. */
   _onLost(target) {
     if (!(target instanceof SVGImageElement) || !this.mapOf(target)) return;
     const { href, pathname } = new URL(target.getAttribute("href") ?? "", document.baseURI);
-    // Of ours the next version may be on its way, and whoever draws them sees to that.
+    // WebMap's own images may have a newer version soon; their layers handle errors.
     if (href.startsWith(BASE.href) || this._lost.has(pathname)) return;
     if (this._lost.size >= MOST_LOST) return;
     this._lost.add(pathname);
@@ -88,7 +88,7 @@ export class Scene {
       return this;
     });
     this._targets = [];
-    // A map begins once all its elements are there, and may be large then.
+    // Maps are made after all their elements exist, with their final size.
     this._maps.settle(this._reselected);
     this._reselected = false;
     this._dots.draw();
@@ -96,7 +96,7 @@ export class Scene {
     return header.frame;
   }
 
-  /** Everything is told again, maybe by another server with another clock. */
+  /** Clear everything: it is sent again, perhaps by a server with another clock. */
   _clear() {
     for (const mount of [...this._mounts.values()].reverse()) this.unmount(mount.id);
     this._targets = [];
@@ -104,7 +104,7 @@ export class Scene {
     this._page.doubtProblems();
   }
 
-  /** Sizes that styles give may be others now. */
+  /** Note that sizes in styles may have changed. */
   restyle() {
     this._dots.restyle();
     queueMicrotask(() => this._dots.draw());
@@ -117,7 +117,7 @@ export class Scene {
 
   /**
    * @param {Node} node
-   * @returns {MapCanvas | undefined} The map that a node is on.
+   * @returns {MapCanvas | undefined} The map that contains a node.
    */
   mapOf(node) {
     return this.maps.find(({ svg }) => svg.contains(node));
@@ -147,7 +147,7 @@ export class Scene {
     return null;
   }
 
-  /** @param {Item} item Goes, with what is known of it. */
+  /** @param {Item} item An item to remove, with its state. */
   _onGone(item) {
     this._maps.end(item);
     this._ages.forget(item);
@@ -227,14 +227,14 @@ export class Scene {
 
   /**
    * @param {number} id
-   * @param {number} element
+   * @param {number | undefined} flags undefined to stop listening.
    * @param {string} kind
-   * @param {number | undefined} flags undefined to hear no more.
+   * @param {number | undefined} flags undefined to stop listening.
    */
   _hear(id, element, kind, flags) {
     const mount = this._mounts.get(id);
     if (!mount) return;
-    // Kept besides, for an element that is made again with the same id.
+    // Kept separately, for a new element with the same id.
     const heard = this._heard.get(mount) ?? new Map();
     this._heard.set(mount, heard);
     const kinds = heard.get(element) ?? new Map();
@@ -362,7 +362,7 @@ export class Scene {
   bind(id, htmlId) {
     const found = document.getElementById(htmlId);
     if (!found) this._page.notice(`This page has no element with the id "${htmlId}".`);
-    // What is not there is filled all the same, where nobody sees it.
+    // A missing element is replaced by an invisible one.
     const element = found ?? document.createElement("div");
     for (const mount of this._targets) mount.bind(id, element);
   }

@@ -1,6 +1,6 @@
 /**
- * What carries world coordinates (metres, y up) to a map's pixels (y down): a point
- * (x, y) goes to (a x + c y + e, b x + d y + f). Never changed, only replaced.
+ * Transform from world coordinates (metres, y up) to a map's pixels (y down): a point
+ * (x, y) maps to (a x + c y + e, b x + d y + f). Never changed, only replaced.
  *
  * @typedef {object} Matrix
  * @property {number} a
@@ -13,14 +13,14 @@
 
 /** @typedef {{x: number, y: number}} Point */
 
-/** The least and the most pixels that a metre may have. */
+/** Least and most pixels per metre. */
 export const SMALLEST = 1e-3;
 export const LARGEST = 1e6;
 
 /**
  * @param {number} width Pixels across.
  * @param {number} height Pixels down.
- * @returns {Matrix} The world's origin in the middle, a pixel to the metre.
+ * @returns {Matrix} The world's origin in the middle, one pixel per metre.
  */
 export function initialView(width, height) {
   return { a: 1, b: 0, c: 0, d: -1, e: width / 2, f: height / 2 };
@@ -56,7 +56,7 @@ export function apply(m, x, y) {
  * @param {Matrix} m
  * @param {number} x
  * @param {number} y
- * @returns {Point} What `m` takes to (x, y).
+ * @returns {Point} The point that `m` maps to (x, y).
  */
 export function unapply(m, x, y) {
   const det = m.a * m.d - m.b * m.c;
@@ -66,7 +66,7 @@ export function unapply(m, x, y) {
 
 /**
  * @param {Matrix} view
- * @returns {number} Pixels in a metre.
+ * @returns {number} Pixels per metre.
  */
 export function scaleOf(view) {
   return Math.sqrt(Math.abs(view.a * view.d - view.b * view.c));
@@ -74,7 +74,7 @@ export function scaleOf(view) {
 
 /**
  * @param {Matrix} view
- * @returns {boolean} Whether a map can be shown that way.
+ * @returns {boolean} Whether a map can be shown with this view.
  */
 export function isView(view) {
   const pixels = scaleOf(view);
@@ -96,7 +96,7 @@ export function translate(view, x, y) {
 }
 
 /**
- * Zoom about a point that stays where it is, within the limits.
+ * Zoom about a fixed point, within the limits.
  *
  * @param {Matrix} view
  * @param {number} factor Above 1 zooms in.
@@ -111,16 +111,16 @@ export function scale(view, factor, x, y) {
 }
 
 /**
- * Turn about a point that stays where it is.
+ * Rotate about a fixed point.
  *
  * @param {Matrix} view
- * @param {number} degrees Counter-clockwise, as it is seen.
+ * @param {number} degrees Counter-clockwise on the screen.
  * @param {number} x Pixels from the left.
  * @param {number} y Pixels from the top.
  * @returns {Matrix}
  */
 export function rotate(view, degrees, x, y) {
-  // Screen y points down, so that the mathematical sense would look clockwise.
+  // Screen y points down, so a mathematically positive angle would be clockwise.
   const angle = (-degrees * Math.PI) / 180;
   const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
   const [e, f] = [x - cos * x + sin * y, y - sin * x - cos * y];
@@ -128,7 +128,7 @@ export function rotate(view, degrees, x, y) {
 }
 
 /**
- * Show a rectangle of the world as large as it can be, turned as it is.
+ * Show a rectangle of the world as large as possible, without changing the rotation.
  *
  * @param {Matrix} view
  * @param {[number, number, number, number]} bounds x and y of two corners, in metres.
@@ -143,7 +143,7 @@ export function fit(view, [x0, y0, x1, y1], width, height, margin = 24) {
   corners.push(apply(view, x1, y1));
   const xs = corners.map((corner) => corner.x);
   const ys = corners.map((corner) => corner.y);
-  // A point, or a line, is shown with some metres around it.
+  // A point or a line is shown with some metres around it.
   const across = Math.max(Math.max(...xs) - Math.min(...xs), now);
   const down = Math.max(Math.max(...ys) - Math.min(...ys), now);
   const free = Math.min(margin, width / 4, height / 4);
@@ -154,7 +154,7 @@ export function fit(view, [x0, y0, x1, y1], width, height, margin = 24) {
 }
 
 /**
- * The map's size changed: what was in the middle stays in the middle.
+ * Adapt the view to a new size of the map: the middle stays in the middle.
  *
  * @param {Matrix} view
  * @param {{width: number, height: number}} before
@@ -169,7 +169,7 @@ export function resize(view, before, after) {
 /**
  * @param {Matrix} m
  * @param {Matrix} n
- * @returns {boolean} Whether `m` and `n` differ by a translation at the most.
+ * @returns {boolean} Whether `m` and `n` differ at most by a translation.
  */
 export function isShifted(m, n) {
   return m.a === n.a && m.b === n.b && m.c === n.c && m.d === n.d;
@@ -185,7 +185,7 @@ export function isSame(m, n) {
 }
 
 /**
- * What an operation comes to; what it leaves alone is not there.
+ * The result of an operation, without unchanged parts.
  *
  * @typedef {object} Outcome
  * @property {Matrix} [view]
@@ -193,14 +193,14 @@ export function isSame(m, n) {
  */
 
 /**
- * Decide what an operation of a program makes of a view. Where no point is given, the
- * middle is meant.
+ * Compute the result of a program's operation on a view. The default point is the
+ * middle.
  *
  * @param {Matrix} view
  * @param {{width: number, height: number}} size Pixels.
  * @param {string} operation
  * @param {number[]} args
- * @returns {Outcome} Nothing for an operation that is not known here.
+ * @returns {Outcome} Empty for an unknown operation.
  */
 export function operated(view, { width, height }, operation, args) {
   const [first, x = width / 2, y = height / 2] = args;
@@ -227,22 +227,21 @@ export function operated(view, { width, height }, operation, args) {
 }
 
 /**
- * The operations that came for a map: each is carried out once, and not before the map
- * has a size.
+ * The operations for a map: each is executed once, and not before the map has a size.
  */
 export class Operations {
   constructor() {
-    /** The number of the newest that came. */
+    /** The number of the newest operation. */
     this.applied = 0;
     /** @type {Array<() => void>} */
     this._waiting = [];
   }
 
   /**
-   * An operation came, or is known to have been carried out.
+   * Note an operation that came, or that was executed before.
    *
    * @param {number} number Counts operations.
-   * @returns {boolean} Whether it is a new one.
+   * @returns {boolean} Whether it is new.
    */
   reach(number) {
     if (number <= this.applied) return false;
@@ -259,21 +258,21 @@ export class Operations {
     else this._waiting.push(operate);
   }
 
-  /** The map has a size: do what waited for that, in order. */
+  /** Execute the waiting operations in order, when the map has a size. */
   goOn() {
     for (const operate of this._waiting.splice(0)) operate();
   }
 }
 
-/** Pixels that nobody sees. */
+/** Pixels that are invisible. */
 const UNSEEN = 0.01;
 
-/** Keeps an element of the world at one place of the screen. */
+/** Keeps an element of the world at a fixed position of the screen. */
 export class Following {
   constructor() {
     /** The element, or 0. */
     this.id = 0;
-    /** @type {Point | null} Where on the screen it stays. */
+    /** @type {Point | null} Its position on the screen. */
     this._place = null;
   }
 
@@ -283,14 +282,14 @@ export class Following {
     this._place = null;
   }
 
-  /** @param {Point | null} place Where the element is, to stay there. */
+  /** @param {Point | null} place Position of the element, to keep. */
   settle(place) {
     this._place = this.id ? place : null;
   }
 
   /**
-   * @param {Point | null} place Where the element is now.
-   * @returns {Point | null} By how much the view is to be shifted, if it is.
+   * @param {Point | null} place Position of the element now.
+   * @returns {Point | null} The necessary shift of the view, if any.
    */
   shift(place) {
     if (!place || !this.id) return null;
@@ -300,10 +299,10 @@ export class Following {
   }
 }
 
-/** Milliseconds between two reports of a view, at least. */
+/** Least milliseconds between two reports of a view. */
 export const REPORT_PERIOD = 100;
 
-/** Has a view reported when it changed: soon, not too often, and with a frame if one comes. */
+/** Reports a changed view: soon, not too often, and with a frame if one comes. */
 export class ViewReports {
   /** @param {() => void} report */
   constructor(report) {
@@ -314,24 +313,24 @@ export class ViewReports {
     this._timer = undefined;
   }
 
-  /** There is something to report, which is the end of a frame's work. */
+  /** Note a change, to report it at the end of a frame's work. */
   note() {
     this._changed = true;
   }
 
-  /** There is something to report, with a frame or without. */
+  /** Note a change, to report it soon, with or without a frame. */
   soon() {
     this._changed = true;
     const wait = this._reported + REPORT_PERIOD - performance.now();
     this._timer ??= setTimeout(() => this._now(), Math.max(0, wait));
   }
 
-  /** A frame has been applied: report what changed. */
+  /** Report changes, after a frame has been applied. */
   settle() {
     if (this._changed) this._now();
   }
 
-  /** Report nothing any more. */
+  /** Stop reporting. */
   end() {
     clearTimeout(this._timer);
   }
@@ -346,17 +345,17 @@ export class ViewReports {
 }
 
 /**
- * Marks the pictures of a map that are far away: several of their pixels share one of
- * the screen's. The style sheet draws those smoothly and all others crisp, since without
- * smoothing a wall that is one pixel thick is left out when it is seen from far away.
+ * Marks the pictures of a map that are zoomed out: several of their pixels share one
+ * pixel of the screen. The style sheet draws those smoothly and all others crisp:
+ * without smoothing, a wall that is one pixel thick disappears when zoomed out.
  *
- * A picture says in `data-cell` how wide its pixels are, in metres.
+ * The attribute `data-cell` of a picture is the width of its pixels, in metres.
  */
 export class FarPictures {
   /** @param {SVGGElement} world */
   constructor(world) {
     this._world = world;
-    /** Pixels of the screen in a metre. */
+    /** Pixels of the screen per metre. */
     this._scale = 0;
     const mark = () => this._mark();
     this._said = new MutationObserver(mark);

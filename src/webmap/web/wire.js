@@ -10,7 +10,7 @@ import {
 } from "./opcodes.js";
 
 /**
- * What is told of a frame, record by record; see `webmap/wire/opcodes.py`.
+ * Receives the records of a frame, one by one; see `webmap/scene/wire/opcodes.py`.
  *
  * @typedef {object} Sink
  * @property {(fragment: number) => void} delta
@@ -54,26 +54,26 @@ import {
 /** @typedef {import('./view.js').Matrix} Matrix */
 
 /**
- * How a map was last seen.
+ * The last view of a map.
  *
  * @typedef {object} ViewState
- * @property {number} session Which server session the numbers belong to.
- * @property {number} applied The newest operation that `matrix` has in it.
+ * @property {number} session The server session of the numbers.
+ * @property {number} applied The newest operation that is part of `matrix`.
  * @property {Matrix | null} matrix From the world to the map's pixels, if known.
  * @property {number} follow The element that the view followed, or 0.
  */
 
 /**
  * @typedef {object} Header
- * @property {boolean} reset Whether the frame tells everything.
+ * @property {boolean} reset Whether the frame is complete and replaces everything.
  * @property {number} frame The number to acknowledge.
  * @property {number} now The display's monotonic clock, in seconds.
  */
 
-/** Bytes that are no frame, or one of another version. */
+/** Bytes that are not a frame, or a frame of another version. */
 export class WireError extends Error {}
 
-/** A frame of another version: this page is older than the server, or newer. */
+/** A frame of another version: this page is older or newer than the server. */
 export class VersionError extends WireError {}
 
 const decoder = new TextDecoder();
@@ -119,7 +119,7 @@ class Reader {
     return this._view.getFloat64(this._at - 8, true);
   }
 
-  /** Numbers go up to 2 ** 53, so they are not shifted. */
+  /** Numbers up to 2 ** 53, so they are not shifted. */
   varint() {
     let byte = this.u8();
     let number = byte & 0x7f;
@@ -215,7 +215,7 @@ function listening(r) {
 }
 
 /**
- * How to read each record. Arguments are read from left to right, as they come.
+ * The reader of each record. Arguments are read from left to right.
  *
  * @type {Record<number, (r: Reader, sink: Sink) => void>}
  */
@@ -264,10 +264,10 @@ const RECORDS = {
  * Read a frame.
  *
  * @param {ArrayBuffer} buffer
- * @param {(header: Header) => Sink} begin Called with the header; gives what is told.
+ * @param {(header: Header) => Sink} begin Called with the header; returns the receiver.
  * @returns {Header}
- * @throws {WireError} If the bytes are no frame of this version; what came before the
- *     fault has been told by then.
+ * @throws {WireError} If the bytes are not a frame of this version; records before the
+ *     error have been processed by then.
  */
 export function readFrame(buffer, begin) {
   const reader = new Reader(buffer);

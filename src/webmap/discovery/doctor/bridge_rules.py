@@ -1,4 +1,4 @@
-"""What the readiness check says of a bridge."""
+"""Findings of the diagnosis about a bridge."""
 
 from collections.abc import Iterator
 
@@ -7,13 +7,13 @@ from webmap.ros.finding import BRIDGE, Finding
 from webmap.ros.rosbridge import advice
 
 SLOW_LOOP = 0.15
-"""Seconds of a round trip from which driving is slowed down."""
+"""Seconds of a round trip from which WebMap limits the speed."""
 
 NO_LOOP = 0.3
-"""Seconds from which there is none: no command is that fresh."""
+"""Seconds of a round trip from which every command is too old."""
 
 CLOCK_OFF = 0.5
-"""Seconds from which stamps of both machines do not fit together."""
+"""Seconds from which the stamps of the two machines do not match."""
 
 SIMULATED = 365 * 24 * 3600.0
 """Seconds of difference from which the robot's clock is a simulator's."""
@@ -26,7 +26,7 @@ TELL = (
 
 
 def bridge_findings(seen: Observed) -> Iterator[Finding]:
-    """Say what holds for the link and for everything behind it."""
+    """Yield the findings about the connection and everything behind it."""
     if seen.trouble:
         yield advice.unreachable(seen.trouble)
         return

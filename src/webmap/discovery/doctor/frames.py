@@ -1,4 +1,4 @@
-"""Whether the frames lead from the map to a robot; without I/O."""
+"""Checks whether frames lead from the map to a robot; without I/O."""
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Quaternion, Vector3
@@ -9,14 +9,14 @@ from webmap.ros.tf import Buffer, Transform, TransformError
 
 
 class FrameListening:
-    """Takes what comes on the topics with frames, of all namespaces."""
+    """Collects the messages on the topics with frames, of all namespaces."""
 
     def __init__(self) -> None:
         self._buffers: dict[str, Buffer] = {}
         self._refused: dict[str, list[str]] = {}
 
     def received(self, message: ReceivedMessage) -> None:
-        """Take a message of ``tf`` or ``tf_static``."""
+        """Process a message of ``tf`` or ``tf_static``."""
         namespace, _, name = message.topic.rpartition("/")
         buffer = self._buffers.setdefault(namespace, Buffer())
         refused = self._refused.setdefault(namespace, [])
@@ -44,18 +44,18 @@ class FrameListening:
                 refused.append(str(error))
 
     def oddities(self, namespace: str) -> tuple[str, ...]:
-        """Return what was odd in the frames of a namespace, each once."""
+        """Return the oddities in the frames of a namespace, each once."""
         buffer = self._buffers.get(namespace)
         notes = [] if buffer is None else list(buffer.notes)
         return tuple(dict.fromkeys([*self._refused.get(namespace, ()), *notes]))
 
     def missing(self, namespace: str, frame: str, start: str = MAP) -> str:
-        """Return why nothing leads from one frame to another; empty if it does.
+        """Return why no transform leads from one frame to another; empty if one does.
 
         Args:
-            namespace: Of the topic that tells of them.
-            frame: Where it should lead to.
-            start: Where it should begin.
+            namespace: Namespace of the topic with the frames.
+            frame: The frame at the end.
+            start: The frame at the start.
 
         """
         buffer = self._buffers.get(namespace)

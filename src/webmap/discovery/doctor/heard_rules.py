@@ -1,31 +1,31 @@
-"""What the readiness check says of what came, or did not come, on a topic."""
+"""Findings of the diagnosis about messages that came, or did not come, on a topic."""
 
 from webmap.discovery.doctor.observed import Heard, Observed
 from webmap.discovery.found import Guess
 from webmap.ros.finding import Finding, Level
 
 OLD = 1.0
-"""Seconds after which a pose is too old to drive by."""
+"""Seconds after which a pose is too old for driving."""
 
 SLOW = 5.0
-"""Messages a second below which a pose or a scan jumps."""
+"""Messages a second below which a pose or a scan moves in visible jumps."""
 
 AGED = 0.5
 
 RARE = 60.0
-"""Seconds after which what may well be slow, as a battery's charge, is old."""
+"""Seconds after which a slow topic, such as a battery's charge, is stale."""
 
 AHEAD = 0.1
 
 
 def heard_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> Finding:
-    """Say how often a pose or a scan comes, and how old it is.
+    """Return the rate and the age of a pose or a scan as a finding.
 
     Args:
-        name: The robot's.
+        name: The robot's name.
         guess: The topic.
-        seen: All that was seen.
-        needed: Whether a robot cannot be driven without it.
+        seen: All observations.
+        needed: Whether a robot cannot be driven without the topic.
 
     """
     heard = seen.heard[guess.topic]
@@ -78,7 +78,7 @@ def heard_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> F
 
 
 def rare_finding(name: str, guess: Guess, seen: Observed) -> Finding:
-    """Say what came on a topic that may well be slow, as a battery's is."""
+    """Return a finding about a topic that may be slow, such as a battery's."""
     heard = seen.heard[guess.topic]
     if not heard.count:
         return Finding(
@@ -107,14 +107,14 @@ def rare_finding(name: str, guess: Guess, seen: Observed) -> Finding:
 
 
 def silence(name: str, topic: str, seen: Observed, bad: Level, blind: str) -> Finding:
-    """Say that nothing came on a topic, and who could publish it.
+    """Return a finding that nothing came on a topic, with its possible publishers.
 
     Args:
-        name: The robot's.
+        name: The robot's name.
         topic: The topic.
-        seen: All that was seen.
-        bad: How bad that is.
-        blind: What follows from it, to go on in a sentence.
+        seen: All observations.
+        bad: Level of the finding.
+        blind: The consequence, as the end of a sentence.
 
     """
     said = f"Nothing came on {topic} in {seen.heard[topic].seconds:.0f} s"
@@ -150,9 +150,9 @@ def silence(name: str, topic: str, seen: Observed, bad: Level, blind: str) -> Fi
 
 
 def age_of(heard: Heard, seen: Observed) -> float | None:
-    """Return how old the newest message was when it came, in seconds.
+    """Return the age of the newest message when it came, in seconds.
 
-    None if it has no stamp, or nobody told the robot's time.
+    None if it has no stamp, or the robot's clock is unknown.
     """
     if heard.stamp is None or seen.clock is None:
         return None

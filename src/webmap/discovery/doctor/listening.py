@@ -1,4 +1,4 @@
-"""Listening to topics: what came on each is counted, and its age is taken."""
+"""Listens to topics: counts the messages of each and measures their age."""
 
 import asyncio
 import contextlib
@@ -18,16 +18,16 @@ from webmap.ros.received import ReceivedMessage
 from webmap.ros.subscriptions import Encoding
 
 ENOUGH = 4
-"""Messages after which a topic is left: three times between two of them."""
+"""Messages after which a topic is unsubscribed: they give three intervals."""
 
 MOST_BYTES = 1 << 21
-"""Of one topic, after which it is left though fewer came."""
+"""Bytes of one topic after which it is unsubscribed, whatever the count."""
 
 MOST_BYTES_IN_ALL = 1 << 24
-"""After which all topics are left: a radio link has more to do than to be looked at."""
+"""Bytes after which all topics are unsubscribed, to spare a radio link."""
 
 FRAMES_AT_ONCE = 100
-"""Messages with frames that the bridge may hold back; each one counts."""
+"""Queue length of topics with frames in the bridge; no message may be lost."""
 
 
 class _Stamped(msgspec.Struct, frozen=True):
@@ -39,7 +39,7 @@ class Listening:
     """Counts the messages of topics.
 
     Args:
-        topics: Which; only these count.
+        topics: The topics; messages of others are ignored.
         now: When listening begins, on the monotonic clock.
 
     """
@@ -53,19 +53,19 @@ class Listening:
         self._newest: dict[str, tuple[ReceivedMessage, float]] = {}
 
     def received(self, message: ReceivedMessage, now: float, wall: float) -> None:
-        """Take a message.
+        """Count a message.
 
         Args:
             message: The message.
             now: When it came, on the monotonic clock.
-            wall: The same on this machine's wall clock, in seconds.
+            wall: The same time on this machine's wall clock, in seconds.
 
         """
         topic = message.topic
         heard = self._heard.get(topic)
         if heard is None:
             return
-        if heard.count:  # the time before the first is the bridge's, to subscribe
+        if heard.count:  # the time before the first one is needed to subscribe
             self._gap[topic] = max(self._gap[topic], now - self._last[topic])
         self._last[topic] = now
         self._newest[topic] = (message, wall)
@@ -75,11 +75,11 @@ class Listening:
         )
 
     def end(self, now: float) -> dict[str, Heard]:
-        """Return what was heard until now."""
+        """Return the measurements until now."""
         return {topic: self._sum_up(topic, now) for topic in self._heard}
 
     def end_of(self, topic: str, now: float) -> Heard:
-        """Return what was heard of one topic until now."""
+        """Return the measurements of one topic until now."""
         return self._sum_up(topic, now)
 
     def _sum_up(self, topic: str, now: float) -> Heard:
@@ -110,12 +110,12 @@ class Listening:
 
 
 class Sampling:
-    """Listens to topics until each has said enough.
+    """Listens to topics until each has sent enough messages.
 
     Args:
-        topics: Which.
+        topics: The topics.
         now: When listening begins, on the monotonic clock.
-        enough: Messages after which a topic is left.
+        enough: Messages after which a topic is unsubscribed.
 
     """
 
@@ -131,17 +131,17 @@ class Sampling:
 
     @property
     def done(self) -> bool:
-        """Whether nothing more is to be heard."""
+        """Whether listening is complete."""
         too_much = sum(self._bytes.values()) >= MOST_BYTES_IN_ALL
         return too_much or len(self._left) == len(self._topics)
 
     def received(self, message: ReceivedMessage, now: float, wall: float) -> bool:
-        """Take a message, and tell whether its topic is to be left now.
+        """Count a message, and return whether to unsubscribe its topic now.
 
         Args:
             message: The message.
             now: When it came, on the monotonic clock.
-            wall: The same on this machine's wall clock, in seconds.
+            wall: The same time on this machine's wall clock, in seconds.
 
         """
         topic = message.topic
@@ -156,7 +156,7 @@ class Sampling:
         return True
 
     def end(self, now: float) -> dict[str, Heard]:
-        """Return what was heard until now; what was cut off in silence is left out."""
+        """Return the measurements; without silent topics if the limit ended them."""
         found = {
             topic: self._left.get(topic) or self._heard(topic, now)
             for topic in self._topics
@@ -177,17 +177,17 @@ async def listen(
     tf: Sequence[str] = (),
     frames: FrameListening | None = None,
 ) -> dict[str, Heard]:
-    """Listen to topics for a while.
+    """Listen to topics for a time.
 
     Args:
-        bridge: The link, which is open.
-        topics: How each is to be encoded.
-        seconds: How long.
+        bridge: The bridge, connected.
+        topics: The encoding of each topic.
+        seconds: How long to listen.
         tf: Topics with frames.
-        frames: What takes those.
+        frames: Receives the messages of those.
 
     Returns:
-        What came on each topic, those with frames too.
+        The measurements of each topic, also of those with frames.
 
     """
     if not (topics or tf):
@@ -229,16 +229,16 @@ async def sample(
     """Listen to a few messages of each topic, which may be large.
 
     Args:
-        bridge: The link, which is open.
-        topics: The type of each.
-        seconds: How long at the most.
+        bridge: The bridge, connected.
+        topics: The type of each topic.
+        seconds: Most seconds to listen.
         received: Called with each message too.
-        enough: Messages after which a topic is left.
-        encoding: How messages are to be encoded.
+        enough: Messages after which a topic is unsubscribed.
+        encoding: The encoding of the messages.
         throttle: Least time between two messages of a topic, in milliseconds.
 
     Returns:
-        What came on each topic.
+        The measurements of each topic.
 
     """
     sampling = Sampling(topics, time.monotonic(), enough=enough)

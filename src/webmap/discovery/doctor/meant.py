@@ -1,4 +1,4 @@
-"""The robots that somebody configured, laid over those that were found; without I/O."""
+"""Combines the configured robots with those that were found; without I/O."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,44 +24,44 @@ TYPES: Mapping[Role, str] = {
     "plan": "nav_msgs/Path",
     "tf": "tf2_msgs/TFMessage",
 }
-"""What a topic is taken to carry if neither a person nor the bridge says it."""
+"""Default types of topics, if neither a person nor the bridge states the type."""
 
 WHERE: tuple[Role, ...] = ("odometry", "pose")
 
 
 @dataclass(frozen=True, slots=True)
 class MeantRobot:
-    """A robot as somebody configured it."""
+    """A robot as a person configured it."""
 
     name: str
     topics: Mapping[Role, tuple[tuple[str, str], ...]] = field(default_factory=dict)
-    """For each role that was said its topics, each with its type, empty if that was
-    not said; no topic if the robot does without. Other roles are as they were found."""
+    """The topics of each configured role with their types; an empty type is not stated;
+    no topics if the robot has none. Other roles are as discovery found them."""
 
     base_frame: str = ""
     """The frame of its base, if it is drawn by frames."""
 
     map_frame: str = ""
-    """The frame that it is drawn in; empty if that was not said."""
+    """The frame that the robot is drawn in; empty if it is not configured."""
 
     elsewhere: frozenset[Role] = frozenset()
-    """What of it goes over another bridge, whose own check tells of it."""
+    """Roles on another bridge; the diagnosis of that bridge reports them."""
 
     found_as: str = ""
-    """What it is called where nobody says its name; empty if it was not found."""
+    """Its name in discovery without settings; empty if it was not found."""
 
 
 def lay_over(
     findings: Findings, meant: Sequence[MeantRobot], types: Mapping[str, str]
 ) -> tuple[Findings, dict[str, MeantRobot]]:
-    """Return what is to be measured, and how each robot was meant, by its name.
+    """Return the findings to measure, and the configured robots by name.
 
-    Robots that were found and that nobody meant are not among it.
+    Robots that were found but not configured are left out.
 
     Args:
-        findings: What was found.
-        meant: The robots that somebody configured, at least one.
-        types: Types by topic, as the bridge or a list tells them.
+        findings: The findings of discovery.
+        meant: The robots that a person configured, at least one.
+        types: Types by topic, from the bridge or a list.
 
     """
     taken: set[str] = set()
@@ -77,10 +77,10 @@ def lay_over(
 def _found(
     meant: Sequence[MeantRobot], robots: Sequence[FoundRobot]
 ) -> list[FoundRobot | None]:
-    """Return for each robot that was meant the one that was found, each but once."""
+    """Return the found robot for each configured robot, each at most once."""
     left = list(robots)
     found: list[FoundRobot | None] = [None for _ in meant]
-    # A name is the weakest sign: it comes when all topics have been looked at.
+    # A name is the weakest match: it is compared after all topics.
     for fits in (_is_called, _has_its_topics, _has_its_name):
         for place, one in enumerate(meant):
             if found[place] is None:
@@ -131,7 +131,7 @@ def _laid(
 
 
 def _type(role: Role, behind: str, said: str) -> str:
-    """Return the type that WebMap goes by: what it sends, and what it listens to."""
+    """Return the type that WebMap uses to send and to subscribe."""
     behind = behind.strip()
     if role == "velocity":
         return said or (behind if is_type(behind, *VELOCITY) else TYPES[role])
@@ -141,5 +141,5 @@ def _type(role: Role, behind: str, said: str) -> str:
 def _plain(topic: str) -> str:
     try:
         return normalise_topic(topic)
-    except ConfigError:  # who made the robot was told so
+    except ConfigError:  # creating the robot reports this error
         return topic

@@ -1,7 +1,7 @@
-"""Looking at a bridge and the robots behind it: a thin shell around links and clocks.
+"""Measures a bridge and the robots behind it: a thin layer around sockets and clocks.
 
-Nothing is published, the links are closed after, and only those questions are asked
-that every bridge was seen to answer.
+Nothing is published, the connections are closed afterwards, and only requests that
+every tested bridge answers are sent.
 """
 
 import asyncio
@@ -28,25 +28,25 @@ from webmap.ros.rosbridge import checks
 from webmap.ros.subscriptions import Encoding
 
 PATIENCE = 3.0
-"""Seconds for an answer; when a bridge takes longer, it is asked no more."""
+"""Seconds for an answer; if a bridge takes longer, it gets no more requests."""
 
 SLOW_TOPICS = 1.0
-"""Seconds that maps and pictures have at the least, which come a few times a second."""
+"""Least seconds for maps and pictures, which come a few times a second."""
 
 MOST_SCANS = 6
-"""How many scans of a robot are listened to."""
+"""Most scans of a robot that are listened to."""
 
 LATCHED = ("nav_msgs/OccupancyGrid", "sensor_msgs/PointCloud2")
-"""Types of maps, which are published once: one that is silent may be too large."""
+"""Types of maps, which are published once: one that does not come may be too large."""
 
 AS_TEXT = 10.0
-"""Seconds for which a map that did not come in binary is awaited as text."""
+"""Seconds to wait for a map as text, if it did not come in binary."""
 
 ONCE = 300_000
-"""Least milliseconds between two of its messages: a bridge takes long to encode one."""
+"""Least milliseconds between two messages of a map: encoding one takes long."""
 
 NEEDLESS = ("/rosout", "/parameter_events")
-"""Topics of every ROS that no client needs; whoever hides topics hides these."""
+"""Topics of every ROS that no client needs; a bridge that hides topics hides these."""
 
 T = TypeVar("T")
 
@@ -65,23 +65,23 @@ async def observe(
     waiting: Callable[[str], object] = lambda _why: None,
     progress: Callable[[str], object] = lambda _what: None,
 ) -> Observed:
-    """Return what can be seen of a bridge and of the robots behind it.
+    """Return the observations of a bridge and of the robots behind it.
 
     Args:
         url: The bridge's address.
-        wait: How long to wait for a bridge that cannot be reached, in seconds.
+        wait: How long to wait for an unreachable bridge, in seconds.
         seconds: How long to listen to topics.
-        ask_parameters: Whether the bridge is asked for a parameter of its own.
-        try_call: Whether a service is offered and called that hangs for a second, to
-            see what that holds up.
-        topics: Types by topic, which are taken in place of those that the bridge lists.
-        meant: Takes what was found and returns the robots as somebody configured
-            them; if there are any, these are measured and no others.
+        ask_parameters: Whether to read a parameter of the bridge.
+        try_call: Whether to offer and call a service that takes a second to answer,
+            to find out what it delays.
+        topics: Types by topic, which replace the list of the bridge.
+        meant: Receives the findings and returns the robots as a person configured
+            them; if there are any, only these are measured.
         waiting: Called once with the reason if the bridge is waited for.
-        progress: Called with what is being done now, in a sentence.
+        progress: Called with a sentence about the current step.
 
     Raises:
-        ConfigError: If ``meant`` says that what was found cannot be meant.
+        ConfigError: If ``meant`` reports that the settings do not fit the findings.
 
     """
     unlisted, told, asked = "", topics is not None, dict(topics or {})
@@ -131,14 +131,14 @@ async def observe(
 
 
 async def tried(seen: Observed) -> Observed:
-    """Return what was seen, with what a call that hangs holds up; it is tried."""
+    """Return the observations, with a test of what a slow service call delays."""
     if seen.unlisted:
         return replace(seen, link=checks.not_tried(seen.link))
     return replace(seen, link=await checks.tried_a_call(seen.link, seen.url))
 
 
 def _as_meant(seen: Observed, robots: Sequence[MeantRobot]) -> Observed:
-    """Return what was seen with the robots as somebody configured them, if any."""
+    """Return the observations with the robots as a person configured them, if any."""
     if not robots:
         return seen
     findings, meant = lay_over(seen.findings, robots, seen.types)
@@ -154,7 +154,7 @@ def _as_meant(seen: Observed, robots: Sequence[MeantRobot]) -> Observed:
 
 
 class _Questions:
-    """Questions to a bridge; when one is not answered in time no more are asked."""
+    """Requests to a bridge; after one without an answer in time, none are sent."""
 
     def __init__(self) -> None:
         self._silent = False
@@ -172,7 +172,7 @@ class _Questions:
     async def nodes(
         self, of: Callable[[str], Awaitable[list[str] | None]], topics: Iterable[str]
     ) -> dict[str, tuple[str, ...]]:
-        """Return nodes by topic, where the bridge named them."""
+        """Return nodes by topic, if the bridge named them."""
         found = {}
         for topic in dict.fromkeys(filter(None, topics)):
             names = await self.ask(partial(of, topic))
@@ -181,7 +181,7 @@ class _Questions:
         return found
 
     async def clock(self, bridge: Bridge) -> Clock | None:
-        """Compare the clocks; the quickest of three answers tells most."""
+        """Compare the clocks; the quickest of three answers is the most accurate."""
         found: list[Clock] = []
         for _ in range(3):
             began, wall = time.monotonic(), time.time()
@@ -190,7 +190,7 @@ class _Questions:
             if theirs is None:
                 break
             found.append(Clock(theirs - (wall + trip / 2), trip))
-        # The first call opens the socket, which takes time of its own.
+        # The first call opens the socket, which takes extra time.
         return min(found, key=lambda each: each.round_trip, default=None)
 
 
@@ -234,9 +234,9 @@ async def _listen(seen: Observed, bridge: Bridge, seconds: float) -> Observed:
 async def _sample(
     seen: Observed, bridge: Bridge, seconds: float, progress: Callable[[str], object]
 ) -> Observed:
-    """Return what was seen, with pictures, maps and plans.
+    """Return the observations, with pictures, maps and plans.
 
-    That is done last, since they would hold up the poses whose age is taken.
+    They are measured last, because they would delay the poses whose age is measured.
     """
     topics = _shown(seen.findings.robots[:MOST_ROBOTS])
     if not topics:
@@ -284,17 +284,17 @@ def _shown(robots: Iterable[FoundRobot]) -> dict[str, str]:
 
 
 def place_of(robot: FoundRobot) -> str:
-    """Return the topic that says where a robot is, empty if there is none."""
+    """Return the topic with a robot's pose, empty if there is none."""
     return robot.topic("odometry") or robot.topic("pose")
 
 
 def _way(
     robot: FoundRobot, heard: Mapping[str, Heard], frames: FrameListening, start: str
 ) -> Way | None:
-    """Return what the frames say of a robot whose odometry names its frame.
+    """Return the frames of a robot whose odometry names its frame.
 
-    Of one without odometry it is the frame of its base that counts. It is drawn in the
-    frame ``start``, if somebody said so, else in the one that was found.
+    Without odometry, the frame of the base is used. The robot is drawn in the frame
+    ``start`` if it is configured, else in the frame that was found.
     """
     tf, where = robot.tf, heard.get(place_of(robot), Heard())
     frame, base = where.frame, where.child

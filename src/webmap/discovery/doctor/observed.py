@@ -1,4 +1,4 @@
-"""What the readiness check saw."""
+"""The observations of the diagnosis."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,29 +9,29 @@ from webmap.discovery.tf_robots import MAP
 from webmap.ros.rosbridge.checks import LinkFacts
 
 MOST_ROBOTS = 10
-"""How many robots are listened to."""
+"""Most robots that are listened to."""
 
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What came on one topic while it was listened to."""
+    """The measurements of one topic."""
 
     count: int = 0
     seconds: float = 0.0
-    """How long it was listened to."""
+    """How long the topic was listened to."""
 
     longest_gap: float = 0.0
-    """The longest time without a message, in seconds, to the end of listening."""
+    """The longest time without a message, in seconds, up to the end of listening."""
 
     bytes: int = 0
     frame: str = ""
-    """The frame that the newest message names."""
+    """The frame in the newest message."""
 
     stamp: float | None = None
-    """The newest message's stamp, in seconds of the robot's clock; None if unset."""
+    """Stamp of the newest message, in seconds of the robot's clock; None if unset."""
 
     arrived: float = 0.0
-    """When it came in, in seconds of this machine's wall clock."""
+    """When the newest message came, in seconds of this machine's wall clock."""
 
     binary: bool = False
     """Whether messages came in a binary encoding."""
@@ -40,11 +40,11 @@ class Heard:
     """Why a message could not be read."""
 
     child: str = ""
-    """The frame that moves in it, where the message names one, as odometry does."""
+    """The moving frame, if the message names one, as odometry does."""
 
     every: float = 0.0
-    """Seconds from one message to the next, where only a few were listened for; 0 if
-    fewer than two came."""
+    """Seconds from one message to the next, if only a few were listened for; 0 if fewer
+    than two came."""
 
     @property
     def rate(self) -> float:
@@ -54,13 +54,13 @@ class Heard:
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The robot's clock beside this machine's."""
+    """The robot's clock compared with this machine's clock."""
 
     ahead: float
-    """Seconds by which the robot's is ahead."""
+    """Seconds by which the robot's clock is ahead."""
 
     round_trip: float
-    """Seconds that asking took; the offset is known to half of it."""
+    """Seconds of the request; the error of ``ahead`` is at most half of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,33 +68,33 @@ class Way:
     """The frames from the map to a robot's odometry, its base and its scanner."""
 
     frame: str
-    """The frame of the odometry; that of the base where there is none."""
+    """The frame of the odometry; the frame of the base if there is none."""
 
     missing: str = ""
-    """Why nothing leads there from the map, empty if it does."""
+    """Why no transform leads to it from the map, empty if one does."""
 
     oddities: tuple[str, ...] = ()
-    """What was odd in these frames, in sentences."""
+    """The oddities in these frames, in sentences."""
 
     base: str = ""
     """The frame of the base, as odometry names it."""
 
     base_missing: str = ""
-    """Why nothing leads there from the odometry's frame."""
+    """Why no transform leads to it from the odometry's frame."""
 
     scan: str = ""
-    """The frame of the scanner, empty if there is none or it said nothing."""
+    """The frame of the scanner; empty if there is none or it sent nothing."""
 
     scan_missing: str = ""
-    """Why nothing leads there from the base."""
+    """Why no transform leads to it from the base."""
 
     start: str = MAP
-    """The frame that the robot is drawn in: its map's, or where its frames begin."""
+    """The frame that the robot is drawn in: its map's, or the root of its frames."""
 
 
 @dataclass(frozen=True, slots=True)
 class Observed:
-    """All that was seen of one bridge and the robots behind it."""
+    """All observations of one bridge and the robots behind it."""
 
     url: str
     trouble: str = ""
@@ -104,33 +104,33 @@ class Observed:
     """Why the bridge does not list its topics, empty if it does."""
 
     told: bool = False
-    """Whether the topics are those that the user gave."""
+    """Whether the list of topics was given by hand."""
 
     shown: tuple[str, ...] = ()
-    """Topics that no client needs and that the bridge shows all the same."""
+    """Topics that no client needs and that the bridge lists."""
 
     types: Mapping[str, str] = field(default_factory=dict)
-    """Types by topic, as the bridge or the user's list has them."""
+    """Types by topic, from the bridge or the given list."""
 
     findings: Findings = field(default_factory=Findings)
     """The robots that are measured, with the topics that are in use."""
 
     meant: Mapping[str, MeantRobot] = field(default_factory=dict)
-    """What somebody said of them, by their names; empty if all of it was found."""
+    """The configured robots by name; empty if all robots were found by discovery."""
 
     others: tuple[str, ...] = ()
-    """Robots that were found too and not measured, since nobody meant them."""
+    """Robots that were found but not measured, because they are not configured."""
 
     clock: Clock | None = None
     publishers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """The nodes that publish on a topic, where the bridge said so."""
+    """The nodes that publish on a topic, if the bridge lists them."""
 
     subscribers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """The nodes that listen to a topic, where the bridge said so."""
+    """The nodes that subscribe to a topic, if the bridge lists them."""
 
     heard: Mapping[str, Heard] = field(default_factory=dict)
     ways: Mapping[str, Way] = field(default_factory=dict)
-    """What the frames say of each robot that has some, by its name."""
+    """The frames of each robot that has some, by its name."""
 
     link: LinkFacts = field(default_factory=LinkFacts)
-    """What was found out about the bridge itself."""
+    """Facts about the bridge itself."""

@@ -1,4 +1,4 @@
-"""What the readiness check says of a robot."""
+"""Findings of the diagnosis about a robot."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,7 @@ MOST_ODDITIES = 3
 
 
 def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
-    """Say what holds for one robot."""
+    """Yield the findings about one robot."""
     one = seen.meant.get(robot.name, MeantRobot(robot.name))
     if "velocity" not in one.elsewhere:
         yield from _velocity(robot, seen)
@@ -32,7 +32,7 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     yield from shown_findings(robot, seen)
     yield from _frames(robot, seen)
     if robot.first("velocity") is not None:
-        # The command knows robots by the names that it finds.
+        # The stop test identifies robots by the names that discovery finds.
         name = one.found_as if robot.name in seen.meant else robot.name
         command = f"webmap doctor {seen.url} --stop-test {name}, or " if name else ""
         yield Finding(
@@ -46,7 +46,7 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
 
 
 def _place(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
-    """Say what holds for that which says where a robot is."""
+    """Yield the findings about the topic with a robot's pose."""
     where = robot.first("odometry") or robot.first("pose")
     if robot.tf_alone:
         yield from _drawn_by_frames(robot, seen)
@@ -73,7 +73,7 @@ def _map(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
 
 
 def _drawn_by_frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
-    """Say whether frames tell where a robot is of which nothing else does."""
+    """Yield whether frames locate a robot that has no other source of its pose."""
     topic, way = robot.topic("tf"), seen.ways.get(robot.name)
     if way is not None and not way.missing:
         yield Finding(
@@ -102,7 +102,7 @@ def _frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     if way is None:
         return
     if robot.tf_alone:
-        pass  # said already: nothing else tells where it is
+        pass  # reported already: the robot has no other source of its pose
     elif way.missing:
         yield Finding(
             "note",
@@ -184,7 +184,7 @@ def _velocity(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
 
 
 def _type(robot: FoundRobot, velocity: Guess, seen: Observed) -> Finding:
-    """Say which type the base takes, and which one WebMap sends."""
+    """Return which type the base takes, and which one WebMap sends."""
     short = velocity.type.rpartition("/")[2]
     takes = seen.types.get(velocity.topic, "").strip()
     said = seen.told or (robot.name in seen.meant and not takes)
@@ -210,7 +210,7 @@ def _type(robot: FoundRobot, velocity: Guess, seen: Observed) -> Finding:
 
 
 def _has_client(velocity: Guess, seen: Observed) -> bool:
-    """Return whether a client of a rosbridge writes or listens to a topic."""
+    """Return whether a client of a rosbridge publishes or subscribes to a topic."""
     nodes = [
         *(seen.publishers.get(velocity.topic) or ()),
         *(seen.subscribers.get(velocity.topic) or ()),

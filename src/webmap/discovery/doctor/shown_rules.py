@@ -1,4 +1,4 @@
-"""What the readiness check says of topics that are shown besides pose and scan."""
+"""Findings of the diagnosis about shown topics other than pose and scan."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,16 +10,16 @@ from webmap.ros.finding import Finding, Level
 from webmap.ros.rosbridge import advice
 
 PICTURE_AGE = 1.0
-"""Seconds after which a picture is too old to drive by."""
+"""Seconds after which a picture is too old for driving."""
 
 CLOUD_AGE = 1.0
 
 MOST: dict[Role, int] = {"camera": 4, "cloud": 2, "costmap": 3, "map": 1, "plan": 2}
-"""How many topics of each kind are looked at, which is what is shown of a robot."""
+"""Most topics of each kind that are measured, which is what is shown of a robot."""
 
 
 def shown_topics(robot: FoundRobot) -> Iterator[tuple[str, str, str]]:
-    """Yield what else is shown of a robot: what it is, the topic, and its type."""
+    """Yield the other shown topics of a robot: role, topic and type."""
     for role, most in MOST.items():
         for guess in robot.guesses.get(role, ())[:most]:
             yield role, guess.topic, guess.type
@@ -32,7 +32,7 @@ def shown_topics(robot: FoundRobot) -> Iterator[tuple[str, str, str]]:
 
 
 def shown_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
-    """Say how often each of them comes, and how old it is."""
+    """Yield the rate and the age of each of these topics."""
     for kind, topic, _ in shown_topics(robot):
         heard = seen.heard.get(topic)
         if heard is None:
@@ -87,7 +87,7 @@ def _came(kind: str, name: str, topic: str, heard: Heard, age: float | None) -> 
 
 def _silent(kind: str, name: str, topic: str, seen: Observed) -> Iterator[Finding]:
     if kind == "map" and seen.publishers.get(topic) == ():
-        return  # that nobody publishes it is said already
+        return  # reported already: the topic has no publisher
     if kind in ("plan", "status"):
         seconds = seen.heard[topic].seconds
         words = f"Nothing came on {topic} in {seconds:.0f} s; it may come with a goal."
@@ -111,7 +111,7 @@ def _silent(kind: str, name: str, topic: str, seen: Observed) -> Iterator[Findin
 
 
 def _map_advice(node: str, topic: str, seen: Observed) -> str:
-    """Return the usual reasons why a map that a node publishes does not come."""
+    """Return the usual reasons why a map with a publisher does not come."""
     if seen.findings.dialect == "ros1":
         return (
             f"Maps are sent once: look whether {node} has loaded its map, and whether "

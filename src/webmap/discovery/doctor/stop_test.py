@@ -1,8 +1,8 @@
 """``webmap doctor URL --stop-test ROBOT``: does the base stop by itself?
 
-The command is one more hand at the gate: it holds the robot's lease and says 20 times a
-second that every input is released. What moves the robot, measures it and keeps the
-result is the gate's own stop test, as behind the button on a robot's card.
+The command is one more client of the gate: it holds the robot's lease and answers 20
+times a second that every input is neutral. The gate's own stop test moves the robot,
+measures it and stores the result, as with the button on a robot's card.
 """
 
 import asyncio
@@ -27,13 +27,13 @@ from webmap.ros.asking import ask_topics
 from webmap.ros.names import normalise_url
 
 PERIOD = 0.05
-"""Seconds between two signs of life of the hand."""
+"""Seconds between two answers to the gate."""
 
 AGAIN = 1.0
-"""Seconds after which something that was asked for is asked for again."""
+"""Seconds after which a request is repeated."""
 
 PATIENCE = 10.0
-"""Seconds that the gate, the robot and its odometry are waited for at each stage."""
+"""Seconds to wait for the gate, the robot and its odometry at each stage."""
 
 ROBOT = "r1"
 STOPS, GOES_ON, UNKNOWN = 0, 1, 2
@@ -42,7 +42,7 @@ Words: TypeAlias = dict[str, Any]
 
 
 class Hand:
-    """What is said to the gate and to the person, stage by stage. No I/O.
+    """The client of the gate and its output for the person, stage by stage. No I/O.
 
     Args:
         now: The time in seconds.
@@ -52,7 +52,7 @@ class Hand:
     def __init__(self, now: float) -> None:
         self.stage: Literal["coming", "ready", "taking", "testing", "over"] = "coming"
         self.code = UNKNOWN
-        """The exit status, once it is over."""
+        """The exit status, at the end."""
         self.news: list[str] = []
         """Sentences for the person, the newest last."""
         self._why = "the gate has not answered"
@@ -63,7 +63,7 @@ class Hand:
         self._seq = 0
 
     def hear(self, words: Words, now: float) -> None:
-        """Take in what the gate says."""
+        """Process a message of the gate."""
         match words["op"]:
             case "tick":
                 self._tick = words["tick"]
@@ -77,12 +77,12 @@ class Hand:
                 self._hear_robot(words, now)
 
     def begin(self, now: float) -> None:
-        """The person agrees."""
+        """Start the test, after the person has agreed."""
         if self.stage == "ready":
             self._go_on("taking", now)
 
     def step(self, now: float) -> list[Words]:
-        """Return what is to be said to the gate now."""
+        """Return the messages to send to the gate now."""
         if now - self._since > PATIENCE and self.stage not in ("ready", "over"):
             self._end(self._why)
         report = self._report
@@ -154,7 +154,7 @@ class Hand:
 
 
 def _is_result(report: Words, text: str) -> bool:
-    """Return whether a report tells of this test already, not of the one before."""
+    """Return whether a report belongs to this test and not to an earlier one."""
     today = datetime.now().astimezone().date().isoformat()
     if report["stop_source"] != "tested" or report["stop_date"] != today:
         return False
@@ -166,13 +166,13 @@ def find_out(urls: Sequence[str], name: str, *, wait: float, yes: bool) -> int:
     """Test whether a robot stops by itself, and return the exit status.
 
     Args:
-        urls: The address of the robot's rosbridge, and none besides.
-        name: The robot as ``webmap discover`` calls it.
-        wait: How long to wait for a rosbridge that cannot be reached, in seconds.
-        yes: Whether nobody is asked.
+        urls: The address of the robot's rosbridge, and no other.
+        name: The robot's name in ``webmap discover``.
+        wait: How long to wait for an unreachable rosbridge, in seconds.
+        yes: Whether to start without asking the person.
 
     Returns:
-        0 if it stops by itself, 1 if it does not, 2 if that was not found out.
+        0 if it stops by itself, 1 if it does not, 2 if the result is unknown.
 
     Raises:
         click.UsageError: If there is more than one address.
@@ -210,7 +210,7 @@ async def _topics(url: str, wait: float) -> dict[str, str]:
 
 
 def _spec(url: str, name: str, robots: tuple[FoundRobot, ...]) -> RobotSpec:
-    """Return the robot as the gate takes it, without a word on how it stops."""
+    """Return the robot as the gate takes it, without its command timeout."""
     robot = next((one for one in robots if one.name == name), None)
     if robot is None:
         there = ", ".join(one.name for one in robots) or "no robot at all"
@@ -231,7 +231,7 @@ def _spec(url: str, name: str, robots: tuple[FoundRobot, ...]) -> RobotSpec:
 
 
 def _lead(client: GateClient, spec: RobotSpec, yes: bool) -> int:
-    """Lead the hand from stage to stage, at 20 Hz."""
+    """Run the client from stage to stage, at 20 Hz."""
     hand = Hand(time.monotonic())
     heard: queue.SimpleQueue[str] = queue.SimpleQueue()
     connection = client.connect("webmap doctor", "operator", heard.put, echo)

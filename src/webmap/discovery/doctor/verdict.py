@@ -1,4 +1,4 @@
-"""All that the readiness check says, in order."""
+"""All findings of the diagnosis, in order."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ MARKS = {"wrong": "WRONG", "warning": "warning", "note": "note", "good": "good"}
 
 
 def judge(seen: Observed) -> list[Finding]:
-    """Return what is to be said, the bridge first, then each robot, worst first."""
+    """Return all findings: the bridge first, then each robot, worst first."""
     groups = [list(bridge_findings(seen))]
     groups += [list(robot_findings(one, seen)) for one in seen.findings.robots]
     return [
@@ -24,7 +24,7 @@ def judge(seen: Observed) -> list[Finding]:
 
 
 def is_ready(findings: Sequence[Finding]) -> bool:
-    """Tell whether nothing is wrong."""
+    """Return whether nothing is wrong."""
     return not any(finding.level == "wrong" for finding in findings)
 
 
@@ -45,6 +45,6 @@ def report(url: str, findings: Sequence[Finding]) -> str:
 
 
 def _counted(count: int, level: Level) -> str:
-    """Return how many findings have a level, as in "4 notes"."""
+    """Return the number of findings of a level as text, such as "4 notes"."""
     is_noun = level in ("warning", "note")
     return f"{count} {level}{'s' if is_noun and count != 1 else ''}"

@@ -2,7 +2,7 @@
 
 Costmaps, clouds, footprints, particles, covariances, look-ahead points, sonars, fixes,
 markers, diagnostics and logs, under the names of Nav2 and move_base. Each is advertised
-for each robot, and computed only while somebody subscribes. Open ``feed`` first.
+for each robot, and computed only while it has subscribers. Open ``feed`` first.
 """
 
 from webmap.sim.feeds.cloud import Clouds
@@ -18,10 +18,10 @@ from webmap.sim.graph_node import Node
 
 
 class Feeds:
-    """What the robots of a node say besides.
+    """The topics of a node's robots besides odometry and scans.
 
     Args:
-        node: Of the robots.
+        node: The node of the robots.
         step: Seconds of a step of the world.
 
     """
@@ -45,7 +45,7 @@ class Feeds:
         )
 
     def start(self) -> None:
-        """Advertise and subscribe everything."""
+        """Advertise and subscribe to all topics."""
         for robot in self._node.world.robots:
             for feed in self._feeds:
                 self._node.advertise(f"{robot.topics}/{feed.topic}", feed.type)
@@ -55,10 +55,10 @@ class Feeds:
         self._logs.start()
 
     def publish(self, steps: int) -> None:
-        """Publish what is due and wanted.
+        """Publish the messages that are due and have subscribers.
 
         Args:
-            steps: How many the world has made.
+            steps: Number of steps of the world so far.
 
         """
         graph = self._node.graph

@@ -1,4 +1,4 @@
-"""A lidar of several rings, whose cloud has walls, robots and the floor."""
+"""A lidar with several rings; its cloud has walls, robots and the floor."""
 
 import math
 
@@ -11,16 +11,16 @@ from webmap.sim.messages import Message
 from webmap.sim.mounts import LASER_HEIGHT
 
 RINGS = np.radians([-6.0, 0.0, 6.0, 12.0])
-"""How far each ring looks up from level."""
+"""Elevation of each ring above the horizontal, in radians."""
 
 ROBOT_TOP = 0.3
-"""How far robots reach above the lidar, in metres; walls are taller than it sees."""
+"""Height of robots above the lidar, in metres; walls are higher than its view."""
 
 POINT = np.dtype(
     {
         "names": ["x", "y", "z", "intensity", "ring"],
         "formats": ["<f4", "<f4", "<f4", "<f4", "<u2"],
-        # As the drivers of spinning lidars lay it out: for SSE, with a gap after z.
+        # Layout of drivers of spinning lidars: aligned for SSE, with a gap after z.
         "offsets": [0, 4, 8, 16, 20],
         "itemsize": 32,
     }
@@ -55,7 +55,7 @@ def cloud_message(header: Message, points: NDArray[np.void]) -> Message:
 
     Args:
         header: Its header.
-        points: Of shape (N,).
+        points: The points, of shape (N,).
 
     """
     layout = points.dtype
@@ -83,11 +83,11 @@ def cloud_message(header: Message, points: NDArray[np.void]) -> Message:
 def cloud_points(
     whole: NDArray[np.float32], walls: NDArray[np.float32]
 ) -> NDArray[np.void]:
-    """Return what the rings see, ring by ring, of the type :data:`POINT`.
+    """Return the points of all rings, ring by ring, of the type :data:`POINT`.
 
     Args:
-        whole: The ranges of a level sweep all around, from -pi on.
-        walls: The same as if there were no other robots.
+        whole: The ranges of a level sweep over the full circle, starting at -pi.
+        walls: The same ranges without other robots.
 
     """
     bearings = -math.pi + np.arange(len(whole)) * (math.tau / len(whole))
@@ -105,7 +105,7 @@ def cloud_points(
         ring["intensity"] = 100 / (1 + reach[hit])
         ring["ring"] = number
         parts.append(ring)
-    # Not concatenate, which closes the gaps.
+    # np.concatenate would remove the gaps.
     points = np.empty(sum(map(len, parts)), POINT)
     begin = 0
     for part in parts:

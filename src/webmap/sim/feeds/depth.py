@@ -1,4 +1,4 @@
-"""A depth camera that looks down a little, and whose cloud is in its optical frame."""
+"""A depth camera that looks down slightly; its cloud is in its optical frame."""
 
 import math
 
@@ -15,22 +15,22 @@ from webmap.sim.scanner import cast_rays, shade
 
 FRAME = "camera_optical"
 AHEAD, HEIGHT = 0.2, 0.4
-"""Where the lens is on the base, in metres."""
+"""Position of the lens on the base, in metres."""
 
 MOUNTED = mount(AHEAD, HEIGHT, down=0.3) @ OPTICAL
-"""Where its optical frame is on the base."""
+"""Pose of its optical frame on the base."""
 
 FIELD = math.radians(60)
-"""How far it sees to the sides, in all."""
+"""Horizontal field of view, in radians."""
 
 RISES = np.tan(np.radians(np.linspace(-40.0, 20.0, 25)))
-"""Of the rows of the picture, over what is level."""
+"""Slope of each row of the picture against the horizontal."""
 
 NEAREST, FARTHEST = 0.3, 6.0
-"""How far it measures along the floor, in metres."""
+"""Least and greatest measured distance along the floor, in metres."""
 
 ROBOT_TOP, WALL_TOP = 0.5, 2.5
-"""How high robots and walls are, in metres."""
+"""Heights of robots and walls, in metres."""
 
 _COLUMNS = 61
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
@@ -55,7 +55,7 @@ class DepthClouds:
         )
 
     def points(self, index: int) -> NDArray[np.float64]:
-        """Return what a robot's camera sees, in the frame of its base: (N, 3)."""
+        """Return the points in view, in the frame of the robot's base: (N, 3)."""
         world = self._node.world
         at = world.robots[index].pose @ Pose(AHEAD)
         bearings = np.linspace(-FIELD / 2, FIELD / 2, _COLUMNS)
@@ -64,7 +64,7 @@ class DepthClouds:
         walls = cast_rays(
             world.obstacles, at.x * ones, at.y * ones, along_x, along_y, FARTHEST
         )
-        walls = np.minimum(walls, 2 * FARTHEST)  # nothing there is not at a height
+        walls = np.minimum(walls, 2 * FARTHEST)  # a ray without a hit has no height
         nearest = walls.copy()
         for disc in world.others(index):
             shade(nearest, along_x, along_y, at, *disc)

@@ -11,14 +11,14 @@ Make = Callable[[int, str, float], Message | None]
 
 @dataclass(frozen=True, slots=True)
 class Feed:
-    """A topic that every robot has, below its own name."""
+    """A topic that every robot has, in its own namespace."""
 
     topic: str
-    """Without the robot's name and the slash behind it."""
+    """The name without the robot's namespace and the slash."""
 
     type: str
     period: float
     """Seconds between two messages."""
 
     make: Make
-    """Called only while somebody subscribes; None if there is nothing to say."""
+    """Called only while the topic has subscribers; None if there is no message."""

@@ -1,4 +1,4 @@
-"""What the parts of the robots say of their health, on one topic for all."""
+"""Diagnostics of the parts of all robots, on one topic."""
 
 from webmap.sim.graph_node import Node
 from webmap.sim.messages import Message
@@ -7,7 +7,7 @@ from webmap.sim.robot import Robot
 TOPIC = "/diagnostics"
 OK, WARN, ERROR = 0, 1, 2
 LOW, EMPTY = 0.3, 0.1
-"""Charges below which the battery warns, and below which it has failed."""
+"""Charges below which the battery warns, and below which it fails."""
 
 
 class Health:
@@ -21,7 +21,7 @@ class Health:
         self._node.advertise(TOPIC, "diagnostic_msgs/DiagnosticArray")
 
     def publish(self) -> None:
-        """Publish what every part says, if somebody listens."""
+        """Publish the status of every part, if the topic has subscribers."""
         graph = self._node.graph
         if not graph.is_wanted(TOPIC):
             return
@@ -37,8 +37,8 @@ def parts(robot: Robot, space: str) -> list[Message]:
 
     Args:
         robot: The robot.
-        space: What updaters put in front of the names of their nodes. In ROS 1 it is
-            the namespace: ``robot_0/``. In ROS 2 it is nothing, unless the parameter
+        space: Prefix that updaters add to the names of their nodes. In ROS 1 it is the
+            namespace: ``robot_0/``. In ROS 2 it is empty, unless the parameter
             ``diagnostic_updater.use_fqn`` is set.
 
     """

@@ -1,4 +1,4 @@
-"""Where robots believe to be: a pose, how sure, particles, and a satellite fix."""
+"""The estimated poses of robots: covariance, particles, and a satellite fix."""
 
 import math
 from typing import Any
@@ -14,41 +14,41 @@ from webmap.sim.messages import Message, pose, read_pose
 
 PARTICLES = 150
 SURE = (0.12, 0.05, 0.06)
-"""Standard deviations ahead and aside in metres and of the heading in radians, of a
-robot that has driven about."""
+"""Standard deviations ahead and sideways in metres and of the heading in radians, of
+a robot that has driven for some time."""
 
 HALVED = 0.5
-"""Metres of way in which a doubt, and an error, gets half as large."""
+"""Metres of driving that halve the standard deviations and the error."""
 
 DATUM = (48.4, 9.95)
 """Latitude and longitude of the map's origin, in degrees; its x points east."""
 
 DEVIATION = 0.3
-"""Standard deviation that is claimed, in metres."""
+"""Standard deviation in the messages, in metres."""
 
 _SEMI_MAJOR, _FLATTENING = 6378137.0, 1 / 298.257223563
 _AUGMENTED, _GPS, _DIAGONAL = 1, 1, 2
 
 
 class Belief:
-    """What one robot's localisation takes for true."""
+    """One robot's estimate of its pose."""
 
     def __init__(self) -> None:
         self.error = Pose()
-        """Where it takes itself to be, seen from where it is."""
+        """The estimated pose relative to the true pose."""
         self.doubt = SURE
         self._travelled = 0.0
 
     def reset(self, true: Pose, given: Pose, doubt: tuple[float, float, float]) -> None:
-        """Believe what a person says: a pose and its standard deviations."""
+        """Set the estimate to a pose with standard deviations."""
         self.error = true.inverse @ given
         self.doubt = doubt
 
     def travel(self, travelled: float) -> None:
-        """Come closer to the truth on the way.
+        """Reduce the error by driving.
 
         Args:
-            travelled: Metres on the wheels since the start.
+            travelled: Metres driven since the start.
 
         """
         share = 0.5 ** ((travelled - self._travelled) / HALVED)
@@ -64,10 +64,10 @@ class Belief:
         )
 
     def covariance(self, yaw: float) -> list[float]:
-        """Return the 36 numbers of a message, in the map's frame.
+        """Return the 36 numbers of a covariance message, in the map's frame.
 
         Args:
-            yaw: The heading that is believed in, in radians.
+            yaw: The estimated heading, in radians.
 
         """
         ahead, aside, turn = (deviation**2 for deviation in self.doubt)
@@ -82,7 +82,7 @@ class Belief:
     def particles(
         self, believed: Pose, random: np.random.Generator
     ) -> list[tuple[float, float, float]]:
-        """Return particles as x, y and yaw that are spread as the doubt says."""
+        """Return particles as x, y and yaw, spread by the standard deviations."""
         spread: NDArray[np.float64] = random.normal(size=(PARTICLES, 3)) * self.doubt
         cos, sin = math.cos(believed.yaw), math.sin(believed.yaw)
         return [
@@ -96,7 +96,7 @@ class Belief:
 
 
 class Localizations:
-    """Publishes ``amcl_pose`` and ``particlecloud``, and takes ``initialpose``."""
+    """Publishes ``amcl_pose`` and ``particlecloud``; reads ``initialpose``."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -109,7 +109,7 @@ class Localizations:
         )
 
     def start(self) -> None:
-        """Take poses from people."""
+        """Subscribe to initial poses."""
         for index, robot in enumerate(self._node.world.robots):
 
             def take(publication: Publication, index: int = index) -> None:
@@ -122,7 +122,7 @@ class Localizations:
             )
 
     def believed(self, index: int) -> Pose:
-        """Return where a robot takes itself to be on the map."""
+        """Return the estimated pose of a robot on the map."""
         robot, belief = self._node.world.robots[index], self._beliefs[index]
         belief.travel(robot.travelled)
         return robot.pose if belief.error == Pose() else robot.pose @ belief.error
@@ -158,7 +158,7 @@ class Localizations:
 
 
 class Satellites:
-    """Makes ``sensor_msgs/NavSatFix`` of where robots truly are."""
+    """Makes ``sensor_msgs/NavSatFix`` with the true positions of robots."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -184,7 +184,7 @@ class Satellites:
 
 
 def on_the_globe(x: float, y: float) -> tuple[float, float]:
-    """Return latitude and longitude in degrees of a place of the map, in metres."""
+    """Return latitude and longitude in degrees of a point of the map, in metres."""
     latitude = math.radians(DATUM[0])
     squared = _FLATTENING * (2 - _FLATTENING)
     bend = 1 - squared * math.sin(latitude) ** 2

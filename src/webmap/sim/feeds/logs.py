@@ -1,4 +1,4 @@
-"""What the nodes of the robots log: that they run, goals, plans, bumps, the battery."""
+"""Log messages of the robots' nodes: start, goals, plans, collisions, the battery."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ _ROS1 = {INFO: 2, WARN: 4, ERROR: 8}
 _ROS2 = {INFO: 20, WARN: 30, ERROR: 40}
 
 Said = tuple[str, str, str]
-"""A level, the last part of a node's name, and what it says."""
+"""A level, the last part of a node's name, and the text."""
 
 
 @dataclass(slots=True)
@@ -40,7 +40,7 @@ class Logs:
         )
 
     def publish(self) -> None:
-        """Publish what happened since, if somebody listens."""
+        """Publish the news since the last call, if the topic has subscribers."""
         world = self._node.world
         wanted = self._node.graph.is_wanted(TOPIC)
         begins, self._was_wanted = wanted and not self._was_wanted, wanted
@@ -82,7 +82,7 @@ class Logs:
 
 
 def _news(robot: Robot, goal: Goal | None, paths: int, before: _Before) -> list[Said]:
-    """Return what is worth a line, and remember that it was said."""
+    """Return the log messages that are due, and remember them."""
     said: list[Said] = []
     if goal is not before.goal:
         if before.goal is not None:

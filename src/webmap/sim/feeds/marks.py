@@ -11,10 +11,10 @@ from webmap.sim.messages import Message, pose
 ARROW, CYLINDER, TEXT = 0, 3, 9
 ADD, DELETE = 0, 2
 SIGHT = 6.0
-"""How far a robot tells another, in metres."""
+"""Distance at which a robot detects another one, in metres."""
 
 SEEN_FOR = 1.0
-"""Seconds for which a robot that was seen stays marked."""
+"""Seconds for which a detected robot stays marked."""
 
 GREEN, ORANGE, INK = (0.1, 0.6, 0.3), (0.9, 0.45, 0.1), (0.2, 0.25, 0.3)
 

@@ -1,6 +1,6 @@
-"""What a planner and a controller show: costmaps, the footprint, a look-ahead point.
+"""Output of a planner and a controller: costmaps, footprint, look-ahead point.
 
-In costmaps what stands around is grown by what a base needs to pass.
+In costmaps, obstacles are inflated by the radius of the base.
 """
 
 import math
@@ -19,32 +19,32 @@ from webmap.sim.obstacles import Obstacles
 
 LETHAL, INSCRIBED, UNKNOWN = 100, 99, -1
 INFLATION = 0.55
-"""How far obstacles are grown, in metres."""
+"""Distance by which obstacles are inflated, in metres."""
 
 STEEPNESS = 4.0
-"""How fast costs fall with the distance, a metre; costmap_2d's scaling factor."""
+"""Decay of costs with distance, per metre; the scaling factor of costmap_2d."""
 
 Disc = tuple[float, float, float]
 
 SIDE = 5.0
-"""Of a local costmap, in metres."""
+"""Side of a local costmap, in metres."""
 
 AGAIN = 25
-"""Publications after which a grid goes out whole even if nobody is new."""
+"""Publications after which the whole grid is sent even without a new subscriber."""
 
 SLOWER = 5
-"""How many times as seldom the global costmap is looked at as the local ones."""
+"""Local costmap updates for each update of the global costmap."""
 
 CORNERS = 16
-"""As costmap_2d has a round base: a polygon of sixteen corners."""
+"""Corners of the polygon of a round base, as in costmap_2d."""
 
 
 class Costs:
     """Costs on a floor, as costmap_2d publishes them: 0 free, 99 inscribed, 100 lethal.
 
     Args:
-        obstacles: Of the floor.
-        radius: Of the base, in metres.
+        obstacles: Obstacles of the floor.
+        radius: Radius of the base, in metres.
 
     """
 
@@ -62,7 +62,7 @@ class Costs:
         """Return the costs of the whole floor, the lowest row first.
 
         Args:
-            others: Round things that stand on it, as x, y and radius in metres.
+            others: Round obstacles on it, as x, y and radius in metres.
 
         """
         costs = self._floor.copy()
@@ -89,14 +89,14 @@ class Costs:
         map_from_grid: Pose,
         others: Iterable[Disc],
     ) -> NDArray[np.int8]:
-        """Return the costs in a square that need not lie along the floor's rows.
+        """Return the costs in a square that may be rotated against the floor's grid.
 
         Args:
             x: The square's left edge in its own frame, in metres.
             y: Its lower edge.
-            cells: How many there are along a side, as large as the floor's.
-            map_from_grid: Where its frame is on the map.
-            others: Round things on the map, as x, y and radius in metres.
+            cells: Number of cells along a side, of the size of the floor's cells.
+            map_from_grid: Pose of its frame on the map.
+            others: Round obstacles on the map, as x, y and radius in metres.
 
         """
         size = self.plan.resolution
@@ -126,14 +126,14 @@ class Costs:
 
 
 def distances(solid: NDArray[np.bool_], reach: int) -> NDArray[np.float64]:
-    """Return how far each cell is from the nearest solid one, inf beyond a reach.
+    """Return the distance of each cell to the nearest solid one, inf beyond a reach.
 
     Args:
-        solid: The cells that count.
-        reach: How far to look, in cells.
+        solid: The solid cells.
+        reach: Greatest distance, in cells.
 
     Returns:
-        From middle to middle, in cells.
+        Distances from center to center, in cells.
 
     """
     upright = np.where(solid, 0.0, np.inf)
@@ -152,7 +152,7 @@ def distances(solid: NDArray[np.bool_], reach: int) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A rectangle of cells that differ from those before."""
+    """A rectangle of changed cells."""
 
     x: int
     y: int
@@ -160,7 +160,7 @@ class Change:
 
 
 class Published:
-    """What subscribers of one costmap have, and so what they need next."""
+    """The state that subscribers of one costmap have, and their next message."""
 
     def __init__(self) -> None:
         self._cells: NDArray[np.int8] | None = None
@@ -174,14 +174,14 @@ class Published:
         place: tuple[float, float],
         subscribers: Iterable[object],
     ) -> Change | bool:
-        """Return True if the whole grid must go out, or what changed, or False.
+        """Return True if the whole grid must be sent, else the change, or False.
 
-        As costmap_2d does it: whole for who is new, and when the grid has moved.
+        Like costmap_2d: the whole grid for a new subscriber or after the grid moved.
 
         Args:
-            cells: The costs of now.
-            place: The lower left corner of now, in metres.
-            subscribers: Who hears the grid.
+            cells: The current costs.
+            place: The current lower left corner, in metres.
+            subscribers: Subscribers of the grid.
 
         """
         who = frozenset(subscribers)
@@ -211,7 +211,7 @@ class CostmapTopics:
 
     @cached_property
     def costs(self) -> Costs:
-        """The floor's costs, worked out when first somebody asks."""
+        """The floor's costs, computed at the first use."""
         world = self._node.world
         return Costs(world.obstacles, world.options.base.radius)
 
@@ -225,7 +225,7 @@ class CostmapTopics:
                 self._node.advertise(f"{topic}_updates", updates)
 
     def publish(self) -> None:
-        """Publish what is wanted."""
+        """Publish the costmaps that have subscribers."""
         self._turn += 1
         for index, robot in enumerate(self._node.world.robots):
             local = self._topic(robot.topics, "local_costmap")
@@ -252,7 +252,7 @@ class CostmapTopics:
         robot = world.robots[index]
         size = world.plan.resolution
         count = round(SIDE / size)
-        # It rolls by whole cells, so that what stands still stays in its cell.
+        # It moves by whole cells, so that fixed obstacles stay in their cells.
         x = (math.floor(robot.odometry.x / size) - count // 2) * size
         y = (math.floor(robot.odometry.y / size) - count // 2) * size
         map_from_odom = robot.pose @ robot.odometry.inverse

@@ -1,4 +1,4 @@
-"""A sonar in front, which measures one distance."""
+"""A sonar at the front, which measures one distance."""
 
 import math
 
@@ -12,7 +12,7 @@ from webmap.sim.scanner import cast_rays, shade
 
 FRAME = "sonar"
 MOUNTED = Pose(0.25)
-"""Where it sits on the base."""
+"""Its pose on the base."""
 
 FIELD = math.radians(25)
 NEAREST, FARTHEST = 0.02, 4.0
@@ -21,14 +21,14 @@ _ULTRASOUND = 0
 
 
 class Sonars:
-    """Makes ``sensor_msgs/Range``: how near the nearest thing in its cone is."""
+    """Makes ``sensor_msgs/Range``: the distance to the nearest obstacle in its cone."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self.feed = Feed("sonar", "sensor_msgs/Range", 0.2, self._make)
 
     def distance(self, index: int) -> float:
-        """Return the way to the nearest thing in a robot's cone; inf if none is."""
+        """Return the distance to the nearest obstacle in the cone; inf if none."""
         world = self._node.world
         at = world.robots[index].pose @ MOUNTED
         turns = at.yaw + np.linspace(-FIELD / 2, FIELD / 2, _RAYS)

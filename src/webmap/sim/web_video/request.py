@@ -1,4 +1,4 @@
-"""What a client of the cameras asks for, as it stands in its request. No I/O."""
+"""Requests to the cameras over HTTP. No I/O."""
 
 import io
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from PIL import Image
 from webmap.ros.rosbridge.server.dialect import resolve
 
 MOST_SIDE = 4096
-"""Pixels of the longest side that a picture is made or read with."""
+"""Most pixels along a side of a picture that is made or read."""
 
 _TOO_LARGE = (Image.DecompressionBombError, Image.DecompressionBombWarning)
 
@@ -29,35 +29,35 @@ _SHOWN = 80
 
 
 class NoPicture(Exception):
-    """What a topic brought is no JPEG that can be read."""
+    """The message of a topic is not a readable JPEG."""
 
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """The form of a picture; what is None stays as the camera has it."""
+    """The format of a picture; None keeps the camera's value."""
 
     quality: int | None = None
     """1 to 100."""
 
     width: int | None = None
-    """In pixels; the height does not follow by itself."""
+    """In pixels; the height does not change with it."""
 
     height: int | None = None
     """In pixels."""
 
     inverted: bool = False
-    """Whether it is turned by half a turn."""
+    """Whether the picture is rotated by half a turn."""
 
     @property
     def is_plain(self) -> bool:
-        """Whether pictures go out byte by byte as they came."""
+        """Whether pictures are sent unchanged."""
         return self == Form()
 
     def apply(self, jpeg: bytes) -> bytes:
-        """Return a picture in this form.
+        """Return a picture in this format.
 
         Raises:
-            NoPicture: If it is none.
+            NoPicture: If it is not a readable JPEG.
 
         """
         try:
@@ -73,13 +73,13 @@ class Form:
         if self.inverted:
             shown = shown.transpose(Image.Transpose.ROTATE_180)
         file = io.BytesIO()
-        # 95 is what web_video_server takes where nobody says.
+        # 95 is the default of web_video_server.
         shown.save(file, "JPEG", quality=self.quality or 95)
         return file.getvalue()
 
 
 class Refusal(Exception):
-    """A request that is refused, with the status and the words of the answer."""
+    """A refused request, with the status and the text of the answer."""
 
     def __init__(self, status: int, words: str) -> None:
         super().__init__(words)
@@ -88,25 +88,25 @@ class Refusal(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked for."""
+    """The requested picture or stream."""
 
     what: Literal["list", "stream", "snapshot"]
     topic: str = ""
-    """Of ``sensor_msgs/Image``, as web_video_server has it."""
+    """Topic of ``sensor_msgs/Image``, as in web_video_server."""
     form: Form = field(default_factory=Form)
 
 
 def read_request(head: bytes) -> Request:
-    """Return what the head of an HTTP request asks for.
+    """Return the request in the head of an HTTP message.
 
     The parameters are those of web_video_server: ``topic``, ``type``, ``quality``,
-    ``width``, ``height`` and ``invert``. As there, others are passed over.
+    ``width``, ``height`` and ``invert``. Others are ignored, as in web_video_server.
 
     Args:
-        head: All up to the blank line.
+        head: All bytes up to the blank line.
 
     Raises:
-        Refusal: If it is no such request.
+        Refusal: If the request is invalid.
 
     """
     line = head.decode("latin-1").partition("\n")[0].rstrip("\r")
@@ -121,7 +121,7 @@ def read_request(head: bytes) -> Request:
     try:
         parts = urlsplit(target)
         said = dict(
-            reversed(  # of two, the first counts
+            reversed(  # of two equal keys, the first is used
                 parse_qsl(
                     parts.query,
                     keep_blank_values=True,
@@ -149,7 +149,7 @@ def read_request(head: bytes) -> Request:
         raise Refusal(
             400, f"type must be {' or '.join(_TYPES)} here, got {_plain(kind)}"
         )
-    # What ros_compressed streams is what the camera's topic has, as it is.
+    # ros_compressed streams the messages of the camera's topic unchanged.
     as_it_is = what == "stream" and kind == "ros_compressed"
     return Request(what, resolve(said["topic"]), Form() if as_it_is else _form(said))
 
@@ -165,7 +165,7 @@ def _form(said: Mapping[str, str]) -> Form:
 
 def _number(said: Mapping[str, str], name: str, most: int) -> int | None:
     text = said.get(name)
-    if text is None or text == "-1":  # -1 is web_video_server's word for "as it is"
+    if text is None or text == "-1":  # web_video_server uses -1 for "unchanged"
         return None
     if text.isascii() and text.isdigit() and len(text) < 6 and 1 <= int(text) <= most:
         return int(text)

@@ -1,4 +1,4 @@
-"""The HTTP connections of those who watch, none of which holds another up."""
+"""The HTTP connections of the cameras' clients; no client delays another."""
 
 import asyncio
 import contextlib
@@ -15,7 +15,7 @@ log = logging.getLogger("webmap.sim")
 
 NODE = "/web_video_server"
 COMPRESSED = "/compressed"
-"""What stands behind the name of an image's topic where its JPEG pictures are."""
+"""End of the name of an image's topic with JPEG pictures."""
 
 _TYPE = "sensor_msgs/CompressedImage"
 _JPEG = b"\xff\xd8\xff"
@@ -23,10 +23,10 @@ _JPEG = b"\xff\xd8\xff"
 
 MOST_CONNECTIONS = 64
 MOST_HEAD = 8192
-"""Bytes of a request, at the most."""
+"""Most bytes of a request."""
 
 PATIENCE = 5.0
-"""Seconds for a request to come, for a first picture, and for one to be taken."""
+"""Seconds for a request, for a first picture, and for a client to read one."""
 
 _BOUNDARY = "boundarydonotcross"
 _SEND_BUFFER = 1 << 14
@@ -43,7 +43,7 @@ _NEVER_KEPT = "Cache-Control: no-cache, no-store, must-revalidate\r\nPragma: no-
 
 
 def image_topics(graph: Graph) -> list[str]:
-    """Return the topics of images whose pictures there are as JPEG."""
+    """Return the topics of images that are available as JPEG."""
     return sorted(
         name.removesuffix(COMPRESSED)
         for name, topic in graph.topics.items()
@@ -52,11 +52,11 @@ def image_topics(graph: Graph) -> list[str]:
 
 
 class NewestPicture:
-    """Hears a camera's topic from when it is made until it is closed.
+    """Subscribes to a camera's topic and keeps the newest picture, until closed.
 
     Args:
-        graph: Where the topic is.
-        topic: Of the image; one of :func:`image_topics`.
+        graph: The graph with the topic.
+        topic: Topic of the image; one of :func:`image_topics`.
 
     """
 
@@ -68,10 +68,10 @@ class NewestPicture:
         graph.subscribe(self, self._topic, self._take, _TYPE, node=NODE)
 
     async def next(self) -> tuple[bytes, float]:
-        """Wait for a picture that was not returned yet; of several, the newest.
+        """Wait for a new picture; of several new ones, return the newest.
 
         Returns:
-            It, and its stamp in seconds.
+            The picture, and its stamp in seconds.
 
         """
         while self._newest is None:
@@ -81,7 +81,7 @@ class NewestPicture:
         return picture
 
     def close(self) -> None:
-        """Hear the topic no more."""
+        """Unsubscribe from the topic."""
         self._graph.unsubscribe(self, self._topic)
 
     def _take(self, publication: Publication) -> None:
@@ -96,8 +96,8 @@ class NewestPicture:
 class WebVideoServer:
     """Answers ``/stream`` and ``/snapshot`` from the camera topics of a graph.
 
-    A client that reads slowly misses pictures and gets the newest one next; one that
-    reads nothing is let go. Pictures are worked out only while somebody asks.
+    A client that reads slowly skips pictures and gets the newest one next; one that
+    reads nothing is disconnected. Pictures are computed only for connected clients.
     """
 
     def __init__(self, graph: Graph) -> None:
@@ -109,7 +109,7 @@ class WebVideoServer:
         """Listen, and return the URL, without a path.
 
         Raises:
-            OSError: If the port is in use or the host is not this machine's.
+            OSError: If the port is in use or the host is not on this machine.
 
         """
         self._server = await asyncio.start_server(
@@ -139,10 +139,10 @@ class WebVideoServer:
                 await self._answer(reader, writer)
                 async with asyncio.timeout(PATIENCE):
                     writer.write_eof()
-                    # Closed with something unread, its end would lose the answer.
+                    # Closing with unread data would lose the answer.
                     await _end_of(reader)
         except asyncio.CancelledError:
-            pass  # by ``stop``; the server would take it for a failure
+            pass  # by ``stop``; the server would log it as an error
         finally:
             self._clients.discard(task)
             writer.transport.abort()
@@ -150,7 +150,7 @@ class WebVideoServer:
     async def _answer(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
-        # Whatever lies in buffers when the next picture comes is the past.
+        # A small buffer: buffered pictures are stale when the next one comes.
         writer.get_extra_info("socket").setsockopt(
             socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER
         )
@@ -213,7 +213,7 @@ class WebVideoServer:
         writer: asyncio.StreamWriter,
     ) -> None:
         newest = NewestPicture(self.graph, request.topic)
-        # A client that hangs up while no picture comes would not be noticed else.
+        # Without this, a client that disconnects between pictures would go unnoticed.
         sends = asyncio.create_task(_send_stream(newest, request, writer))
         ends = asyncio.create_task(_end_of(reader))
         try:
@@ -241,13 +241,13 @@ class WebVideoServer:
 
 
 async def _next(newest: NewestPicture, request: Request) -> tuple[bytes, float]:
-    """Return the next picture in the form that was asked for, and its stamp."""
+    """Return the next picture in the requested format, and its stamp."""
     while True:
         picture, stamp = await newest.next()
         if request.form.is_plain:
             return picture, stamp
         try:
-            # In a thread, as the world's clock is in this one.
+            # In a thread, because the world's clock runs in this one.
             return await asyncio.to_thread(request.form.apply, picture), stamp
         except NoPicture as error:
             log.warning("%s: left out a picture: %s", request.topic, error)

@@ -8,17 +8,17 @@ import { apply, unapply } from "../view.js";
 
 /** @typedef {{x: number, y: number, yaw: number}} Pose Metres and radians. */
 
-/** A drag shorter than this in pixels says a place but no heading. */
+/** A drag shorter than this in pixels gives a position but no heading. */
 const HEADING_FROM = 12;
 
 /**
- * Return the pose that a press and a drag on the map ask for.
+ * Return the pose of a press and a drag on the map.
  *
  * @param {Matrix} view
- * @param {Point} from Where the press was, in pixels.
- * @param {Point} to Where the pointer is.
- * @param {Pose | null} robot Where the robot is; without a heading from the drag it
- *     shall look the way it comes.
+ * @param {Point} from Position of the press, in pixels.
+ * @param {Point} to Position of the pointer, in pixels.
+ * @param {Pose | null} robot Pose of the robot; if the drag gives no heading, the pose
+ *     has the heading from the robot to the press.
  * @returns {Pose}
  */
 export function aim(view, from, to, robot) {
@@ -30,11 +30,11 @@ export function aim(view, from, to, robot) {
 }
 
 /**
- * Return the place and direction of a pose on the screen.
+ * Return the position and direction of a pose on the screen.
  *
  * @param {Matrix} view
  * @param {Pose} pose
- * @returns {{x: number, y: number, degrees: number}} Clockwise, as SVG has it.
+ * @returns {{x: number, y: number, degrees: number}} Clockwise, as in SVG.
  */
 export function onScreen(view, { x, y, yaw }) {
   const place = apply(view, x, y);
@@ -46,7 +46,7 @@ export function onScreen(view, { x, y, yaw }) {
 /**
  * @param {Point} from
  * @param {Point} to
- * @param {number} otherwise When both are the same place.
+ * @param {number} otherwise The heading if both positions are equal.
  */
 function heading(from, to, otherwise) {
   const [dx, dy] = [to.x - from.x, to.y - from.y];
@@ -54,28 +54,28 @@ function heading(from, to, otherwise) {
 }
 
 /**
- * What a tool does with what is aimed.
+ * The callbacks of a tool that aims.
  *
  * @typedef {object} Aims
  * @property {() => boolean} mayBegin Whether there is anything to aim for.
- * @property {(active: boolean) => void} changed Aiming began or ended.
- * @property {(pose: Pose | null) => void} preview What is aimed now; null when the press
- *     was given up.
- * @property {(pose: Pose) => void} done The press was let go of at this pose.
- * @property {() => Pose | null} [origin] From where one comes, for a press without a
+ * @property {(active: boolean) => void} changed Aiming started or ended.
+ * @property {(pose: Pose | null) => void} preview The current pose; null when the press
+ *     was cancelled.
+ * @property {(pose: Pose) => void} done The press was released at this pose.
+ * @property {() => Pose | null} [origin] The start of the heading of a press without a
  *     drag; the selected robot if not given.
- * @property {boolean} [lasting] It aims press after press until it is left: a tool that
- *     aims once in between hands the map back to it.
+ * @property {boolean} [lasting] It stays active for several presses: a tool that aims
+ *     once in between returns the map to it.
  */
 
-/** @type {WeakMap<MapCanvas, PressAim>} The one that is active on a map. */
+/** @type {WeakMap<MapCanvas, PressAim>} The active tool of a map. */
 const active = new WeakMap();
 
 /**
- * Press where, drag which way, release: how a pose is given on a map.
+ * Aims a pose on a map: press for the position, drag for the heading, release.
  *
- * Begins by a key or {@link PressAim#activate}; Escape leaves. One tool of a map aims at
- * a time; one that aims press after press goes on when another has aimed in between.
+ * Starts with a key or {@link PressAim#activate}; Escape ends it. One tool of a map
+ * aims at a time; a lasting tool continues after another has aimed in between.
  */
 export class PressAim {
   /**
@@ -88,7 +88,7 @@ export class PressAim {
     this._key = key;
     this._aims = aims;
     this.active = false;
-    /** @type {PressAim | null} What goes on when this one has ended. */
+    /** @type {PressAim | null} The tool that continues when this one has ended. */
     this._interrupted = null;
     /** @type {{id: number, from: Point, robot: string | null} | null} */
     this._press = null;
@@ -108,7 +108,7 @@ export class PressAim {
     this.activate(!this.active);
   }
 
-  /** Whether it goes on as soon as another has aimed. */
+  /** Whether it continues as soon as another tool has aimed. */
   get waits() {
     return active.get(this._map)?._interrupted === this;
   }
@@ -123,7 +123,7 @@ export class PressAim {
       this._map.svg.classList.toggle("webmap-aiming", active.has(this._map));
     }
     this._aims.changed(this.active);
-    // Else the next press of whom it was in would select no robot.
+    // Else the next press of the interrupted tool would select no robot.
     if (!active.has(this._map)) back?.activate(true);
   }
 
@@ -137,7 +137,7 @@ export class PressAim {
     other.leave();
   }
 
-  /** @returns {PressAim | null} What goes on now. */
+  /** @returns {PressAim | null} The tool that continues now. */
   _leaveMap() {
     const back = this._interrupted;
     this._interrupted = null;
@@ -146,14 +146,14 @@ export class PressAim {
     return back;
   }
 
-  /** @returns {boolean} Whether there was something to leave. */
+  /** @returns {boolean} Whether the tool was active. */
   leave() {
     if (!this.active) return false;
     this.activate(false);
     return true;
   }
 
-  /** Give up the press that is aimed, if there is one. */
+  /** Cancel the current press, if there is one. */
   drop() {
     if (!this._press) return;
     this._press = null;
@@ -163,7 +163,7 @@ export class PressAim {
   _listen() {
     const { signal } = this._ending;
     const { svg } = this._map;
-    // Before anybody else, so that a press while aiming neither moves nor selects.
+    // Captured first, so that a press while aiming neither moves nor selects.
     const first = { signal, capture: true };
     svg.addEventListener("pointerdown", (event) => this._down(event), first);
     svg.addEventListener("pointermove", (event) => this._move(event), first);
@@ -188,7 +188,7 @@ export class PressAim {
     event.stopImmediatePropagation();
     event.preventDefault();
     if (this._press || event.button !== 0) {
-      // A second finger is a doubt about the first.
+      // A second finger cancels the press of the first.
       this.drop();
       return;
     }
@@ -233,7 +233,7 @@ export class PressAim {
 /**
  * @param {MapCanvas} map
  * @param {string} robot
- * @returns {Pose | null} Where the map shows the robot; null where it does not.
+ * @returns {Pose | null} Pose of the robot on the map; null if it is not shown.
  */
 export function poseOf(map, robot) {
   const element = map.world.querySelector(`.robot[data-robot="${CSS.escape(robot)}"]`);
@@ -247,7 +247,7 @@ export function poseOf(map, robot) {
 
 /**
  * @param {MapCanvas} map
- * @returns {string[]} The robots that are selected: the one, and those marked besides.
+ * @returns {string[]} The selected robots: the main one, and the other marked ones.
  */
 export function chosen(map) {
   if (map.selected === null) return [];

@@ -8,7 +8,7 @@ export function byId(id) {
 }
 
 /**
- * Change a text, and nothing when it is the same: what is live would be read again.
+ * Set a text only if it differs: a screen reader reads a live region at every change.
  *
  * @param {Element} element
  * @param {string} text
@@ -23,7 +23,7 @@ export function typing({ target }) {
 }
 
 /**
- * The sheet on a narrow screen.
+ * Open and close the sheet on a narrow screen.
  *
  * @param {AbortSignal} signal
  */
@@ -37,7 +37,7 @@ export function listenToSheet(signal) {
 }
 
 /**
- * Say on the sheet's handle what is selected, for when it is closed.
+ * Show the selected robots on the sheet's handle, for a closed sheet.
  *
  * @param {MapCanvas} map
  */
@@ -61,7 +61,7 @@ export function nameSheet(map) {
   };
 }
 
-/** Show the map again, if the sheet covers it. */
+/** Close the sheet, if it covers the map. */
 export function closeSheet() {
   byId("sheet").setAttribute("aria-expanded", "false");
 }

@@ -58,10 +58,10 @@ export function button(className, label, act) {
 }
 
 /**
- * Make a button that acts as soon as it is touched: STOP waits for no release.
+ * Make a button that acts at the press: STOP does not wait for the release.
  *
- * A finger beside another one, one that rests, and one under which the page is made
- * anew never make a click. Keyboards and assistive technology make nothing else.
+ * A second finger, a resting finger, and a finger on an element that is replaced never
+ * make a click. Keyboards and assistive technology only make clicks.
  *
  * @param {string} className
  * @param {string} label
@@ -83,7 +83,7 @@ export function stopButton(className, label, act) {
     pressed = event.pointerId;
     act();
   });
-  // A mouse is one pointer for ever: what is pressed and left is no click that comes.
+  // A mouse keeps its pointer id: a press that left the button has no click here.
   element.addEventListener("pointerleave", (event) => {
     if (event.pointerType === "mouse") pressed = null;
   });
@@ -91,8 +91,8 @@ export function stopButton(className, label, act) {
 }
 
 /**
- * Change an element's text, and nothing when it is the same: a screen reader reads a
- * live region again for every change.
+ * Set an element's text only if it differs: a screen reader reads a live region again
+ * at every change.
  *
  * @param {Element} element
  * @param {string} text
@@ -104,16 +104,17 @@ export function say(element, text) {
 /**
  * A button that acts when it is pressed twice, deliberately.
  *
- * Its first press asks in words for the second, so that it works alike for a finger, a
- * mouse, a keyboard and a screen reader. Enter presses it; Space is STOP everywhere.
+ * After the first press its label requests the second, so that it works the same with a
+ * finger, a mouse, a keyboard and a screen reader. Enter presses it; Space is STOP
+ * everywhere.
  */
 export class TwiceButton {
   /**
    * @param {string} className
-   * @param {string} label What it says before it is pressed.
-   * @param {string} again What it says after the first press.
+   * @param {string} label Its label before the first press.
+   * @param {string} again Its label after the first press.
    * @param {(meant: readonly string[]) => void} act Called with the robots, or their
-   *     STOPs, that the first press was said of and that are still there.
+   *     STOPs, that were there at the first press and still are.
    */
   constructor(className, label, again, act) {
     this._twice = new Twice();
@@ -138,8 +139,8 @@ export class TwiceButton {
 
   /**
    * @param {boolean} visible
-   * @param {readonly string[]} [robots] What a press is said of: robots by id, or their
-   *     STOPs. The first press is forgotten when there is one more, or another.
+   * @param {readonly string[]} [robots] What a press applies to: ids of robots, or of
+   *     their STOPs. A new or other one cancels the first press.
    * @param {string} [label]
    */
   show(visible, robots = this._robots, label = this._label) {

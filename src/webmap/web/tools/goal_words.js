@@ -3,7 +3,7 @@ import { GOALS } from "../constants.js";
 /** @typedef {import('../motion/report.js').GoalWord} GoalWord */
 
 /**
- * How a goal reads and looks; a word, a shape and a tone that always go together.
+ * The look of a goal; text and shape always belong together.
  *
  * @typedef {object} GoalLook
  * @property {string} text
@@ -44,7 +44,7 @@ export function seconds(number) {
   return `${Math.round(number / 60)} min`;
 }
 
-/** For how long a goal that was reached or called off stays on the map, in ms. */
+/** Milliseconds for which a reached or cancelled goal stays on the map. */
 const LINGER = 4000;
 
 /** Decides which goals a page shows. Times are in milliseconds of one clock. */
@@ -57,7 +57,7 @@ export class ShownGoals {
   }
 
   /**
-   * Take what the gate says of a robot's goal.
+   * Update a robot's goal from a report of the gate.
    *
    * @param {string} robot
    * @param {GoalWord | null | undefined} goal
@@ -69,8 +69,8 @@ export class ShownGoals {
       this._seen.set(robot, { goal: null, endedAt: null });
       return;
     }
-    // A goal that had ended when the page first heard of the robot is no news. A later
-    // goal may end before the page has a report of it under way.
+    // A goal that had ended before the first report of the robot is not shown. A later
+    // goal may end before the page gets a report of its progress.
     const { over } = look(goal);
     const since = known?.goal?.id === goal.id ? (known.endedAt ?? now) : now;
     const endedAt = over ? (known === undefined ? -Infinity : since) : null;
@@ -83,7 +83,7 @@ export class ShownGoals {
   }
 
   /**
-   * Show a goal no more.
+   * Hide a goal.
    *
    * @param {string} robot
    */
@@ -108,22 +108,22 @@ export class ShownGoals {
   }
 }
 
-/** How often a goal is offered to the gate, and how long it waits in between, in ms. */
+/** Number of attempts to send a goal, and the milliseconds between two attempts. */
 export const TRIES = 13;
 export const RETRY = 250;
 
 /**
- * Send a goal, and again for about three seconds while the gate has no link for it.
+ * Send a goal, again for about three seconds while the gate has no connection for it.
  *
- * The goal of an action uses up the link of all robots behind that bridge, and the gate
- * has a new one a moment later. What it refused for that it has not written, so this is
- * the one refusal after which a goal is offered again by itself.
+ * The goal of an action uses up the connection of all robots behind that bridge, and
+ * the gate opens a new one a moment later. A goal refused for this reason was not sent
+ * to the robot, so this is the only refusal after which a goal is sent again.
  *
- * @param {() => Promise<void>} offer Offers it to the gate once.
- * @param {() => boolean} wanted Whether it is to be sent still; asked after every wait.
- * @returns {Promise<boolean>} Whether the gate has accepted it; false when it was called
- *     off in between, after which nothing is sent.
- * @throws {Error} When the gate refuses it for another reason, or for this one at last.
+ * @param {() => Promise<void>} offer Sends it to the gate once.
+ * @param {() => boolean} wanted Whether to send it still; checked after every wait.
+ * @returns {Promise<boolean>} Whether the gate has accepted it; false if it was
+ *     cancelled in between, after which nothing is sent.
+ * @throws {Error} If the gate refuses it for another reason, or at the last attempt.
  */
 export async function sendGoal(offer, wanted) {
   for (let tries = 1; ; tries++) {

@@ -7,18 +7,18 @@ const overlays = new WeakMap();
 
 /** @typedef {'top-left' | 'top-right' | 'bottom-left' | 'bottom-right'} Corner */
 
-/** @type {readonly Corner[]} In the order in which keys go through them. */
+/** @type {readonly Corner[]} In the order of the Tab key. */
 const CORNERS = ["top-left", "top-right", "bottom-left", "bottom-right"];
 
 /**
- * Put something over a map.
+ * Put an element over a map.
  *
  * @param {MapCanvas} map
  * @param {Element} panel
- * @param {Corner} [corner] Where panels share the room; without one it covers the map.
- * @param {string} [place] A selector of the page's own element, which gets it instead. A
- *     page without such an element has it over the map.
- * @returns {() => void} Takes it away.
+ * @param {Corner} [corner] The corner for it; without one it covers the map.
+ * @param {string} [place] A selector of the page's own element, which contains it
+ *     instead. If the page has no such element, it is over the map.
+ * @returns {() => void} Removes it.
  */
 export function lay(map, panel, corner, place = "") {
   const own = ownPlace(place);
@@ -47,15 +47,15 @@ export function ownPlace(place) {
 
 /**
  * @param {MapCanvas} map
- * @returns {HTMLElement | null} What lies over the map, if anything does.
+ * @returns {HTMLElement | null} The overlay of the map, if there is one.
  */
 export function overlayOf(map) {
   return overlays.get(map)?.element ?? null;
 }
 
 /**
- * An element of HTML that covers a map, wherever the page puts the map: what is in the
- * `<svg>` cannot be laid out. Itself it lets every pointer through.
+ * An HTML element that covers a map, at every position of the map: an `<svg>` has no
+ * layout for its content. It lets all pointer events through.
  */
 class Overlay {
   /** @param {MapCanvas} map */
@@ -65,11 +65,11 @@ class Overlay {
     this._corners = new Map(CORNERS.map((name, i) => [name, corners[i]]));
     this._frame = html("div", "webmap-frame", {}, ...corners);
     this.element = html("div", "webmap-overlay", {}, this._frame);
-    // Said here, as the style sheet may come later than this is measured.
+    // Set here, because the style sheet may be loaded after the first measurement.
     Object.assign(this.element.style, { position: "absolute", left: "0", top: "0" });
     const host = svg.parentElement;
     if (host && getComputedStyle(host).position === "static") {
-      // So that the overlay goes along, wherever that is moved.
+      // So that the overlay moves with the host.
       host.style.position = "relative";
     }
     svg.after(this.element);
@@ -82,7 +82,7 @@ class Overlay {
     this._place();
   }
 
-  /** Whether nothing lies over the map any more. */
+  /** Whether nothing is over the map any more. */
   get empty() {
     return (
       this.element.childElementCount === 1 &&
@@ -106,8 +106,8 @@ class Overlay {
   }
 
   /**
-   * Fold what a panel that was unfolded lies over, where the style has panels lie over
-   * one another as there is little room.
+   * Close the panels under a panel that was opened, if the style puts panels over one
+   * another for lack of space.
    *
    * @param {EventTarget | null} opened
    */

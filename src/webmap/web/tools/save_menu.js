@@ -5,33 +5,33 @@ import { lay, ownPlace } from "./overlay.js";
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 
 /**
- * Where the button is: `place`, a selector of the page's own element, and `classes` that
- * the button gets there; without a place it lies over the map.
+ * Position of the button: `place`, a selector of the page's own element, and `classes`
+ * of the button there; without a place it is over the map.
  *
  * @typedef {{place?: string, classes?: string}} Where
  */
 
 /**
  * @typedef {object} Group
- * @property {number} order Groups stand in the order of this.
- * @property {string} title What the button says that it is for.
+ * @property {number} order Groups are sorted by this.
+ * @property {string} title Purpose of the button, in its title.
  * @property {string} heading
  * @property {HTMLElement} content
  */
 
 const ICON = "M12 3.5v11M7.5 10.5l4.5 4.5 4.5-4.5M4.5 20h15";
 
-/** Pixels that the menu stays away from the map's foot, which a sheet may lie over. */
+/** Pixels between the menu and the map's bottom, which a sheet may cover. */
 const GAP = 24;
 
 /** @type {WeakMap<MapCanvas, Map<string, SaveMenu>>} */
 const menus = new WeakMap();
 
 /**
- * Add to what can be saved: one button for all of it, as there is little room.
+ * Add a group to the save menu: one button for all groups, to save space.
  *
  * @param {MapCanvas} map
- * @param {Where} where Modules that say the same place share a button.
+ * @param {Where} where Modules with the same place share a button.
  * @param {Group} group
  * @returns {{menu: SaveMenu, leave: () => void}}
  */
@@ -51,7 +51,7 @@ export function joinSaveMenu(map, where, group) {
   return { menu, leave };
 }
 
-/** A button that opens a choice of what to save. */
+/** A button that opens a menu of things to save. */
 class SaveMenu {
   /**
    * @param {MapCanvas} map
@@ -81,7 +81,7 @@ class SaveMenu {
     };
     addEventListener("pointerdown", outside, { signal, capture: true });
     addEventListener("focusin", outside, { signal });
-    // For pages on which nobody drives, and so nobody else hears of Escape.
+    // For pages without control of robots, where nothing else handles Escape.
     const escape = (/** @type {KeyboardEvent} */ event) => {
       if (event.key === "Escape") this._leave();
     };
@@ -104,7 +104,7 @@ class SaveMenu {
 
   /**
    * @param {Group} group
-   * @returns {() => void} Takes it out again.
+   * @returns {() => void} Removes it.
    */
   add(group) {
     const head = html("p", "webmap-export-head", { "aria-hidden": "true" }, group.heading);
@@ -125,13 +125,13 @@ class SaveMenu {
     this._menu.replaceChildren(...groups.map(([, element]) => element));
   }
 
-  /** Close it and give the focus back to the button. */
+  /** Close the menu and focus the button. */
   close() {
     this._open(false);
     this._go.focus();
   }
 
-  /** @param {string} text What stands beside the button while something is saved. */
+  /** @param {string} text Text next to the button while something is saved. */
   say(text) {
     say(this._word, text);
   }
@@ -145,7 +145,7 @@ class SaveMenu {
     return lay(this._map, this._element, "top-left", place);
   }
 
-  /** @returns {boolean} Whether there was something to leave. */
+  /** @returns {boolean} Whether the menu was open. */
   _leave() {
     if (this._menu.hidden) return false;
     this.close();
@@ -161,18 +161,18 @@ class SaveMenu {
     this._element.classList.remove("leftward");
     const { top, right } = this._menu.getBoundingClientRect();
     this._element.classList.toggle("leftward", right > room);
-    // What lies below the map, such as STOP, stays in sight.
+    // Controls below the map, such as STOP, stay visible.
     const end = this._map.svg.getBoundingClientRect().bottom - GAP;
     this._menu.style.maxHeight = end > top ? `${end - top}px` : "";
     this._menu.querySelector("button")?.focus({ preventScroll: true });
   }
 }
 
-/** Milliseconds for which the browser may still read a file that was offered to it. */
+/** Milliseconds for which the browser may still read an offered file. */
 const READ_WITHIN = 60_000;
 
 /**
- * Have the browser save a file on the viewer's own machine.
+ * Save a file on the viewer's own machine.
  *
  * @param {Blob} file
  * @param {string} name
