@@ -384,7 +384,7 @@ class Buttons:
         self.robot.report_error(text)
 
     def on_report(self, report: object) -> None:
-        """Update the buttons when STOP becomes active or ends; STOP bars some buttons."""
+        """Update the buttons when STOP begins or ends; STOP bars some buttons."""
         latched = bool(getattr(report, "latched", False))
         if latched != self._latched:
             self._latched = latched
