@@ -77,10 +77,10 @@ class NavSatFixMsg(Stamped, frozen=True, kw_only=True):
 class NavSatFix(RobotLayer):
     """A cross at a robot's satellite position, with a circle of one standard deviation.
 
-    A fix is projected to a plane that touches the globe at a datum: lengths have an
-    error of 4 mm at 10 km from the datum, and of 0.5 m at 50 km. ``TileLayer`` with the
-    same datum uses the same projection. Without a fix the last fix stays and ages, with
-    the class ``lost``.
+    A fix is projected to a plane that touches the globe at a datum: lengths are
+    accurate to 4 mm at 10 km from the datum, and to 0.5 m at 50 km. ``TileLayer`` with
+    the same datum uses the same projection. Without a fix the last fix stays and ages,
+    with the class ``lost``.
 
     Style it by CSS: ``.navsatfix > .cross``, ``.navsatfix > .doubt`` and
     ``.navsatfix.lost``.
@@ -141,7 +141,7 @@ class NavSatFix(RobotLayer):
         """Draw a fix in place of the last one; it is on the globe, not in a frame.
 
         Raises:
-            ProtocolError: If a valid fix has coordinates outside their ranges.
+            ProtocolError: If a message with a fix has coordinates outside their ranges.
         """
         lost = message.status.status < 0
         if not lost:

@@ -124,7 +124,7 @@ class _Piece:
         self._draw()
 
     def shorten(self, surplus: float) -> None:
-        """Drop points at the beginning while the rest is long enough."""
+        """Remove points at the beginning while the rest stays long enough."""
         changed = False
         while len(self.points) > 2:
             first = math.dist(self.points[0], self.points[1])
