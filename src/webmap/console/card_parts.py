@@ -112,7 +112,7 @@ def cap(v: float, w: float) -> str:
 
 
 class OwnStop:
-    """The stopping bound that holds when WebMap, its machine or the link fails.
+    """The stopping bound that applies when WebMap, its machine or the link fails.
 
     Args:
         fastest: The greatest speed at which this page drives a robot, in m/s.

@@ -10,7 +10,7 @@ import { lay } from "../../web/tools/overlay.js";
 /** Points along x, 44 pixels long, with a ring around the goal's position. */
 const ARROW = "M7 0H34M0 7a7 7 0 1 1 .01 0M44 0 30-8v16z";
 
-/** The sign in the ring besides the colour, by the shape of the goal's state. */
+/** The sign in the ring in addition to the colour, by the shape of the goal's state. */
 /** @type {Readonly<Record<string, string>>} */
 const SIGNS = {
   sent: "",

@@ -229,7 +229,7 @@ class PointCloud(RobotLayer):
     ``base_frame``), straight up even if the robot is tilted: 0 is the floor if that
     frame is on the floor. In a cloud with ``frame="map"`` they are above the map's
     plane. Without frames for the sensor, its z is assumed to point up and to begin at
-    the base.
+    the base frame.
 
     A cloud of one row may have a ``row_step`` of 0. Of points above one another one dot
     is drawn. With ``colour_by`` the dots are in eight bands of a field's values, each
@@ -251,10 +251,10 @@ class PointCloud(RobotLayer):
     _: KW_ONLY
 
     z_min: float = -math.inf
-    """The least height of a drawn point, in metres above the base."""
+    """The least height of a drawn point, in metres above the base frame."""
 
     z_max: float = math.inf
-    """The greatest height of a drawn point, in metres above the base."""
+    """The greatest height of a drawn point, in metres above the base frame."""
 
     cell: Annotated[
         float, Limit("metres of at least 0", lambda side: 0 <= side < math.inf)
@@ -266,7 +266,8 @@ class PointCloud(RobotLayer):
 
     colour_by: str | None = None
     """The name of the field whose values give the colours, such as ``"intensity"``;
-    ``"z"`` is the height above the base."""
+    ``"z"`` is the height above the base frame.
+    """
 
     low: float | None = None
     """The lower limit of the lowest band; the cloud's least value if not given."""

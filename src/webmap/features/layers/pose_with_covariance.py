@@ -147,8 +147,8 @@ class PoseWithCovariance(RobotLayer):
     def build(self) -> None:
         """Make the ellipse and the sector.
 
-        The layer has no age limit, because AMCL publishes nothing while the robot does
-        not move.
+        The age limit is long, because AMCL publishes nothing while the robot does not
+        move.
         """
         self.ellipse = self.add(
             svg.ellipse(

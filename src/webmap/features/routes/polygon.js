@@ -327,8 +327,8 @@ export class SweepNet {
       const faced = pairs.filter(([k, l]) => this._overlap(k, l) >= 0);
       const facing = new Set(faced.flat());
       for (const [k, l] of pairs) {
-        // Diagonal links only from nodes without a straight neighbour, because an area
-        // like a comb has many teeth.
+        // Diagonal links only where a piece has no piece opposite: a comb-shaped area
+        // has many teeth.
         const aslant = !facing.has(k) || !facing.has(l);
         if (aslant || this._overlap(k, l) >= 0) this._joinTwo(k, l);
       }

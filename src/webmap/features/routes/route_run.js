@@ -54,7 +54,7 @@ export class RouteRun {
     this._acceptedAt = null;
   }
 
-  /** Whether the run goes on, or can be continued. */
+  /** Whether the run is active, or can be continued. */
   get live() {
     return this.state !== "ended";
   }
@@ -166,7 +166,7 @@ export class RouteRun {
     return null;
   }
 
-  /** @param {string} goal @param {number} since How old it is. @returns {Action} */
+  /** @param {string} goal @param {number} since Age in ms. @returns {Action} */
   _arrived(goal, since) {
     // The robot is still here at the next call.
     if (this.loop && since < LOOP_PERIOD) return null;

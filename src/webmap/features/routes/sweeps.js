@@ -215,7 +215,11 @@ function asPlan(legs, frame) {
   return { problem: "", points, sweeps: legs.map(asSweep) };
 }
 
-/** @param {Point} from @param {Point} to @returns {number} Along the sweeps if both are one. */
+/**
+ * @param {Point} from
+ * @param {Point} to
+ * @returns {number} In radians; along the sweeps for equal points.
+ */
 function headingTo(from, to) {
   return between(from, to) > SAME ? Math.atan2(to.y - from.y, to.x - from.x) : 0;
 }

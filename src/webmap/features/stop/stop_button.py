@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 @map_modules.register
 class StopButton:
-    """A large red button that stops robots, whoever has control.
+    """A large red button that stops robots, regardless of who has control.
 
     STOP does not require control, and the page sends it to the gate itself.
 

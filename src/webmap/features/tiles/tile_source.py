@@ -85,8 +85,7 @@ class FolderTiles:
         folder: The folder.
 
     Raises:
-        ConfigError: If there is no level in it.
-
+        ConfigError: If the folder contains no level.
     """
 
     def __init__(self, folder: Path) -> None:

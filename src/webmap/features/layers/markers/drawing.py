@@ -106,7 +106,7 @@ def draw(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
 
     Args:
         marker: The marker, of a type in :data:`CLASSES`.
-        tilt: The rotation of the marker besides its heading.
+        tilt: The rotation of the marker without its heading.
 
     Raises:
         ProtocolError: If a number is not valid.
