@@ -1,4 +1,4 @@
-"""The lists that unfold from the page's bar: the bridges, and what was refused."""
+"""Lists that unfold from the page's bar: bridges and refused messages."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ WORST = ("lost", "connecting", "late")
 """States that are not well, the worst first."""
 
 LATE = 0.5
-"""Seconds from which on it is said that what comes from a bridge comes late."""
+"""Seconds of delay from which a bridge's data is shown as late."""
 
 
 class BridgeList:
@@ -24,8 +24,7 @@ class BridgeList:
     Args:
         element: The page's element to fill.
         bridges: The bridges.
-        buttons: For each bridge what can be done with it.
-
+        buttons: The buttons of each bridge.
     """
 
     def __init__(
@@ -61,7 +60,7 @@ class BridgeList:
         self.poll()
 
     def poll(self) -> None:
-        """Look at the bridges again."""
+        """Update the list."""
         states = [describe_link(bridge) for bridge in self._bridges]
         for line, word, (link, text) in zip(
             self._lines, self._words, states, strict=True
@@ -75,7 +74,7 @@ class BridgeList:
 
 
 def describe_link(bridge: "Bridge") -> tuple[str, str]:
-    """Return what the page calls a bridge's state, and a sentence for it."""
+    """Return the page's name for a bridge's state, and a sentence that describes it."""
     if bridge.state == "open" and bridge.lag >= LATE:
         return "late", f"open, {bridge.lag:.1f} s late"
     if bridge.state == "open":
@@ -87,7 +86,7 @@ def describe_link(bridge: "Bridge") -> tuple[str, str]:
 
 
 def summary(links: Sequence[str]) -> str:
-    """Return a few words for the states of all bridges."""
+    """Return a short text for the states of all bridges."""
     total, open_ = len(links), sum(link in ("open", "late") for link in links)
     late = links.count("late")
     if total == 1:
@@ -104,18 +103,17 @@ def summary(links: Sequence[str]) -> str:
 
 
 SHOWN = 12
-"""How many people are listed."""
+"""The greatest number of people that the list shows."""
 
 
 class RefusedList:
-    """A count of refused messages that unfolds into who sent them, and what.
+    """A count of refused messages that unfolds into their senders and contents.
 
-    It is there once there is one, and not for those who may only look.
+    Hidden until a message is refused, and always hidden from viewers.
 
     Args:
         element: The page's element to fill.
-        role: What the viewer may do.
-
+        role: The role of the page's user.
     """
 
     def __init__(self, element: "Element", role: str) -> None:
@@ -134,7 +132,7 @@ class RefusedList:
         self.poll()
 
     def poll(self) -> None:
-        """Look at the counts again."""
+        """Update the counts."""
         rows = refusals.rows
         if not self._may or rows == self._shown:
             return
@@ -148,7 +146,7 @@ class RefusedList:
 
 
 def line(by: str, count: int, last: str, at: "datetime") -> "Element":
-    """Return how many of one person's messages were refused, and the last of them."""
+    """Return the number of one person's refused messages, and the last of them."""
     return html.li(
         html.span(text=by, class_="url"),
         html.span(text=f"{count}, last at {at.astimezone():%H:%M:%S}", class_="word"),

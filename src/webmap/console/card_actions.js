@@ -5,8 +5,8 @@ import { byId, closeSheet } from "../web/tools/dom.js";
 /** @typedef {import('../web/motion/report.js').RobotReport} Report */
 
 /**
- * The buttons of the card that act at once. Only the test of its own stopping lets a
- * robot creep, and only one that this page holds.
+ * Handle the buttons of the card that act at once. Only the stop test lets a robot
+ * creep, and only a robot that this page has control of.
  *
  * @param {MapCanvas} map
  * @param {(message: Record<string, unknown>) => void} send
@@ -50,15 +50,16 @@ export function listenToActions(map, send, signal) {
   };
 }
 
-/** A second press that comes sooner is the other half of a double click; ms. */
+/** Milliseconds; an earlier second press is the other half of a double click. */
 const SOONEST = 400;
 
-/** After this long the first press is forgotten; ms. */
+/** Milliseconds after which the first press is forgotten. */
 const LATEST = 4000;
 
 /**
- * The button that lets a robot creep and then be silent, to see whether it stops by
- * itself. As it moves the robot it wants a lease, and a second, deliberate press.
+ * The button of the stop test: it lets a robot creep, then ends all commands and
+ * measures whether the base stops by itself. As the test moves the robot, it requires
+ * control and a second, deliberate press.
  */
 export class StopTestButton {
   /** @param {Drive} drive */
@@ -69,9 +70,9 @@ export class StopTestButton {
   }
 
   /**
-   * Say what a press would do.
+   * Show what a press would do.
    *
-   * @param {string | null} robot The one that is selected.
+   * @param {string | null} robot The selected robot.
    * @param {number} now
    */
   show(robot, now) {

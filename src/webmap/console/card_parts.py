@@ -1,4 +1,4 @@
-"""Parts of the card of the selected robot: speeds, own stop, goal, health."""
+"""Parts of the card of the selected robot: speeds, command timeout, goal, health."""
 
 import math
 import time
@@ -15,17 +15,16 @@ if TYPE_CHECKING:
 COLUMNS = ("Sent", "Echoed", "Measured")
 
 OF_THE_PAGE = "limit of the page"
-"""Why a robot is driven no faster that might be."""
+"""Why a robot is driven slower than its own limits allow."""
 
 NOBODY_KNOWS = "Command timeout of the base: unknown."
 
 
 class SpeedTable:
-    """Three views of one motion, which agree as long as all is well.
+    """A robot's commanded, echoed and measured velocity, which normally agree.
 
     Args:
-        most: What this page asks for at most, in m/s and rad/s.
-
+        most: The greatest speeds that this page asks for, in m/s and rad/s.
     """
 
     def __init__(self, most: tuple[float, float]) -> None:
@@ -38,7 +37,7 @@ class SpeedTable:
         self.elements: list[Element] = [self._table(), self._limits()]
 
     def show(self, robot: "Robot") -> None:
-        """Show what is known of a robot's motion."""
+        """Show the velocities and the speed limit of a robot."""
         report = robot.report
         sent = echoed = measured = None
         if report is not None:
@@ -53,7 +52,8 @@ class SpeedTable:
             )
         self.elements[1].set(hidden=report is None)
         if report is not None:
-            # Before somebody has it, its own limits alone are in the report.
+            # Before an operator has control, the report has only the robot's own
+            # limits.
             self._cap.text = cap(
                 min(report.v, self._most[0]), min(report.w, self._most[1])
             )
@@ -99,7 +99,7 @@ class SpeedTable:
 
 
 def linear(velocity: tuple[float, ...] | None) -> str:
-    """Return the speed, whatever the direction; backwards is below zero."""
+    """Return the speed in any direction as text; backward is negative."""
     if velocity is None:
         return UNKNOWN
     twist = Twist(*velocity)
@@ -107,16 +107,15 @@ def linear(velocity: tuple[float, ...] | None) -> str:
 
 
 def cap(v: float, w: float) -> str:
-    """Return the speeds in force as people read them."""
+    """Return the speed limits as text."""
     return f"{number(v)} m/s, {number(w)} rad/s"
 
 
 class OwnStop:
-    """Shows the bound that holds when WebMap, its machine or the link dies.
+    """The stopping bound that applies when WebMap, its machine or the link fails.
 
     Args:
-        fastest: What this page drives a robot at, in m/s.
-
+        fastest: The greatest speed at which this page drives a robot, in m/s.
     """
 
     def __init__(self, fastest: float) -> None:
@@ -138,7 +137,7 @@ class OwnStop:
         ]
 
     def show(self, robot: "Robot") -> None:
-        """Show what is known of a robot's own stop, and of the test of it."""
+        """Show a robot's command timeout, and the state of the stop test."""
         report = robot.report
         self.elements[0].set(hidden=report is None)
         if report is None:
@@ -161,14 +160,13 @@ class OwnStop:
 def bound(
     stop_time: float | None, source: str | None, v: float, brake: float
 ) -> tuple[str, str]:
-    """Return within what time a robot stands that is told nothing, and how that comes.
+    """Return the time within which a robot stops without commands, and its reason.
 
     Args:
-        stop_time: Seconds after which its base brakes by itself, if that is known.
-        source: How it is known; ``None`` if it is not.
-        v: The speed in force, in m/s.
-        brake: How hard it brakes, in m/s².
-
+        stop_time: Command timeout of the base in seconds; ``None`` if unknown.
+        source: The source of the command timeout; ``None`` if unknown.
+        v: The speed limit, in m/s.
+        brake: The robot's deceleration, in m/s².
     """
     if stop_time is None:
         if source is None:
@@ -192,44 +190,46 @@ GOALS = {
     "failed": ("Goal failed", "failed", "bad"),
     "cancelled": ("Goal cancelled", "cancelled", ""),
 }
-"""The words, the shape and the tone of each state of a goal.
+"""The text, the shape and the tone of each state of a goal.
 
-The page has a table of the words and shapes, made from this one. console.html has a
+The page has a table of the texts and shapes, made from this one. console.html has a
 symbol ``goal-SHAPE`` for each shape.
 """
 
 
 LINGER = 30.0
-"""Seconds for which a goal that was reached or cancelled is shown; one that failed is
-shown until the next."""
+"""Seconds for which a reached or canceled goal is shown.
+
+A failed goal is shown until the next goal.
+"""
 
 
 class Goal(Protocol):
-    """What a robot's report says of its goal, as far as it is told in numbers."""
+    """The part of a robot's report about its goal that this module needs."""
 
     @property
     def state(self) -> str:
-        """How it stands."""
+        """State of the goal."""
 
     @property
     def left(self) -> float | None:
-        """The rest of the way, in metres."""
+        """Remaining distance, in metres."""
 
     @property
     def eta(self) -> float | None:
-        """The rest of the time, in seconds."""
+        """Remaining time, in seconds."""
 
     @property
     def time(self) -> float | None:
-        """How long it has been under way, in seconds."""
+        """Time since the goal began, in seconds."""
 
     @property
     def recoveries(self) -> int | None:
-        """How often the robot had to free itself."""
+        """Number of recoveries that the robot's navigation has run."""
 
 
 class GoalLine:
-    """One line of the card: what the robot's goal has come to, and how far it is."""
+    """A line of the card: the state of the robot's goal, and the progress."""
 
     def __init__(self) -> None:
         self._use = svg.use(href="#goal-sent")
@@ -241,7 +241,7 @@ class GoalLine:
         )
 
     def show(self, robot: "Robot") -> None:
-        """Show how it stands with the goal of a robot; nothing if it has none."""
+        """Show the state of a robot's goal; nothing if the robot has none."""
         goal = None if robot.report is None else robot.report.goal
         ended = robot.goal_ended_at
         past = ended is not None and time.monotonic() - ended > LINGER
@@ -257,7 +257,7 @@ class GoalLine:
 
 
 def figures(goal: Goal) -> str:
-    """Return what the robot tells of a goal that it follows, in numbers with units."""
+    """Return the figures of a goal in progress, with units."""
     if goal.state not in ("under way", "cancelling"):
         return ""
     parts = []
@@ -274,7 +274,7 @@ def figures(goal: Goal) -> str:
 
 
 MOST = 6
-"""Parts that are listed; the worst come first."""
+"""The greatest number of parts that are listed; the worst come first."""
 
 LEVELS = {
     "error": ("wrong", "Error"),
@@ -282,19 +282,18 @@ LEVELS = {
     "warn": ("warning", "Warning"),
     "ok": ("good", "OK"),
 }
-"""For each level of diagnostics its shape and colour, and its word."""
+"""The shape with colour, and the text, of each level of diagnostics."""
 
 
 class RobotHealth:
     """Lists the parts of the selected robot that are not well; a module of maps.
 
-    A robot without diagnostics has no such list. One of which all is well has one line,
-    and so has one of which nothing was heard.
+    A robot without diagnostics has no list. The list is one line if all parts are well,
+    or if no diagnostics were received.
 
     Args:
         map: The map.
         card: The page's element to append to.
-
     """
 
     def __init__(self, map: "Map", card: "Element") -> None:
@@ -309,18 +308,18 @@ class RobotHealth:
         self.on_select()
 
     def destroy(self) -> None:
-        """Take the list away."""
+        """Remove the list."""
         self.element.remove()
 
     def on_select(self) -> None:
-        """Show the health of the robot that is selected now."""
+        """Show the health of the selected robot."""
         self.poll()
 
     def poll(self) -> None:
-        """Look at the parts again; those that say nothing become silent by that."""
+        """Update the parts; a part without new messages becomes stale by this."""
         robot = self.map.selected
         modules = [] if robot is None else robot.modules
-        # Those that follow diagnostics.
+        # Modules that follow diagnostics.
         found = [m for m in modules if hasattr(m, "parts") and hasattr(m, "hold")]
         said = _lines([part for module in found for part in module.parts])
         if found and not said:
@@ -335,18 +334,18 @@ class RobotHealth:
 
 
 def _lines(parts: list[Any]) -> list[tuple[str, str, str]]:
-    """Return what is wrong, or that all is well; nothing if no part tells either."""
+    """Return the problems, or that all is well; nothing if no part has diagnostics."""
     bad = [part for part in parts if part.level != "ok"]
     lines = []
     for part in bad[:MOST]:
         level, word = LEVELS[part.level]
-        # A count of seconds would be another line every second.
+        # A count of seconds would change the line every second.
         words = "" if part.level == "stale" else f": {part.message}"
         whose = " (robot unknown)" if part.shared else ""
         lines.append((level, f"{word}: ", f"{part.name}{whose}{words}"))
     if len(bad) > MOST:
         lines.append(("note", "", f"and {len(bad) - MOST} more parts"))
-    # That the parts of nobody are well tells nothing of this robot.
+    # Good parts that belong to no known robot do not show that this robot is well.
     if not bad and any(not part.shared for part in parts):
         count = f"{len(parts)} part{'' if len(parts) == 1 else 's'}"
         lines.append(("good", "All OK: ", count))

@@ -3,9 +3,10 @@ import { byId, listenToSheet, nameSheet, say, typing } from "../web/tools/dom.js
 import { keepSizes, listenToList, listenToTools } from "./view_tools.js";
 
 /**
- * What of the console acts in the browser itself, because it must be quick, or work
- * while the display cannot be reached: the state of the connection, who "you" are, the
- * buttons of the view and of the card, the search, the sheet on a phone, help.
+ * The parts of the console that run in the browser, because they must be quick or work
+ * while the display cannot be reached: the state of the connection, which robots are
+ * "yours", the buttons of the view and of the card, the search, the sheet on a phone,
+ * help.
  */
 
 /** @typedef {import('../web/drive.js').Drive} Drive */
@@ -42,8 +43,8 @@ export default function attach(map, options, send) {
 }
 
 /**
- * Show whether commands would arrive, and which robots are "yours". How long they take
- * depends on the robot, too, so the driving panel has that figure.
+ * Show whether commands would arrive, and which robots are "yours". The round trip
+ * depends on the robot too, so the driving panel shows it.
  *
  * @param {Drive} drive
  */
@@ -73,7 +74,7 @@ function showConnection(drive) {
   };
 }
 
-/** Say how many robots there are, and of how many the data is old. */
+/** Show the number of robots, and of robots with stale data. */
 function count() {
   const rows = document.querySelectorAll("#robots > .row").length;
   const old = document.querySelectorAll("#robots > .row .age.stale").length;
@@ -91,14 +92,17 @@ function toggle(element, name, on) {
   else delete element.dataset[name];
 }
 
-/** Milliseconds between two looks at which names there is room for. */
+/** Milliseconds between two checks which names have room. */
 const PERIOD = 300;
 
-/** How large a name is on the screen, in pixels: about so much a letter, and a line. */
+/**
+ * Size of a name on the screen, in pixels: about the width of a letter, and the height
+ * of a line.
+ */
 const LETTER = 8;
 const LINE = 18;
 
-/** With more robots in sight than this only the selected one has its name. */
+/** With more visible robots than this, only the selected robot has its name. */
 const MOST = 150;
 
 /**
@@ -108,14 +112,14 @@ const MOST = 150;
  * @property {number} x
  * @property {number} y
  * @property {number} width
- * @property {boolean} first Whether it comes before the others.
+ * @property {boolean} first Whether this name takes priority over the others.
  */
 
 /**
  * Return which names can be shown without covering one another.
  *
  * @param {Name[]} names
- * @returns {boolean[]} For each, whether there is room for it.
+ * @returns {boolean[]} For each name, whether there is room.
  */
 export function roomFor(names) {
   const order = names.map((_, index) => index);
@@ -141,7 +145,7 @@ export function roomFor(names) {
  * Keep the robots' names on the map from covering one another.
  *
  * @param {MapCanvas} map
- * @returns {() => void} Ends it.
+ * @returns {() => void} Ends the updates.
  */
 function spreadNames(map) {
   const spread = () => {
@@ -180,8 +184,8 @@ function nameOf({ view, selected }, robot) {
 }
 
 /**
- * Hide the robots whose name does not have what was typed in it. Enter selects the only
- * one that is left.
+ * Hide the robots whose name does not contain the search text. Enter selects the robot
+ * if only one is left.
  *
  * @param {AbortSignal} signal
  */
@@ -213,7 +217,7 @@ function listenToSearch(signal) {
   document.addEventListener("keydown", key, { signal });
 }
 
-/** @returns {HTMLElement[]} What selects the robots that are listed. */
+/** @returns {HTMLElement[]} The buttons that select the listed robots. */
 function hits() {
   return [...document.querySelectorAll("#robots > .row:not(.filtered) [aria-pressed]")].filter(
     (button) => button instanceof HTMLElement,
@@ -221,9 +225,10 @@ function hits() {
 }
 
 /**
- * Help lies beside STOP and is no modal dialog: that would take STOP's clicks. While it
- * is open no input moves a robot (`data-hands-off`), as it covers what the operator would
- * have to see. Esc closes it, unless this page drives: then Esc is STOP.
+ * Help opens beside STOP and is not a modal dialog, because a modal dialog would block
+ * clicks on STOP. While help is open no input moves a robot (`data-hands-off`), because
+ * help covers the operator's view. Esc closes help, unless this page is driving: then
+ * Esc is STOP.
  *
  * @param {Drive} drive
  * @param {AbortSignal} signal

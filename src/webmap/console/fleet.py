@@ -1,4 +1,4 @@
-"""What the console shows of a robot: all that is configured, its picture, its name.
+"""How the console shows a robot: its configured modules, its picture, its name.
 
 ``map.css`` has the colours.
 """
@@ -21,17 +21,16 @@ def make_robot(
     bridges: "Mapping[str, Bridge] | Iterable[Bridge]",
     picture: str = "",
 ) -> "Robot":
-    """Return a robot, with what the console shows of it.
+    """Return a robot with the modules that the console shows.
 
     Args:
-        config: The robot.
-        bridges: Its bridges, by the names that the configuration has for them, or in
-            any order if it has their addresses.
-        picture: The URL that pages load its picture from, if it has one.
+        config: The robot's configuration.
+        bridges: The robot's bridges, by their names in the configuration, or in any
+            order if the configuration has their addresses.
+        picture: The URL from which pages load the robot's picture; empty if none.
 
     Raises:
-        ConfigError: If something in it cannot be meant; every mistake is named.
-
+        ConfigError: If the configuration is not valid; the error lists every mistake.
     """
     if not isinstance(bridges, Mapping):
         bridges = {bridge.url: bridge for bridge in bridges}
@@ -40,7 +39,7 @@ def make_robot(
     if pictured is not None:
         model = picture_model(pictured, picture)
     robot = webmap.Robot.from_config(config, bridges, model=model)
-    if pictured is not None:  # the name lies below it
+    if pictured is not None:  # the name is below the picture
         robot.svg.set_style("--reach", picture_reach(pictured))
     robot.add_module(NameLabel)
     return robot
@@ -58,7 +57,7 @@ HATCH = (
 
 
 def robot_model() -> "Element":
-    """Return a rounded body of half a metre with an arrow that says where it looks."""
+    """Return a rounded body of half a metre with an arrow that shows the heading."""
     return svg.g(
         svg.circle(r=0.35, class_="hit"),
         svg.g(
@@ -72,25 +71,24 @@ def robot_model() -> "Element":
 
 
 def picture_reach(picture: "PictureConfig") -> float:
-    """Return how far from the base a picture reaches at the most, in metres."""
+    """Return the greatest distance from robot origin to picture edge, in metres."""
     half = math.hypot(picture.width, picture.height) / 2
     return half + math.hypot(picture.x, picture.y)
 
 
 def picture_model(picture: "PictureConfig", href: str) -> "Element":
-    """Return a model that is a picture, with the same marks as any other robot.
+    """Return a model made of a picture, with the same marks as any other robot.
 
     Args:
-        picture: Where it is on the robot.
-        href: The URL that pages load it from.
-
+        picture: The position of the picture on the robot.
+        href: The URL from which pages load the picture.
     """
     width, height = picture.width, picture.height
     placed = geometry.Affine.translation(picture.x, picture.y)
     placed @= geometry.Affine.rotation(math.radians(picture.angle))
     image = svg.image(class_="picture", href=href, preserveAspectRatio="none")
     image.set_matrix(placed @ geometry.Affine(1, 0, 0, -1, 0, 0))
-    # What is drawn over the usual body while its data is old lies over the picture.
+    # The hatching that marks stale data on the usual body is drawn over the picture.
     hatch = svg.path(d=HATCH, class_="hatch")
     hatch.set_matrix(placed @ geometry.Affine(width / 0.47, 0, 0, height / 0.38, 0, 0))
     reach = svg.rect(class_="reach", fill="transparent")
@@ -105,19 +103,19 @@ def picture_model(picture: "PictureConfig", href: str) -> "Element":
 
 
 class NameLabel:
-    """The robot's name below it, upright wherever it looks; a module of robots."""
+    """The robot's name below the robot, always upright; a module of robots."""
 
     def __init__(self, robot: "Robot") -> None:
         self.robot = robot
         self.svg = svg.g(svg.text(text=robot.name, class_="label"), class_="upright")
-        # Over the body, and under what other modules draw.
+        # Above the body, and below what other modules draw.
         robot.svg.insert(list(robot.svg.children).index(robot.model) + 1, self.svg)
         self.on_odometry_update()
 
     def destroy(self) -> None:
-        """Take the name away."""
+        """Remove the name."""
         self.svg.remove()
 
     def on_odometry_update(self) -> None:
-        """Turn against the robot, so that the name stays upright."""
+        """Turn against the robot's heading, so that the name stays upright."""
         self.svg.set_pose(0.0, 0.0, -self.robot.yaw)

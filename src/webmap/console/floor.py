@@ -1,7 +1,7 @@
-"""Floor plans: an image with the YAML beside it that ROS's map_server reads.
+"""Floor plans: an image with a YAML file in the format of ROS's map_server.
 
-The image is drawn anew in the console's own colours, once for the day and once for
-the night, since a page can show either without asking.
+The image is drawn in the console's own colours, once for the light and once for the
+dark theme, so that a page can switch without a request.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from webmap.base.map_file import MapImage, read_map
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-# Wall, unknown and free; unknown is --map-void and free --map-floor of tokens.css.
+# Wall, unknown, free; unknown is --map-void and free is --map-floor in tokens.css.
 COLOURS = {
     "day": ("#3a4654", "#dfe4ea", "#ffffff"),
     "night": ("#8fa0b3", "#0b0f14", "#1b222b"),
@@ -23,26 +23,26 @@ COLOURS = {
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """A floor plan, ready to be placed in the world."""
+    """A floor plan with its position in the world."""
 
     day: Path
     night: Path
     x: float
-    """The image's left edge before it is turned, in metres."""
+    """Left edge of the image before the rotation, in metres."""
     y: float
-    """The image's lower edge before it is turned, in metres."""
+    """Lower edge of the image before the rotation, in metres."""
     width: float
-    """In metres."""
+    """Width in metres."""
     height: float
-    """In metres."""
+    """Height in metres."""
     yaw: float
-    """How far it is turned about its lower left corner, in radians."""
+    """Rotation about the lower left corner, in radians."""
     bounds: tuple[float, float, float, float]
-    """What is known of it: left, bottom, width and height in metres."""
+    """The known part: left, bottom, width and height in metres."""
 
     @property
     def matrix(self) -> geometry.Affine:
-        """What carries the image, which has y downward, to its place in the world."""
+        """The transform from the image, whose y points down, to the world."""
         upright = geometry.Affine(1, 0, 0, -1, 0, 2 * self.y + self.height)
         return geometry.Affine.rotation(self.yaw, self.x, self.y) @ upright
 
@@ -50,16 +50,15 @@ class Floor:
 def load_floor(file: Path, folder: Path) -> Floor:
     """Read a floor plan and draw it in the console's colours.
 
-    Walls, free floor and what nobody knows are what map_server makes of the image: by
-    the thresholds, the mode and ``negate``.
+    Walls, free and unknown cells follow the rules of map_server: the thresholds, the
+    mode and ``negate``.
 
     Args:
-        file: The YAML file of a map, as map_server takes it.
-        folder: Where the drawn images go.
+        file: The YAML file of a map, in the format of map_server.
+        folder: The folder for the drawn images.
 
     Raises:
-        ConfigError: If the file or its image cannot be read or makes no sense.
-
+        ConfigError: If the file or its image cannot be read or is not valid.
     """
     plan = read_map(file)
     images = {}
@@ -73,7 +72,7 @@ def load_floor(file: Path, folder: Path) -> Floor:
 
 
 def paint(plan: MapImage, wall: str, unknown: str, free: str) -> "Image":
-    """Return a map as an image: exactly one colour for each value of a cell."""
+    """Return a map as an image with exactly one colour for each cell value."""
     from PIL import Image, ImageColor, ImageOps
 
     ramp = Image.frombytes("L", (101, 1), bytes(range(101)))
@@ -88,12 +87,11 @@ def paint(plan: MapImage, wall: str, unknown: str, free: str) -> "Image":
 
 
 def known_part(plan: MapImage) -> tuple[float, float, float, float]:
-    """Return the rectangle of the world in which the map knows anything.
+    """Return the rectangle of the world that contains all known cells.
 
     Returns:
-        Left, bottom, width and height in metres, of the whole image if it is turned
-        or knows nothing.
-
+        Left, bottom, width and height in metres; of the whole image if the map is
+        rotated or has no known cell.
     """
     rows, columns = plan.cells.shape
     at = plan.origin

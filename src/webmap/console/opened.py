@@ -1,4 +1,4 @@
-"""The console that is open: what comes later is shown on all its pages."""
+"""The open console: whatever is added later appears on all its pages."""
 
 import time
 import weakref
@@ -9,51 +9,49 @@ if TYPE_CHECKING:
     from webmap import Bridge, Page, Robot
 
 Factory: TypeAlias = str | Callable[..., Any]
-"""The name of a module, or what makes one."""
+"""The name of a module, or a callable that makes one."""
 
 TOP = 10.0
-"""How near the first map lies: over those from files, under costmaps and robots."""
+"""Order of the first map: above maps from files, below costmaps and robots."""
 
 
 class Console:
-    """What is shown on every page of the console besides what it was opened with.
+    """What every page of the console shows in addition to the initial content.
 
     Args:
-        told: The robots that it was opened with.
-
+        told: The robots that the console was opened with.
     """
 
     def __init__(self, told: "Sequence[Robot]" = ()) -> None:
         self.told = tuple(told)
-        """The robots that it was opened with, in that order."""
+        """The robots that the console was opened with, in that order."""
         self.robots: list[Robot] = []
         """The robots that were added, in that order."""
         self.grids: dict[tuple[Bridge, str], dict[str, Any]] = {}
-        """The maps under the robots, in the order in which they were added: for a
-        bridge and a topic the options of ``OccupancyGrid``."""
+        """The options of ``OccupancyGrid`` by bridge and topic, the first map first."""
         self.images: list[tuple[str, float, float, float, float]] = []
-        """Pictures under everything else, as ``Map.add_image`` takes them."""
+        """Pictures below everything else, as arguments of ``Map.add_image``."""
         self._modules: dict[str, dict[str, Any]] = {}
         self._more: list[tuple[Factory, tuple[Any, ...], dict[str, Any]]] = []
         self._pages: weakref.WeakSet[Page] = weakref.WeakSet()
         self._removed: dict[Robot, float] = {}
-        """The robots that were taken off the pages, and when."""
+        """The robots that were removed from the pages, and the times."""
 
     def add(self, robot: "Robot") -> None:
-        """Show a robot on the pages that are open and on those to come."""
+        """Show a robot on all open and future pages."""
         self.robots.append(robot)
         for page in list(self._pages):
             _show(robot, page)
 
     def remove(self, robot: "Robot") -> None:
-        """Take a robot off every page until a pose of it comes."""
+        """Remove a robot from every page until a new pose of the robot arrives."""
         self._removed[robot] = time.monotonic()
         for page in list(self._pages):
             for map in page.maps:
                 map.remove_robot(robot)
 
     def bring_back(self) -> None:
-        """Show the robots again of which a pose has come since they were removed."""
+        """Show removed robots again from which a pose has arrived since the removal."""
         now = time.monotonic()
         for robot, since in list(self._removed.items()):
             if robot.hears_poses(now - since):
@@ -62,17 +60,17 @@ class Console:
                     _show(robot, page)
 
     def add_grid(self, bridge: "Bridge", topic: str, **options: Any) -> bool:
-        """Show a map under the robots, likewise; one that is shown stays as it is.
+        """Show a map under the robots on all pages; a map shown before stays unchanged.
 
         Args:
-            bridge: The bridge that has it.
-            topic: Of ``nav_msgs/OccupancyGrid``.
-            **options: The other arguments of ``OccupancyGrid``. Maps lie in the order
-                in which they came, the first on top, unless ``order`` says otherwise.
+            bridge: The bridge that has the topic.
+            topic: A topic of type ``nav_msgs/OccupancyGrid``.
+            **options: The other arguments of ``OccupancyGrid``. Maps are drawn in the
+                order in which they were added, the first on top, unless ``order`` is
+                given.
 
         Returns:
-            Whether it is new.
-
+            Whether the map is new.
         """
         if (bridge, topic) in self.grids:
             return False
@@ -86,44 +84,41 @@ class Console:
     def add_image(
         self, file: str, x: float, y: float, width: float, height: float
     ) -> None:
-        """Show a picture under everything else, likewise.
+        """Show a picture below everything else on all pages.
 
         Args:
-            file: Its path.
+            file: The path of the picture.
             x: The left edge, in metres.
             y: The lower edge, in metres.
             width: In metres.
             height: In metres.
-
         """
         self.images.append((file, x, y, width, height))
         for page in list(self._pages):
             _show_image(self.images[-1], page)
 
     def add_module(self, name: Factory, /, *args: Any, **options: Any) -> None:
-        """Give the map of every page one module more.
+        """Add a module to the map of every page.
 
         Args:
-            name: The module's name, or what makes it.
-            *args: What its constructor gets after the map.
-            **options: Its arguments by name.
-
+            name: The module's name, or a callable that makes the module.
+            *args: Arguments for the constructor, after the map.
+            **options: Keyword arguments for the constructor.
         """
         self._more.append((name, args, options))
         for page in list(self._pages):
             _add_module(name, args, options, page)
 
     def add_module_once(self, name: Factory, /, *args: Any, **options: Any) -> bool:
-        """Give the map of every page a module, unless that was done already.
+        """Add a module to the map of every page, unless it was added before.
 
         Args:
-            name: The module's name, or what makes it.
-            *args: What its constructor gets after the map.
-            **options: Its arguments by name.
+            name: The module's name, or a callable that makes the module.
+            *args: Arguments for the constructor, after the map.
+            **options: Keyword arguments for the constructor.
 
         Returns:
             Whether the module is new.
-
         """
         new = (name, args, options) not in self._more
         if new:
@@ -131,17 +126,16 @@ class Console:
         return new
 
     def set_module(self, name: str, /, **options: Any) -> None:
-        """Give the map of every page to come a module, or that module more options.
+        """Add a module, or more options of the module, to the map of future pages.
 
         Args:
             name: The module's name.
-            **options: Its arguments by name, besides those it was given before.
-
+            **options: Keyword arguments, in addition to those given before.
         """
         self._modules[name] = {**self._modules.get(name, {}), **options}
 
     def opened(self, page: "Page") -> None:
-        """Show on a page that has been filled what was added until now."""
+        """Show everything that was added until now on a newly filled page."""
         self._pages.add(page)
         for name, options in self._modules.items():
             _add_module(name, (), options, page)
@@ -163,7 +157,7 @@ class Console:
                 continue
             for map in page.maps:
                 grid = map.add_module("OccupancyGrid", bridge, topic, **options)
-                if len(bridges) > 1:  # else the topic says which map it is
+                if len(bridges) > 1:  # else the topic identifies the map
                     name = f"{topic} ({bridge.name})"
                     grid.layer.svg.set("data-layer", name)
 
@@ -184,5 +178,5 @@ def _add_module(
     for map in page.maps:
         try:
             map.add_module(name, *args, **options)
-        except ValueError as error:  # a file that was there is not any more
+        except ValueError as error:  # the file no longer exists
             map.report_error(f"{name} is not shown: {error}")

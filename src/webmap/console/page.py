@@ -1,4 +1,4 @@
-"""The page itself: a map with everything around it, for each viewer that opens it."""
+"""The console's page: a map with all controls around it, for each open page."""
 
 import asyncio
 import atexit
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.console")
 
 PRODUCT = "WebMap"
-"""What the bar says in any case."""
+"""Shown in the bar in any case."""
 
 SPEED = 1.0
 ROTATION_SPEED = 1.5
-"""What the keys ask for at most, in m/s and rad/s; each robot's own limits hold too."""
+"""Greatest speeds for keys, in m/s and rad/s; each robot's limits apply too."""
 
 PERIOD = 0.25
-"""Seconds between two looks at what no trigger tells: ages and links."""
+"""Seconds between two updates of values without a trigger: ages and connections."""
 
 
 def open_console(
@@ -48,20 +48,19 @@ def open_console(
     """Make the console the page at ``/``.
 
     Args:
-        bridges: The links whose state is shown.
-        robots: What is shown on the map and in the list, in that order. Their bridges
-            are named by address.
-        floor: The YAML file of a floor plan, as map_server takes it.
-        title: What this installation is called.
-        place: What labels and views are kept under; the URLs of the bridges, if not
-            given. For bridges whose port is another one at each start.
+        bridges: The bridges whose state is shown.
+        robots: The robots on the map and in the list, in that order. Their bridges are
+            named by address.
+        floor: The YAML file of a floor plan, in the format of map_server.
+        title: The name of this installation.
+        place: The name under which labels and views are stored; by default the URLs of
+            the bridges. Use it for bridges whose port changes at each start.
 
     Returns:
-        The console, to add robots that come later.
+        The console, to add robots later.
 
     Raises:
         ConfigError: If the floor plan cannot be read.
-
     """
     plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(config, bridges) for config in robots]
@@ -87,7 +86,7 @@ def build(
     title: str,
     kept_under: str,
 ) -> None:
-    """Fill one viewer's page; its views are kept under a name."""
+    """Fill one page; its views are stored under ``kept_under``."""
     page.element("title").text = "" if title == PRODUCT else title
     map = webmap.Map(page.element("map"))
     if floor is not None:
@@ -141,7 +140,7 @@ def _folder_for_this_process() -> Path:
 
 
 def show_floor(map: "Map", floor: Floor) -> None:
-    """Place a floor plan for the day and one for the night; map.css shows one."""
+    """Place a floor plan for each theme, light and dark; map.css shows one."""
     for name, file in (("day", floor.day), ("night", floor.night)):
         image = map.add_image(str(file), floor.x, floor.y, floor.width, floor.height)
         image.set_matrix(floor.matrix)
@@ -149,7 +148,7 @@ def show_floor(map: "Map", floor: Floor) -> None:
 
 
 async def poll_on(polls: Sequence[Callable[[], None]]) -> None:
-    """Look again at what no trigger tells, until cancelled."""
+    """Call the functions periodically, until canceled."""
     while True:
         for poll in polls:
             try:
@@ -160,13 +159,13 @@ async def poll_on(polls: Sequence[Callable[[], None]]) -> None:
 
 
 MARGIN = 4.0
-"""Metres around robots that are shown without a floor."""
+"""Margin around robots that are shown without a floor, in metres."""
 
 DOT_PIXELS = 3.0
-"""How large the dots of a scan are on the screen."""
+"""Size of a scan's dots on the screen, in pixels."""
 
 PATIENCE = 12
-"""Looks after which robots whose pose is unknown are waited for no longer."""
+"""Number of updates for which the page waits for robots with unknown pose."""
 
 Bounds = tuple[float, float, float, float]
 """Left, bottom, width and height, in metres."""
@@ -175,14 +174,13 @@ Bounds = tuple[float, float, float, float]
 class Frame:
     """Connection state, zoom buttons, help and the card's buttons; a module of maps.
 
-    All of it acts in the browser, since it must work over a bad link, and some of it
-    just then.
+    All of it runs in the browser, because it must work over a bad connection, and some
+    of it is needed exactly then.
 
     Args:
         map: The map.
-        title: What this installation is called.
+        title: The name of this installation.
         floor: The floor plan, if there is one.
-
     """
 
     def __init__(self, map: "Map", title: str, floor: "Floor | None") -> None:
@@ -196,7 +194,7 @@ class Frame:
         )
 
     def place(self) -> None:
-        """Show the floor, or the robots where they are as soon as that is known."""
+        """Show the floor, or the robots as soon as their poses are known."""
         self._looks += 1
         bounds = self._bounds or self._around_robots()
         if bounds is not None and not self._placed:
@@ -204,16 +202,16 @@ class Frame:
             self.map.fit(*bounds)
 
     def on_own_view(self) -> None:
-        """Leave the view to a page that begins with the one it was left with."""
+        """Keep the view that the page has restored."""
         self._placed = True
 
     def on_view_found(self) -> None:
-        """Show what the page begins with, when nobody left it with another view."""
+        """Show the initial view, because no view was stored for this page."""
         self._placed = False
         self.place()
 
     def on_view(self) -> None:
-        """Keep the dots of scans as large on the screen, whatever the zoom."""
+        """Keep the size of a scan's dots on the screen at every zoom."""
         scale = math.sqrt(abs(self.map.world.tf.determinant))
         size = min(max(DOT_PIXELS / max(scale, 1e-3), 0.02), 0.3)
         if abs(size - self._dot_size) > 0.1 * size:
@@ -221,7 +219,7 @@ class Frame:
             self.map.root.set_style("--dot-size", round(size, 3))
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Follow the selected robot, from the middle, which the page asks for."""
+        """Follow the selected robot in the middle of the map, when the page asks."""
         robot = self.map.selected
         if message.get("op") != "follow" or robot is None:
             return
@@ -247,23 +245,23 @@ class Frame:
 
 
 class Layout:
-    """Saves and loads what a viewer sees of the page; a module of maps.
+    """Saves and loads the layout of a page; a module of maps.
 
-    All of it is the browser's: the view, what is switched on, which panels are open,
-    where the camera is. No robot, selection, lease or goal is any part of it, and the
-    page sends nothing but what :meth:`on_message` takes.
+    The browser stores the layout: the view, the visible layers, the open panels, the
+    camera's position. The layout never contains a robot, selection, control or goal,
+    and the page sends only the messages that :meth:`on_message` accepts.
 
-    Fires ``on_own_view()`` when the page has shown the view that it was left with, and
-    ``on_view_found()`` when the viewer wants the one that it would begin with else.
+    Fires ``on_own_view()`` when the page has restored its last view, and
+    ``on_view_found()`` when the page needs the initial view.
 
     Args:
         map: The map.
-        of: What the page shows: the last view is kept for that and the page's address.
-        place: A CSS selector of the page's element that the button goes into; over the
-            map if not given.
-        classes: What the button is styled by there.
+        of: What the page shows: the last view is stored under this and the page's
+            address.
+        place: A CSS selector of the page's element for the button; by default the
+            button is over the map.
+        classes: CSS classes of the button in that element.
         restore: Whether the page opens with the last view.
-
     """
 
     def __init__(
@@ -284,27 +282,28 @@ class Layout:
         )
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Take what the page says of its view."""
+        """Handle the page's messages about its view."""
         if message.get("own") is True:
             self.map.notify_modules("on_own_view")
-            # Behind what was said of the view before this was known.
+            # The page receives this after all messages about the view that were sent
+            # before.
             self.half.send({"own": True})
         elif message.get("found") is True:
             self.map.notify_modules("on_view_found")
 
 
 class CostmapNames:
-    """Says which costmap each one is, for the list of layers; a module of maps.
+    """Names each costmap in the list of layers; a module of maps.
 
-    Robots that are alike are switched together, so the name is what their topics end
-    in: ``global_costmap/costmap``.
+    Similar robots are switched together, so the name is the end of the topics' names:
+    ``global_costmap/costmap``.
     """
 
     def __init__(self, map: "Map") -> None:
         self.map = map
 
     def poll(self) -> None:
-        """Name those that came since."""
+        """Name the costmaps that were added since the last call."""
         for module in self.map.modules:
             layer = getattr(module, "layer", None)
             if layer is None or getattr(layer, "palette", None) != "costmap":
@@ -314,5 +313,5 @@ class CostmapNames:
 
 
 def ending(topic: str) -> str:
-    """Return the last two parts of a topic's name."""
+    """Return the last two parts of a topic name."""
     return "/".join(topic.strip("/").split("/")[-2:])

@@ -1,4 +1,4 @@
-"""The card of the selected robot: where it is, how it moves, what can be done."""
+"""The card of the selected robot: pose, motion and actions."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -22,9 +22,10 @@ ACTIONS = (
     ("release", "icon-release", "Release control"),
     ("remove", "icon-close", "Remove from page"),
 )
-"""What ``data-act`` says, the symbol and the words.
+"""``data-act``, the symbol and the text of each button.
 
-console.js follows, cancels and hands back, since that must work over a bad link too.
+console.js handles follow, cancel and release, because they must work over a bad
+connection too.
 """
 
 UNABLE = {
@@ -40,7 +41,7 @@ TEST_WORDS = (
     ("asking", "Robot will move slowly: press again"),
     ("running", "Stop test running"),
 )
-"""What the button of the stop test says; console.js says which, in ``data-test``."""
+"""Texts of the stop test's button; console.js selects one with ``data-test``."""
 
 
 class RobotCard:
@@ -48,13 +49,12 @@ class RobotCard:
 
     Args:
         map: The map.
-        element: The page's element to fill; it is hidden while nothing is selected.
-        aim_goal: Lets the viewer's next press on the map be the goal.
-        forget_goal: Takes the arrow of a robot's goal away.
-        aim_pose: Lets the viewer's next press on the map be the robot's pose.
-        most: What this page drives a robot at, in m/s and rad/s.
-        remove: Takes a robot that is gone off all pages.
-
+        element: The page's element to fill; hidden while nothing is selected.
+        aim_goal: Called to make the next press on the map the goal.
+        forget_goal: Called to remove the arrow of a robot's goal.
+        aim_pose: Called to make the next press on the map the robot's pose.
+        most: The greatest speeds at which this page drives a robot, in m/s and rad/s.
+        remove: Called to remove a robot without poses from all pages.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class RobotCard:
         self.on_select()
 
     def destroy(self) -> None:
-        """Let go of the robot and empty the card."""
+        """Detach from the robot and empty the card."""
         self._let_go()
         self.element.clear()
 
@@ -120,7 +120,7 @@ class RobotCard:
         self.show_state()
 
     def poll(self) -> None:
-        """Look again at what no trigger tells."""
+        """Update the values that have no trigger."""
         if self._robot is not None:
             self.show_state()
             self._cameras.poll()
@@ -129,7 +129,7 @@ class RobotCard:
                 self._age.set_age(age)
 
     def show_pose(self) -> None:
-        """Show where the robot is."""
+        """Show the robot's pose."""
         robot = self._robot
         assert robot is not None
         known = robot.valid
@@ -139,7 +139,7 @@ class RobotCard:
         self._speeds.show(robot)
 
     def show_state(self) -> None:
-        """Show who drives, how fast that may be, and how fast it is."""
+        """Show who has control, the speed limit and the speed."""
         robot = self._robot
         assert robot is not None
         state, report = robot.state, robot.report
@@ -164,7 +164,7 @@ class RobotCard:
             self._buttons[name].set("title", None if is_able else UNABLE[name])
 
     def show_battery(self, battery: Any) -> None:
-        """Show charge and voltage, as far as they are known."""
+        """Show charge and voltage, as far as known."""
         parts = []
         if battery.charge is not None:
             parts.append(f"{round(100 * battery.charge)} %")
@@ -234,7 +234,7 @@ class RobotCard:
 
 
 class Feed:
-    """Tells a card what its robot's triggers tell; a module of robots."""
+    """Forwards a robot's triggers to a card; a module of robots."""
 
     def __init__(self, robot: "Robot", card: RobotCard) -> None:
         self.robot = robot
@@ -254,20 +254,20 @@ class Feed:
 
 
 def fact(name: str, value: "Element", unit: str) -> "Element":
-    """Return a value with its name above it and its unit after it."""
+    """Return a value with its name above and its unit after it."""
     return html.div(
         html.dt(text=name), html.dd(value, html.span(text=unit, class_="unit"))
     )
 
 
 def action(act: str, symbol: str, words: str) -> "Element":
-    """Return a button on which console.js acts."""
+    """Return a button whose presses console.js handles."""
     element = html.button(icon(symbol), words, type="button", class_="button")
     return element.set("data-act", act)
 
 
 def stop_test() -> "Element":
-    """Return the button that lets a robot creep to see whether it stops by itself."""
+    """Return the button of the stop test."""
     words = [html.span(text=text, class_=name) for name, text in TEST_WORDS]
     element = html.button(
         icon("icon-test"), *words, type="button", class_="button", disabled=True
@@ -280,12 +280,11 @@ def stop_test() -> "Element":
 
 
 class RobotButtons:
-    """Shows the buttons of the robot that is selected; a module of maps.
+    """Shows the buttons of the selected robot; a module of maps.
 
     Args:
         map: The map.
         card: The page's element to append to.
-
     """
 
     def __init__(self, map: "Map", card: "Element") -> None:
@@ -297,7 +296,7 @@ class RobotButtons:
         self.on_select()
 
     def destroy(self) -> None:
-        """Take the buttons away."""
+        """Remove the buttons."""
         self._let_go()
         self.element.remove()
 

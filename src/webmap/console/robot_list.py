@@ -1,4 +1,4 @@
-"""The list of robots: who each is, how old its pose, its battery, who drives."""
+"""The list of robots: name, age of the pose, battery, operator."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -10,14 +10,14 @@ if TYPE_CHECKING:
     from webmap import Element, Map, Robot
 
 FULL = 18.0
-"""The width of the picture's charge when the battery is full."""
+"""Width of the charge in the battery symbol when the battery is full."""
 
 AGE_LIMIT = 1.0
-"""Seconds after which a pose looks old."""
+"""Seconds after which a pose is shown as stale."""
 
 
 class BatteryMark:
-    """A battery that is as full as the robot's, with the percentage beside it."""
+    """A battery symbol that shows the robot's charge, with the percentage beside it."""
 
     def __init__(self) -> None:
         self._fill = svg.rect(x=2.5, y=2.5, width=0, height=8, rx=1, class_="charge")
@@ -35,7 +35,7 @@ class BatteryMark:
         )
 
     def show(self, charge: float | None) -> None:
-        """Show a charge from 0 to 1; nothing is shown of one that is not known."""
+        """Show a charge from 0 to 1; hide the symbol if the charge is unknown."""
         self.element.set(hidden=charge is None)
         if charge is None:
             return
@@ -45,12 +45,11 @@ class BatteryMark:
 
 
 class RobotList:
-    """A line for each robot of a map, to see it and to select it; a module of maps.
+    """A line for each robot of a map, to see and select the robot; a module of maps.
 
     Args:
         map: The map.
         element: The page's ``ul``.
-
     """
 
     def __init__(self, map: "Map", element: "Element") -> None:
@@ -61,41 +60,41 @@ class RobotList:
             self.on_add_robot(robot)
 
     def destroy(self) -> None:
-        """Take every line away."""
+        """Remove all lines."""
         for row in tuple(self._rows.values()):
             self.on_remove_robot(row.robot)
 
     def on_add_robot(self, robot: "Robot") -> None:
-        """Add a line."""
+        """Add the robot's line."""
         row = robot.add_module(Row, self.map)
         self._rows[id(robot)] = row
         self.element.append(row.element)
         row.on_report()
 
     def on_remove_robot(self, robot: "Robot") -> None:
-        """Take a line away."""
+        """Remove the robot's line."""
         row = self._rows.pop(id(robot), None)
         if row is not None:
             robot.remove_module(row)
 
     def on_select(self) -> None:
-        """Mark the line of the robot that is selected now."""
+        """Mark the line of the selected robot."""
         for row in self._rows.values():
             row.show_selected(self.map.selected is row.robot)
 
     def on_mark(self) -> None:
-        """Mark the lines of the robots that are selected besides."""
+        """Mark the lines of the other robots that are selected for goals."""
         for row in self._rows.values():
             row.show_marked(row.robot in self.map.marked)
 
     def poll(self) -> None:
-        """Look again at what no trigger tells: ages, and links that were lost."""
+        """Update the values without a trigger: ages, and lost connections."""
         for row in self._rows.values():
             row.poll()
 
 
 class Row:
-    """One robot's line in the list on one viewer's page; a module of robots."""
+    """One robot's line in the list on one page; a module of robots."""
 
     def __init__(self, robot: "Robot", map: "Map") -> None:
         self.robot = robot
@@ -134,11 +133,11 @@ class Row:
                 self._battery.show(module.charge)
 
     def destroy(self) -> None:
-        """Take the line away."""
+        """Remove the line."""
         self.element.remove()
 
     def on_report(self, report: object = None) -> None:
-        """Say who drives."""
+        """Show who has control."""
         state = self.robot.state
         shape, tone = look_of(self.robot)
         self._shape.show(shape)
@@ -155,11 +154,11 @@ class Row:
         self._button.set("aria-pressed", "true" if selected else "false")
 
     def show_marked(self, marked: bool) -> None:
-        """Tick the box of a robot that is selected besides."""
+        """Tick the box if the robot is also selected for goals."""
         self._besides.set(checked=marked)
 
     def poll(self) -> None:
-        """Look again at the age of the pose, and at the link."""
+        """Update the age of the pose, and the state of the connection."""
         age = self.robot.pose_age
         if age is not None:
             self._age.set_age(age)
@@ -167,7 +166,7 @@ class Row:
 
 
 class StateShape:
-    """The shape of a robot's state; the page puts a clock in its place if it is old."""
+    """The shape of a robot's state; for a stale pose the page shows a clock."""
 
     def __init__(self) -> None:
         self._use = svg.use(href="#state-waiting")

@@ -4,20 +4,21 @@ import { byId } from "../web/tools/dom.js";
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('./console.js').Options} Options */
 
-/** What a press of a zoom button zooms by. */
+/** Zoom factor of one press of a zoom button. */
 const STEP = 1.5;
 
-/** The least space around what is shown as a whole, in pixels. */
+/** Smallest margin around the whole view, in pixels. */
 const MARGIN = 24;
 
-/** The room that a robot gets to each side, in metres. */
+/** Space around a robot on each side, in metres. */
 const AROUND = 1;
 
-/** A place and a size in metres: x, y, to the right, up. */
+/** Position and size in metres: x, y, width to the right, height up. */
 /** @typedef {[number, number, number, number]} Box */
 
 /**
- * Let map.css draw names and marks in pixels at every zoom, and upright at every turn.
+ * Keep names and marks on the map at a constant size in pixels at every zoom, and
+ * upright at every rotation; map.css draws them.
  *
  * @param {MapCanvas} map
  */
@@ -37,7 +38,7 @@ export function keepSizes(map) {
 }
 
 /**
- * The buttons of the view, which the browser owns.
+ * Handle the buttons of the view in the browser.
  *
  * @param {MapCanvas} map
  * @param {Options} options
@@ -54,7 +55,7 @@ export function listenToTools(map, options, signal) {
   on("zoom-in", () => zoom(map, STEP));
   on("zoom-out", () => zoom(map, 1 / STEP));
   on("show-all", () => showAll(map, options.bounds));
-  // Before the module that moves the view, which knows no floor.
+  // Before the module that moves the view, which does not know the floor.
   map.svg.addEventListener(
     "keydown",
     (event) => {
@@ -70,7 +71,8 @@ export function listenToTools(map, options, signal) {
 /**
  * @param {MapCanvas} map
  * @param {number} factor
- * @returns {Matrix} The view, zoomed about the robot that is followed, or its middle.
+ * @returns {Matrix} The zoomed view, about the followed robot or the middle of the
+ *     view.
  */
 function zoom(map, factor) {
   const { view } = map;
@@ -91,8 +93,8 @@ function zoom(map, factor) {
 /**
  * @param {MapCanvas} map
  * @param {Box | null} bounds
- * @returns {Matrix | null} The view of the floor and of every robot, or of all that is
- *     drawn where there is no floor, north up; null if there is nothing yet.
+ * @returns {Matrix | null} The view of the floor and of every robot, or of all drawn
+ *     things where there is no floor, north up; null if there is nothing yet.
  */
 function showAll({ svg, world, width, height }, bounds) {
   const box = world.getBBox();
@@ -110,8 +112,9 @@ function showAll({ svg, world, width, height }, bounds) {
 /**
  * @param {SVGSVGElement} svg
  * @param {number} width
- * @returns {number} How much of the map's width the card leaves, in pixels; all of it
- *     where little would be left, as on a phone, whose card lies in the sheet.
+ * @returns {number} The part of the map's width that the card leaves free, in pixels;
+ *     the whole width where little would be left, as on a phone, where the card is in
+ *     the sheet.
  */
 function besideCard(svg, width) {
   const card = byId("card").getBoundingClientRect();
@@ -122,7 +125,7 @@ function besideCard(svg, width) {
 /**
  * @param {Box} box
  * @param {[number, number]} place
- * @returns {Box} The box, and the place with room around it.
+ * @returns {Box} The box, extended by the place with room around it.
  */
 function withPlace([x, y, across, up], [px, py]) {
   const left = Math.min(x, px - AROUND);
@@ -134,7 +137,7 @@ function withPlace([x, y, across, up], [px, py]) {
 
 /**
  * @param {SVGGElement} world
- * @returns {[number, number][]} Where the robots are, in metres.
+ * @returns {[number, number][]} Positions of the robots, in metres.
  */
 function placesOfRobots(world) {
   const toWorld = world.getScreenCTM()?.inverse();
@@ -149,7 +152,8 @@ function placesOfRobots(world) {
 
 /**
  * @param {MapCanvas} map
- * @returns {[number, number] | null} Where the selected robot is, in the map's pixels.
+ * @returns {[number, number] | null} Position of the selected robot, in the map's
+ *     pixels.
  */
 function placeOfSelected({ world }) {
   const robot = world.querySelector(".robot.selected");
@@ -160,21 +164,20 @@ function placeOfSelected({ world }) {
 
 /** @typedef {[number, number]} Point In pixels of the window. */
 
-/** How much around a robot has to be free, in pixels. */
+/** Free space that a robot needs on each side, in pixels. */
 const CLEAR = 48;
 
-/** Between two places where a robot may be brought, in pixels, at least. */
+/** Smallest distance between two candidate positions, in pixels. */
 const APART = 32;
 
-/** How many places are looked at, about. */
+/** Approximate number of candidate positions. */
 const PLACES = 600;
 
-/** For how long the card of a robot may take to appear, in milliseconds. */
+/** Longest wait for a robot's card to appear, in milliseconds. */
 const PATIENCE = 1500;
 
 /**
- * Move the map so that a robot that is selected in the list lies where nothing covers the
- * map.
+ * Move the map so that a robot selected in the list is where nothing covers the map.
  *
  * @param {MapCanvas} map
  * @param {AbortSignal} signal
@@ -224,8 +227,7 @@ function show(map, robot) {
 
 /**
  * @param {MapCanvas} map
- * @returns {Point | undefined} Where nothing covers the map, as near to its middle as
- *     may be.
+ * @returns {Point | undefined} The uncovered point that is nearest to the map's middle.
  */
 function nearest({ svg }) {
   const { left, top, width, height } = svg.getBoundingClientRect();
@@ -244,7 +246,7 @@ function nearest({ svg }) {
 /**
  * @param {Pick<MapCanvas, 'svg'>} map
  * @param {Point} place
- * @returns {boolean} Whether the map is to be seen there and around.
+ * @returns {boolean} Whether nothing covers the map at this place and around it.
  */
 function isFree({ svg }, [x, y]) {
   const corners = [-CLEAR, 0, CLEAR].flatMap((dx) =>

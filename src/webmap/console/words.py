@@ -1,4 +1,4 @@
-"""How states, numbers and sentences are written, and which symbols they have."""
+"""The texts and symbols of states, numbers and sentences."""
 
 import math
 import re
@@ -10,13 +10,13 @@ if TYPE_CHECKING:
     from webmap import Element, Robot
 
 UNKNOWN = "\N{EN DASH}"
-"""What stands where a number would."""
+"""Shown in place of an unknown number."""
 
 LOW, EMPTY = 0.2, 0.1
-"""Charges below which a battery is low, and as good as empty."""
+"""Charges below which a battery is low or nearly empty."""
 
 NAME = re.compile(r"[\d/_:.]")
-"""What is in a URL, a topic or the name of a robot, and in no plain word."""
+"""Characters that occur in a URL, topic or robot name, but not in plain words."""
 
 LOOKS = {
     "no_bridge": ("state-down", "bad"),
@@ -40,19 +40,16 @@ LOOKS = {
     "held": ("state-held", "active"),
     "free": ("state-free", ""),
 }
-"""For each state of a robot a symbol of console.html, and a tone."""
+"""The symbol of console.html and the tone of each state of a robot."""
 
 
 def icon(symbol: str) -> "Element":
-    """Return a symbol of console.html as a picture that says nothing by itself."""
+    """Return a symbol of console.html as a decorative picture."""
     return svg.svg(svg.use(href=f"#{symbol}"), class_="icon").set("aria-hidden", "true")
 
 
 def look_of(robot: "Robot") -> tuple[str, str]:
-    """Return the symbol and the tone of what a robot is doing.
-
-    The tone is ``active``, ``warn``, ``bad`` or nothing.
-    """
+    """Return the symbol and the tone of a robot's state."""
     shape, tone = LOOKS[robot.state.name]
     another = robot.report is not None and robot.report.other_writer is not None
     if another and robot.state.name not in ("no_bridge", "connecting", "other"):
@@ -61,14 +58,14 @@ def look_of(robot: "Robot") -> tuple[str, str]:
 
 
 def battery_tone(charge: float) -> str:
-    """Return how a charge between 0 and 1 is to be shown."""
+    """Return the tone of a charge between 0 and 1."""
     if charge < EMPTY:
         return "bad"
     return "warn" if charge < LOW else ""
 
 
 def number(value: float, digits: int = 2) -> str:
-    """Return a number as people read it: a real minus sign, and never minus zero."""
+    """Return a number as text: with a real minus sign, and never minus zero."""
     if not math.isfinite(value):
         return UNKNOWN
     text = f"{value:.{digits}f}"
@@ -78,12 +75,12 @@ def number(value: float, digits: int = 2) -> str:
 
 
 def heading(yaw: float) -> str:
-    """Return a yaw in radians as whole degrees in 0 to 359."""
+    """Return a yaw in radians as whole degrees from 0 to 359."""
     return str(round(math.degrees(yaw)) % 360)
 
 
 def sentence(text: str) -> str:
-    """Return words of the gate as a sentence.
+    """Return a text of the gate as a sentence.
 
     A name at the beginning, such as a URL or a topic, keeps its small letter.
     """

@@ -5,23 +5,25 @@ import { svg } from "../../web/tools/elements.js";
 /** @typedef {import('../../web/view.js').Matrix} Matrix */
 /** @typedef {import('../../web/view.js').Point} Point */
 
-/** Pixels from the robot to the handle that turns. */
+/** Pixels from the robot to the rotation handle. */
 const REACH = 84;
 
 let names = 0;
 
-/** The shadow of what is aligned, where it would be, and the handle that turns it. */
+/**
+ * The preview of an alignment: a shadow of the aligned things, and the rotation handle.
+ */
 export class AlignDrawing {
   /** @param {MapCanvas} map */
   constructor(map) {
     this._map = map;
-    /** @type {Element[]} Those that were given a name to be shown twice. */
+    /** @type {Element[]} Elements that got an `id` so that they can be shown twice. */
     this._named = [];
-    /** What it is turned about, on the common map. @type {Point | null} */
+    /** The point of rotation, on the common map. @type {Point | null} */
     this.pivot = null;
     this._shadow = svg("g", { class: "webmap-align-shadow", "aria-hidden": "true" });
     this._arm = svg("path", { class: "webmap-align-arm", "aria-hidden": "true" });
-    /** Turns by a drag; takes the keys. */
+    /** Rotates the alignment when dragged; receives the keys. */
     this.handle = svg(
       "g",
       {
@@ -45,9 +47,9 @@ export class AlignDrawing {
   }
 
   /**
-   * @param {string[]} robots Who is aligned.
-   * @param {string | null} mark What the layers that go along have as `data-bridge`;
-   *   those that are a robot's own go along with that.
+   * @param {string[]} robots The robots that are aligned.
+   * @param {string | null} mark `data-bridge` of the layers that are aligned too; a
+   *     robot's own layers are aligned with the robot.
    */
   show(robots, mark) {
     this._unname();
@@ -59,7 +61,7 @@ export class AlignDrawing {
     ];
     const found = wanted.flatMap((one) => [...this._map.world.querySelectorAll(one)]);
     this._shadow.replaceChildren(...found.map((element) => this._twice(element)));
-    // Within the map's own `<svg>`, as its styles tell how large things are drawn.
+    // Inside the map's own `<svg>`, because its styles set the sizes of drawn things.
     this._map.overlay.append(this._shadow);
     this.element.removeAttribute("hidden");
   }
@@ -73,7 +75,7 @@ export class AlignDrawing {
   }
 
   /**
-   * @param {string} robot What it is turned about.
+   * @param {string} robot The robot that is the point of rotation.
    * @param {Alignment} before
    * @param {Alignment} now
    */
@@ -101,7 +103,8 @@ export class AlignDrawing {
 
   /**
    * @param {Point} place On the common map.
-   * @returns {Point} The same, or the middle of what is seen, so that the handle is.
+   * @returns {Point} The same point, or the middle of the visible map, so that the
+   *     handle is visible.
    */
   _inSight(place) {
     const { width, height, view } = this._map;
@@ -112,7 +115,7 @@ export class AlignDrawing {
 
   /**
    * @param {string} robot
-   * @returns {Point | null} Where the map shows it.
+   * @returns {Point | null} The robot's position on the map.
    */
   _placeOf(robot) {
     const { world } = this._map;
@@ -124,7 +127,7 @@ export class AlignDrawing {
 
   /**
    * @param {Element} element
-   * @returns {SVGUseElement} The same, which goes on changing as it does.
+   * @returns {SVGUseElement} A copy that follows all changes of the element.
    */
   _twice(element) {
     if (!element.id) {
@@ -145,8 +148,8 @@ function text({ a, b, c, d, e, f }) {
 }
 
 /**
- * Where a map lies on the common one: metres, metres, and degrees counter-clockwise, as
- * fleet files have it.
+ * The position of a map on the common map: metres, metres, and degrees
+ * counter-clockwise, as in fleet files.
  *
  * @typedef {{x: number, y: number, angle: number}} Alignment
  */
@@ -154,7 +157,7 @@ function text({ a, b, c, d, e, f }) {
 
 /**
  * @param {Alignment} alignment
- * @returns {Matrix} What takes points of the map to the common one.
+ * @returns {Matrix} The transform from points of the map to the common map.
  */
 export function matrixOf({ x, y, angle }) {
   const yaw = (angle * Math.PI) / 180;
@@ -165,7 +168,8 @@ export function matrixOf({ x, y, angle }) {
 /**
  * @param {Alignment} before
  * @param {Alignment} now
- * @returns {Matrix} What takes everything from where it is to where it will be.
+ * @returns {Matrix} The transform from the old to the new position of all aligned
+ *     things.
  */
 export function between(before, now) {
   const turn = matrixOf({ x: 0, y: 0, angle: now.angle - before.angle });
@@ -188,7 +192,7 @@ export function moved(alignment, dx, dy) {
 }
 
 /**
- * Turn about a point that stays where it is.
+ * Rotate about a point.
  *
  * @param {Alignment} alignment
  * @param {number} degrees Counter-clockwise.
@@ -216,7 +220,8 @@ export function normal(degrees) {
 
 /**
  * @param {Alignment} alignment
- * @returns {Alignment} To the millimetre and the hundredth of a degree, as it is saved.
+ * @returns {Alignment} Rounded to the millimetre and the hundredth of a degree, as
+ *     saved.
  */
 export function rounded({ x, y, angle }) {
   return {

@@ -4,12 +4,13 @@ import { button, html, say } from "../../web/tools/elements.js";
 /** @typedef {import('./align_tool.js').Subject} Subject */
 
 /**
- * What the panel asks for.
+ * Callbacks of the panel.
  *
  * @typedef {object} Wishes
  * @property {() => void} toggle
- * @property {(whole: boolean) => void} choose Whether all of the bridge is aligned.
- * @property {(now: Alignment) => void} type Numbers were typed.
+ * @property {(whole: boolean) => void} choose Whether everything of the bridge is
+ *     aligned.
+ * @property {(now: Alignment) => void} type Called when numbers were typed.
  * @property {() => void} save
  * @property {() => void} cancel
  */
@@ -23,7 +24,7 @@ const FIELDS = [
   ["angle", "angle in °", "0.1"],
 ];
 
-/** The button that begins, and what is said and typed while a map is aligned. */
+/** The button that begins an alignment, and its text and fields. */
 export class AlignPanel {
   /** @param {Wishes} wishes */
   constructor(wishes) {
@@ -60,14 +61,14 @@ export class AlignPanel {
     });
     this._word = html("span", "webmap-align-word", { role: "status" });
     this._line = html("code", "webmap-align-line", { hidden: "" });
-    /** The button, and what is said: it shares the room with those of other tools. */
+    /** The button and the text; they share the room with those of other tools. */
     this.element = html(
       "section",
       "webmap-panel webmap-align",
       { "aria-label": "Alignment" },
       this._go,
     );
-    /** What is open while a map is aligned, and tells what came of it. */
+    /** Open during an alignment; shows the result. */
     this.form = html(
       "section",
       "webmap-panel webmap-align-form",
@@ -89,7 +90,7 @@ export class AlignPanel {
     const empty = this._body.hidden && this._word.textContent === "";
     this.form.toggleAttribute("hidden", empty);
     if (empty) return;
-    // Below the buttons, in however many rows they are.
+    // Below the buttons, which may take several rows.
     const buttons = (this.element.parentElement ?? this.element).getBoundingClientRect();
     const around = this.form.parentElement?.getBoundingClientRect();
     if (around) this.form.style.top = `${Math.max(0, buttons.bottom - around.top) + 8}px`;
@@ -152,7 +153,7 @@ export class AlignPanel {
   }
 
   /**
-   * Arrow keys in a field count by its own step; with shift ten times that.
+   * Change a field by its own step with the arrow keys; with Shift by ten steps.
    *
    * @param {KeyboardEvent} event
    * @param {HTMLInputElement} input

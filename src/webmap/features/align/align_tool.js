@@ -11,27 +11,28 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('../../web/halves.js').Half} Half */
 
 /**
- * What is to be aligned, as the display tells it.
+ * What the display offers to align.
  *
  * @typedef {object} Subject
  * @property {string} robot
  * @property {string} name
  * @property {string} bridge
- * @property {string} mark What the layers of the bridge have as `data-bridge`.
- * @property {string[]} together The robots that go with the bridge.
- * @property {boolean} whole Whether all of the bridge goes along as it is now.
+ * @property {string} mark `data-bridge` of the bridge's layers.
+ * @property {string[]} together The robots that are aligned with the bridge.
+ * @property {boolean} whole Whether everything of the bridge is aligned together at
+ *     present.
  * @property {[number, number, number]} own
  * @property {[number, number, number]} common
  */
 
-/** What a key moves by in metres, and turns by in degrees; with shift ten times. */
+/** Step of a key in metres, and its rotation in degrees below; with Shift ten times. */
 const KEY_MOVE = 0.05;
 const KEY_TURN = 1;
 
-/** Milliseconds between two looks where the robot is. */
+/** Milliseconds between two updates of the robot's position. */
 const FOLLOW_PERIOD = 200;
 
-/** @type {Record<string, [number, number]>} Right and down, as it is seen. */
+/** @type {Record<string, [number, number]>} Right and down on the screen. */
 const ARROWS = {
   ArrowRight: [1, 0],
   ArrowLeft: [-1, 0],
@@ -40,11 +41,12 @@ const ARROWS = {
 };
 
 /**
- * Lay the map of the selected robot, or of all behind its bridge, onto the common map.
+ * Align the map of the selected robot, or of its whole bridge, with the common map.
  *
- * A drag on the map moves it, the handle turns it about the robot, fields take numbers.
- * With the handle focused arrow keys move and `q` and `e` turn; Enter saves, Escape
- * leaves. What is shown is a shadow of what is there: nothing moves before it is saved.
+ * A drag on the map moves, the handle rotates about the robot, fields take numbers.
+ * While the handle has the focus, arrow keys move and `q` and `e` rotate; Enter saves,
+ * Escape cancels. The page shows a shadow at the new position: nothing moves before it
+ * is saved.
  *
  * @param {MapCanvas} map
  * @param {object} _options
@@ -123,7 +125,8 @@ class AlignTool {
     const { signal } = this._ending;
     const { svg: root } = this._map;
     const { handle } = this._drawing;
-    // Before anybody else, so that a press while aligning neither moves nor selects.
+    // Before all other listeners, so that a press during an alignment neither moves the
+    // view nor selects a robot.
     const first = { signal, capture: true };
     root.addEventListener("pointerdown", (event) => this._down(event, false), first);
     handle.addEventListener("pointerdown", (event) => this._down(event, true), first);
@@ -158,7 +161,7 @@ class AlignTool {
     this._follow();
   }
 
-  /** @returns {boolean} Whether there was something to leave. */
+  /** @returns {boolean} Whether the tool was active. */
   _leave() {
     if (!this._subject) return false;
     this._subject = null;
@@ -184,7 +187,7 @@ class AlignTool {
 
   /**
    * @param {Alignment} now
-   * @param {boolean} [fields] Whether the fields do not have it already.
+   * @param {boolean} [fields] Whether to update the fields too.
    */
   _set(now, fields = true) {
     this._now = rounded(now);
@@ -199,7 +202,7 @@ class AlignTool {
     this._send({ save: { robot, whole: this._whole, ...this._now } });
   }
 
-  /** The robot goes on moving meanwhile. */
+  /** The robot may move during the alignment. */
   _follow() {
     clearInterval(this._following);
     this._following = setInterval(() => this._draw(), FOLLOW_PERIOD);
@@ -209,7 +212,7 @@ class AlignTool {
     if (this._subject) this._drawing.draw(this._subject.robot, this._before, this._now);
   }
 
-  // By hand --------------------------------------------------------------------
+  // Pointer --------------------------------------------------------------------
 
   /**
    * @param {PointerEvent} event
@@ -251,7 +254,7 @@ class AlignTool {
     this._drag = null;
   }
 
-  /** The browser took the pointer away: nothing was meant. */
+  /** The browser canceled the pointer: discard the drag. */
   _giveUp() {
     if (this._drag) this._set(this._drag.start);
     this._drag = null;
@@ -302,8 +305,8 @@ function bearing(from, to) {
 
 /**
  * @param {import('../../web/view.js').Matrix} view
- * @param {[number, number]} arrow Right and down, as it is seen.
- * @returns {[number, number]} The same direction in the world, a metre long.
+ * @param {[number, number]} arrow Right and down on the screen.
+ * @returns {[number, number]} The same direction in the world, with a length of 1 m.
  */
 function alongWorld(view, [right, down]) {
   const from = unapply(view, 0, 0);

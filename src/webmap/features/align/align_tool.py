@@ -1,4 +1,4 @@
-"""Laying a robot's map onto the common one, by hand."""
+"""Manual alignment of a robot's map with the common map."""
 
 import asyncio
 import logging
@@ -26,17 +26,17 @@ log = logging.getLogger("webmap.modules.align_tool")
 MAY_ALIGN = ("operator", "admin")
 
 MOVING = ("driving", "stopping")
-"""The states of a robot that somebody drives."""
+"""The states of a robot in which its alignment cannot change."""
 
 
 @map_modules.register
 class AlignTool:
-    """Lays the map of the selected robot, or of all behind its bridge, onto the map.
+    """Aligns the map of the selected robot, or of its bridge, with the common map.
 
-    A drag moves what is aligned, a handle turns it, fields take exact numbers, and
-    arrow keys nudge. The page shows where it would be and nothing moves until it is
-    saved; then it holds for everybody, and for goals. It is kept in the state folder,
-    until a program or a fleet file states another alignment.
+    A drag moves, a handle rotates, fields take exact numbers, and arrow keys move in
+    small steps. The page shows a preview, and nothing moves until the operator saves. A
+    saved alignment applies to all pages and to goals. It is kept in the state folder
+    until a program or a fleet file sets another alignment.
     """
 
     def __init__(self, map: "Map") -> None:
@@ -48,11 +48,11 @@ class AlignTool:
         )
 
     def on_add_robot(self, robot: "Robot") -> None:
-        """Align a robot as it was saved."""
+        """Apply the saved alignment of a robot."""
         store.restore(robot)
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Begin to align a robot, or save what came of it."""
+        """Begin to align a robot, or save an alignment."""
         begin, save = message.get("begin"), message.get("save")
         if isinstance(begin, str):
             self._begin(begin)
@@ -122,7 +122,7 @@ class AlignTool:
         self.half.send({"saved": {"line": toml_line(pose), "lost": lost}})
 
     def _barred(self, robot: "Robot | None", *, whole: bool = False) -> str | None:
-        """Return why a robot cannot be aligned from here now, None if it can."""
+        """Return why a robot cannot be aligned from this page now, None if it can."""
         if self.map.page.viewer.role not in MAY_ALIGN:
             return "Only operators can align maps."
         if robot is None:
@@ -136,7 +136,7 @@ class AlignTool:
         return None
 
     def _together(self, robot: "Robot") -> "list[Robot]":
-        """Return who goes with a robot's bridge, itself among them."""
+        """Return the robots that are aligned with a robot's bridge, itself included."""
         bridge = robot.whereabouts.bridge
         return [
             each

@@ -1,4 +1,4 @@
-"""Buttons that do one thing on a robot each: a call, a message, a parameter."""
+"""Buttons that each do one thing on a robot: call, publish or set a parameter."""
 
 import asyncio
 import time
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 MAY_PRESS = ("operator", "admin")
-"""Roles of viewers who may."""
+"""Roles that may press buttons."""
 
 ASKED_FOR = 0.3
-"""Seconds for which a question stands before its answer counts: no double click."""
+"""Seconds before the answer to a question counts, against double clicks."""
 
 HEADER = "std_msgs/Header"
-"""What nobody fills in by hand: a stamp of zero, and no frame."""
+"""Forms leave out this type: its stamp is zero and its frame empty."""
 
 
 class ButtonView:
@@ -70,7 +70,7 @@ class ButtonView:
         self.refresh()
 
     def refresh(self) -> None:
-        """Show how the button is now."""
+        """Show the state of the button."""
         button = self.button
         running = button.state == "running"
         why = self._barred()
@@ -119,10 +119,11 @@ class ButtonView:
         await self._run(self._values)
 
     async def _run(self, values: Any) -> None:
-        # Whoever is no operator any more, or was never one, has no say.
+        # Only a current operator may press, whatever the page sends.
         if self._barred() is None:
             self._close(self._sheet)
-            # A press is the robot's: it goes on when the viewer looks elsewhere.
+            # The press belongs to the robot: it continues when the page shows another
+            # robot.
             await asyncio.shield(spawn(self.button.press(values, by=self._viewer.name)))
 
     def _open_form(self) -> None:
@@ -181,19 +182,18 @@ class ButtonView:
 
 
 def _said(button: RobotButton, why: str | None) -> str:
-    """Return what stands under a button that cannot be pressed because of ``why``."""
+    """Return the text under a button that cannot be pressed because of ``why``."""
     if button.state == "running":
         return f"Running for {button.by}"
     return button.words or (f"Not available: {why}" if why else "")
 
 
 class FormView:
-    """Inputs for the fields of a type, and what stands in them.
+    """Inputs for the fields of a type, and their values.
 
     Args:
-        fields: Those of the type.
-        given: Plain data that stands in it at first; the defaults for the rest.
-
+        fields: The fields of the type.
+        given: Initial values as plain data; all other fields have their defaults.
     """
 
     def __init__(self, fields: Sequence[Field], given: Mapping[str, Any]) -> None:
@@ -213,11 +213,10 @@ class FormView:
             self.element.append(html.p(text="No fields to fill in."))
 
     def message(self, *, ros2: bool) -> dict[str, Any]:
-        """Return the message that stands in the form.
+        """Return the message with the form's values.
 
         Raises:
-            Misfit: If an entry makes no sense; the form shows which.
-
+            Misfit: If an entry is not valid; the form shows which.
         """
         for path, error in self._errors.items():
             error.text = ""
@@ -319,20 +318,20 @@ def _at(message: Mapping[str, Any], path: str) -> Any:
 class Buttons:
     """Offers buttons: each calls a service, publishes a message or sets a parameter.
 
-    Nothing that drives goes this way: velocity, goals and cancel are refused by name
-    and by type, when the button is made and again at each press.
+    A button can never move a robot: velocity, goals and cancel are refused by name and
+    by type, when the button is made and again at each press.
 
     Fires ``on_button(button)`` on the robot's modules whenever a press begins or ends.
 
     Args:
         robot: The robot.
-        bridge: The link to its ROS system.
-        buttons: A table for each, with ``label``, one of ``service``, ``topic`` and
-            ``parameter``, and what goes with it.
+        bridge: The bridge of the robot's ROS system.
+        buttons: A table for each button, with ``label``, one of ``service``, ``topic``
+            and ``parameter``, and their settings.
 
     Raises:
-        ConfigError: If a button makes no sense, or would move a robot; it is named.
-
+        ConfigError: If a button is not valid, or would move a robot; the error names
+            the button.
     """
 
     def __init__(
@@ -353,8 +352,7 @@ class Buttons:
         """Return the button with a label: ``await buttons["Dock"].press()``.
 
         Raises:
-            KeyError: If there is none.
-
+            KeyError: If there is no button with the label.
         """
         for button in self.buttons:
             if button.spec.label == label:
@@ -365,11 +363,11 @@ class Buttons:
         """Show the buttons in an element of a page.
 
         Args:
-            element: What they are appended to.
+            element: The element to append the buttons to.
 
         Returns:
-            What takes them away; the end of the current scope does, too.
-
+            A handle that removes the buttons; the end of the current scope removes them
+            too.
         """
         scope = Scope(f"buttons of {self.robot.name}", self._failed)
         holder = html.div(class_="robot-buttons")
@@ -386,7 +384,7 @@ class Buttons:
         self.robot.report_error(text)
 
     def on_report(self, report: object) -> None:
-        """Look whether STOP stands, which bars buttons."""
+        """Update the buttons when STOP begins or ends; STOP bars some buttons."""
         latched = bool(getattr(report, "latched", False))
         if latched != self._latched:
             self._latched = latched

@@ -1,4 +1,4 @@
-"""One button of a robot: what it does, and how far that is, for everybody who looks."""
+"""One button of a robot: its action and the state of its press, for all pages."""
 
 import json
 import logging
@@ -23,20 +23,19 @@ log = logging.getLogger("webmap.buttons")
 State = Literal["idle", "running", "done", "failed"]
 
 PROGRAM = "this program"
-"""Who presses, where nobody's hand does."""
+"""Who presses, if a program does."""
 
 MAX_WORDS = 300
-"""Characters of what is said of a result."""
+"""The greatest number of characters of a result's text."""
 
 
 class RobotButton:
-    """A button, whoever presses it: it runs once at a time, and all see how it goes.
+    """A button shared by all pages: one press runs at a time, and all pages show it.
 
     Args:
-        robot: The robot that it is on.
-        bridge: The link to the robot's ROS system.
-        spec: What it does.
-
+        robot: The robot of the button.
+        bridge: The bridge of the robot's ROS system.
+        spec: The action.
     """
 
     def __init__(self, robot: "Robot", bridge: Bridge, spec: ButtonSpec) -> None:
@@ -44,11 +43,11 @@ class RobotButton:
         self.spec = spec
         self.state: State = "idle"
         self.words = ""
-        """What came of the last press; empty before the first."""
+        """The result of the last press; empty before the first."""
         self.by = ""
         """Who pressed last."""
         self.since = 0.0
-        """When that was, in monotonic seconds."""
+        """Time of the last press, in monotonic seconds."""
         self._bridge = bridge
         self._fields: Sequence[Field] | None = None
         self._listeners: list[Callable[[], None]] = []
@@ -58,7 +57,7 @@ class RobotButton:
 
     @property
     def barred(self) -> str | None:
-        """Why it cannot be pressed now, in words; None if it can."""
+        """Why the button cannot be pressed now, as text; None if it can."""
         if self.state == "running":
             return f"already running for {self.by}"
         report = self.robot.report
@@ -72,23 +71,22 @@ class RobotButton:
         return keep(Removal(lambda: self._listeners.remove(fn)))
 
     def notify(self) -> None:
-        """Tell who looks that something about it is different."""
+        """Notify all listeners that the state has changed."""
         for fn in tuple(self._listeners):
             fn()
 
     @property
     def ros2(self) -> bool:
-        """Whether its type is written as ROS 2 has it."""
+        """Whether the type is written in the ROS 2 dialect."""
         return (self.spec.type or "").count("/") == 2
 
     async def press(self, values: Any = None, *, by: str = PROGRAM) -> bool:
-        """Do what the button does; return whether that succeeded.
+        """Run the action; return whether it succeeded.
 
         Args:
             values: The fields to send, or the parameter's value; those of the
                 configuration if not given.
             by: Who presses, for people and for the log.
-
         """
         why = self.barred
         if why is not None:
@@ -113,11 +111,11 @@ class RobotButton:
         return True
 
     def fields(self) -> Sequence[Field]:
-        """Return the fields of what it sends, for a form.
+        """Return the fields of the message to send, for a form.
 
         Raises:
-            UnknownType: If their definition is not shipped and was not asked for.
-
+            UnknownType: If WebMap does not contain the definition and the robot was not
+                asked for it.
         """
         if self.spec.kind == "parameter":
             return [_field_of_value(self.spec.value)]
@@ -127,12 +125,11 @@ class RobotButton:
         return self._fields
 
     async def ask_fields(self) -> None:
-        """Ask the robot for the fields, if it is one of ROS 1.
+        """Ask the robot for the fields, if the robot runs ROS 1.
 
         Raises:
-            BridgeError: If it may not be asked, or does not tell.
-            ConfigError: If what it tells makes no sense.
-
+            BridgeError: If the request is not allowed, or the robot does not answer.
+            ConfigError: If the answer is not valid.
         """
         assert self.spec.type is not None, "a form has a type"
         kind = "srv" if self.spec.kind == "service" else "msg"
@@ -146,7 +143,7 @@ class RobotButton:
             return self.spec.values
         try:
             fields = self.fields()
-        except ValueError:  # nobody knows its fields: sent as it stands
+        except ValueError:  # unknown fields: sent as configured
             return self.spec.values
         return checked(fields, self.spec.values, ros2=self.ros2)
 
@@ -157,7 +154,7 @@ class RobotButton:
 
 
 def values_of(spec: ButtonSpec) -> Mapping[str, Any]:
-    """Return what a form begins with."""
+    """Return the initial values of a form."""
     return {"value": spec.value} if spec.kind == "parameter" else spec.values
 
 
@@ -174,16 +171,15 @@ def _field_of_value(value: Any) -> Field:
 
 
 class NotDone(WebMapError):
-    """A button did not do what it is there for; the text says why, to people."""
+    """A button's action failed; the text explains the reason to people."""
 
 
 def declared_motion(spec: ButtonSpec, url: str) -> str | None:
-    """Return why a button may not act, by what robots were declared to be moved by.
+    """Return why a button may not act on the declared motion topics of robots.
 
     Args:
-        spec: What it would do.
+        spec: The button's action.
         url: The address of its bridge.
-
     """
     if spec.kind == "parameter":
         return None
@@ -198,19 +194,18 @@ def declared_motion(spec: ButtonSpec, url: str) -> str | None:
 
 
 async def run(bridge: Bridge, spec: ButtonSpec, values: Any) -> str:
-    """Do what a button does.
+    """Run a button's action.
 
     Args:
-        bridge: The link.
-        spec: What it does.
+        bridge: The bridge.
+        spec: The action.
         values: The fields to send, or the parameter's value.
 
     Returns:
-        What came of it, in words.
+        The result, as text.
 
     Raises:
-        NotDone: If it failed, was refused, or nobody answered in time.
-
+        NotDone: If the action failed, was refused, or was not answered in time.
     """
     try:
         await _refuse_motion(bridge, spec)
@@ -231,12 +226,11 @@ async def run(bridge: Bridge, spec: ButtonSpec, values: Any) -> str:
 
 
 async def _refuse_motion(bridge: Bridge, spec: ButtonSpec) -> None:
-    """Look again, now that robots are declared and the robot tells its types.
+    """Check again, because robots are declared and the robot's types are known now.
 
     Raises:
         MotionRefused: If it would move a robot.
-        NotDone: If the robot has another type than was said.
-
+        NotDone: If the robot's type differs from the configured type.
     """
     found = await _type_on_robot(bridge, spec)
     for type in (spec.type, found):
@@ -295,11 +289,10 @@ async def _set_ros2(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
 
 
 def answered(answer: Any) -> str:
-    """Return in words what a service answered.
+    """Return a service's answer as text.
 
     Raises:
-        NotDone: If it says ``success: false``.
-
+        NotDone: If the answer has ``success: false``.
     """
     if not isinstance(answer, Mapping):
         return "Done"
@@ -314,7 +307,7 @@ def answered(answer: Any) -> str:
 
 
 def shown(value: Any) -> str:
-    """Return a value as people read it."""
+    """Return a value as text."""
     if value is None:
         return "nothing"
     if isinstance(value, str):
@@ -323,6 +316,6 @@ def shown(value: Any) -> str:
 
 
 def shortened(text: str) -> str:
-    """Return a text without what no screen shows, at most so long."""
+    """Return a text without unprintable characters, cut to ``MAX_WORDS``."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return plain if len(plain) <= MAX_WORDS else f"{plain[: MAX_WORDS - 3]}..."

@@ -27,36 +27,34 @@ CameraType: TypeAlias = Literal[
     "sensor_msgs/msg/CompressedImage",
     "sensor_msgs/msg/Image",
 ]
-"""The types that have pictures, in either dialect."""
+"""The types of pictures, in both dialects."""
 
 PACKED, RAW = "sensor_msgs/CompressedImage", "sensor_msgs/Image"
 
 DRAWN = "jpeg"
-"""The encoding of a large raw picture that the worker process has drawn."""
+"""The encoding of a large raw picture after the worker process has drawn it."""
 
 
 class ShownImageMsg(ImageMsg):
-    """A raw picture that comes as JPEG if it is large."""
+    """A raw picture that is converted to JPEG if it is large."""
 
     def digest(self) -> ImageMsg:
         """Return the picture as JPEG; called in the worker process.
 
         Raises:
-            ProtocolError: If its encoding or its size cannot be used.
-
+            ProtocolError: If its encoding or its size is not supported.
         """
         return msgspec.structs.replace(self, encoding=DRAWN, data=jpeg(self))
 
 
 class ShownAnyImageMsg(AnyImageMsg):
-    """A picture of either type, that comes as JPEG if it is raw and large."""
+    """A picture of either type; a large raw picture is converted to JPEG."""
 
     def digest(self) -> AnyImageMsg:
         """Return the picture as JPEG if it is raw; called in the worker process.
 
         Raises:
-            ProtocolError: If its encoding or its size cannot be used.
-
+            ProtocolError: If its encoding or its size is not supported.
         """
         if self.raw is None:
             return self
@@ -75,25 +73,24 @@ PLAIN = re.compile(r"/image(?![^/]*(?:compress|jpe?g|png|webp))[^/]*\Z")
 
 @robot_modules.register
 class Camera(CameraFeed):
-    """Takes the newest picture of a camera, for everybody who watches it.
+    """Receives the newest picture of a camera, for all pages that watch it.
 
-    The robot is asked for pictures only while somebody does, and once for all. Pages
-    get them by URL: show :attr:`url` in an ``<img>``.
+    The robot sends pictures only while a page watches, and once for all pages. Pages
+    load them by URL: show :attr:`url` in an ``<img>``.
 
     Args:
         robot: The robot that carries the camera.
-        bridge: The link to the ROS system that has the topic.
-        topic: Of ``sensor_msgs/CompressedImage`` (JPEG, PNG or WebP) or of
+        bridge: The bridge of the ROS system that has the topic.
+        topic: A topic of type ``sensor_msgs/CompressedImage`` (JPEG, PNG or WebP) or
             ``sensor_msgs/Image``.
-        name: What people call the camera.
+        name: The camera's name, for people.
         throttle: The least time between two pictures, in milliseconds.
-        type: Which of the two it is. If not given, the name tells: ``.../compressed``
-            is compressed and ``.../image_raw`` and the like are not; of any other the
-            bridge knows the type once somebody publishes it.
+        type: The type of the topic. If not given, the name decides: ``.../compressed``
+            is compressed, ``.../image_raw`` and similar names are not; for any other
+            name the bridge knows the type once the topic has a publisher.
 
     Raises:
-        ConfigError: If the type has no pictures.
-
+        ConfigError: If the type is not a type of pictures.
     """
 
     def __init__(
@@ -147,11 +144,10 @@ class Camera(CameraFeed):
             self.robot.set_problem(about, text)
 
     def on_picture(self, image: CompressedImageMsg | ImageMsg | AnyImageMsg) -> None:
-        """Show a picture, whichever it is.
+        """Show a picture of either type.
 
         Raises:
-            ProtocolError: If it cannot be shown.
-
+            ProtocolError: If the picture cannot be shown.
         """
         if isinstance(image, AnyImageMsg):
             image = image.raw or image.packed
@@ -161,20 +157,18 @@ class Camera(CameraFeed):
             self.on_compressed(image)
 
     def on_compressed(self, image: CompressedImageMsg) -> None:
-        """Show a picture as it is.
+        """Show a compressed picture unchanged.
 
         Raises:
-            ProtocolError: If no browser can show it.
-
+            ProtocolError: If browsers cannot show it.
         """
         self.show(image.data, image.media_type, self._bridge.lag)
 
     def on_image(self, image: ImageMsg) -> None:
-        """Show a raw picture; while one is being made ready, the newest waits.
+        """Show a raw picture; while one is being converted, only the newest waits.
 
         Raises:
-            ProtocolError: If its encoding or its size cannot be used.
-
+            ProtocolError: If its encoding or its size is not supported.
         """
         if image.encoding == DRAWN:
             self.show(image.data, "image/jpeg", self._bridge.lag)
@@ -200,7 +194,7 @@ class Camera(CameraFeed):
 
 
 def type_by_name(topic: str) -> str | None:
-    """Return the type of pictures that a topic's name promises, None if it does not."""
+    """Return the type of pictures that a topic's name implies, None if unknown."""
     if topic.endswith("/compressed"):
         return PACKED
     return RAW if PLAIN.search(topic) else None
@@ -210,8 +204,7 @@ def jpeg(image: ImageMsg) -> bytes:
     """Return a raw picture as JPEG.
 
     Raises:
-        ProtocolError: If its encoding or its size cannot be used.
-
+        ProtocolError: If its encoding or its size is not supported.
     """
     from PIL import Image
 

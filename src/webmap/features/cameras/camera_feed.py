@@ -1,4 +1,4 @@
-"""What everything has that shows the pictures of a camera to whoever watches."""
+"""The base class of cameras: shares the newest picture with all pages that watch."""
 
 import time
 from collections import deque
@@ -12,77 +12,76 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 AGE_LIMIT = 1.0
-"""Seconds after which a picture is old."""
+"""Seconds after which a picture is stale."""
 
 LEAST_KEPT, MOST_KEPT = 3, 64
-"""Pictures that may be asked for: pages that lag still ask for the ones before."""
+"""Pictures that pages may request: slow pages still request earlier ones."""
 
 KEPT_FOR = 5.0
-"""Seconds for which one more than the least is kept."""
+"""Seconds for which pictures beyond the least number are kept."""
 
 KEPT_BYTES = 8 << 20
-"""How many bytes more than the least are kept."""
+"""Greatest number of bytes of the pictures beyond the least number."""
 
 
 class CameraFeed:
-    """The newest picture of one camera, and who watches it.
+    """The newest picture of one camera, and the pages that watch it.
 
-    One that is derived from this says in ``begin`` and ``end`` how its pictures come,
-    and hands each to :meth:`show`. They come only while somebody watches, and once
-    for all who do.
+    A derived class starts and stops its pictures in ``begin`` and ``end``, and passes
+    each to :meth:`show`. Pictures arrive only while a page watches, and once for all
+    pages.
 
     Args:
         robot: The robot that carries the camera.
-        name: What people call the camera.
-
+        name: The camera's name, for people.
     """
 
     def __init__(self, robot: "Robot", name: str) -> None:
         self.robot = robot
         self.name = name
         self.url: str | None = None
-        """Where pages find the newest picture; None until there is one."""
+        """The URL of the newest picture; None until there is one."""
         self.stamp: float | None = None
-        """When it was sent, in monotonic seconds."""
+        """Time when the picture was sent, in monotonic seconds."""
         self._watchers: dict[object, Callable[[], None]] = {}
         self._kept: deque[tuple[str, float, int]] = deque()
 
     def begin(self) -> None:
-        """Have pictures come: somebody watches now."""
+        """Start the pictures: a page watches now."""
         raise NotImplementedError
 
     def end(self) -> None:
-        """Have no more pictures come: nobody watches any more."""
+        """Stop the pictures: no page watches any more."""
         raise NotImplementedError
 
     def destroy(self) -> None:
-        """Take the pictures away."""
+        """Remove the pictures."""
         if self._watchers:
             self._watchers.clear()
             self._finish()
 
     @property
     def watched(self) -> bool:
-        """Whether anybody watches, so that pictures come."""
+        """Whether a page watches, so that pictures arrive."""
         return bool(self._watchers)
 
     def watch(self, fn: Callable[[], None]) -> Removable:
-        """Call ``fn`` whenever there is another picture.
+        """Call ``fn`` whenever there is a new picture.
 
         Returns:
-            What ends it; the end of the current scope does, too.
-
+            A handle that ends the calls; the end of the current scope ends them too.
         """
         key = object()
         first = not self._watchers
         self._watchers[key] = fn
         if first:
-            # Not a thing of the first who watches: it goes on for the others.
+            # Outside the scope of the first watcher, because the pictures continue for
+            # others.
             try:
                 with no_scope():
                     self.begin()
             except BaseException:
-                # Whoever comes next is the first again, and begins.
+                # The next watcher is the first again, and begins.
                 self._watchers.pop(key, None)
                 raise
         scope = current_scope()
@@ -97,15 +96,14 @@ class CameraFeed:
         return watching
 
     def show(self, data: bytes, media_type: str, lag: float = 0.0) -> None:
-        """Show a picture to everybody who watches, in place of the one before.
+        """Show a picture to all watchers, in place of the last one.
 
         Args:
             data: The picture.
             media_type: Its type, as in ``image/jpeg``.
-            lag: How many seconds it was under way.
-
+            lag: Seconds between sending and receiving.
         """
-        # What a camera saw is nothing to be found on an operator's disk later.
+        # Pictures must not remain on an operator's disk.
         self.url = pictures.publish(data, media_type, fleeting=True)
         now = time.monotonic()
         self.stamp = now - lag

@@ -17,15 +17,15 @@ import { closeSheet } from "../../web/tools/dom.js";
 /** @typedef {{op: 'cameras', robot: string, name: string, cameras: Camera[]}} Cameras */
 /** @typedef {{op: 'picture', camera: number, url: string, stamp: number}} Picture */
 
-/** Milliseconds between two looks at the age. */
+/** Milliseconds between two updates of the age. */
 const PERIOD = 100;
 
-/** The oldest picture that does not look old, in ms; the gate stops at this age too. */
+/** Milliseconds after which a picture is stale; the gate also stops at this age. */
 const OLD = 1000;
 
 /**
- * One camera of the selected robot, large. Whoever drives the robot while it is open goes
- * by it: when its picture is old the robot stops.
+ * One camera of the selected robot, large. An operator who drives the robot while the
+ * panel is open relies on it: when its picture is stale the robot stops.
  *
  * @param {MapCanvas} map
  * @param {object} _options
@@ -52,7 +52,7 @@ class CameraPanel {
     this._there = { op: "cameras", robot: "", name: "", cameras: [] };
     /** @type {Camera | null} */
     this._camera = null;
-    /** @type {number | null} What the other half was told. */
+    /** @type {number | null} The camera that the display was asked for. */
     this._watched = null;
     this._goesBy = () => {};
     this._view = new CameraView({
@@ -75,7 +75,8 @@ class CameraPanel {
       signal,
     );
     this._timer = setInterval(() => this._look(), PERIOD);
-    // Whether it is open is no part of it: who drives with it open goes by it.
+    // Whether the panel is open is not part of the layout, because an operator who
+    // drives with it open relies on it.
     this._leave = map.layout.add("camera", {
       read: () => ({ dock: this._kept.dock, x: this._kept.x, y: this._kept.y }),
       write: (place) => this._move(place),
@@ -107,7 +108,7 @@ class CameraPanel {
   _take(there) {
     const same = there.robot === this._there.robot;
     this._there = there;
-    // Asked anew, as a page that has come back must: the other half says what it sends.
+    // Request again, as a reconnected page must: the display sends the current state.
     this._watched = null;
     const { cameras } = there;
     const chosen = same && cameras.find(({ id }) => id === this._camera?.id);
@@ -116,7 +117,7 @@ class CameraPanel {
   }
 
   /**
-   * Show a camera, and open the panel for it.
+   * Show a camera, and open its panel.
    *
    * @param {number} id
    */
@@ -153,7 +154,7 @@ class CameraPanel {
   _dock(dock) {
     const { dock: before, x, y } = this._kept;
     if (dock === "float" && before === "float") {
-      // Without a pointer it goes from corner to corner.
+      // Without a pointer the panel moves from corner to corner.
       Object.assign(this._kept, nextCorner(x, y));
     }
     this._move({ ...this._kept, dock });
@@ -191,12 +192,12 @@ class CameraPanel {
     const open = this._open;
     const { dock } = this._kept;
     const { element } = this._view;
-    // What was waited for while it was closed does not count.
+    // The waiting time while the panel was closed does not count.
     if (open && element.hidden) this._picture.restart();
     if (open) document.body.dataset.camera = dock;
     else delete document.body.dataset.camera;
     this._view.open(open, dock, this._there, this._camera);
-    // What floats lies over the map, but under the panels that drive and stop.
+    // A floating panel is over the map, but below the panels for driving and STOP.
     const before = dock === "float" ? this._map.svg : this._map.svg.parentElement;
     if (before?.nextElementSibling !== element) before?.after(element);
     this._goesBy();
@@ -208,7 +209,7 @@ class CameraPanel {
     this._look();
   }
 
-  /** Ask for pictures while they can be seen. */
+  /** Request pictures while the panel is visible. */
   _watch() {
     const seen = this._open && document.visibilityState === "visible";
     const wanted = seen ? (this._camera?.id ?? null) : null;
@@ -246,7 +247,8 @@ class CameraPanel {
 }
 
 /**
- * @param {string} url Ours begin with "/_webmap/", whatever the server is under.
+ * @param {string} url URLs of WebMap begin with "/_webmap/", under any path of the
+ *     server.
  */
 function addressOf(url) {
   return new URL(`../../${url.replace("/_webmap/", "")}`, import.meta.url).href;
@@ -269,12 +271,13 @@ function cardButton(id) {
   return button instanceof HTMLElement ? button : null;
 }
 
-/** Milliseconds after which a load that never ends holds up the next no more. */
+/** Milliseconds after which an unfinished load no longer blocks the next. */
 const PATIENCE = 2000;
 
 /**
- * The newest picture of one camera: one is loaded at a time, what comes meanwhile is
- * left out but for the newest, and what is shown knows its age.
+ * The newest picture of one camera. One picture is loaded at a time; of the pictures
+ * that arrive meanwhile only the newest is loaded. The age of the shown picture is
+ * known.
  *
  * Times are in milliseconds of the page's own clock.
  *
@@ -282,7 +285,7 @@ const PATIENCE = 2000;
  */
 export class NewestPicture {
   /**
-   * @param {(url: string) => Promise<T>} load Loads a picture whole.
+   * @param {(url: string) => Promise<T>} load Loads a whole picture.
    * @param {(picture: T) => void} show
    * @param {() => number} now
    */
@@ -291,16 +294,16 @@ export class NewestPicture {
     this._show = show;
     this._now = now;
     this._since = now();
-    /** @type {number | null} When the picture was taken that is shown. */
+    /** @type {number | null} Time when the shown picture was taken. */
     this._taken = null;
     /** @type {{url: string, taken: number} | null} */
     this._next = null;
-    /** Loads of another camera, and those that were given up, count no more. */
+    /** Identifies the current load; results of earlier loads are ignored. */
     this._number = 0;
     this._busySince = -Infinity;
   }
 
-  /** Another camera was chosen: there is no picture of it yet. */
+  /** Begin again without a picture, for another camera. */
   restart() {
     this._number++;
     this._busySince = -Infinity;
@@ -314,18 +317,16 @@ export class NewestPicture {
     return this._taken !== null;
   }
 
-  /**
-   * How old the picture is that is shown; without one, for how long it was waited for.
-   */
+  /** Age of the shown picture; without a picture, the waiting time. */
   get age() {
     return Math.max(0, this._now() - (this._taken ?? this._since));
   }
 
   /**
-   * A picture can be had.
+   * Offer a new picture.
    *
    * @param {string} url
-   * @param {number} age How old it is already.
+   * @param {number} age Its age already.
    */
   offer(url, age) {
     this._next = { url, taken: this._now() - Math.max(0, age) };
@@ -345,7 +346,7 @@ export class NewestPicture {
           this._taken = next.taken;
           this._show(picture);
         },
-        // It was withdrawn for a newer one, which is on its way.
+        // The display replaced it by a newer picture, which is on its way.
         () => {},
       )
       .finally(() => {

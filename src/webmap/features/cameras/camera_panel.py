@@ -1,4 +1,4 @@
-"""What the cameras of a robot see: all of them on its card, one of them large."""
+"""Pictures of a robot's cameras: all of them on its card, one of them large."""
 
 import itertools
 import math
@@ -17,7 +17,7 @@ _number_of: "weakref.WeakKeyDictionary[Any, int]" = weakref.WeakKeyDictionary()
 
 
 class CameraViews:
-    """A picture for each camera of one robot; robots send them only while shown."""
+    """A picture for each camera of one robot; the robot sends only visible cameras."""
 
     def __init__(self) -> None:
         self.element: Element = html.div(class_="cameras")
@@ -25,7 +25,7 @@ class CameraViews:
         self._views: list[View] = []
 
     def show(self, robot: "Robot | None") -> None:
-        """Show the cameras of a robot in place of those of the one before."""
+        """Show the cameras of a robot in place of those of the last one."""
         self._robot = robot
         for view in self._views:
             view.destroy()
@@ -33,7 +33,7 @@ class CameraViews:
         self.element.append(*(view.element for view in self._views))
 
     def poll(self) -> None:
-        """Look at the ages again, and whether there are other cameras now."""
+        """Update the ages and the list of cameras."""
         if cameras_of(self._robot) != [view.camera for view in self._views]:
             self.show(self._robot)
         for view in self._views:
@@ -41,7 +41,7 @@ class CameraViews:
 
 
 class View:
-    """What one camera sees; pressed, it is shown large."""
+    """The picture of one camera; a press shows it large."""
 
     def __init__(self, camera: Any) -> None:
         self.camera = camera
@@ -59,19 +59,19 @@ class View:
             class_="camera-small",
             title="Show the camera large or small",
         )
-        # camera_panel.js shows it, without a way to here and back.
+        # camera_panel.js shows it without a round trip.
         button.set("data-camera-id", str(camera_number(camera)))
         self.element: Element = html.figure(button)
         self._watching = camera.watch(self._show)
         self._show()
 
     def destroy(self) -> None:
-        """Watch no more."""
+        """Stop watching."""
         self._watching.remove()
         self.element.remove()
 
     def poll(self) -> None:
-        """Say how old the picture is."""
+        """Show the picture's age."""
         stamp = self.camera.stamp
         self._age.set_age(math.inf if stamp is None else time.monotonic() - stamp)
 
@@ -85,7 +85,7 @@ class View:
 class CameraPanel:
     """Sends a page the pictures of the camera that it has chosen; a module of maps.
 
-    Which camera that is, and where the panel is, the page decides and remembers.
+    The page chooses the camera and the position of the panel, and stores both.
     """
 
     def __init__(self, map: "Map") -> None:
@@ -103,21 +103,21 @@ class CameraPanel:
         )
 
     def destroy(self) -> None:
-        """Ask for no more pictures."""
+        """Stop the pictures."""
         self._watch(None)
 
     def on_ready(self) -> None:
-        """Tell a page that has come, or come back, what there is."""
+        """Send the cameras to a page that has connected or reconnected."""
         self._watch(None)
         self._told = None
         self.poll()
 
     def on_select(self) -> None:
-        """Tell the page of the cameras of another robot."""
+        """Send the page the cameras of the robot selected now."""
         self.poll()
 
     def poll(self) -> None:
-        """Tell the page of cameras that came or went."""
+        """Send the page the cameras that were added or removed."""
         robot = self.map.selected
         cameras = cameras_of(robot)
         told = {
@@ -136,10 +136,10 @@ class CameraPanel:
         self.half.send(told)
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Send the pictures of the camera that the page looks at, or of none."""
+        """Send the pictures of the camera that the page has chosen, or none."""
         number = message.get("camera")
         if message.get("op") == "watch":
-            # A page names what it was told of, and nothing else.
+            # Only numbers that the page has received are valid.
             self._watch(self._cameras.get(number) if type(number) is int else None)
 
     def _watch(self, camera: Any) -> None:
@@ -170,12 +170,12 @@ def cameras_of(robot: "Robot | None") -> list[Any]:
 
 
 def is_camera(module: object) -> bool:
-    """Return whether a module of a robot is a camera that can be watched."""
+    """Return whether a module of a robot is a camera."""
     return hasattr(module, "watch") and hasattr(module, "url")
 
 
 def camera_number(camera: Any) -> int:
-    """Return what pages call a camera; unique in the process."""
+    """Return a camera's number on pages; unique in the process."""
     if camera not in _number_of:
         _number_of[camera] = next(_numbers)
     return _number_of[camera]

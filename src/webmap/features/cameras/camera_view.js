@@ -16,7 +16,7 @@ const SIGNS = {
   close: { label: "Close the camera", path: "M6 6l12 12M18 6L6 18" },
 };
 
-/** What is seen of the camera's panel, and its buttons. */
+/** The visible elements of the camera's panel, and its buttons. */
 export class CameraView {
   /**
    * @param {{
@@ -115,15 +115,15 @@ export class CameraView {
   }
 
   /**
-   * @param {number} age In ms; without a picture, for how long it was waited for.
+   * @param {number} age In ms; without a picture, the waiting time.
    * @param {boolean} shown Whether there is a picture.
    * @param {boolean} old
-   * @param {boolean} mine Whether this page holds the robot.
+   * @param {boolean} mine Whether this page has control of the robot.
    */
   tell(age, shown, old, mine) {
     this.element.classList.toggle("stale", old);
     say(this._age, shown ? ageText(age) : "");
-    // Whole seconds, so that a screen reader does not hear ten words a second.
+    // Whole seconds, so that a screen reader does not read ten values a second.
     const seconds = Math.floor(age / 1000);
     let words = "";
     if (!shown && !old) words = "Waiting for a picture.";
@@ -177,7 +177,7 @@ function signButton(what, act) {
 }
 
 /**
- * Where the camera's panel is, and what of it is kept in the browser.
+ * The position of the camera's panel, and the state that the browser stores.
  *
  * @typedef {'side' | 'below' | 'float'} Dock
  *
@@ -185,25 +185,25 @@ function signButton(what, act) {
  * @property {boolean} open
  * @property {Dock} dock
  * @property {string} camera The name of the camera that was chosen last.
- * @property {number} x Where it floats: parts of the free room, from 0 to 1.
+ * @property {number} x Position while floating: share of the free room, from 0 to 1.
  * @property {number} y
  */
 
 const DOCKS = /** @type {const} */ (["side", "below", "float"]);
 
-/** Where it is until somebody puts it elsewhere. */
+/** The position until the operator moves the panel. */
 export const FOUND = { dock: /** @type {const} */ ("side"), x: 0, y: 0 };
 
 const KEY = "webmap.camera";
 
-/** @returns {Kept} What was kept, or what is meant without it. */
+/** @returns {Kept} The stored state, or the defaults. */
 export function readKept() {
   /** @type {any} */
   let said = null;
   try {
     said = JSON.parse(localStorage.getItem(KEY) ?? "null");
   } catch {
-    // Not ours, or there is no storage: begin anew.
+    // Not written by WebMap, or no storage: use the defaults.
   }
   const part = (/** @type {unknown} */ value, /** @type {number} */ otherwise) =>
     typeof value === "number" && value >= 0 && value <= 1 ? value : otherwise;
@@ -221,12 +221,12 @@ export function keep(kept) {
   try {
     localStorage.setItem(KEY, JSON.stringify(kept));
   } catch {
-    // Without storage it is as before after a reload.
+    // Without storage a reload restores the defaults.
   }
 }
 
 /**
- * Return the corner that comes after the one that is nearest, clockwise.
+ * Return the corner after the nearest corner, clockwise.
  *
  * @param {number} x
  * @param {number} y
@@ -236,13 +236,16 @@ export function nextCorner(x, y) {
   return x < 0.5 ? { x: 0, y: 0 } : { x: 0, y: 1 };
 }
 
-/** Pixels that what floats stays away from other things, and from the map's top. */
+/**
+ * Least distance between a floating panel and other elements, or the map's top, in
+ * pixels.
+ */
 const GAP = 12;
 const TOOLS = 72;
 
 /**
- * Return the free room for the top left corner of what floats over a map, between all
- * other things that are there.
+ * Return the free room for the top left corner of a floating panel over a map, between
+ * all other elements.
  *
  * @param {Element} floating
  * @param {Element} over
@@ -269,7 +272,8 @@ export function roomFor(floating, over) {
 
 /**
  * @param {string} selector
- * @returns {{left: number, top: number, right: number}} Nowhere if it is not shown.
+ * @returns {{left: number, top: number, right: number}} Empty if the element is not
+ *     shown.
  */
 function rectangle(selector) {
   const element = document.querySelector(selector);
@@ -279,14 +283,14 @@ function rectangle(selector) {
 }
 
 /**
- * Let an element be dragged within the room that there is for it.
+ * Let an element be dragged within its free room.
  *
- * @param {HTMLElement} handle What is dragged by.
+ * @param {HTMLElement} handle The element to drag.
  * @param {() => boolean} wanted Whether it can be dragged now.
  * @param {() => {left: number, top: number, width: number, height: number}} room For
  *     its top left corner, in pixels.
- * @param {() => {left: number, top: number}} place Where that is now.
- * @param {(x: number, y: number) => void} move Takes parts of the room.
+ * @param {() => {left: number, top: number}} place The current position of that corner.
+ * @param {(x: number, y: number) => void} move Takes shares of the room.
  * @param {AbortSignal} signal
  */
 export function listenToDrags(handle, wanted, room, place, move, signal) {

@@ -1,4 +1,4 @@
-"""A camera that is on the web: an MJPEG stream, or a picture by its address."""
+"""A camera over HTTP: an MJPEG stream, or single pictures."""
 
 from typing import TYPE_CHECKING
 
@@ -16,22 +16,21 @@ if TYPE_CHECKING:
 
 @robot_modules.register
 class HttpCamera(CameraFeed):
-    """Pulls the pictures of a camera over HTTP, once for everybody who watches.
+    """Loads the pictures of a camera over HTTP, once for all pages that watch.
 
-    Browsers get them from here and never know the address. Whether it is a stream or
-    a single picture, its answer tells.
+    Pages get the pictures from WebMap and never receive the camera's address. The
+    camera's response decides between a stream and a single picture.
 
     Args:
         robot: The robot that carries the camera.
-        address: ``http://`` or ``https://``; of a ``multipart/x-mixed-replace``
-            stream, as ``web_video_server`` has it at ``/stream``, or of a single
-            picture that is asked for again, as at ``/snapshot``.
-        name: What people call the camera.
+        address: ``http://`` or ``https://``: a ``multipart/x-mixed-replace`` stream,
+            such as ``/stream`` of ``web_video_server``, or a single picture that is
+            requested repeatedly, such as ``/snapshot``.
+        name: The camera's name, for people.
         throttle: The least time between two pictures, in milliseconds.
 
     Raises:
-        ConfigError: If that is no such address, or no such time.
-
+        ConfigError: If the address or the time is not valid.
     """
 
     def __init__(
@@ -53,17 +52,17 @@ class HttpCamera(CameraFeed):
 
     @property
     def address(self) -> str:
-        """Where the camera is, without what may be secret in it."""
+        """The camera's address, without possible secrets."""
         return self._address.shown
 
     def begin(self) -> None:
-        """Connect to the camera, as soon as the process runs."""
+        """Connect to the camera as soon as the process runs."""
         seconds = self._throttle / 1000
         self._pull = Pull(self._address, seconds, self._show, self._complain)
         lifecycle.add(self._pull)
 
     def end(self) -> None:
-        """Hang up."""
+        """Disconnect."""
         if self._pull is not None:
             lifecycle.discard(self._pull)
             self._pull.hang_up()

@@ -1,11 +1,11 @@
 /**
- * Copying a report as text, which only a page can do.
+ * Copies a report as text, which only the browser can do.
  *
- * A page that came without TLS over a network has no clipboard of its own. There the
- * text is shown and selected, and copied by the old command or, failing that, by hand.
+ * A page without TLS over a network has no clipboard API. There the text is shown and
+ * selected, and copied by the old command or, if that fails, by the user.
  */
 
-/** How long a button says that it has copied, in milliseconds. */
+/** Milliseconds for which a button confirms that it has copied. */
 const SAYS = 2000;
 
 /** @param {Element} text */

@@ -1,4 +1,4 @@
-"""The readiness check on the page: a button for each bridge, and what it finds."""
+"""The readiness check on the page: a button for each bridge, and the findings."""
 
 import asyncio
 import itertools
@@ -26,22 +26,21 @@ SHAPES = {
     "note": ("M12 2.5a9.5 9.5 0 1 0 .01 0z", "M12 11v6M12 7v.01"),
     "good": ("", "M4 12.5l5.5 5.5L20 6.5"),
 }
-"""The outline of each level, which is filled, and what is drawn on it."""
+"""The outline of each level, filled, and the symbol drawn on it."""
 
 OLD = 3600.0
-"""Seconds after which a report counts as old."""
+"""Seconds after which a report is stale."""
 
 _numbers = itertools.count(1)
 
 
 class DoctorReports:
-    """What stands in the way of driving, for each bridge; a module of maps.
+    """What prevents driving, for each bridge; a module of maps.
 
     Args:
         map: The map.
         element: The page's element for the reports; each is a popover of it.
         bridges: The bridges.
-
     """
 
     def __init__(
@@ -56,11 +55,11 @@ class DoctorReports:
         )
         self._reports = [Report(bridge, map) for bridge in bridges]
         self.buttons = [report.opener for report in self._reports]
-        """For each bridge what opens its report, and makes the first."""
+        """For each bridge the button that opens its report and makes the first."""
         element.append(*(report.element for report in self._reports))
 
     def poll(self) -> None:
-        """Look whether there is something new."""
+        """Update the reports that have changed."""
         for report in self._reports:
             report.poll()
 
@@ -70,8 +69,7 @@ class Report:
 
     Args:
         bridge: The bridge.
-        map: The page's map, whose robots it is about.
-
+        map: The page's map; the report is about its robots.
     """
 
     def __init__(self, bridge: "Bridge", map: "Map") -> None:
@@ -122,14 +120,14 @@ class Report:
         self.poll()
 
     def poll(self) -> None:
-        """Look whether there is something new."""
+        """Update the report if it has changed."""
         checkup = self._checkup
         if self._shown == checkup.version:
             return
         self._shown = checkup.version
         self._try.poll()
         running, known = checkup.is_running, checkup.ended is not None
-        doing = checkup.doing.removesuffix(".")  # the page puts dots that go on
+        doing = checkup.doing.removesuffix(".")  # the page adds animated dots
         self._doing.text = doing if running or not known else checkup.summary
         self.element.set("aria-busy", "true" if running else None)
         self._checked.set(hidden=running or not known)
@@ -143,12 +141,12 @@ class Report:
         self._list.append(*groups(checkup.findings))
 
     def _opened(self) -> None:
-        """Make the first report; one that is there is kept until asked for anew."""
+        """Make the first report; an existing report stays until a new check."""
         if self._checkup.ended is None:
             self._start()
 
     def _start(self) -> None:
-        """Look at the robots that are shown now, by the topics that they use now."""
+        """Check the robots that are shown now, with the topics that they use now."""
         made = self._map.module_arguments()
         self._checkup.start(in_use(self._map.robots, self._bridge, made))
 
@@ -161,7 +159,7 @@ def groups(findings: Sequence["Finding"]) -> "Iterator[Element]":
 
 
 def line(finding: "Finding") -> "Element":
-    """Return one finding: a shape, a word, what is so, and what to do."""
+    """Return one finding: a shape, a word, the fact, and the advice."""
     return entry(
         finding.level, f"{WORDS[finding.level]}: ", finding.words, finding.advice
     )
@@ -178,10 +176,9 @@ def entry(level: str, word: str, words: str, advice: str = "") -> "Element":
 
     Args:
         level: ``"wrong"``, ``"warning"``, ``"note"`` or ``"good"``.
-        word: What stands out.
-        words: What is so.
-        advice: What stands below it, if anything.
-
+        word: The highlighted word.
+        words: The fact.
+        advice: The text below, if any.
     """
     outline, mark = SHAPES[level]
     shape = svg.svg(
@@ -200,7 +197,7 @@ def entry(level: str, word: str, words: str, advice: str = "") -> "Element":
 log = logging.getLogger("webmap.console")
 
 SECONDS = 3.0
-"""How long topics are listened to."""
+"""Seconds for which the check listens to topics."""
 
 PLURAL = {"wrong": "wrong", "warning": "warnings", "note": "notes", "good": "good"}
 
@@ -208,16 +205,15 @@ Observe = Callable[..., Awaitable[Observed]]
 
 
 class Checkup:
-    """The readiness check of one bridge, and what it found last.
+    """The readiness check of one bridge, and its last findings.
 
-    However many viewers ask, there is one at a time, with one socket for listening;
-    the bridge's own links are not touched.
+    One check runs at a time for all pages, with one socket for listening; the bridge's
+    own connections are not used.
 
     Args:
         url: The bridge's address.
-        observe: Looks at a bridge.
-        tried: Takes what was seen, tries a call that hangs, and adds what that tells.
-
+        observe: Observes a bridge.
+        tried: Takes the observation, tries a call that hangs, and adds the result.
     """
 
     def __init__(
@@ -225,13 +221,13 @@ class Checkup:
     ) -> None:
         self.url = url
         self.version = 0
-        """A number that grows whenever there is something new to show."""
+        """Increases with every change."""
         self.doing = ""
-        """What is being done, in a sentence; empty if nothing is."""
+        """The current step, as a sentence; empty if no check runs."""
         self.findings: Sequence[Finding] = ()
-        """What was found last: the bridge first, then each robot, worst first."""
+        """The last findings: the bridge first, then each robot, worst first."""
         self.ended: float | None = None
-        """When topics were listened to last, on the monotonic clock; None if never."""
+        """Last time of listening to topics, on the monotonic clock; None if never."""
         self._observe = observe
         self._tried = tried
         self._seen: Observed | None = None
@@ -239,18 +235,18 @@ class Checkup:
 
     @property
     def is_running(self) -> bool:
-        """Whether somebody's check is under way."""
+        """Whether a check is running, from any page."""
         return self._task is not None and not self._task.done()
 
     @property
     def can_try(self) -> bool:
-        """Whether a call that hangs can be tried: the bridge was there at the check."""
+        """Whether a hanging call can be tried: the check reached the bridge."""
         seen = self._seen
         return seen is not None and not seen.trouble and not self.is_running
 
     @property
     def summary(self) -> str:
-        """How many findings of each level there are, in words."""
+        """The number of findings of each level, as text."""
         numbers = {level: 0 for level in PLURAL}
         for finding in self.findings:
             numbers[finding.level] += 1
@@ -268,20 +264,19 @@ class Checkup:
         return report_text(self.url, self.findings)
 
     def start(self, robots: Sequence[MeantRobot] = ()) -> None:
-        """Look at the bridge, unless somebody has that done already.
+        """Check the bridge, unless a check is running already.
 
         Args:
-            robots: The robots that the page has of it, with the topics in use; those
-                that are found are looked at if there are none.
-
+            robots: The page's robots on this bridge, with the topics in use; if empty,
+                the discovered robots are checked.
         """
         if not self.is_running:
             self._begin(self._look(robots))
 
     def try_call(self) -> None:
-        """Try what a call that hangs holds up; the rest of the report stays.
+        """Test what a hanging call blocks; the rest of the report stays.
 
-        Nothing is tried while something is done, or if the bridge was away.
+        Does nothing while a check runs, or if the bridge was unreachable.
         """
         if self._seen is not None and self.can_try:
             self._begin(self._try(self._seen))
@@ -323,7 +318,7 @@ _checkups: "weakref.WeakKeyDictionary[Bridge, Checkup]" = weakref.WeakKeyDiction
 
 
 def checkup_of(bridge: "Bridge") -> Checkup:
-    """Return the check of a bridge, which all viewers share."""
+    """Return the check of a bridge, shared by all pages."""
     found = _checkups.get(bridge)
     if found is None:
         found = _checkups[bridge] = Checkup(bridge.url)
@@ -331,7 +326,7 @@ def checkup_of(bridge: "Bridge") -> Checkup:
 
 
 MAY_TRY = ("operator", "admin")
-"""Roles of viewers who may try a call."""
+"""Roles that may try a call."""
 
 TRY_WORDS = (
     "Does one slow service call delay later calls on the same connection? To test "
@@ -344,12 +339,11 @@ TRY_WORDS = (
 
 
 class TryCall:
-    """A button and the question that it asks, on one page.
+    """A button and its confirmation question, on one page.
 
     Args:
-        checkup: What tries it, and has the report.
-        role: What the viewer may do.
-
+        checkup: The check that tries the call, and has the report.
+        role: The role of the page's user.
     """
 
     def __init__(self, checkup: "Checkup", role: str) -> None:
@@ -375,7 +369,7 @@ class TryCall:
         self.poll()
 
     def poll(self) -> None:
-        """Look whether it can be tried now."""
+        """Update whether the call can be tried now."""
         for button in (self.button, self._yes):
             button.set(disabled=not self._checkup.can_try)
 
@@ -384,6 +378,6 @@ class TryCall:
 
     def _agreed(self) -> None:
         self._ask(False)
-        # Whoever may only look has no say, whatever their page sends.
+        # Viewers cannot answer, whatever their page sends.
         if self._may:
             self._checkup.try_call()

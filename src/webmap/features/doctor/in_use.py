@@ -1,4 +1,4 @@
-"""Which topics of a bridge the robots of a page use, for the check of that bridge."""
+"""The topics of a bridge that a page's robots use, for the check of that bridge."""
 
 import inspect
 from collections.abc import Iterable, Mapping
@@ -17,7 +17,7 @@ DRAWN: Mapping[str, Role] = {
     "Path": "plan",
     "PointCloud": "cloud",
 }
-"""What a topic is to a robot that one of these modules reads."""
+"""The role of a topic for a robot, by the module that reads it."""
 
 GRIDS: tuple[Role, ...] = ("map", "costmap")
 
@@ -30,13 +30,12 @@ Topics: TypeAlias = dict[Role, tuple[tuple[str, str], ...]]
 def in_use(
     robots: "Iterable[Robot]", bridge: "Bridge", maps: Iterable[Made] = ()
 ) -> list[MeantRobot]:
-    """Return the robots that use a bridge, with the topics that they use of it.
+    """Return the robots that use a bridge, with the topics that they use on it.
 
     Args:
         robots: The robots that are shown.
         bridge: The bridge.
-        maps: The modules of the map that they are shown on.
-
+        maps: The modules of the map that shows the robots.
     """
     grids = list(maps)
     found = (_in_use(robot, bridge, grids) for robot in robots)
@@ -68,18 +67,18 @@ def _in_use(
         topics["tf"] = ((f"{frames['namespace']}/tf", ""),)
         base, start = frames["base_frame"], frames["map_frame"]
     elif feed is None:
-        # Whatever frames are told of, it is not drawn by them.
+        # The robot is not drawn by frames, whichever frames the bridge has.
         topics["tf"] = ()
         if frames is not None:
             elsewhere.add("odometry")
     topics |= _drawn(robot, bridge, maps)
     if not any(topics[role] for role in topics if role not in GRIDS):
-        return None  # it has at most a map there that it shares with others
+        return None  # the robot has at most a shared map there
     return MeantRobot(robot.name, topics, base, start, frozenset(elsewhere))
 
 
 def _drawn(robot: "Robot", bridge: "Bridge", maps: Iterable[Made]) -> Topics:
-    """Return what is drawn of a robot, and the maps that it is shown on."""
+    """Return the topics drawn for a robot, including the maps that show it."""
     roles: tuple[Role, ...] = (*DRAWN.values(), *GRIDS)
     topics: Topics = dict.fromkeys(roles, ())
     grids = list(maps)
@@ -109,7 +108,7 @@ def _grid(
     args: tuple[Any, ...],
     options: dict[str, Any],
 ) -> tuple[Role, str]:
-    """Return a grid's role and topic; no topic if it is none that the robot is on."""
+    """Return a grid's role and topic; no topic if the robot is not on the grid."""
     said = {**dict(zip(("bridge", "topic"), args, strict=False)), **options}
     role: Role = "costmap" if said.get("palette") == "costmap" else "map"
     mine = said.get("bridge") is bridge and said.get("robot") in (None, robot)

@@ -15,14 +15,14 @@ import { Panel, Requests, StickPad } from "./teleop_panel.js";
 /** @typedef {{holonomic?: boolean | null, stopPlace?: string}} Options */
 
 /**
- * Drive the selected robot with keys, an on-screen stick or a gamepad, and show how that
- * stands.
+ * Drive the selected robot with keys, an on-screen stick or a gamepad, and show the
+ * state.
  *
- * Options: `holonomic`, whether Q and E, and the sticks, move the base sideways; null if
- * each robot's element says so (`data-holonomic`). `stopPlace`, a selector of the page's
- * own element for the robot's STOP; without it STOP is a part of the panel. Speeds are not
- * known here: the gate scales. Sends `{active}` when the page's keys start or stop to
- * belong to this map.
+ * Options: `holonomic`, whether Q and E, and the sticks, move the robot sideways; null
+ * if each robot's element decides (`data-holonomic`). `stopPlace`, a selector of the
+ * page's own element for the robot's STOP; without it STOP is a part of the panel.
+ * Speeds are not known here: the gate scales. Sends `{active}` when this map starts or
+ * stops to receive the page's keys.
  *
  * @param {MapCanvas} map
  * @param {Options} options
@@ -34,7 +34,7 @@ export default function attach(map, options, send) {
   return { destroy: () => teleop.destroy() };
 }
 
-/** The selected robot, if its base can move sideways. */
+/** The selected robot, if it can move sideways. */
 const SELECTED_HOLONOMIC = ".robot.selected[data-holonomic]";
 
 class Teleop {
@@ -90,12 +90,12 @@ class Teleop {
       ...takes,
       this._desk.sit(this._seat),
       map.onSelect(() => this._select()),
-      // Who says STOP between the two presses of a button takes the first one back.
+      // STOP between the two presses of a button cancels the first press.
       this._drive.on("stop", () => this._panel.forget()),
       this._drive.on("step", show),
       this._drive.on("step", () => this._halos.show()),
       this._drive.on("state", show),
-      // What there is to say of the others can wait for the next step.
+      // Updates for all other robots can wait for the next step.
       this._drive.on("robot", ({ robot }) => robot === map.selected && show()),
     ];
     this._show();
@@ -172,7 +172,7 @@ class Teleop {
     const asking = request?.by === status.connection;
     this._panel.showButtons(report, asking, useful ? this._stick.wanted : null);
     const moving = robot === null ? null : this._drive.motionDelay(robot);
-    // What was heard before the connection was lost says nothing of now.
+    // Reports from before the connection was lost do not describe the present.
     const heard = status.link === "lost" ? null : report;
     this._panel.showFigures(heard, status.delay, moving);
   }
@@ -180,15 +180,15 @@ class Teleop {
 
 /**
  * @param {import('../../web/motion/report.js').RobotReport} report
- * @returns {boolean} Whether a stick could drive the robot, without asking a person.
+ * @returns {boolean} Whether a stick could drive the robot without a request to another
+ *     operator.
  */
 function ofUse(report) {
   return mayReach(report) || (report.mine && !isLatched(report));
 }
 
 /**
- * Circles around the robots that are driven: as far as each of them can get, at the speed
- * of now, before it stands.
+ * Circles around the driven robots: the stopping distance of each at its present speed.
  */
 export class Halos {
   /** @param {MapCanvas} map */
@@ -201,7 +201,7 @@ export class Halos {
     this._frame = 0;
   }
 
-  /** Look again which robots move, and how fast; without a connection nobody knows. */
+  /** Update which robots move, and how fast; unknown without a connection. */
   show() {
     if (this._drive.state === "lost") {
       this._removeAll();
@@ -232,7 +232,7 @@ export class Halos {
     const known = this._circles.get(robot);
     if (known?.isConnected) return known;
     const circle = svg("circle", { class: "stopping-halo", "data-halo-of": robot });
-    // Behind the robots, so that it hides none and is in nobody's way.
+    // Below the robots, so that a circle hides no robot and blocks no press.
     const robots = this._map.world.querySelector(":scope > .robots");
     this._map.world.insertBefore(circle, robots);
     this._circles.set(robot, circle);
@@ -245,7 +245,7 @@ export class Halos {
     this._circles.delete(robot);
   }
 
-  /** Keep every circle with its robot, for as long as there are any. */
+  /** Move each circle with its robot, as long as there are circles. */
   _follow() {
     for (const [robot, circle] of this._circles) {
       const place = placeOf(this._map, robot);
@@ -261,13 +261,14 @@ export class Halos {
 /**
  * @param {MapCanvas} map
  * @param {string} robot
- * @returns {{x: number, y: number} | null} Metres; null where the map does not show it.
+ * @returns {{x: number, y: number} | null} Metres; null if the map does not show the
+ *     robot.
  */
 function placeOf(map, robot) {
   const element = map.world.querySelector(`.robot[data-robot="${CSS.escape(robot)}"]`);
   if (!(element instanceof SVGGraphicsElement)) return null;
   if (element.classList.contains("unplaced")) return null;
-  // Read without consolidating: the scene keeps hold of the items of the list.
+  // Read without consolidate(), because the scene keeps references to the list's items.
   const list = element.transform.baseVal;
   if (list.numberOfItems === 0) return null;
   let matrix = list.getItem(0).matrix;
@@ -278,13 +279,13 @@ function placeOf(map, robot) {
 }
 
 /**
- * Say without keys what can be said without them, where fingers drive by the stick:
- * a phone has no Space.
+ * Remove the keys from a description where fingers drive by the stick: a phone has no
+ * Space.
  *
  * @param {Description} description
  * @param {{touch: boolean, stick: boolean}} what Whether fingers are the pointer, and
- *     whether the stick is there.
- * @param {string} inputs What there is to drive with.
+ *     whether the stick is shown.
+ * @param {string} inputs The available inputs.
  * @returns {Description}
  */
 export function withoutKeys(description, { touch, stick }, inputs) {

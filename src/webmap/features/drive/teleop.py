@@ -1,4 +1,4 @@
-"""The keys drive the selected robot."""
+"""Keys, gamepads and the on-screen stick drive the selected robot."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -11,24 +11,22 @@ if TYPE_CHECKING:
 
 @map_modules.register
 class Teleop:
-    """W, A, S and D, or the arrows, drive the selected robot of this map.
+    """W, A, S and D, or the arrow keys, drive the selected robot of this map.
 
-    The browser sends how the hands are, twenty times a second; the gate decides what
-    becomes of it. A key that is let go, a page that is hidden and a link that is lost
-    all stop the robot.
+    The browser sends the state of its inputs 20 times a second; the gate decides the
+    velocity. A released key, a hidden page and a lost connection each stop the robot.
 
     Args:
         map: The map.
-        speed: Metres per second at most, forward and back.
-        rotation_speed: Radians per second at most.
-        holonomic: Whether Q and E move sideways, for bases that can; None if for
-            those of which :meth:`Robot.set_twist_topic` says so.
-        stop_place: A CSS selector of the page's element that the STOP button of the
-            selected robot goes into; in the panel over the map if not given.
+        speed: Greatest speed in m/s, forward and backward.
+        rotation_speed: Greatest rotation speed in rad/s.
+        holonomic: Whether Q and E move the robot sideways; None to use the setting of
+            :meth:`Robot.set_twist_topic` of each robot.
+        stop_place: A CSS selector of the page's element for the STOP button of the
+            selected robot; by default STOP is in the panel over the map.
 
     Raises:
         ValueError: If a speed is not a number above 0.
-
     """
 
     def __init__(
@@ -55,9 +53,9 @@ class Teleop:
         )
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Note whether the page's keys belong to this map now."""
+        """Record whether this map receives the page's keys now."""
         self.map.page.set_driving(self, message.get("active") is True)
 
     def destroy(self) -> None:
-        """Drive no more from this map."""
+        """Stop driving from this map."""
         self.map.page.clear_speeds(self)

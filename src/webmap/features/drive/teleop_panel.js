@@ -8,12 +8,12 @@ import { button, html, say, stopButton, TwiceButton } from "../../web/tools/elem
 /** @typedef {import('../../web/motion/asking.js').Request} Request */
 /** @typedef {import('../../web/motion/report.js').RobotReport} RobotReport */
 
-/** From this loop age on it is said aloud, in ms. */
+/** Round trip from which the panel shows a warning, in ms. */
 const SLOW = 150;
 
 const ASK = "Request control";
 
-/** The words, the shape and the buttons in the corner of the map. */
+/** The text, the shape and the buttons in the corner of the map. */
 export class Panel {
   /**
    * @param {Record<'stop' | 'lease' | 'stick' | 'test', () => void> &
@@ -29,7 +29,7 @@ export class Panel {
     this._figures = html("dl", "webmap-teleop-figures");
     /** @type {Map<string, HTMLElement>} */
     this._values = new Map();
-    /** In this panel, unless the page has a place of its own for it. */
+    /** In this panel, unless the page has its own place for STOP. */
     this.stop = stopButton("webmap-teleop-stop", "STOP", acts.stop);
     this._lease = button("webmap-teleop-lease", "Take control", acts.lease);
     this._reset = new TwiceButton(
@@ -119,7 +119,7 @@ export class Panel {
     return figure;
   }
 
-  /** Forget the first presses of what takes two. */
+  /** Forget the first presses of buttons that require two. */
   forget() {
     this._reset.forget();
     this._tester.forget();
@@ -127,8 +127,9 @@ export class Panel {
 
   /**
    * @param {RobotReport | null} report
-   * @param {boolean} asking Whether this page has asked for the robot.
-   * @param {boolean | null} stick Whether the stick is wanted; null when it is no use.
+   * @param {boolean} asking Whether this page has requested control of the robot.
+   * @param {boolean | null} stick Whether the stick is switched on; null where it is
+   *     useless.
    */
   showButtons(report, asking, stick) {
     const name = report?.name ?? "";
@@ -137,7 +138,7 @@ export class Panel {
     this._lease.hidden = act === null;
     if (act !== null) {
       say(this._lease, act);
-      // It begins with the words on the button, for people who speak to their computer.
+      // Begins with the button's text, for people who use speech control.
       set(this._lease, "aria-label", `${act} of ${name}`);
     }
     const stops = report === null ? [] : [stopKey(report)];
@@ -148,17 +149,17 @@ export class Panel {
     this._stick.hidden = stick === null;
     set(this._stick, "aria-pressed", String(stick === true));
     set(this.stop, "aria-label", name ? `STOP ${name}` : "STOP the selected robot");
-    // Off only when there is nothing to stop, never because of doubt.
+    // Disabled only when there is nothing to stop, never because the state is unknown.
     set(this.stop, "data-robot", name);
     this.stop.disabled = report === null;
   }
 }
 
 /**
- * Return what the operator can do about a robot's lease.
+ * Return the operator's possible action on control of a robot.
  *
  * @param {RobotReport | null} report
- * @param {boolean} asking Whether this page has asked for it.
+ * @param {boolean} asking Whether this page has requested control.
  * @returns {string | null}
  */
 function actOf(report, asking) {
@@ -171,8 +172,8 @@ function actOf(report, asking) {
 
 /**
  * @param {RobotReport} report
- * @returns {boolean} Whether this page may find out that the robot stops by itself: also
- *     of one of which that is stated, or that was tested before.
+ * @returns {boolean} Whether this page may run the stop test: also for a robot whose
+ *     command timeout is stated or was tested before.
  */
 function mayTest(report) {
   return report.mine && !isTested(report);
@@ -193,14 +194,13 @@ function set(element, name, value) {
 }
 
 /**
- * The on-screen stick: there from the start where fingers are the pointer, and wherever
- * it is asked for.
+ * The on-screen stick: shown from the start on touch devices, and on request elsewhere.
  */
 export class StickPad {
   /** @param {Drive} drive */
   constructor(drive) {
     this._sideways = false;
-    /** Whether the operator wants it. */
+    /** Whether the operator has switched the stick on. */
     this.wanted = matchMedia("(pointer: coarse)").matches;
     const knob = html("div", "webmap-stick-knob");
     this._pad = html(
@@ -222,22 +222,22 @@ export class StickPad {
     this.show(false, false);
   }
 
-  /** Whether the base that it drives moves sideways, too. */
+  /** Whether the driven robot can move sideways. */
   set holonomic(/** @type {boolean} */ holonomic) {
     if (this._mode.hidden !== holonomic) return;
-    // What is held would mean something else from one moment to the next.
+    // The same stick position would suddenly mean another velocity.
     this._stick.release();
     this._mode.hidden = !holonomic;
   }
 
-  /** Let go. */
+  /** Release the stick. */
   release() {
     this._stick.release();
   }
 
   /**
-   * @param {boolean} useful Whether there is a robot that it could drive.
-   * @param {boolean} dead Whether what is held now does nothing.
+   * @param {boolean} useful Whether there is a robot that the stick could drive.
+   * @param {boolean} dead Whether the input has no effect.
    */
   show(useful, dead) {
     const visible = useful && this.wanted;
@@ -251,7 +251,7 @@ export class StickPad {
   }
 }
 
-/** Who asks the operator for robots, each with the two answers there are. */
+/** Requests of others for control of robots, each with its two answers. */
 export class Requests {
   /** @param {Drive} drive */
   constructor(drive) {
@@ -307,7 +307,7 @@ export class Requests {
 
 /**
  * @param {string} label
- * @param {string} name The accessible name; it begins with the label.
+ * @param {string} name The accessible name; begins with the label.
  * @param {() => void} act
  */
 function answer(label, name, act) {

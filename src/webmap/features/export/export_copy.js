@@ -1,15 +1,15 @@
 import { SVG_TAGS } from "../../web/opcodes.js";
 import { svg } from "../../web/tools/elements.js";
 
-/** What a drawing may hold: nothing that runs, and no markup of another kind. */
+/** Elements that a drawing may contain: no scripts, and no other markup. */
 const TAGS = new Set(SVG_TAGS);
 
-/** What is drawn only where something refers to it. */
+/** Elements that are drawn only where another element refers to them. */
 const REFERRED = new Set(
   "clipPath defs linearGradient marker mask pattern radialGradient stop symbol".split(" "),
 );
 
-/** What an element says of itself; how it looks comes from its style. */
+/** Attributes of an element's own; its appearance comes from its style. */
 const ATTRIBUTES = new Set(
   (
     "clipPathUnits cx cy d dx dy fx fy gradientTransform gradientUnits height id " +
@@ -20,14 +20,16 @@ const ATTRIBUTES = new Set(
   ).split(" "),
 );
 
-/** Copies what is drawn into a document that needs nothing else. */
+/** Copies the visible map into a self-contained document. */
 export class Copier {
-  /** @param {DOMRect} frame What is seen, in pixels of the window. */
+  /** @param {DOMRect} frame The visible area, in pixels of the window. */
   constructor(frame) {
     this._frame = frame;
-    /** @type {{copy: SVGElement, address: string}[]} Pictures that are still to come. */
+    /**
+     * @type {{copy: SVGElement, address: string}[]} Pictures that are not loaded yet.
+     */
     this.pictures = [];
-    /** @type {Map<string, Element>} What is referred to and lies elsewhere. */
+    /** @type {Map<string, Element>} Elements that are referred to and are elsewhere. */
     this.referred = new Map();
   }
 
@@ -35,7 +37,7 @@ export class Copier {
    * @param {Element} original
    * @param {Inherited} above
    * @param {boolean} [unseen] Whether it is only referred to.
-   * @returns {SVGElement | null} null if there is nothing to see.
+   * @returns {SVGElement | null} null if nothing is visible.
    */
   copy(original, above, unseen = false) {
     const tag = original.localName;
@@ -48,7 +50,8 @@ export class Copier {
       if (ATTRIBUTES.has(name)) copy.setAttribute(name, value);
     }
     const here = writeStyle(copy, style, above);
-    // What is referred to has no place, and so no transform of its own in pixels.
+    // An element that is only referred to has no position, and so no transform in
+    // pixels.
     if (!hidden) writeTransform(copy, style, original);
     if (!this._reference(original, copy, hidden)) return null;
     for (const child of original.childNodes) {
@@ -68,7 +71,7 @@ export class Copier {
    * @param {Element} original
    * @param {SVGElement} copy
    * @param {boolean} hidden
-   * @returns {boolean} Whether it is worth to be kept.
+   * @returns {boolean} Whether to keep the copy.
    */
   _reference(original, copy, hidden) {
     const address = original.getAttribute("href") ?? original.getAttribute("xlink:href");
@@ -92,10 +95,10 @@ export class Copier {
 }
 
 /**
- * Put pictures into a drawing as data.
+ * Embed pictures into a drawing as data.
  *
  * @param {{copy: SVGElement, address: string}[]} pictures
- * @returns {Promise<string[]>} The addresses of those that could not be had.
+ * @returns {Promise<string[]>} The addresses of pictures that could not be loaded.
  */
 export async function embed(pictures) {
   /** @type {Map<string, Promise<string>>} */
@@ -134,11 +137,11 @@ async function dataOf(address) {
 }
 
 /**
- * What style sheets say, written onto the elements themselves, so that a drawing looks
- * the same without them.
+ * Styles of style sheets, written onto the elements, so that a drawing looks the same
+ * without style sheets.
  */
 
-/** What children take from their parents. */
+/** Properties that children inherit from their parents. */
 const INHERITED = (
   "clip-rule color fill fill-opacity fill-rule font-family font-size font-style " +
   "font-variant font-weight image-rendering letter-spacing marker-end marker-mid " +
@@ -147,7 +150,10 @@ const INHERITED = (
   "text-anchor text-rendering visibility"
 ).split(" ");
 
-/** @type {[string, string][]} What each element has for itself, with its first value. */
+/**
+ * @type {[string, string][]} Properties that each element has for itself, with their
+ *     initial values.
+ */
 const OWN = [
   ["clip-path", "none"],
   ["dominant-baseline", "auto"],
@@ -157,13 +163,13 @@ const OWN = [
   ["vector-effect", "none"],
 ];
 
-/** @type {[string, string][]} What stops of gradients have besides. */
+/** @type {[string, string][]} Additional properties of gradient stops. */
 const STOPS = [
   ["stop-color", "rgb(0, 0, 0)"],
   ["stop-opacity", "1"],
 ];
 
-/** @type {Record<string, string[]>} What a style sheet may say of a shape. */
+/** @type {Record<string, string[]>} Geometry of shapes that a style sheet may set. */
 const GEOMETRY = {
   circle: ["cx", "cy", "r"],
   ellipse: ["cx", "cy", "rx", "ry"],
@@ -176,8 +182,8 @@ const GEOMETRY = {
 /**
  * @param {SVGElement} copy
  * @param {CSSStyleDeclaration} style Of the original.
- * @param {Inherited} above What the copy's parent has.
- * @returns {Inherited} What the copy has.
+ * @param {Inherited} above The styles of the copy's parent.
+ * @returns {Inherited} The styles of the copy.
  */
 function writeStyle(copy, style, above) {
   /** @type {Inherited} */
@@ -205,7 +211,7 @@ function writeStyle(copy, style, above) {
 
 /**
  * @param {SVGElement} copy
- * @param {CSSStyleDeclaration} style Of the original, as it is drawn.
+ * @param {CSSStyleDeclaration} style Of the original, as drawn.
  * @param {SVGElement} original
  */
 function writeTransform(copy, style, original) {
@@ -227,17 +233,15 @@ function writeTransform(copy, style, original) {
   copy.setAttribute("transform", `matrix(${numbers.join(" ")})`);
 }
 
-/**
- * Texts that take the same room where the fonts of this machine are not there.
- */
+/** Texts that keep their size where this machine's fonts are missing. */
 
-/** The names for a kind of font that every program knows, not only a browser. */
+/** Generic font families that every program knows, not only browsers. */
 const KINDS = new Set(["serif", "sans-serif", "monospace", "cursive", "fantasy"]);
 
 /**
- * @param {string} families As a style sheet says it, `system-ui`.
- * @returns {string} The same, and at its end a kind of font that every program has. What
- *     stands there already stays in its order, so that this machine draws as before.
+ * @param {string} families As in a style sheet, such as `system-ui`.
+ * @returns {string} The same list with a generic family at its end. The existing order
+ *     stays, so that this machine draws as before.
  */
 export function standingAlone(families) {
   const named = families.split(",").map((each) => each.trim().toLowerCase());
@@ -247,10 +251,10 @@ export function standingAlone(families) {
 }
 
 /**
- * Keep a text as long as it is drawn here, whatever the font.
+ * Keep the drawn length of a text with any font.
  *
  * @param {SVGElement} copy
- * @param {number} length In the units of the text; nothing is kept of 0.
+ * @param {number} length In the units of the text; 0 has no effect.
  */
 export function keepLength(copy, length) {
   if (!(length > 0) || copy.hasAttribute("textLength")) return;

@@ -8,10 +8,10 @@ import { joinSaveMenu, offer } from "../../web/tools/save_menu.js";
 /** @typedef {import('../../web/tools/save_menu.js').Where} Where */
 
 /**
- * Save what is seen of the map, as SVG or as PNG.
+ * Save the visible map, as SVG or as PNG.
  *
  * Options: `place`, a selector of the page's own element for the button, and `classes`
- * that the button gets there; without a place it lies over the map.
+ * of the button there; without `place` the button is over the map.
  *
  * @param {MapCanvas} map
  * @param {Where} options
@@ -68,19 +68,19 @@ class ExportTool {
   }
 }
 
-/** Panels that belong to the picture, beside what lies on the map itself. */
+/** Panels that are part of the picture, in addition to the map's content. */
 const PANELS = ".webmap-scale-bar, .webmap-attribution";
 
-/** Pixels of a PNG, at the most; browsers refuse canvases that are much larger. */
+/** Greatest number of pixels of a PNG; browsers refuse much larger canvases. */
 const MOST_PIXELS = 32e6;
 
 /**
- * Draw what is seen of a map as a document that needs nothing else: no style sheet, no
- * script, no other file.
+ * Draw the visible map as a self-contained document: no style sheet, no script, no
+ * other file.
  *
  * @param {MapCanvas} map
  * @returns {Promise<{text: string, width: number, height: number, missing: string[]}>}
- *     The document, its size in pixels, and the pictures that could not be had.
+ *     The document, its size in pixels, and the pictures that could not be loaded.
  */
 async function viewAsSvg(map) {
   const frame = map.svg.getBoundingClientRect();
@@ -112,7 +112,7 @@ async function viewAsSvg(map) {
   const overlay = overlayOf(map);
   for (const child of overlay?.children ?? []) {
     if (child.classList.contains("webmap-frame")) continue;
-    // Its children have a display of their own, and would be drawn.
+    // Its children have their own display value, and would be drawn.
     if (getComputedStyle(child).display === "none") continue;
     if (child instanceof SVGSVGElement) {
       for (const part of child.children) add(part);
@@ -127,7 +127,7 @@ async function viewAsSvg(map) {
     if (drawn) inner.append(drawn);
   }
   addReferred(root, copier);
-  // In a document that is on no page nothing is loaded, and no policy of it asked.
+  // A document outside all pages loads nothing and checks no content policy.
   document.implementation.createDocument(root.namespaceURI, null).adoptNode(root);
   const missing = await embed(copier.pictures);
   const text = new XMLSerializer().serializeToString(root);
@@ -136,8 +136,8 @@ async function viewAsSvg(map) {
 
 /**
  * @param {{text: string, width: number, height: number}} view
- * @param {number} scale Pixels of the picture for one of the screen.
- * @returns {Promise<Blob>} The same as a PNG.
+ * @param {number} scale Pixels of the picture for one pixel of the screen.
+ * @returns {Promise<Blob>} The view as a PNG.
  */
 async function asPng({ text, width, height }, scale) {
   const address = URL.createObjectURL(new Blob([text], { type: "image/svg+xml" }));
@@ -166,7 +166,7 @@ async function asPng({ text, width, height }, scale) {
 /**
  * @param {Date} now
  * @param {string} ending
- * @returns {string} A name that sorts by time and that every system takes.
+ * @returns {string} A name that sorts by time and is valid on every system.
  */
 function fileName(now, ending) {
   const two = (/** @type {number} */ n) => String(n).padStart(2, "0");
@@ -177,7 +177,7 @@ function fileName(now, ending) {
 
 /**
  * @param {Element} element
- * @returns {string} The colour that lies behind it.
+ * @returns {string} The colour of its background.
  */
 function groundOf(element) {
   /** @type {Element | null} */
@@ -200,7 +200,7 @@ function addReferred(root, copier) {
   const defs = svg("defs", {});
   /** @type {Set<string>} */
   const done = new Set();
-  // What is referred to may refer to more.
+  // A referenced element may refer to more elements.
   for (const [address, target] of copier.referred) {
     if (done.has(address) || root.querySelector(CSS.escape(address).replace("\\#", "#"))) {
       continue;
@@ -213,12 +213,12 @@ function addReferred(root, copier) {
 }
 
 /**
- * Draw a panel of HTML with what is in it: its ground, its texts and its drawings.
+ * Draw a panel of HTML with its background, its texts and its drawings.
  *
  * @param {HTMLElement} panel
- * @param {DOMRect} frame What is seen, in pixels of the window.
+ * @param {DOMRect} frame The visible area, in pixels of the window.
  * @param {(drawing: SVGSVGElement) => SVGElement | null} copy
- * @returns {SVGElement | null} null if nothing of it is seen.
+ * @returns {SVGElement | null} null if nothing of the panel is visible.
  */
 function drawPanel(panel, frame, copy) {
   const style = getComputedStyle(panel);
@@ -256,7 +256,7 @@ function drawPanel(panel, frame, copy) {
  * @param {Text} text
  * @param {CSSStyleDeclaration} style
  * @param {DOMRect} frame
- * @returns {SVGTextElement[]} One for each line in which it was laid out.
+ * @returns {SVGTextElement[]} One element for each line of the layout.
  */
 function lines(text, style, frame) {
   /** @type {{words: string, box: DOMRect, right: number}[]} */
@@ -277,7 +277,7 @@ function lines(text, style, frame) {
     const { x, y } = place(box, frame);
     const line = svg("text", {
       x,
-      // Where most fonts have their base line, in the box of a line.
+      // The base line of most fonts, in the box of a line.
       y: `${Number(y) + box.height / 2 + 0.35 * size}`,
       fill: style.color,
       "font-family": standingAlone(style.fontFamily),

@@ -1,4 +1,4 @@
-"""What a viewer sees of a map, saved as a picture."""
+"""Saves the visible map as a picture."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -12,17 +12,16 @@ MAX_WORDS = 200
 
 @map_modules.register
 class ExportTool:
-    """Saves what is seen of the map as SVG or PNG, on the viewer's own machine.
+    """Saves the visible map as SVG or PNG on the operator's or viewer's own machine.
 
-    The file has all that it needs in it: styles are written onto the elements, images
-    are embedded, and there is nothing that runs.
+    The file is self-contained: styles are written onto the elements, images are
+    embedded, and there are no scripts.
 
     Args:
         map: The map.
-        place: A CSS selector of the page's element that the button goes into; over the
-            map if not given.
-        classes: What the button is styled by there.
-
+        place: A CSS selector of the page's element for the button; by default the
+            button is over the map.
+        classes: CSS classes of the button in that element.
     """
 
     def __init__(self, map: "Map", *, place: str = "", classes: str = "") -> None:
@@ -35,7 +34,7 @@ class ExportTool:
         )
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Say what the page could not save."""
+        """Report what the page could not save."""
         failed, missing = message.get("failed"), message.get("missing")
         if isinstance(failed, str):
             self.map.report_error(f"the view was not saved: {failed[:MAX_WORDS]}")

@@ -7,10 +7,10 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
 /** @typedef {import('../../web/motion/report.js').GoalWord} GoalWord */
 
-/** Points along x, 44 pixels long, with a ring around the place itself. */
+/** Points along x, 44 pixels long, with a ring around the goal's position. */
 const ARROW = "M7 0H34M0 7a7 7 0 1 1 .01 0M44 0 30-8v16z";
 
-/** What stands in the ring besides a colour, by the shape of the goal's look. */
+/** The sign in the ring in addition to the colour, by the shape of the goal's state. */
 /** @type {Readonly<Record<string, string>>} */
 const SIGNS = {
   sent: "",
@@ -32,13 +32,12 @@ const SIGNS = {
  * @property {Pose} pose
  */
 
-/**
- * Goals over a map: an arrow where each robot goes, and in words how it stands with it.
- */
+/** Goals over a map: an arrow at each robot's goal, and the state as text. */
 export class GoalMarks {
   /**
    * @param {MapCanvas} map
-   * @param {(robot: string) => void} onEnd The button at a goal was pressed.
+   * @param {(robot: string) => void} onEnd Called when the button at a goal was
+   *     pressed.
    */
   constructor(map, onEnd) {
     this._map = map;
@@ -63,7 +62,8 @@ export class GoalMarks {
   /**
    * @param {Map<string, {pose: Pose, state?: string, goal?: GoalWord, name?: string,
    *     mine?: boolean, cancels?: boolean}>} goals By robot. `state`: aimed, asked or
-   *     sent, for what the gate does not tell of yet. `mine`: the robot is selected.
+   *     sent, for goals that the gate does not report yet. `mine`: the robot is
+   *     selected.
    */
   show(goals) {
     for (const [robot, mark] of this._marks) {
@@ -123,8 +123,8 @@ export class GoalMarks {
       sign.setAttribute("transform", `translate(${x} ${y})`);
       const inside = x >= 0 && y >= 0 && x <= width && y <= height;
       label.classList.toggle("outside", !inside);
-      // Beside the arrow and not on it: what is selected to the right, so that the words
-      // of a group do not hide each other, and inside the map.
+      // Beside the arrow, not on it: to the right for the selected robot, so that the
+      // texts of a group do not cover each other, and inside the map.
       const tip = x + 44 * Math.cos((degrees * Math.PI) / 180);
       const room = label.classList.contains("mine") && x < 0.55 * width;
       const at = room ? Math.max(x, tip) + 12 : Math.min(x, tip) - 12;
@@ -134,18 +134,20 @@ export class GoalMarks {
 }
 
 /**
- * Hides the goals that robots' own topics tell of, where the goal tool shows a goal: it is
- * the same one. What it has shown stays hidden afterwards, until the topic tells of
+ * Hides the goals of robots' own topics where the goal tool shows a goal, because both
+ * are the same goal. A hidden goal stays hidden afterwards, until the topic sends
  * another.
  */
 class SentElsewhere {
-  /** @param {SVGSVGElement} mapSvg The map's. */
+  /** @param {SVGSVGElement} mapSvg The map's element. */
   constructor(mapSvg) {
     this._svg = mapSvg;
     /** @type {Set<string>} */
     this._robots = new Set();
-    /** Poses that were shown, by robot.
-     * @type {Map<string, string[]>} */
+    /**
+     * Poses that were shown, by robot.
+     * @type {Map<string, string[]>}
+     */
     this._seen = new Map();
     this._sheet = new CSSStyleSheet();
     document.adoptedStyleSheets.push(this._sheet);
@@ -156,7 +158,7 @@ class SentElsewhere {
     document.adoptedStyleSheets = sheets.filter((sheet) => sheet !== this._sheet);
   }
 
-  /** @param {Set<string>} robots Those of which the goal tool shows a goal. */
+  /** @param {Set<string>} robots The robots whose goal the goal tool shows. */
   hideFor(robots) {
     const same = robots.size === this._robots.size;
     if (same && [...robots].every((robot) => this._robots.has(robot))) return;
@@ -178,8 +180,9 @@ class SentElsewhere {
 const selector = (robot) => `[data-robot=${JSON.stringify(robot)}] .posestamped.goal`;
 
 /**
- * @param {Iterable<string>} robots Of which the goal tool shows a goal now.
- * @param {Iterable<[string, string[]]>} seen What it showed before, by robot.
+ * @param {Iterable<string>} robots The robots whose goal the goal tool shows now.
+ * @param {Iterable<[string, string[]]>} seen The goals that the tool showed before, by
+ *     robot.
  * @returns {string} The style sheet.
  */
 export function hidden(robots, seen) {

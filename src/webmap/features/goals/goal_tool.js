@@ -16,13 +16,13 @@ import { lay } from "../../web/tools/overlay.js";
 /**
  * Send the selected robots to a place: press there, drag for the heading, release.
  *
- * Begins by its button, by `g`, or by a message `{active: true}`; Escape leaves. Asks
- * for the lease where it needs it. A message `{reached: id}` takes away the goal of a
- * robot. Sends `{goal: {robot, x, y, yaw}}` when the gate has accepted one,
- * `{cancel: robot}`, and `{mark: robot}` when a robot was pressed for long.
+ * The tool begins with its button, with `g`, or with a message `{active: true}`; Escape
+ * ends it. It takes control where needed. A message `{reached: id}` removes the goal of
+ * a robot. Sends `{goal: {robot, x, y, yaw}}` when the gate has accepted a goal,
+ * `{cancel: robot}`, and `{mark: robot}` after a long press on a robot.
  *
- * Options: `button` (true), whether there are buttons; `key` ("g"); `spacing` (1), how
- * far from each other several robots are sent, in metres.
+ * Options: `button` (true), whether there are buttons; `key` ("g"); `spacing` (1), the
+ * distance between several robots that are sent together, in metres.
  *
  * @param {MapCanvas} map
  * @param {Options} options
@@ -49,7 +49,7 @@ class GoalTool {
     this._drive = map.drive;
     this._send = send;
     /**
-     * Where robots are to go, until the gate tells of it.
+     * Goals of robots, until the gate reports them.
      * @type {Map<string, {pose: Pose, state: 'aimed' | 'asked' | 'sent'}>}
      */
     this._goals = new Map();
@@ -98,7 +98,7 @@ class GoalTool {
       this._drive.on("gone", (robot) => this._shown.gone(robot)),
       this._drive.on("refused", ({ robot, what, why }) => this._refused(robot, what, why)),
     ];
-    // Goals that have ended leave by themselves, and marks come with the scene.
+    // Removes the marks of ended goals, and adds marks when the scene arrives.
     this._timer = setInterval(() => this._show(), 250);
     for (const { robot, goal } of this._drive.robots.values()) this._hear(robot, goal);
     this._show();
@@ -139,7 +139,7 @@ class GoalTool {
 
   /**
    * @param {Pose} pose
-   * @returns {[string, Pose][]} Where each of the selected robots goes.
+   * @returns {[string, Pose][]} The goal of each selected robot.
    */
   _places(pose) {
     const robots = chosen(this._map);
@@ -180,7 +180,7 @@ class GoalTool {
     });
     this._show();
     for (const { robot, pose, goal } of asked) {
-      // A STOP, or another goal, that came meanwhile.
+      // A STOP, or another goal, arrived meanwhile.
       if (this._goals.get(robot) !== goal) continue;
       try {
         const accepted = await sendGoal(
@@ -256,7 +256,7 @@ class GoalTool {
   }
 
   _selected() {
-    // What is aimed was meant for the robots that were selected then.
+    // The aimed goal was for the robots that were selected before.
     this._aim.leave();
     say(this._word, "");
     this._show();
@@ -288,7 +288,7 @@ class GoalTool {
     this._draw(robots);
   }
 
-  /** @param {string[]} robots The selected ones. */
+  /** @param {string[]} robots The selected robots. */
   _draw(robots) {
     /** @type {Parameters<GoalMarks['show']>[0]} */
     const goals = new Map();
@@ -306,12 +306,12 @@ class GoalTool {
   }
 }
 
-/** For how long a finger rests on a robot until that means something, in ms. */
+/** Duration of a long press on a robot, in ms. */
 const LONG = 500;
-/** How far it may move meanwhile, in pixels. */
+/** Greatest movement of the finger during a long press, in pixels. */
 const STILL = 10;
 
-/** A long press on a robot, which is to a finger what Shift is to a mouse. */
+/** A long press on a robot: on a touch screen the same as a click with Shift. */
 class Marking {
   /**
    * @param {MapCanvas} map
@@ -332,7 +332,7 @@ class Marking {
     for (const end of ["pointerup", "pointercancel"]) {
       svg.addEventListener(end, () => this._up(), { signal });
     }
-    // A browser's own menu would take the press away from us.
+    // The browser's own menu would end the press.
     svg.addEventListener("contextmenu", (event) => this._noMenu(event), { signal });
   }
 
@@ -379,7 +379,7 @@ function robotAt({ target }) {
   return robot?.getAttribute("data-robot") ?? null;
 }
 
-/** So many robots at most stand in one line; more stand in a grid. */
+/** Greatest number of robots in one line; more robots form a grid. */
 const LONGEST_LINE = 4;
 
 /**
@@ -406,8 +406,8 @@ export function formation({ x, y, yaw }, count, spacing) {
 }
 
 /**
- * Match robots to places so that their straight ways are short all together; ways that
- * cross could be made shorter by exchanging their ends, so none do.
+ * Match robots to places so that the sum of their straight distances is small. Two
+ * crossing lines can always be shortened by exchanging their ends, so no lines cross.
  *
  * @param {Point[]} robots
  * @param {Pose[]} places As many as there are robots.

@@ -1,4 +1,4 @@
-"""The selected robots are sent to a place on the map."""
+"""Sends the selected robots to a place on the map."""
 
 import logging
 from typing import TYPE_CHECKING, Any
@@ -14,32 +14,31 @@ log = logging.getLogger("webmap.modules.goal_tool")
 
 
 SPACING = (0.3, 20.0)
-"""Metres between robots that are sent together, the least and the most."""
+"""Smallest and greatest distance between robots that are sent together, in metres."""
 
 
 @map_modules.register
 class GoalTool:
-    """A press on the map is where the selected robot goes, a drag how it stands there.
+    """A press on the map sets the selected robot's goal, a drag sets its heading.
 
-    Robots that are marked besides go there too, in a line across the heading, or in a
-    grid if they are more than four; each to the place that keeps ways short.
+    The other selected robots get goals too, in a line across the heading, or in a grid
+    if they are more than four; each robot gets the place that keeps distances short.
 
-    It begins by its button, by its key or by :meth:`aim`; nothing is sent before the
-    viewer presses on the map, and then the page sends it to the gate by itself.
+    The tool begins with its button, its key or :meth:`aim`; nothing is sent before the
+    operator presses on the map, and then the page sends the goal to the gate itself.
 
     Fires ``on_goal_sent(robot, x, y, yaw)`` on the map's modules when the gate has
     accepted a goal, and ``on_goal_canceled(robot)``.
 
     Args:
         map: The map.
-        button: Whether there is a button for it on the map.
-        key: The key that begins.
-        spacing: How far from each other several robots are sent, in metres.
+        button: Whether the map has a button for the tool.
+        key: The key that begins the tool.
+        spacing: The distance between robots that are sent together, in metres.
 
     Raises:
         ValueError: If ``key`` is not one character, or ``spacing`` is not from 0.3 to
             20 m.
-
     """
 
     def __init__(
@@ -66,15 +65,15 @@ class GoalTool:
         )
 
     def aim(self) -> None:
-        """Let the viewer's next press on the map be the goal."""
+        """Make the operator's next press on the map the goal."""
         self.half.send({"active": True})
 
     def forget(self, robot: "Robot") -> None:
-        """Take the arrow of a robot's goal away: it got there, or does not go."""
+        """Remove the arrow of a goal that was reached or is not driven to."""
         self.half.send({"reached": robot.id})
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Take what the page says that it sent."""
+        """Handle the page's messages about sent and canceled goals."""
         goal, canceled = message.get("goal"), message.get("cancel")
         if isinstance(goal, dict):
             sent = robot_and_pose(self.map, goal)

@@ -12,17 +12,18 @@ const SENT = "Pose sent.";
 
 /** @typedef {(message: object) => void} Send */
 
-/** A robot's outline with its nose along x, and the way that it looks. */
+/** A robot's outline, with an arrow along x for the heading. */
 const OUTLINE = "M-14-11H8l9 11-9 11h-22zM17 0h26M43 0l-9-6M43 0l-9 6";
 
 /**
- * Tell the selected robot where it is: press there, drag for the heading, release.
+ * Set the initial pose of the selected robot: press there, drag for the heading,
+ * release.
  *
- * Begins by its button, by `i`, or by a message `{active: true}`; Escape leaves. Sends
- * `{told: {robot, x, y, yaw}}` when the gate has taken it. Asks by `{doubt: robot}` what
- * the robot is told of how sure that is; the answer is `{doubt: {robot, x, y, yaw,
- * turn}}` with variances in m² and rad², or null, and how far the axes of the robot's own
- * map are turned on this one, in radians.
+ * The tool begins with its button, with `i`, or with a message `{active: true}`; Escape
+ * ends it. Sends `{told: {robot, x, y, yaw}}` when the gate has accepted the pose.
+ * Sends `{doubt: robot}` to request the variances of the pose; the answer is `{doubt:
+ * {robot, x, y, yaw, turn}}` with variances in m² and rad², or null, and the rotation
+ * of the robot's own map on this map, in radians.
  *
  * Options: `button` (true), whether there is a button; `key` ("i").
  *
@@ -180,19 +181,21 @@ class InitialPoseTool {
 }
 
 /**
- * How sure a pose is that a robot is told: variances of x and y in m² along the axes of
- * the robot's own map, of yaw in rad², and how far those axes are turned on this map.
+ * The variances of an initial pose: x and y in m² along the axes of the robot's own
+ * map, yaw in rad², and the rotation of those axes on this map.
  *
  * @typedef {{x: number, y: number, yaw: number, turn: number}} Variances
  */
 
-/** Standard deviations that are drawn and said, as those of a robot's own doubt are. */
+/**
+ * Number of standard deviations that are drawn and written, as for a robot's own pose.
+ */
 const DEVIATIONS = 2;
 
-/** Pixels that a wedge is long at least, so that it is seen beyond the outline. */
+/** Least length of the wedge in pixels, so that it is visible beyond the outline. */
 const WEDGE = 64;
 
-/** The ellipse and the wedge of a pose that is aimed. */
+/** The ellipse and the wedge of an aimed pose. */
 export class Doubt {
   constructor() {
     this._ellipse = svg("ellipse", { class: "webmap-locate-ellipse" });
@@ -208,14 +211,14 @@ export class Doubt {
     this._variances = variances;
   }
 
-  /** What is drawn, in words; empty while it is not known. */
+  /** The drawn standard deviations as text; empty while unknown. */
   get words() {
     if (!this._variances) return "";
     const { x, y, yaw } = this._variances;
     const [along, across] = [x, y].map((variance) => metres(deviation(variance)));
     const degrees = Math.round(Math.min(180, (deviation(yaw) * 180) / Math.PI));
     const places = along === across ? [along] : [along, across];
-    // No line ends between a number and its unit.
+    // No line break between a number and its unit.
     return [...places, `${degrees}°`].map((each) => `±\u00a0${each}`).join(", ");
   }
 
@@ -256,7 +259,7 @@ function transform({ x, y, degrees }) {
 
 /**
  * @param {number} radius In pixels.
- * @param {number} half Half its angle, in radians.
+ * @param {number} half Half the angle, in radians.
  * @returns {string} The path of a sector about x.
  */
 function sector(radius, half) {

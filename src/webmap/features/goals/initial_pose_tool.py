@@ -1,4 +1,4 @@
-"""A person tells the selected robot where it is."""
+"""Sets the initial pose of the selected robot."""
 
 import logging
 from typing import TYPE_CHECKING, Any
@@ -14,24 +14,23 @@ log = logging.getLogger("webmap.modules.initial_pose")
 
 @map_modules.register
 class InitialPoseTool:
-    """A press on the map is where the selected robot is, a drag which way it looks.
+    """A press on the map sets the selected robot's position, a drag sets its heading.
 
-    It begins by its button, by its key or by :meth:`aim`. What is aimed is drawn with
-    the ellipse and the wedge of two standard deviations that the robot will be told.
-    The page tells it to the gate, which refuses it while the robot moves, follows a
-    goal, or is somebody else's.
+    The tool begins with its button, its key or :meth:`aim`. The aimed pose is drawn
+    with the ellipse and the wedge of two standard deviations, which the robot receives
+    with the pose. The page sends the pose to the gate, which refuses it while the robot
+    moves, follows a goal, or another operator has control.
 
     Fires ``on_pose_told(robot, x, y, yaw)`` on the map's modules when the gate has
-    taken it.
+    accepted the pose.
 
     Args:
         map: The map.
-        button: Whether there is a button for it on the map.
-        key: The key that begins.
+        button: Whether the map has a button for the tool.
+        key: The key that begins the tool.
 
     Raises:
         ValueError: If ``key`` is not one character.
-
     """
 
     def __init__(self, map: "Map", *, button: bool = True, key: str = "i") -> None:
@@ -46,11 +45,11 @@ class InitialPoseTool:
         )
 
     def aim(self) -> None:
-        """Let the viewer's next press on the map say where the robot is."""
+        """Make the operator's next press on the map the robot's pose."""
         self.half.send({"active": True})
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Take what the page says that it told, or tell it how sure that will be."""
+        """Handle the page's message of a sent pose, or send the page variances."""
         if "doubt" in message:
             self._tell_doubt(message["doubt"])
         elif isinstance(message.get("told"), dict):

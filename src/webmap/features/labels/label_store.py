@@ -1,4 +1,4 @@
-"""Places with a name, and where they are kept."""
+"""Labels, and the files that store them."""
 
 import json
 import math
@@ -29,12 +29,12 @@ ICONS = {
     "star": "M12 3.500l2.6 5.6 6 .7-4.5 4.1 1.2 6-5.3-3-5.3 3 1.2-6-4.5-4.1 6-.700z",
     "warning": "M12 4L2.8 20h18.400zM12 10v4.500M12 17v.5",
 }
-"""The pictures of places, in lines on a square of 24."""
+"""The icons of labels, as lines on a square of 24 units."""
 
 MAX_LABELS = 2000
 MAX_NAME = 60
 FARTHEST = 1e6
-"""Metres from the origin."""
+"""Greatest distance from the origin, in metres."""
 
 _KEYS = ("name", "x", "y", "icon", "kind", "yaw")
 _STORE = re.compile(r"[A-Za-z0-9_-]{1,40}")
@@ -42,37 +42,36 @@ _KIND = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,39}")
 
 
 class Label(msgspec.Struct, frozen=True):
-    """A place with a name."""
+    """A named place on the map."""
 
     name: str
     x: float
-    """Metres."""
+    """In metres."""
 
     y: float
-    """Metres."""
+    """In metres."""
 
     icon: str = "pin"
     kind: str = ""
-    """A class more, to style it by."""
+    """An additional CSS class."""
 
     yaw: float | None = None
-    """How a robot stands there, in radians; None if nobody minds."""
+    """Heading of a robot at the label, in radians; None for any."""
 
     id: str = ""
     kept: bool = False
-    """Whether it was added on a page."""
+    """Whether the label was added on a page."""
 
 
 def read_labels(data: Any, of: str) -> tuple[Label, ...]:
-    """Return places from plain data: a list of tables, or a table with ``labels``.
+    """Return labels from plain data: a list of tables, or a table with ``labels``.
 
     Args:
-        data: As YAML, JSON or TOML give it.
-        of: What it is, for people.
+        data: Data as read from YAML, JSON or TOML.
+        of: The name of the source, for people.
 
     Raises:
-        ConfigError: If one makes no sense; it is named by its number and its key.
-
+        ConfigError: If a label is not valid; the error has its number and its key.
     """
     if isinstance(data, Mapping) and set(data) == {"labels"}:
         data = data["labels"]
@@ -96,7 +95,7 @@ def read_labels(data: Any, of: str) -> tuple[Label, ...]:
 
 
 class _Misplaced(ConfigError):
-    """What is wrong with a label, and where in its file."""
+    """An error in a label, with its position in the file."""
 
     def __init__(self, way: tuple[str | int, ...], of: str, words: str) -> None:
         super().__init__(f"{of}: {words}" if of else words)
@@ -107,12 +106,11 @@ class _Misplaced(ConfigError):
 
 
 def label_file(file: str | Path) -> tuple[Label, ...]:
-    """Return the places of a YAML or JSON file.
+    """Return the labels of a YAML or JSON file.
 
     Raises:
-        ConfigError: If it is none, or one of them makes no sense; the file and the
-            line in it are named.
-
+        ConfigError: If the file is not of this format, or a label is not valid; the
+            error has the file and the line.
     """
     from webmap.base.lined_yaml import LinedYaml
 
@@ -126,25 +124,23 @@ def label_file(file: str | Path) -> tuple[Label, ...]:
 
 
 def new_label(data: Mapping[str, Any]) -> Label:
-    """Return a place that somebody adds on a page.
+    """Return a label that was added on a page.
 
     Raises:
-        ConfigError: If it makes no sense; the key is named.
-
+        ConfigError: If the data is not valid; the error names the key.
     """
     return msgspec.structs.replace(_label(data, ""), id=generate_id(), kept=True)
 
 
 def moved_label(label: Label, data: Any) -> Label:
-    """Return a place that somebody moves on a page.
+    """Return a label that was moved on a page.
 
     Args:
-        label: The place as it is.
+        label: The label before the move.
         data: A table with ``x`` and ``y`` in metres.
 
     Raises:
-        ConfigError: If it makes no sense; the key is named.
-
+        ConfigError: If the data is not valid; the error names the key.
     """
     if not isinstance(data, Mapping):
         raise ConfigError("a label is moved to x and y, in metres")
@@ -154,15 +150,14 @@ def moved_label(label: Label, data: Any) -> Label:
 
 
 class LabelStore:
-    """The places that were added on pages, in a file.
+    """A file with the labels that were added on pages.
 
     Args:
-        folder: Where such files are.
-        name: Which one: labels of one name are the same on every page.
+        folder: The folder of such files.
+        name: The name of the file: labels of one name are the same on every page.
 
     Raises:
-        ConfigError: If the name cannot be a file's.
-
+        ConfigError: If the name is not valid as a file name.
     """
 
     def __init__(self, folder: Path, name: str) -> None:
@@ -173,11 +168,10 @@ class LabelStore:
         self.file = folder / "labels" / f"{name}.json"
 
     def load(self) -> tuple[Label, ...]:
-        """Return what is in the file; nothing if there is none.
+        """Return the labels of the file; none if there is no file.
 
         Raises:
-            ConfigError: If it cannot be read.
-
+            ConfigError: If the file cannot be read.
         """
         try:
             data = json.loads(read_file(self.file, LARGEST_STATE))
@@ -192,11 +186,10 @@ class LabelStore:
         )
 
     def save(self, labels: Iterable[Label]) -> None:
-        """Write them all, or leave the file as it was.
+        """Write all labels, or leave the file unchanged.
 
         Raises:
-            OSError: If the disk does not take them.
-
+            OSError: If the file cannot be written.
         """
         plain = [
             {key: getattr(label, key) for key in _KEYS if getattr(label, key) != ""}

@@ -12,10 +12,11 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {(message: Record<string, unknown>) => void} Send */
 
 /**
- * Labels: kept upright, pressed to send a robot there, added, moved and taken away.
+ * Labels: keep them upright, send a robot to a pressed label, add, move and remove
+ * labels.
  *
- * Options: `editable`, whether this viewer may; `key`, which begins to add one; `icons`
- * to choose from; `longest`, characters of a name.
+ * Options: `editable`, whether this page may edit; `key`, which begins to add a label;
+ * `icons` to choose from; `longest`, the greatest length of a name in characters.
  *
  * @param {MapCanvas} map
  * @param {Options} options
@@ -93,7 +94,7 @@ class Labels {
     const { signal } = this._ending;
     const first = { signal, capture: true };
     const { svg: root } = this._map;
-    // Before the map hears of it, which would select no robot.
+    // Before the map's own listener, which would deselect the robot.
     root.addEventListener("click", (event) => this._clicked(event), first);
     root.addEventListener("keydown", (event) => this._pressed(event), first);
     window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
@@ -145,7 +146,7 @@ class Labels {
     this._fit();
   }
 
-  /** @returns {boolean} Whether there was something to leave. */
+  /** @returns {boolean} Whether the tool was active. */
   _leave() {
     if (!this._active && this._sheet.hidden) return false;
     this._activate(false);
@@ -164,7 +165,7 @@ class Labels {
     this._fit();
   }
 
-  /** Take no room on the map while there is nothing in the panel. */
+  /** Take no room on the map while the panel is empty. */
   _fit() {
     this._panel.hidden =
       Boolean(this._go.hidden) && Boolean(this._sheet.hidden) && !this._word.textContent;
@@ -181,7 +182,7 @@ class Labels {
     this._sheet.querySelector("button")?.focus({ preventScroll: true });
   }
 
-  /** Show what can be done with the label that is chosen. */
+  /** Show the possible actions on the chosen label. */
   _refresh() {
     const label = this._chosen;
     if (!label || this._move) return;
@@ -268,7 +269,7 @@ class Labels {
   /**
    * @param {string} robot
    * @param {{x: number, y: number}} place
-   * @returns {number} The direction in which the robot comes there.
+   * @returns {number} The heading of the robot's arrival at the place.
    */
   _wayTo(robot, place) {
     const element = this._map.world.querySelector(`[data-robot="${CSS.escape(robot)}"]`);
@@ -288,7 +289,7 @@ function labelOf(target) {
 
 /**
  * @param {SVGGraphicsElement} element Of the world.
- * @returns {{x: number, y: number} | null} Where it is, in metres.
+ * @returns {{x: number, y: number} | null} Its position, in metres.
  */
 function placeOf(element) {
   const list = element.transform.baseVal;
@@ -298,15 +299,15 @@ function placeOf(element) {
 
 /** @typedef {{x: number, y: number, across: number}} Name */
 
-/** Half of what a name and its spot take up and down, in pixels. */
+/** Half the height of a name with its spot, in pixels. */
 const HEIGHT = 46;
 
 /**
- * Choose whose names are shown, so that none lies on another.
+ * Choose which names are shown, so that no name covers another.
  *
- * @param {Name[]} names Where they are on the screen, and how wide, in pixels; the first
- *     comes first.
- * @returns {boolean[]} For each whether there is no room for it.
+ * @param {Name[]} names Their positions on the screen and their widths, in pixels;
+ *     earlier names have priority.
+ * @returns {boolean[]} For each name, whether there is no room.
  */
 export function crowded(names) {
   /** @type {Name[]} */
@@ -323,10 +324,11 @@ export function crowded(names) {
 }
 
 /**
- * Keep labels upright and as large, whatever the view, and names from lying on others.
+ * Keep labels upright and at a constant size in every view, and keep names from
+ * covering one another.
  *
  * @param {MapCanvas} map
- * @returns {() => void} Ends it.
+ * @returns {() => void} Ends the updates.
  */
 function keepLabels(map) {
   let frame = 0;

@@ -1,4 +1,4 @@
-"""Points of interest, by their names."""
+"""Labels: named places on the map."""
 
 import asyncio
 import logging
@@ -37,9 +37,8 @@ class LabelLayer(Layer):
     """The labels of a configuration, and those added on pages under one name.
 
     Args:
-        name: Of the file that keeps those that are added.
-        configured: Labels that nobody can take away on a page.
-
+        name: The name of the file that stores the added labels.
+        configured: Labels that cannot be removed on a page.
     """
 
     def __init__(self, name: str, configured: tuple[Label, ...]) -> None:
@@ -50,43 +49,40 @@ class LabelLayer(Layer):
         self.svg.classes.add("labels")
 
     def start(self) -> None:
-        """Draw what is configured, and what was added before."""
+        """Draw the configured labels, and the labels added before."""
         for label in self.configured.values():
             self.draw(label)
         self.added.show_on(self)
 
     def add(self, label: Label) -> None:
-        """Show one more, and keep it.
+        """Show and store a new label.
 
         Raises:
-            ConfigError: If it cannot be kept.
-
+            ConfigError: If the label cannot be stored.
         """
         if len(self._drawn) >= MAX_LABELS:
             raise ConfigError(f"{MAX_LABELS} labels are the most")
         self.added.add(label)
 
     def remove(self, id: str) -> None:
-        """Take one away that was added on a page.
+        """Remove a label that was added on a page.
 
         Raises:
-            ConfigError: If it is in the configuration, or there is none.
-
+            ConfigError: If the label is in the configuration, or does not exist.
         """
         self._check_added(id)
         self.added.remove(id)
 
     def move(self, id: str, place: Any) -> None:
-        """Put one elsewhere that was added on a page.
+        """Move a label that was added on a page.
 
         Args:
-            id: Which one.
+            id: The label's id.
             place: A table with ``x`` and ``y`` in metres.
 
         Raises:
-            ConfigError: If it is in the configuration, there is none, or the place
-                makes no sense.
-
+            ConfigError: If the label is in the configuration or does not exist, or the
+                place is not valid.
         """
         self._check_added(id)
         self.added.move(id, place)
@@ -99,11 +95,11 @@ class LabelLayer(Layer):
             )
 
     def erase(self, id: str) -> None:
-        """Draw a label no more."""
+        """Remove a label's drawing."""
         self._drawn.pop(id).remove()
 
     def draw(self, label: Label) -> None:
-        """Draw a label, also one that is drawn already and is elsewhere now."""
+        """Draw a label; a label drawn before is moved."""
         if label.id in self._drawn:
             self._drawn[label.id].set_pose(label.x, label.y, 0.0)
             return
@@ -123,14 +119,13 @@ class LabelLayer(Layer):
 
 
 class AddedLabels:
-    """The added labels of one file: the same object for everybody who shows them.
+    """The added labels of one file: one object, shared by all layers that show them.
 
-    So none of them writes the file without what others added. It is read whenever
-    somebody shows its labels and nobody did before.
+    Because the object is shared, the file always contains the labels of all layers. The
+    file is read when the first layer shows its labels.
 
     Args:
         store: The file.
-
     """
 
     _of: ClassVar[dict[Path, "AddedLabels"]] = {}
@@ -147,17 +142,16 @@ class AddedLabels:
 
     @classmethod
     def of(cls, name: str) -> "AddedLabels":
-        """Return those that the state folder keeps under a name.
+        """Return the labels that the state folder has under a name.
 
         Raises:
-            ConfigError: If the name cannot be a file's.
-
+            ConfigError: If the name is not valid as a file name.
         """
         store = LabelStore(state_folder(), name)
         return cls._of.setdefault(store.file, cls(store))
 
     def show_on(self, layer: LabelLayer) -> Removal:
-        """Draw them on a layer, now and as they change, until the removal."""
+        """Draw the labels on a layer, with all later changes, until the removal."""
         if not self._shown_by and self._saving is None:
             self._load()
         self._shown_by.append(layer)
@@ -168,21 +162,19 @@ class AddedLabels:
         return keep(Removal(lambda: self._shown_by.remove(layer)))
 
     def add(self, label: Label) -> None:
-        """Show one more, and keep it.
+        """Show and store a new label.
 
         Raises:
-            ConfigError: If it cannot be kept.
-
+            ConfigError: If the label cannot be stored.
         """
         self._check_writable()
         self._draw(label)
 
     def remove(self, id: str) -> None:
-        """Take one away.
+        """Remove a label.
 
         Raises:
-            ConfigError: If there is none, or that cannot be kept.
-
+            ConfigError: If the label does not exist, or the change cannot be stored.
         """
         del self.labels[self._found(id).id]
         for layer in self._shown_by:
@@ -190,16 +182,15 @@ class AddedLabels:
         self._save()
 
     def move(self, id: str, place: Any) -> None:
-        """Put one elsewhere.
+        """Move a label.
 
         Args:
-            id: Which one.
+            id: The label's id.
             place: A table with ``x`` and ``y`` in metres.
 
         Raises:
-            ConfigError: If there is none, that cannot be kept, or the place makes no
-                sense.
-
+            ConfigError: If the label does not exist, the change cannot be stored, or
+                the place is not valid.
         """
         self._draw(moved_label(self._found(id), place))
 
@@ -259,34 +250,33 @@ class AddedLabels:
 
 
 ORDER = 90.0
-"""Under the robots, over everything else."""
+"""Below the robots, above everything else."""
 
 MAY_ADD = ("operator", "admin")
-"""Roles of viewers who may."""
+"""Roles that may edit labels."""
 
 
 @map_modules.register
 class Labels:
-    """Shows places with their names, upright and as large at every zoom.
+    """Shows named places, upright and at a constant size at every zoom.
 
-    They come from the program, from a file, and from the page, where people add them;
-    those are kept on this machine and are on every page that has labels of that name.
-    A press on a label offers to send the selected robot there.
+    Labels come from the program, from a file, and from pages, where people add them;
+    added labels are stored on this machine and appear on every page that has labels of
+    the same name. A press on a label offers to send the selected robot there.
 
     Style them by CSS: ``.label``, with the icon's name and ``kind`` as further classes.
 
     Args:
         map: The map.
-        labels: Tables with ``name``, ``x`` and ``y`` in metres, and if wanted ``icon``,
-            ``kind`` (a class) and ``yaw`` in radians.
+        labels: Tables with ``name``, ``x`` and ``y`` in metres, and optionally
+            ``icon``, ``kind`` (a class) and ``yaw`` in radians.
         file: A YAML or JSON file with such a list.
-        name: Which file of the state folder keeps those that are added.
-        editable: Whether they can be added, moved and taken away on the page.
-        key: The key that begins to add one.
+        name: The name of the file in the state folder for added labels.
+        editable: Whether labels can be added, moved and removed on the page.
+        key: The key that begins to add a label.
 
     Raises:
-        ConfigError: If a label makes no sense; it is named by its number and its key.
-
+        ConfigError: If a label is not valid; the error has its number and its key.
     """
 
     def __init__(
@@ -322,7 +312,7 @@ class Labels:
         )
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Add a label, move or take one away, or note where a robot was sent."""
+        """Add, move or remove a label, or record where a robot was sent."""
         try:
             if "goal" in message:
                 sent = robot_and_pose(self.map, message["goal"])

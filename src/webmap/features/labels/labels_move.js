@@ -4,19 +4,20 @@ import { button, html } from "../../web/tools/elements.js";
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/view.js').Point} Point */
 
-/** One press of an arrow key in a field, in metres. */
+/** Step of an arrow key in a field, in metres. */
 const STEP = 0.1;
 
 /**
- * A label on its way to another place: dragged on the map, or by numbers, in which the
- * arrow keys count up and down. A field has the focus, so that no key drives a robot.
+ * The move of a label: by a drag on the map, or by numbers, which the arrow keys
+ * change. A field has the focus, so that no key drives a robot.
  */
 export class LabelMove {
   /**
    * @param {MapCanvas} map
    * @param {SVGGraphicsElement} label
-   * @param {Point} place Where it is, in metres.
-   * @param {(to: Point | null) => void} done Where it is to be; null to leave it.
+   * @param {Point} place Its position, in metres.
+   * @param {(to: Point | null) => void} done Called with the new position; with null to
+   *     cancel.
    */
   constructor(map, label, place, done) {
     this._map = map;
@@ -30,7 +31,7 @@ export class LabelMove {
     const [x, y] = /** @type {const} */ (["x", "y"]).map((axis) => this._field(axis));
     this._x = x;
     this._y = y;
-    /** What goes into the sheet. */
+    /** The fields for the sheet. */
     this.fields = [
       html("label", "", {}, "x in m", x),
       html("label", "", {}, "y in m", y),
@@ -39,7 +40,7 @@ export class LabelMove {
     ];
     this._ending = new AbortController();
     const { signal } = this._ending;
-    // Before anybody else, so that a drag moves the label and not the map.
+    // Before all other listeners, so that a drag moves the label and not the map.
     const first = { signal, capture: true };
     const { svg } = map;
     svg.addEventListener("pointerdown", (event) => this._down(event), first);
@@ -52,7 +53,7 @@ export class LabelMove {
     this._show();
   }
 
-  /** The display has taken it: it stays where it is. */
+  /** The display has accepted the move: keep the position. */
   accepted() {
     this._accepted = true;
   }
@@ -94,14 +95,15 @@ export class LabelMove {
     event.stopImmediatePropagation();
     event.preventDefault();
     if (this._press || event.button !== 0) {
-      // A second finger is a doubt about the first.
+      // A second finger cancels the drag of the first.
       this._press = null;
       return;
     }
     const at = this._map.pointOf(event);
     const label = this._map.toScreen(this._to.x, this._to.y);
     const on = event.target instanceof Node && this._label.contains(event.target);
-    // Taken by its rim it does not jump; a press elsewhere fetches it.
+    // A label dragged by its rim does not jump; a press elsewhere moves the label
+    // there.
     const [dx, dy] = on ? [label.x - at.x, label.y - at.y] : [0, 0];
     this._press = { id: event.pointerId, dx, dy };
     this._map.svg.setPointerCapture(event.pointerId);
@@ -145,7 +147,7 @@ export class LabelMove {
 
 /**
  * @param {number} metres
- * @returns {number} To the centimetre, which is finer than a finger.
+ * @returns {number} Rounded to the centimetre, which is finer than a finger.
  */
 function rounded(metres) {
   return Math.round(metres * 100) / 100;

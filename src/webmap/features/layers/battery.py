@@ -13,22 +13,21 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 FULL = 1.2
-"""What a full battery may say at the most: gauges that are not calibrated say more."""
+"""Greatest charge of a full battery; uncalibrated gauges report more than 1."""
 
 
 @robot_modules.register
 class Battery:
     """Follows a ``sensor_msgs/BatteryState`` and fires ``on_battery_update``.
 
-    Some drivers publish a percentage of 0 to 100, where the message has 0 to 1. Once
-    one has been seen above 1.2, that driver is taken to count so.
+    The message defines a percentage from 0 to 1, but some drivers publish 0 to 100.
+    After one value above 1.2, the layer treats all values of the topic as 0 to 100.
 
     Args:
-        robot: The robot that runs on the battery.
-        bridge: The link to the ROS system that has the topic.
+        robot: The robot of the battery.
+        bridge: The bridge of the ROS system that has the topic.
         topic: The topic.
         throttle: The least time between two messages, in milliseconds.
-
     """
 
     def __init__(
@@ -36,11 +35,11 @@ class Battery:
     ) -> None:
         self.robot = robot
         self.charge: float | None = None
-        """Between 0 and 1; None if the robot does not know."""
+        """Between 0 and 1; None if unknown."""
         self.voltage: float | None = None
-        """In volts; None if the robot does not know."""
+        """In volts; None if unknown."""
         self.stamp: float | None = None
-        """When the newest message was sent, in monotonic seconds."""
+        """Time when the newest message was sent, in monotonic seconds."""
         self._topic = topic
         self._hundredths = False
         self._bridge = bridge
@@ -54,7 +53,7 @@ class Battery:
         )
 
     def on_message(self, message: BatteryStateMsg) -> None:
-        """Take the newest charge; what is not a number is unknown."""
+        """Store the newest charge; a value that is not a number is unknown."""
         voltage = message.voltage
         self.charge = self._charge_of(message.percentage)
         self.voltage = voltage if math.isfinite(voltage) else None
@@ -62,8 +61,8 @@ class Battery:
         self.robot.notify_modules("on_battery_update", self)
 
     def _charge_of(self, percentage: float) -> float | None:
-        """Return a charge of 0 to 1; None if it is not known, or cannot be."""
-        if math.isnan(percentage):  # as the message has it for "not measured"
+        """Return a charge from 0 to 1; None if it is unknown or impossible."""
+        if math.isnan(percentage):  # "not measured" by the message's definition
             self.robot.clear_problem(self)
             return None
         if not 0 <= percentage <= 100:

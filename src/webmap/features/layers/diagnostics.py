@@ -1,4 +1,4 @@
-"""What the parts of a robot say of their health."""
+"""The health of a robot's parts."""
 
 import binascii
 import time
@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 Whose: TypeAlias = Literal["own", "another", "nobody"]
-"""Of a robot, a part is its own, another robot's, or by its name of nobody."""
+"""Owner of a part, for one robot: the robot, another robot, or unknown."""
 
 
 class PartOwners:
     """The robots that follow one topic, by their namespaces.
 
-    Nothing in a ``diagnostic_msgs/DiagnosticArray`` says which robot it is about but
-    the names of the parts. Updaters put the name of their node in front: in ROS 1 with
-    its namespace and without the slash that it begins with (``robot_0/base: Motors``),
-    in ROS 2 without the namespace (``base: Motors``) unless they are told otherwise
+    In a ``diagnostic_msgs/DiagnosticArray`` only the names of the parts identify the
+    robot. Updaters begin a name with the name of their node: in ROS 1 with its
+    namespace and without the leading slash (``robot_0/base: Motors``), in ROS 2 by
+    default without the namespace (``base: Motors``), on request with it
     (``/robot_0/base: Motors``). Aggregators name groups: ``/Power/base: Battery``.
     """
 
@@ -40,29 +40,27 @@ class PartOwners:
         self._followers: Counter[str] = Counter()
 
     def join(self, namespace: str) -> Removal:
-        """Count a robot in until the current scope ends, or this is removed.
+        """Add a robot until the current scope ends, or until the removal.
 
         Args:
-            namespace: The robot's, as :func:`bare` has it; empty if it has none.
-
+            namespace: The robot's namespace, as :func:`bare` returns it; empty if none.
         """
         self._followers[namespace] += 1
         return keep(Removal(lambda: self._leave(namespace)))
 
     def whose(self, name: str, namespace: str) -> Whose:
-        """Return whose a part is.
+        """Return the owner of a part.
 
-        All parts are those of the only robot. With several, a part is that of the
+        A single robot owns all parts. With several robots, a part belongs to the
         innermost namespace that its name begins with.
 
         Args:
             name: The part's name.
-            namespace: The namespace of the robot that asks, as :func:`bare` has it.
-
+            namespace: The namespace of the robot that asks, as :func:`bare` returns it.
         """
         if len(self._followers) < 2:
             return "own"
-        # What stands behind the colon is a task, which may have slashes too.
+        # The text after the colon is a task, which may contain slashes too.
         inside = bare(name).partition(":")[0]
         while inside and inside not in self._followers:
             inside = inside.rpartition("/")[0]
@@ -77,12 +75,12 @@ class PartOwners:
 
 
 def bare(name: str) -> str:
-    """Return a name of a part, or a namespace, without slashes in front and behind."""
+    """Return the name of a part, or a namespace, without outer slashes."""
     return name.strip("/")
 
 
 def part_owners(bridge: Bridge, topic: str) -> PartOwners:
-    """Return the robots that follow a topic behind a bridge."""
+    """Return the robots that follow a topic of a bridge."""
     return _owners.setdefault(bridge, {}).setdefault(topic, PartOwners())
 
 
@@ -93,24 +91,24 @@ _owners: weakref.WeakKeyDictionary[Bridge, dict[str, PartOwners]] = (
 
 OK, WARN, ERROR, STALE = range(4)
 LEVELS = ("ok", "warn", "error", "stale")
-"""The names of the levels, by their numbers."""
+"""The names of the levels, in the order of their numbers."""
 
 MAX_PARTS = 1000
-"""The most parts that one robot may have."""
+"""Greatest number of parts of one robot."""
 
 MAX_VALUES = 100
-"""The most values that are kept of one part."""
+"""Greatest number of values that are kept of one part."""
 
 LONGEST_NAME, LONGEST = 256, 1000
-"""The most characters that are kept of a name, and of a message or a value."""
+"""Greatest numbers of characters that are kept of a name, and of a message or value."""
 
 UNHEARD = "unheard"
-"""The class of a badge while nothing was heard that tells how the robot is."""
+"""The class of a badge until diagnostics of the robot are received."""
 
 UNSAID = "no diagnostics of this robot received"
 GREY = "#8a8f98"
 
-# An error weighs more than a part that has gone silent, though its number is less.
+# An error is worse than a stale part, although its number is smaller.
 _WEIGHT = {"ok": 0, "warn": 1, "stale": 2, "error": 3}
 
 
@@ -126,7 +124,7 @@ class DiagnosticStatusMsg(msgspec.Struct, frozen=True, kw_only=True, gc=False):
 
     name: str
     level_value: int | str = msgspec.field(name="level")
-    """The level as it came; :attr:`level` is what to count with."""
+    """The level as received; use :attr:`level` for comparisons."""
 
     message: str = ""
     hardware_id: str = ""
@@ -136,12 +134,11 @@ class DiagnosticStatusMsg(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     def level(self) -> int:
         """0 ok, 1 warning, 2 error, 3 stale.
 
-        It is a ``byte``, which some bridges of ROS 2 write as text: the character
+        The field is a ``byte``, which some bridges of ROS 2 send as text: the character
         itself, or base64.
 
         Raises:
-            ProtocolError: If it is none of them.
-
+            ProtocolError: If the level has any other value.
         """
         said = self.level_value
         level = said if isinstance(said, int) else _byte(said)
@@ -159,7 +156,7 @@ class DiagnosticArrayMsg(Stamped, frozen=True, kw_only=True):
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """What one part said last."""
+    """The last report of one part."""
 
     name: str
     level: str
@@ -169,10 +166,10 @@ class Health:
     hardware_id: str
     values: dict[str, str]
     heard: float
-    """When, in monotonic seconds."""
+    """Time of receipt, in monotonic seconds."""
 
     shared: bool = False
-    """Whether several robots follow the topic and its name is of none of them."""
+    """Whether several robots follow the topic and the part belongs to none of them."""
 
 
 @robot_modules.register
@@ -194,34 +191,34 @@ class Health:
     rank=140,
 )
 class Diagnostics:
-    """Follows a ``diagnostic_msgs/DiagnosticArray`` and says what is worst.
+    """Follows a ``diagnostic_msgs/DiagnosticArray`` and shows the worst level.
 
-    On the robot there is a badge, whose class is the worst level and whose title says
-    what it is. Fires ``on_diagnostics_update``.
+    A badge on the robot has the worst level as its class, and its title describes the
+    part. Fires ``on_diagnostics_update``.
 
-    A part whose name begins with another robot's namespace is left out. One that begins
-    with nobody's is shown with every robot that follows the topic, so that no error is
-    lost; that it is well says nothing of any of them.
+    A part whose name begins with another robot's namespace is left out. A part that
+    belongs to no robot is shown with every robot that follows the topic, so that no
+    error is lost; if such a part is well, this counts for none of the robots.
 
     Style it by CSS: ``.diagnostics.ok``, ``.warn``, ``.error``, ``.stale``, and
-    ``.unheard`` while no part of the robot was heard; rows of :meth:`show_in` have
-    these classes too, but for the last.
+    ``.unheard`` until a part of the robot is received; rows of :meth:`show_in` have the
+    same classes except ``.unheard``.
 
     Args:
         robot: The robot.
-        bridge: The link to the ROS system that has the topic.
+        bridge: The bridge of the ROS system that has the topic.
         topic: The topic: ``/diagnostics``, or ``/diagnostics_agg``.
-        namespace: The robot's, such as ``/robot_0``, where robots share a topic.
-        prefix: Only parts whose names begin with this are taken, and all of them are
-            the robot's. A slash in front counts neither here nor there.
-        hold: Seconds after which a part that says nothing counts as stale.
-        throttle: The least time between two messages, in milliseconds. It is 0
-            since each message tells of other parts.
+        namespace: The robot's namespace, such as ``/robot_0``, where robots share a
+            topic.
+        prefix: Only parts whose names begin with this prefix are used, and all of them
+            belong to the robot. A leading slash is ignored on both sides.
+        hold: Seconds without a message after which a part is stale.
+        throttle: The least time between two messages, in milliseconds. The default is 0
+            because each message may contain other parts.
 
     Raises:
-        ConfigError: If ``hold`` is not above 0, or there are both a namespace and a
-            prefix.
-
+        ConfigError: If ``hold`` is not above 0, or if both a namespace and a prefix are
+            given.
     """
 
     def __init__(
@@ -275,23 +272,23 @@ class Diagnostics:
 
     @staticmethod
     def options_for(found: FoundTopic) -> dict[str, Any]:
-        """Return the robot's namespace, by which parts of a shared topic are told."""
-        # On a topic of its own there is nobody to tell it from.
+        """Return the robot's namespace, which marks its parts on a shared topic."""
+        # On its own topic a robot needs no namespace.
         return {"namespace": "" if found.own else found.namespace}
 
     def destroy(self) -> None:
-        """Take the badge away."""
+        """Remove the badge."""
         if self._joined is not None:
             self._joined.remove()
         self.svg.remove()
 
     @property
     def parts(self) -> list[Health]:
-        """What all parts said last, the worst first."""
+        """The last reports of all parts, the worst first."""
         now = time.monotonic()
         parts = []
         for part in self._parts.values():
-            # Since it was taken, robots may have come and gone.
+            # Robots may have been added or removed since the report was received.
             whose = self._whose(part.name)
             if whose == "another":
                 continue
@@ -302,9 +299,9 @@ class Diagnostics:
 
     @property
     def level(self) -> str | None:
-        """The worst level of all parts; None if nothing was heard of this robot.
+        """The worst level of all parts; None without diagnostics of this robot.
 
-        That parts of nobody are well does not count.
+        Parts of unknown robots that are well do not count.
         """
         return _level(self.parts)
 
@@ -312,19 +309,19 @@ class Diagnostics:
         """List the parts in an element of a page until the current scope ends.
 
         Args:
-            element: A ``ul``, or whatever takes ``li``; what is in it goes.
-
+            element: A ``ul``, or another element that accepts ``li``; its content is
+                removed.
         """
         self._lists.append(element)
         keep(Removal(lambda: self._lists.remove(element)))
         self._fill(element)
 
     def on_array(self, message: DiagnosticArrayMsg) -> None:
-        """Take what some parts say; what others said stays.
+        """Store the reports of some parts; the reports of all others stay.
 
         Raises:
-            ProtocolError: If a part says a level that there is not; the others count.
-
+            ProtocolError: If the level of a part is not valid; the other parts are
+                stored.
         """
         wrong: ProtocolError | None = None
         for status in message.status:
@@ -358,9 +355,9 @@ class Diagnostics:
             self._parts[name] = said
 
     def _hides_worse(self, said: Health) -> bool:
-        """Tell whether another part of this name said worse just now.
+        """Return whether another part of this name recently reported a worse level.
 
-        In ROS 2 the same nodes of two robots say the same names, one after the other.
+        In ROS 2 the same nodes of two robots use the same names.
         """
         before = self._parts.get(said.name)
         if before is None or said.heard - before.heard > self.hold:
@@ -411,7 +408,7 @@ class Diagnostics:
 
 
 def _level(parts: list[Health]) -> str | None:
-    """Return the worst level, of parts of which the worst is first."""
+    """Return the worst level of parts that are sorted, the worst first."""
     if not parts:
         return None
     well = parts[0].level == LEVELS[OK]
@@ -419,7 +416,7 @@ def _level(parts: list[Health]) -> str | None:
 
 
 def _byte(text: str) -> int:
-    """Return the byte that a text stands for, or -1."""
+    """Return the byte that a text encodes, or -1."""
     if len(text) == 1:
         return ord(text)
     try:

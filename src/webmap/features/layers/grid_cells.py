@@ -1,4 +1,4 @@
-"""Cells of a grid that somebody publishes one by one, such as what is inflated."""
+"""Single cells of a grid, such as inflated obstacles."""
 
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
@@ -20,50 +20,49 @@ if TYPE_CHECKING:
     Points: TypeAlias = NDArray[np.float64]
 
 SMALLEST = 1e-4
-"""Metres: the side of the smallest cell that is drawn."""
+"""Smallest side of a cell that is drawn, in metres."""
 
 MAX_CELLS = 100_000
-"""Cells of which no more are looked at."""
+"""Greatest number of cells that are processed."""
 
 BESIDE = 0.01
-"""Share of a cell by which the next one in a row may be off."""
+"""Greatest offset between neighbours of a row, as a share of a cell."""
 
 
 class Rows(NamedTuple):
-    """Cells that touch along x."""
+    """Rows of cells that touch along x."""
 
     first: "Points"
     """The middle of the first cell of each row, of shape (N, 3), in metres."""
 
     lengths: list[int]
-    """How many cells each row has."""
+    """The number of cells of each row."""
 
 
 class GridCellsMsg(Stamped, frozen=True, kw_only=True):
     """``nav_msgs/GridCells``."""
 
     cell_width: float
-    """Metres along x."""
+    """Size along x, in metres."""
 
     cell_height: float
-    """Metres along y."""
+    """Size along y, in metres."""
 
     cells: list[PointMsg]
-    """Their middles, in metres."""
+    """Centres of the cells, in metres."""
 
     @property
     def size(self) -> tuple[float, float]:
         """Width and height of a cell, in metres.
 
         Raises:
-            ProtocolError: If a cell of that size cannot be drawn.
-
+            ProtocolError: If cells of this size cannot be drawn.
         """
         for name, side in (
             ("cell_width", self.cell_width),
             ("cell_height", self.cell_height),
         ):
-            if not SMALLEST <= side <= FARTHEST:  # nor is NaN
+            if not SMALLEST <= side <= FARTHEST:  # also false for NaN
                 raise ProtocolError(
                     f"{name} must be from {SMALLEST:g} to {FARTHEST:g} m, got {side:g}"
                 )
@@ -88,11 +87,11 @@ class GridCellsMsg(Stamped, frozen=True, kw_only=True):
     rank=100,
 )
 class GridCells(RobotLayer):
-    """Cells, such as the inflated ones of older costmaps or frontiers of a robot.
+    """Cells, such as the inflated cells of older costmaps or the frontiers of a robot.
 
-    The older costmaps have them on ``/move_base/local_costmap/inflated_obstacles``. A
-    cell is 0.1 mm wide at the least. Cells that touch along x are drawn as one
-    rectangle, which is short on the wire; a message without cells draws nothing.
+    Older costmaps publish them on ``/move_base/local_costmap/inflated_obstacles``. The
+    least size of a cell is 0.1 mm. Cells that touch along x are drawn as one rectangle,
+    to send less data; a message without cells draws nothing.
 
     Style it by CSS: ``.gridcells > .cells``, and one of several by its name:
     ``.gridcells.frontiers > .cells``.
@@ -102,8 +101,9 @@ class GridCells(RobotLayer):
     """``"robot"`` for cells in the robot's own frame."""
 
     max_cells: Count = 5000
-    """How many are drawn at the most, evenly chosen. That there are more is said; more
-    than 100 000 are refused."""
+    """The greatest number of cells that are drawn, evenly chosen. A notice reports that
+    there are more; more than 100 000 are refused.
+    """
 
     throttle: int = 1000
     age_limit: float = 10.0
@@ -117,14 +117,14 @@ class GridCells(RobotLayer):
                 fill="#0f766e",
                 fill_opacity=0.35,
                 stroke="none",
-                # Rows that touch would have seams between them.
+                # Touching rows would have visible seams.
                 shape_rendering="crispEdges",
             )
         )
 
     @property
     def cells(self) -> list[tuple[float, float]]:
-        """The middles of the newest cells, all of them, in metres."""
+        """The centres of all cells of the newest message, in metres."""
         given = self._message.cells if self._message is not None else []
         return [(cell.x, cell.y) for cell in given]
 
@@ -132,20 +132,19 @@ class GridCells(RobotLayer):
         """Return the message, the rows of cells to draw, and a cell's width and height.
 
         Raises:
-            ProtocolError: If one that is to be drawn is not finite or farther away than
-                anything can be, if their size makes no sense, or there are too many to
-                look at.
-
+            ProtocolError: If a cell to draw is not finite or beyond the greatest
+                distance, if the size of cells is not valid, or if there are too many
+                cells.
         """
         given = message.cells
         if len(given) > MAX_CELLS:
             raise ProtocolError(f"{len(given)} cells; {MAX_CELLS} are the limit")
-        # Only these are looked at: 100,000 would hold up the other robots for 0.1 s.
+        # Only these are checked: 100,000 would delay the other robots by 0.1 s.
         chosen = [given[index] for index in thinned(len(given), self.max_cells)]
         width, height = message.size if chosen else (1.0, 1.0)
         rows = rows_of(_usable(chosen), width, height)
         if len(given) > len(chosen):
-            # Without their number, which would be another in every message.
+            # Without the number of cells, which would differ in every message.
             self.complain(
                 f"there are more than {self.max_cells} cells, of which so many are "
                 "drawn, evenly chosen; max_cells says how many"
@@ -155,7 +154,7 @@ class GridCells(RobotLayer):
     def draw(
         self, found: tuple[GridCellsMsg, Rows, float, float], at: Transform
     ) -> None:
-        """Draw the rows as they look from above."""
+        """Draw the rows as seen from above."""
         self._message, rows, width, height = found
         (a, b, c, x), (d, e, f, y), _ = at.rows
         east, north, up = (rows.first - (width / 2, height / 2, 0)).T
@@ -178,17 +177,16 @@ class GridCells(RobotLayer):
 
 
 def _usable(cells: "list[PointMsg]") -> "Points":
-    """Return the middles of cells, in metres.
+    """Return the centres of cells, in metres.
 
     Raises:
-        ProtocolError: If one is not finite, or farther away than anything can be.
-
+        ProtocolError: If a centre is not finite, or beyond the greatest distance.
     """
     import numpy as np
 
     points = np.array([(cell.x, cell.y, cell.z) for cell in cells]).reshape(-1, 3)
     points[~np.isfinite(points[:, 2]), 2] = 0.0
-    if not (np.abs(points) <= FARTHEST).all():  # nor is NaN
+    if not (np.abs(points) <= FARTHEST).all():  # also false for NaN
         check_finite([(cell.x, cell.y) for cell in cells], "cells")
         in_space(cells)
     return points
@@ -198,10 +196,9 @@ def rows_of(cells: "Points", width: float, height: float) -> Rows:
     """Return cells that touch along x as rows.
 
     Args:
-        cells: Their middles, in metres, in any order.
-        width: Of a cell along x, in metres.
-        height: Of a cell along y, in metres.
-
+        cells: The centres, in metres, in any order.
+        width: Width of a cell along x, in metres.
+        height: Height of a cell along y, in metres.
     """
     import numpy as np
 
@@ -212,7 +209,7 @@ def rows_of(cells: "Points", width: float, height: float) -> Rows:
     off = np.abs(np.diff(cells, axis=0) - (width, 0, 0))
     touch = (off <= (BESIDE * width, BESIDE * height, BESIDE * width)).all(axis=1)
     starts = np.flatnonzero(np.concatenate(([True], ~touch)))
-    # Cells that are a little off add up along a row, which then begins anew.
+    # Small offsets of cells add up along a row; the row is split then.
     number = np.arange(len(cells)) - np.repeat(starts, _lengths(starts, len(cells)))
     drift = cells[:, 0] - cells[np.arange(len(cells)) - number, 0] - number * width
     strays = np.diff(np.rint(drift / (BESIDE * width))) != 0
@@ -227,5 +224,5 @@ def _lengths(starts: "NDArray[np.intp]", count: int) -> "NDArray[np.intp]":
 
 
 def _short(value: float) -> str:
-    """Return metres to a tenth of a millimetre: cells may be small."""
+    """Return metres to a tenth of a millimetre, as cells may be small."""
     return f"{round(value, 4) + 0.0:.10g}"

@@ -1,4 +1,4 @@
-"""Grids of cells as pictures: which colour a cell has, and where the picture lies."""
+"""Grids of cells as pictures: the colours of cells and the position of the picture."""
 
 import io
 import math
@@ -17,11 +17,10 @@ Palette: TypeAlias = Literal["map", "costmap", "raw"]
 
 
 def check_palette(palette: str) -> None:
-    """Let the name of a palette pass.
+    """Check the name of a palette.
 
     Raises:
-        ConfigError: If there is none of that name.
-
+        ConfigError: If there is no palette of that name.
     """
     if palette not in PALETTES:
         known = ", ".join(PALETTES)
@@ -29,12 +28,11 @@ def check_palette(palette: str) -> None:
 
 
 def place_grid(origin: Pose, height: float) -> Affine:
-    """Return where the picture of a grid lies, as ``Picture.show`` takes it.
+    """Return the transform of a grid's picture, for ``Picture.show``.
 
     Args:
         origin: The pose of the lower left corner of the grid's first cell.
-        height: Of the whole grid, in metres.
-
+        height: Height of the whole grid, in metres.
     """
     cos, sin = math.cos(origin.yaw), math.sin(origin.yaw)
     placed = Affine(cos, sin, -sin, cos, origin.x, origin.y)
@@ -42,15 +40,14 @@ def place_grid(origin: Pose, height: float) -> Affine:
 
 
 async def draw_aside(cells: "NDArray[np.int8]", palette: str) -> bytes:
-    """Return a large grid as a PNG that the worker process draws.
+    """Return a large grid as a PNG, drawn by the worker process.
 
     Args:
-        cells: Of shape (height, width), the lowest row first.
+        cells: Array of shape (height, width), the lowest row first.
         palette: The name of one of :data:`PALETTES`.
 
     Raises:
         ProtocolError: If the worker fails.
-
     """
     import numpy as np
 
@@ -59,19 +56,18 @@ async def draw_aside(cells: "NDArray[np.int8]", palette: str) -> bytes:
 
 
 def png_of_bytes(data: bytes, width: int, palette: str) -> bytes:
-    """Return a grid, given as the bytes of its rows, as :func:`grid_png` does."""
+    """Return a grid, given as the bytes of its rows, as a PNG like :func:`grid_png`."""
     import numpy as np
 
     return grid_png(np.frombuffer(data, np.int8).reshape(-1, width), palette)
 
 
 def grid_png(cells: "NDArray[np.int8]", palette: str) -> bytes:
-    """Return a grid as a PNG of one pixel a cell, its highest row at the top.
+    """Return a grid as a PNG of one pixel per cell, its highest row at the top.
 
     Args:
-        cells: Of shape (height, width), the lowest row first.
+        cells: Array of shape (height, width), the lowest row first.
         palette: The name of one of :data:`PALETTES`.
-
     """
     import numpy as np
     from PIL import Image
@@ -110,10 +106,10 @@ def _costmap_colour(value: int) -> Colour:
     return (red, 0, 255 - red, 255)
 
 
-# By the value of a cell as a byte: -1, which is unknown, is 255.
+# Indexed by the value of a cell as a byte: -1, which is unknown, is 255.
 PALETTES: dict[str, list[Colour]] = {
     "map": [_map_colour(value) for value in range(256)],
     "costmap": [_costmap_colour(value) for value in range(256)],
     "raw": [(255 - value, 255 - value, 255 - value, 255) for value in range(256)],
 }
-"""The colours of each palette, as RViz has them where it has any."""
+"""The colours of each palette; those of RViz where RViz has the palette."""

@@ -1,4 +1,4 @@
-"""The readings of a laser scanner, as dots."""
+"""Laser scans, drawn as dots."""
 
 import math
 from dataclasses import KW_ONLY
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     from webmap.base.geometry import Pose
 
 MAX_RAYS = 1 << 18
-"""The most rays that a scan may have."""
+"""Greatest number of rays of a scan."""
 
 MOST_TURN = 1000.0
-"""Radians at which a ray may be, which is more than a hundred turns."""
+"""Greatest angle of a ray, in radians: more than a hundred turns."""
 
 LONGEST_SWEEP = 0.5
-"""Seconds; a scan that claims to have taken longer is taken to be of one moment."""
+"""Seconds; a scan with a longer duration is drawn as taken at one moment."""
 
 
 class SweepMsg(LaserScanMsg, frozen=True, kw_only=True):
-    """A scan that says how long it took."""
+    """A scan with its duration."""
 
     time_increment: float = 0.0
     """Seconds between neighbouring rays; 0 for a scan of one moment."""
@@ -55,13 +55,13 @@ class SweepMsg(LaserScanMsg, frozen=True, kw_only=True):
     rank=20,
 )
 class LaserScanner(RobotLayer):
-    """A dot where each ray of a laser scan hit something.
+    """A dot at each point that a laser scan hit.
 
-    A scan stays on the map where the robot was at its stamp, and what the robot turned
-    and moved while the scan was taken is made up for, so that walls stand still. Of a
-    robot that knows frames the sensor is where those have it, unless its place is told
-    here. One that hangs upside down, is tilted or stands on its side is drawn as its
-    plane looks from above.
+    A scan stays on the map where the robot was at the scan's stamp. The motion of the
+    robot during the scan is compensated, so that walls do not move. If the robot has
+    frames, the position of the sensor comes from the frames, unless it is given here.
+    The scan of an upside-down, tilted or vertical sensor is drawn as its plane looks
+    from above.
 
     Style the dots by CSS: ``.laserscan > .dot``, and those of one of several by its
     name: ``.laserscan.rear > .dot``; their size is the custom property ``--dot-size``,
@@ -71,19 +71,19 @@ class LaserScanner(RobotLayer):
     frame = "robot"
 
     x: float = 0.0
-    """Where the sensor is on the robot, in metres forward."""
+    """Position of the sensor on the robot, in metres forward."""
 
     y: float = 0.0
-    """In metres to the left."""
+    """Position of the sensor on the robot, in metres to the left."""
 
     angle: float = 0.0
-    """Where it looks, in degrees from the robot's x, counter-clockwise."""
+    """Direction of the sensor, in degrees from the robot's x, counter-clockwise."""
 
     max_dots: Annotated[
         int | None,
         Limit("at least 1 or None", lambda value: value is None or value >= 1),
     ] = 50
-    """How many dots are drawn at the most, evenly chosen; None for one per ray."""
+    """The greatest number of dots, evenly chosen; None for one per ray."""
 
     throttle: int = 300
 
@@ -93,7 +93,7 @@ class LaserScanner(RobotLayer):
 
     @classmethod
     def options_for(cls, found: FoundTopic) -> dict[str, Any]:
-        """Return the options of a scan, with a class of its own for each of several."""
+        """Return the options of a scan; each of several scans has its own class."""
         return {**super().options_for(found), "name": scan_name(found.number)}
 
     def build(self) -> None:
@@ -101,11 +101,10 @@ class LaserScanner(RobotLayer):
         self.dots = self.add(svg.path(class_="dot"))
 
     def read(self, message: LaserScanMsg) -> "NDArray[np.float64]":
-        """Return where the rays hit, as the sensor was when the first one did.
+        """Return the points that the rays hit, relative to the sensor at the first ray.
 
         Raises:
-            ProtocolError: If its angles make no sense, or it has too many rays.
-
+            ProtocolError: If the angles are not valid, or there are too many rays.
         """
         check_rays(message)
         doubt = scan_doubt(message)
@@ -119,22 +118,22 @@ class LaserScanner(RobotLayer):
         return points
 
     def draw(self, found: "NDArray[np.float64]", at: Transform) -> None:
-        """Draw the dots as they look from above."""
+        """Draw the dots as seen from above."""
         points, _ = levelled(found, at)
         dots, unit = in_units(points)
         self.dots.set_dots(dots.tobytes(), unit)
 
 
 def scan_doubt(scan: LaserScanMsg) -> str | None:
-    """Return what a person should know of a scan; None if it is as it should be.
+    """Return a problem of a scan that people should know; None if there is none.
 
-    A scan all of whose readings are infinite is not odd: it is one of an empty field.
+    A scan with only infinite readings is no problem: the area around is empty.
     """
     ranges = scan.ranges
     count = len(ranges)
     if not count:
         return "its scans have no ranges; expected one distance for each ray"
-    # A number is itself, NaN is not; the first settles it for nearly every scan.
+    # A number equals itself, NaN does not; the first reading decides for most scans.
     if ranges[0] != ranges[0] and not (ranges == ranges).any():
         return (
             f"none of its {count} ranges is a number, all are null or NaN; expected "
@@ -144,12 +143,11 @@ def scan_doubt(scan: LaserScanMsg) -> str | None:
 
 
 def check_rays(scan: LaserScanMsg) -> None:
-    """Let a scan pass whose rays go somewhere.
+    """Check that the rays of a scan have directions.
 
     Raises:
-        ProtocolError: If an angle is not finite or beyond all turns, several rays have
-            one direction, or there are more rays than any scanner has.
-
+        ProtocolError: If an angle is not finite or too large, several rays have the
+            same direction, or there are too many rays.
     """
     for name in ("angle_min", "angle_increment"):
         angle = getattr(scan, name)
@@ -175,13 +173,14 @@ def check_rays(scan: LaserScanMsg) -> None:
 def straightened(
     points: "NDArray[np.float64]", shares: "NDArray[np.float64]", moved: "Pose"
 ) -> "NDArray[np.float64]":
-    """Return points as they would have been seen at the beginning of a sweep.
+    """Return points as the sensor would have seen them at the beginning of a sweep.
 
     Args:
-        points: As the sensor saw them one after another, of shape (N, 2), in metres.
-        shares: When, from 0 at the beginning to 1 at the end of the sweep.
-        moved: Where the sensor is at the end, seen from where it was at the beginning.
-
+        points: The points in the order of the rays, relative to the moving sensor, of
+            shape (N, 2), in metres.
+        shares: The time of each point, from 0 at the beginning to 1 at the end of the
+            sweep.
+        moved: The sensor's pose at the end, relative to its pose at the beginning.
     """
     import numpy as np
 
@@ -196,19 +195,18 @@ def straightened(
 def scan_points(
     scan: LaserScanMsg, max_dots: int | None = None
 ) -> "tuple[NDArray[np.float64], NDArray[np.int64]]":
-    """Return where the rays hit, in metres in the sensor's own frame.
+    """Return the points that the rays hit, in metres in the sensor's own frame.
 
-    A ray counts if its range lies within the sensor's limits, which leaves out what
-    REP 117 has a driver report for "too near", "nothing there" and "bad reading".
+    A ray counts if its range is within the sensor's limits. This leaves out the values
+    of REP 117 for "too near", "nothing detected" and "bad reading".
 
     Args:
-        scan: The scan, whose angles are finite.
-        max_dots: Keep so many at the most, evenly spread over the rays, so that the
-            same bearings are kept in every scan; None for all.
+        scan: The scan, with finite angles.
+        max_dots: The greatest number of points, evenly spread over the rays, so that
+            every scan keeps the same bearings; None for all.
 
     Returns:
-        Points of shape (N, 2), in ray order, and the number of each one's ray.
-
+        Points of shape (N, 2), in ray order, and the number of each point's ray.
     """
     import numpy as np
 

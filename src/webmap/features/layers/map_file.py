@@ -1,4 +1,4 @@
-"""Maps from disk."""
+"""Maps from files on this machine."""
 
 import asyncio
 from pathlib import Path
@@ -23,22 +23,21 @@ if TYPE_CHECKING:
 
 @map_modules.register
 class MapFile:
-    """Draws a map that ROS's map_server would serve: a YAML file and its image.
+    """Draws a map in the format of ROS's map_server: a YAML file and its image.
 
-    The thresholds, ``negate`` and the mode of the file count as map_server has them.
-    It is read beside the model; a file that makes no sense is said on the pages.
+    The thresholds, ``negate`` and the mode of the file work as in map_server. The file
+    is read in a thread; pages show the error if the file is not valid.
 
     Style it by CSS: ``.map-file``.
 
     Args:
         map: The map.
-        file: The YAML file; its image lies in the same folder or below.
+        file: The YAML file; its image is in the same folder or below.
         palette: ``"map"``, ``"costmap"`` or ``"raw"``, as for ``OccupancyGrid``.
-        order: What lies over what: greater is nearer; a topic's map has 10.
+        order: The drawing order: greater is nearer; a topic's map has 10.
 
     Raises:
         ConfigError: If there is no such palette.
-
     """
 
     def __init__(
@@ -63,12 +62,12 @@ class FileLayer(Layer):
         self.file = Path(file)
         self.palette = palette
         self.image: MapImage | None = None
-        """What was read, once it is."""
+        """The map; None until it is read."""
         self.svg.classes.add("map-file")
         self.svg.set(pointer_events="none")
 
     def start(self) -> None:
-        """Begin to read."""
+        """Begin to read the file."""
         self.picture = Picture()
         self.svg.append(self.picture.element)
         spawn(self._read())

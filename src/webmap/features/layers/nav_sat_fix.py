@@ -1,4 +1,4 @@
-"""Where satellites have a robot."""
+"""Positions by satellites."""
 
 import math
 import time
@@ -18,11 +18,11 @@ class NavSatStatusMsg(msgspec.Struct, frozen=True):
     """``sensor_msgs/NavSatStatus``."""
 
     status: int = -1
-    """-1 no fix, 0 a fix, above a fix with corrections."""
+    """-1 no fix, 0 a fix, greater for a fix with corrections."""
 
 
 class NavSatFixMsg(Stamped, frozen=True, kw_only=True):
-    """``sensor_msgs/NavSatFix``, and what a ``GPSFix`` says of the same."""
+    """``sensor_msgs/NavSatFix``, and the same fields of a ``GPSFix``."""
 
     latitude: float
     """Degrees, north positive."""
@@ -35,15 +35,14 @@ class NavSatFixMsg(Stamped, frozen=True, kw_only=True):
     """Nine numbers in square metres: east, north and up."""
 
     position_covariance_type: int = 0
-    """0 if nobody knows it."""
+    """0 if unknown."""
 
     @property
     def place(self) -> tuple[float, float]:
         """Latitude and longitude, in degrees.
 
         Raises:
-            ProtocolError: If they are on no globe.
-
+            ProtocolError: If they are outside their ranges.
         """
         lat, lon = self.latitude, self.longitude
         if not (-90 <= lat <= 90 and -360 <= lon <= 360):
@@ -55,7 +54,7 @@ class NavSatFixMsg(Stamped, frozen=True, kw_only=True):
 
     @property
     def deviation(self) -> float | None:
-        """The standard deviation in the plane, in metres; None if it is not known."""
+        """The standard deviation in the plane, in metres; None if unknown."""
         c = self.position_covariance
         if self.position_covariance_type == 0 or len(c) != 9:
             return None
@@ -76,12 +75,12 @@ class NavSatFixMsg(Stamped, frozen=True, kw_only=True):
     rank=130,
 )
 class NavSatFix(RobotLayer):
-    """A cross where satellites have a robot, with a circle of one standard deviation.
+    """A cross at a robot's satellite position, with a circle of one standard deviation.
 
-    A fix is put on the map as on a plane that touches the globe at a datum: lengths are
-    right to 4 mm at 10 km from there, and to 0.5 m at 50 km. ``TileLayer`` with the
-    same datum puts its tiles there too. Without a fix the last one stays and ages, with
-    the class ``lost``.
+    A fix is projected to a plane that touches the globe at a datum: lengths are
+    accurate to 4 mm at 10 km from the datum, and to 0.5 m at 50 km. ``TileLayer`` with
+    the same datum uses the same projection. Without a fix the last fix stays and ages,
+    with the class ``lost``.
 
     Style it by CSS: ``.navsatfix > .cross``, ``.navsatfix > .doubt`` and
     ``.navsatfix.lost``.
@@ -91,33 +90,33 @@ class NavSatFix(RobotLayer):
 
     datum: tuple[float, float] | None = None
     """Latitude and longitude of the map's origin, in degrees. If not given, the first
-    fix is taken to be where the robot is on the map then; fixes before it has a place
-    there are not drawn. A robot with frames and no map, which is quiet about that, is
-    taken to be where its odometry has it, until there is a map."""
+    fix is aligned with the robot's position on the map at that time; fixes before the
+    robot has a pose are not drawn. For a robot with frames but without a map, and with
+    ``quiet`` set for this, the odometry position is used until there is a map.
+    """
 
     east: float = 0.0
-    """How far the map's x is turned from east, in degrees, counter-clockwise from
-    above."""
+    """Rotation of the map's x from east, in degrees, counter-clockwise from above."""
 
     throttle: int = 500
     age_limit: float = 5.0
 
     type: str = "sensor_msgs/NavSatFix"
     """``sensor_msgs/NavSatFix``, or a ``GPSFix`` of ``gps_msgs`` or ``gps_common``,
-    which says the same in the same words."""
+    which has the same fields.
+    """
 
     def build(self) -> None:
         """Make the cross and the circle.
 
         Raises:
-            ConfigError: If the datum is on no globe, or ``east`` is not finite.
-
+            ConfigError: If the datum is outside its ranges, or ``east`` is not finite.
         """
         if self.datum is not None and len(self.datum) != 2:
             raise ConfigError(
                 f"datum is a latitude and a longitude in degrees, got {self.datum!r}"
             )
-        # Fixes are switched together: a robot has one place.
+        # All fixes share one switch: a robot has one position.
         self.svg.unset("data-layer")
         self._plane = LocalPlane(*(self.datum or (0.0, 0.0)), self.east)
         self.position: tuple[float, float] | None = None
@@ -139,11 +138,10 @@ class NavSatFix(RobotLayer):
         )
 
     def take(self, message: NavSatFixMsg) -> None:
-        """Draw a fix in place of the one before; it is on the globe, not in a frame.
+        """Draw a fix in place of the last one; it is on the globe, not in a frame.
 
         Raises:
-            ProtocolError: If it claims to be one and is on no globe.
-
+            ProtocolError: If a message with a fix has coordinates outside their ranges.
         """
         lost = message.status.status < 0
         if not lost:
@@ -174,13 +172,13 @@ class NavSatFix(RobotLayer):
             )
 
     def _anchor(self, place: tuple[float, float]) -> None:
-        """Take a place on the globe for the robot's, as soon as that has one."""
+        """Align a position on the globe with the robot's, once the robot has a pose."""
         if not self.robot.valid:
             return
         on_map = self._is_on_map()
         if on_map is None:
             return
-        # Where it is by odometry alone is good until it is known on the map.
+        # A position by odometry alone is used until the position on the map is known.
         if on_map or self.datum is None:
             at = self.robot.position
             self.datum, self._origin = place, (at.x, at.y)
@@ -188,11 +186,11 @@ class NavSatFix(RobotLayer):
         self._waiting = not on_map
 
     def _is_on_map(self) -> bool | None:
-        """Return whether the robot's pose is one of the map; None if it may yet be."""
+        """Return whether the robot's pose is on the map; None if it may become so."""
         tf, pose = self.robot.tf, self.robot.whereabouts.newest
         if tf is None or pose is None or pose.frame_id in ("", tf["map_frame"]):
             return True
-        # Many robots have frames and no map, and that is no mistake if it is quiet.
+        # Many robots have frames but no map; this is no error if ``quiet`` is set.
         frames = self.robot.whereabouts.frames
         missing = frames is not None and time.monotonic() >= frames.complete_from
         return False if tf["quiet"] and missing else None

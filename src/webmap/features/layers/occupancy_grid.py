@@ -1,4 +1,4 @@
-"""Maps and costmaps, as images."""
+"""Maps and costmaps, drawn as images."""
 
 import asyncio
 import math
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     Found: TypeAlias = tuple[MapMetaDataMsg, NDArray[np.int8]]
 
 SMALL = 1 << 18
-"""Cells up to which a grid is drawn at once; a larger one in the worker process."""
+"""Cells up to which a grid is drawn at once; the worker process draws larger grids."""
 
 
 class OccupancyGridUpdateMsg(Stamped, frozen=True, kw_only=True):
@@ -55,8 +55,7 @@ class OccupancyGridUpdateMsg(Stamped, frozen=True, kw_only=True):
         """The cells, of shape (height, width), read-only.
 
         Raises:
-            ProtocolError: If there are more or fewer than the size says.
-
+            ProtocolError: If their number does not match the size.
         """
         return cells_of(self.data, self.width, self.height)
 
@@ -80,7 +79,7 @@ class OccupancyGridUpdateMsg(Stamped, frozen=True, kw_only=True):
             "global costmap",
             {r"global_costmap/costmap\Z": "a global costmap"},
             most=1,
-            # All of the map, under the local one: it is large, and changes slowly.
+            # The whole map, below the local costmap: it is large, and changes slowly.
             options={"palette": "costmap", "throttle": 5000, "order": 15.0},
             role="costmap",
         ),
@@ -103,11 +102,11 @@ class OccupancyGridUpdateMsg(Stamped, frozen=True, kw_only=True):
     rank=10,
 )
 class OccupancyGrid(MapLayer):
-    """A map or a costmap as an image that all viewers share.
+    """A map or a costmap as an image, shared by all pages.
 
-    The topic has a ``nav_msgs/OccupancyGrid``, and the same with ``_updates`` behind it
-    a ``map_msgs/OccupancyGridUpdate``. What is unknown is transparent. Cells must be -1
-    to 100; other values are refused, unless the palette is ``"raw"``.
+    The topic has the type ``nav_msgs/OccupancyGrid``; the topic with ``_updates`` added
+    has the type ``map_msgs/OccupancyGridUpdate``. Unknown cells are transparent. Cells
+    must be -1 to 100; other values are refused, unless the palette is ``"raw"``.
 
     Style it by CSS: ``.occupancy-grid``, with the palette's name as a further class:
     ``.occupancy-grid.costmap { opacity: 0.4 }``.
@@ -118,23 +117,26 @@ class OccupancyGrid(MapLayer):
     palette: Palette = "map"
     """``"map"``: free is white and occupied black. ``"costmap"``: free is transparent,
     then blue to red, inscribed cyan and lethal purple. ``"raw"``: the 256 values of a
-    byte from white to black."""
+    byte from white to black.
+    """
 
     throttle: int = 0
     """The least time between two whole grids, in milliseconds."""
 
     map_frame: str | None = None
-    """The map's frame, for data that is in another, such as a local costmap in
-    ``odom``: it is taken there by the ``/tf`` of the bridge. If not given, data is
-    drawn as it comes."""
+    """The map's frame, for data in another frame, such as a local costmap in ``odom``:
+    the bridge's ``/tf`` transforms the data to the map. If not given, data is drawn
+    without a transform.
+    """
 
     order: float | None = None
-    """What lies over what: greater is nearer; robots have 100. If not given, it is 20
-    for a costmap and 10 for any other."""
+    """The drawing order: greater is nearer; robots have 100. If not given, it is 20 for
+    a costmap and 10 for any other grid.
+    """
 
     @classmethod
     def options_for(cls, found: FoundTopic) -> dict[str, Any]:
-        """Return the options of a grid; a robot's own is not drawn too often."""
+        """Return the options of a grid; the rate of a robot's own grid is limited."""
         options = super().options_for(found)
         if found.kind.name == "grid" and found.own:
             options["throttle"] = 500
@@ -145,18 +147,17 @@ class OccupancyGrid(MapLayer):
 
         Raises:
             ConfigError: If there is no such palette.
-
         """
         check_palette(self.palette)
         self.usual_order = 20.0 if self.palette == "costmap" else 10.0
         self.info: MapMetaDataMsg | None = None
-        """Size and place of what came last."""
+        """Size and position of the newest grid."""
         self.cells: NDArray[np.int8] | None = None
-        """What came last, of shape (height, width), the lowest row first."""
+        """The newest cells, of shape (height, width), the lowest row first."""
         self._drawing: asyncio.Task[None] | None = None
         self._undrawn = False
         self.svg.classes.add(self.palette)
-        # Each of several maps is switched by itself.
+        # Each of several maps has its own switch.
         self.svg.set("data-layer", self.topic)
         if self.palette == "costmap":
             self.svg.set("data-layer", None).set(opacity=0.7)
@@ -167,7 +168,7 @@ class OccupancyGrid(MapLayer):
         """Make the image, and subscribe to the grid and to its updates."""
         super().start()
         updates = self.topic.rstrip("/") + "_updates"
-        # Every update counts, so none may be held back or replaced by the next.
+        # Every update counts, so none may be delayed or replaced by the next.
         self.bridge.subscribe(
             updates,
             refusing(self, updates, self.on_update),
@@ -178,11 +179,10 @@ class OccupancyGrid(MapLayer):
         )
 
     def read(self, message: OccupancyGridMsg) -> "Found":
-        """Return size and place of a grid, and its cells.
+        """Return size and position of a grid, and its cells.
 
         Raises:
-            ProtocolError: If its size, its place or a cell makes no sense.
-
+            ProtocolError: If its size, its position or a cell is not valid.
         """
         info = message.info
         resolution = info.resolution
@@ -207,11 +207,11 @@ class OccupancyGrid(MapLayer):
         self._draw()
 
     def on_update(self, update: OccupancyGridUpdateMsg) -> None:
-        """Change a rectangle of the grid; without a grid there is nothing to change.
+        """Change a rectangle of the grid; does nothing without a grid.
 
         Raises:
-            ProtocolError: If it reaches out of the grid, or a cell makes no sense.
-
+            ProtocolError: If the rectangle extends beyond the grid, or a cell is not
+                valid.
         """
         if self.cells is None:
             return
@@ -238,12 +238,13 @@ class OccupancyGrid(MapLayer):
             self._drawing = spawn(self._draw_on())
 
     async def _draw_on(self) -> None:
-        """Draw what is newest until that is drawn."""
+        """Draw the newest grid until the drawing is up to date."""
         try:
             while self._undrawn and self.cells is not None and not self.scope.closed:
                 self._undrawn = False
                 cells, info = self.cells, self.info
-                # An update meanwhile may be half drawn; it has it drawn again.
+                # An update during the drawing may be half drawn; it causes another
+                # drawing.
                 try:
                     png = await draw_aside(cells, self.palette)
                 except ProtocolError as error:
@@ -264,11 +265,10 @@ class OccupancyGrid(MapLayer):
 
 
 def check_values(cells: "NDArray[np.int8]", palette: str) -> None:
-    """Let cells pass that the palette has a colour for.
+    """Check that the palette has a colour for all cells.
 
     Raises:
-        ProtocolError: If there are others; one of them is named.
-
+        ProtocolError: If it has not; the error names one of the values.
     """
     if palette == "raw":
         return

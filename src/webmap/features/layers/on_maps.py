@@ -1,4 +1,4 @@
-"""What a robot brings along to every map that shows it."""
+"""Modules of a robot that are added to every map that shows the robot."""
 
 import inspect
 from typing import TYPE_CHECKING, Any
@@ -14,23 +14,22 @@ if TYPE_CHECKING:
 
 @robot_modules.register
 class OnMaps:
-    """Gives every map that shows the robot a module, as long as it shows it.
+    """Adds a module to every map while the map shows the robot.
 
-    So a robot has its costmap and its markers with it, which are drawn by modules of
-    maps: ``robot.add_module("OnMaps", "Markers", bridge, "/bob/markers")``. They lie
-    on the common map as the robot is aligned: a module that takes a ``robot`` gets this
-    one, unless another is told.
+    For example a costmap or markers of a robot, which modules of maps draw:
+    ``robot.add_module("OnMaps", "Markers", bridge, "/bob/markers")``. They are on the
+    common map by the robot's alignment: a module with a ``robot`` argument gets this
+    robot, unless another is given.
 
     Args:
         robot: The robot.
         module: The name of a map module.
-        *args: What its constructor gets after the map.
-        **options: Its arguments by name.
+        *args: Arguments for the constructor, after the map.
+        **options: Keyword arguments for the constructor.
 
     Raises:
         ModuleNotFound: If there is no map module of that name.
-        ConfigError: If it takes no such arguments.
-
+        ConfigError: If the module does not accept the arguments.
     """
 
     def __init__(
@@ -48,12 +47,12 @@ class OnMaps:
             self.on_map(map, True)
 
     def destroy(self) -> None:
-        """Take the modules away."""
+        """Remove the modules."""
         for map in list(self._made):
             self.on_map(map, False)
 
     def on_map(self, map: "Map", shown: bool) -> None:
-        """Add the module to a map that shows the robot now, or take it away."""
+        """Add the module to a map that shows the robot now, or remove it."""
         if not shown:
             module = self._made.pop(map, None)
             if module is not None and module in map.modules:

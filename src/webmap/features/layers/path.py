@@ -1,4 +1,4 @@
-"""The way that a robot's planner has in mind."""
+"""Paths of a robot's planner."""
 
 import math
 from itertools import pairwise
@@ -39,19 +39,19 @@ from webmap.scene import svg
     rank=40,
 )
 class Path(RobotLayer):
-    """A line that stays in place on the map while the robot goes along.
+    """A line that stays in place on the map while the robot moves.
 
-    Fires ``on_path_update``. The poses are in the map's frame, or in the frame that the
-    message names if the robot knows frames. A path without poses takes the line away.
+    Fires ``on_path_update``. The poses are in the map's frame, or in the frame of the
+    message if the robot has frames. A path without poses removes the line.
 
-    Style it by CSS: ``.path > polyline``, and one of several by its name:
-    ``.path.local > polyline``.
+    Style it by CSS: ``.path > polyline``, and one of several by its name: ``.path.local
+    > polyline``.
     """
 
     topic: str = "/plan"
 
     max_points: Annotated[int, Limit("at least 2", lambda value: value >= 2)] = 500
-    """How many poses are drawn at the most, evenly chosen."""
+    """The greatest number of poses that are drawn, evenly chosen."""
 
     throttle: int = 500
     age_limit: float = 5.0
@@ -71,44 +71,41 @@ class Path(RobotLayer):
 
     @property
     def points(self) -> list[tuple[float, float]]:
-        """The newest path, all of it, in metres in the map's frame.
+        """All positions of the newest path, in metres in the map's frame.
 
-        Only the positions that are drawn are known to be finite.
+        Only the drawn positions were checked to be finite.
         """
         poses = self._message.poses if self._message is not None else []
         return [(p.pose.position.x, p.pose.position.y) for p in poses]
 
     @property
     def length(self) -> float:
-        """How long the path is, in metres; 0 if there is none."""
+        """Length of the path, in metres; 0 if there is none."""
         return sum(math.dist(one, next) for one, next in pairwise(self.points))
 
     def take(self, message: PathMsg) -> None:
-        """Draw a path in place of the one before, and fire ``on_path_update``.
+        """Draw a path in place of the last one, and fire ``on_path_update``.
 
         Raises:
-            ProtocolError: If it cannot be drawn.
-
+            ProtocolError: If the path cannot be drawn.
         """
         super().take(message)
         self._message = message
         self.robot.notify_modules("on_path_update", self)
 
     def read(self, message: PathMsg) -> list[Vector3]:
-        """Return the positions that are to be drawn.
+        """Return the positions to draw.
 
         Raises:
-            ProtocolError: If one of them is not finite, or farther away than anything
-                can be.
-
+            ProtocolError: If a position is not finite, or beyond the greatest distance.
         """
-        # Only these are looked at, so that a long path does not hold up other robots.
+        # Only these are checked, so that a long path does not delay other robots.
         kept = thinned(len(message.poses), self.max_points)
         chosen = [message.poses[index].pose.position for index in kept]
         check_finite([(place.x, place.y) for place in chosen], "a path")
         return in_space(chosen)
 
     def draw(self, found: list[Vector3], at: Transform) -> None:
-        """Draw the line as it looks from above."""
+        """Draw the line as seen from above."""
         line = flat(found, at)
         self.line.set(points=[(rounded(x), rounded(y)) for x, y in line])

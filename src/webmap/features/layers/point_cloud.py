@@ -1,4 +1,4 @@
-"""Clouds of points, seen from above."""
+"""Point clouds, seen from above."""
 
 import binascii
 import math
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     Found: TypeAlias = tuple[NDArray[np.float64], NDArray[np.float64] | None]
 
 MAX_POINTS = 1 << 23
-"""The most points that a cloud may have."""
+"""Greatest number of points of a cloud."""
 
 MANY = 100_000
-"""Points of which no more are looked at one by one."""
+"""Greatest number of points that are processed one by one."""
 
 MOST = 2 * MANY
-"""Points of a large cloud that the worker process hands over, evenly chosen."""
+"""Points of a large cloud that the worker process returns, evenly chosen."""
 
 COLOURS = (
     "#30318f", "#2f6fde", "#1aa5c8", "#1fbf7a", "#8fcf2f", "#e8c51c", "#f08a1d",
@@ -41,12 +41,12 @@ COLOURS = (
 """From low to high."""
 
 
-# By the constants of sensor_msgs/PointField.
+# Indexed by the constants of sensor_msgs/PointField.
 _FORMATS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 
 
 class Octets(Numbers):
-    """Bytes of ``uint8[]``: JSON brings them in base64, or as a list of numbers."""
+    """Bytes of ``uint8[]``: in JSON base64, or a list of numbers."""
 
     typecode = "B"
     __slots__ = ()
@@ -61,7 +61,7 @@ class Octets(Numbers):
         return super()._numbers(value)
 
     def array(self) -> "NDArray[np.uint8]":
-        """Return the bytes as a read-only array of shape (N,), not copied."""
+        """Return the bytes as a read-only array of shape (N,), without a copy."""
         import numpy as np
 
         return np.frombuffer(memoryview(self.values).toreadonly(), np.uint8)
@@ -72,7 +72,7 @@ class PointFieldMsg(msgspec.Struct, frozen=True):
 
     name: str
     offset: int
-    """Bytes from the point's beginning."""
+    """Offset from the point's beginning, in bytes."""
 
     datatype: int
     """1 to 8: int8, uint8, int16, uint16, int32, uint32, float32, float64."""
@@ -87,10 +87,10 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
     width: int
     fields: list[PointFieldMsg]
     point_step: int
-    """Bytes a point."""
+    """Bytes per point."""
 
     row_step: int
-    """Bytes a row; more than its points take, if rows are padded."""
+    """Bytes per row; more than its points take, if rows are padded."""
 
     data: Octets
     is_bigendian: bool = False
@@ -102,8 +102,7 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
             *names: The fields' names.
 
         Raises:
-            ProtocolError: If there is no such field, or the sizes do not fit.
-
+            ProtocolError: If there is no such field, or the sizes do not match.
         """
         import numpy as np
 
@@ -136,15 +135,14 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
         return [points[name].astype(np.float64) for name in names]
 
     def digest(self) -> "PointCloud2Msg":
-        """Return what can be drawn of the cloud; called in the worker process."""
+        """Return the drawable part of the cloud; called in the worker process."""
         return self.thinned(MOST)
 
     def thinned(self, most: int) -> "PointCloud2Msg":
-        """Return the cloud with ``most`` points at the most, evenly chosen, in one row.
+        """Return the cloud with at most ``most`` points, evenly chosen, in one row.
 
         Raises:
-            ProtocolError: If the sizes do not fit.
-
+            ProtocolError: If the sizes do not match.
         """
         row_step = self._row_step
         self._check_sizes(row_step)
@@ -181,7 +179,7 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
 
     @property
     def _row_step(self) -> int:
-        """Bytes a row; some drivers leave that out of a cloud of a single row."""
+        """Bytes per row; some drivers leave this out of a cloud of a single row."""
         if self.row_step == 0 and self.height == 1:
             return self.width * self.point_step
         return self.row_step
@@ -220,64 +218,65 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
     rank=30,
 )
 class PointCloud(RobotLayer):
-    """A cloud of points as dots, as it looks from above.
+    """A cloud of points as dots, seen from above.
 
-    Points are first taken from the cloud's frame to the map as both were at its stamp,
-    with all of its turns and its height: a lidar may be tilted or hang upside down, and
-    a camera's optical frame has z forward. Then heights are looked at, and only then
-    is the cloud flattened.
+    Points are first transformed from the cloud's frame to the map, both at the cloud's
+    stamp, with all rotations and the height: a lidar may be tilted or upside down, and
+    z of a camera's optical frame points forward. Then heights are checked, and only
+    then is the cloud flattened.
 
-    Heights are in metres above the robot's base frame (``base_link``, or what
-    ``base_frame`` says), straight up whatever way the robot leans: 0 is the floor where
-    that frame is on the floor. In a cloud with ``frame="map"`` they are above the map's
-    plane. Where no frames tell how the sensor is mounted, its z is taken to point up
-    and to begin at the base.
+    Heights are in metres above the robot's base frame (``base_link``, or the frame of
+    ``base_frame``), straight up even if the robot is tilted: 0 is the floor if that
+    frame is on the floor. In a cloud with ``frame="map"`` they are above the map's
+    plane. Without frames for the sensor, its z is assumed to point up and to begin at
+    the base frame.
 
     A cloud of one row may have a ``row_step`` of 0. Of points above one another one dot
-    is drawn. With ``colour_by`` the dots are in
-    eight bands of a field's values, each with a class: ``band-0`` is the lowest.
+    is drawn. With ``colour_by`` the dots are in eight bands of a field's values, each
+    with a class: ``band-0`` is the lowest.
 
     Style it by CSS: ``.pointcloud > .dot``, ``.pointcloud > .dot.band-7``; the dots'
     size is the custom property ``--dot-size``, in metres.
     """
 
     x: float = 0.0
-    """Where the sensor is on the robot, in metres forward."""
+    """Position of the sensor on the robot, in metres forward."""
 
     y: float = 0.0
-    """In metres to the left."""
+    """Position of the sensor on the robot, in metres to the left."""
 
     angle: float = 0.0
-    """Where it looks, in degrees from the robot's x, counter-clockwise."""
+    """Direction of the sensor, in degrees from the robot's x, counter-clockwise."""
 
     _: KW_ONLY
 
     z_min: float = -math.inf
-    """The height of the lowest point that is drawn, in metres above the base."""
+    """The least height of a drawn point, in metres above the base frame."""
 
     z_max: float = math.inf
-    """The height of the highest."""
+    """The greatest height of a drawn point, in metres above the base frame."""
 
     cell: Annotated[
         float, Limit("metres of at least 0", lambda side: 0 <= side < math.inf)
     ] = 0.05
-    """Of points in one square of this side, in metres, one is drawn; 0 for all."""
+    """One point is drawn in each square of this side, in metres; 0 for all."""
 
     max_points: Count = 3000
-    """How many dots are drawn at the most, evenly chosen."""
+    """The greatest number of dots, evenly chosen."""
 
     colour_by: str | None = None
     """The name of the field whose values give the colours, such as ``"intensity"``;
-    ``"z"`` is the height above the base."""
+    ``"z"`` is the height above the base frame.
+    """
 
     low: float | None = None
-    """The value that begins the lowest band; the least of a cloud if not given."""
+    """The lower limit of the lowest band; the cloud's least value if not given."""
 
     high: float | None = None
-    """The value that ends the highest band; the greatest if not given."""
+    """The upper limit of the highest band; the cloud's greatest value if not given."""
 
     frame: Frame = "robot"
-    """``"map"`` for a cloud that is given in the map's frame."""
+    """``"map"`` for a cloud in the map's frame."""
 
     throttle: int = 500
     age_limit: float = 2.0
@@ -287,7 +286,6 @@ class PointCloud(RobotLayer):
 
         Raises:
             ConfigError: If ``z_min`` is not below ``z_max``.
-
         """
         if not self.z_min < self.z_max:
             raise ConfigError(
@@ -302,13 +300,12 @@ class PointCloud(RobotLayer):
         self.svg.append(*self.dots)
 
     def read(self, message: PointCloud2Msg) -> "Found":
-        """Return points of the cloud's frame, and a field's values.
+        """Return points in the cloud's frame, and a field's values.
 
         Points are of shape (N, 3), or (N, 2) if the cloud has no heights.
 
         Raises:
-            ProtocolError: If the sizes of a cloud do not fit, or it has not the fields.
-
+            ProtocolError: If the sizes of a cloud do not match, or a field is missing.
         """
         import numpy as np
 
@@ -320,14 +317,14 @@ class PointCloud(RobotLayer):
         columns = dict(zip(names, message.columns(*names), strict=True))
         keep = np.ones(len(columns["x"]), dtype=bool)
         for axis in axes:
-            keep &= abs(columns[axis]) < FARTHEST  # nor is what is not finite
+            keep &= abs(columns[axis]) < FARTHEST  # also false if not finite
         points = np.column_stack([columns[axis][keep] for axis in axes])
         if self.colour_by in (None, "z"):
             return points, None
         return points, columns[str(self.colour_by)][keep]
 
     def draw(self, found: "Found", at: Transform) -> None:
-        """Draw what is left of the points when they are flat."""
+        """Draw the remaining points after flattening."""
         points, values = found
         places, heights = levelled(points, at)
         if self.colour_by == "z":
@@ -349,7 +346,7 @@ class PointCloud(RobotLayer):
     def _choose(
         self, places: "NDArray[np.float64]", heights: "NDArray[np.float64] | None"
     ) -> "NDArray[np.int64]":
-        """Return which points to draw."""
+        """Return the indices of the points to draw."""
         import numpy as np
 
         chosen = np.arange(len(places))
@@ -373,7 +370,7 @@ class PointCloud(RobotLayer):
             low = float(known.min()) if len(known) else 0.0
         if high is None:
             high = float(known.max()) if len(known) else 1.0
-        # Differences of numbers that are finite and absurd may be infinite.
+        # Differences of finite but extreme numbers may be infinite.
         with np.errstate(over="ignore", invalid="ignore"):
             width = np.subtract(high, low) if high > low else 1.0
             share = (values - low) / width
@@ -383,12 +380,11 @@ class PointCloud(RobotLayer):
 
 
 def one_a_cell(points: "NDArray[np.float64]", cell: float) -> "NDArray[np.int64]":
-    """Return which points to keep so that each square of a side has one at the most.
+    """Return the indices of points to keep, so that each square has at most one.
 
     Args:
-        points: Of shape (N, 2), in metres, N above 0.
-        cell: The side, in metres.
-
+        points: Points of shape (N, 2), in metres, N above 0.
+        cell: The side of a square, in metres.
     """
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""A point that somebody publishes, such as what a controller steers to."""
+"""Single points, such as the point that a controller steers to."""
 
 import math
 
@@ -27,8 +27,7 @@ class PointStampedMsg(Stamped, frozen=True, kw_only=True):
             "lookahead",
             {r"/lookahead_point\Z": "what a controller steers to"},
             most=1,
-            # A controller gives it in the frame of the base, also where no frames are
-            # told.
+            # A controller publishes it in the robot's frame, also without known frames.
             options={"name": "lookahead", "frame": "robot", "age_limit": 2.0},
         ),
         TopicKind("point"),
@@ -39,26 +38,25 @@ class PointStampedMsg(Stamped, frozen=True, kw_only=True):
 class PointStamped(RobotLayer):
     """A spot at a point, such as ``/clicked_point`` of RViz.
 
-    What Nav2's regulated pure pursuit steers to, ``/lookahead_point``, is given in the
-    robot's frame: with ``frame="robot"`` it is in place also where the robot has no
-    frames. The console shows a point of the class ``lookahead`` only as long as it is
-    not old, since nobody steers to it later.
+    Nav2's regulated pure pursuit publishes the point that it steers to,
+    ``/lookahead_point``, in the robot's frame: with ``frame="robot"`` it is drawn
+    correctly also if the robot has no frames. The console hides a stale point of the
+    class ``lookahead``, because the robot no longer steers to it.
 
     Style it by CSS: ``.pointstamped > .point``, and one of several by its name:
     ``.pointstamped.lookahead > .point``.
     """
 
     frame: Frame = "map"
-    """``"robot"`` for a point in the robot's own frame, as Nav2's controllers give
-    it."""
+    """``"robot"`` for a point in the robot's own frame, as from Nav2's controllers."""
 
     radius: Metres = 0.1
-    """How large the spot is, in metres."""
+    """Radius of the spot, in metres."""
 
     def build(self) -> None:
         """Make the spot, hidden until there is a point."""
         self.point: Vector3 | None = None
-        """The newest point, as the message has it, in metres."""
+        """The newest point in the message's frame, in metres."""
         self.spot = self.add(
             svg.circle(
                 class_="point",
@@ -73,11 +71,10 @@ class PointStamped(RobotLayer):
         self.svg.set(visibility="hidden")
 
     def read(self, message: PointStampedMsg) -> Vector3:
-        """Return a point that is somewhere; without a height it is in the plane.
+        """Return the point; without a height it is in the plane.
 
         Raises:
-            ProtocolError: If it is not finite, or farther away than anything can be.
-
+            ProtocolError: If the point is not finite, or beyond the greatest distance.
         """
         p = message.point
         if not (math.isfinite(p.x) and math.isfinite(p.y)):
@@ -98,7 +95,7 @@ class PointStamped(RobotLayer):
         return Vector3(p.x, p.y, height)
 
     def draw(self, found: Vector3, at: Transform) -> None:
-        """Put the spot where the point is seen from above."""
+        """Move the spot to the point, as seen from above."""
         self.point = found
         ((x, y),) = flat([found], at)
         self.spot.set_pose(rounded(x), rounded(y), 0.0)

@@ -28,11 +28,10 @@ class PolygonStampedMsg(Stamped, frozen=True, kw_only=True):
     polygon: PolygonMsg
 
     def digest(self) -> "PolygonStampedMsg":
-        """Return the polygon if it is not too long; called in the worker process.
+        """Return the polygon if it is small enough; called in the worker process.
 
         Raises:
-            TooLarge: If it has more corners than are drawn.
-
+            TooLarge: If it has too many corners.
         """
         check_items("corners", len(self.polygon.points))
         return self
@@ -58,7 +57,7 @@ class PolygonStampedMsg(Stamped, frozen=True, kw_only=True):
 class Polygon(RobotLayer):
     """A polygon, such as the footprint that a costmap publishes.
 
-    That is ``/local_costmap/published_footprint`` in Nav2, and
+    The topic of a footprint is ``/local_costmap/published_footprint`` in Nav2, and
     ``/move_base/local_costmap/footprint`` in ROS 1. A polygon without points draws
     nothing.
 
@@ -69,8 +68,9 @@ class Polygon(RobotLayer):
     name: str = "footprint"
 
     frame: Frame = "map"
-    """``"map"``, in which costmaps give footprints, or ``"robot"`` for a polygon in the
-    robot's own frame."""
+    """``"map"``, the frame of costmaps' footprints, or ``"robot"`` for a polygon in the
+    robot's own frame.
+    """
 
     age_limit: Seconds = 5.0
 
@@ -92,9 +92,8 @@ class Polygon(RobotLayer):
         """Return the corners.
 
         Raises:
-            ProtocolError: If a point is not finite or farther away than anything can
-                be, or there are too many.
-
+            ProtocolError: If a point is not finite or beyond the greatest distance, or
+                if there are too many.
         """
         points = [(point.x, point.y) for point in message.polygon.points]
         if len(points) > MAX_POINTS:
@@ -105,7 +104,7 @@ class Polygon(RobotLayer):
         return in_space(message.polygon.points)
 
     def draw(self, found: list[Vector3], at: Transform) -> None:
-        """Draw the outline as it looks from above."""
+        """Draw the outline as seen from above."""
         self.points = [(point.x, point.y) for point in found]
         corners = flat(found, at)
         self.outline.set(points=[(rounded(x), rounded(y)) for x, y in corners])

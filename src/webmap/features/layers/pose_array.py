@@ -1,4 +1,4 @@
-"""Many poses at once, such as the particles of a localisation."""
+"""Arrays of poses, such as the particles of a localisation."""
 
 import math
 
@@ -61,7 +61,7 @@ POSES, PARTICLES = "geometry_msgs/PoseArray", "nav2_msgs/ParticleCloud"
 class PoseArray(RobotLayer):
     """An arrow for each of many poses, such as ``/particlecloud`` of AMCL in ROS 1.
 
-    Poses with a quaternion of zeros are left out, and how many is said.
+    Poses with a quaternion of zeros are left out, and their number is reported.
 
     Style them by CSS: ``.posearray > .arrow``.
     """
@@ -69,17 +69,18 @@ class PoseArray(RobotLayer):
     in_plane = True
 
     type: str = POSES
-    """``geometry_msgs/PoseArray`` or ``nav2_msgs/ParticleCloud``, which is
-    ``/particle_cloud`` of Nav2."""
+    """``geometry_msgs/PoseArray`` or ``nav2_msgs/ParticleCloud``, the type of
+    ``/particle_cloud`` in Nav2.
+    """
 
     frame: Frame = "map"
     """``"robot"`` for poses in the robot's own frame."""
 
     length: Metres = 0.2
-    """How long an arrow is, in metres."""
+    """Length of an arrow, in metres."""
 
     max_poses: Count = 500
-    """How many are drawn at the most, evenly chosen."""
+    """The greatest number of poses that are drawn, evenly chosen."""
 
     throttle: int = 500
     age_limit: float = 10.0
@@ -93,12 +94,11 @@ class PoseArray(RobotLayer):
 
     @property
     def poses(self) -> list[Pose]:
-        """The newest poses, all of them but those that turn nowhere.
+        """All newest poses, except those with a quaternion of zeros.
 
         Raises:
-            ProtocolError: If one of them is not finite, which only those that are drawn
-                are known to be.
-
+            ProtocolError: If a pose is not finite; only the drawn poses were checked
+                before.
         """
         given = self._message.poses if self._message is not None else []
         return [pose.usable for pose in given if not pose.turns_nowhere]
@@ -106,14 +106,13 @@ class PoseArray(RobotLayer):
     def read(
         self, message: PoseArrayMsg | ParticleCloudMsg
     ) -> tuple[PoseArrayMsg | ParticleCloudMsg, list[Pose]]:
-        """Return the message and those of its poses that are to be drawn.
+        """Return the message and the poses to draw.
 
         Raises:
-            ProtocolError: If one of them is not finite.
-
+            ProtocolError: If a pose is not finite.
         """
         given = message.poses
-        # Only these are looked at: 20,000 would hold up the other robots for 0.1 s.
+        # Only these are checked: 20,000 would delay the other robots by 0.1 s.
         chosen = [given[index] for index in thinned(len(given), self.max_poses)]
         poses = [pose.usable for pose in chosen if not pose.turns_nowhere]
         missing = len(chosen) - len(poses)
@@ -127,13 +126,13 @@ class PoseArray(RobotLayer):
     def draw(
         self, found: tuple[PoseArrayMsg | ParticleCloudMsg, list[Pose]], at: Transform
     ) -> None:
-        """Draw the arrows; no poses draw nothing."""
+        """Draw the arrows; nothing without poses."""
         self._message, poses = found
         self.arrows.set(d="".join(arrow(pose, self.length) for pose in poses) or None)
 
 
 def arrow(pose: Pose, length: float) -> str:
-    """Return the path of a narrow triangle that begins at a pose and points along."""
+    """Return the path of a narrow triangle that begins at a pose and points along x."""
     cos, sin = math.cos(pose.yaw) * length, math.sin(pose.yaw) * length
     # From one corner of its base to the tip, and back to the other corner.
     x, y = pose.x - 0.12 * sin, pose.y + 0.12 * cos

@@ -1,4 +1,4 @@
-"""A pose that somebody publishes, such as a goal, as an arrow."""
+"""Single poses, such as a goal, drawn as an arrow."""
 
 import math
 
@@ -33,9 +33,9 @@ from webmap.scene import svg
 class PoseStamped(RobotLayer):
     """An arrow that points along x of a pose, such as ``/goal_pose``.
 
-    With ``name="goal"`` it is where the robot is sent: it is hidden as long as the goal
-    tool shows a goal of the robot, so that nothing is drawn twice, and it goes when the
-    robot gets there.
+    With ``name="goal"`` it is the robot's goal: it is hidden while the goal tool shows
+    a goal of the robot, so that no goal is drawn twice, and it is removed when the
+    robot reaches it.
 
     Style it by CSS: ``.posestamped > .arrow``, and one of several by its name:
     ``.posestamped.goal > .arrow``.
@@ -47,15 +47,15 @@ class PoseStamped(RobotLayer):
     """``"robot"`` for a pose in the robot's own frame."""
 
     length: Metres = 0.6
-    """How long the arrow is, in metres."""
+    """Length of the arrow, in metres."""
 
     reached: Metres = 0.4
-    """How near the robot is, in metres, when it got to a pose named ``goal``."""
+    """Distance in metres within which the robot has reached a pose named ``goal``."""
 
     def build(self) -> None:
         """Make the arrow, hidden until there is a pose."""
         self.pose: Pose | None = None
-        """The newest pose, as the message has it."""
+        """The newest pose, in the message's frame."""
         self.arrow = self.add(
             svg.path(class_="arrow", fill="#b3261e", fill_opacity=0.85)
         )
@@ -63,30 +63,29 @@ class PoseStamped(RobotLayer):
         self.svg.set(visibility="hidden")
         self._ends = self.name == "goal" and self.frame == "map"
         self._goes_to: Pose | None = None
-        """What is drawn until the robot gets there."""
+        """The goal that is drawn until the robot reaches it."""
         self._count = 0
 
     def read(self, message: PoseStampedMsg) -> tuple[Pose, str]:
         """Return a pose that can be drawn, and its frame.
 
         Raises:
-            ProtocolError: If it is not finite or turns nowhere.
-
+            ProtocolError: If it is not finite or its quaternion is zero.
         """
         return message.pose.usable, message.frame_id
 
     def draw(self, found: tuple[Pose, str], at: Transform) -> None:
-        """Put the arrow there."""
+        """Move the arrow to the pose."""
         self.pose, frame_id = pose, _ = found
         self._goes_to = pose if self._ends and self._in_map(frame_id) else None
         self.arrow.set_pose(pose.x, pose.y, pose.yaw)
         self._count += 1
-        # By this the page knows one that the goal tool has shown already.
+        # Identifies a goal that the goal tool has shown already.
         self.svg.set("data-pose", f"{self.topic} {self._count}")
         self.svg.set(visibility=None)
 
     def on_odometry_update(self) -> None:
-        """Hide a goal when the robot gets there."""
+        """Hide a goal when the robot reaches it."""
         if self._goes_to is not None and self._is_there(self._goes_to):
             self._goes_to = None
             self.svg.set(visibility="hidden")
@@ -97,7 +96,7 @@ class PoseStamped(RobotLayer):
         return math.dist((x, y), (at.x, at.y)) < self.reached
 
     def _in_map(self, frame_id: str) -> bool:
-        """Tell whether a frame is that of the robot's poses, so that both compare."""
+        """Return whether a frame is that of the robot's poses, so that both compare."""
         tf, frames = self.robot.tf, self.robot.whereabouts.frames
         if tf is None or frames is None:
             return frame_id.strip("/") in ("", "map")
@@ -106,7 +105,7 @@ class PoseStamped(RobotLayer):
 
 
 def arrow(length: float) -> str:
-    """Return the path of an arrow along x, whose head is a third of it."""
+    """Return the path of an arrow along x, whose head is a third of its length."""
     shaft, half = length * 2 / 3, length / 20
     wide = length / 6
     return (

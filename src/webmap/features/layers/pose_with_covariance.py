@@ -1,4 +1,4 @@
-"""How sure a robot is of where it is."""
+"""The uncertainty of a robot's pose."""
 
 import math
 from typing import Annotated
@@ -19,52 +19,50 @@ AMCL, ODOMETRY = "geometry_msgs/PoseWithCovarianceStamped", "nav_msgs/Odometry"
 
 
 class DoubtfulPoseMsg(msgspec.Struct, frozen=True):
-    """``geometry_msgs/PoseWithCovariance``, covariance and all."""
+    """``geometry_msgs/PoseWithCovariance`` with its covariance."""
 
     pose: PoseMsg
     covariance: list[float]
-    """36 numbers, row by row: x, y, z and turns about them."""
+    """36 numbers, row by row: x, y, z and rotations about them."""
 
 
 class Ellipse(msgspec.Struct, frozen=True):
-    """Where something is with a certain probability."""
+    """The area that contains a position with a certain probability."""
 
     major: float
-    """The longer half axis, in standard deviations of a metre."""
+    """The longer half axis, in metres per standard deviation."""
 
     minor: float
-    """The shorter half axis."""
+    """The shorter half axis, in metres per standard deviation."""
 
     yaw: float
-    """How far the longer axis is turned from x, in radians."""
+    """Angle from x to the longer axis, in radians."""
 
 
 class DoubtfulPoseStampedMsg(Stamped, frozen=True, kw_only=True):
     """``geometry_msgs/PoseWithCovarianceStamped`` and ``nav_msgs/Odometry``.
 
-    Both have the same fields as far as they are wanted here.
+    Both have the fields that this view needs.
     """
 
     pose: DoubtfulPoseMsg
 
     @property
     def place(self) -> Pose:
-        """Place and heading in the plane.
+        """Position and heading in the plane.
 
         Raises:
-            ProtocolError: If it is not finite, or a quaternion of zeros.
-
+            ProtocolError: If it is not finite, or its quaternion is zero.
         """
         return self.pose.pose.usable
 
     @property
     def ellipse(self) -> Ellipse:
-        """The ellipse of one standard deviation about the place.
+        """The ellipse of one standard deviation about the position.
 
         Raises:
             ProtocolError: If the covariance has not 36 finite numbers, or its part in
-                the plane is that of no spread at all, or of one that nothing can have.
-
+                the plane is no valid spread, or an impossibly large one.
         """
         c = self._covariance()
         xx, xy, yy = c[0], (c[1] + c[6]) / 2, c[7]
@@ -88,9 +86,8 @@ class DoubtfulPoseStampedMsg(Stamped, frozen=True, kw_only=True):
         """The standard deviation of the heading, in radians.
 
         Raises:
-            ProtocolError: If the covariance has not 36 finite numbers, or it is
-                negative.
-
+            ProtocolError: If the covariance has not 36 finite numbers, or the variance
+                is negative.
         """
         variance = self._covariance()[35]
         if variance < 0:
@@ -128,9 +125,9 @@ class DoubtfulPoseStampedMsg(Stamped, frozen=True, kw_only=True):
     rank=60,
 )
 class PoseWithCovariance(RobotLayer):
-    """The ellipse in which a robot takes itself to be, and its heading's sector.
+    """The ellipse of a robot's estimated position, and the sector of its heading.
 
-    Where and how large it is comes from the message, in the map's frame.
+    The pose and the uncertainty come from the message, in the map's frame.
 
     Style it by CSS: ``.covariance > .ellipse`` and ``.covariance > .heading``.
     """
@@ -145,12 +142,13 @@ class PoseWithCovariance(RobotLayer):
     deviations: Annotated[
         float, Limit("above 0", lambda value: math.isfinite(value) and value > 0)
     ] = 2.0
-    """How many standard deviations are drawn."""
+    """The number of standard deviations that are drawn."""
 
     def build(self) -> None:
         """Make the ellipse and the sector.
 
-        AMCL is silent while a robot stands, so that nothing is old for long.
+        The age limit is long, because AMCL publishes nothing while the robot does not
+        move.
         """
         self.ellipse = self.add(
             svg.ellipse(
@@ -162,11 +160,10 @@ class PoseWithCovariance(RobotLayer):
         )
 
     def read(self, message: DoubtfulPoseStampedMsg) -> tuple[Pose, Ellipse, float]:
-        """Return the place, the ellipse, and half the angle of the sector in radians.
+        """Return the pose, the ellipse, and half the angle of the sector in radians.
 
         Raises:
-            ProtocolError: If the pose or the covariance makes no sense.
-
+            ProtocolError: If the pose or the covariance is not valid.
         """
         place, ellipse = message.place, message.ellipse
         turn = self.deviations * message.heading_deviation

@@ -1,4 +1,4 @@
-"""Sonars and other sensors that measure one distance."""
+"""Range sensors, such as sonars, that measure one distance."""
 
 import math
 from dataclasses import KW_ONLY
@@ -13,23 +13,23 @@ from webmap.ros.tf import Transform
 from webmap.scene import svg
 
 LEVEL = 0.02
-"""Sine of the angle up or down below which a sensor is said to look ahead."""
+"""Sine of the angle up or down below which a sensor counts as level."""
 
 
 class RangeMsg(Stamped, frozen=True, kw_only=True):
-    """``sensor_msgs/Range``: one ray, as wide as a cone."""
+    """``sensor_msgs/Range``: one distance within a cone."""
 
     field_of_view: float
-    """The cone's whole angle, in radians."""
+    """The whole angle of the cone, in radians."""
 
     min_range: float
-    """Metres."""
+    """In metres."""
 
     max_range: float
-    """Metres."""
+    """In metres."""
 
     range: float
-    """Metres; infinite if nothing is there, NaN if it does not know."""
+    """In metres; infinite if nothing is in reach, NaN if unknown."""
 
     radiation_type: int = 0
     """0 ultrasound, 1 infrared."""
@@ -43,29 +43,29 @@ class RangeMsg(Stamped, frozen=True, kw_only=True):
     rank=110,
 )
 class Range(RobotLayer):
-    """A cone up to what a sensor measures; the cone is in the robot's frame.
+    """A cone up to a range sensor's measured distance, in the robot's frame.
 
-    The cone ends where something is, or at the sensor's reach if nothing is there;
-    then it has the class ``clear``. Without a reading there is no cone. A sensor of
-    fixed distance says -inf for "something" and +inf for "nothing" (REP 117). One that
-    looks up or down has the outline that its cone has from above; how it is turned
-    about its own axis does not matter.
+    The cone ends at the detected object, or at the sensor's greatest range if nothing
+    is detected; then it has the class ``clear``. Without a reading there is no cone. A
+    sensor of fixed distance reports -inf for "object" and +inf for "nothing" (REP 117).
+    The cone of a sensor that points up or down is drawn as its outline looks from
+    above; the rotation about its own axis does not matter.
 
     Style it by CSS: ``.range > .cone`` and ``.range > .cone.clear``.
     """
 
-    encoding = "binary"  # text has no infinity, which is a reading
+    encoding = "binary"  # JSON has no infinity, which is a reading
 
     frame = "robot"
 
     x: float = 0.0
-    """Where the sensor is on the robot, in metres forward."""
+    """Position of the sensor on the robot, in metres forward."""
 
     y: float = 0.0
-    """In metres to the left."""
+    """Position of the sensor on the robot, in metres to the left."""
 
     angle: float = 0.0
-    """Where it looks, in degrees from the robot's x, counter-clockwise."""
+    """Direction of the sensor, in degrees from the robot's x, counter-clockwise."""
 
     _: KW_ONLY
 
@@ -74,7 +74,7 @@ class Range(RobotLayer):
     def build(self) -> None:
         """Make the cone."""
         self.distance: float | None = None
-        """In metres; infinite if nothing is in reach, None if that is not known."""
+        """In metres; infinite if nothing is in reach, None if unknown."""
         self.cone = self.add(
             svg.path(class_="cone", fill="#d9822b", fill_opacity=0.35, stroke="none")
         )
@@ -83,8 +83,7 @@ class Range(RobotLayer):
         """Return the distance, and the length and half the angle of the cone.
 
         Raises:
-            ProtocolError: If the sensor's own numbers make no sense.
-
+            ProtocolError: If the sensor's own parameters are not valid.
         """
         reach, nearest = message.max_range, message.min_range
         view = message.field_of_view
@@ -110,7 +109,7 @@ class Range(RobotLayer):
         return distance, drawn, view / 2
 
     def draw(self, found: tuple[float | None, float, float], at: Transform) -> None:
-        """Draw the cone as it looks from above."""
+        """Draw the cone as seen from above."""
         self.distance, reach, half = found
         self.cone.classes.toggle("clear", self.distance == math.inf)
         if abs(at.rows[2][0]) < LEVEL:

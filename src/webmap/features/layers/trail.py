@@ -1,4 +1,4 @@
-"""The way that a robot has come."""
+"""The path that a robot has driven."""
 
 import math
 from collections import deque
@@ -15,26 +15,25 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 PIECE = 50
-"""Points after which a piece of the trail is done with and never sent again."""
+"""Points after which a piece of the trail is complete and never sent again."""
 
 
 @robot_modules.register
 class Trail:
-    """Draws where the robot was, as a line behind it.
+    """Draws the past positions of the robot as a line.
 
-    A jump, as when it is localised anew, breaks the line.
+    A jump, such as after a new localisation, breaks the line.
 
     Style it by CSS: ``.trail > polyline``.
 
     Args:
-        robot: The robot; its odometry topic says where it is.
-        length: How much of its way is kept, in metres.
-        step: How far it has to go for another point, in metres.
-        jump: From how far on, in metres, two poses have no way between them.
+        robot: The robot; its odometry topic has its position.
+        length: The length of the trail, in metres.
+        step: The distance between two points, in metres.
+        jump: The distance in metres from which two poses are not connected by a line.
 
     Raises:
         ConfigError: If ``length``, ``step`` or ``jump`` is not a number above 0.
-
     """
 
     def __init__(
@@ -61,17 +60,17 @@ class Trail:
 
     @property
     def points(self) -> list[list[tuple[float, float]]]:
-        """The trail, oldest first, in pieces that go on from one another or not."""
+        """The trail, oldest first, in pieces that may be connected."""
         return [list(piece.points) for piece in self._pieces]
 
     def clear(self) -> None:
-        """Forget the way so far."""
+        """Remove the trail so far."""
         self.svg.clear()
         self._pieces.clear()
         self._last = None
 
     def on_odometry_update(self) -> None:
-        """Go on to where the robot is now."""
+        """Extend the trail to the robot's position."""
         at = (self.robot.position.x, self.robot.position.y)
         far = math.inf if self._last is None else math.dist(self._last, at)
         if far < self.step:
@@ -93,7 +92,7 @@ class Trail:
         self.svg.append(piece.line)
 
     def _forget_old(self) -> None:
-        """Keep as many pieces as the length takes, and shorten the oldest of them."""
+        """Keep the pieces within the length, and shorten the oldest."""
         surplus = sum(piece.length for piece in self._pieces) - self.length
         while surplus >= self._pieces[0].length and len(self._pieces) > 1:
             old = self._pieces.popleft()
@@ -119,13 +118,13 @@ class _Piece:
         )
 
     def go(self, at: tuple[float, float], far: float) -> None:
-        """Go on to a point, which is so far from the last."""
+        """Extend the line to a point at the given distance from the last."""
         self.points.append(at)
         self.length += far
         self._draw()
 
     def shorten(self, surplus: float) -> None:
-        """Drop points at the beginning as long as what is left is long enough."""
+        """Remove points at the beginning while the rest stays long enough."""
         changed = False
         while len(self.points) > 2:
             first = math.dist(self.points[0], self.points[1])

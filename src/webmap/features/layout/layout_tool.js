@@ -24,20 +24,21 @@ const FILE = "webmap-layout.json";
 /** @type {Place} */
 const ORIGIN = { x: 0, y: 0, pixels_per_metre: 1, turn_rad: 0 };
 
-/** Milliseconds after which a view that changed is kept, at the latest. */
+/** Milliseconds after which a changed view is stored, at the latest. */
 const KEEP_WITHIN = 500;
 
 /**
- * The viewer's layout of the page: saved to a file, loaded, and as it was found; and the
- * last view of this address, which is there again when the page opens.
+ * The page's layout: save to a file, load, reset; and the last view of this address,
+ * which the page restores when it opens.
  *
- * Options: `place` and `classes`, as of the export tool, with which it shares a button;
- * `of`, what the page shows, so that a view is kept for that alone; `restore`, whether
- * the page opens with the last view, which `?layout=found` in its address forbids.
+ * Options: `place` and `classes`, as for the export tool, with which it shares a
+ * button; `of`, what the page shows, so that a view is stored for it alone; `restore`,
+ * whether the page opens with the last view; `?layout=found` in its address prevents
+ * this.
  *
- * Sends `{own: true}` when it has shown the last view, and hears it back, behind
- * whatever the display may have said of the view meanwhile. Sends `{found: true}` to
- * have the view that the page begins with.
+ * Sends `{own: true}` when it has restored the last view, and receives it back after
+ * all messages about the view that the display sent before. Sends `{found: true}` to
+ * request the initial view.
  *
  * @param {MapCanvas} map
  * @param {Options} options
@@ -56,7 +57,7 @@ export default function attach(map, options, send) {
   };
 }
 
-/** Keeps the view that hands chose for this address, and shows it again. */
+/** Stores the view that the user chose for this address, and restores it. */
 class LastView {
   /**
    * @param {MapCanvas} map
@@ -70,7 +71,7 @@ class LastView {
     this._timer = undefined;
     const asked = new URLSearchParams(location.search).get("layout");
     this._place = keptView(this._address);
-    // After a reload, or a break of the link, the page knows better itself.
+    // After a reload or a lost connection, the page itself knows the view.
     if (map.restored) map.byHand ||= this._place !== null;
     else if (this._place && restore && asked !== "found") {
       this._show(this._place);
@@ -91,11 +92,14 @@ class LastView {
     this._keep();
   }
 
-  /** What the display said of the view before it knew is undone, if no hand came first. */
+  /**
+   * Restore the view again after earlier messages of the display, unless the user has
+   * moved the view.
+   */
   restoreAgain() {
     if (this._map.byHand || !this._place) return;
     this._show(this._place);
-    // It was chosen by hand, if not now.
+    // The user chose this view in an earlier session.
     this._map.byHand = true;
   }
 
@@ -106,8 +110,8 @@ class LastView {
   }
 
   /**
-   * Keep nothing until hands move the view again. The view is straight then, as a page
-   * begins with it; how large it is and where, the display says.
+   * Store nothing until the user moves the view again. The rotation is reset, as on a
+   * new page; the display sends the scale and the position.
    */
   forget() {
     const seen = placeOf(this._map.view, this._map);

@@ -1,4 +1,4 @@
-"""What the nodes of a robot log."""
+"""The log of a robot's nodes."""
 
 import time
 from collections import deque
@@ -18,46 +18,45 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 MAX_TEXT = 2000
-"""The most characters that are kept of one line."""
+"""Greatest number of characters that are kept of one line."""
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One thing that a node said."""
+    """One log message of a node."""
 
     level: str
     """``"debug"``, ``"info"``, ``"warn"``, ``"error"`` or ``"fatal"``."""
 
     name: str
-    """The node's or the logger's."""
+    """Name of the node or logger."""
 
     text: str
     stamp: float
-    """When it was said, in seconds of the robot's clock."""
+    """Time of the message, in seconds of the robot's clock."""
 
     heard: float
-    """When it came, in monotonic seconds."""
+    """Time of receipt, in monotonic seconds."""
 
 
 @robot_modules.register
 class Rosout:
-    """Follows what nodes log, keeps the newest lines, and fires ``on_rosout(line)``.
+    """Follows the log of nodes, keeps the newest lines, and fires ``on_rosout(line)``.
 
     Style the rows of :meth:`show_in` by CSS: ``li.warn``, ``li.error``, ``li.fatal``.
 
     Args:
         robot: The robot.
-        bridge: The link to the ROS system that has the topic.
+        bridge: The bridge of the ROS system that has the topic.
         topic: The topic.
         level: The least level that is kept: ``"debug"``, ``"info"``, ``"warn"``,
             ``"error"`` or ``"fatal"``.
-        prefix: Only nodes whose names begin with this are heard, where robots share a
-            topic; a slash in front counts for nothing.
-        lines: How many lines are kept.
+        prefix: Only nodes whose names begin with this prefix are used, where robots
+            share a topic; a leading slash is ignored.
+        lines: The number of lines that are kept.
 
     Raises:
-        ConfigError: If there is no such level, or no line is to be kept.
-
+        ConfigError: If there is no such level, or ``lines`` is less than 1.
     """
 
     def __init__(
@@ -78,9 +77,9 @@ class Rosout:
         self.level = level
         self.prefix = prefix.lstrip("/")
         self.lines: deque[Line] = deque(maxlen=lines)
-        """What was said, the newest last."""
+        """The lines, the newest last."""
         self._lists: list[Element] = []
-        # The type is another in each dialect, and the topic is always there.
+        # The type depends on the dialect, and the topic always exists.
         bridge.subscribe(
             topic, refusing(robot, topic, self.on_log), decode=LogMsg, queue_length=100
         )
@@ -89,8 +88,8 @@ class Rosout:
         """List the lines in an element of a page until the current scope ends.
 
         Args:
-            element: An ``ol``, or whatever takes ``li``; what is in it goes.
-
+            element: An ``ol``, or another element that accepts ``li``; its content is
+                removed.
         """
         element.clear()
         for line in self.lines:
@@ -99,7 +98,7 @@ class Rosout:
         keep(Removal(lambda: self._lists.remove(element)))
 
     def on_log(self, message: LogMsg) -> None:
-        """Keep a line, if it is one of those that are wanted."""
+        """Keep a line, if it passes the filters."""
         level, name = message.level_name, message.name
         if LEVELS.index(level) < LEVELS.index(self.level):
             return

@@ -7,22 +7,24 @@ import { lay } from "../../web/tools/overlay.js";
 
 /**
  * @typedef {object} Options
- * @property {string[]} [bridges] Their names.
- * @property {string[]} [levels] From the least on.
- * @property {string} [level] From which on lines are shown at first.
- * @property {number} [lines] How many of each bridge are shown.
+ * @property {string[]} [bridges] Names of the bridges.
+ * @property {string[]} [levels] In ascending order.
+ * @property {string} [level] The least level that is shown at first.
+ * @property {number} [lines] Number of lines of each bridge.
  */
 
-/** @typedef {[number, string, string, string, number, number]} Said Number, level, node,
- *     text, how many times in a row, and when, in seconds of the display's clock. */
+/**
+ * @typedef {[number, string, string, string, number, number]} Said Number, level, node,
+ *     text, repetitions, and time in seconds of the display's clock.
+ */
 
-/** Where the choice is kept in this browser. */
+/** The key of the choice in this browser's storage. */
 const KEPT = "webmap.rosout";
 
-/** How often ages are counted on, in milliseconds. */
+/** Milliseconds between two updates of the ages. */
 const PERIOD = 1000;
 
-/** What people call a level; its outline, which is filled, and what is drawn on it. */
+/** The name of a level for people, its outline, filled, and the symbol drawn on it. */
 const LOOKS = /** @type {Record<string, [string, string, string]>} */ ({
   debug: ["Debug", "", "M5 12h.1M12 12h.1M19 12h.1"],
   info: ["Info", "M12 2.5a9.5 9.5 0 1 0 .01 0z", "M12 11v6M12 7v.1"],
@@ -32,9 +34,9 @@ const LOOKS = /** @type {Record<string, [string, string, string]>} */ ({
 });
 
 /**
- * The newest lines that nodes log, in a panel that unfolds. Only while it is unfolded
- * the display listens: sends `{open: true}` and `{open: false}`; hears `{bridge, said,
- * total, state}` with the lines that are new or said again.
+ * The newest log lines of nodes, in a panel that unfolds. The display subscribes only
+ * while the panel is unfolded: sends `{open: true}` and `{open: false}`; receives
+ * `{bridge, said, total, state}` with the lines that are new or repeated.
  *
  * @param {MapCanvas} map
  * @param {Options} options
@@ -51,7 +53,7 @@ export default function attach(map, options, send) {
 
 /**
  * @param {number} seconds
- * @returns {string} How long ago, as people say it.
+ * @returns {string} The time span as text for people.
  */
 export function ago(seconds) {
   if (seconds < 60) return `${Math.max(0, Math.floor(seconds))} s`;
@@ -172,7 +174,7 @@ class RosoutPanel {
     try {
       localStorage.setItem(KEPT, JSON.stringify(choice));
     } catch {
-      // A browser that keeps nothing starts folded the next time.
+      // A browser without storage starts with the panel folded the next time.
     }
   }
 }
@@ -181,7 +183,7 @@ class RosoutPanel {
 class Book {
   /**
    * @param {string} name
-   * @param {boolean} named Whether there are others.
+   * @param {boolean} named Whether there are other bridges.
    */
   constructor(name, named) {
     this.total = 0;

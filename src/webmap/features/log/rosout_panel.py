@@ -1,4 +1,4 @@
-"""What the nodes behind bridges log, in a panel over the map."""
+"""The log of the nodes of all bridges, in a panel over the map."""
 
 import asyncio
 import itertools
@@ -21,44 +21,44 @@ if TYPE_CHECKING:
 TOPIC = "/rosout"
 
 MOST = 200
-"""Lines that are kept of one bridge."""
+"""Number of lines that are kept of one bridge."""
 
 LONGEST = 500
-"""Characters of a line that are kept."""
+"""Number of characters that are kept of a line."""
 
 
 @dataclass(slots=True)
 class Said:
-    """One thing that a node said, once or several times in a row."""
+    """A log message of a node, once or several times in a row."""
 
     number: int
     level: str
     """``"debug"``, ``"info"``, ``"warn"``, ``"error"`` or ``"fatal"``."""
 
     name: str
-    """The node's or the logger's."""
+    """Name of the node or logger."""
 
     text: str
     count: int
     heard: float
-    """When it came last, in monotonic seconds."""
+    """Time of the last receipt, in monotonic seconds."""
 
     version: int
-    """Grows with every change of any line."""
+    """Increases with every change of any line."""
 
 
 class BridgeLog:
-    """The newest lines of one bridge; the same for all who look.
+    """The newest lines of one bridge, shared by all pages.
 
-    The topic is subscribed to while somebody looks and no longer: logs are many. What
-    was heard until then is kept.
+    The topic is subscribed to only while a page has the panel open, because logs are
+    frequent. Lines received before are kept.
     """
 
     def __init__(self, bridge: Bridge) -> None:
         self.lines: deque[Said] = deque(maxlen=MOST)
-        """What was said, the newest last."""
+        """The lines, the newest last."""
         self.total = 0
-        """Messages that were heard in all."""
+        """Number of all messages received."""
         self.version = 0
         self._bridge = weakref.ref(bridge)
         self._numbers = itertools.count(1)
@@ -66,19 +66,19 @@ class BridgeLog:
         self._subscription: Removable | None = None
 
     def watch(self) -> Removal:
-        """Listen; the removal of what is returned ends it, unless others look."""
+        """Subscribe until the returned removal, unless other pages watch."""
         self._watchers += 1
         bridge = self._bridge()
         if self._subscription is None and bridge is not None:
             with no_scope():
-                # The type is another in each dialect, and the topic is always there.
+                # The type depends on the dialect, and the topic always exists.
                 self._subscription = bridge.subscribe(
                     TOPIC, self.on_log, decode=LogMsg, queue_length=100
                 )
         return Removal(self._leave)
 
     def on_log(self, message: LogMsg) -> None:
-        """Keep a line; one that is said again and again is counted."""
+        """Keep a line; repetitions are counted."""
         self.total += 1
         self.version += 1
         level, name = message.level_name, message.name[:LONGEST]
@@ -110,7 +110,7 @@ _logs: "weakref.WeakKeyDictionary[Bridge, BridgeLog]" = weakref.WeakKeyDictionar
 
 
 def log_of(bridge: Bridge) -> BridgeLog:
-    """Return the log of a bridge, which all pages share."""
+    """Return the log of a bridge, shared by all pages."""
     found = _logs.get(bridge)
     if found is None:
         found = _logs[bridge] = BridgeLog(bridge)
@@ -118,29 +118,28 @@ def log_of(bridge: Bridge) -> BridgeLog:
 
 
 PERIOD = 0.25
-"""Seconds between two looks for new lines, while the panel is open."""
+"""Seconds between two checks for new lines, while the panel is open."""
 
 
 @map_modules.register
 class RosoutPanel:
     """A panel that unfolds into the newest lines of ``/rosout``, of each bridge.
 
-    It hears ``rosgraph_msgs/Log`` of ROS 1 and ``rcl_interfaces/Log`` of ROS 2, while
-    somebody has it open. What is said again and again is counted, and each viewer
-    chooses from which level on lines are shown.
+    It receives ``rosgraph_msgs/Log`` of ROS 1 and ``rcl_interfaces/Log`` of ROS 2 while
+    a page has the panel open. Repetitions are counted, and each page chooses the least
+    level of the lines that it shows.
 
     Style it by CSS: ``.webmap-rosout-line[data-level="error"]``.
 
     Args:
         map: The map.
-        bridges: The links to the ROS systems.
-        level: The least level that is shown until the viewer chooses: ``"debug"``,
-            ``"info"``, ``"warn"``, ``"error"`` or ``"fatal"``.
-        lines: How many lines of each bridge are shown.
+        bridges: The bridges of the ROS systems.
+        level: The least level that is shown until the page chooses another:
+            ``"debug"``, ``"info"``, ``"warn"``, ``"error"`` or ``"fatal"``.
+        lines: The number of lines of each bridge that are shown.
 
     Raises:
-        ConfigError: If there is no such level, or no line is to be shown.
-
+        ConfigError: If there is no such level, or ``lines`` is less than 1.
     """
 
     def __init__(
@@ -176,14 +175,14 @@ class RosoutPanel:
         keep(Removal(self._close))
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Listen while the viewer has the panel open."""
+        """Subscribe while the page has the panel open."""
         if message.get("open") is True:
             self._open()
         elif message.get("open") is False:
             self._close()
 
     def tell(self) -> None:
-        """Send the page what is new."""
+        """Send the page the new lines."""
         for number, log in enumerate(self._logs):
             state = self._bridges[number].state
             version, told = self._told[number]
@@ -199,7 +198,7 @@ class RosoutPanel:
             )
 
     def _open(self) -> None:
-        # A page that was loaded anew knows nothing of what was said before.
+        # A page that was loaded again knows none of the earlier lines.
         self._told = [(0, "") for _ in self._logs]
         if not self._watching:
             self._watching = [log.watch() for log in self._logs]

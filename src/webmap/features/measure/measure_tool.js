@@ -9,10 +9,10 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('../../web/halves.js').Half} Half */
 
 /**
- * Measure on the map: press where it begins, drag, release. What was measured stays
- * until the next press, or until the tool is left.
+ * Measure on the map: press at the beginning, drag, release. The measurement stays
+ * until the next press, or until the tool ends.
  *
- * Begins by its button or by `m`; Escape leaves.
+ * The tool begins with its button or with `m`; Escape ends it.
  *
  * Options: `key` ("m").
  *
@@ -28,7 +28,7 @@ export default function attach(map, options) {
 /**
  * @param {Point} from In metres.
  * @param {Point} to
- * @returns {string} How far it is, and in which direction from x.
+ * @returns {string} The distance, and the direction from x.
  */
 export function measured(from, to) {
   const [dx, dy] = [to.x - from.x, to.y - from.y];
@@ -47,7 +47,7 @@ class MeasureTool {
     this._active = false;
     /** @type {number | null} */
     this._pointer = null;
-    /** What is measured, in metres. @type {{from: Point, to: Point} | null} */
+    /** The measured line, in metres. @type {{from: Point, to: Point} | null} */
     this._line = null;
     this._button = button("webmap-measure-go", "Measure", () => this._toggle());
     this._button.title = `Key ${key}`;
@@ -85,7 +85,8 @@ class MeasureTool {
   _listen() {
     const { signal } = this._ending;
     const { svg: root } = this._map;
-    // Before anybody else, so that a press that measures neither moves nor selects.
+    // Before all other listeners, so that a measuring press neither moves the view nor
+    // selects a robot.
     const first = { signal, capture: true };
     root.addEventListener("pointerdown", (event) => this._down(event), first);
     root.addEventListener("pointermove", (event) => this._move(event), first);
@@ -117,7 +118,7 @@ class MeasureTool {
     this._draw();
   }
 
-  /** @returns {boolean} Whether there was something to leave. */
+  /** @returns {boolean} Whether the tool was active. */
   _leave() {
     if (!this._active) return false;
     this._activate(false);

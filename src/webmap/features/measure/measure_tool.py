@@ -1,4 +1,4 @@
-"""How far it is from here to there, on the map."""
+"""Measures distances on the map."""
 
 from typing import TYPE_CHECKING
 
@@ -10,19 +10,18 @@ if TYPE_CHECKING:
 
 @map_modules.register
 class MeasureTool:
-    """Measures on the map: press where it begins, drag, release.
+    """Measures on the map: press at the beginning, drag, release.
 
-    It begins by its button or by its key; Escape leaves. Only the viewer's own page
-    shows the line, its length in metres and its direction in degrees, counter-clockwise
-    from x.
+    The tool begins with its button or its key; Escape ends it. Only the page that
+    measures shows the line, its length in metres and its direction in degrees,
+    counter-clockwise from x.
 
     Args:
         map: The map.
-        key: The key that begins.
+        key: The key that begins the tool.
 
     Raises:
         ValueError: If ``key`` is not one character.
-
     """
 
     def __init__(self, map: "Map", *, key: str = "m") -> None:

@@ -1,20 +1,20 @@
 /** @typedef {import('../../web/view.js').Point} Point */
 
-/** With more corners than this a preview would not keep up with the pointer. */
+/** With more corners than this the preview could not follow the pointer. */
 export const MOST_CORNERS = 60;
 
-/** The smallest area that is one, in m². */
+/** Smallest valid area, in m². */
 export const LEAST_AREA = 0.1;
 
-/** Corners nearer to each other are one: a double press, in metres. */
+/** Corners closer together than this are one corner, from a double press; metres. */
 const SAME = 0.01;
 
-/** What is nearer to a line than this lies on it, in metres. */
+/** A point closer to a line than this is on the line; metres. */
 const ON = 1e-6;
 
 /**
  * @param {Point[]} corners
- * @returns {Point[]} The corners without those that repeat the one before.
+ * @returns {Point[]} The corners without repetitions of the previous corner.
  */
 export function cleaned(corners) {
   /** @type {Point[]} */
@@ -28,10 +28,10 @@ export function cleaned(corners) {
 }
 
 /**
- * Say why these corners make no area.
+ * Return the reason why these corners form no area.
  *
  * @param {Point[]} corners As {@link cleaned} returns them, in metres.
- * @returns {string} What was got and what is needed; empty if they make one.
+ * @returns {string} The problem and the requirement; empty if the corners form an area.
  */
 export function problemOf(corners) {
   const count = corners.length;
@@ -60,7 +60,7 @@ export function problemOf(corners) {
 
 /**
  * @param {Point[]} corners
- * @returns {[Point, Point][]} The sides; the last one leads back to the first corner.
+ * @returns {[Point, Point][]} The sides; the last side ends at the first corner.
  */
 export function sidesOf(corners) {
   return corners.map((corner, i) => [corner, corners[(i + 1) % corners.length]]);
@@ -68,7 +68,7 @@ export function sidesOf(corners) {
 
 /**
  * @param {Point[]} corners
- * @returns {number} In m²; positive if they go counter-clockwise.
+ * @returns {number} In m²; positive for counter-clockwise corners.
  */
 export function signedArea(corners) {
   const [{ x: x0, y: y0 }] = corners;
@@ -89,7 +89,7 @@ export function longestSide(corners) {
   let yaw = 0;
   for (const [p, q] of sidesOf(corners)) {
     const length = between(p, q);
-    // Of sides that are as long but for rounding the first one counts.
+    // Of sides that differ only by rounding, the first one counts.
     if (length <= longest * (1 + 1e-9)) continue;
     longest = length;
     yaw = Math.atan2(q.y - p.y, q.x - p.x);
@@ -98,9 +98,9 @@ export function longestSide(corners) {
 }
 
 /**
- * @param {Point[]} corners Of an area that {@link problemOf} has nothing against.
+ * @param {Point[]} corners Of a valid area by {@link problemOf}.
  * @param {Point} point
- * @returns {boolean} Whether it lies in the area, or on a side of it.
+ * @returns {boolean} Whether the point is in the area, or on one of its sides.
  */
 export function contains(corners, point) {
   let inside = false;
@@ -114,13 +114,14 @@ export function contains(corners, point) {
 }
 
 /**
- * @param {Point[]} corners Of an area that {@link problemOf} has nothing against.
+ * @param {Point[]} corners Of a valid area by {@link problemOf}.
  * @param {Point} from In the area.
  * @param {Point} to
- * @returns {boolean} Whether the straight way between them stays in the area.
+ * @returns {boolean} Whether the straight line between the two points stays in the
+ *     area.
  */
 export function holds(corners, from, to) {
-  // Between two places where it meets sides it is inside as a whole, or outside.
+  // Between two crossings with sides the line is completely inside or outside.
   const cuts = [0, 1];
   for (const side of sidesOf(corners)) cuts.push(...cutsOf(from, to, side));
   cuts.sort((a, b) => a - b);
@@ -134,7 +135,7 @@ export function holds(corners, from, to) {
  * @param {Point} from
  * @param {Point} to
  * @param {[Point, Point]} side
- * @returns {number[]} Where a way meets a side, as parts of the way.
+ * @returns {number[]} Where a line meets a side, as fractions of the line.
  */
 function cutsOf(from, to, [p, q]) {
   const [dx, dy, ex, ey] = [to.x - from.x, to.y - from.y, q.x - p.x, q.y - p.y];
@@ -177,9 +178,9 @@ function sideOf([p, q], { x, y }) {
 }
 
 /**
- * @param {[Point, Point]} line From one point to another, which may be the same.
+ * @param {[Point, Point]} line From one point to another, which may be equal.
  * @param {Point} point
- * @returns {Point} What of the line is nearest to the point.
+ * @returns {Point} The point of the line that is nearest.
  */
 export function nearestOn([p, q], { x, y }) {
   const [dx, dy] = [q.x - p.x, q.y - p.y];
@@ -205,23 +206,26 @@ export function between(p, q) {
 }
 
 /**
- * A straight part of the way over an area, in a frame with x along the sweeps.
+ * A straight part of the path over an area, in a frame with x along the sweeps.
  *
  * @typedef {object} Piece
- * @property {number | null} line Which line it lies on, counted from 0; null for one
- *     that leads into a corner.
- * @property {Point} a Its left end; of one into a corner, where it leaves its sweep.
+ * @property {number | null} line The line of the piece, counted from 0; null for a
+ *     piece into a corner.
+ * @property {Point} a The left end; of a piece into a corner, the point where it leaves
+ *     its sweep.
  * @property {Point} b
- * @property {number} [of] The piece that one into a corner leaves.
+ * @property {number} [of] The piece that a piece into a corner leaves.
  */
 
-/** @typedef {{piece: number, end: number}} Entry A piece, and at which end: 0 is `a`. */
+/**
+ * @typedef {{piece: number, end: number}} Entry A piece and one of its ends: 0 is `a`.
+ */
 /** @typedef {{entry: Entry, path: Point[], length: number}} Way */
 
-/** What is nearer than this is one place, in metres. */
+/** Points closer together than this are one node, in metres. */
 const SAME_NODE = 1e-9;
 
-/** The ways inside of an area along its pieces, and from each to those beside it. */
+/** The paths inside of an area along its pieces, and between neighbouring pieces. */
 export class SweepNet {
   /**
    * @param {Point[]} area Its corners.
@@ -232,11 +236,11 @@ export class SweepNet {
     this._area = area;
     /** @type {Point[]} */
     this._nodes = [];
-    /** @type {Map<number, number>[]} How far it is from each node to others. */
+    /** @type {Map<number, number>[]} Distances from each node to its neighbours. */
     this._links = [];
     /** @type {number[][]} The nodes on each piece. */
     this._on = pieces.map(() => []);
-    /** @type {Set<number>[]} The pieces beside each. */
+    /** @type {Set<number>[]} The neighbours of each piece. */
     this._beside = pieces.map(() => new Set());
     /** @type {number[][]} The nodes at the ends of each piece. */
     this._ends = pieces.map((piece, i) => this._endsOf(piece, i));
@@ -255,11 +259,12 @@ export class SweepNet {
   }
 
   /**
-   * Return the next piece after one: one beside it, or the nearest, on ways in the area.
+   * Return the next piece: a neighbour, or the nearest piece, on a path inside of the
+   * area.
    *
-   * @param {Entry} entry How the last one was gone to.
+   * @param {Entry} entry How the last piece was entered.
    * @param {Set<number>} todo
-   * @returns {Way | null} null if none of them can be gone to so.
+   * @returns {Way | null} null if no piece can be reached inside of the area.
    */
   next({ piece, end }, todo) {
     const from = this._ends[piece][1 - end];
@@ -271,7 +276,8 @@ export class SweepNet {
   }
 
   /**
-   * Go into a corner before the sweep that begins at it: afterwards it would be far.
+   * Enter a corner before the sweep that begins at it; afterwards the corner would be
+   * far.
    *
    * @param {Entry} entry
    * @param {Set<number>} todo
@@ -321,14 +327,15 @@ export class SweepNet {
       const faced = pairs.filter(([k, l]) => this._overlap(k, l) >= 0);
       const facing = new Set(faced.flat());
       for (const [k, l] of pairs) {
-        // Aslant only from where nothing lies straight ahead: a comb has many teeth.
+        // Diagonal links only where a piece has no piece opposite: a comb-shaped area
+        // has many teeth.
         const aslant = !facing.has(k) || !facing.has(l);
         if (aslant || this._overlap(k, l) >= 0) this._joinTwo(k, l);
       }
     });
   }
 
-  /** @param {number} k @param {number} l @returns {number} In metres; below 0 a gap. */
+  /** @param {number} k @param {number} l @returns {number} In metres; a gap is < 0. */
   _overlap(k, l) {
     const [p, q] = [this.pieces[k], this.pieces[l]];
     return Math.min(p.b.x, q.b.x) - Math.max(p.a.x, q.a.x);
@@ -355,7 +362,7 @@ export class SweepNet {
   /**
    * @param {number} m
    * @param {number} n
-   * @returns {boolean} Whether the straight way between them stays in the area.
+   * @returns {boolean} Whether the straight line between the nodes stays in the area.
    */
   _link(m, n) {
     const [p, q] = [this._nodes[m], this._nodes[n]];
@@ -366,7 +373,7 @@ export class SweepNet {
     return true;
   }
 
-  /** @param {number} piece @param {Point} a Where it begins. */
+  /** @param {number} piece @param {Point} a Where the piece begins. */
   _string(piece, a) {
     const nodes = this._on[piece];
     nodes.sort((m, n) => between(a, this._nodes[m]) - between(a, this._nodes[n]));
@@ -376,7 +383,7 @@ export class SweepNet {
   /**
    * @param {number} from
    * @param {Set<number>} wanted
-   * @returns {Way | null} The shortest way to an end of one of these pieces.
+   * @returns {Way | null} The shortest path to an end of one of these pieces.
    */
   _nearest(from, wanted) {
     /** @type {Map<number, Entry>} */

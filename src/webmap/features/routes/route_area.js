@@ -13,34 +13,39 @@ import { planSweeps, SPACING } from "./sweeps.js";
 /** @typedef {import('../../web/view.js').Point} Point */
 
 /**
- * What an area asks of the route that it is for.
+ * The parts of a route that an area needs.
  *
  * @typedef {object} Route
- * @property {() => boolean} mayBegin Whether the route is in sight.
- * @property {() => number} room How many points it can take.
- * @property {() => Pose | null} here Where the selected robot stands.
- * @property {(points: Pose[]) => void} take Puts points behind those there are.
- * @property {() => void} changed What is to be seen is another.
+ * @property {() => boolean} mayBegin Whether the route's panel is visible.
+ * @property {() => number} room Number of points that the route can still take.
+ * @property {() => Pose | null} here Pose of the selected robot.
+ * @property {(points: Pose[]) => void} take Appends points to the route.
+ * @property {() => void} changed Called after every visible change.
  */
 
-/** So near to the first corner a press closes the area, in pixels: a finger's width. */
+/**
+ * A press this close to the first corner closes the area, in pixels: a finger's width.
+ */
 const NEAR = 20;
 
-/** So near to the last corner it is the second half of a double press, in pixels. */
+/**
+ * A press this close to the last corner is the second half of a double press, in
+ * pixels.
+ */
 const TWICE = 4;
 
 /** @type {Plan} */
 const NO_SWEEPS = { problem: "", points: [], sweeps: [] };
 
-/** What has a use for Enter itself. */
+/** Elements that handle Enter themselves. */
 const PRESSED_BY_KEY = "button, summary, a[href], input, select, textarea, [tabindex]";
 
 /**
- * An area that becomes points of a route: its corners are pressed on the map, and sweeps
- * that go over it back and forth are shown until they are taken or left.
+ * An area that becomes points of a route: the operator presses its corners on the map;
+ * sweeps over the area are shown until they are added to the route or discarded.
  *
- * The corners end with the first one pressed again, Enter or Done; Escape leaves. It
- * sends nothing to any robot: whoever runs the route does.
+ * A press on the first corner, Enter or Done ends the corners; Escape leaves. This
+ * class sends nothing to any robot: that happens only when the route runs.
  */
 export class RouteArea {
   /** @param {MapCanvas} map @param {Route} route */
@@ -49,10 +54,10 @@ export class RouteArea {
     this._route = route;
     /** @type {Point[]} */
     this._corners = [];
-    /** @type {Point | null} A corner that is being pressed. */
+    /** @type {Point | null} The corner that is being pressed. */
     this._aimed = null;
     this._closed = false;
-    /** Why the area could not be closed, in a sentence. */
+    /** Why the area could not be closed, as a sentence. */
     this._refused = "";
     this._plan = NO_SWEEPS;
     this._drawing = new AreaDrawing(map);
@@ -65,9 +70,9 @@ export class RouteArea {
       take: () => this._take(),
       leave: () => this.leave(),
     });
-    /** Begins an area. */
+    /** The button that begins an area. */
     this.button = this._panel.begin;
-    /** What is pressed and set; it is hidden where there is no area. */
+    /** The buttons and fields; hidden without an area. */
     this.element = this._panel.element;
     this._aim = new PressAim(map, "", {
       mayBegin: () => route.mayBegin(),
@@ -79,7 +84,7 @@ export class RouteArea {
     this._ending = new AbortController();
     const { signal } = this._ending;
     window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
-    // While corners are pressed the aim has it.
+    // While corners are pressed the aim handles Escape.
     this._offEscape = deskOf(map.drive).claimEscape(() => this._closed && this.leave());
     this._draw();
   }
@@ -91,17 +96,17 @@ export class RouteArea {
     this._drawing.destroy();
   }
 
-  /** Whether corners are pressed, or will be when another tool has aimed. */
+  /** Whether corners are being pressed, or will be after another tool ends. */
   get draws() {
     return this._aim.active || this._aim.waits;
   }
 
-  /** Whether there is an area, or one is begun. */
+  /** Whether there is an area, or a begun one. */
   get active() {
     return this.draws || this._closed;
   }
 
-  /** @returns {string} What there is to say; empty where there is no area. */
+  /** @returns {string} The text for the operator; empty without an area. */
   get words() {
     if (this._aim.waits) return "Waiting: finish the other tool, then add more corners.";
     if (this.draws) return this._refused || this._drawingWords();
@@ -110,17 +115,17 @@ export class RouteArea {
     return problem || `${points.length} points, ${sweeps.length} sweeps.`;
   }
 
-  /** Whether what it says is why something cannot be done. */
+  /** Whether the text is the reason of a refusal. */
   get refused() {
     return this.draws ? this._refused !== "" : this._plan.problem !== "";
   }
 
-  /** Look again where the robot is. */
+  /** Update the robot's position. */
   look() {
     this._panel.showHere(this._route.here() !== null);
   }
 
-  /** @returns {boolean} Whether there was something to leave. */
+  /** @returns {boolean} Whether the tool was active. */
   leave() {
     if (!this.active) return false;
     this._closed = false;
@@ -222,7 +227,7 @@ export class RouteArea {
   }
 
   _take() {
-    // The route may have other points than when it was drawn.
+    // The number of the route's points may have changed since the last drawing.
     this._draw();
     const { points } = this._plan;
     if (points.length === 0) return;
@@ -250,25 +255,25 @@ export class RouteArea {
 }
 
 /**
- * What can be done with an area.
+ * Callbacks of the area's panel.
  *
  * @typedef {object} Acts
  * @property {() => void} begin
- * @property {() => void} close No further corner is pressed.
- * @property {() => void} undo The last corner is taken away.
- * @property {() => void} here The robot's place becomes a corner.
- * @property {() => void} changed The sweeps are wanted another way.
+ * @property {() => void} close End the corners.
+ * @property {() => void} undo Remove the last corner.
+ * @property {() => void} here Add the robot's position as a corner.
+ * @property {() => void} changed The settings of the sweeps have changed.
  * @property {() => void} take
  * @property {() => void} leave
  */
 
-/** The buttons and the field with which an area is made into sweeps. */
+/** The buttons and the field that turn an area into sweeps. */
 class AreaPanel {
   /** @param {Acts} acts */
   constructor(acts) {
     /** Whether sweeps go across the longest side. */
     this.across = false;
-    /** Begins an area. */
+    /** The button that begins an area. */
     this.begin = button("webmap-area-begin", "Area", acts.begin);
     this.begin.title = "Cover an area with parallel sweeps";
     this._done = button("webmap-area-done", "Done", acts.close);
@@ -286,7 +291,8 @@ class AreaPanel {
     });
     this._spacing.addEventListener("input", acts.changed);
     this._spacing.addEventListener("keydown", ({ key }) => {
-      // The page leaves Escape to a field, and this one has no use for it.
+      // The page leaves Escape to a field that has the focus, and this field does not
+      // use it.
       if (key === "Escape") acts.leave();
     });
     this._turn = button("webmap-area-across", "Across", () => {
@@ -312,17 +318,17 @@ class AreaPanel {
     );
   }
 
-  /** The metres between sweeps; NaN where there is no number. */
+  /** Distance between sweeps in metres; NaN if the field has no number. */
   get spacing() {
     return this._spacing.value === "" ? NaN : Number(this._spacing.value);
   }
 
   /**
    * @param {object} area
-   * @param {boolean} area.active Whether there is one.
+   * @param {boolean} area.active Whether there is an area.
    * @param {boolean} area.closed
-   * @param {number} area.corners How many there are.
-   * @param {boolean} area.ready Whether there are sweeps to take.
+   * @param {number} area.corners Number of corners.
+   * @param {boolean} area.ready Whether there are sweeps to add.
    */
   show({ active, closed, corners, ready }) {
     this._turn.setAttribute("aria-pressed", String(this.across));
@@ -333,24 +339,27 @@ class AreaPanel {
     this.element.hidden = !active;
   }
 
-  /** @param {boolean} possible Whether a robot's place can be added. */
+  /** @param {boolean} possible Whether the robot's position can be added. */
   showHere(possible) {
     this._here.disabled = !possible;
   }
 
-  /** Whether the keys are with the buttons of an area. */
+  /** Whether one of the area's buttons has the focus. */
   get focused() {
     return this.element.contains(document.activeElement);
   }
 
-  /** Let the keys go on with what is there now: a button that is gone has no next one. */
+  /**
+   * Focus the first button that is visible now, because the focused button may be
+   * hidden.
+   */
   focus() {
     const next = [this._done, this._take, this._turn, this.begin];
     next.find((each) => !each.disabled && each.offsetParent !== null)?.focus();
   }
 }
 
-/** An area over a map, its corners, and the sweeps that would go over it. */
+/** An area over a map, with its corners and sweeps. */
 class AreaDrawing {
   /** @param {MapCanvas} map */
   constructor(map) {
@@ -360,7 +369,7 @@ class AreaDrawing {
     this._outline = svg("path", { class: "webmap-area-outline" });
     this._ways = svg("path", { class: "webmap-area-ways" });
     this._sweeps = svg("path", { class: "webmap-area-sweeps" });
-    // In metres, as the plan is: only the view moves it.
+    // In metres, like the plan: only the view moves it.
     this._world = svg("g", {}, this._outline, this._ways, this._sweeps);
     this._marks = svg("g", {});
     this._drawing = svg(
@@ -380,8 +389,8 @@ class AreaDrawing {
   /**
    * @param {Point[]} corners In metres.
    * @param {object} how
-   * @param {boolean} how.closed Whether no further corner is pressed.
-   * @param {Point[]} how.points What the robot would go to, in this order.
+   * @param {boolean} how.closed Whether the corners are complete.
+   * @param {Point[]} how.points Goals of the robot, in this order.
    * @param {[Point, Point][]} how.sweeps
    */
   show(corners, { closed, points, sweeps }) {
@@ -407,7 +416,7 @@ class AreaDrawing {
       const mark = this._marks.children[i];
       mark.setAttribute("cx", `${place.x}`);
       mark.setAttribute("cy", `${place.y}`);
-      // The first is pressed again to close the area.
+      // A press on the first corner closes the area.
       mark.setAttribute("r", i === 0 ? "10" : "6");
     }
   }

@@ -6,10 +6,10 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
 
-/** A ring with a nose that says which way the robot stands there. */
+/** A ring with a nose for the heading. */
 const NOSE = "M12-6 22 0 12 6z";
 
-/** Numbered points over a map, which can be dragged, and the line from one to the next. */
+/** Numbered points over a map, which can be dragged, and the lines between them. */
 export class RoutePoints {
   /**
    * @param {MapCanvas} map
@@ -37,8 +37,8 @@ export class RoutePoints {
 
   /**
    * @param {Pose[]} points
-   * @param {{loop: boolean, current: number | null, movable: boolean}} how `current`: the
-   *     point that the robot goes to.
+   * @param {{loop: boolean, current: number | null, movable: boolean}} how `current`:
+   *     the point that the robot drives to.
    */
   show(points, { loop, current, movable }) {
     this._points = points;
@@ -101,12 +101,12 @@ export class RoutePoints {
   }
 }
 
-/** The routes that the server keeps: their names, and what can be done with them. */
+/** The routes stored on the server: their names and buttons. */
 export class SavedRoutes {
   /**
-   * @param {boolean} saves Whether this viewer may change them.
+   * @param {boolean} saves Whether this page may change them.
    * @param {(message: object) => void} send
-   * @param {() => {points: Pose[], loop: boolean}} route What would be saved.
+   * @param {() => {points: Pose[], loop: boolean}} route The route to save.
    */
   constructor(saves, send, route) {
     this._send = send;

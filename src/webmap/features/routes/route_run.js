@@ -4,63 +4,65 @@ import { look, sendGoal } from "../../web/tools/goal_words.js";
 /** @typedef {import('../../web/motion/report.js').RobotReport} RobotReport */
 
 /** @typedef {'going' | 'paused' | 'halted' | 'ended'} RunState */
-/** @typedef {{send: Pose} | {cancel: true} | null} Action What is to be done now. */
+/** @typedef {{send: Pose} | {cancel: true} | null} Action The next action. */
 
-/** A robot that does not say that it is there is, when it is as near as this; metres. */
+/**
+ * Distance within which a robot that does not report its arrival has arrived; metres.
+ */
 const THERE = 0.3;
 
-/** For how long the gate may take to tell of a goal that it accepted, in ms. */
+/** Longest time until the gate reports a goal that it has accepted, in ms. */
 const PATIENCE = 5000;
 
 /**
- * A loop whose points are all reached already sends a goal as seldom as this, in ms:
- * nothing else would hold it back.
+ * Least time between two goals of a loop whose points are all reached already, in ms:
+ * nothing else would limit the rate.
  */
 const LOOP_PERIOD = 1000;
 
-/** With fewer points a loop would send the same goal for ever. */
+/** A loop with fewer points would send the same goal for ever. */
 export const LEAST_LOOP = 2;
 
 /**
- * Decides how one robot goes along a route: which goal is next, and when it ends.
+ * Decides how one robot follows a route: the next goal, and the end.
  *
- * Sends nothing by itself: every method returns what is to be done. After a failure, a
- * STOP, or when the lease is gone it halts and says why; only a person lets it go on. No
- * goal is sent twice but by a person.
+ * This class sends nothing: every method returns the next action. After a failure, a
+ * STOP, or the loss of control the run halts with a reason; only an operator can
+ * continue it. No goal is sent twice, except by an operator.
  */
 export class RouteRun {
   /**
    * @param {Pose[]} points
-   * @param {{loop?: boolean}} [options] `loop`: whether it begins anew after the last
-   *     point, if there are {@link LEAST_LOOP} at least.
+   * @param {{loop?: boolean}} [options] `loop`: whether the route begins again after
+   *     the last point, if it has at least {@link LEAST_LOOP}.
    */
   constructor(points, { loop = false } = {}) {
     this.points = points;
     this.loop = loop && points.length >= LEAST_LOOP;
-    /** The point that it goes to, counted from 0. */
+    /** The point that the robot drives to, counted from 0. */
     this.index = 0;
     /** @type {RunState} */
     this.state = "paused";
-    /** Why it does not go on, in words. */
+    /** Why the run does not continue, as text. */
     this.why = "";
     this.rounds = 0;
-    /** @type {string | null} The goal that the gate has of it. */
+    /** @type {string | null} The gate's goal of this run. */
     this._goal = null;
-    /** @type {string | null} What the gate had before. */
+    /** @type {string | null} The gate's goal before that. */
     this._before = null;
-    /** @type {number | null} When the gate accepted it. */
+    /** @type {number | null} Time when the gate accepted the goal. */
     this._acceptedAt = null;
   }
 
-  /** Whether it goes, or may go on. */
+  /** Whether the run is active, or can be continued. */
   get live() {
     return this.state !== "ended";
   }
 
   /**
-   * Begin, or go on to the point that was not reached.
+   * Begin, or continue to the point that was not reached.
    *
-   * @param {string | null} goal The goal that the gate has of the robot now.
+   * @param {string | null} goal The robot's present goal in the gate.
    * @returns {Action}
    */
   go(goal) {
@@ -69,9 +71,9 @@ export class RouteRun {
   }
 
   /**
-   * Leave out the point that it goes to.
+   * Skip the point that the robot drives to.
    *
-   * @param {string | null} goal The goal that the gate has of the robot now.
+   * @param {string | null} goal The robot's present goal in the gate.
    * @returns {Action}
    */
   skip(goal) {
@@ -98,7 +100,7 @@ export class RouteRun {
   }
 
   /**
-   * The gate has accepted the goal that was to be sent.
+   * Handle that the gate has accepted the goal.
    *
    * @param {number} now
    */
@@ -107,7 +109,7 @@ export class RouteRun {
   }
 
   /**
-   * The goal was not taken, or the robot cannot be had.
+   * Halt, because the goal was refused, or control of the robot is not available.
    *
    * @param {string} why
    */
@@ -118,7 +120,7 @@ export class RouteRun {
   }
 
   /**
-   * Take what the gate says of the robot while the goal waits to be offered again.
+   * Handle the gate's report while the goal waits to be sent again.
    *
    * @param {Pick<RobotReport, 'latched' | 'goal'>} report
    * @returns {null}
@@ -130,15 +132,15 @@ export class RouteRun {
   }
 
   /**
-   * Take what the gate says of the robot.
+   * Handle the gate's report.
    *
    * @param {Pick<RobotReport, 'mine' | 'latched' | 'goal'>} report
-   * @param {number | null} away How far the robot is from its point, in metres.
+   * @param {number | null} away Distance from the robot to its point, in metres.
    * @param {number} now
    * @returns {Action}
    */
   report({ mine, latched, goal }, away, now) {
-    // Until the gate has accepted the goal the lease may be on its way.
+    // Until the gate has accepted the goal, control may not be granted yet.
     if (this.state !== "going" || this._acceptedAt === null) return null;
     if (latched) return this._halted("STOP was pressed");
     if (!mine) return this._halted("this page has no control of the robot any more");
@@ -164,9 +166,9 @@ export class RouteRun {
     return null;
   }
 
-  /** @param {string} goal @param {number} since How old it is. @returns {Action} */
+  /** @param {string} goal @param {number} since Age in ms. @returns {Action} */
   _arrived(goal, since) {
-    // The next look at the robot finds it here still.
+    // The robot is still here at the next call.
     if (this.loop && since < LOOP_PERIOD) return null;
     return this._next() ? this._send(goal) : null;
   }
@@ -201,17 +203,21 @@ export class RouteRun {
  *
  * @typedef {object} Going
  * @property {RouteRun} run
- * @property {Pose | null} order Where it is to be sent, until the gate has accepted that.
- * @property {boolean} busy Whether the gate is being asked, and has not answered.
+ * @property {Pose | null} order The goal to send, until the gate has accepted it.
+ * @property {boolean} busy Whether a request to the gate is unanswered.
  */
 
-/** The robots that are on routes: does what their runs decide, and tells them the news. */
+/**
+ * The robots on routes: executes the actions of their runs, and reports events to the
+ * runs.
+ */
 export class RouteRobots {
   /**
    * @param {Drive} drive
    * @param {(robot: string) => Pose | null} poseOf
    * @param {() => void} changed
-   * @param {Map<string, {name: string, run: RouteRun}>} [runs] Those of the tool before.
+   * @param {Map<string, {name: string, run: RouteRun}>} [runs] The runs of the previous
+   *     tool.
    */
   constructor(drive, poseOf, changed, runs = new Map()) {
     this._drive = drive;
@@ -220,7 +226,7 @@ export class RouteRobots {
     /** @type {Map<string, Going>} */
     this._going = new Map();
     for (const [robot, { name, run }] of runs) {
-      // A display that was started anew may call another robot so.
+      // A restarted display may use the same id for another robot.
       if (drive.robots.get(robot)?.name !== name) continue;
       this._going.set(robot, { run, order: null, busy: false });
     }
@@ -233,10 +239,11 @@ export class RouteRobots {
   }
 
   /**
-   * Nobody is left to send the next goals; those under way stay as they are.
+   * End the sending of further goals; robots continue to their present goals.
    *
-   * @returns {Map<string, {name: string, run: RouteRun}>} Who may go on by others of its
-   *     kind: what was being sent is not sent again by itself.
+   * @returns {Map<string, {name: string, run: RouteRun}>} The runs that another
+   *     instance may continue; a goal that was being sent is not sent again
+   *     automatically.
    */
   destroy() {
     const runs = new Map();
@@ -268,7 +275,7 @@ export class RouteRobots {
     if (going) this._perform(robot, going, going.run[what](this._goalOf(robot)));
   }
 
-  /** Look where the robots are. */
+  /** Update the positions of the robots. */
   look() {
     for (const robot of this._going.keys()) this._look(robot);
   }
@@ -285,7 +292,7 @@ export class RouteRobots {
     const { run } = going;
     const order = { ...pose };
     going.order = order;
-    // Not after a pause and another order, nor on another run.
+    // Not after a pause and another goal, nor for another run.
     const wanted = () =>
       run.state === "going" && going.order === order && this._going.get(robot) === going;
     try {
@@ -313,7 +320,7 @@ export class RouteRobots {
   }
 
   /**
-   * A goal has left this page.
+   * Handle that this page has sent a goal.
    *
    * @param {string} robot
    */
@@ -321,7 +328,8 @@ export class RouteRobots {
     const { run, order, busy } = this._going.get(robot) ?? {};
     if (!run || !order) return;
     if (!busy) run.halt("another goal was sent");
-    // Called off while the lease was taken for it: the cancel was sent before it.
+    // Canceled while control was being taken for it: the cancel was sent before the
+    // goal.
     else if (run.state !== "going") this._drive.cancel(robot);
   }
 
@@ -363,16 +371,16 @@ export class RouteRobots {
   }
 }
 
-/** A map that is not there again by then is another one, in ms. */
+/** A map that does not return within this time is another map; ms. */
 export const KEPT_FOR = 5000;
 
 /**
- * What a tool for routes leaves behind: its points, and who goes along what.
+ * The state that a route tool leaves behind: its points, and the robots' runs.
  *
  * @typedef {object} Route
  * @property {Pose[]} points
  * @property {boolean} loop
- * @property {boolean} open Whether its panel was unfolded.
+ * @property {boolean} open Whether the panel was unfolded.
  * @property {Map<string, {name: string, run: RouteRun}>} runs By robot.
  */
 
@@ -380,8 +388,8 @@ export const KEPT_FOR = 5000;
 const kept = new Map();
 
 /**
- * Keep a route for the tool that comes next on the same map: when the link of the page
- * breaks, everything on it is drawn anew, and this tool is taken away with it.
+ * Keep a route for the next tool on the same map: when the page's connection is lost,
+ * the whole page content is drawn again, and this tool is removed.
  *
  * @param {number} map
  * @param {Route} route
@@ -394,7 +402,8 @@ export function keepRoute(map, route, now) {
 /**
  * @param {number} map
  * @param {number} now
- * @returns {Route | null} What was kept a moment ago; it is kept no longer.
+ * @returns {Route | null} The route that was kept a moment ago; it is no longer kept
+ *     afterwards.
  */
 export function keptRoute(map, now) {
   const { route, at } = kept.get(map) ?? { route: null, at: 0 };

@@ -14,14 +14,14 @@ import { keepRoute, keptRoute, LEAST_LOOP, RouteRobots } from "./route_run.js";
 const TOO_SHORT = `A loop needs at least ${LEAST_LOOP} points.`;
 
 /**
- * Routes: points that are pressed on the map, or lie over an area there, and a robot that
- * goes from one to the next.
+ * Routes: points that are pressed on the map, or cover an area there, and a robot that
+ * drives from one to the next.
  *
  * Sends `{op: "save", name, route}`, `{op: "load", name}` and `{op: "delete", name}`;
- * hears `{routes: [name]}`, `{loaded: {name, points, loop}}`, `{saved: name}` and
+ * receives `{routes: [name]}`, `{loaded: {name, points, loop}}`, `{saved: name}` and
  * `{problem: text}`.
  *
- * Options: `saves` (true), whether this viewer may keep routes.
+ * Options: `saves` (true), whether this page may store routes.
  *
  * @param {MapCanvas} map
  * @param {{saves?: boolean}} options
@@ -49,7 +49,7 @@ class RouteTool {
     const before = keptRoute(map.id, performance.now());
     /** @type {Pose[]} */
     this._points = before?.points ?? [];
-    /** @type {Pose | null} A point that is being aimed. */
+    /** @type {Pose | null} The point that is being aimed. */
     this._aimed = null;
     this._listed = "";
     this._aim = new PressAim(map, "", {
@@ -151,7 +151,7 @@ class RouteTool {
     this._saved.receive(message);
   }
 
-  // The points -----------------------------------------------------------------
+  // Points ---------------------------------------------------------------------
 
   _robotPose() {
     const { selected } = this._map;
@@ -187,7 +187,7 @@ class RouteTool {
     );
   }
 
-  /** @param {number} index Exchanged with the one before. */
+  /** @param {number} index The point to exchange with the previous one. */
   _raise(index) {
     const points = [...this._points];
     [points[index - 1], points[index]] = [points[index], points[index - 1]];
@@ -200,7 +200,7 @@ class RouteTool {
     this._show();
   }
 
-  // Going along ----------------------------------------------------------------
+  // Running --------------------------------------------------------------------
 
   _begin() {
     const { selected } = this._map;
@@ -219,7 +219,7 @@ class RouteTool {
     if (this._map.selected !== null) this._robots.act(this._map.selected, what);
   }
 
-  // What is seen ---------------------------------------------------------------
+  // Display --------------------------------------------------------------------
 
   _show() {
     const { run, busy = false } = this._robots.of(this._map.selected) ?? {};
@@ -228,7 +228,7 @@ class RouteTool {
     const open = this._details.open;
     this._edit.setAttribute("aria-pressed", String(this._aim.active));
     say(this._edit, this._aim.active ? "Done" : "Add points");
-    // So that there is a map to press on, on a phone too.
+    // Leaves a part of the map free to press on, also on a phone.
     const adding = this._aim.active || this._aim.waits || this._area.draws;
     this._details.classList.toggle("adding", adding);
     this._details.classList.toggle("area", this._area.active);

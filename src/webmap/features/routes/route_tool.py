@@ -1,4 +1,4 @@
-"""The selected robot goes from place to place."""
+"""Routes: the selected robot drives from goal to goal."""
 
 import asyncio
 import hashlib
@@ -26,11 +26,11 @@ MOST_ROUTES = 200
 MOST_POINTS = 500
 LONGEST_NAME = 60
 FARTHEST = 1e6
-"""Metres from the origin along an axis; the gate takes no goal that is farther."""
+"""Greatest coordinate of a goal in metres; the gate refuses farther goals."""
 
 
 class Waypoint(msgspec.Struct, forbid_unknown_fields=True):
-    """A pose to go to: metres and radians in the frame of the map."""
+    """A goal: metres and radians in the frame of the map."""
 
     x: float
     y: float
@@ -38,15 +38,15 @@ class Waypoint(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Route(msgspec.Struct, forbid_unknown_fields=True):
-    """Poses in the order in which they are gone to."""
+    """Goals in order."""
 
     points: list[Waypoint]
     loop: bool = False
-    """Whether the first comes after the last."""
+    """Whether the first goal follows the last."""
 
 
 class Saved(msgspec.Struct, forbid_unknown_fields=True):
-    """What a file holds."""
+    """The content of a file."""
 
     map: str
     routes: dict[str, Route] = {}
@@ -56,8 +56,7 @@ def read_name(value: Any) -> str:
     """Return the name of a route.
 
     Raises:
-        ConfigError: If it is none.
-
+        ConfigError: If the name is not valid.
     """
     name = value.strip() if isinstance(value, str) else ""
     if not name or len(name) > LONGEST_NAME or not name.isprintable():
@@ -66,11 +65,10 @@ def read_name(value: Any) -> str:
 
 
 def read_route(value: Any) -> Route:
-    """Return a route as a page sends it.
+    """Return a route from a page's message.
 
     Raises:
-        ConfigError: If it is none.
-
+        ConfigError: If the route is not valid.
     """
     try:
         route = msgspec.convert(value, Route)
@@ -81,23 +79,22 @@ def read_route(value: Any) -> Route:
             f"a route has 1 to {MOST_POINTS} points, got {len(route.points)}"
         )
     for point in route.points:
-        # Written so that NaN fails it too.
+        # Written so that NaN is refused too.
         if not all(abs(n) <= FARTHEST for n in (point.x, point.y, point.yaw)):
             raise ConfigError(f"this is no point to go to: {point}")
     return route
 
 
 class RouteStore:
-    """The routes of one map, on disk; may be used by any thread.
+    """The stored routes of one map; may be used by any thread.
 
     Args:
-        folder: Where the files are.
-        map: What the map is called.
-
+        folder: The folder of the files.
+        map: The name of the map.
     """
 
     _lock = threading.Lock()
-    """Of all, as two pages may show one map."""
+    """One lock for all stores, because two pages may show one map."""
 
     def __init__(self, folder: Path, map: str) -> None:
         plain = re.sub(r"[^a-z0-9]+", "-", map.lower()).strip("-")[:40] or "map"
@@ -106,11 +103,10 @@ class RouteStore:
         self._map = map
 
     def names(self) -> list[str]:
-        """Return the names of the routes there are.
+        """Return the names of the stored routes.
 
         Raises:
             ConfigError: If the file cannot be read.
-
         """
         return sorted(self._read().routes, key=str.casefold)
 
@@ -118,8 +114,7 @@ class RouteStore:
         """Return a route.
 
         Raises:
-            ConfigError: If there is none of that name, or the file cannot be read.
-
+            ConfigError: If there is no route of that name, or the file cannot be read.
         """
         found = self._read().routes.get(name)
         if found is None:
@@ -127,11 +122,10 @@ class RouteStore:
         return found
 
     def save(self, name: str, route: Route) -> None:
-        """Keep a route, in place of one of the same name.
+        """Store a route; it replaces a route of the same name.
 
         Raises:
             ConfigError: If there are too many, or the file cannot be read or written.
-
         """
         with self._lock:
             saved = self._read()
@@ -143,11 +137,10 @@ class RouteStore:
             self._write(saved)
 
     def delete(self, name: str) -> None:
-        """Forget a route; nothing happens if there is none of that name.
+        """Delete a route; does nothing if there is no route of that name.
 
         Raises:
             ConfigError: If the file cannot be read or written.
-
         """
         with self._lock:
             saved = self._read()
@@ -160,7 +153,7 @@ class RouteStore:
         except FileNotFoundError:
             return Saved(self._map)
         except (OSError, msgspec.DecodeError, RecursionError) as error:
-            # It is left as it is: somebody may be able to mend it.
+            # The file stays unchanged, so that a person can repair it.
             raise ConfigError(f"{self.file} cannot be read: {error}") from error
 
     def _write(self, saved: Saved) -> None:
@@ -173,19 +166,18 @@ class RouteStore:
 
 @map_modules.register
 class RouteTool:
-    """Routes of waypoints: drawn on the map, kept by name, gone along by a robot.
+    """Routes of waypoints: drawn on the map, stored by name, driven by a robot.
 
-    An area that is drawn becomes waypoints of sweeps over it, in the page alone.
+    An area on the map becomes waypoints of sweeps over it, only in the page.
 
-    The page sends one goal after the other, under the lease that it has: a route goes
-    on only as long as its page is there. Routes are kept on the server, in the folder
-    of WebMap's state, for each map.
+    The page sends one goal after the other, while it has control: a route continues
+    only as long as its page is open. Routes are stored on the server, in WebMap's state
+    folder, for each map.
 
     Args:
         map: The map.
-        name: What the map is called; routes of maps of other names are not offered. The
-            path of the page if not given.
-
+        name: The name of the map; routes of maps with other names are not offered. By
+            default the path of the page.
     """
 
     def __init__(self, map: "Map", name: str | None = None) -> None:
@@ -201,11 +193,11 @@ class RouteTool:
         )
 
     def on_ready(self) -> None:
-        """Tell the page which routes there are."""
+        """Send the page the names of the routes."""
         self._do(lambda: None)
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Keep, load or delete a route, as the page asks."""
+        """Store, load or delete a route for the page."""
         op = message.get("op")
         if op == "load":
             self._do(lambda: self._load(read_name(message.get("name"))))
@@ -228,7 +220,7 @@ class RouteTool:
         return {"saved": name}
 
     def _do(self, work: Callable[[], dict[str, Any] | None]) -> None:
-        """Do something with the file in a thread, and tell the page what came of it."""
+        """Do work on the file in a thread, and send the page the result."""
 
         async def do() -> None:
             try:

@@ -16,36 +16,38 @@ import {
 /** @typedef {import('./polygon.js').Entry} Entry */
 /** @typedef {import('../../web/view.js').Point} Point */
 
-/** How far sweeps may be apart, and are if nobody says, in metres. */
+/** Smallest, greatest and default distance between sweeps, in metres. */
 export const SPACING = { least: 0.2, most: 20, usual: 1 };
 
-/** What is nearer than this is one place, in metres. */
+/** Points closer together than this are one point, in metres. */
 const SAME = 1e-6;
 
 /**
- * How an area is gone over, back and forth.
+ * The sweeps over an area, back and forth.
  *
  * @typedef {object} Plan
- * @property {string} problem Why there is none, in a sentence; empty if there is one.
- * @property {Pose[]} points What a robot goes to: both ends of each sweep, heading along
- *     it, and where a way between two sweeps turns.
- * @property {[Point, Point][]} sweeps Each from where it begins to where it ends.
+ * @property {string} problem Why there is no plan, as a sentence; empty if there is
+ *     one.
+ * @property {Pose[]} points The robot's goals: both ends of each sweep, with the
+ *     heading along it, and the turning points of the path between two sweeps.
+ * @property {[Point, Point][]} sweeps Each from its beginning to its end.
  */
 
 /**
  * Lay parallel sweeps over an area, in metres of the map.
  *
- * The first and the last keep half of the spacing from the area's bounds, and each ends
- * as long before the side that it comes to; where there is less room, in the middle of
- * it. A corner that would be farther from all sweeps than the spacing gets one of its
- * own. Of an area without bays all is within the spacing of a sweep then: half of it
- * between sweeps, and half of it at the sides.
+ * The first and the last sweep keep a distance of half the spacing from the area's
+ * bounds, and each sweep ends at the same distance before a side; where there is less
+ * room, in its middle. A corner that would be farther from all sweeps than the spacing
+ * gets its own sweep. In an area without bays every point is then within one spacing of
+ * a sweep: half a spacing between sweeps, and half a spacing at the sides.
  *
  * @param {Point[]} corners
  * @param {object} how
- * @param {number} how.spacing Metres from sweep to sweep, at most.
- * @param {boolean} [how.across] Whether they go across the longest side, not along it.
- * @param {number} how.room As many points as there may be.
+ * @param {number} how.spacing Greatest distance between sweeps, in metres.
+ * @param {boolean} [how.across] Whether sweeps are across the longest side, not along
+ *     it.
+ * @param {number} how.room Greatest number of points.
  * @returns {Plan}
  */
 export function planSweeps(corners, { spacing, across = false, room }) {
@@ -55,7 +57,7 @@ export function planSweeps(corners, { spacing, across = false, room }) {
   const frame = frameOf(area[0], longestSide(area) + (across ? Math.PI / 2 : 0));
   const local = area.map(frame.into);
   const lines = linesOver(local, spacing);
-  // Every line has a point at least; what is too much anyway is not laid first.
+  // Every line has at least one point; an obviously too large number is not planned.
   if (lines.count > room) return none(tooMany(lines.count, room, "at least "));
   const straight = Array.from({ length: lines.count }, (_, line) =>
     clipped(local, lines.at(line), spacing / 2).map(([a, b]) => ({ line, a, b })),
@@ -90,9 +92,9 @@ function tooMany(count, room, least) {
 /**
  * @param {Point} origin
  * @param {number} yaw
- * @returns {{yaw: number, into: (p: Point) => Point, outOf: (p: Point) => Point}} To a
- *     frame with x along the sweeps, and back. Its origin is near, as the map's may be
- *     so far away that little is left of a number's digits.
+ * @returns {{yaw: number, into: (p: Point) => Point, outOf: (p: Point) => Point}}
+ *     Transforms to a frame with x along the sweeps, and back. The frame's origin is
+ *     near the area, because far from the map's origin numbers lose precision.
  */
 function frameOf(origin, yaw) {
   const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
@@ -112,13 +114,14 @@ function frameOf(origin, yaw) {
 /**
  * @param {Point[]} area
  * @param {number} spacing
- * @returns {{count: number, at: (line: number) => number}} The lines, and where they lie.
+ * @returns {{count: number, at: (line: number) => number}} The number of lines, and
+ *     their positions.
  */
 function linesOver(area, spacing) {
   const ys = area.map(({ y }) => y);
   const [low, high] = [Math.min(...ys), Math.max(...ys)];
   const rest = high - low - spacing;
-  // What is only rounding needs no line of its own.
+  // A rounding error must not add a line.
   const gaps = Math.max(0, Math.ceil(rest / spacing - 1e-9));
   if (gaps === 0) return { count: 1, at: () => (low + high) / 2 };
   return { count: gaps + 1, at: (line) => low + spacing / 2 + (line * rest) / gaps };
@@ -127,8 +130,8 @@ function linesOver(area, spacing) {
 /**
  * @param {Point[]} area
  * @param {number} y
- * @param {number} inset By how much it is shorter at each end.
- * @returns {[Point, Point][]} What of a line lies in the area, from left to right.
+ * @param {number} inset Length to remove at each end.
+ * @returns {[Point, Point][]} The parts of a line in the area, from left to right.
  */
 function clipped(area, y, inset) {
   const xs = sidesOf(area).flatMap(([p, q]) =>
@@ -138,7 +141,7 @@ function clipped(area, y, inset) {
   /** @type {[Point, Point][]} */
   const parts = [];
   for (let i = 0; i + 1 < xs.length; i += 2) {
-    // A corner that the line only touches.
+    // The line only touches a corner here.
     if (xs[i + 1] - xs[i] < SAME) continue;
     const middle = (xs[i] + xs[i + 1]) / 2;
     parts.push([
@@ -153,7 +156,7 @@ function clipped(area, y, inset) {
  * @param {Point[]} area
  * @param {Piece[]} straight
  * @param {number} spacing
- * @returns {Piece[]} From sweeps into the corners that these leave out.
+ * @returns {Piece[]} Pieces from sweeps into the corners that the sweeps leave out.
  */
 function intoCorners(area, straight, spacing) {
   const turn = Math.sign(signedArea(area));
@@ -175,8 +178,8 @@ function intoCorners(area, straight, spacing) {
  * @param {Point[]} area
  * @param {Piece[]} pieces
  * @param {Point} corner
- * @returns {{at: Point, piece: number} | undefined} The nearest place on a sweep to
- *     which the straight way stays in the area.
+ * @returns {{at: Point, piece: number} | undefined} The nearest point on a sweep from
+ *     which the straight line to the corner stays in the area.
  */
 function nearestSweep(area, pieces, corner) {
   return pieces
@@ -202,7 +205,7 @@ function asPlan(legs, frame) {
   for (const { via, from, to } of legs) {
     for (const [i, at] of via.entries()) add(at, headingTo(at, via[i + 1] ?? from));
     const heading = headingTo(from, to);
-    // A sweep into a corner may begin where the one before has ended.
+    // A piece into a corner may begin where the last sweep ended.
     if (via.length > 0 || !last || between(last, from) > SAME) add(from, heading);
     if (between(from, to) > SAME) add(to, heading);
     last = to;
@@ -212,36 +215,42 @@ function asPlan(legs, frame) {
   return { problem: "", points, sweeps: legs.map(asSweep) };
 }
 
-/** @param {Point} from @param {Point} to @returns {number} Along the sweeps if both are one. */
+/**
+ * @param {Point} from
+ * @param {Point} to
+ * @returns {number} In radians; along the sweeps for equal points.
+ */
 function headingTo(from, to) {
   return between(from, to) > SAME ? Math.atan2(to.y - from.y, to.x - from.x) : 0;
 }
 
-/** From so many ends of the first and last line at most an order is tried. */
+/** Greatest number of ends of the first and last line from which an order is tried. */
 const MOST_STARTS = 8;
 
 /**
- * A piece of the way, and how one gets to it from the one before.
+ * A piece of the path, and the connection from the previous piece.
  *
  * @typedef {object} Leg
- * @property {Point[]} via Places on the way, where the straight one would leave the area.
+ * @property {Point[]} via Points on the connection, where the straight line would leave
+ *     the area.
  * @property {Point} from
  * @property {Point} to
  */
 
 /**
- * An order, with the paths of the net to each piece: both of their ends too.
+ * An order of pieces, with the net's paths to each piece, including both ends.
  *
- * @typedef {{steps: {entry: Entry, path: Point[]}[], jumps: number, between: number}} Walk
+ * @typedef {{steps: {entry: Entry, path: Point[]}[], jumps: number, between: number}}
+ *     Walk
  */
 
 /**
- * Put the pieces of an area into an order.
+ * Find an order of the pieces of an area.
  *
- * From each one goes to a piece beside it, and to the nearest that is left if there is
- * none; ways between them stay in the area wherever one is found there. Several
- * beginnings are tried: the one that leaves the area least is taken, of these the one
- * with the shortest ways between pieces, of these the one nearest to the first corner.
+ * The next piece is a neighbour, or the nearest piece if there is no neighbour left;
+ * paths between pieces stay in the area where possible. Several starts are tried. The
+ * best order leaves the area least often; of equal orders the one with the shortest
+ * paths between pieces is taken, then the one nearest to the first corner.
  *
  * @param {Point[]} area Its corners.
  * @param {Piece[]} pieces
@@ -266,7 +275,7 @@ function inOrder(area, pieces) {
 /**
  * @param {Point} first
  * @param {Piece[]} pieces
- * @returns {Entry[]} The nearest to the first corner is the first.
+ * @returns {Entry[]} The nearest to the first corner comes first.
  */
 function startsOf(first, pieces) {
   const last = Math.max(...pieces.map(({ line }) => line ?? 0));
@@ -324,7 +333,7 @@ function walked(area, net, start) {
  * @param {SweepNet} net
  * @param {Point} from
  * @param {Set<number>} todo
- * @returns {Entry} As the crow flies.
+ * @returns {Entry} The nearest by straight distance.
  */
 function nearest(net, from, todo) {
   const entries = [...todo].flatMap((piece) => [
@@ -338,7 +347,8 @@ function nearest(net, from, todo) {
 /**
  * @param {Point[]} area
  * @param {Point[]} path
- * @returns {Point[]} What is left between its ends, where straight ways stay in the area.
+ * @returns {Point[]} The necessary points between the ends, where straight lines stay
+ *     in the area.
  */
 function shortened(area, path) {
   /** @type {Point[]} */

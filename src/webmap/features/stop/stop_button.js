@@ -10,20 +10,21 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('../../web/motion/stopping.js').Verdict} Verdict */
 
 /**
- * So many robots one reset is for, at most: a page that says more than 120 things at once
- * loses its connection. The others stay stopped until the next.
+ * Greatest number of robots of one Reset: a page that sends more than 120 messages at
+ * once loses its connection. The other robots stay stopped until the next Reset.
  */
 const RESET_AT_ONCE = 60;
 
 /**
- * A button that stops all robots, always in sight, and what became of every STOP.
+ * A button that stops all robots, always visible, and the result of every STOP.
  *
- * Also covers the page with an alarm when a robot moves on although it was given zero.
- * Space and Escape stop the robot that is driven or selected, all while there is none,
- * and Shift and Escape all, whether or not the map has a `Teleop`.
+ * Also covers the page with an alarm when a robot moves although it was sent zero.
+ * Space and Escape stop the driven or selected robot, or all robots if there is none;
+ * Shift with Escape stops all robots. The keys work with and without a `Teleop` on the
+ * map.
  *
- * Options: `place`, a selector of the page's own element for the button; without a place
- * it lies over the map.
+ * Options: `place`, a selector of the page's own element for the button; without it the
+ * button is over the map.
  *
  * @param {MapCanvas} map
  * @param {{place?: string}} options
@@ -44,7 +45,7 @@ class Stop {
     this._drive = map.drive;
     this._obedience = new Obedience();
     /**
-     * Why the gate refused the last reset, by robot.
+     * Why the gate refused the last Reset, by robot.
      * @type {Map<string, string>}
      */
     this._refused = new Map();
@@ -117,7 +118,7 @@ class Stop {
   }
 
   _stopped() {
-    // Who says STOP between the two presses takes the first one back.
+    // A STOP between the two presses cancels the first press.
     this._reset.forget();
     this._show();
   }
@@ -135,7 +136,7 @@ class Stop {
     this._showVerdicts(verdicts.sort(byName));
   }
 
-  /** @returns {string[]} Which resets the gate refused, and why. */
+  /** @returns {string[]} The refused Resets, with reasons. */
   _refusals() {
     const { robots } = this._drive;
     return [...this._refused].map(
@@ -144,9 +145,9 @@ class Stop {
   }
 
   /**
-   * The gate's own alarms, and what is seen here where the gate raises none.
+   * The gate's own alarms, and alarms that only this page detects.
    *
-   * @returns {Map<string, string>} What there is to say of each robot.
+   * @returns {Map<string, string>} The text for each robot.
    */
   _alarms() {
     const alarms = new Map();
@@ -183,11 +184,15 @@ function byName(one, other) {
   return one.name.localeCompare(other.name, undefined, { numeric: true });
 }
 
-/** Covers the page: a robot does not do what it is told. */
+/** Covers the page: a robot does not follow its commands. */
 class Alarm {
-  /** @param {() => void} stopAll Where no button of the page that does is in sight. */
+  /**
+   * @param {() => void} stopAll Used where no button of the page for STOP ALL is
+   *     visible.
+   */
   constructor(stopAll) {
-    // Figures change several times a second, which nobody wants to have read out.
+    // The figures change several times a second; screen readers must not read each
+    // change.
     this._names = html("p", "webmap-alarm-names", { "aria-live": "off" });
     /** @type {Set<string>} */
     this._seen = new Set();
@@ -195,7 +200,7 @@ class Alarm {
     this._current = new Map();
     this._ending = new AbortController();
     this._stop = stopButton("webmap-alarm-stop", "STOP ALL", stopAll);
-    // A hand that knows where STOP is on the page finds it there.
+    // STOP is at its usual place for an operator who knows the page.
     this._twins = new StopTwins();
     this._element = html(
       "div",
@@ -231,7 +236,7 @@ class Alarm {
     }
   }
 
-  /** Have STOP where it is on the page, and everything else beside it. */
+  /** Put STOP at its place on the page, and everything else beside it. */
   _place() {
     const { all, top, bottom } = this._twins.place();
     this._stop.hidden = all;
@@ -253,8 +258,8 @@ class Alarm {
   }
 
   /**
-   * Lie over popovers and dialogs as well: what opened last is on top, whatever its
-   * z-index. A browser that knows no popovers has the alarm over all but its dialogs.
+   * Move above popovers and dialogs: the last opened is on top, whatever its z-index.
+   * In a browser without popovers the alarm is above everything except dialogs.
    */
   _raise() {
     if (!("popover" in HTMLElement.prototype)) return;
@@ -265,24 +270,24 @@ class Alarm {
 
 /**
  * @param {Event} event Something was opened or closed.
- * @returns {boolean} Whether it may lie over the alarm now; that of another map does not
- *     count, or the two would rise above each other for ever.
+ * @returns {boolean} Whether the element may cover the alarm now. Another map's alarm
+ *     does not count, because the two would rise above each other for ever.
  */
 function coversAnew({ target }) {
   const covers = "dialog, [popover]:not(.webmap-alarm)";
   return target instanceof Element && target.matches(covers);
 }
 
-/** The STOP buttons of the page that can be pressed, but for those of an alarm. */
+/** The page's STOP buttons that can be pressed, except those of an alarm. */
 const ORIGINALS = ".webmap-stop-button:enabled:not(.webmap-alarm *)";
 
-/** Pixels between a twin and what lies beside it. */
+/** Pixels between a twin and its neighbours. */
 const GAP = 16;
 
 /**
  * Copies of the page's STOP buttons, each at the place of its original.
  *
- * Something that covers the page contains them, so that STOP is where it always is.
+ * An element that covers the page contains them, so that STOP stays at its usual place.
  */
 class StopTwins {
   constructor() {
@@ -292,7 +297,7 @@ class StopTwins {
   }
 
   /**
-   * Follow the originals: which there are, where they are and what they say.
+   * Follow the originals: their number, places and texts.
    *
    * @returns {{all: boolean, top: number, bottom: number}} `all`: whether one of them
    *     stops all robots. `top` and `bottom`: pixels that the twins need there.
@@ -338,7 +343,8 @@ class StopTwins {
 
 /**
  * @param {Element} element
- * @returns {element is HTMLButtonElement} Whether its middle is on the screen.
+ * @returns {element is HTMLButtonElement} Whether the element's middle is on the
+ *     screen.
  */
 function isInSight(element) {
   if (!(element instanceof HTMLButtonElement)) return false;

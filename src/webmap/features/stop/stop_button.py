@@ -1,4 +1,4 @@
-"""STOP, always in sight."""
+"""STOP buttons that are always visible."""
 
 from typing import TYPE_CHECKING
 
@@ -10,15 +10,14 @@ if TYPE_CHECKING:
 
 @map_modules.register
 class StopButton:
-    """A large red button that stops robots, whoever drives them.
+    """A large red button that stops robots, regardless of who has control.
 
-    It needs no lease, and the page sends it to the gate by itself.
+    STOP does not require control, and the page sends it to the gate itself.
 
     Args:
         map: The map.
-        place: A CSS selector of the page's element that the button goes into; over the
-            map if not given.
-
+        place: A CSS selector of the page's element for the button; by default the
+            button is over the map.
     """
 
     def __init__(self, map: "Map", *, place: str = "") -> None:

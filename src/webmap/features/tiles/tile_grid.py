@@ -1,6 +1,6 @@
-"""Which tiles a view needs, and where each of them lies on the map.
+"""The tiles that a view needs, and their positions on the map.
 
-Tiles are numbered as the web has them: z, x from west, y from north, in the spherical
+Tiles are numbered as in web maps: z, x from west, y from north, in the spherical
 Mercator projection.
 """
 
@@ -13,10 +13,10 @@ from webmap.base.local_plane import REACH, LocalPlane
 
 MAX_ZOOM = 24
 WORLD = 40_075_016.686
-"""Metres round the equator."""
+"""Length of the equator, in metres."""
 
 OVERLAP = 1 / 512
-"""How much larger a tile is drawn than it is, so that no seam is seen between two."""
+"""Enlargement of a drawn tile, so that there is no visible seam between tiles."""
 
 
 class Tile(NamedTuple):
@@ -32,10 +32,9 @@ class TileGrid:
 
     Args:
         plane: The plane.
-        zooms: The levels that there are, ascending.
-        size: Pixels on a side of a tile.
-        most: Tiles that are shown at once.
-
+        zooms: The available levels, ascending.
+        size: The side of a tile, in pixels.
+        most: Greatest number of tiles that are shown at once.
     """
 
     def __init__(
@@ -47,16 +46,15 @@ class TileGrid:
         self.most = most
 
     def wanted(self, view: Affine, width: float, height: float) -> list[Tile]:
-        """Return the tiles that a view shows, those in its middle first.
+        """Return the tiles in a view, the middle of the view first.
 
-        The level is the one whose pixels are nearest to the screen's in size, and a
-        coarser one if that were too many tiles.
+        The level is the one whose pixels are nearest to the screen's in size, or a
+        coarser one if that would be too many tiles.
 
         Args:
-            view: From the map, in metres, to pixels.
-            width: Of the canvas, in pixels.
-            height: In pixels.
-
+            view: The transform from the map, in metres, to pixels.
+            width: Width of the canvas, in pixels.
+            height: Height of the canvas, in pixels.
         """
         if width <= 0 or height <= 0 or not self.zooms:
             return []
@@ -76,7 +74,7 @@ class TileGrid:
         return tiles[: self.most]
 
     def place(self, tile: Tile) -> Affine:
-        """Return where a tile lies: from x right and y down, 0 to 1, to the map."""
+        """Return a tile's transform to the map, from x right and y down, 0 to 1."""
         west, north = self._corner(tile.z, tile.x, tile.y)
         east = self._corner(tile.z, tile.x + 1, tile.y)
         south = self._corner(tile.z, tile.x, tile.y + 1)
@@ -95,7 +93,7 @@ class TileGrid:
         )
 
     def _level(self, scale: float) -> int:
-        """Return the level for so many pixels to the metre."""
+        """Return the level for a scale in pixels per metre."""
         round_here = WORLD * math.cos(math.radians(self.plane.latitude))
         exact = math.log2(max(scale * round_here / self.size, 1e-9))
         return min(self.zooms, key=lambda zoom: (abs(zoom - exact), zoom))
@@ -109,9 +107,10 @@ class TileGrid:
         *,
         reach: int | None = None,
     ) -> list[Tile] | None:
-        """Return the tiles of a level that are seen; None if they are far too many.
+        """Return the visible tiles of a level; None if they are far too many.
 
-        With ``reach`` only those are looked at that are so many from the middle one.
+        With ``reach`` only the tiles within this number from the middle tile are
+        considered.
         """
         inverse = view.inverse
         numbers = [
@@ -136,14 +135,14 @@ class TileGrid:
         ]
 
     def _number(self, z: int, x: float, y: float) -> tuple[float, float]:
-        """Return where a place of the plane is, in tiles of a level from north-west."""
+        """Return a point of the plane in tiles of a level, from north-west."""
         away = math.hypot(x, y)
-        if away > REACH:  # what lies further is not drawn
+        if away > REACH:  # the area beyond is not drawn
             x, y = x * REACH / away, y * REACH / away
         latitude, longitude = self.plane.to_globe(x, y)
         lat = math.radians(max(-85.0511, min(85.0511, latitude)))
         row = (1 - math.asinh(math.tan(lat)) / math.pi) / 2 * 2**z
-        # Longitudes go on over the date line, as the plane's do.
+        # Longitudes continue over the date line, like those of the plane.
         return (longitude + 180) / 360 * 2**z, min(max(row, 0.0), 2**z - 1e-6)
 
     def _is_seen(self, tile: Tile, view: Affine, width: float, height: float) -> bool:
@@ -163,7 +162,7 @@ class TileGrid:
 
 
 def _span(numbers: Sequence[float], around: int) -> tuple[int, int]:
-    """Return the first and the last of columns; longitudes go on over the date line."""
+    """Return the first and last column; longitudes continue over the date line."""
     return math.floor(min(numbers)), min(
         math.floor(max(numbers)), math.floor(min(numbers)) + around - 1
     )

@@ -5,9 +5,9 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('../../web/halves.js').Half} Half */
 
 /**
- * Say whose the tiles of a map are.
+ * Show the attribution of a map's tiles.
  *
- * Options: `attribution`, the words; nothing is shown without any.
+ * Options: `attribution`, the text; nothing is shown without it.
  *
  * @param {MapCanvas} map
  * @param {{attribution?: string}} options

@@ -1,4 +1,4 @@
-"""Tiles of a map from this machine's disk, under everything else."""
+"""Map tiles from this machine's disk, below everything else."""
 
 import asyncio
 import math
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from webmap.core.map import Map
 
 ORDER = -1.0
-"""Under the images of the map."""
+"""Below the images of the map."""
 
 PAUSE = 0.1
-"""Least seconds between two looks at which tiles the view needs."""
+"""Least time between two updates of the needed tiles, in seconds."""
 
 MOST = 256
-"""Tiles that anybody may want at once."""
+"""Upper limit of the option ``most``."""
 
 
 class _Shown(NamedTuple):
@@ -39,9 +39,8 @@ class _Shown(NamedTuple):
 class TileLayer:
     """Draws satellite or street tiles from a folder or an MBTiles file.
 
-    The level follows the zoom, and only what is seen is loaded. A tile that is not
-    there leaves its place empty. They lie where ``NavSatFix`` with the same datum puts
-    its fixes.
+    The level follows the zoom, and only visible tiles are loaded. A missing tile leaves
+    its place empty. With the same datum ``NavSatFix`` uses the same projection.
 
     Style it by CSS: ``.tiles`` and ``.webmap-attribution``.
 
@@ -49,17 +48,16 @@ class TileLayer:
         map: The map.
         source: A folder with ``z/x/y.png``, or an MBTiles file; never another host.
         datum: Latitude and longitude of the map's origin, in degrees.
-        east: How far the map's x is turned from east, in degrees, counter-clockwise
-            from above: 90 if x points north.
-        attribution: Whose the tiles are, which most licences want to be shown; what
-            the file says, if not given.
-        tile_size: Pixels on a side, 256 or 512.
-        most: Tiles that are loaded at once for a viewer.
+        east: Rotation of the map's x from east, in degrees, counter-clockwise from
+            above: 90 if x points north.
+        attribution: The owner of the tiles, which most licences require to be shown; by
+            default the attribution of the file.
+        tile_size: The side of a tile in pixels, 256 or 512.
+        most: Greatest number of tiles that are loaded at once for a page.
         opacity: From 0 to 1.
 
     Raises:
-        ConfigError: If there are no such tiles, or the datum is on no globe.
-
+        ConfigError: If there are no such tiles, or the datum is outside its ranges.
     """
 
     def __init__(
@@ -89,7 +87,7 @@ class TileLayer:
         self.source = open_tiles(source)
         self.grid = TileGrid(plane, self.source.zooms, size=tile_size, most=most)
         self.shown: dict[Tile, _Shown | None] = {}
-        """What is on the map; None where there is no tile."""
+        """The tiles on the map; None for a missing tile."""
         self.svg: Element = svg.g(class_="tiles", pointer_events="none")
         self.svg.set(opacity=None if math.isclose(opacity, 1) else opacity)
         self._fragment = Fragment(self.svg)
@@ -109,7 +107,7 @@ class TileLayer:
         self.on_view()
 
     def on_view(self) -> None:
-        """Look which tiles the view needs now."""
+        """Update the tiles that the view needs."""
         self._dirty = True
         if self._looking is None and not self._closed:
             self._looking = spawn(self._look_on())
@@ -121,7 +119,7 @@ class TileLayer:
         self.map.unmount(self._fragment)
         close = getattr(self.source, "close", None)
         if close is not None:
-            # In a thread, for it waits for one that reads a tile just now.
+            # In a thread, because closing waits for a read in progress.
             asyncio.get_running_loop().run_in_executor(None, close)
 
     async def _look_on(self) -> None:
@@ -137,17 +135,17 @@ class TileLayer:
         map = self.map
         wanted = self.grid.wanted(map.world.tf, map.canvas_width, map.canvas_height)
         for tile in wanted:
-            if self._dirty or self._closed:  # the view is another already
+            if self._dirty or self._closed:  # the view has changed
                 return
             if tile not in self.shown:
                 self._make_room(wanted)
                 await self._load(tile)
-        # Only now, so that no hole is seen while a level changes.
+        # Only now, so that no gap is visible while the level changes.
         for tile in self.shown.keys() - set(wanted):
             self._drop(tile)
 
     def _make_room(self, wanted: list[Tile]) -> None:
-        """Let no more than the most be there with the one that comes."""
+        """Remove tiles, so that the next tile does not exceed the greatest number."""
         spare = (tile for tile in list(self.shown) if tile not in wanted)
         while len(self.shown) >= self.grid.most:
             self._drop(next(spare))

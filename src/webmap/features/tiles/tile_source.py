@@ -1,7 +1,7 @@
-"""Tiles of maps from this machine's disk: a folder, or an MBTiles file.
+"""Map tiles from this machine's disk: a folder, or an MBTiles file.
 
-Nothing is ever fetched from another host. A file is somebody else's work: what is in
-it is bounded in size and in time, and only pictures are handed on.
+Nothing is ever requested from another host. Files are untrusted: their content is
+limited in size and in time, and only pictures are passed on.
 """
 
 import html
@@ -17,13 +17,13 @@ from webmap.base.errors import ConfigError
 from webmap.features.tiles.tile_grid import MAX_ZOOM, Tile
 
 LARGEST = 4 << 20
-"""Bytes that one tile may have."""
+"""Greatest size of a tile, in bytes."""
 
 WIDEST = 1024
-"""Pixels that a tile may have on a side."""
+"""Greatest side of a tile, in pixels."""
 
 PATIENCE = 2.0
-"""Seconds that one question to an MBTiles file may take."""
+"""Greatest duration of a query to an MBTiles file, in seconds."""
 
 MEDIA = {"png": "image/png", "jpeg": "image/jpeg", "webp": "image/webp"}
 SUFFIXES = ("png", "jpg", "jpeg", "webp")
@@ -32,33 +32,31 @@ _STEPS = 10_000
 
 
 class Source(Protocol):
-    """Where tiles come from."""
+    """A source of tiles."""
 
     attribution: str
 
     @property
     def zooms(self) -> Sequence[int]:
-        """The levels that there are, ascending."""
+        """The available levels, ascending."""
 
     def read(self, tile: Tile) -> tuple[bytes, str] | None:
         """Return a tile and its media type; None if there is none.
 
         Raises:
-            ConfigError: If there is something that is no tile.
-
+            ConfigError: If the content is not a tile.
         """
 
 
 def open_tiles(source: str | Path) -> Source:
-    """Return where tiles come from.
+    """Return the source for a path.
 
     Args:
         source: A folder with ``z/x/y.png`` (or ``.jpg``, ``.webp``), or an MBTiles
             file.
 
     Raises:
-        ConfigError: If it is neither, or holds no tiles that can be drawn.
-
+        ConfigError: If it is neither, or contains no tiles that can be drawn.
     """
     if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", str(source)):
         raise ConfigError(
@@ -87,8 +85,7 @@ class FolderTiles:
         folder: The folder.
 
     Raises:
-        ConfigError: If there is no level in it.
-
+        ConfigError: If the folder contains no level.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -109,14 +106,13 @@ class FolderTiles:
         """Return a tile and its media type; None if there is none.
 
         Raises:
-            ConfigError: If it is no tile, or lies outside of the folder.
-
+            ConfigError: If the file is not a tile, or is outside of the folder.
         """
         for suffix in SUFFIXES:
             file = self.folder / f"{tile.z}" / f"{tile.x}" / f"{tile.y}.{suffix}"
             try:
                 real = file.resolve(strict=True)
-            except (OSError, RuntimeError):  # not there, or a ring of links
+            except (OSError, RuntimeError):  # missing, or a cycle of links
                 continue
             if not real.is_relative_to(self.folder):
                 raise ConfigError(f"{file} leads out of {self.folder}")
@@ -135,8 +131,7 @@ class MBTiles:
         file: The file.
 
     Raises:
-        ConfigError: If it is none, or holds no pictures.
-
+        ConfigError: If it is not an MBTiles file, or contains no pictures.
     """
 
     def __init__(self, file: Path) -> None:
@@ -147,12 +142,12 @@ class MBTiles:
         with file.open("rb") as stream:
             if stream.read(len(_HEADER)) != _HEADER:
                 raise ConfigError(f"tiles {str(file)!r}: this is no MBTiles file")
-        # Read only, and never with a journal or a log of somebody else's beside it.
+        # Read only, and never with another process's journal or log.
         address = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
         self._database = sqlite3.connect(address, uri=True, check_same_thread=False)
         self._database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
         self._database.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
-        # tables may be views; what they call must be harmless
+        # tables may be views; the functions in them must be harmless
         self._database.execute("PRAGMA trusted_schema=OFF")
         self._database.execute("PRAGMA cell_size_check=ON")
         self._deadline = 0.0
@@ -176,13 +171,13 @@ class MBTiles:
         """Return a tile and its media type; None if there is none.
 
         Raises:
-            ConfigError: If the file does not answer in time, or with no picture.
-
+            ConfigError: If the file does not answer in time, or the content is not a
+                picture.
         """
         rows = self._ask(
             "SELECT tile_data FROM tiles "
             "WHERE zoom_level = ? AND tile_column = ? AND tile_row = ? LIMIT 1",
-            # The rows of MBTiles are counted from the south.
+            # MBTiles counts rows from the south.
             (tile.z, tile.x, 2**tile.z - 1 - tile.y),
         )
         if not rows or rows[0][0] is None:
@@ -197,7 +192,7 @@ class MBTiles:
         try:
             low, high = (int(str(known[name])) for name in ("minzoom", "maxzoom"))
         except (KeyError, ValueError):
-            # Asked for one by one, the index has them; together, every row is read.
+            # Two single queries use the index; one query for both reads every row.
             ((low, high),) = self._ask(
                 "SELECT (SELECT MIN(zoom_level) FROM tiles), "
                 "(SELECT MAX(zoom_level) FROM tiles)"
@@ -222,8 +217,7 @@ def media_type(data: bytes, name: str) -> str:
     """Return the media type of a tile that browsers can draw.
 
     Raises:
-        ConfigError: If it is none, or too large.
-
+        ConfigError: If browsers cannot draw it, or it is too large.
     """
     import io
 
@@ -244,6 +238,6 @@ def media_type(data: bytes, name: str) -> str:
 
 
 def plain(text: str) -> str:
-    """Return what an attribution says without its markup, in one line."""
+    """Return the text of an attribution without its markup, in one line."""
     words = html.unescape(re.sub(r"<[^<>]*>", "", text[:2000]))
     return " ".join("".join(c if c.isprintable() else " " for c in words).split())[:300]

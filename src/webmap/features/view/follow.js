@@ -5,8 +5,8 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('../../web/halves.js').Half} Half */
 
 /**
- * A button that keeps the selected robot where it is on the screen, until the view is
- * moved by hand.
+ * A button that keeps the selected robot at its place on the screen, until the user
+ * moves the view.
  *
  * Sends `{follow: id}` with the gate's id of the robot, or `{follow: null}`.
  *
@@ -29,7 +29,7 @@ export default function attach(map, _options, send) {
   toggle.title = "Move the map with the selected robot";
   /** @type {import('../../web/drive.js').Drive} */
   const drive = map.drive;
-  // The view does not tell when it begins to follow; it is looked at instead.
+  // The view sends no event when following begins; its state is read instead.
   const offs = [
     lay(map, toggle, "bottom-right"),
     map.onSelect(show),

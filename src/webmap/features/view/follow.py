@@ -1,4 +1,4 @@
-"""The view goes with a robot."""
+"""Makes the view follow a robot."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -10,9 +10,9 @@ if TYPE_CHECKING:
 
 @map_modules.register
 class Follow:
-    """A button that keeps the selected robot where it is on the screen.
+    """A button that keeps the selected robot at its place on the screen.
 
-    It ends when the viewer moves the view by hand.
+    Following ends when the user moves the view.
     """
 
     def __init__(self, map: "Map") -> None:
@@ -22,5 +22,5 @@ class Follow:
         )
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Follow the robot that the page names, or none."""
+        """Follow the robot in the page's message, or none."""
         self.map.follow(self.map.find_robot(message.get("follow")))

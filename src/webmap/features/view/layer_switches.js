@@ -4,28 +4,28 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/halves.js').Half} Half */
 
-/** Where the choice is kept in this browser. */
+/** The key of the choice in this browser's storage. */
 const KEPT = "webmap.layers";
 
-/** What parts a layer's name from that of one of its drawings, in what is kept. */
+/** Separates a layer's name from that of one of its drawings in the stored choice. */
 const OF = "\n";
 
-/** How many drawings of a layer are listed; more of them are switched together only. */
+/** Greatest number of listed drawings of a layer; others are only switched together. */
 const MOST = 16;
 
-/** How often an open list looks what there is, in milliseconds. */
+/** Milliseconds between two updates of an open list. */
 const PERIOD = 1000;
 
-/** Puts the layers of robot_2 before those of robot_10. */
+/** Sorts the layers of robot_2 before those of robot_10. */
 const order = new Intl.Collator("en", { numeric: true });
 
 let maps = 0;
 
 /**
- * A list of what the map shows, each to be switched on and off.
+ * A list of the layers of the map, each with a switch.
  *
- * Options: `layers`, names with their CSS selectors; `off`, the names of those that are
- * off at first.
+ * Options: `layers`, names with their CSS selectors; `off`, the names that are off at
+ * first.
  *
  * @param {MapCanvas} map
  * @param {{layers?: [string, string][], off?: string[]}} options
@@ -39,8 +39,8 @@ export default function attach(map, options) {
 /**
  * @param {[string, string][]} layers
  * @param {Record<string, boolean>} shown
- * @param {string} scope A selector of what the layers are in.
- * @returns {string} The style sheet that hides what is not shown.
+ * @param {string} scope A selector of the element that contains the layers.
+ * @returns {string} The style sheet that hides the layers that are off.
  */
 export function hiding(layers, shown, scope) {
   const rules = [];
@@ -56,9 +56,9 @@ export function hiding(layers, shown, scope) {
 }
 
 /**
- * @param {Iterable<{dataset: DOMStringMap}>} drawings What a layer draws at the moment.
- * @returns {string[]} What of it can be switched by itself, in natural order; nothing if
- *     it is one thing.
+ * @param {Iterable<{dataset: DOMStringMap}>} drawings The present drawings of a layer.
+ * @returns {string[]} The drawings that have their own switch, in natural order; none
+ *     if there is only one drawing.
  */
 export function several(drawings) {
   const found = new Set();
@@ -117,7 +117,7 @@ class LayerSwitches {
     document.adoptedStyleSheets = sheets.filter((sheet) => sheet !== this._sheet);
   }
 
-  /** List what is on the map at the moment. */
+  /** List the present layers of the map. */
   _look() {
     if (!this._details.open) return;
     const there = new Set();
@@ -153,7 +153,7 @@ class LayerSwitches {
   }
 
   /**
-   * Show that more is drawn than there are switches for.
+   * Show that there are more drawings than switches.
    *
    * @param {string} name Of the layer.
    * @param {number} more
@@ -169,7 +169,7 @@ class LayerSwitches {
     this._arrange();
   }
 
-  /** Sort the rows: each layer, then the drawings of that layer, then its note. */
+  /** Sort the rows: each layer, then its drawings, then its note. */
   _arrange() {
     const rows = this._layers.flatMap(([name]) => {
       const keys = [...this._rows.keys()].filter((key) => key.split(OF)[0] === name);
@@ -200,14 +200,14 @@ class LayerSwitches {
   }
 }
 
-/** @returns {Record<string, boolean>} What was chosen before in this browser. */
+/** @returns {Record<string, boolean>} The choice stored in this browser. */
 function kept() {
   try {
     const value = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
     const choices = Object.entries(value).filter(([, on]) => typeof on === "boolean");
     return Object.fromEntries(choices);
   } catch {
-    return {}; // storage may be forbidden, or hold what is not ours
+    return {}; // no storage, or not written by WebMap
   }
 }
 
@@ -216,6 +216,6 @@ function keep(shown) {
   try {
     localStorage.setItem(KEPT, JSON.stringify(shown));
   } catch {
-    // Then it is chosen again next time.
+    // Without storage the choice is not kept.
   }
 }

@@ -1,4 +1,4 @@
-"""What is drawn on the map, switched on and off by each viewer."""
+"""Switches for the layers of the map, for each page."""
 
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
@@ -30,12 +30,14 @@ LAYERS = {
     "Labels": ".labels",
     "Health": "",
 }
-"""The names in the order of the list, with the CSS selectors of what is not drawn from
-a topic. Layers declare theirs; those with other names come last."""
+"""Names in the order of the list, with the CSS selectors of content without topics.
+
+Layers declare their own selectors; names that are not here come last.
+"""
 
 
 def all_layers() -> dict[str, str]:
-    """Return the CSS selector of each name, of all layers there are."""
+    """Return the CSS selector of each name, of all layers."""
     selectors = {name: [said] if said else [] for name, said in LAYERS.items()}
     for declared in declarations():
         for name, selector in declared.switches.items():
@@ -46,22 +48,20 @@ def all_layers() -> dict[str, str]:
 
 @map_modules.register
 class LayerSwitches:
-    """A list of what the map shows, each to be switched on and off.
+    """A list of the layers of the map, each with a switch.
 
-    Only what is there at the time is listed. A layer that draws different things, such
-    as two scans or two maps, has a switch for each of them besides. The choice is the
-    viewer's own and is kept in that browser; what is switched off still comes from the
-    robot.
+    Only layers with present content are listed. A layer with different drawings, such
+    as two scans or two maps, also has a switch for each of them. Each browser stores
+    its own choice; robots still send data of layers that are off.
 
     Args:
         map: The map.
-        layers: A CSS selector for each name, in the order of the list; what
-            layers and ``map.add_image`` draw if not given.
-        off: Names of those that are off until the viewer switches them on.
+        layers: A CSS selector for each name, in the order of the list; by default the
+            names of all layers and of ``map.add_image``.
+        off: Names that are off until the user switches them on.
 
     Raises:
-        ConfigError: If ``off`` has a name that is not in ``layers``.
-
+        ConfigError: If a name in ``off`` is not in ``layers``.
     """
 
     def __init__(

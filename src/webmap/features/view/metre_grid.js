@@ -11,8 +11,8 @@ let grids = 0;
  *
  * @param {number} scale Pixels per metre.
  * @param {number} least The least distance, in pixels.
- * @returns {number | null} In metres, a round number from 1 on; null when the scale makes
- *     no sense.
+ * @returns {number | null} In metres, a round number from 1 on; null if the scale is
+ *     not valid.
  */
 function gridStep(scale, least) {
   const metres = least / scale;
@@ -24,9 +24,9 @@ function gridStep(scale, least) {
 }
 
 /**
- * Draw lines under the map.
+ * Draw a grid of lines below the map.
  *
- * Options: `least`, the least distance between two of them, in pixels.
+ * Options: `least`, the least distance between two lines, in pixels.
  *
  * @param {MapCanvas} map
  * @param {{least?: number}} options

@@ -1,4 +1,4 @@
-"""Lines under the map, to see distances and motion by."""
+"""A grid below the map that shows distances and motion."""
 
 from typing import TYPE_CHECKING
 
@@ -10,10 +10,10 @@ if TYPE_CHECKING:
 
 @map_modules.register
 class MetreGrid:
-    """Draws quiet lines under the map, a round number of metres apart.
+    """Draws thin lines below the map, a round number of metres apart.
 
     The distance between two lines follows the zoom: it is the least of 1, 2, 5, 10 and
-    so on that has room. Pages that WebMap makes have this module.
+    so on that has room. WebMap's own pages have this module.
 
     Args:
         map: The map.
@@ -21,7 +21,6 @@ class MetreGrid:
 
     Raises:
         ValueError: If ``least`` is less than 4.
-
     """
 
     def __init__(self, map: "Map", least: int = 32) -> None:

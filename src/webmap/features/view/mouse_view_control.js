@@ -5,15 +5,16 @@ import { fit, rotate, scale, scaleOf, translate } from "../../web/view.js";
 /** @typedef {import('../../web/view.js').Matrix} Matrix */
 /** @typedef {import('../../web/view.js').Point} Point */
 
-/** What a key press zooms by, and turns by in radians. */
+/** Zoom factor of a key press, and rotation below in radians. */
 const KEY_FACTOR = 1.25;
 const KEY_ANGLE = Math.PI / 24;
 
 /**
- * Move, zoom and turn the view by mouse, wheel, fingers and keys.
+ * Move, zoom and rotate the view by mouse, wheel, fingers and keys.
  *
- * Drag moves, the wheel zooms about the pointer and turns with shift; two fingers do
- * all three. With the map focused: `+ - [ ]`, and `0` shows everything.
+ * A drag moves, the wheel zooms about the pointer and rotates with Shift; two fingers
+ * do all three. While the map has the focus, `+ - [ ]` zoom and rotate, and `0` shows
+ * everything.
  *
  * Options: `min_zoom` and `max_zoom` in pixels per metre.
  *
@@ -35,7 +36,7 @@ class MouseViewControl {
     this._map = map;
     this._zoom = { min, max };
     /**
-     * Where the fingers are, or the mouse while its button is down.
+     * Positions of the fingers, or of the mouse while its button is down.
      * @type {Map<number, Point>}
      */
     this._pointers = new Map();
@@ -69,14 +70,14 @@ class MouseViewControl {
       passive: false,
     });
     svg.addEventListener("keydown", (event) => this._key(event), { signal });
-    // An image under the pointer would be dragged out of the map instead.
+    // The browser would drag an image under the pointer out of the map instead.
     svg.addEventListener("dragstart", (event) => event.preventDefault(), { signal });
   }
 
   /** @param {PointerEvent} event */
   _down(event) {
     if (event.pointerType === "mouse" && event.button > 1) return;
-    // The middle button scrolls the page by itself otherwise.
+    // The browser would scroll the page with the middle button.
     if (event.button === 1) event.preventDefault();
     this._pointers.set(event.pointerId, this._map.pointOf(event));
     if (this._pointers.size === 1) this._start = this._map.pointOf(event);
@@ -88,7 +89,7 @@ class MouseViewControl {
     const from = this._pointers.get(event.pointerId);
     if (!from) return;
     if (event.buttons === 0) {
-      // The button went up where nobody told us.
+      // The button was released without an event for this element.
       this._up(event, false);
       return;
     }
@@ -118,7 +119,8 @@ class MouseViewControl {
   /** @param {PointerEvent} event */
   _drag(event) {
     this._dragging = true;
-    // Not before: a captured press would click the map rather than what lies there.
+    // Not before: a captured press would click the map, not the element below the
+    // pointer.
     this._map.svg.setPointerCapture(event.pointerId);
     this._map.svg.classList.add("webmap-dragging");
   }
@@ -177,23 +179,25 @@ class MouseViewControl {
 }
 
 /**
- * What hands do to a view: moves, zooms and turns as arithmetic, without a browser.
+ * Arithmetic of moving, zooming and rotating a view, without a browser.
  *
- * Points are in pixels from the top left of the map; angles in radians, clockwise as
- * one sees them, since y points down on a screen.
+ * Points are in pixels from the top left of the map; angles in radians, clockwise on
+ * the screen, because y points down.
  */
 
 
 /** @typedef {{min: number, max: number}} Zoom Least and greatest pixels per metre. */
 
-/** The pixels that one "line" and one "page" of a wheel stand for (WheelEvent.deltaMode). */
+/** Pixels of one "line" and one "page" of a wheel (WheelEvent.deltaMode). */
 const PIXELS = [1, 16, 400];
 
-/** Farther than this in pixels a press has become a drag, and its end is no click. */
+/**
+ * A press that moves farther than this, in pixels, is a drag, and its end is no click.
+ */
 const DRAG_THRESHOLD = 4;
 
 /**
- * Zoom and turn about a point that stays where it is.
+ * Zoom and rotate about a fixed point.
  *
  * @param {Matrix} view
  * @param {Point} point
@@ -202,15 +206,15 @@ const DRAG_THRESHOLD = 4;
  * @returns {Matrix}
  */
 export function zoomAndTurn(view, { x, y }, factor, angle) {
-  // `rotate` counts in degrees, counter-clockwise.
+  // `rotate` takes degrees, counter-clockwise.
   return rotate(scale(view, factor, x, y), (-angle * 180) / Math.PI, x, y);
 }
 
 /**
- * Return the part of a zoom that keeps the world in sight.
+ * Return the part of a zoom factor that keeps the world visible.
  *
- * A view that lies outside of the limits already is not pulled in, only not let farther
- * out: a map must not jump because somebody touched it.
+ * A view that is outside of the limits already is not corrected, but cannot go farther
+ * out: a map must not jump at a touch.
  *
  * @param {Matrix} view
  * @param {number} factor
@@ -226,7 +230,7 @@ export function allowedFactor(view, factor, zoom) {
 }
 
 /**
- * What one turn of a wheel asks for.
+ * The fields of a wheel event that are used here.
  *
  * @typedef {object} WheelLike
  * @property {number} deltaX
@@ -237,22 +241,22 @@ export function allowedFactor(view, factor, zoom) {
  */
 
 /**
- * Return the way that a wheel was turned, in pixels of scrolling.
+ * Return the rotation of a wheel, in pixels of scrolling.
  *
- * With shift most browsers turn a vertical wheel into a horizontal one.
+ * With Shift most browsers turn vertical scrolling into horizontal scrolling.
  *
  * @param {WheelLike} event
  */
 function wheelPixels(event) {
   const delta = event.deltaY === 0 && event.shiftKey ? event.deltaX : event.deltaY;
-  // A free-spinning wheel must not fling the map out of sight with one event.
+  // One event of a free-spinning wheel must not move the map out of sight.
   return Math.max(-400, Math.min(400, delta * (PIXELS[event.deltaMode] ?? 1)));
 }
 
 /**
- * Return the factor of a turn of the wheel: towards the operator is smaller.
+ * Return the zoom factor of a wheel's rotation: towards the user is smaller.
  *
- * A trackpad's pinch comes as a wheel with Ctrl, and with about a tenth of the way.
+ * A trackpad's pinch is a wheel event with Ctrl, with about a tenth of the distance.
  *
  * @param {WheelLike} event
  */
@@ -261,7 +265,7 @@ export function wheelFactor(event) {
 }
 
 /**
- * Return the angle of a turn of the wheel: about 9 degrees for one notch.
+ * Return the angle of a wheel's rotation: about 9 degrees for one notch.
  *
  * @param {WheelLike} event
  */
@@ -270,19 +274,19 @@ export function wheelAngle(event) {
 }
 
 /**
- * Follow two fingers: what was under each stays under it, as far as the zoom's limits
- * let it; between those, the point between the fingers stays.
+ * Follow two fingers: the points under the fingers stay under them, as far as the zoom
+ * limits allow; beyond the limits the point between the fingers stays.
  *
  * @param {Matrix} view
- * @param {readonly [Point, Point]} from Where the fingers were.
- * @param {readonly [Point, Point]} to Where they are.
+ * @param {readonly [Point, Point]} from Previous positions of the fingers.
+ * @param {readonly [Point, Point]} to Present positions of the fingers.
  * @param {Zoom} zoom
  * @returns {Matrix}
  */
 export function pinch(view, from, to, zoom) {
   const before = between(from);
   const after = between(to);
-  // Fingers on one spot say nothing about size or turn.
+  // Fingers at the same point define neither size nor angle.
   const known = before.length > 1 && after.length > 1;
   const factor = known ? allowedFactor(view, after.length / before.length, zoom) : 1;
   const angle = known ? after.angle - before.angle : 0;

@@ -1,4 +1,4 @@
-"""Mouse, wheel and touch change the view."""
+"""Changes the view by mouse, wheel and touch."""
 
 from typing import TYPE_CHECKING
 
@@ -10,10 +10,10 @@ if TYPE_CHECKING:
 
 @map_modules.register
 class MouseViewControl:
-    """Drag moves the view, the wheel zooms, shift and the wheel turn.
+    """A drag moves the view, the wheel zooms, Shift and the wheel rotate.
 
-    On a touch screen two fingers zoom and turn. The click that ends a drag is not a
-    click. It runs in the browser, which owns the view.
+    On a touch screen two fingers zoom and rotate. The release that ends a drag is not a
+    click. The module runs in the browser, which owns the view.
     """
 
     def __init__(self, map: "Map") -> None:

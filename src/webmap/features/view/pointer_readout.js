@@ -5,9 +5,9 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('../../web/halves.js').Half} Half */
 
 /**
- * Show where the pointer is, in metres of the map.
+ * Show the pointer's position, in metres of the map.
  *
- * Options: `digits` after the point.
+ * Options: `digits` after the decimal point.
  *
  * @param {MapCanvas} map
  * @param {{digits?: number}} options
@@ -57,6 +57,6 @@ export default function attach(map, { digits = 2 }) {
  */
 function metres(value, digits) {
   const text = value.toFixed(digits);
-  // What rounds to zero has no sign.
+  // A number that rounds to zero has no sign.
   return Number(text) === 0 ? (0).toFixed(digits) : text.replace("-", "\u2212");
 }

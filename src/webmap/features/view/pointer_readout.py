@@ -1,4 +1,4 @@
-"""Where the pointer is."""
+"""Shows the pointer's position."""
 
 from typing import TYPE_CHECKING
 
@@ -10,15 +10,14 @@ if TYPE_CHECKING:
 
 @map_modules.register
 class PointerReadout:
-    """Shows the world coordinates under the pointer, in metres.
+    """Shows the world coordinates of the pointer, in metres.
 
     Args:
         map: The map.
-        digits: How many digits are shown after the point.
+        digits: Number of digits after the decimal point.
 
     Raises:
         ValueError: If ``digits`` is not in 0 to 6.
-
     """
 
     def __init__(self, map: "Map", digits: int = 2) -> None:

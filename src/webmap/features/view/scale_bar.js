@@ -10,7 +10,7 @@ import { lay } from "../../web/tools/overlay.js";
  *
  * @param {number} scale Pixels per metre.
  * @param {number} room In pixels.
- * @returns {number | null} In metres; null when the scale makes no sense.
+ * @returns {number | null} In metres; null if the scale is not valid.
  */
 export function roundLength(scale, room) {
   const most = room / scale;
@@ -22,7 +22,7 @@ export function roundLength(scale, room) {
 
 /**
  * @param {number} metres
- * @returns {string} In a unit that needs few digits.
+ * @returns {string} With a unit that needs few digits.
  */
 export function lengthText(metres) {
   if (metres >= 1000) return `${tidy(metres / 1000)} km`;
@@ -33,7 +33,7 @@ export function lengthText(metres) {
 /**
  * Show a length on the map.
  *
- * Options: `width`, the longest it may be, in pixels.
+ * Options: `width`, the greatest width of the bar, in pixels.
  *
  * @param {MapCanvas} map
  * @param {{width?: number}} options

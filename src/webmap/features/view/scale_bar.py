@@ -1,4 +1,4 @@
-"""A length to compare with, on the map."""
+"""A scale bar on the map."""
 
 from typing import TYPE_CHECKING
 
@@ -10,15 +10,14 @@ if TYPE_CHECKING:
 
 @map_modules.register
 class ScaleBar:
-    """Shows how long a round number of metres is at the current zoom.
+    """Shows the length of a round number of metres at the current zoom.
 
     Args:
         map: The map.
-        width: The longest that the bar may be, in pixels.
+        width: Greatest width of the bar, in pixels.
 
     Raises:
         ValueError: If ``width`` is less than 20.
-
     """
 
     def __init__(self, map: "Map", width: int = 120) -> None:

@@ -1,4 +1,4 @@
-"""The name of the selected robot, somewhere on the page."""
+"""Shows the name of the selected robot in an element of the page."""
 
 from typing import TYPE_CHECKING
 
@@ -15,9 +15,8 @@ class ShowSelected:
 
     Args:
         map: The map.
-        element: The element; all that it holds is replaced by the name.
-        default_msg: What it shows when no robot is selected.
-
+        element: The element; the name replaces its content.
+        default_msg: The text while no robot is selected.
     """
 
     def __init__(
@@ -33,6 +32,6 @@ class ShowSelected:
         self.element.text = ""
 
     def on_select(self) -> None:
-        """Show the robot that is selected now."""
+        """Show the name of the robot that is selected now."""
         selected = self.map.selected
         self.element.text = self.default_msg if selected is None else selected.name

@@ -1,6 +1,7 @@
-"""Markers: what ROS programs draw to show what they think.
+"""Markers: shapes that ROS programs publish for people.
 
-The layer is in ``layer``, how a marker looks from above in ``shapes`` and ``drawing``.
+The layer is in ``layer``; ``shapes`` and ``drawing`` define how a marker looks from
+above.
 """
 
 from webmap.features.layers.markers.layer import Markers

@@ -1,4 +1,4 @@
-"""What each type of ``visualization_msgs/Marker`` looks like from above."""
+"""How each type of ``visualization_msgs/Marker`` looks from above."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -24,16 +24,16 @@ from webmap.scene import svg
 from webmap.scene.element import Element
 
 SHADES = 16
-"""How finely the colours of single points are told apart, from 0 to 1."""
+"""Number of steps to which the colours of single points are rounded, from 0 to 1."""
 
 
 def filled(colour: ColorMsg) -> dict[str, Any]:
-    """Return the attributes of an area of a colour."""
+    """Return the attributes of an area with a colour."""
     return {"fill": _rgb(colour), "fill_opacity": _alpha(colour)}
 
 
 def drawn(colour: ColorMsg, width: float) -> dict[str, Any]:
-    """Return the attributes of a line of a colour, with its width in metres."""
+    """Return the attributes of a line with a colour and a width in metres."""
     return {
         "stroke": _rgb(colour),
         "stroke_opacity": _alpha(colour),
@@ -51,7 +51,7 @@ def by_colour(
     parts: Iterable[tuple[str, ColorMsg]],
     style: Callable[[ColorMsg], dict[str, Any]],
 ) -> Iterable[Element]:
-    """Return one path for each colour, whatever their number of parts."""
+    """Return one path for each colour, with all parts of that colour."""
     paths: dict[tuple[float, ...], list[str]] = {}
     for path, colour in parts:
         key = (_shade(colour.r), _shade(colour.g), _shade(colour.b), _shade(colour.a))
@@ -66,7 +66,7 @@ def _shade(part: float) -> int:
 
 
 def _share(part: float) -> float:
-    """Return a part of a colour that is one; what is not a number is nothing."""
+    """Return a component of a colour within 0 to 1; 0 if it is not finite."""
     return min(1.0, max(0.0, part)) if math.isfinite(part) else 0.0
 
 
@@ -80,10 +80,10 @@ def _alpha(colour: ColorMsg) -> float:
 
 
 MAX_TEXT = 500
-"""The most characters that are shown of a text."""
+"""Greatest number of characters that are shown of a text."""
 
 LETTERS = 16.0
-"""The size of letters before they are scaled: browsers round what is below 1."""
+"""The size of letters before they are scaled: browsers round sizes below 1."""
 
 CLASSES = {
     kinds.ARROW: "arrow",
@@ -98,19 +98,18 @@ CLASSES = {
     kinds.TEXT_VIEW_FACING: "text",
     kinds.TRIANGLE_LIST: "triangle-list",
 }
-"""The class of each type that can be drawn."""
+"""The CSS class of each type that can be drawn."""
 
 
 def draw(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
-    """Return what a marker consists of, in the coordinates of its place.
+    """Return the elements of a marker, in the coordinates of its pose.
 
     Args:
         marker: The marker, of a type in :data:`CLASSES`.
-        tilt: How it is turned there besides its heading.
+        tilt: The rotation of the marker without its heading.
 
     Raises:
-        ProtocolError: If a number makes no sense.
-
+        ProtocolError: If a number is not valid.
     """
     return _DRAWN[marker.type](marker, tilt)
 
@@ -119,8 +118,7 @@ def sizes(marker: MarkerMsg, *axes: str) -> list[float]:
     """Return sizes of a marker along axes, in metres.
 
     Raises:
-        ProtocolError: If one of them is not above 0, or larger than anything.
-
+        ProtocolError: If a size is not above 0, or above the greatest size.
     """
     found = [getattr(marker.scale, axis) for axis in axes]
     for axis, size in zip(axes, found, strict=True):
@@ -250,7 +248,7 @@ def _triangle_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
 
 
 def _square_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
-    """Return points, which face whoever looks."""
+    """Return points, which always face the camera."""
     wide, high = sizes(marker, "x", "y")
     square = f"h{wide:.3f}v{high:.3f}h{-wide:.3f}z"
     parts = (
@@ -298,13 +296,13 @@ def _repeated(
 
 
 def _height(marker: MarkerMsg) -> float:
-    """Return how high a marker is.
+    """Return the height of a marker.
 
-    It only shows where the marker is tilted; and what lies flat may be tilted later.
+    The height is visible only on a tilted marker, and a flat marker may be tilted
+    later.
 
     Raises:
-        ProtocolError: If it is higher than anything.
-
+        ProtocolError: If the height is above the greatest size.
     """
     height = marker.scale.z
     if not (math.isfinite(height) and height > 0):

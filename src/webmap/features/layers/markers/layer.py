@@ -1,4 +1,4 @@
-"""Markers: what ROS programs draw to show what they think."""
+"""Markers: shapes that ROS programs publish for people."""
 
 import asyncio
 import logging
@@ -32,7 +32,7 @@ from webmap.scene.element import Element
 log = logging.getLogger("webmap.modules")
 
 Put = Callable[[Transform], object]
-"""Puts a marker where its frame is now."""
+"""Places a marker at the present pose of its frame."""
 
 
 @dataclass(slots=True)
@@ -44,7 +44,7 @@ class _Moving:
 
 
 class MarkerFrames(LayerFrames):
-    """Tells where the frames of markers are on the map, and which of them move."""
+    """Finds the frames of markers on the map, and follows those that move."""
 
     def _begin(self) -> None:
         self._moving: dict[object, _Moving] = {}
@@ -53,15 +53,14 @@ class MarkerFrames(LayerFrames):
     def place(
         self, key: object, frame_id: str, stamp: float, locked: bool, put: Put
     ) -> Transform:
-        """Return what takes coordinates of a marker's frame to those of the map.
+        """Return the transform from a marker's frame to the map.
 
         Args:
-            key: Of the marker.
-            frame_id: Its frame; empty if it does not say.
-            stamp: When the frame is meant, in seconds of the robot's clock; 0 for now.
-            locked: Whether the marker goes on moving with the frame.
-            put: Called when the frame has moved, or is known at last.
-
+            key: The key of the marker.
+            frame_id: The marker's frame; empty if not given.
+            stamp: Time of the frame, in seconds of the robot's clock; 0 for now.
+            locked: Whether the marker follows later motion of the frame.
+            put: Called when the frame has moved, or becomes known.
         """
         self._moving.pop(key, None)
         source = self._source(frame_id)
@@ -74,11 +73,11 @@ class MarkerFrames(LayerFrames):
         return found
 
     def forget(self, key: object) -> None:
-        """Forget a marker that is gone."""
+        """Forget a deleted marker."""
         self._moving.pop(key, None)
 
     def say(self) -> None:
-        """Say which frames nobody tells of, or take that back."""
+        """Report the unknown frames, or withdraw the report."""
         needed = {moving.frame for moving in self._moving.values()}
         self._lost = {f: words for f, words in self._lost.items() if f in needed}
         words = ""
@@ -103,7 +102,7 @@ class MarkerFrames(LayerFrames):
         self.say()
 
     def _find(self, source: str, stamp: float) -> tuple[Transform, bool]:
-        """Return where a frame is, and whether news would not change that."""
+        """Return the pose of a frame, and whether it is final."""
         try:
             found = self._look(source, stamp)
         except TransformError as error:
@@ -118,7 +117,7 @@ class MarkerFrames(LayerFrames):
 
 
 MAX_MARKERS = 5000
-"""The most markers that one topic may show."""
+"""Greatest number of markers of one topic."""
 
 
 MarkerType: TypeAlias = Literal[
@@ -127,7 +126,7 @@ MarkerType: TypeAlias = Literal[
     "visualization_msgs/msg/MarkerArray",
     "visualization_msgs/msg/Marker",
 ]
-"""The types that have markers, in either dialect."""
+"""The types of markers, in both dialects."""
 
 VIEWS: dict[str, type[MarkerMsg] | type[MarkerArrayMsg]] = {
     "visualization_msgs/MarkerArray": MarkerArrayMsg,
@@ -137,19 +136,19 @@ VIEWS: dict[str, type[MarkerMsg] | type[MarkerArrayMsg]] = {
 Key = tuple[str, int]
 
 LONGEST_NAME = 256
-"""Characters of a marker's namespace."""
+"""Greatest number of characters of a marker's namespace."""
 
 MOST_COUNTED = 100_000
-"""Markers that are counted of those that are left out."""
+"""Greatest number of left-out markers that are counted."""
 
 SETTLED = 0.5
-"""Seconds after the first that is left out until their number is said."""
+"""Seconds from the first left-out marker to the report of their number."""
 
 _LEFT_OUT = "left out"
-"""The problem of markers that are too many."""
+"""The problem of too many markers."""
 
 _MOVED = "moved"
-"""The problem of markers that cannot be drawn where their frames have got to."""
+"""The problem of markers that cannot be drawn at the new pose of their frames."""
 
 
 @layer(
@@ -160,16 +159,16 @@ _MOVED = "moved"
     rank=120,
 )
 class Markers(MapLayer):
-    """What ROS programs draw to show what they think, as it looks from above.
+    """Markers that ROS programs publish, as seen from above.
 
-    Arrows, cubes, spheres, cylinders, lines, lists of them, points, triangles and
-    texts are drawn, with their colours; meshes are not. A marker that makes no sense
-    is left out by itself, and said. A sphere, a list of them or points with a
-    quaternion of zeros are drawn unturned, and that is logged once.
+    Arrows, cubes, spheres, cylinders, lines, lists of them, points, triangles and texts
+    are drawn, with their colours; meshes are not. A marker that is not valid is left
+    out and reported; all others are drawn. A sphere, a list of spheres or points with a
+    quaternion of zeros are drawn without rotation, and this is logged once.
 
-    Each is drawn where its own frame was at its stamp, and one that is ``frame_locked``
-    goes on moving with the frame. One whose frame nobody tells of is drawn as it comes,
-    and that is said until somebody does. What is tilted, or lies on its side, is drawn
+    Each marker is drawn where its own frame was at its stamp, and a ``frame_locked``
+    marker follows the frame. A marker whose frame is unknown is drawn without a
+    transform, and this is reported until the frame is known. A tilted marker is drawn
     as its outline looks from above.
 
     Style it by CSS: ``.markers > .marker``, with the type as a further class
@@ -177,28 +176,28 @@ class Markers(MapLayer):
     ``data-ns``: ``.marker[data-ns="goals"] { display: none }``.
     """
 
-    # Every message counts: one may take away what another has put there.
+    # Every message counts, because it may delete earlier markers.
     queue_length = 100
 
     type: MarkerType = "visualization_msgs/MarkerArray"
     """``visualization_msgs/MarkerArray`` or ``visualization_msgs/Marker``."""
 
     def lay(self) -> None:
-        """Lay the layer onto the common map, and each marker where its frame is."""
+        """Place the layer on the common map, and each marker in its frame."""
         self.frames = MarkerFrames(
             self, self.bridge, self.map_frame, self.namespace, self.robot
         )
 
     def build(self) -> None:
-        """Make ready; there are no markers yet."""
+        """Prepare the layer; there are no markers yet."""
         self.shapes: dict[Key, Element] = {}
-        """What is drawn, by namespace and number."""
+        """The drawn markers, by namespace and number."""
         self._looks: dict[Key, tuple[object, ...]] = {}
         self._ends: dict[Key, float] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._said_unturned = False
         self._left_out: set[Key] = set()
-        """Markers that would be beyond :data:`MAX_MARKERS`."""
+        """Markers beyond :data:`MAX_MARKERS`."""
         self._count_timer: asyncio.TimerHandle | None = None
         keep(Removal(self._forget_timer))
         keep(Removal(self._forget_count))
@@ -206,11 +205,10 @@ class Markers(MapLayer):
         keep(Removal(lambda: self.clear_problem(_LEFT_OUT)))
 
     def take(self, message: MarkerArrayMsg | MarkerMsg) -> None:
-        """Add, change and delete as the markers say.
+        """Add, change and delete markers.
 
         Raises:
-            ProtocolError: If there is one that makes no sense; the others are drawn.
-
+            ProtocolError: If a marker is not valid; all others are drawn.
         """
         single = isinstance(message, MarkerMsg)
         markers = [message] if isinstance(message, MarkerMsg) else message.markers
@@ -280,7 +278,7 @@ class Markers(MapLayer):
                 self.clear_problem(_LEFT_OUT)
 
     def _leave_out(self, key: Key) -> None:
-        """Count a marker that has no room; that is said when no more come."""
+        """Count a marker beyond the limit; the number is reported with a delay."""
         if len(self._left_out) < MOST_COUNTED:
             self._left_out.add(key)
         if self._count_timer is None:
@@ -301,10 +299,10 @@ class Markers(MapLayer):
             self.clear_problem(_LEFT_OUT)
 
     def _move(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
-        """Put a marker where its frame is by now.
+        """Place a marker at the present pose of its frame.
 
-        One that cannot be drawn there is left out, as it is not where it was, and the
-        first is said until the next message.
+        A marker that cannot be drawn there is left out, because its old position is
+        wrong. The first such marker is reported until the next message.
         """
         try:
             self._show(key, marker, frame)
@@ -314,9 +312,9 @@ class Markers(MapLayer):
                 self.set_problem(_MOVED, f"{self.topic}: {_wrong(marker, error)}")
 
     def _say_unturned(self, marker: MarkerMsg) -> None:
-        """Say once that somebody leaves orientations out; they are drawn as RViz does.
+        """Log once that orientations are missing; they are drawn as in RViz.
 
-        It stays no problem: nothing looks otherwise for it.
+        This is not a lasting problem, because it changes nothing on the map.
         """
         if not self._said_unturned and lies_unturned(marker):
             self._said_unturned = True
@@ -330,7 +328,7 @@ class Markers(MapLayer):
             )
 
     def _show(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
-        """Put a marker where it is, drawn anew if it looks otherwise from above."""
+        """Place a marker, and draw it again if it looks different from above."""
         before, look = self.shapes.get(key), look_of(marker, frame)
         if before is not None and self._looks[key] == look:
             place(before, marker, frame)
@@ -359,7 +357,7 @@ class Markers(MapLayer):
             shape.remove()
 
     def _set_timer(self) -> None:
-        """Come back when the next marker's time is over."""
+        """Wake up when the next marker's lifetime ends."""
         self._forget_timer()
         if self._ends:
             wait = max(0.0, min(self._ends.values()) - time.monotonic())

@@ -1,4 +1,4 @@
-"""Typed views of markers, with which ROS programs draw what they think."""
+"""Typed views of marker messages."""
 
 from typing import ClassVar
 
@@ -15,7 +15,7 @@ ADD, DELETE, DELETE_ALL = 0, 2, 3
 
 
 class ColorMsg(msgspec.Struct, frozen=True, gc=False):
-    """``std_msgs/ColorRGBA``; each from 0 to 1."""
+    """``std_msgs/ColorRGBA``; each component from 0 to 1."""
 
     r: float
     g: float
@@ -30,13 +30,13 @@ class MarkerMsg(Stamped, frozen=True, kw_only=True):
     action: int
     pose: PoseMsg
     scale: PointMsg
-    """Metres; what each of them means depends on the type."""
+    """In metres; the meaning of each depends on the type."""
 
     color: ColorMsg
     ns: str = ""
     id: int = 0
     lifetime: Time = Time()
-    """How long it is to be seen; 0 for ever."""
+    """Time for which the marker is shown; 0 for ever."""
 
     points: list[PointMsg] = msgspec.field(default_factory=list)
     """In the frame of :attr:`pose`."""

@@ -1,4 +1,4 @@
-"""Markers as elements, each in its place, as they look from above."""
+"""Markers as elements at their poses, seen from above."""
 
 import math
 
@@ -14,37 +14,36 @@ from webmap.scene import svg
 from webmap.scene.element import Element
 
 MAX_POINTS = 20_000
-"""The most points that one marker may have."""
+"""Greatest number of points of one marker."""
 
 SEEN = 3
-"""Decimals of a rotation up to which a marker is drawn anew as it tilts."""
+"""Decimals of a rotation that decide whether a tilting marker is drawn again."""
 
 UNTURNED = QuaternionMsg(0.0, 0.0, 0.0, 1.0)
 
 AS_IT_COMES = Transform()
-"""The frame of a marker that is drawn with its own numbers."""
+"""The identity: draws a marker with its own coordinates."""
 
 
 def lies_unturned(marker: MarkerMsg) -> bool:
-    """Return whether nobody has set a marker's orientation, so that it is not turned.
+    """Return whether a marker's orientation was not set, so that it is not rotated.
 
-    A quaternion of exact zeros is how ROS 1 begins a message, and RViz draws it so.
-    What is merely too short to be a rotation was worked out by somebody, and wrongly.
+    ROS 1 initializes an orientation with zeros, and RViz draws it without rotation. A
+    quaternion that is only too short was computed, and wrongly.
     """
     q = marker.pose.orientation
     return marker.type != kinds.TEXT_VIEW_FACING and q.x == q.y == q.z == q.w == 0.0
 
 
 def shape_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> Element:
-    """Return a marker as a group in its place, seen from above.
+    """Return a marker as a group at its pose, seen from above.
 
     Args:
         marker: The marker.
-        frame: As :func:`place` has it.
+        frame: See :func:`place`.
 
     Raises:
-        ProtocolError: If its type cannot be drawn, or a number makes no sense.
-
+        ProtocolError: If its type cannot be drawn, or a number is not valid.
     """
     name = CLASSES.get(marker.type)
     if name is None:
@@ -64,38 +63,36 @@ def shape_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> Element:
 
 
 def look_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> tuple[object, ...]:
-    """Return what a marker's shape depends on, but for its place.
+    """Return all values that a marker's shape depends on, except its position.
 
     Args:
         marker: The marker.
-        frame: As :func:`place` has it.
+        frame: See :func:`place`.
 
     Raises:
-        ProtocolError: If its pose makes no sense.
-
+        ProtocolError: If its pose is not valid.
     """
     m = marker
     q = _split(m, frame)[1].rotation
-    sign = math.copysign(1.0, q.w)  # both signs are one rotation
+    sign = math.copysign(1.0, q.w)  # both signs are the same rotation
     tilt = (round(sign * part, SEEN) + 0.0 for part in (q.x, q.y, q.z, q.w))
     return (m.type, m.scale, m.color, m.points, m.colors, m.text, *tilt)
 
 
 def place(shape: Element, marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> None:
-    """Put a shape where the marker has it, as it was drawn.
+    """Place an already drawn shape at its marker's pose.
 
     Args:
         shape: The shape.
-        marker: Its marker.
-        frame: What takes coordinates of the marker's frame to those of the map.
+        marker: The shape's marker.
+        frame: The transform from the marker's frame to the map.
 
     Raises:
-        ProtocolError: If its pose makes no sense.
-
+        ProtocolError: If its pose is not valid.
     """
     at, _ = _split(marker, frame)
     if marker.type == kinds.TEXT_VIEW_FACING:
-        # The world has y upward; letters have it downward.
+        # y points up in the world, and down in letters.
         size = sizes(marker, "z")[0] / LETTERS
         shape.set_matrix(Affine(size, 0, 0, -size, at.x, at.y))
     else:
@@ -103,9 +100,9 @@ def place(shape: Element, marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> 
 
 
 def _split(marker: MarkerMsg, frame: Transform) -> tuple[Pose, Transform]:
-    """Return where a marker is in the plane, and how it is tilted there."""
+    """Return the marker's pose in the plane, and its tilt there."""
     if marker.type == kinds.TEXT_VIEW_FACING:
-        # Its orientation means nothing, and often nobody has set it.
+        # The orientation of this type has no meaning, and is often not set.
         at = marker.pose.position
         check_finite([(at.x, at.y)], "the place of a text")
         (found,) = flat(in_space([at]), frame)
