@@ -99,7 +99,7 @@ def test_every_python_of_the_package_is_started_in_one_place():
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.Attribute) and node.attr == "executable"
     ]
-    assert places == ["children.py"]
+    assert places == ["base/children.py"]
 
 
 def test_a_script_imports_modules_beside_it_and_children_do_not(tmp_path):

@@ -137,7 +137,8 @@ def test_every_logger_of_the_package_is_guarded():
     named = {
         ast.unparse(node.args[0])
         for file in SOURCE.rglob("*.py")
-        if file != SOURCE / "logs.py" and "getLogger" in (text := file.read_text())
+        if file != SOURCE / "base" / "logs.py"
+        and "getLogger" in (text := file.read_text())
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("getLogger")
     }

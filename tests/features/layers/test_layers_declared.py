@@ -205,7 +205,7 @@ def test_a_header_and_a_stamp_of_its_own_are_what_the_message_says(robot, link):
 
 PRIVATE = {
     # Layers that draw more than one topic, or in several frames at once.
-    "Diagnostics": {"refusing", "Removal", "keep"},
+    "Diagnostics": {"refusing", "Removal", "keep", "robot_modules"},
     "Markers": {"LayerFrames", "TransformError", "not_known", "Removal", "keep"},
     "OccupancyGrid": {"refusing", "spawn"},
     # What only these know.

@@ -93,7 +93,7 @@ def test_there_is_an_end_to_how_many_are_kept(store, monkeypatch):
     ],
 )
 def test_what_is_no_route_is_refused(value):
-    with pytest.raises(ConfigError, match=r"no route|a route has|no point"):
+    with pytest.raises(ConfigError, match=r"not a route|a route has|no point"):
         read_route(value)
 
 
