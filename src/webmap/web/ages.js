@@ -26,8 +26,8 @@ function formatAge(seconds) {
 /** Shows the ages of data, with or without a connection to the display. */
 export class Ages {
   /**
+   * @param {DisplayClock} clock
    * @param {() => void} onStale Called when data became stale, or fresh again.
-   * @param {() => void} onStale Called when something became old, or fresh again.
    */
   constructor(clock, onStale) {
     this._clock = clock;
@@ -102,10 +102,10 @@ export class Ages {
 }
 
 /**
- * @returns {boolean} Whether the data became stale, or fresh again.
+ * @param {Item} item
  * @param {Age} age
  * @param {number | null} now The display's clock, in seconds.
- * @returns {boolean} Whether it became old, or fresh again.
+ * @returns {boolean} Whether the data became stale, or fresh again.
  */
 function showAge(item, age, now) {
   const { measured } = age;

@@ -227,7 +227,7 @@ export class Scene {
 
   /**
    * @param {number} id
-   * @param {number | undefined} flags undefined to stop listening.
+   * @param {number} element
    * @param {string} kind
    * @param {number | undefined} flags undefined to stop listening.
    */
