@@ -5,7 +5,7 @@ import { MapCanvas } from "/_webmap/web/map.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const query = new URLSearchParams(location.search);
-const modules = (query.get("modules") ?? "teleop,mouse_view_control").split(",");
+const modules = (query.get("modules") ?? "drive/teleop,view/mouse_view_control").split(",");
 
 // "each": the robots' elements say so, and that of r1 does.
 const each = query.get("holonomic") === "each";
