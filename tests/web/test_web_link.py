@@ -131,7 +131,7 @@ def test_a_tab_that_a_page_opens_is_another_page(host, tab, opened):
 def test_a_display_that_hangs_is_noticed(host, tab, opened):
     host.silent = True
     tab.wait_for_selector("html.disconnected", state="attached", timeout=6000)
-    assert "says nothing" in tab.inner_text("[role=status]")
+    assert "No data from WebMap" in tab.inner_text("[role=status]")
     host.silent = False
     wait(tab, "!document.documentElement.classList.contains('disconnected')")
     assert len(opened.hellos) == 1
@@ -151,7 +151,7 @@ def frame_of(record: bytes) -> bytes:
 def test_a_record_that_is_not_known_is_said_and_all_is_told_again(host, tab, opened):
     frames = opened.frames
     host.send(frame_of(b"\xfa"))
-    tab.wait_for_selector("[role=alert]:has-text('did not understand')")
+    tab.wait_for_selector("[role=alert]:has-text('cannot read a message')")
     host.until(lambda: "250" in str(host.events(Trouble)), tab=tab)
     host.until(lambda: opened.frames > frames, tab=tab)
     host.call(opened.robot.set_pose, 1, 2, 0)

@@ -184,7 +184,7 @@ def test_the_alarm_lies_above_what_is_open_and_what_opens(open_bench) -> None:
 def test_the_alarms_of_two_maps_do_not_rise_above_each_other_for_ever(
     open_bench,
 ) -> None:
-    bench = open_bench("?two&modules=stop,teleop")
+    bench = open_bench("?two&modules=stop/stop_button,drive/teleop")
     bench.page.evaluate(
         """() => {
             window.toggles = 0;
