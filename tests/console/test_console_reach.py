@@ -83,7 +83,7 @@ def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
     expect(page.locator("#card .state .holder")).to_have_text("Free")
     page.keyboard.press("Escape")
     expect(page.locator("#card .state .holder")).to_have_text("STOP active")
-    expect(page.locator(".webmap-stop-standing")).to_contain_text("Robot 1 stays")
+    expect(page.locator(".webmap-stop-standing")).to_contain_text("STOP active: Robot 1")
     reset()
 
 
