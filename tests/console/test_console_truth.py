@@ -69,7 +69,7 @@ def test_a_robot_with_a_goal_navigates_and_one_s_own_cancel_is_named(open_consol
     select(page, "Robot 2")
     send_away(page)
     same_word(page, re.compile("^Navigating"))
-    page.get_by_role("button", name="Cancel goal").click()
+    page.locator("#card").get_by_role("button", name="Cancel goal").click()
     goal = page.locator("#card .goal")
     expect(goal).to_contain_text("Goal cancelled: by ")
     expect(goal).not_to_contain_text("another program")

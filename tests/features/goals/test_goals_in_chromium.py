@@ -287,7 +287,7 @@ def told_and_refused(tab: Page, robot: ClientConnection) -> None:
     tab.keyboard.press("i")
     press(tab, *beside(tab, "Old 0", 5), drag=30)
     expect(word).to_have_text(
-        "Goal not sent: the robot is navigating: cancel the goal first"
+        "Pose not sent: the robot is navigating: cancel the goal first"
     )
     label(tab).get_by_role("button", name="Cancel goal").click()
 
@@ -377,7 +377,7 @@ def test_a_route_is_drawn_run_skipped_halted_and_kept(tab):
         "Interrupted before point 1 of 1: failed: no path to the goal."
     )
     tab.locator(".webmap-route-skip").click()
-    expect(word).to_have_text("New 1 ended.")
+    expect(word).to_have_text("Route of New 1 ended.")
 
 
 def drawn_route(tab: Page) -> list[tuple[str, float]]:
@@ -438,4 +438,4 @@ def test_a_route_is_put_in_order_and_goes_round(tab, bridges):
     assert heard == pytest.approx(there, abs=0.02)
     expect(word).to_have_text("Old 0 is navigating to point 1 of 3, round 2.")
     tab.locator(".webmap-route-end").click()
-    expect(word).to_have_text("Old 0 ended.")
+    expect(word).to_have_text("Route of Old 0 ended.")
