@@ -164,7 +164,7 @@ def test_a_bridge_that_is_not_there_is_said_and_the_other_robot_goes_on(tab, ros
         expect(bridges.locator("summary")).to_have_text("1 of 2 bridges open")
         bridges.locator("summary").click()
         line = bridges.locator("li").filter(has_text=gone)
-        expect(line).to_contain_text("cannot be reached")
+        expect(line).to_contain_text("no connection")
         expect(line).to_contain_text("refused")
         expect(row(tab, "Gone")).to_contain_text("No connection to the bridge")
         expect(row(tab, "Anna")).to_contain_text(DRIVEN)

@@ -57,10 +57,10 @@ def test_anybody_stops_a_robot_that_somebody_else_drives(server, witness, tab, o
     open_and_drive(tab, server, witness)
     other.goto(server.url)
     row = other.locator("#robots .row")
-    expect(row).to_contain_text(re.compile("drives|holds it"))
+    expect(row).to_contain_text(re.compile("has control"))
     other.get_by_role("button", name="STOP ALL").click()
     wait_until(lambda: standing(witness), what="standing still")
-    expect(row).to_contain_text("Stopped")
+    expect(row).to_contain_text("STOP active")
     tab.wait_for_timeout(700)
     assert standing(witness), "the key that is still held drives on"
     tab.keyboard.up("s")

@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "wire"))
+# The server of a scene is a helper of the tests of the browser.
+sys.path.insert(0, str(Path(__file__).parents[2] / "web"))
 
+from scene_host import SceneHost
 from wire_picture import f32, histories, play
 
 from real_browser import watched_tab
@@ -94,8 +96,6 @@ def expected(node, mount=None):
 
 @pytest.fixture(scope="module")
 def blank(chromium, request):
-    from scene_host import SceneHost
-
     with SceneHost() as host, watched_tab(chromium, 800, 600) as page:
         page.goto(host.url)
         yield page
