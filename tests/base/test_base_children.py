@@ -14,8 +14,8 @@ from bag_making import ODOMETRY, Made
 from webmap.base.children import python_command
 from webmap.cli.demo import simulator
 from webmap.cli.play import replay
-from webmap.gate.display.child import Child
-from webmap.gate.messages import Ready
+from webmap.gate.display.supervisor import Child
+from webmap.gate.protocol import Ready
 from webmap.ros.offload import Offload
 from webmap.ros.rosbridge.events import Publish
 

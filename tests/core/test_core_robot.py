@@ -12,7 +12,7 @@ from webmap import Robot, svg
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.scope import Removal, Scope
 from webmap.core.runtime import goal_message, twist_message
-from webmap.gate.messages import SentGoal, SentTwist
+from webmap.gate.protocol import SentGoal, SentTwist
 from webmap.poses import type_asking
 from webmap.ros import messages
 

@@ -9,7 +9,7 @@ import pytest
 from webmap.base.geometry import Twist
 from webmap.console.words import LOOKS
 from webmap.core.robot_state import WORDS, Facts, state_of
-from webmap.gate.messages.robot_report import Doing
+from webmap.gate.protocol import Doing
 
 MOVES = (0.4, 0.0, 0.0)
 ANN = SimpleNamespace(connection="c2", name="Ann")

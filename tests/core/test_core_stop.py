@@ -13,8 +13,8 @@ from webmap import Bridge, Robot
 from webmap.base.errors import BridgeClosed, ConfigError, MotionError, MotionRefused
 from webmap.base.lifecycle import lifecycle
 from webmap.core.motion import MotionRoad
-from webmap.gate import framing
-from webmap.gate.messages import StopReport
+from webmap.gate import pipe
+from webmap.gate.protocol import StopReport
 from webmap.gate.specs import checked
 
 LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
@@ -177,7 +177,7 @@ def test_stop_hooks_and_scan_assist_are_plain_data_and_back(robot):
 def test_numbers_of_numpy_are_numbers_that_the_gate_can_be_told(robot, size):
     far = np.float64(0.5)
     drivable(robot).set_scan_assist("/scan", size, x=far, stop_distance=far, brake=far)
-    framing.pack(checked(robot.motion.spec()))
+    pipe.pack(checked(robot.motion.spec()))
 
 
 @pytest.mark.parametrize("size", ["0.3", [1.0, 2.0], None])

@@ -11,9 +11,9 @@ import time
 import pytest
 
 from webmap.discovery.doctor.stop_test import GOES_ON, STOPS, UNKNOWN, Hand
+from webmap.gate.disk import Records
 from webmap.gate.events import Key, Press, StopRecord
-from webmap.gate.kept.records import Records
-from webmap.gate.rules.stoptest import MOVES_ON
+from webmap.gate.rules.stop_test import MOVES_ON
 from webmap.testing import WitnessRobot
 from webmap_process import simulator
 

@@ -6,7 +6,7 @@ from gate_page import Page
 from gate_robot import FakeRobot
 
 from webmap.gate.display.client import GateClient
-from webmap.gate.messages import RobotSpec
+from webmap.gate.protocol import RobotSpec
 
 
 @pytest.fixture(autouse=True)

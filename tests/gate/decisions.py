@@ -25,7 +25,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from webmap.gate.rules import latch
+from webmap.gate.rules import stop
 from webmap.gate.rules.gate import Gate
 
 FILE = Path(__file__).with_name("decisions.json")
@@ -54,7 +54,7 @@ class Decisions:
         """Note what gates decide from now on; identities of STOPs are numbered."""
         numbers = itertools.count(1)
         known = SimpleNamespace(token_hex=lambda size: f"{next(numbers):0{2 * size}x}")
-        monkeypatch.setattr(latch, "secrets", known)
+        monkeypatch.setattr(stop, "secrets", known)
         if not FOLDER and self.name not in RECORDED:
             return
         handle, step = Gate.handle, Gate.step

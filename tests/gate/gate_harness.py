@@ -4,12 +4,11 @@ import json
 from dataclasses import dataclass, field
 
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, messages
+from webmap.gate import actions, events, protocol
 from webmap.gate.events import Key, Press
-from webmap.gate.messages import RobotSpec
+from webmap.gate.protocol import RobotSpec
+from webmap.gate.rules.connections import Epochs, Ticks
 from webmap.gate.rules.gate import Gate
-from webmap.gate.rules.lease import Epochs
-from webmap.gate.rules.ticks import Ticks
 
 URL = "ws://robot:9090"
 KEY = Key(URL, "/cmd_vel")
@@ -74,7 +73,7 @@ class Bench:
     attempts: list[Written] = field(default_factory=list)
     """What was written and what was dropped, in order."""
     done: list[actions.Action] = field(default_factory=list)
-    said: list[messages.FromGate] = field(default_factory=list)
+    said: list[protocol.FromGate] = field(default_factory=list)
     tick: int = -1
     seq: int = 0
 
@@ -91,7 +90,7 @@ class Bench:
         for n in range(steps):
             self.now += step
             if self.beating:
-                self.tell(messages.Heartbeat())
+                self.tell(protocol.Heartbeat())
             if self.answering and self.up:
                 self.tell(events.Alive(URL, self.now - self.rtt))
             if each is not None and n % round(0.05 / step) == 0:
@@ -106,7 +105,7 @@ class Bench:
             match action:
                 case actions.Say(message):
                     self.said.append(message)
-                    if isinstance(message, messages.Tick):
+                    if isinstance(message, protocol.Tick):
                         self.tick = message.tick
                 case actions.Lock(key):
                     why = None if self.lock_held else "another has it"
@@ -183,12 +182,12 @@ class Bench:
         self.tell(events.LinkDown(URL, "tasks"))
 
     def join(self, who, role="operator"):
-        self.tell(messages.Connect(who, who.upper(), role))
+        self.tell(protocol.Connect(who, who.upper(), role))
 
     def say(self, who, **command):
         if command["op"] == "reset":
             command.setdefault("stop", self.stop_of(command["robot"]))
-        self.tell(messages.FromBrowser(who, json.dumps(command).encode()))
+        self.tell(protocol.FromBrowser(who, json.dumps(command).encode()))
 
     def take(self, who="a", robot="r1"):
         """Take the robot and return the epoch, if it was given."""
@@ -245,11 +244,11 @@ class Bench:
         return [action for action in self.done if isinstance(action, type)]
 
     def report(self, robot="r1"):
-        reports = self.of(messages.RobotReport)
+        reports = self.of(protocol.RobotReport)
         return next(r for r in reversed(reports) if r.robot == robot)
 
     def refusals(self, who="a"):
-        return [r for r in self.of(messages.Refused) if r.connection == who]
+        return [r for r in self.of(protocol.Refused) if r.connection == who]
 
     def stop_of(self, robot="r1"):
         """Return the identity of the STOP that a page shows for a robot."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from gate_harness import Bench
 
-from webmap.gate import events, messages
+from webmap.gate import events, protocol
 from webmap.gate.shell import IDLE_STEP, STEP
 
 BEAT = 0.05
@@ -21,7 +21,7 @@ class PacedBench(Bench):
 
     beat_at: float = float("-inf")
     each_at: float = float("-inf")
-    newest: dict[str, messages.RobotReport] = field(default_factory=dict)
+    newest: dict[str, protocol.RobotReport] = field(default_factory=dict)
     """The newest report of each robot."""
 
     def run(self, seconds, each=None, step=STEP):
@@ -34,7 +34,7 @@ class PacedBench(Bench):
             if self.now >= self.beat_at + BEAT - 1e-6:
                 self.beat_at = self.now
                 if self.beating:
-                    self.tell(messages.Heartbeat())
+                    self.tell(protocol.Heartbeat())
                 if self.answering and self.up:
                     self.tell(
                         events.Alive(next(iter(self.gate._fleet._bases)).url, self.now)
@@ -53,7 +53,7 @@ class PacedBench(Bench):
     def report(self, robot="r1"):
         """Return the newest report of a robot, of all that were said."""
         for message in self.said:
-            if isinstance(message, messages.RobotReport):
+            if isinstance(message, protocol.RobotReport):
                 self.newest[message.robot] = message
         self.said.clear()
         return self.newest[robot]

@@ -10,9 +10,9 @@ import signal
 import sys
 from pathlib import Path
 
+from webmap.gate import disk
+from webmap.gate.disk import Records
 from webmap.gate.events import Key, Press
-from webmap.gate.kept import records
-from webmap.gate.kept.records import Records
 
 KEY = Key("ws://127.0.0.1:9090", "/cmd_vel")
 IDS = frozenset({"a1"})
@@ -29,7 +29,7 @@ def die_after(lines: int) -> None:
 
     def trace(frame, event, _):
         nonlocal left
-        if frame.f_code.co_filename != records.__file__:
+        if frame.f_code.co_filename != disk.__file__:
             return None
         if event == "line":
             left -= 1

@@ -15,7 +15,7 @@ import sys
 import time
 from pathlib import Path
 
-from webmap.gate.messages import RobotSpec
+from webmap.gate.protocol import RobotSpec
 
 FOLDER = Path(__file__).with_name("stored_state")
 
@@ -87,9 +87,9 @@ def main() -> None:
     from gate_page import Page
     from gate_robot import FakeRobot, eventually
 
+    from webmap.gate.disk import Records, path_of
     from webmap.gate.display.client import GateClient
     from webmap.gate.events import StopRecord
-    from webmap.gate.kept.records import Records, path_of
     from webmap.gate.specs import checked, key_of
 
     folder = Path(sys.argv[1])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
 from webmap.gate.events import Sweep
-from webmap.gate.messages import AssistSpec
+from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import assist, free_way, inside, points_of, polygon_around
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))

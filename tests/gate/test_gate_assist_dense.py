@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
 from webmap.gate.events import Sweep
-from webmap.gate.lanes.scans import hear_scan
-from webmap.gate.messages import AssistSpec
+from webmap.gate.lanes.witness import hear_scan
+from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import FREE, assist, free_way, points_of, polygon_around
-from webmap.gate.rules.folding import LIMIT, MOST, folded
+from webmap.gate.rules.scan_geometry import LIMIT, MOST, folded
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 SPEC = AssistSpec(topic="/scan", footprint=BOX)

@@ -12,7 +12,7 @@ from gate_robot import eventually
 
 from webmap.base.geometry import Twist
 from webmap.gate.display.client import GateClient
-from webmap.gate.messages import AssistSpec, RobotReport, RobotSpec
+from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.assist import polygon_around
 
 RADIUS = 0.25
@@ -44,7 +44,7 @@ def ranges_seen(bridge):
     """What the scanner sees now, by a client of its own."""
     from websockets.sync.client import connect
 
-    from webmap.gate.lanes.scans import hear_scan, subscribe
+    from webmap.gate.lanes.witness import hear_scan, subscribe
 
     with connect(bridge, max_size=None) as link:
         link.send(subscribe("/base_scan", "t").decode())

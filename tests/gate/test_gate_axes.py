@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
-from webmap.gate import events, messages
+from webmap.gate import events, protocol
 from webmap.gate.events import Sweep
 from webmap.gate.limits import Axes, Speed, fit, ramp
-from webmap.gate.messages import PROGRAM, AssistSpec
+from webmap.gate.protocol import PROGRAM, AssistSpec
 from webmap.gate.specs import checked
 
 FLYING = {"z_max": 0.5, "rx_max": 0.2, "ry_max": 0.1}
@@ -25,13 +25,13 @@ limit = st.floats(0.0, 10.0)
 
 def begin(*specs, **changes):
     bench = Bench().begin(*specs or (spec(**{**FLYING, "holonomic": True, **changes}),))
-    bench.tell(messages.ProgramTake(7, "r1"))
+    bench.tell(protocol.ProgramTake(7, "r1"))
     return bench
 
 
 def twist(bench, wanted):
     epoch = bench.report().epoch or 0
-    command = messages.ProgramTwist("r1", epoch, bench.tick, wanted.numbers)
+    command = protocol.ProgramTwist("r1", epoch, bench.tick, wanted.numbers)
     bench.tell(command)
 
 
@@ -109,7 +109,7 @@ class TestWithLimits:
         bench = begin()
         twist(bench, EVERYTHING)
         assert bench.written[-1].twist == EVERYTHING
-        assert bench.of(messages.SentTwist)[-1] == messages.SentTwist(
+        assert bench.of(protocol.SentTwist)[-1] == protocol.SentTwist(
             "r1", 0.1, 0.2, 0.3, PROGRAM, 0.4, 0.05, -0.06
         )
         bench.run(0.15)

@@ -2,10 +2,10 @@
 
 import pytest
 
-from webmap.gate.lanes import attempts as waits
 from webmap.gate.lanes import budget as limits
-from webmap.gate.lanes.attempts import Attempts
+from webmap.gate.lanes import lane as waits
 from webmap.gate.lanes.budget import Budget
+from webmap.gate.lanes.lane import Attempts
 
 
 def send(budget, seconds, rate, *, size=100, work=0.00005, begin=1000.0, kept=0):

@@ -4,8 +4,8 @@ import json
 
 from link_bench import in_loop, noting_bridge, raw_bridge, until
 
-from webmap.gate.lanes import calls
-from webmap.gate.lanes.calls import Calls
+from webmap.gate.lanes import tasks
+from webmap.gate.lanes.tasks import Calls
 
 
 def request(id, service="/e_stop"):
@@ -28,7 +28,7 @@ async def test_a_call_is_answered_on_a_socket_that_ends_with_it(caplog):
 
 @in_loop
 async def test_a_call_that_hangs_holds_no_other_up_and_is_given_up(monkeypatch, caplog):
-    monkeypatch.setattr(calls, "CALL_TIMEOUT", 1.0)
+    monkeypatch.setattr(tasks, "CALL_TIMEOUT", 1.0)
     async with noting_bridge() as bridge:
         bridge.answers_services = False
         made = Calls(bridge.url)

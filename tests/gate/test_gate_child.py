@@ -9,10 +9,10 @@ import threading
 import pytest
 from gate_robot import eventually
 
-from webmap.gate import framing
-from webmap.gate.display import child
-from webmap.gate.display.child import Child
-from webmap.gate.messages import Ready, RefusedCount, Tick
+from webmap.gate import pipe
+from webmap.gate.display import supervisor as supervisor_module
+from webmap.gate.display.supervisor import Child
+from webmap.gate.protocol import Ready, RefusedCount, Tick
 
 
 class Watched:
@@ -112,7 +112,7 @@ def test_one_that_does_not_read_holds_nothing_up_and_is_killed_in_the_end(
     for _ in range(4):
         gate.child.send(RefusedCount("a", 1, text))
     assert gate.ends == [], "as yet it may only be slow"
-    monkeypatch.setattr(child, "MAX_UNSENT", 1 << 16)
+    monkeypatch.setattr(supervisor_module, "MAX_UNSENT", 1 << 16)
     gate.child.send(RefusedCount("a", 1, text))
     eventually(lambda: gate.ends, "its end")
     assert "it does not read" in caplog.text
@@ -152,7 +152,7 @@ def test_one_that_talks_nonsense_is_killed(run, caplog):
 
 
 def test_one_whose_words_cannot_be_dealt_with_is_killed(run, caplog):
-    data = framing.pack(Ready(5)).hex()
+    data = pipe.pack(Ready(5)).hex()
     words = f"import os, time; os.write(1, bytes.fromhex('{data}')); time.sleep(600)"
 
     def hear(child, message):

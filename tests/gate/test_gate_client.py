@@ -11,7 +11,7 @@ from gate_robot import FakeRobot, eventually
 
 from webmap.base.errors import ConfigError, MotionError, NoLease
 from webmap.base.geometry import Twist
-from webmap.gate import messages
+from webmap.gate import protocol
 from webmap.gate.display.client import GateClient
 
 JITTER = 0.15
@@ -166,7 +166,7 @@ class TestGoals:
         pose = fake.of("publish", "/goal")[0].message["msg"]
         assert pose["header"] == {"stamp": {"secs": 0, "nsecs": 0}, "frame_id": "map"}
         assert pose["pose"]["position"] == {"x": 1.0, "y": 2.0, "z": 0.0}
-        eventually(lambda: of(reports, messages.SentGoal), "the report of it")
+        eventually(lambda: of(reports, protocol.SentGoal), "the report of it")
         page.say(op="cancel", robot="r1")
         eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
         assert fake.of("publish", "/cancel")[0].message["msg"] == {}
@@ -317,8 +317,8 @@ class TestProgram:
 
         eventually(drive, "motion")
         assert fake.last_speed in (0.25, 0.0)
-        eventually(lambda: of(reports, messages.SentTwist), "the report of it")
-        sent = of(reports, messages.SentTwist)[0]
+        eventually(lambda: of(reports, protocol.SentTwist), "the report of it")
+        sent = of(reports, protocol.SentTwist)[0]
         assert (sent.vx, sent.wz, sent.by) == (0.25, 0.5, "program")
         at = fake.moving[-1][0]
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
@@ -441,7 +441,7 @@ class TestLife:
         page.x = None
         pid = client.pid
         os.kill(pid, signal.SIGKILL)
-        eventually(lambda: of(reports, messages.GateDown), "the report of it")
+        eventually(lambda: of(reports, protocol.GateDown), "the report of it")
         eventually(lambda: len(page.of("hello")) == 2, "a new greeting")
         eventually(lambda: page.robot().get("link") == "up", "a new link")
         assert client.pid != pid
@@ -492,7 +492,7 @@ class TestLife:
         os.kill(client.pid, number)
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at < 0.05 + JITTER
-        eventually(lambda: of(reports, messages.GateDown), "its end")
+        eventually(lambda: of(reports, protocol.GateDown), "its end")
 
     def test_a_second_gate_on_this_computer_shows_but_does_not_drive(
         self, client, page, robot_spec
@@ -511,7 +511,7 @@ class TestLife:
         second.stop()
 
     def test_what_cannot_be_meant_is_refused_before_the_gate_hears_of_it(self, client):
-        spec = messages.RobotSpec(id="r1", name="Bob", bridge_url="ws://x", v_max=-1.0)
+        spec = protocol.RobotSpec(id="r1", name="Bob", bridge_url="ws://x", v_max=-1.0)
         with pytest.raises(ConfigError):
             client.declare(spec)
 
@@ -559,7 +559,7 @@ class TestStopStands:
         client.stop_robot(None)
 
         def latched():
-            return [r for r in of(heard, messages.RobotReport) if r.latched]
+            return [r for r in of(heard, protocol.RobotReport) if r.latched]
 
         eventually(latched, "the word that STOP stands")
         client.stop()
@@ -570,7 +570,7 @@ class TestStopStands:
         def reset():
             # The new gate may be told the STOP once more, which makes it a newer one.
             client.reset("r1", latched()[-1].stop.id)
-            return not of(heard, messages.RobotReport)[-1].latched
+            return not of(heard, protocol.RobotReport)[-1].latched
 
         eventually(reset, "the reset")
 

@@ -11,12 +11,12 @@ from webmap.gate.commands import (
     Cancel,
     Drive,
     Goal,
+    Refusal,
     Release,
     Stop,
     Take,
     parse,
 )
-from webmap.gate.refusal import Refusal
 
 DRIVE = {
     "op": "drive",

@@ -10,8 +10,7 @@ from webmap.base.geometry import Twist
 from webmap.gate.clock import now
 from webmap.gate.events import Alive, Echoed, Key, LinkDown, LinkUp
 from webmap.gate.lanes import control
-from webmap.gate.lanes.control import BUSY_PING, ECHO, IDLE_PING, ControlLane
-from webmap.gate.lanes.unproven import MOST
+from webmap.gate.lanes.control import BUSY_PING, ECHO, IDLE_PING, MOST, ControlLane
 
 ZERO, SLOW = Twist(), Twist(0.1)
 

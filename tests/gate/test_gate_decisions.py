@@ -7,9 +7,9 @@ import pytest
 from gate_harness import KEY, URL, ZERO, Bench, spec
 
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, messages
+from webmap.gate import actions, events, protocol
 from webmap.gate.events import Key
-from webmap.gate.messages import PROGRAM
+from webmap.gate.protocol import PROGRAM
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ class TestTaking:
         report = bench.report()
         assert epoch is not None
         assert report.state == "held"
-        assert report.holder == messages.Holder("a", "A")
+        assert report.holder == protocol.Holder("a", "A")
         assert not report.armed
 
     def test_taking_it_twice_changes_nothing(self, bench):
@@ -75,7 +75,7 @@ class TestTaking:
 
     def test_the_lease_ends_with_its_connection(self, bench):
         bench.take("a")
-        bench.tell(messages.Disconnect("a"))
+        bench.tell(protocol.Disconnect("a"))
         assert bench.state == "free"
         assert bench.take("b")
 
@@ -190,15 +190,15 @@ class TestDriving:
         assert twist.vy == pytest.approx(2**-0.5)
 
     def test_the_pages_own_limit_counts_also_while_driving(self, bench):
-        bench.tell(messages.Speeds("a", 0.5, 9.0))
+        bench.tell(protocol.Speeds("a", 0.5, 9.0))
         bench.drive_off()
         assert bench.written[-1].twist.vx == 0.5
         assert bench.report().why == ("limit of the robot", "limit of the page")
-        bench.tell(messages.Speeds("a", 0.2, 9.0))
+        bench.tell(protocol.Speeds("a", 0.2, 9.0))
         bench.hold(0.1, x=1.0)
         assert bench.written[-1].twist.vx == 0.2
-        bench.tell(messages.Speeds("nobody", 0.1, 0.1))
-        bench.tell(messages.Speeds("b", 0.1, 0.1))
+        bench.tell(protocol.Speeds("nobody", 0.1, 0.1))
+        bench.tell(protocol.Speeds("b", 0.1, 0.1))
         assert bench.report().v == 0.2
 
     def test_a_lower_limit_counts_for_what_waits_to_be_written(self, bench):
@@ -206,7 +206,7 @@ class TestDriving:
         bench.run(0.05)
         bench.drive(x=0.9)
         bench.drive(x=1.0)  # too soon: it waits
-        bench.tell(messages.Speeds("a", 0.3, 0.3))
+        bench.tell(protocol.Speeds("a", 0.3, 0.3))
         bench.run(0.05)
         assert bench.written[-1].twist.vx == 0.3
 
@@ -265,7 +265,7 @@ class TestFreshness:
         old = driving.report().epoch - 1
         driving.drive("b", x=0.5, **stale)
         driving.drive("a", x=0.5, epoch=old, **stale)
-        driving.tell(messages.ProgramTwist("r1", old + 1, 1, (0.0, 0.0, 0.0)))
+        driving.tell(protocol.ProgramTwist("r1", old + 1, 1, (0.0, 0.0, 0.0)))
         assert driving.since(self.at) == []
         assert driving.state == "driving"
 
@@ -323,7 +323,7 @@ class TestFreshness:
         bench.hold(0.3)
         bench.drive(tick=1)  # refused
         bench.run(0.06)
-        tick = bench.of(messages.Tick)[-1]
+        tick = bench.of(protocol.Tick)[-1]
         assert tick.acks["a"] == bench.seq - 1
         assert tick.acks["b"] == -1
 
@@ -335,7 +335,7 @@ class TestGarbage:
 
         def mixed():
             for _ in range(9):
-                bench.tell(messages.FromBrowser("a", b'{"op":"drive","x":NaN}'))
+                bench.tell(protocol.FromBrowser("a", b'{"op":"drive","x":NaN}'))
 
         bench.run(0.4, mixed)
         first = next(w for w in bench.since(last) if w.twist == ZERO)
@@ -343,29 +343,29 @@ class TestGarbage:
 
     def test_much_of_it_closes_the_connection_once(self, bench):
         for _ in range(50):
-            bench.tell(messages.FromBrowser("a", b"rubbish"))
-        (close,) = bench.of(messages.CloseConnection)
+            bench.tell(protocol.FromBrowser("a", b"rubbish"))
+        (close,) = bench.of(protocol.CloseConnection)
         assert close.connection == "a"
         refused = [r for r in bench.refusals() if r.what == "command"]
         assert len(refused) == 1
 
     def test_a_little_of_it_does_not(self, bench):
         bench.run(3.0, lambda: bench.say("a", op="nonsense"), step=0.06)
-        assert bench.of(messages.CloseConnection) == []
+        assert bench.of(protocol.CloseConnection) == []
 
     def test_a_flood_of_sense_closes_the_connection_too(self, bench):
         for _ in range(500):
             bench.say("a", op="take", robot="r9")
-        assert len(bench.of(messages.CloseConnection)) == 1
+        assert len(bench.of(protocol.CloseConnection)) == 1
 
     def test_who_is_not_connected_is_not_heard(self, bench):
         bench.say("nobody", op="take", robot="r1")
         bench.say(PROGRAM, op="take", robot="r1")
         assert bench.state == "free"
-        bench.tell(messages.Connect(PROGRAM, "x", "viewer"))
-        bench.tell(messages.Disconnect(PROGRAM))
-        bench.tell(messages.Disconnect("nobody"))
-        bench.tell(messages.ProgramTake(1, "r1"))
+        bench.tell(protocol.Connect(PROGRAM, "x", "viewer"))
+        bench.tell(protocol.Disconnect(PROGRAM))
+        bench.tell(protocol.Disconnect("nobody"))
+        bench.tell(protocol.ProgramTake(1, "r1"))
         assert bench.state == "held"
 
 
@@ -416,15 +416,15 @@ class TestStop:
 
     def test_python_can_do_it(self, bench):
         bench.drive_off()
-        bench.tell(messages.Stop(None))
+        bench.tell(protocol.Stop(None))
         assert bench.written[-1].twist == ZERO
-        bench.tell(messages.Reset("r1", bench.stop_of()))
+        bench.tell(protocol.Reset("r1", bench.stop_of()))
         bench.drive_off()
         assert bench.written[-1].twist != ZERO
-        bench.tell(messages.Stop("r1"))
+        bench.tell(protocol.Stop("r1"))
         assert bench.written[-1].twist == ZERO
-        bench.tell(messages.Stop("r9"))
-        bench.tell(messages.Reset("r1", bench.stop_of()))
+        bench.tell(protocol.Stop("r9"))
+        bench.tell(protocol.Reset("r1", bench.stop_of()))
         assert bench.state == "stopping"
 
     def test_without_a_link_it_is_the_first_thing_sent_when_there_is_one(self, bench):
@@ -613,9 +613,9 @@ class TestDisplay:
         assert bench.gate.silent
 
     def test_ticks_come_at_20_hz(self, bench):
-        before = len(bench.of(messages.Tick))
+        before = len(bench.of(protocol.Tick))
         bench.run(1.0)
-        ticks = [t.tick for t in bench.of(messages.Tick)][before:]
+        ticks = [t.tick for t in bench.of(protocol.Tick)][before:]
         assert len(ticks) in (19, 20, 21)
         assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
 
@@ -686,7 +686,7 @@ class TestBlindness:
 class TestReports:
     def test_velocities_are_told_ten_times_a_second_at_most(self, bench):
         bench.drive_off()
-        before = len(bench.of(messages.RobotReport))
+        before = len(bench.of(protocol.RobotReport))
         n = iter(range(1000))
 
         def each():
@@ -694,19 +694,19 @@ class TestReports:
             bench.drive(x=1.0)
 
         bench.run(1.0, each)
-        told = bench.of(messages.RobotReport)[before:]
+        told = bench.of(protocol.RobotReport)[before:]
         assert 8 <= len(told) <= 11
         bench.run(0.2)
         assert bench.report().measured is None or bench.report().measured[0] == 0.19
 
     def test_what_was_written_is_told_with_its_author(self, bench):
         bench.drive_off(x=0.5)
-        sent = bench.of(messages.SentTwist)
-        assert sent[-1] == messages.SentTwist("r1", 0.5, 0.0, 0.0, "a")
+        sent = bench.of(protocol.SentTwist)
+        assert sent[-1] == protocol.SentTwist("r1", 0.5, 0.0, 0.0, "a")
         bench.run(0.5)
-        assert bench.of(messages.SentTwist)[-1].by is None
+        assert bench.of(protocol.SentTwist)[-1].by is None
 
     def test_they_can_be_written_as_json(self, bench):
         bench.drive_off()
-        for report in bench.of(messages.RobotReport):
+        for report in bench.of(protocol.RobotReport):
             json.dumps(msgspec.to_builtins(report), allow_nan=False)

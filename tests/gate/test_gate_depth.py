@@ -8,10 +8,10 @@ import pytest
 from link_bench import TEXT, Heard, frame, in_loop, raw_bridge, until
 
 from webmap.base.errors import ProtocolError
-from webmap.gate import framing, messages
+from webmap.gate import pipe, protocol
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import Key
-from webmap.gate.lanes import answers, navigation, reading, scans, words
+from webmap.gate.lanes import navigation, rosbridge, witness
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import Ears, open_socket
 
@@ -24,8 +24,8 @@ GOAL = SendGoal(
     Key("ws://r", "/cmd_vel"), "r1", "g1", "navigate_to_pose", 0, 0, 0, "A", 9
 )
 READERS = {
-    "words": words.hear,
-    "answers": lambda data: answers.answer_to(data, "a"),
+    "words": rosbridge.hear,
+    "answers": lambda data: navigation.answer_to(data, "a"),
     "navigation": lambda data: navigation.of_action(data, GOAL),
 }
 
@@ -47,12 +47,12 @@ def test_what_holds_too_many_values_is_refused_before_it_is_read(reader):
 def test_a_dense_scan_in_json_is_read():
     ranges = b",".join([b"1.25"] * 7200)
     data = b'{"op":"publish","topic":"/s","msg":{"ranges":[' + ranges + b"]}}"
-    assert words.hear(data).topic == "/s"
+    assert rosbridge.hear(data).topic == "/s"
 
 
 def test_what_nests_a_little_is_read():
     data = b'{"op":"x","a":' + b"[" * 20 + b"]" * 20 + b"}"
-    assert reading.plain(data)["op"] == "x"
+    assert rosbridge.plain(data)["op"] == "x"
 
 
 def scan(ranges):
@@ -85,12 +85,12 @@ def list_of(count, each):
 )
 def test_a_scan_of_many_parts_is_refused_before_it_is_decoded(ranges):
     with pytest.raises(ProtocolError, match="more than 1000 lists, maps and texts"):
-        scans.hear_scan(scan(ranges), 0.0)
+        witness.hear_scan(scan(ranges), 0.0)
 
 
 def test_a_scan_that_nests_too_deeply_is_refused():
     with pytest.raises(ProtocolError, match="not CBOR"):
-        scans.hear_scan(scan(b"\x81" * 900 + b"\x00"), 0.0)
+        witness.hear_scan(scan(b"\x81" * 900 + b"\x00"), 0.0)
 
 
 @pytest.mark.parametrize(
@@ -105,15 +105,15 @@ def test_a_scan_that_nests_too_deeply_is_refused():
     ids=["doubles", "singles", "mixed", "typed", "longest typed"],
 )
 def test_a_scan_of_many_numbers_is_not(ranges):
-    scans.check_parts(scan(ranges))
+    witness.check_parts(scan(ranges))
 
 
 def test_what_nests_too_deeply_on_the_pipe_is_logged_and_left_out(caplog):
     body = b"\x82\xa4type\xa1x" + b"\x91" * 100_000 + b"\xc0"
-    good = framing.pack(messages.Heartbeat())
+    good = pipe.pack(protocol.Heartbeat())
     for deep in (b"\x91" * 100_000, b"\x81\xa1x" * 100_000, body):
         framed = struct.pack("<I", len(deep)) + deep
-        assert len(framing.Unpacker(messages.ToGate).feed(framed + good)) == 1
+        assert len(pipe.Unpacker(protocol.ToGate).feed(framed + good)) == 1
     assert "not a message on the gate's pipe" in caplog.text
     assert "Traceback" not in caplog.text
 
@@ -123,7 +123,7 @@ async def test_a_link_that_brings_such_goes_on_and_says_so_once(caplog):
     heard = Heard()
 
     def hear(data):
-        words.hear(data)
+        rosbridge.hear(data)
         heard.texts.append(data)
 
     async def talk(link):

@@ -6,9 +6,8 @@ import datetime
 import pytest
 
 from webmap.gate.actions import KeepLatch, KeepStopTest
+from webmap.gate.disk import Disk, Records
 from webmap.gate.events import Key, LatchKept, LockState, Press, StopTestKept
-from webmap.gate.kept.disk import Disk
-from webmap.gate.kept.records import Records
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
 ANN = Press("Ann", "a1")

@@ -11,11 +11,11 @@ from gate_robot import eventually
 
 from webmap.base.errors import ConfigError, MotionError, NoLease
 from webmap.base.geometry import Twist
-from webmap.gate import messages
+from webmap.gate import protocol
 from webmap.gate.display import supervisor
 from webmap.gate.display.client import GateClient
 from webmap.gate.display.program import ProgramRoad
-from webmap.gate.messages import PROGRAM, Holder
+from webmap.gate.protocol import PROGRAM, Holder
 
 
 class FakeChild:
@@ -80,7 +80,7 @@ def client(made):
 @pytest.fixture
 def gate(client, made):
     gate = eventually(lambda: client.pid and made[0], "a gate")
-    gate.say(messages.Ready(1), messages.Tick(7, {}))
+    gate.say(protocol.Ready(1), protocol.Tick(7, {}))
     return gate
 
 
@@ -140,27 +140,27 @@ class TestQuickProgram:
 class TestProgram:
     def test_a_lease_is_asked_for_and_given(self, client, gate):
         future = client.take("r1")
-        (asked,) = gate.of(messages.ProgramTake)
-        gate.say(messages.TakeReply(asked.request, "r1", 3, None))
+        (asked,) = gate.of(protocol.ProgramTake)
+        gate.say(protocol.TakeReply(asked.request, "r1", 3, None))
         assert future.result(1) == 3
         client.twist("r1", Twist(0.5))
-        assert gate.told[-1] == messages.ProgramTwist("r1", 3, 7, Twist(0.5).numbers)
+        assert gate.told[-1] == protocol.ProgramTwist("r1", 3, 7, Twist(0.5).numbers)
         client.move("r1", 1.0, 2.0, 0.5)
-        assert gate.told[-1] == messages.ProgramMove("r1", 3, 7, (1.0, 2.0, 0.5))
+        assert gate.told[-1] == protocol.ProgramMove("r1", 3, 7, (1.0, 2.0, 0.5))
         client.locate("r1", 1.0, 2.0, 0.5)
-        assert gate.told[-1] == messages.ProgramLocate("r1", 3, 7, (1.0, 2.0, 0.5))
+        assert gate.told[-1] == protocol.ProgramLocate("r1", 3, 7, (1.0, 2.0, 0.5))
         client.cancel("r1")
-        assert gate.told[-1] == messages.ProgramCancel("r1")
+        assert gate.told[-1] == protocol.ProgramCancel("r1")
         client.release("r1")
-        assert gate.told[-1] == messages.ProgramRelease("r1")
+        assert gate.told[-1] == protocol.ProgramRelease("r1")
         with pytest.raises(NoLease):
             client.twist("r1", Twist(0.5))
 
     def test_a_lease_is_asked_for_and_refused(self, client, gate):
         future = client.take("r1")
-        (asked,) = gate.of(messages.ProgramTake)
-        gate.say(messages.TakeReply(asked.request, "r1", None, "Ann has control"))
-        gate.say(messages.TakeReply(99, "r1", None, "nobody asked"))
+        (asked,) = gate.of(protocol.ProgramTake)
+        gate.say(protocol.TakeReply(asked.request, "r1", None, "Ann has control"))
+        gate.say(protocol.TakeReply(99, "r1", None, "nobody asked"))
         with pytest.raises(NoLease, match="Ann has control"):
             future.result(1)
 
@@ -207,7 +207,7 @@ class TestPages:
     @pytest.fixture
     def page(self, client, gate, said):
         page = client.connect("Ann", "operator", said.append, said.append)
-        gate.say(held(), messages.Hello(page.id))
+        gate.say(held(), protocol.Hello(page.id))
         return page
 
     def ops(self, said):
@@ -219,27 +219,27 @@ class TestPages:
     def test_a_page_hears_what_is_meant_for_it(self, page, gate, said):
         del said[:]
         gate.say(
-            messages.Tick(8, {"c9": 1}),
-            messages.Tick(9, {page.id: 5}),
-            messages.Refused(page.id, "r1", "take", "Ben drives it"),
-            messages.Refused("c9", "r1", "take", "Ben drives it"),
-            messages.RobotGone("r1"),
-            messages.Hello("c9"),
+            protocol.Tick(8, {"c9": 1}),
+            protocol.Tick(9, {page.id: 5}),
+            protocol.Refused(page.id, "r1", "take", "Ben drives it"),
+            protocol.Refused("c9", "r1", "take", "Ben drives it"),
+            protocol.RobotGone("r1"),
+            protocol.Hello("c9"),
         )
         assert self.ops(said) == ["tick", "refused", "gone"]
-        gate.say(messages.CloseConnection("c9", "x"))
-        gate.say(messages.CloseConnection(page.id, "too much"))
+        gate.say(protocol.CloseConnection("c9", "x"))
+        gate.say(protocol.CloseConnection(page.id, "too much"))
         assert said[-1] == "too much"
 
     def test_what_it_says_is_handed_on_and_no_more_after_its_end(self, page, gate):
         page.receive('{"op": "take"}')
         page.receive(b"x" * 5000)
-        assert [len(m.text) for m in gate.of(messages.FromBrowser)] == [14, 2048]
+        assert [len(m.text) for m in gate.of(protocol.FromBrowser)] == [14, 2048]
         page.set_speeds(0.5, 1.0)
-        assert gate.told[-1] == messages.Speeds(page.id, 0.5, 1.0)
+        assert gate.told[-1] == protocol.Speeds(page.id, 0.5, 1.0)
         page.close()
         page.close()
-        assert gate.of(messages.Disconnect) == [messages.Disconnect(page.id)]
+        assert gate.of(protocol.Disconnect) == [protocol.Disconnect(page.id)]
 
     def test_a_page_whose_callback_fails_is_no_others_matter(
         self, client, gate, caplog
@@ -248,7 +248,7 @@ class TestPages:
             raise RuntimeError("the page is gone")
 
         page = client.connect("Ann", "operator", fail, fail)
-        gate.say(messages.Hello(page.id), held())
+        gate.say(protocol.Hello(page.id), held())
         assert "a callback failed" in caplog.text
 
     def test_pages_that_ask_for_the_same_are_told_the_same(self, client, gate):
@@ -256,7 +256,7 @@ class TestPages:
         for said in (ann, ben, eve):
             page = client.connect("Ann", "operator", said.append, print)
             page.set_speeds(0.2 if said is eve else 0.5, 1.0)
-            gate.say(messages.Hello(page.id))
+            gate.say(protocol.Hello(page.id))
         gate.say(report())
         assert ann[-1] == ben[-1] != eve[-1]
 
@@ -289,7 +289,7 @@ class TestPages:
         assert list(client._unheard) == [(page.id, robot)]
         gate.die()
         second = eventually(lambda: client.pid and made[1], "a second gate")
-        (again,) = second.of(messages.FromBrowser)
+        (again,) = second.of(protocol.FromBrowser)
         assert json.loads(again.text) == {"op": "stop", "robot": robot or "*"}
 
     def test_a_stop_of_a_robot_that_is_gone_is_not_said_to_the_next_gate(
@@ -299,7 +299,7 @@ class TestPages:
         client.forget("r1")
         gate.die()
         second = eventually(lambda: client.pid and made[1], "a second gate")
-        assert second.of(messages.FromBrowser) == []
+        assert second.of(protocol.FromBrowser) == []
 
 
 class TestLife:
@@ -310,14 +310,14 @@ class TestLife:
         client.stop_robot("r1")
         client.forget("r2")
         client.forget("r2")
-        assert len(gate.of(messages.Forget)) == 1
+        assert len(gate.of(protocol.Forget)) == 1
         gate.die()
         second = eventually(lambda: client.pid and made[1], "a second gate")
-        assert [one.id for one in second.of(messages.RobotSpec)] == ["r1"]
-        assert second.of(messages.Connect)
-        assert second.of(messages.Speeds)
-        assert second.of(messages.Stop) == [messages.Stop("r1")]
-        gate.say(messages.Ready(1))  # it is dead, and counts no more
+        assert [one.id for one in second.of(protocol.RobotSpec)] == ["r1"]
+        assert second.of(protocol.Connect)
+        assert second.of(protocol.Speeds)
+        assert second.of(protocol.Stop) == [protocol.Stop("r1")]
+        gate.say(protocol.Ready(1))  # it is dead, and counts no more
         assert not client.ready
 
     def test_a_reset_names_a_stop_and_forgets_none_that_was_not_heard(
@@ -325,12 +325,12 @@ class TestLife:
     ):
         client.stop_robot("r1")
         client.reset("r1", "s1")
-        assert gate.told[-1] == messages.Reset("r1", "s1")
+        assert gate.told[-1] == protocol.Reset("r1", "s1")
         assert list(client._unheard) == [(None, "r1")]
 
     def test_the_nodes_of_other_programs_are_told(self, client, gate):
         client.name_writers("r1", ("/teleop",))
-        assert gate.told[-1] == messages.WriterNodes("r1", ("/teleop",))
+        assert gate.told[-1] == protocol.WriterNodes("r1", ("/teleop",))
 
     def test_a_gate_that_says_nothing_is_killed(self, client, gate, monkeypatch):
         monkeypatch.setattr(supervisor, "HUNG", 2)
@@ -345,8 +345,8 @@ class TestLife:
 
         client.on_report(fail)
         removal = client.on_report(reports.append)
-        sent = messages.SentTwist("r1", 0.5, 0.0, 0.0, None)
-        gate.say(sent, messages.Tick(8, {}))
+        sent = protocol.SentTwist("r1", 0.5, 0.0, 0.0, None)
+        gate.say(sent, protocol.Tick(8, {}))
         removal.remove()
         gate.say(sent)
         assert reports == [sent]

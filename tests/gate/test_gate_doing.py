@@ -6,7 +6,7 @@ from gate_harness import KEY, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import events
 from webmap.gate.rules.goals import BRAKES
-from webmap.gate.rules.other_writer import GRACE
+from webmap.gate.rules.obedience import EXPECTED_FOR
 
 OTHERS = Twist(0.1, 0.0, -0.2)
 
@@ -94,7 +94,7 @@ def test_it_is_handed_over(bench):
 
 
 def test_another_program_drives_a_robot_that_nobody_drives(bench):
-    bench.run(GRACE)
+    bench.run(EXPECTED_FOR)
     bench.run(0.5, lambda: bench.tell(events.Echoed(KEY, OTHERS)))
     assert bench.report().doing == "other"
     bench.take("a")

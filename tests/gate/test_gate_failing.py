@@ -9,7 +9,7 @@ from gate_robot import eventually
 
 from webmap.base.errors import NoLease
 from webmap.core.runtime import Runtime
-from webmap.gate import messages
+from webmap.gate import protocol
 from webmap.gate.display.client import GateClient
 
 
@@ -56,7 +56,7 @@ def failing(broken, reports, robot_spec, state_folder, monkeypatch):
 
 
 def downs(reports):
-    return [report for report in reports if isinstance(report, messages.GateDown)]
+    return [report for report in reports if isinstance(report, protocol.GateDown)]
 
 
 def mend(broken, monkeypatch, state_folder):
@@ -107,8 +107,8 @@ def test_a_gate_that_runs_again_is_said_to_run_and_drives(
     failing, broken, reports, monkeypatch, state_folder, fake
 ):
     mend(broken, monkeypatch, state_folder)
-    eventually(lambda: isinstance(reports[-1], messages.RobotReport), "a gate")
-    assert any(isinstance(report, messages.GateUp) for report in reports)
+    eventually(lambda: isinstance(reports[-1], protocol.RobotReport), "a gate")
+    assert any(isinstance(report, protocol.GateUp) for report in reports)
     page = Page(failing)
     page.drive_off(fake)
     page.end()

@@ -7,9 +7,9 @@ from gate_harness import KEY, URL, ZERO, Bench, spec
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, messages
+from webmap.gate import actions, events, protocol
 from webmap.gate.events import Key
-from webmap.gate.messages import AssistSpec
+from webmap.gate.protocol import AssistSpec
 from webmap.gate.specs import checked, key_of
 
 
@@ -96,8 +96,8 @@ class TestDeclaring:
     def test_a_forgotten_robot_is_stopped_before_it_is_dropped(self):
         bench = Bench().begin()
         bench.drive_off()
-        bench.tell(messages.Forget("r1"))
-        assert bench.of(messages.RobotGone) == [messages.RobotGone("r1")]
+        bench.tell(protocol.Forget("r1"))
+        assert bench.of(protocol.RobotGone) == [protocol.RobotGone("r1")]
         bench.say("b", op="take", robot="r1")
         assert "no robot" in bench.refusals("b")[-1].why
         at = bench.now
@@ -106,7 +106,7 @@ class TestDeclaring:
         bench.run(1.0)
         assert len([w for w in bench.written if w.at >= at]) >= 10
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
-        bench.tell(messages.Forget("r1"))
+        bench.tell(protocol.Forget("r1"))
         assert not bench.gate.busy
 
     @pytest.mark.parametrize("later", [10.0, None])
@@ -114,7 +114,7 @@ class TestDeclaring:
         bench = Bench().begin()
         bench.drive_off()
         bench.break_links()
-        bench.tell(messages.Forget("r1"))
+        bench.tell(protocol.Forget("r1"))
         if later is None:  # the file on disk still says so, for the next gate
             bench.run(61.0)
             assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
@@ -131,14 +131,14 @@ class TestDeclaring:
 
     def test_one_that_stands_is_dropped_at_once(self):
         bench = Bench().begin()
-        bench.tell(messages.Forget("r1"))
+        bench.tell(protocol.Forget("r1"))
         assert bench.did(actions.Detach)
         assert bench.did(actions.Unlock)
 
     def test_one_that_comes_back_while_it_is_being_stopped_stays(self):
         bench = Bench().begin()
         bench.drive_off()
-        bench.tell(messages.Forget("r1"))
+        bench.tell(protocol.Forget("r1"))
         bench.tell(spec())
         bench.run(1.0)
         assert bench.did(actions.Detach) == []
@@ -161,11 +161,11 @@ class TestSharing:
     def test_the_lower_limits_count(self, bench):
         bench.drive_off(robot="r1")
         assert bench.written[-1].twist == Twist(0.4)
-        assert {s.robot for s in bench.of(messages.SentTwist)} == {"r1", "r2"}
+        assert {s.robot for s in bench.of(protocol.SentTwist)} == {"r1", "r2"}
 
     def test_forgetting_one_that_holds_the_machine_back_stops_it_first(self, bench):
         bench.drive_off(robot="r1")
-        bench.tell(messages.Forget("r2"))
+        bench.tell(protocol.Forget("r2"))
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r2")]
         at = bench.now
         assert bench.written[-1].twist == ZERO
@@ -190,21 +190,21 @@ class TestSharing:
     ):
         bench = Bench().begin(spec(), spec(id="r2", **more))
         assert bench.take("a", "r1")
-        bench.tell(messages.Forget("r2"))
+        bench.tell(protocol.Forget("r2"))
         assert bench.report().holder is None
 
     def test_forgetting_one_of_two_that_are_alike_leaves_the_other_driving(self):
         bench = Bench().begin(spec(), spec(id="r2", name="Bob again"))
         bench.drive_off(robot="r1")
-        bench.tell(messages.Forget("r2"))
+        bench.tell(protocol.Forget("r2"))
         bench.hold(0.1, x=1.0)
         assert bench.written[-1].twist == Twist(1.0)
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r2")]
 
     def test_forgetting_both_stops_the_machine_first(self, bench):
         bench.drive_off(robot="r1")
-        bench.tell(messages.Forget("r2"))
-        bench.tell(messages.Forget("r1"))
+        bench.tell(protocol.Forget("r2"))
+        bench.tell(protocol.Forget("r1"))
         assert bench.written[-1].twist == ZERO
         bench.run(1.0)
         assert len(bench.did(actions.Detach)) == 2
@@ -288,7 +288,7 @@ class TestSeveral:
         bench.tell(events.LinkDown(other, "control"))
         assert bench.state == "driving"
         assert bench.report("r2").link == "down"
-        bench.tell(messages.Speeds("a", 0.5, 0.5))
+        bench.tell(protocol.Speeds("a", 0.5, 0.5))
         assert bench.report("r2").v == 1.0
 
 

@@ -20,8 +20,8 @@ from link_bench import (
 )
 
 from webmap.base.errors import BridgeClosed
-from webmap.gate.lanes import attempts as waits
 from webmap.gate.lanes import budget, sockets
+from webmap.gate.lanes import lane as waits
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import open_socket
 

@@ -10,7 +10,7 @@ from gate_harness import Bench, spec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.gate import messages
+from webmap.gate import protocol
 from webmap.gate.display.pages import Pages
 from webmap.gate.limits import Cap, Speed, offered, page_cap, speed_in_force
 
@@ -33,7 +33,7 @@ def join(pages, *speeds):
     connection = pages.connect("Ann", "operator", said.append, print)
     if speeds:
         connection.set_speeds(*speeds)
-    pages.greet(messages.Hello(connection.id))
+    pages.greet(protocol.Hello(connection.id))
     return connection, said
 
 
@@ -64,7 +64,7 @@ def test_a_page_is_told_what_it_would_have(pages):
 
 def test_a_page_is_told_so_when_it_is_taken_too():
     bench = Bench().begin(spec(v_max=None, w_max=None))
-    bench.tell(messages.Speeds("a", 0.8, 1.2))
+    bench.tell(protocol.Speeds("a", 0.8, 1.2))
     bench.take()
     report = bench.report()
     assert (report.v, report.w, report.why) == (0.8, 1.2, ("limit of the page",))
@@ -108,4 +108,4 @@ def test_what_is_offered_is_what_is_in_force_then(own_v, own_w, v, w):
 def test_a_report_with_an_infinite_speed_crosses_the_pipe():
     report = free(v_max=None, w_max=None)
     packed = msgspec.msgpack.encode(report)
-    assert msgspec.msgpack.decode(packed, type=messages.RobotReport) == report
+    assert msgspec.msgpack.decode(packed, type=protocol.RobotReport) == report

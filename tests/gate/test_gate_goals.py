@@ -6,7 +6,7 @@ from gate_harness import URL, ZERO, Bench, spec
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, messages
+from webmap.gate import actions, events, protocol
 from webmap.gate.rules.goals import ELSEWHERE, IN_VAIN
 from webmap.gate.rules.goals import MOVE_BASE as MOVE_BASE_TYPE
 from webmap.gate.specs import checked
@@ -34,8 +34,8 @@ def test_the_holder_of_the_lease_sends_a_goal(bench):
     bench.goal(x=3.0, y=-1.0, yaw=0.25)
     (goal,) = goals(bench)
     assert (goal.robot, goal.x, goal.y, goal.yaw) == ("r1", 3.0, -1.0, 0.25)
-    assert bench.of(messages.SentGoal) == [
-        messages.SentGoal("r1", 3.0, -1.0, 0.25, "a")
+    assert bench.of(protocol.SentGoal) == [
+        protocol.SentGoal("r1", 3.0, -1.0, 0.25, "a")
     ]
 
 
@@ -162,7 +162,7 @@ def test_a_goal_is_not_written_after_a_pause_of_the_process(bench):
     bench.held_up = 1.0
     bench.goal()
     assert "held up" in bench.refusals()[-1].why
-    assert bench.of(messages.SentGoal) == []
+    assert bench.of(protocol.SentGoal) == []
 
 
 def test_a_goal_that_could_not_be_written_is_told(bench):
@@ -170,8 +170,8 @@ def test_a_goal_that_could_not_be_written_is_told(bench):
     bench.clear = False
     bench.goal()
     assert "held up" in bench.refusals()[-1].why
-    assert bench.of(messages.SentGoal) == []
-    bench.tell(messages.Disconnect("a"))
+    assert bench.of(protocol.SentGoal) == []
+    bench.tell(protocol.Disconnect("a"))
     bench.tell(events.WroteGoal("r1", "g", 0, 0, 0, "a", False))
 
 
@@ -202,10 +202,10 @@ def test_when_its_sender_is_lost_a_goal_does_what_was_set(loss, policy):
     bench = Bench().begin(spec(on_operator_loss=policy))
     bench.take()
     bench.goal()
-    bench.tell(messages.Disconnect("b"))  # somebody else
+    bench.tell(protocol.Disconnect("b"))  # somebody else
     assert cancels(bench) == 0
     if loss == "connection":
-        bench.tell(messages.Disconnect("a"))
+        bench.tell(protocol.Disconnect("a"))
     elif loss == "display":
         bench.beating = False
         bench.run(0.5)
@@ -219,7 +219,7 @@ def test_one_that_cannot_be_cancelled_goes_on_whatever_is_set():
     bench = Bench().begin(only)
     bench.take()
     bench.goal()
-    bench.tell(messages.Disconnect("a"))
+    bench.tell(protocol.Disconnect("a"))
     assert cancels(bench) == 0
 
 
@@ -228,7 +228,7 @@ def test_when_its_robot_is_removed_a_goal_does_what_was_set(policy):
     bench = Bench().begin(spec(on_operator_loss=policy))
     bench.take()
     bench.goal()
-    bench.tell(messages.Forget("r1"))
+    bench.tell(protocol.Forget("r1"))
     kept = (actions.CancelGoals, actions.Detach)
     order = [type(a) for a in bench.done if isinstance(a, kept)]
     called_off = [actions.CancelGoals] if policy == "cancel" else []
@@ -394,14 +394,14 @@ class TestHowItGoes:
 
     def test_numbers_that_flow_are_told_ten_times_a_second_at_most(self, bench):
         self.tell(bench, active=True, left=9.0)
-        before = len(bench.of(messages.RobotReport))
+        before = len(bench.of(protocol.RobotReport))
         id = goals(bench)[-1].id
 
         def say():
             bench.tell(events.GoalProgress("r1", id, active=True, left=bench.now))
 
         bench.run(1.0, say)
-        assert len(bench.of(messages.RobotReport)) - before <= 11
+        assert len(bench.of(protocol.RobotReport)) - before <= 11
 
     def test_a_failure_has_its_reason(self, bench):
         goal = self.end(bench, "failed", "no path to the goal")
@@ -485,7 +485,7 @@ class TestHowItGoes:
     def test_a_cancel_that_went_to_a_dead_link_is_said_again_on_the_next(self, bench):
         """The link looked open for some seconds, and so the cancel looked written."""
         id = goals(bench)[-1].id
-        bench.tell(messages.Disconnect("a"))
+        bench.tell(protocol.Disconnect("a"))
         bench.say("b", op="cancel", robot="r1")
         bench.run(4.0)
         assert cancels(bench) == 1
@@ -601,8 +601,8 @@ class TestWhereItIs:
         (told,) = self.locate(bench)
         assert (told.robot, told.x, told.y, told.yaw) == ("r1", 1.0, 2.0, 0.5)
         bench.tell(events.WrotePose("r1", 1.0, 2.0, 0.5, "a", done=True))
-        assert bench.of(messages.SentPose) == [
-            messages.SentPose("r1", 1.0, 2.0, 0.5, "a")
+        assert bench.of(protocol.SentPose) == [
+            protocol.SentPose("r1", 1.0, 2.0, 0.5, "a")
         ]
         bench.tell(events.WrotePose("r1", 1.0, 2.0, 0.5, "a", done=False))
         assert "dropped" in self.why(bench)
@@ -666,10 +666,10 @@ class TestWhereItIs:
         assert len(self.locate(bench)) == 1
 
     def test_a_program_with_the_lease_tells_it_too(self, bench):
-        told = messages.ProgramLocate("r1", 0, bench.tick, (1.0, 2.0, 0.5))
+        told = protocol.ProgramLocate("r1", 0, bench.tick, (1.0, 2.0, 0.5))
         bench.tell(told)
         assert bench.did(actions.TellPose) == []
-        bench.tell(messages.ProgramTake(1, "r1"))
+        bench.tell(protocol.ProgramTake(1, "r1"))
         bench.run(0.1)
         epoch = bench.report().epoch
         bench.tell(msgspec.structs.replace(told, epoch=epoch, tick=bench.tick))

@@ -11,7 +11,7 @@ from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.gate import events
 from webmap.gate.events import Sweep
-from webmap.gate.messages import AssistSpec
+from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import free_way, points_of
 from webmap.gate.specs import checked
 

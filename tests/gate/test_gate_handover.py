@@ -4,7 +4,7 @@ import pytest
 from gate_harness import KEY, ZERO, Bench, spec
 
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, messages
+from webmap.gate import actions, events, protocol
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def moving(bench, seconds, speed, turn=0.0):
 class TestAsking:
     def test_the_holder_sees_who_asks_and_drives_on(self, bench):
         ask(bench)
-        assert bench.report().asker == messages.AskerReport("b", "B", 10.0)
+        assert bench.report().asker == protocol.AskerReport("b", "B", 10.0)
         bench.hold(1.0, x=1.0)
         assert bench.report().asker.left == pytest.approx(9.0, abs=0.2)
         assert bench.state == "driving"
@@ -53,9 +53,9 @@ class TestAsking:
     def test_the_time_that_is_left_is_told_ten_times_a_second_at_most(self, bench):
         bench.run(2.0)
         ask(bench)
-        before = len(bench.of(messages.RobotReport))
+        before = len(bench.of(protocol.RobotReport))
         bench.hold(1.0)
-        assert len(bench.of(messages.RobotReport)) - before <= 14
+        assert len(bench.of(protocol.RobotReport)) - before <= 14
 
     def test_who_does_not_answer_for_ten_seconds_has_granted_it(self, bench):
         ask(bench)
@@ -100,7 +100,7 @@ class TestAsking:
         ask(bench)
         match loss:
             case "page":
-                bench.tell(messages.Disconnect("b"))
+                bench.tell(protocol.Disconnect("b"))
             case "stop":
                 bench.say("a", op="stop", robot="r1")
                 assert bench.refusals("b")[-1].why == "STOP by A"
@@ -116,7 +116,7 @@ class TestAsking:
         if going == "release":
             bench.say("a", op="release", robot="r1")
         else:
-            bench.tell(messages.Disconnect("a"))
+            bench.tell(protocol.Disconnect("a"))
         assert bench.report().changing
         bench.run(1.1)
         assert holder(bench) == "b"
@@ -142,7 +142,7 @@ class TestAsking:
         assert "STOP by A is active" in bench.refusals("b")[-1].why
 
     def test_an_asker_without_a_name_is_called_by_its_connection(self, bench):
-        bench.tell(messages.Connect("c9", "", "operator"))
+        bench.tell(protocol.Connect("c9", "", "operator"))
         ask(bench, "c9")
         ask(bench, "b")
         assert bench.refusals("b")[-1].why == "c9 has already requested control"
@@ -218,8 +218,8 @@ class TestChanging:
         )
         ask(bench, "c")
         assert "control goes to B" in bench.refusals("c")[-1].why
-        bench.tell(messages.ProgramTake(1, "r1"))
-        assert bench.of(messages.TakeReply)[-1].epoch is None
+        bench.tell(protocol.ProgramTake(1, "r1"))
+        assert bench.of(protocol.TakeReply)[-1].epoch is None
 
     @pytest.mark.parametrize("going", ["release", "lost"])
     def test_an_heir_who_goes_leaves_it_free(self, bench, going):
@@ -228,7 +228,7 @@ class TestChanging:
         if going == "release":
             bench.say("b", op="release", robot="r1")
         else:
-            bench.tell(messages.Disconnect("b"))
+            bench.tell(protocol.Disconnect("b"))
         bench.run(2.0)
         assert bench.report().state == "free"
         assert not bench.report().changing
@@ -262,6 +262,6 @@ class TestChanging:
     def test_the_limit_of_the_new_page_counts(self, bench):
         ask(bench)
         grant(bench)
-        bench.tell(messages.Speeds("b", 0.2, 0.2))
+        bench.tell(protocol.Speeds("b", 0.2, 0.2))
         bench.run(1.1)
         assert bench.report().v == 0.2

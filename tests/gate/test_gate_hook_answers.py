@@ -6,11 +6,12 @@ import pytest
 from gate_harness import KEY, URL, Bench, spec
 from link_bench import frame, in_loop, noting_bridge, raw_bridge, until
 
-from webmap.gate import actions, events, messages, reports
-from webmap.gate.lanes import calls, navigation
-from webmap.gate.lanes.answers import answer_to
-from webmap.gate.lanes.calls import Calls
+from webmap.gate import actions, events, protocol
+from webmap.gate.display import pages
+from webmap.gate.lanes import navigation, tasks
 from webmap.gate.lanes.links import Links
+from webmap.gate.lanes.navigation import answer_to
+from webmap.gate.lanes.tasks import Calls
 from webmap.gate.limits import Cap
 
 LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
@@ -132,7 +133,7 @@ class Doing:
 class TestLinks:
     @in_loop
     async def test_tell_how_every_hook_ended(self, monkeypatch):
-        monkeypatch.setattr(calls, "CALL_TIMEOUT", 0.5)
+        monkeypatch.setattr(tasks, "CALL_TIMEOUT", 0.5)
         async with noting_bridge() as bridge, Doing(bridge.url) as doing:
             doing.run(LOCK, 1)
             assert doing.of(events.HookEnded) == [events.HookEnded("r1", LOCK, 1, None)]
@@ -255,7 +256,7 @@ class TestReport:
     def test_reaches_the_page(self, bench):
         stop(bench)
         end(bench, E_STOP, REFUSED)
-        text = reports.robot_text(bench.report(), mine=False, page=Cap(1.0, 1.0, ""))
+        text = pages.robot_text(bench.report(), mine=False, page=Cap(1.0, 1.0, ""))
         assert json.loads(text)["hooks"] == [f"stop hook /e_stop: {REFUSED}"]
 
 
@@ -299,7 +300,7 @@ class TestDeclaredAnew:
 
 def test_an_answer_may_come_when_the_robot_is_forgotten(bench):
     stop(bench)
-    bench.tell(messages.Forget("r1"))
-    said = len(bench.of(messages.RobotReport))
+    bench.tell(protocol.Forget("r1"))
+    said = len(bench.of(protocol.RobotReport))
     end(bench, E_STOP, REFUSED)
-    assert len(bench.of(messages.RobotReport)) == said
+    assert len(bench.of(protocol.RobotReport)) == said

@@ -14,8 +14,8 @@ from link_bench import (
     until,
 )
 
-from webmap.gate.lanes import attempts as waits
 from webmap.gate.lanes import lane as lanes
+from webmap.gate.lanes import lane as waits
 from webmap.gate.lanes.sockets import Ears
 
 

@@ -9,9 +9,8 @@ from link_bench import in_loop
 from hanging_bridge import hanging_bridge, until
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import Echoed, Key, LinkUp
-from webmap.gate.lanes.calls import Calls
 from webmap.gate.lanes.control import ControlLane
-from webmap.gate.lanes.tasks import TasksLane
+from webmap.gate.lanes.tasks import Calls, TasksLane
 from webmap.gate.lanes.witness import WitnessLane
 
 KEY = Key("ws://x", "/cmd_vel")

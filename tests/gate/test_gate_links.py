@@ -8,7 +8,7 @@ from webmap.gate import actions
 from webmap.gate.clock import now
 from webmap.gate.events import Echoed, Key, LinkDown, LinkUp, Measured, Wrote
 from webmap.gate.lanes.links import Links
-from webmap.gate.messages import AssistSpec
+from webmap.gate.protocol import AssistSpec
 
 SLOW, ZERO = Twist(0.1), Twist()
 MOVING = {"twist": {"twist": {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": 0.0}}}}

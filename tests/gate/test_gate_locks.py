@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from webmap.gate import locks as module
 from webmap.gate.clock import now
+from webmap.gate.disk import path_of
 from webmap.gate.events import Key
-from webmap.gate.kept import locks as module
-from webmap.gate.kept.locks import Locks, state_folder
-from webmap.gate.kept.records import path_of
+from webmap.gate.locks import Locks, state_folder
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
 

@@ -36,12 +36,11 @@ from hypothesis.stateful import (
 from machine_bench import PacedBench
 
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, messages
+from webmap.gate import actions, events, protocol
 from webmap.gate.events import Press
-from webmap.gate.messages import PROGRAM
+from webmap.gate.protocol import PROGRAM
+from webmap.gate.rules.connections import Epochs, Ticks
 from webmap.gate.rules.gate import Gate
-from webmap.gate.rules.lease import Epochs
-from webmap.gate.rules.ticks import Ticks
 from webmap.gate.shell import STEP
 
 pytestmark = pytest.mark.slow
@@ -287,26 +286,26 @@ class Motion(RuleBasedStateMachine):
 
     @rule(who=st.sampled_from(PEOPLE), v=st.sampled_from([0.2, 0.8, 9.0]))
     def speeds_of_page(self, who, v):
-        self.bench.tell(messages.Speeds(who, v, v))
+        self.bench.tell(protocol.Speeds(who, v, v))
         self.speeds[who] = v
         self.paced = len(self.bench.written)
 
     @rule(who=st.sampled_from(PEOPLE))
     def page_is_reloaded(self, who):
-        self.bench.tell(messages.Disconnect(who))
+        self.bench.tell(protocol.Disconnect(who))
         self.bench.join(who)
         self.last_seq[who], self.speeds[who] = -1, 9.0
 
     @rule(who=st.sampled_from(PEOPLE), words=st.binary(max_size=30))
     def garbage(self, who, words):
-        self.bench.tell(messages.FromBrowser(who, words))
+        self.bench.tell(protocol.FromBrowser(who, words))
 
     # The program.
 
     @rule()
     def program_takes(self):
         self.request += 1
-        self.bench.tell(messages.ProgramTake(self.request, "r1"))
+        self.bench.tell(protocol.ProgramTake(self.request, "r1"))
 
     @rule(vx=st.sampled_from([0.0, 0.4, 2.0]), old=st.sampled_from([0, 0, 8]))
     def program_twists(self, vx, old):
@@ -316,7 +315,7 @@ class Motion(RuleBasedStateMachine):
         age = bench.gate._ticks.age(tick, bench.now)
         valid = held and age is not None and age <= 0.3
         self.sent.append(Sent(bench.now, PROGRAM, epoch, vx == 0, valid))
-        bench.tell(messages.ProgramTwist("r1", epoch, tick, (vx, 0.0, 0.0)))
+        bench.tell(protocol.ProgramTwist("r1", epoch, tick, (vx, 0.0, 0.0)))
 
     @rule(v_max=st.sampled_from([0.4, 1.0]))
     def declared_anew(self, v_max):
@@ -325,7 +324,7 @@ class Motion(RuleBasedStateMachine):
 
     @rule()
     def forgotten_and_declared(self):
-        self.bench.tell(messages.Forget("r1"))
+        self.bench.tell(protocol.Forget("r1"))
         self.bench.tell(self._spec())
 
     # The world.

@@ -5,8 +5,8 @@ import json
 import pytest
 from gate_harness import Bench, spec
 
-from webmap.gate import messages
-from webmap.gate.malformed_stop import begins_like_stop, robot_in
+from webmap.gate import protocol
+from webmap.gate.commands import begins_like_stop, robot_in
 
 START = b'{"op":"stop"'
 
@@ -87,7 +87,7 @@ def two():
 
 
 def send(bench, data, who="b"):
-    bench.tell(messages.FromBrowser(who, data))
+    bench.tell(protocol.FromBrowser(who, data))
 
 
 NAMES_ONE = [
@@ -143,16 +143,16 @@ def test_a_viewer_stops_by_it_too_and_a_stranger_does_not(two):
 def test_it_counts_as_garbage_and_is_served_before_the_page_is_closed(two):
     for _ in range(19):
         send(two, b"{")
-    assert two.of(messages.CloseConnection) == []
+    assert two.of(protocol.CloseConnection) == []
     send(two, b'{"op":"stop"')
-    assert two.of(messages.CloseConnection)
+    assert two.of(protocol.CloseConnection)
     said = [
         message
         for message in two.said
-        if isinstance(message, messages.CloseConnection)
-        or (isinstance(message, messages.SentTwist) and message.by is None)
+        if isinstance(message, protocol.CloseConnection)
+        or (isinstance(message, protocol.SentTwist) and message.by is None)
     ]
-    assert isinstance(said[-1], messages.CloseConnection), "zero goes first"
+    assert isinstance(said[-1], protocol.CloseConnection), "zero goes first"
     assert two.report("r1").latched
     two.run(1.1)
     send(two, b'{"op":"stop"', "b")
@@ -177,5 +177,5 @@ def test_what_only_resembles_it_stops_nothing(two):
 def test_a_good_one_is_no_garbage(two):
     for _ in range(30):
         send(two, json.dumps({"op": "stop", "robot": "r1"}).encode())
-    assert two.of(messages.CloseConnection) == []
+    assert two.of(protocol.CloseConnection) == []
     assert two.refusals("b") == []

@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from webmap.gate import framing
+from webmap.gate import pipe
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import GoalEnded, GoalProgress, Key
 from webmap.gate.lanes import navigation
-from webmap.gate.messages import RobotSpec
+from webmap.gate.protocol import RobotSpec
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
 SPEC = RobotSpec(
@@ -62,7 +62,7 @@ class TestAction:
     def test_counts_that_nobody_counted_are_left_out(self, number):
         word = self.feedback(number_of_recoveries=number)
         assert word == GoalProgress("r1", "g1", True)
-        assert framing.pack(word)
+        assert pipe.pack(word)
 
     def test_times_beyond_all_numbers_are_no_word(self):
         assert self.feedback(navigation_time={"sec": 10**400, "nanosec": 0}) is None

@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
-from webmap.gate import events, messages
+from webmap.gate import events, protocol
 from webmap.gate.events import Key, LockState
-from webmap.gate.rules.other_writer import (
+from webmap.gate.rules.obedience import (
     ECHOES,
-    GRACE,
+    EXPECTED_FOR,
     MOST_ECHOES,
     REMEMBERED,
     SURE,
@@ -174,7 +174,7 @@ class TestWhatIsNot:
 def bench():
     """A robot whose link has been there for a while."""
     bench = Bench().begin()
-    bench.run(GRACE)
+    bench.run(EXPECTED_FOR)
     return bench
 
 
@@ -218,7 +218,7 @@ class TestReport:
 
     def test_it_is_said_beside_the_alarm(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
-        bench.run(GRACE)
+        bench.run(EXPECTED_FOR)
         seen = events.Measured(KEY, Twist(0.4))
 
         def each():
@@ -231,11 +231,11 @@ class TestReport:
         assert bench.report().other_writer == SAID
 
     def test_its_nodes_are_named_as_the_display_tells_them(self, bench):
-        bench.tell(messages.WriterNodes("r1", ("/teleop",)))
+        bench.tell(protocol.WriterNodes("r1", ("/teleop",)))
         publish(bench)
         assert bench.report().other_writer == SAID
-        bench.tell(messages.WriterNodes("r1", ("/teleop",)))
-        bench.tell(messages.WriterNodes("r9", ("/other",)))
+        bench.tell(protocol.WriterNodes("r1", ("/teleop",)))
+        bench.tell(protocol.WriterNodes("r9", ("/other",)))
         assert bench.report().other_writer == f"{SAID}: /teleop"
 
     def test_speeds_that_change_are_said_ten_times_a_second_at_most(self, bench):
@@ -248,12 +248,12 @@ class TestReport:
                 bench.tell(events.Echoed(KEY, Twist(0.1 + next(turn) / 1000)))
 
         bench.run(1.0, each)
-        assert 5 <= len(bench.of(messages.RobotReport)) <= 11
+        assert 5 <= len(bench.of(protocol.RobotReport)) <= 11
 
     def test_a_new_link_may_bring_what_was_written_before(self, bench):
         bench.break_links()
         bench.connect_links()
-        publish(bench, GRACE - 0.1)
+        publish(bench, EXPECTED_FOR - 0.1)
         assert bench.report().other_writer is None
         publish(bench, 0.5)
         assert bench.report().other_writer == SAID
@@ -266,7 +266,7 @@ class TestReport:
 
     def test_what_follows_a_goal_is_expected_to_drive(self):
         bench = Bench().begin(spec(action="/navigate"))
-        bench.run(GRACE)
+        bench.run(EXPECTED_FOR)
         bench.take()
         bench.goal()
         publish(bench, 5.0)
@@ -274,14 +274,14 @@ class TestReport:
         assert bench.report().other_writer is None
         goal = bench.report().goal
         bench.tell(events.GoalEnded("r1", goal.id))
-        publish(bench, GRACE - 0.2)
+        publish(bench, EXPECTED_FOR - 0.2)
         assert bench.report().other_writer is None
         publish(bench, 1.0)
         assert bench.report().other_writer == SAID
 
     def test_but_not_after_a_goal_whose_end_nobody_tells(self):
         bench = Bench().begin(spec(cancel_topic=None))
-        bench.run(GRACE)
+        bench.run(EXPECTED_FOR)
         bench.take()
         bench.goal()
         publish(bench, 5.0)

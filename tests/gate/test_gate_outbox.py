@@ -6,9 +6,9 @@ import threading
 
 import pytest
 
-from webmap.gate import framing, outbox
-from webmap.gate.messages import FromGate, GateUp, Ready, Tick
-from webmap.gate.outbox import BackgroundHandler, Outbox
+from webmap.gate import pipe as pipe_module
+from webmap.gate.pipe import BackgroundHandler, Outbox, Unpacker
+from webmap.gate.protocol import FromGate, GateUp, Ready, Tick
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def shut(end):
 
 
 def heard(read):
-    return framing.Unpacker(FromGate).feed(os.read(read, 1 << 16))
+    return Unpacker(FromGate).feed(os.read(read, 1 << 16))
 
 
 class TestOutbox:
@@ -39,7 +39,7 @@ class TestOutbox:
         assert heard(pipe[0]) == [Ready(0), Ready(1), Ready(2)]
 
     def test_what_newer_messages_replace_is_dropped_first(self, pipe, monkeypatch):
-        monkeypatch.setattr(outbox, "FULL", -1)
+        monkeypatch.setattr(pipe_module, "FULL", -1)
         box = Outbox(pipe[1])
         box.put(Tick(1, {}))
         box.put(Ready(1))
@@ -47,7 +47,7 @@ class TestOutbox:
         assert heard(pipe[0]) == [Ready(1)]
 
     def test_in_the_end_everything_is_dropped(self, pipe, monkeypatch):
-        monkeypatch.setattr(outbox, "OVERFULL", -1)
+        monkeypatch.setattr(pipe_module, "OVERFULL", -1)
         box = Outbox(pipe[1])
         box.put(Ready(1))
         box.close(5.0)
@@ -67,7 +67,7 @@ class TestLog:
         return logging.LogRecord("gate", logging.INFO, "", 0, text, (), None)
 
     def test_a_terminal_that_stands_still_holds_nothing_up(self, monkeypatch):
-        monkeypatch.setattr(outbox, "FULL", 2)
+        monkeypatch.setattr(pipe_module, "FULL", 2)
         go_on, written = threading.Event(), []
 
         class Stopped(logging.Handler):
@@ -89,15 +89,15 @@ class TestLog:
 
 class TestFraming:
     def test_what_is_no_message_is_left_out(self, caplog):
-        data = framing.pack(GateUp()) + framing.pack(Ready(5))
-        assert framing.Unpacker(FromGate).feed(data) == [Ready(5)]
+        data = pipe_module.pack(GateUp()) + pipe_module.pack(Ready(5))
+        assert Unpacker(FromGate).feed(data) == [Ready(5)]
         assert "not a message" in caplog.text
 
     def test_bytes_in_pieces_make_the_same_messages(self):
-        unpacker, data = framing.Unpacker(FromGate), framing.pack(Ready(5)) * 2
+        unpacker, data = Unpacker(FromGate), pipe_module.pack(Ready(5)) * 2
         found = [m for byte in data for m in unpacker.feed(bytes([byte]))]
         assert found == [Ready(5), Ready(5)]
 
     def test_a_length_that_makes_no_sense_ends_the_pipe(self):
-        with pytest.raises(framing.WireError, match="a message of 4294967295 bytes"):
-            framing.Unpacker(FromGate).feed(b"\xff" * 8)
+        with pytest.raises(pipe_module.WireError, match="a message of 4294967295 bytes"):
+            Unpacker(FromGate).feed(b"\xff" * 8)

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.gate.outline import MOST_CORNERS, why_no_outline
 from webmap.gate.rules.assist import polygon_around
+from webmap.gate.specs import MOST_CORNERS, why_no_outline
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 HOOK = ((0, 0), (2, 0), (2, 2), (1, 2), (1, 1), (0, 1))

@@ -14,8 +14,8 @@ from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.events import Key
-from webmap.gate.lanes.own_map import in_own_map
-from webmap.gate.messages import RobotSpec
+from webmap.gate.lanes.tasks import in_own_map
+from webmap.gate.protocol import RobotSpec
 from webmap.gate.specs import checked
 
 QUARTER = math.pi / 2

@@ -9,14 +9,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
+from webmap.gate.commands import Refusal
 from webmap.gate.limits import Cap, Speed, caps_of, fit, ramp, speed_in_force
-from webmap.gate.refusal import Refusal
-from webmap.gate.rules.burst import Burst
-from webmap.gate.rules.connection import Connection, Rate
-from webmap.gate.rules.deadman import DEADMAN, NEUTRAL, DeadMan
+from webmap.gate.rules.connections import (
+    Connection,
+    Epochs,
+    Lease,
+    Rate,
+    Ticks,
+    check_lease,
+    check_role,
+    check_take,
+)
 from webmap.gate.rules.health import Health, Pulse
-from webmap.gate.rules.lease import Epochs, Lease, check_lease, check_role, check_take
-from webmap.gate.rules.ticks import Ticks
+from webmap.gate.rules.motion import DEADMAN, NEUTRAL, Burst, DeadMan
 
 axis = st.floats(-1e308, 1e308)
 positive = st.floats(0, 1e6)

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from gate_robot import eventually
 
-from webmap.gate import priority
+from webmap.gate import process
 from webmap.gate.display.client import GateClient
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="Linux's way to say it")
@@ -29,7 +29,7 @@ def policies_of_threads(pid):
 @linux
 def test_a_thread_that_may_runs_before_what_is_not_urgent_as_do_those_it_starts():
     def rise():
-        risen, policies = priority.rise(), []
+        risen, policies = process.rise(), []
         thread = threading.Thread(
             target=lambda: policies.append(os.sched_getscheduler(0))
         )
@@ -47,18 +47,18 @@ def test_one_that_may_not_goes_on_as_one_among_all(monkeypatch):
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    assert not in_a_thread(priority.rise)
+    assert not in_a_thread(process.rise)
 
 
 def test_another_system_is_not_asked(monkeypatch):
     monkeypatch.setattr(sys, "platform", "win32")
     monkeypatch.delattr(os, "sched_setscheduler", raising=False)
-    assert not in_a_thread(priority.rise)
+    assert not in_a_thread(process.rise)
 
 
 @linux
 def test_all_of_the_gate_is_urgent_where_it_may_be_and_the_display_is_not():
-    may = in_a_thread(priority.rise)
+    may = in_a_thread(process.rise)
     client = GateClient()
     client.start()
     try:

@@ -12,10 +12,10 @@ import pytest
 from gate_robot import eventually
 
 from webmap.base.children import python_command
-from webmap.gate import framing, process
+from webmap.gate import pipe, process
 from webmap.gate.events import Shutdown
-from webmap.gate.messages import FromGate, Heartbeat, Ready
-from webmap.gate.outbox import Outbox
+from webmap.gate.pipe import Outbox
+from webmap.gate.protocol import FromGate, Heartbeat, Ready
 from webmap.gate.rules.gate import Gate
 
 
@@ -41,7 +41,7 @@ def gate():
 
 
 def said_until_ready(gate):
-    unpacker, said = framing.Unpacker(FromGate), []
+    unpacker, said = pipe.Unpacker(FromGate), []
 
     def ready():
         said.extend(unpacker.feed(os.read(gate.stdout.fileno(), 1 << 16)))
@@ -53,7 +53,7 @@ def said_until_ready(gate):
 
 def test_it_says_who_it_is_and_ends_with_the_pipe(gate):
     assert said_until_ready(gate)[0] == Ready(gate.pid)
-    _, err = gate.communicate(framing.pack(Heartbeat()), timeout=60)
+    _, err = gate.communicate(pipe.pack(Heartbeat()), timeout=60)
     assert (gate.returncode, err) == (0, b"")
 
 
@@ -73,7 +73,7 @@ def test_a_gate_that_can_hear_no_longer_is_told_to_end():
         tell = None
 
     out, into = os.pipe()
-    os.write(into, framing.pack(Heartbeat()))
+    os.write(into, pipe.pack(Heartbeat()))
     loop = Loop()
     with pytest.raises(LookupError):
         process._read(out, loop, Shell())
@@ -108,7 +108,7 @@ def test_an_error_of_its_own_ends_it_with_a_code(monkeypatch, caplog):
         assert asyncio.run(process._serve(pipe_in, box)) == 1
         assert "the gate has failed" in caplog.text
         box.close(30.0)
-        said = framing.Unpacker(FromGate).feed(os.read(out, 1 << 16))
+        said = pipe.Unpacker(FromGate).feed(os.read(out, 1 << 16))
         assert said == [Ready(os.getpid())]
     finally:
         gc.unfreeze()

@@ -6,8 +6,8 @@ import pytest
 from gate_harness import ZERO, Bench, spec
 
 from webmap.base.geometry import Twist
-from webmap.gate import actions, messages
-from webmap.gate.messages import PROGRAM
+from webmap.gate import actions, protocol
+from webmap.gate.protocol import PROGRAM
 
 
 @pytest.fixture
@@ -16,21 +16,21 @@ def bench():
 
 
 def take(bench):
-    bench.tell(messages.ProgramTake(7, "r1"))
-    return bench.of(messages.TakeReply)[-1]
+    bench.tell(protocol.ProgramTake(7, "r1"))
+    return bench.of(protocol.TakeReply)[-1]
 
 
 def twist(bench, *velocity, epoch=None, tick=None):
     epoch = bench.report().epoch or 0 if epoch is None else epoch
     tick = bench.tick if tick is None else tick
-    bench.tell(messages.ProgramTwist("r1", epoch, tick, velocity))
+    bench.tell(protocol.ProgramTwist("r1", epoch, tick, velocity))
 
 
 def test_a_program_takes_and_is_answered(bench):
     reply = take(bench)
     assert (reply.request, reply.robot, reply.why) == (7, "r1", None)
     assert reply.epoch == bench.report().epoch
-    assert bench.report().holder == messages.Holder(PROGRAM, PROGRAM)
+    assert bench.report().holder == protocol.Holder(PROGRAM, PROGRAM)
     assert take(bench).epoch == reply.epoch
 
 
@@ -92,7 +92,7 @@ def test_what_is_not_right_is_refused(bench, bad):
 
 def test_without_a_lease_nothing_moves(bench):
     twist(bench, 0.5, 0.0, 0.0)
-    bench.tell(messages.ProgramMove("r1", 0, bench.tick, (1.0, 2.0, 0.0)))
+    bench.tell(protocol.ProgramMove("r1", 0, bench.tick, (1.0, 2.0, 0.0)))
     assert bench.written == []
     assert not bench.did(actions.SendGoal)
 
@@ -146,28 +146,28 @@ class TestTheAnswerToATake:
     def ask(self, bench):
         bench.answering = False
         bench.run(0.4)
-        bench.tell(messages.ProgramTake(7, "r1"))
-        assert not bench.of(messages.TakeReply)
+        bench.tell(protocol.ProgramTake(7, "r1"))
+        assert not bench.of(protocol.TakeReply)
 
     def test_comes_once_the_robot_would_move(self, bench):
         self.ask(bench)
         bench.answering = True
         bench.run(0.02)
-        assert bench.of(messages.TakeReply)[-1].epoch
+        assert bench.of(protocol.TakeReply)[-1].epoch
 
     def test_comes_in_any_case_after_a_while(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
-        bench.tell(messages.ProgramTake(7, "r1"))
+        bench.tell(protocol.ProgramTake(7, "r1"))
         bench.run(1.4)
-        assert not bench.of(messages.TakeReply)
+        assert not bench.of(protocol.TakeReply)
         bench.run(0.2)
-        assert bench.of(messages.TakeReply)[-1].epoch
+        assert bench.of(protocol.TakeReply)[-1].epoch
 
     def test_is_a_refusal_if_somebody_else_was_quicker(self, bench):
         self.ask(bench)
         bench.say("a", op="take", robot="r1")
         bench.run(0.02)
-        assert "nobody has control" in bench.of(messages.TakeReply)[-1].why
+        assert "nobody has control" in bench.of(protocol.TakeReply)[-1].why
 
     def test_comes_at_once_for_a_robot_that_takes_goals_only(self):
         bench = Bench().begin(spec(twist_topic=None))
@@ -177,24 +177,24 @@ class TestTheAnswerToATake:
 def test_it_gives_the_lease_back(bench):
     take(bench)
     twist(bench, 0.5, 0.0, 0.0)
-    bench.tell(messages.ProgramRelease("r1"))
+    bench.tell(protocol.ProgramRelease("r1"))
     assert bench.written[-1].twist == ZERO
     assert bench.report().holder is None
-    bench.tell(messages.ProgramRelease("r1"))
-    bench.tell(messages.ProgramRelease("r9"))
+    bench.tell(protocol.ProgramRelease("r1"))
+    bench.tell(protocol.ProgramRelease("r9"))
 
 
 def test_it_sends_goals_and_cancels_them(bench):
     epoch = take(bench).epoch
-    bench.tell(messages.ProgramMove("r1", epoch, bench.tick, (1.0, 2.0, 0.5)))
-    assert bench.of(messages.SentGoal) == [
-        messages.SentGoal("r1", 1.0, 2.0, 0.5, PROGRAM)
+    bench.tell(protocol.ProgramMove("r1", epoch, bench.tick, (1.0, 2.0, 0.5)))
+    assert bench.of(protocol.SentGoal) == [
+        protocol.SentGoal("r1", 1.0, 2.0, 0.5, PROGRAM)
     ]
-    bench.tell(messages.ProgramMove("r1", epoch, bench.tick, (math.nan, 2.0, 0.5)))
+    bench.tell(protocol.ProgramMove("r1", epoch, bench.tick, (math.nan, 2.0, 0.5)))
     assert len(bench.did(actions.SendGoal)) == 1
-    bench.tell(messages.ProgramCancel("r1"))
+    bench.tell(protocol.ProgramCancel("r1"))
     assert len(bench.did(actions.CancelGoals)) == 1
-    bench.tell(messages.ProgramCancel("r9"))
+    bench.tell(protocol.ProgramCancel("r9"))
 
 
 def test_its_own_twist_of_zero_is_a_release(bench):

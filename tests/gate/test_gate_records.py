@@ -6,8 +6,8 @@ import os
 
 import pytest
 
+from webmap.gate.disk import UNKNOWN, Records, path_of
 from webmap.gate.events import Key, Press, StopRecord
-from webmap.gate.kept.records import UNKNOWN, Records, path_of
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
 ANN, BEN = Press("Ann", "a1"), Press("Ben", "b1")

@@ -3,7 +3,7 @@
 import pytest
 
 from webmap.gate.actions import Say
-from webmap.gate.messages import Connect, Disconnect, FromBrowser, RefusedCount
+from webmap.gate.protocol import Connect, Disconnect, FromBrowser, RefusedCount
 from webmap.gate.rules.gate import Gate
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from webmap.gate.display.restarts import LIVED, LONGEST_PAUSE, Restarts, in_words
-from webmap.gate.display.unheard import HEEDED, Unheard
+from webmap.gate.display.client import HEEDED, Unheard
+from webmap.gate.display.supervisor import LIVED, LONGEST_PAUSE, Restarts, in_words
 
 
 def pauses(restarts, count, now=100.0):

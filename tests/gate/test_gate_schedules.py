@@ -11,7 +11,7 @@ from gate_harness import KEY, spec
 from machine_bench import PacedBench
 
 from webmap.base.geometry import Twist
-from webmap.gate import events, messages
+from webmap.gate import events, protocol
 from webmap.gate.events import Press
 
 PEOPLE = ("a", "b")
@@ -29,7 +29,7 @@ def lose(bench, chance):
         case "bridge":
             bench.answering = False
         case "page":
-            bench.tell(messages.Disconnect(chance.choice(PEOPLE)))
+            bench.tell(protocol.Disconnect(chance.choice(PEOPLE)))
         case "disk":
             bench.full_disk = not bench.full_disk
     bench.run(chance.choice([0.1, 0.4]))
@@ -39,7 +39,7 @@ def mend(bench, chance):
     bench.beating = bench.answering = True
     bench.connect_links()
     for who in PEOPLE:
-        bench.tell(messages.Disconnect(who))
+        bench.tell(protocol.Disconnect(who))
         bench.join(who)
     bench.run(0.2)
 
@@ -87,13 +87,13 @@ def echo(bench, chance):
 
 def speeds(bench, chance):
     v = chance.choice([0.2, 0.8, 9.0])
-    bench.tell(messages.Speeds(chance.choice(PEOPLE), v, v))
+    bench.tell(protocol.Speeds(chance.choice(PEOPLE), v, v))
 
 
 def program(bench, chance):
-    bench.tell(messages.ProgramTake(chance.randrange(1000), "r1"))
+    bench.tell(protocol.ProgramTake(chance.randrange(1000), "r1"))
     epoch = bench.report().epoch or 0
-    bench.tell(messages.ProgramTwist("r1", epoch, bench.tick, (0.4, 0.0, 0.0)))
+    bench.tell(protocol.ProgramTwist("r1", epoch, bench.tick, (0.4, 0.0, 0.0)))
 
 
 def declare(bench, chance):

@@ -8,12 +8,11 @@ import pytest
 from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
-from webmap.gate import actions, events, messages, shell
+from webmap.gate import actions, events, protocol, shell
+from webmap.gate.disk import UNKNOWN, Disk, Records, path_of
 from webmap.gate.events import Key, Press
-from webmap.gate.kept.disk import Disk
-from webmap.gate.kept.locks import Locks
-from webmap.gate.kept.records import UNKNOWN, Records, path_of
 from webmap.gate.lanes.control import ControlLane
+from webmap.gate.locks import Locks
 from webmap.gate.shell import Shell
 
 
@@ -35,7 +34,7 @@ class Running:
     async def __aenter__(self):
         self.work = asyncio.create_task(self.shell.run())
         self._hand = asyncio.create_task(self._stream())
-        self.shell.tell(messages.Connect("a", "Ann", "operator"))
+        self.shell.tell(protocol.Connect("a", "Ann", "operator"))
         return self
 
     async def __aexit__(self, *_):
@@ -51,7 +50,7 @@ class Running:
     async def _stream(self):
         while True:
             await asyncio.sleep(0.05)
-            self.shell.tell(messages.Heartbeat())
+            self.shell.tell(protocol.Heartbeat())
             report, tick = self.report(), self.tick
             if self.x is not None and report is not None and tick is not None:
                 self._seq += 1
@@ -68,16 +67,16 @@ class Running:
 
     def say(self, **command):
         text = json.dumps(command).encode()
-        self.shell.tell(messages.FromBrowser("a", text))
+        self.shell.tell(protocol.FromBrowser("a", text))
 
     @property
     def tick(self):
-        ticks = (m.tick for m in reversed(self.said) if isinstance(m, messages.Tick))
+        ticks = (m.tick for m in reversed(self.said) if isinstance(m, protocol.Tick))
         return next(ticks, None)
 
     def report(self):
         for message in reversed(self.said):
-            if isinstance(message, messages.RobotReport):
+            if isinstance(message, protocol.RobotReport):
                 return message
         return None
 
@@ -170,7 +169,7 @@ async def test_a_gate_that_fails_sends_zero_and_ends(
         gate.x = None
         moves = len(speeds(bridge))
         monkeypatch.setattr(gate.shell._gate, where, fail)
-        gate.shell.tell(messages.Heartbeat())
+        gate.shell.tell(protocol.Heartbeat())
         await gate.work
         assert gate.shell.failed
         assert "every driven robot is stopped" in caplog.text
@@ -204,7 +203,7 @@ async def test_a_link_that_breaks_on_the_last_zero_keeps_none_from_the_others(
         before = len(bridge.of("publish", "/second"))
         monkeypatch.setattr(ControlLane, "write", break_on_the_first)
         monkeypatch.setattr(gate.shell._gate, "handle", lambda *_: 1 / 0)
-        gate.shell.tell(messages.Heartbeat())
+        gate.shell.tell(protocol.Heartbeat())
         async with asyncio.timeout(5):
             await gate.work
         assert broken
@@ -226,7 +225,7 @@ async def test_a_gate_that_has_failed_writes_nothing_but_zero_whoever_goes_on(
         await until(lambda: bridge.of("call_service"), "a call that hangs")
         with monkeypatch.context() as patch:
             patch.setattr(gate.shell._gate, "handle", lambda *_: 1 / 0)
-            gate.shell.tell(messages.Heartbeat())
+            gate.shell.tell(protocol.Heartbeat())
         assert gate.shell.failed
         before = len(speeds(bridge))
         await gate.work
@@ -289,8 +288,8 @@ async def test_a_robot_that_is_forgotten_meanwhile_is_left_to_the_other_gate(
 ):
     async with robot_of_another_gate(tmp_path, monkeypatch) as (gate, other, key):
         await gate.reported(lambda r: not r.armable, "that it is not to be had")
-        gate.shell.tell(messages.Forget("r1"))
-        gone = messages.RobotGone("r1")
+        gate.shell.tell(protocol.Forget("r1"))
+        gone = protocol.RobotGone("r1")
         await until(lambda: gone in gate.said, "the end of the robot")
         assert gate.shell._waiting_for_lock == {}
         other.release(key)
@@ -304,7 +303,7 @@ async def test_a_robot_that_is_forgotten_may_be_had_by_another_gate(tmp_path):
         gate.shell.tell(robot(bridge))
         await gate.reported(lambda r: r.armable, "a robot to be had")
         assert not Locks(tmp_path).acquire(key).held
-        gate.shell.tell(messages.Forget("r1"))
+        gate.shell.tell(protocol.Forget("r1"))
         await until(lambda: Locks(tmp_path).acquire(key).held, "the lock")
 
 
@@ -317,7 +316,7 @@ async def test_a_state_file_that_cannot_be_read_is_a_stop_that_stands(tmp_path, 
         await gate.reported(lambda r: r.latched, "the STOP")
         assert gate.report().stop.by == UNKNOWN
         assert "cannot be read" in caplog.text
-        gate.shell.tell(messages.Reset("r1", gate.report().stop.id))
+        gate.shell.tell(protocol.Reset("r1", gate.report().stop.id))
         await gate.reported(lambda r: r.armable, "a robot to be had")
         await until(lambda: not path.exists(), "no file")
         assert not any(speeds(bridge))
@@ -331,7 +330,7 @@ async def test_a_stop_of_another_gate_is_seen_and_one_of_its_own_is_kept(tmp_pat
         await gate.reported(lambda r: r.latched and r.stop.by == "Ben", "the STOP")
         await until(lambda: speeds(bridge)[-1] == 0.0, "the zero")
         gate.x = None
-        gate.shell.tell(messages.Reset("r1", gate.report().stop.id))
+        gate.shell.tell(protocol.Reset("r1", gate.report().stop.id))
         await gate.reported(lambda r: not r.latched, "the reset")
         await until(lambda: Records(tmp_path).latch_of(key) is None, "no file")
         gate.say(op="stop", robot="r1")

@@ -1,7 +1,7 @@
 """What a standstill is made of."""
 
 from webmap.base.geometry import Twist
-from webmap.gate.rules.standstill import STILL_FOR, Standstill
+from webmap.gate.rules.health import STILL_FOR, Standstill
 
 
 def test_odometry_without_a_velocity_neither_begins_nor_ends_a_standstill():

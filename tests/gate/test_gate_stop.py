@@ -7,9 +7,9 @@ from gate_harness import KEY, URL, ZERO, Bench, spec
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, messages
+from webmap.gate import actions, events, protocol
 from webmap.gate.events import Key, Press
-from webmap.gate.messages import PROGRAM
+from webmap.gate.protocol import PROGRAM
 from webmap.gate.specs import checked
 
 
@@ -61,8 +61,8 @@ class TestLatch:
         assert bench.take("a") is None
         bench.run(5.0)
         assert bench.take("b") is None
-        bench.tell(messages.ProgramTake(1, "r1"))
-        assert bench.of(messages.TakeReply)[-1].epoch is None
+        bench.tell(protocol.ProgramTake(1, "r1"))
+        assert bench.of(protocol.TakeReply)[-1].epoch is None
         assert bench.report().latched
 
     def test_no_command_and_no_goal_gets_through_it(self, bench):
@@ -71,8 +71,8 @@ class TestLatch:
         at = bench.now
         bench.run(1.0, lambda: bench.drive(x=1.0, epoch=epoch))
         bench.goal(epoch=epoch)
-        bench.tell(messages.ProgramTwist("r1", epoch, bench.tick, (1.0, 0, 0)))
-        bench.tell(messages.ProgramMove("r1", epoch, bench.tick, (1.0, 0, 0)))
+        bench.tell(protocol.ProgramTwist("r1", epoch, bench.tick, (1.0, 0, 0)))
+        bench.tell(protocol.ProgramMove("r1", epoch, bench.tick, (1.0, 0, 0)))
         assert bench.moving_since(at) == []
         assert bench.did(actions.SendGoal) == []
 
@@ -175,18 +175,18 @@ class TestLatch:
         assert bench.refusals("b") == []
 
     def test_python_stops_and_resets(self, bench):
-        bench.tell(messages.Stop("r1"))
+        bench.tell(protocol.Stop("r1"))
         assert bench.report().stop.by == PROGRAM
-        bench.tell(messages.Reset("r1", bench.stop_of()))
+        bench.tell(protocol.Reset("r1", bench.stop_of()))
         assert not bench.report().latched
-        bench.tell(messages.Reset("r1", bench.stop_of()))
+        bench.tell(protocol.Reset("r1", bench.stop_of()))
         assert bench.refusals(PROGRAM)[-1].what == "reset"
 
     def test_a_robot_that_is_declared_anew_is_still_stopped(self, bench):
         stop(bench)
         bench.tell(spec(v_max=0.5))
         assert bench.report().latched
-        bench.tell(messages.Forget("r1"))
+        bench.tell(protocol.Forget("r1"))
         bench.run(1.0)
         assert bench.did(actions.Detach)
         bench.tell(spec())
@@ -200,7 +200,7 @@ class TestLatch:
         stop(bench)
         bench.run(0.6)
         assert bench.did(actions.Watch)[-1].on
-        bench.tell(messages.Forget("r1"))
+        bench.tell(protocol.Forget("r1"))
         kept = (actions.Watch, actions.Detach)
         last = [a for a in bench.done if isinstance(a, kept)][-2:]
         assert last == [actions.Watch(KEY, False), actions.Detach(KEY, "r1")]
@@ -300,7 +300,7 @@ class TestByAnotherKey:
         bench.tell(spec())
         bench.tell(spec(id="r2", twist_topic=None))
         reset(bench, robot="r2")
-        bench.tell(messages.Forget("r2"))
+        bench.tell(protocol.Forget("r2"))
         kept = len(bench.did(actions.KeepLatch))
         reset(bench)
         assert len(bench.did(actions.KeepLatch)) == kept + 1
@@ -368,7 +368,7 @@ class TestOnDisk:
     def test_a_forgotten_robots_stop_is_kept_all_the_same(self):
         bench = Bench(slow_disk=True).begin()
         stop(bench)
-        bench.tell(messages.Forget("r1"))
+        bench.tell(protocol.Forget("r1"))
         bench.run(1.0)
         bench.keep(bench.did(actions.KeepLatch)[-1])
         bench.tell(spec())
@@ -403,7 +403,7 @@ class TestOnDisk:
 
     def test_no_report_says_before_it_is_known_that_none_stands(self):
         bench = Bench(disk={KEY: Press("B", "b1")}).begin()
-        assert all(r.latched for r in bench.of(messages.RobotReport))
+        assert all(r.latched for r in bench.of(protocol.RobotReport))
 
     def test_a_machine_that_another_gate_has_gets_no_zeros_from_the_disk(self):
         bench = Bench(disk={KEY: Press("B", "b1")}, lock_held=False).begin()
@@ -547,7 +547,7 @@ class TestConfirmation:
         assert seen.report().stop.confirmed is True
 
     def test_one_that_never_answered_says_so_in_the_end(self):
-        from webmap.gate.rules.confirm import Confirmation
+        from webmap.gate.rules.stop import Confirmation
 
         confirmation = Confirmation()
         confirmation.begin(0.0)
@@ -689,10 +689,10 @@ class TestResetNamesAStop:
         assert bench.report().latched
 
     def test_of_a_python_program_likewise(self, bench):
-        bench.tell(messages.Stop("r1"))
+        bench.tell(protocol.Stop("r1"))
         seen = bench.stop_of()
         stop(bench)
-        bench.tell(messages.Reset("r1", seen))
+        bench.tell(protocol.Reset("r1", seen))
         assert bench.report().latched
         assert "B pressed STOP" in bench.refusals(PROGRAM)[-1].why
 
@@ -709,7 +709,7 @@ class TestResetNamesAStop:
         stop(bench)
         for stated in ({}, {"stop": ""}, {"stop": 7}, {"stop": "x" * 65}):
             command = {"op": "reset", "robot": "r1", **stated}
-            bench.tell(messages.FromBrowser("b", json.dumps(command).encode()))
+            bench.tell(protocol.FromBrowser("b", json.dumps(command).encode()))
             bench.run(1.1)
         assert len(bench.refusals("b")) == 4
         assert bench.report().latched

@@ -4,7 +4,7 @@ import pytest
 from gate_harness import KEY, ZERO, Bench, spec
 
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, messages
+from webmap.gate import actions, events, protocol
 from webmap.gate.events import StopRecord
 
 
@@ -103,7 +103,7 @@ class TestRunning:
         base.run(0.3)
         assert bench.written[-1].twist == ZERO
         report = bench.report()
-        assert report.test == messages.TestReport(
+        assert report.test == protocol.TestReport(
             "failed", "the base did not stop within 3 s"
         )
         assert (report.stop_time, report.stop_source) == (None, "tested")
@@ -172,7 +172,7 @@ class TestRunning:
         assert bench.report().stop_source is None
 
     def test_a_goal_that_may_run_is_cancelled_first(self, bench, base):
-        bench.tell(messages.Forget("r1"))
+        bench.tell(protocol.Forget("r1"))
         begin(bench)
         assert bench.did(actions.CancelGoals) == []
         bench.tell(spec(odometry_topic="/odom", stops_within=None))
@@ -241,7 +241,7 @@ class TestDoubt:
             case "release":
                 bench.say("a", op="release", robot="r1")
             case "page":
-                bench.tell(messages.Disconnect("a"))
+                bench.tell(protocol.Disconnect("a"))
             case "blind":
                 base.speaks = False
                 base.run(1.2)
@@ -253,7 +253,7 @@ class TestDoubt:
             case "link":
                 bench.break_links()
                 bench.connect_links()
-        assert bench.report().test == messages.TestReport("failed", text)
+        assert bench.report().test == protocol.TestReport("failed", text)
         assert bench.written[-1].twist == ZERO
         assert bench.did(actions.KeepStopTest) == []
         base.run(0.5, x=1.0)
@@ -264,7 +264,7 @@ class TestDoubt:
         begin(bench)
         base.run(0.05)
         bench.now += 0.25
-        bench.tell(messages.Heartbeat())
+        bench.tell(protocol.Heartbeat())
         bench.tell(events.Alive(KEY.url, bench.now))
         bench.drive(x=0.0)
         assert bench.report().test.text == "the page stopped sending commands"
@@ -331,7 +331,7 @@ class TestKept:
         assert report.v <= 0.3
 
     def test_a_result_for_a_machine_that_is_gone_does_no_harm(self, bench):
-        bench.tell(messages.Forget("r1"))
+        bench.tell(protocol.Forget("r1"))
         bench.run(1.0)
         bench.tell(events.StopTestKept(KEY, StopRecord(0.2, "2026-11-20")))
 

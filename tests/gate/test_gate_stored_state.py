@@ -15,11 +15,10 @@ from gate_robot import eventually
 from stored_robots import FOLDER, IDENTITIES, PORT, ROBOTS, STOPPED, TESTED
 
 from webmap.gate import actions, events, shell
+from webmap.gate.disk import UNKNOWN, Disk, Records
 from webmap.gate.display.client import GateClient
 from webmap.gate.events import Key
-from webmap.gate.kept.disk import Disk
-from webmap.gate.kept.locks import Locks
-from webmap.gate.kept.records import UNKNOWN, Records
+from webmap.gate.locks import Locks
 from webmap.gate.rules.motion import ZERO
 
 

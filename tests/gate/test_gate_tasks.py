@@ -6,17 +6,9 @@ from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
 from webmap.gate.actions import SendGoal, TellPose
-from webmap.gate.events import (
-    GoalEnded,
-    GoalLost,
-    GoalProgress,
-    Key,
-    LinkDown,
-    LinkUp,
-)
+from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, LinkDown, LinkUp
 from webmap.gate.lanes import tasks
-from webmap.gate.lanes.calls import Calls
-from webmap.gate.lanes.tasks import TasksLane, goal_topics, hook_topics
+from webmap.gate.lanes.tasks import Calls, TasksLane, goal_topics, hook_topics
 
 MOVE_BASE = spec(
     action="/move_base", action_type="move_base_msgs/MoveBaseAction", cancel_topic=None

@@ -6,9 +6,9 @@ from gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, events
 from webmap.gate.limits import Speed
-from webmap.gate.rules.ages import Ages
-from webmap.gate.rules.loopage import LoopAge, governed, reaction
+from webmap.gate.rules.health import Ages
 from webmap.gate.rules.obedience import Obedience
+from webmap.gate.rules.speeds import LoopAge, governed, reaction
 
 
 class TestAlarm:

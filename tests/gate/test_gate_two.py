@@ -9,10 +9,9 @@ from gate_page import Page
 from gate_robot import eventually
 
 from webmap.gate import actions
+from webmap.gate.disk import Disk, Records
 from webmap.gate.display.client import GateClient
 from webmap.gate.events import Key, LatchKept, LatchSeen, LockState, Press
-from webmap.gate.kept.disk import Disk
-from webmap.gate.kept.records import Records
 
 ANN, BEN = Press("Ann", "a1"), Press("Ben", "b1")
 IDS = frozenset({"a1", "b1"})

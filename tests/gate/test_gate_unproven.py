@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
-from webmap.gate.lanes.unproven import MOST, REMEMBERED, Unproven
+from webmap.gate.lanes.control import MOST, REMEMBERED, Unproven
 
 ZERO = Twist()
 AHEAD = Twist(0.5)

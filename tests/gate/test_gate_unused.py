@@ -3,8 +3,8 @@
 import pytest
 from gate_harness import Bench, spec
 
-from webmap.gate import messages
-from webmap.gate.rules import hands
+from webmap.gate import protocol
+from webmap.gate.rules import authority
 
 UNUSED = 15.0
 """Seconds here, since two minutes at 20 Hz take long even on a virtual clock."""
@@ -12,7 +12,7 @@ UNUSED = 15.0
 
 @pytest.fixture(autouse=True)
 def soon(monkeypatch):
-    monkeypatch.setattr(hands, "UNUSED", UNUSED)
+    monkeypatch.setattr(authority, "UNUSED", UNUSED)
 
 
 @pytest.fixture
@@ -93,6 +93,6 @@ def test_who_asks_for_it_gets_it_as_ever(bench):
 
 def test_a_programs_lease_stays_as_any_person_may_take_it():
     bench = Bench().begin()
-    bench.tell(messages.ProgramTake(1, "r1"))
+    bench.tell(protocol.ProgramTake(1, "r1"))
     bench.run(2 * UNUSED)
     assert held(bench)

@@ -3,9 +3,8 @@
 import pytest
 from gate_harness import Bench
 
-from webmap.gate.commands import parse
-from webmap.gate.refusal import Refusal
-from webmap.gate.rules.video import Video
+from webmap.gate.commands import Refusal, parse
+from webmap.gate.rules.health import Video
 
 
 @pytest.fixture

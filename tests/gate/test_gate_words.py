@@ -8,7 +8,7 @@ from gate_harness import KEY, spec
 
 from webmap.base.geometry import Twist
 from webmap.gate.actions import SendGoal, TellPose
-from webmap.gate.lanes import words
+from webmap.gate.lanes import rosbridge
 
 
 def said(data):
@@ -17,7 +17,7 @@ def said(data):
 
 def goal_by(way, **changes):
     goal = SendGoal(KEY, "r1", "g1", 1.0, 2.0, math.pi, "a", way)
-    return said(words.goal(spec(**changes), goal))
+    return said(rosbridge.goal(spec(**changes), goal))
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def goal_by(way, **changes):
     ],
 )
 def test_a_velocity_with_a_header_has_stamp_zero_in_the_dialect(type, stamp):
-    velocity = words.velocity("/cmd_vel", type, Twist(0.5, 0.25, -1.0), "base")
+    velocity = rosbridge.velocity("/cmd_vel", type, Twist(0.5, 0.25, -1.0), "base")
     message = said(velocity)["msg"]
     assert message["header"] == {"stamp": stamp, "frame_id": "base"}
     assert message["twist"]["linear"] == {"x": 0.5, "y": 0.25, "z": 0.0}
@@ -38,7 +38,9 @@ def test_a_velocity_with_a_header_has_stamp_zero_in_the_dialect(type, stamp):
 @pytest.mark.parametrize("type", ["Twist", "TwistStamped", "msg/TwistStamped"])
 def test_a_velocity_has_all_six_numbers(type):
     twist = Twist(1.0, 2.0, 6.0, vz=3.0, wx=4.0, wy=5.0)
-    message = said(words.velocity("/cmd_vel", f"geometry_msgs/{type}", twist))["msg"]
+    message = said(rosbridge.velocity("/cmd_vel", f"geometry_msgs/{type}", twist))[
+        "msg"
+    ]
     message = message.get("twist", message)
     assert message["linear"] == {"x": 1.0, "y": 2.0, "z": 3.0}
     assert message["angular"] == {"x": 4.0, "y": 5.0, "z": 6.0}
@@ -51,7 +53,7 @@ def heard_with(**changes):
         "angular": {axis: numbers[f"r{axis}"] for axis in "xyz"},
     }
     frame = {"op": "publish", "topic": "/odom", "msg": {"twist": {"twist": message}}}
-    return words.hear(json.dumps(frame).encode()).twist
+    return rosbridge.hear(json.dumps(frame).encode()).twist
 
 
 def test_odometry_tells_all_six_numbers():
@@ -72,7 +74,9 @@ def test_without_a_number_in_the_plane_there_is_no_velocity(axis):
 
 
 def test_a_plain_velocity_has_no_header():
-    message = said(words.velocity("/cmd_vel", "geometry_msgs/Twist", Twist(0.5)))["msg"]
+    message = said(rosbridge.velocity("/cmd_vel", "geometry_msgs/Twist", Twist(0.5)))[
+        "msg"
+    ]
     assert message.keys() == {"linear", "angular"}
 
 
@@ -98,18 +102,20 @@ def test_a_goal_goes_to_an_action():
 
 
 def test_everything_else_is_said():
-    assert said(words.cancel_by_topic("/cancel"))["msg"] == {}
-    cancel = said(words.cancel_by_service("/go", "c1"))
+    assert said(rosbridge.cancel_by_topic("/cancel"))["msg"] == {}
+    cancel = said(rosbridge.cancel_by_service("/go", "c1"))
     assert cancel["service"] == "/go/_action/cancel_goal"
-    assert said(words.flag("/lock", True))["msg"] == {"data": True}
-    call = said(words.trigger("/e_stop", "std_srvs/Trigger", "t1"))
+    assert said(rosbridge.flag("/lock", True))["msg"] == {"data": True}
+    call = said(rosbridge.trigger("/e_stop", "std_srvs/Trigger", "t1"))
     assert (call["op"], call["service"], call["id"]) == (
         "call_service",
         "/e_stop",
         "t1",
     )
     located = spec(pose_topic="/initialpose", pose_covariance=(0.1, 0.2, 0.3))
-    pose = said(words.pose_estimate(located, TellPose(KEY, "r1", 1.0, 2.0, 0.0, "a")))
+    pose = said(
+        rosbridge.pose_estimate(located, TellPose(KEY, "r1", 1.0, 2.0, 0.0, "a"))
+    )
     covariance = pose["msg"]["pose"]["covariance"]
     assert (covariance[0], covariance[7], covariance[35]) == (0.1, 0.2, 0.3)
 
@@ -124,7 +130,7 @@ FLAT = {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": -1.0}}
 
 @pytest.mark.parametrize("message", [FLAT, {"twist": FLAT}, {"twist": {"twist": FLAT}}])
 def test_a_velocity_is_found_in_what_has_one(message):
-    assert words.hear(frame(message)).twist == Twist(0.5, 0.0, -1.0)
+    assert rosbridge.hear(frame(message)).twist == Twist(0.5, 0.0, -1.0)
 
 
 @pytest.mark.parametrize(
@@ -139,11 +145,11 @@ def test_a_velocity_is_found_in_what_has_one(message):
     ],
 )
 def test_no_velocity_is_found_in_what_has_none(message):
-    assert words.hear(frame(message)).twist is None
+    assert rosbridge.hear(frame(message)).twist is None
 
 
 def test_a_bare_nan_is_read_and_is_no_velocity():
-    heard = words.hear(frame({"linear": {"x": math.nan}, "angular": {"z": 0.0}}))
+    heard = rosbridge.hear(frame({"linear": {"x": math.nan}, "angular": {"z": 0.0}}))
     assert (heard.topic, heard.twist) == ("/odom", None)
 
 
@@ -151,9 +157,9 @@ def test_a_bare_nan_is_read_and_is_no_velocity():
     "data", [b"", b"{", b"\xff", b"[]", b'{"op": 5}', b'{"op": NaN}']
 )
 def test_what_makes_no_sense_is_nothing(data):
-    assert words.hear(data) is None
+    assert rosbridge.hear(data) is None
 
 
 def test_a_number_for_an_id_is_a_text():
-    assert words.hear(b'{"op": "service_response", "id": 7}').id == "7"
-    assert words.hear(b'{"op": "status"}').id is None
+    assert rosbridge.hear(b'{"op": "service_response", "id": 7}').id == "7"
+    assert rosbridge.hear(b'{"op": "status"}').id is None

@@ -10,7 +10,7 @@ import sys
 import threading
 
 from webmap.gate.display.client import GateClient
-from webmap.gate.messages import RobotSpec
+from webmap.gate.protocol import RobotSpec
 
 
 class Hand:

@@ -10,7 +10,7 @@ from safety_figures import Figure, note
 from safety_run import FULL, TRIALS, Progress, grace, is_measured
 from safety_waiting import Waiting
 
-from webmap.gate.rules.burst import LENGTH, NEW_LINK_LENGTH
+from webmap.gate.rules.motion import LENGTH, NEW_LINK_LENGTH
 from webmap.testing import Bounds, Quiet, check_invariants
 
 EVERY = 5

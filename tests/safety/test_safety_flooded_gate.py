@@ -12,7 +12,7 @@ from safety_load import helper
 from safety_run import grace
 
 from webmap.gate.display.client import GateClient
-from webmap.gate.messages import RobotSpec
+from webmap.gate.protocol import RobotSpec
 from webmap.testing import Sentinel, WitnessRobot
 
 pytestmark = [pytest.mark.safety, pytest.mark.serial]

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from safety_corpus import CORPUS, NO_NUMBERS, REST, ROBOT
 
-from webmap.gate import actions, messages
+from webmap.gate import actions, protocol
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "gate"))
 from gate_harness import Bench, spec
@@ -65,7 +65,7 @@ def filled(bench, text):
 
 def say(bench, text):
     data = text if isinstance(text, bytes) else text.encode(errors="surrogatepass")
-    bench.tell(messages.FromBrowser("a", data))
+    bench.tell(protocol.FromBrowser("a", data))
 
 
 def good(bench, op="drive"):

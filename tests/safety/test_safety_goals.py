@@ -21,7 +21,7 @@ from websockets.sync.client import connect
 
 from real_browser import watched_tab
 from webmap.gate.display.client import GateClient
-from webmap.gate.messages import RobotSpec
+from webmap.gate.protocol import RobotSpec
 from webmap.testing import Sentinel, WitnessRobot
 
 pytestmark = [pytest.mark.safety, pytest.mark.serial]

@@ -14,7 +14,7 @@ from safety_figures import Soak, note
 from safety_load import UNDER_LOAD, maps_coming, under_load
 from safety_run import FULL, SHOW
 
-from webmap.gate.rules.burst import HELD_PERIOD
+from webmap.gate.rules.motion import HELD_PERIOD
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 

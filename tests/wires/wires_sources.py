@@ -40,7 +40,7 @@ from wires_words import Names, lines, tree
 import webmap
 from webmap import cli
 from webmap.console.opened import Console
-from webmap.gate import framing
+from webmap.gate import pipe
 from webmap.gate.display.client import GateClient
 from webmap.gate.specs import checked
 from webmap.server import application
@@ -90,7 +90,7 @@ class Source:
 
         def declare(gate, spec):
             spec = checked(spec)
-            declared[spec.id] = unpacked(framing.pack(spec)[4:])
+            declared[spec.id] = unpacked(pipe.pack(spec)[4:])
 
         def noted(console, *args, **options):
             made(console, *args, **options)

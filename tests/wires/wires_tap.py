@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 from wires_words import ANY, Names, goal_number, is_zero, lines, thinned, tree
 
-from webmap.gate import framing
-from webmap.gate.display.child import Child
+from webmap.gate import pipe
+from webmap.gate.display.supervisor import Child
 
 PERIODIC = ("drive", "program-twist", "robot", "sent-twist", "tick", "writer-nodes")
 """What is said again and again: each distinct message is shown once."""
@@ -49,7 +49,7 @@ class Tap:
         own matter."""
         self._lock = threading.RLock()
         self._child_send = Child.send
-        self._unpacker_read = framing.Unpacker._read
+        self._unpacker_read = pipe.Unpacker._read
 
     def begin(self) -> None:
         """Forget what was noted, names too."""
@@ -65,7 +65,7 @@ class Tap:
 
         def noted_send(child: Child, *messages: msgspec.Struct) -> None:
             for message in messages:
-                tap.note(TO_GATE, unpacked(framing.pack(message)[4:]))
+                tap.note(TO_GATE, unpacked(pipe.pack(message)[4:]))
             send(child, *messages)
 
         def noted_read(unpacker: Any, body: bytes, messages: list[Any]) -> None:
@@ -73,7 +73,7 @@ class Tap:
             read(unpacker, body, messages)
 
         Child.send = noted_send  # type: ignore[method-assign]
-        framing.Unpacker._read = noted_read  # type: ignore[method-assign]
+        pipe.Unpacker._read = noted_read  # type: ignore[method-assign]
 
     def note(self, channel: str, message: dict[str, Any]) -> None:
         """Note a message."""

@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
 from webmap.base.plain_files import LARGEST_STATE, read_file, write_file
-from webmap.gate.kept.locks import state_folder
+from webmap.gate.locks import state_folder
 from webmap.poses.alignment import alignment, alignments, numbers
 from webmap.ros.bridge import Bridge
 

@@ -15,7 +15,7 @@ from webmap.core.extendable import Extendable
 from webmap.core.given_pose import Orientation, Position
 from webmap.core.motion import MotionRoad
 from webmap.core.registry import Namespace
-from webmap.gate.messages import RobotReport
+from webmap.gate.protocol import RobotReport
 from webmap.gate.rules.goals import OVER
 from webmap.ros.bridge import Bridge
 

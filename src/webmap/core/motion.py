@@ -26,7 +26,7 @@ from webmap.config.motion import (
 )
 from webmap.config.reading import Config, read_part
 from webmap.gate.limits import PLANE, Axes
-from webmap.gate.messages import AssistSpec, RobotReport, RobotSpec
+from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.assist import polygon_around
 from webmap.gate.specs import checked, checked_assist
 from webmap.poses.type_asking import TypeAsking

@@ -15,7 +15,7 @@ from webmap.base.scope import Removal, Scope, current_scope
 from webmap.base.tasks import begin
 from webmap.core.pictures import Publisher
 from webmap.core.view import initial_view
-from webmap.gate.messages import Role
+from webmap.gate.protocol import Role
 from webmap.scene.bound import BoundElement, Document
 from webmap.scene.element import Element
 from webmap.scene.events import Event, Handler, Listener

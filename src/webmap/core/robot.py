@@ -21,7 +21,7 @@ from webmap.core.problems import Problems
 from webmap.core.registry import Namespace, robot_modules
 from webmap.core.robot_model import ModelImages, checked_model
 from webmap.core.robot_state import Facts, RobotState, since_when, state_of
-from webmap.gate.messages import RobotReport
+from webmap.gate.protocol import RobotReport
 from webmap.poses.alignment import alignment
 from webmap.poses.odometry import OdometryFeed
 from webmap.poses.placing import PoseReading

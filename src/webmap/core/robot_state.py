@@ -4,10 +4,10 @@ from datetime import datetime, timedelta
 from typing import NamedTuple
 
 from webmap.base.geometry import Twist
-from webmap.gate.messages import RobotReport
+from webmap.gate.protocol import RobotReport
 from webmap.gate.rules.goals import BRAKES, OVER
+from webmap.gate.rules.health import moves
 from webmap.gate.rules.obedience import MOVES, TURNS
-from webmap.gate.rules.standstill import moves
 from webmap.poses.silence import PERIODS
 from webmap.ros.bridge import Bridge
 

@@ -20,7 +20,7 @@ from webmap.base.tasks import spawn
 from webmap.core.motion import MotionRoad, roads
 from webmap.core.refused import refusals
 from webmap.core.robot import robots
-from webmap.gate.messages import (
+from webmap.gate.protocol import (
     GateDown,
     RefusedCount,
     Report,

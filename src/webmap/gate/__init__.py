@@ -1,12 +1,12 @@
-"""The gate: the process through which all motion goes.
+"""The gate: the only process that moves robots. It belongs to one display.
 
-Read it in this order: ``messages`` (what crosses the pipe), ``commands`` and
-``reports`` (what crosses the socket to a page), ``events`` and ``actions`` (what the
-decisions are told, and what they ask for), then the decisions themselves, which are
-all in ``rules`` and do no I/O.
+All commands to robots pass it, and it stops a robot when commands do not arrive in
+time. Nothing that draws, serves pages or reads the robots' sensors belongs here.
 
-Around them is the shell, which decides nothing: ``lanes`` towards the robots, ``kept``
-for what outlives the gate, ``shell``, which brings all of that together, ``process``
-towards the display, and ``display``, the other end of that pipe, which is the only part
-of this package that runs in another process.
+Open ``rules`` first: all decisions, without I/O. ``protocol`` has the messages between
+display and gate, ``commands`` what a page sends, ``events`` and ``actions`` what goes
+into the rules and comes out. ``shell`` connects the rules with the sockets to the
+robots (``lanes``), the files (``disk``, ``locks``) and the pipe to the display
+(``pipe``); ``process`` is the process. ``display`` is the other end of the pipe, and
+runs in the display's process.
 """

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from webmap.base.geometry import Twist
 from webmap.gate.events import Key, Press
-from webmap.gate.messages import FromGate, RobotSpec, Way
+from webmap.gate.protocol import FromGate, RobotSpec, Way
 
 
 @dataclass(frozen=True, slots=True)

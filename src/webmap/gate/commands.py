@@ -1,4 +1,4 @@
-"""What a page may say on ``/drive``, read strictly. No I/O, no state.
+"""The commands that a page sends on ``/drive``, parsed strictly. No I/O, no state.
 
 One JSON object in one text frame of at most 1024 bytes, with exactly these fields::
 
@@ -37,19 +37,40 @@ A page whose driver goes by a camera adds ``"video"`` to each ``drive``: for how
 milliseconds the newest picture that the page showed had been there.
 
 Whatever is not one of these is refused whole, but what begins with ``{"op":"stop"``
-stops robots first (:mod:`webmap.gate.malformed_stop`). What the gate says back stands
-in :mod:`webmap.gate.reports`.
+stops robots first (:mod:`webmap.gate.commands`). What the gate says back stands
+in :mod:`webmap.gate.display.pages`.
+
+A frame that begins like a STOP stops robots, whatever follows. Which ones is read from
+it as far as that can be done without doubt.
 """
 
 import json
 import math
+import re
 import reprlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NoReturn, TypeVar
 
+from webmap.base.errors import MotionError
 from webmap.gate.events import MAX_ID
-from webmap.gate.refusal import Refusal
+
+
+class Refusal(MotionError):
+    """A command that is refused whole: it changes nothing and feeds no dead-man.
+
+    Args:
+        why: One sentence for the person who gave the command.
+        garbage: Whether the words made no sense, rather than coming at the wrong
+            time or from the wrong hand. A page that sends much garbage is closed.
+
+    """
+
+    def __init__(self, why: str, *, garbage: bool = False) -> None:
+        super().__init__(why)
+        self.why = why
+        self.garbage = garbage
+
 
 MAX_BYTES = 1024
 """The longest command, in bytes of UTF-8."""
@@ -367,3 +388,49 @@ def _short(value: object) -> str:
 
 def _refuse(why: str) -> NoReturn:
     raise Refusal(why, garbage=True)
+
+
+_SPACE = rb"[ \t\n\r]*"
+_STOP = rb"%b\{%b\"op\"%b:%b\"stop\"" % (_SPACE, _SPACE, _SPACE, _SPACE)
+_BEGINS = re.compile(_STOP)
+_NAMES_NEXT = re.compile(
+    _STOP
+    + rb"%b,%b\"robot\"%b:%b(\"(?:[^\"\\]|\\.)*\")" % (_SPACE, _SPACE, _SPACE, _SPACE)
+)
+_NAME_KEY = re.compile(rb"\"robot\"" + _SPACE + rb":")
+
+
+def begins_like_stop(data: bytes) -> bool:
+    """Return whether a frame begins with ``{"op":"stop"``, spaces allowed."""
+    return _BEGINS.match(data) is not None
+
+
+def robot_in(data: bytes) -> str | None:
+    """Return the one robot that a frame names, if that can be read without doubt.
+
+    Args:
+        data: A frame that begins like a STOP.
+
+    Returns:
+        The name, which may be unknown; ``None`` if no robot is named, or several, or
+        the name cannot be read.
+
+    """
+    try:
+        fields = json.loads(data.decode(), object_pairs_hook=list)
+        names = [value for name, value in fields if name == "robot"]
+    except (ValueError, RecursionError):
+        names = _named_next(data)
+    name = names[0] if len(names) == 1 else None
+    return name if isinstance(name, str) else None
+
+
+def _named_next(data: bytes) -> list[str]:
+    """Return the robot that stands right behind the beginning of what is not JSON."""
+    found = _NAMES_NEXT.match(data)
+    if found is None or len(_NAME_KEY.findall(data)) > 1:
+        return []
+    try:
+        return [json.loads(found[1].decode())]
+    except ValueError:
+        return []

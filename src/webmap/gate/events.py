@@ -1,4 +1,4 @@
-"""What the shell tells the decisions, besides what comes over the pipe."""
+"""What the shell reports to the rules, besides the messages of the pipe."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

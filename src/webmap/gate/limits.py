@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from webmap.base.geometry import Twist
 from webmap.gate.events import StopRecord
-from webmap.gate.messages import RobotSpec
+from webmap.gate.protocol import RobotSpec
 
 Vector = tuple[float, float, float]
 

@@ -1,4 +1,4 @@
-"""The gate's process: its pipes to the display, its signals, and its end.
+"""The process of the gate: its pipe to the display, its signals, its end.
 
 Its end is the end of the pipe, a signal, or an error of its own; in each case it first
 sends zero to whatever is driven, for half a second at most.
@@ -16,13 +16,33 @@ from types import FrameType
 
 from webmap.base.errors import WireError
 from webmap.base.logs import set_up_logging
-from webmap.gate import events, framing, messages
-from webmap.gate.kept.disk import Disk
-from webmap.gate.kept.locks import Locks, state_folder
-from webmap.gate.kept.records import Records
-from webmap.gate.outbox import BackgroundHandler, Outbox
-from webmap.gate.priority import rise
+from webmap.gate import events, pipe, protocol
+from webmap.gate.disk import Disk, Records
+from webmap.gate.locks import Locks, state_folder
+from webmap.gate.pipe import BackgroundHandler, Outbox
 from webmap.gate.shell import Shell
+
+REAL_TIME = 1
+"""The lowest of the real-time priorities: before every program that has none."""
+
+
+def rise() -> bool:
+    """Have this thread, and those that it starts, run before what is not urgent.
+
+    The gate needs little of a processor, but needs it soon. Linux gives that to root
+    and to whom ``RLIMIT_RTPRIO`` allows it; on other systems and for other users the
+    gate is one program among all, as it also works.
+
+    Returns:
+        Whether it was allowed.
+
+    """
+    if sys.platform != "linux":
+        return False
+    with contextlib.suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(REAL_TIME))
+        return True
+    return False
 
 
 def main() -> int:
@@ -56,7 +76,7 @@ async def _serve(pipe_in: int, outbox: Outbox) -> int:
     threading.Thread(
         target=_read, args=(pipe_in, loop, shell), name="gate-inbox", daemon=True
     ).start()
-    outbox.put(messages.Ready(os.getpid()))
+    outbox.put(protocol.Ready(os.getpid()))
     gc.freeze()  # what is there now stays; collecting should not look at it again
     await shell.run()
     return 1 if shell.failed else 0
@@ -64,7 +84,7 @@ async def _serve(pipe_in: int, outbox: Outbox) -> int:
 
 def _read(file: int, loop: asyncio.AbstractEventLoop, shell: Shell) -> None:
     """Bring what comes on the pipe to the loop; runs in a thread of its own."""
-    unpacker = framing.Unpacker(messages.ToGate)
+    unpacker = pipe.Unpacker(protocol.ToGate)
     why = "the display process has ended"
     with contextlib.suppress(RuntimeError):  # the loop has ended before the pipe
         try:

@@ -9,12 +9,12 @@ import contextlib
 import logging
 from collections import deque
 
-from webmap.gate import actions, events, messages
+from webmap.gate import actions, events, protocol
 from webmap.gate.clock import now
-from webmap.gate.kept.disk import Disk
-from webmap.gate.kept.locks import Locks
+from webmap.gate.disk import Disk
 from webmap.gate.lanes.links import Links
-from webmap.gate.outbox import Outbox
+from webmap.gate.locks import Locks
+from webmap.gate.pipe import Outbox
 from webmap.gate.rules.gate import Gate
 from webmap.gate.rules.motion import ZERO
 
@@ -53,7 +53,7 @@ class Shell:
         self._locks = locks
         self._disk = disk
         self._links = Links(self.tell)
-        self._inbox: deque[messages.ToGate | events.Event] = deque()
+        self._inbox: deque[protocol.ToGate | events.Event] = deque()
         self._working = False
         self._ending = asyncio.Event()
         self._silent = asyncio.Event()
@@ -61,7 +61,7 @@ class Shell:
         self._watched: set[events.Key] = set()
         """The machines that may be driven."""
 
-    def tell(self, event: messages.ToGate | events.Event) -> None:
+    def tell(self, event: protocol.ToGate | events.Event) -> None:
         """Bring an event; called from within an action, it waits its turn.
 
         A gate that has failed takes in nothing more: its last word was zero.

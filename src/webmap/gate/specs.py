@@ -1,15 +1,19 @@
-"""Robots as the gate takes them: names in one spelling, numbers that make sense."""
+"""The declaration of a robot, checked: names in one form, numbers that make sense.
 
+The gate asks which points lie inside the outline and when one touches an edge. Neither
+means anything where edges cross, or where there is no inside.
+"""
+
+import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.gate.events import Key
-from webmap.gate.hookspecs import checked_hooks
-from webmap.gate.messages import AssistSpec, RobotSpec
-from webmap.gate.outline import why_no_outline
+from webmap.gate.protocol import AssistSpec, Point, RobotSpec
 from webmap.ros.names import (
     is_type,
     normalise_topic,
@@ -17,6 +21,154 @@ from webmap.ros.names import (
     same_type,
     split_type,
 )
+
+MOST_CORNERS = 100
+"""Corners of an outline: each of them costs time with every command."""
+
+LEAST_AREA = 1e-4
+"""In square metres: a square of one centimetre."""
+
+FARTHEST = 1000.0
+"""Metres from the robot's origin to a corner."""
+
+
+def why_no_outline(corners: Sequence[Point]) -> str | None:
+    """Return why corners make no outline, in words that follow a colon.
+
+    Args:
+        corners: In their order, finite, in metres.
+
+    Returns:
+        None if they make one.
+
+    """
+    number = len(corners)
+    if not 3 <= number <= MOST_CORNERS:
+        return f"expected 3 to {MOST_CORNERS} corners, got {number}"
+    if any(abs(x) > FARTHEST or abs(y) > FARTHEST for x, y in corners):
+        return f"expected corners within {FARTHEST:g} m of the robot's origin"
+    for (i, one), (j, other) in itertools.combinations(enumerate(corners, 1), 2):
+        if one == other:
+            return f"corners {i} and {j} are the same point; leave one of them out"
+    for i, j in itertools.combinations(range(number), 2):
+        if _cross(corners, i, j):
+            return (
+                f"the edge from corner {i + 1} meets the edge from corner {j + 1}; "
+                "give the corners in their order around the robot"
+            )
+    area = abs(_area(corners))
+    if area < LEAST_AREA:
+        return (
+            f"it has an area of {area:g} m²; expected {LEAST_AREA:g} m² or more, with "
+            "lengths in metres"
+        )
+    return None
+
+
+def _cross(corners: Sequence[Point], i: int, j: int) -> bool:
+    """Return whether two edges have a point in common that they should not have."""
+    number = len(corners)
+    a, b = corners[i], corners[(i + 1) % number]
+    c, d = corners[j], corners[(j + 1) % number]
+    if b == c:  # neighbours share a corner, and cross if one leads back over the other
+        return _turn(a, b, d) == 0.0 and _ahead(a, b, d) < 0.0
+    if d == a:
+        return _turn(c, d, b) == 0.0 and _ahead(c, d, b) < 0.0
+    apart = _turn(a, b, c) * _turn(a, b, d) > 0.0 or _turn(c, d, a) * _turn(c, d, b) > 0
+    return not apart and _boxes_meet(a, b, c, d)
+
+
+def _turn(a: Point, b: Point, c: Point) -> float:
+    """Return on which side of the line from a to b the point c lies; 0 on it."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _ahead(a: Point, b: Point, c: Point) -> float:
+    """Return whether c lies ahead of b, on the way from a; negative if behind."""
+    return (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1])
+
+
+def _boxes_meet(a: Point, b: Point, c: Point, d: Point) -> bool:
+    return all(
+        max(a[k], b[k]) >= min(c[k], d[k]) and max(c[k], d[k]) >= min(a[k], b[k])
+        for k in (0, 1)
+    )
+
+
+def _area(corners: Sequence[Point]) -> float:
+    """Return the area inside, negative where the corners go clockwise."""
+    pairs = itertools.pairwise((*corners, corners[0]))
+    return sum(ax * by - bx * ay for (ax, ay), (bx, by) in pairs) / 2
+
+
+PLACES = (("topic", "std_msgs/Bool"), ("service", "std_srvs/Trigger"))
+"""What a hook may name, and of which type that is."""
+
+
+def checked_hooks(
+    name: str, hooks: Any, twist_topic: str | None
+) -> tuple[dict[str, str], ...]:
+    """Return the stop hooks of the robot called ``name``, with names resolved.
+
+    Args:
+        name: The robot, for people.
+        hooks: Any number of hooks, in order.
+        twist_topic: Where its velocity goes, which no hook may write to.
+
+    Raises:
+        ConfigError: If something in them cannot be meant.
+
+    """
+    if isinstance(hooks, str | Mapping) or not isinstance(hooks, Iterable):
+        raise ConfigError(
+            f"robot {name!r}: stop_hooks is a list of hooks, got {hooks!r}"
+        )
+    return tuple(_checked(name, hook, twist_topic) for hook in hooks)
+
+
+def place_of(hook: Mapping[str, str]) -> tuple[str, str]:
+    """Return whether a checked hook is a topic or a service, and its name."""
+    place = "topic" if "topic" in hook else "service"
+    return place, hook[place]
+
+
+def _checked(name: str, hook: Any, twist_topic: str | None) -> dict[str, str]:
+    if not isinstance(hook, Mapping):
+        raise ConfigError(
+            f"robot {name!r}: a stop hook is a table such as "
+            f"{{'topic': '/lock', 'type': 'std_msgs/Bool'}}, got {hook!r}"
+        )
+    for place, type in PLACES:
+        if place in hook and hook.keys() <= {place, "type"}:
+            return _resolved(name, hook, place, type, twist_topic)
+    raise ConfigError(
+        f"robot {name!r}: a stop hook has the key 'topic' or the key 'service', and "
+        f"besides 'type' no other, got {dict(hook)!r}"
+    )
+
+
+def _resolved(
+    name: str, hook: Mapping[str, Any], place: str, type: str, twist_topic: str | None
+) -> dict[str, str]:
+    given = hook.get("type", type)
+    if not isinstance(given, str) or not is_type(given, type):
+        raise ConfigError(
+            f"robot {name!r}: the {place} of a stop hook is of type {type}, "
+            f"got {given!r}"
+        )
+    where = hook[place]
+    if not isinstance(where, str) or not where:
+        raise ConfigError(
+            f"robot {name!r}: the {place} of a stop hook is a name such as '/lock', "
+            f"got {where!r}"
+        )
+    resolved = normalise_topic(where)
+    if twist_topic and resolved == normalise_topic(twist_topic):
+        raise ConfigError(
+            f"robot {name!r}: its velocity goes to {resolved}, so that is no stop hook"
+        )
+    return {place: resolved, "type": given}
+
 
 ACTIONS = ("nav2_msgs/NavigateToPose", "move_base_msgs/MoveBaseAction")
 """The types of actions that take goals."""

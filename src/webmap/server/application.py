@@ -11,7 +11,7 @@ from webmap.core.runtime import runtime
 
 if TYPE_CHECKING:
     from webmap.gate.display.client import DriveConnection
-    from webmap.gate.messages import Role
+    from webmap.gate.protocol import Role
     from webmap.server.access import Authenticate
     from webmap.server.app import WebApp
 

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from starlette.websockets import WebSocket
 
 from webmap.core.page import Viewer
+from webmap.gate.commands import begins_like_stop
 from webmap.gate.display.client import DriveConnection
-from webmap.gate.malformed_stop import begins_like_stop
-from webmap.gate.messages import Role
+from webmap.gate.protocol import Role
 from webmap.server.open_pages import OpenPages
 from webmap.server.outbox import BatchedCallsByLoop, DriveQueue
 from webmap.server.page_socket import (

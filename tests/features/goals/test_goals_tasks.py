@@ -10,7 +10,7 @@ from module_fakes import Channel, Someone
 from webmap import Bridge, Map, Robot
 from webmap.console.card_parts import GOALS, GoalLine, figures
 from webmap.core.page import Page, PageEntry
-from webmap.gate.messages import GoalReport
+from webmap.gate.protocol import GoalReport
 
 
 def goal(state="under way", **fields):

@@ -21,8 +21,8 @@ from webmap.base.outside_text import escaped
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.robots import host_name
 from webmap.gate.display.client import GateClient
-from webmap.gate.messages import RobotSpec
-from webmap.gate.rules.stoptest import MOVES_ON
+from webmap.gate.protocol import RobotSpec
+from webmap.gate.rules.stop_test import MOVES_ON
 from webmap.ros.asking import ask_topics
 from webmap.ros.names import normalise_url
 

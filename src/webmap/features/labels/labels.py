@@ -23,7 +23,7 @@ from webmap.features.labels.label_store import (
     new_label,
     read_labels,
 )
-from webmap.gate.kept.locks import state_folder
+from webmap.gate.locks import state_folder
 from webmap.scene import svg
 from webmap.scene.element import Element
 

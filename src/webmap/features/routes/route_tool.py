@@ -15,7 +15,7 @@ from webmap.base.errors import ConfigError
 from webmap.base.plain_files import LARGEST_STATE, read_file, write_file
 from webmap.base.tasks import spawn
 from webmap.core.registry import map_modules
-from webmap.gate.kept.locks import state_folder
+from webmap.gate.locks import state_folder
 
 if TYPE_CHECKING:
     from webmap.core.map import Map

@@ -1,4 +1,8 @@
-"""The display's end of the pipe: what WebMap says to the gate, and what it hears.
+"""The display's end of the gate: what pages and programs use.
+
+A gate may end in the moment in which somebody says STOP, or not run at all. So a STOP
+is kept until a gate that was told of it has gone on for a while, and every new gate is
+told of it again. A robot that is told to stop twice stands no less.
 
 Every method may be called from any thread and none waits for the gate. Callbacks come
 in a thread of the client's own and must be quick.
@@ -10,20 +14,55 @@ import json
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.base.scope import Removal
-from webmap.gate import commands, framing, messages
+from webmap.gate import commands, pipe, protocol
+from webmap.gate.commands import Refusal, begins_like_stop, robot_in
 from webmap.gate.display.pages import DriveConnection, Pages
 from webmap.gate.display.program import ProgramRoad
 from webmap.gate.display.supervisor import Supervisor
-from webmap.gate.display.unheard import Unheard
-from webmap.gate.malformed_stop import begins_like_stop, robot_in
-from webmap.gate.messages import FromGate, Report, RobotSpec, Role
-from webmap.gate.refusal import Refusal
+from webmap.gate.protocol import FromGate, Report, RobotSpec, Role
 from webmap.gate.specs import checked
+
+HEEDED = 2.0
+"""Seconds for which a gate must have gone on since it was told."""
+
+
+class Unheard:
+    """The STOPs that are kept, each with who said it."""
+
+    def __init__(self) -> None:
+        self._said: dict[tuple[str | None, str | None], float] = {}
+
+    def __iter__(self) -> Iterator[tuple[str | None, str | None]]:
+        """Go through them: by whose connection, or ``None``, and for which robot."""
+        return iter(list(self._said))
+
+    def say(self, by: str | None, robot: str | None, now: float) -> None:
+        """Keep one; a gate that runs is told of it now.
+
+        Args:
+            by: The connection that said it; ``None`` for a program.
+            robot: Which robot; ``None`` for all.
+            now: The time.
+
+        """
+        self._said[by, robot] = now
+
+    def told(self, now: float) -> None:
+        """Note that a gate has only now been told of all."""
+        self._said = dict.fromkeys(self._said, now)
+
+    def lives(self, now: float) -> None:
+        """Note that the gate that was told goes on."""
+        if self._said:
+            self._said = {
+                who: at for who, at in self._said.items() if now - at < HEEDED
+            }
+
 
 __all__ = ["DriveConnection", "GateClient"]
 
@@ -78,7 +117,7 @@ class GateClient:
         """
         spec = checked(spec)
         try:
-            framing.pack(spec)
+            pipe.pack(spec)
         except TypeError as error:  # a gate that is started anew would not hear it
             raise ConfigError(f"robot {spec.name!r}: {error}") from error
         with self._lock:
@@ -89,7 +128,7 @@ class GateClient:
         """Have the gate drop a robot; it is stopped if it is driven."""
         with self._lock:
             if self._specs.pop(robot_id, None) is not None:
-                self.tell(messages.Forget(robot_id))
+                self.tell(protocol.Forget(robot_id))
 
     def connect(
         self,
@@ -176,7 +215,7 @@ class GateClient:
         """STOP a robot or, with ``None``, all of them."""
         with self._lock:
             self._keep_stop(None, robot_id)
-            self.tell(messages.Stop(robot_id))
+            self.tell(protocol.Stop(robot_id))
 
     def reset(self, robot_id: str, stop: str) -> None:
         """End the STOP of a robot that has this identity; moves nothing.
@@ -188,21 +227,21 @@ class GateClient:
 
         """
         if self.ready:
-            self.tell(messages.Reset(robot_id, stop))
+            self.tell(protocol.Reset(robot_id, stop))
         else:
             log.error("the gate is not running: the reset is lost")
 
     def name_writers(self, robot_id: str, nodes: tuple[str, ...]) -> None:
         """Tell which nodes besides the bridge publish to a robot's velocity topic."""
-        self.tell(messages.WriterNodes(robot_id, nodes))
+        self.tell(protocol.WriterNodes(robot_id, nodes))
 
-    def tell(self, message: messages.ToGate) -> None:
+    def tell(self, message: protocol.ToGate) -> None:
         """Send a message to the gate, if it runs."""
         self._supervisor.tell(message)
 
     # STOPs that may not have been heard.
 
-    def _heed(self, message: messages.FromBrowser) -> None:
+    def _heed(self, message: protocol.FromBrowser) -> None:
         """Keep a page's STOP, in case that no gate hears it."""
         if b"stop" not in message.text:
             return
@@ -225,15 +264,15 @@ class GateClient:
             log.error("STOP: the gate is not running; STOP is sent as soon as it runs")
         self._unheard.say(by, robot, time.monotonic())
 
-    def _stop_again(self, by: str | None, robot: str | None) -> messages.ToGate:
+    def _stop_again(self, by: str | None, robot: str | None) -> protocol.ToGate:
         if by is None or not self._pages.knows(by):
-            return messages.Stop(robot)
+            return protocol.Stop(robot)
         text = json.dumps({"op": "stop", "robot": robot or "*"})
-        return messages.FromBrowser(by, text.encode())
+        return protocol.FromBrowser(by, text.encode())
 
     # The gate.
 
-    def introduction(self) -> list[messages.ToGate]:
+    def introduction(self) -> list[protocol.ToGate]:
         """Return what a new gate must hear first."""
         stops = [
             self._stop_again(by, robot)
@@ -245,35 +284,35 @@ class GateClient:
     def hear(self, message: FromGate) -> None:
         """Take in what the gate says."""
         match message:
-            case messages.Tick(tick):
+            case protocol.Tick(tick):
                 self._program.hear_tick(tick)
                 self._pages.hear_tick(message)
                 with self._lock:
                     self._unheard.lives(time.monotonic())
-            case messages.RobotReport():
+            case protocol.RobotReport():
                 self._program.hear_robot(message)
                 self._pages.hear_robot(message)
                 self._report(message)
-            case messages.Hello():
+            case protocol.Hello():
                 self._pages.greet(message)
-            case messages.Refused():
+            case protocol.Refused():
                 self._pages.hear_refusal(message)
                 self._report(message)
-            case messages.CloseConnection():
+            case protocol.CloseConnection():
                 self._pages.hear_close(message)
-            case messages.TakeReply():
+            case protocol.TakeReply():
                 self._program.hear_take(message)
-            case messages.RobotGone():
+            case protocol.RobotGone():
                 self._pages.hear_gone(message)
                 self._report(message)
-            case messages.Ready():
+            case protocol.Ready():
                 with self._lock:
                     self._unheard.told(time.monotonic())
-                self._report(messages.GateUp())
+                self._report(protocol.GateUp())
             case _:  # for listeners alone
                 self._report(message)
 
-    def gone(self, down: messages.GateDown) -> None:
+    def gone(self, down: protocol.GateDown) -> None:
         """Note that the gate is gone, and every lease with it."""
         self._pages.gone()
         self._program.gone(down.why)

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 from webmap.base.errors import MotionError, NoLease
 from webmap.base.geometry import Twist
-from webmap.gate import messages
-from webmap.gate.messages import PROGRAM
+from webmap.gate import protocol
+from webmap.gate.protocol import PROGRAM
 
 LEAST_PAUSE = 0.01
 """The least time between two velocities for one robot, in seconds; a program that gives
@@ -29,7 +29,7 @@ class ProgramRoad:
 
     def __init__(
         self,
-        tell: Callable[[messages.ToGate], None],
+        tell: Callable[[protocol.ToGate], None],
         lock: "threading.RLock",
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -39,7 +39,7 @@ class ProgramRoad:
         self._numbers = itertools.count(1)
         self._takes: dict[int, concurrent.futures.Future[int]] = {}
         self._epochs: dict[str, int] = {}
-        self._passed_on: dict[str, tuple[float, messages.Velocity]] = {}
+        self._passed_on: dict[str, tuple[float, protocol.Velocity]] = {}
         """By robot, the last velocity that the gate was told, and when."""
         self._tick: int | None = None
 
@@ -65,14 +65,14 @@ class ProgramRoad:
                 return future
             request = next(self._numbers)
             self._takes[request] = future
-            self._tell(messages.ProgramTake(request, robot_id))
+            self._tell(protocol.ProgramTake(request, robot_id))
         return future
 
     def release(self, robot_id: str) -> None:
         """Give the program's lease back; the robot is stopped if it is driven."""
         with self._lock:
             self._epochs.pop(robot_id, None)
-            self._tell(messages.ProgramRelease(robot_id))
+            self._tell(protocol.ProgramRelease(robot_id))
 
     def twist(self, robot_id: str, twist: Twist) -> None:
         """Send one velocity; without another within 200 ms the robot is stopped.
@@ -96,7 +96,7 @@ class ProgramRoad:
             if now - at < LEAST_PAUSE and (any(velocity) or not any(last)):
                 return
             self._passed_on[robot_id] = (now, velocity)
-            self._tell(messages.ProgramTwist(robot_id, epoch, tick, velocity))
+            self._tell(protocol.ProgramTwist(robot_id, epoch, tick, velocity))
 
     def move(self, robot_id: str, x: float, y: float, yaw: float) -> None:
         """Send a goal: metres and radians in the robot's ``goal_frame``.
@@ -109,7 +109,7 @@ class ProgramRoad:
         pose = _finite(x, y, yaw)
         with self._lock:
             epoch, tick = self._licence(robot_id)
-            self._tell(messages.ProgramMove(robot_id, epoch, tick, pose))
+            self._tell(protocol.ProgramMove(robot_id, epoch, tick, pose))
 
     def locate(self, robot_id: str, x: float, y: float, yaw: float) -> None:
         """Tell where a robot is: metres and radians in its ``goal_frame``.
@@ -122,11 +122,11 @@ class ProgramRoad:
         pose = _finite(x, y, yaw)
         with self._lock:
             epoch, tick = self._licence(robot_id)
-            self._tell(messages.ProgramLocate(robot_id, epoch, tick, pose))
+            self._tell(protocol.ProgramLocate(robot_id, epoch, tick, pose))
 
     def cancel(self, robot_id: str) -> None:
         """Cancel the robot's goals; needs no lease."""
-        self._tell(messages.ProgramCancel(robot_id))
+        self._tell(protocol.ProgramCancel(robot_id))
 
     def _licence(self, robot_id: str) -> tuple[int, int]:
         epoch = self._epochs.get(robot_id)
@@ -140,7 +140,7 @@ class ProgramRoad:
         """Note the newest tick."""
         self._tick = tick
 
-    def hear_robot(self, report: messages.RobotReport) -> None:
+    def hear_robot(self, report: protocol.RobotReport) -> None:
         """Note whose a robot is now."""
         holder = None if report.holder is None else report.holder.connection
         with self._lock:
@@ -150,7 +150,7 @@ class ProgramRoad:
                 self._epochs.pop(report.robot, None)
                 self._passed_on.pop(report.robot, None)
 
-    def hear_take(self, reply: messages.TakeReply) -> None:
+    def hear_take(self, reply: protocol.TakeReply) -> None:
         """Answer who asked for a lease."""
         with self._lock:
             future = self._takes.pop(reply.request, None)

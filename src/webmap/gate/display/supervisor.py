@@ -1,16 +1,225 @@
-"""Starts the gate, sees that it lives, and starts another when it has ended."""
+"""Starts the gate process, watches it and starts it again."""
 
+import contextlib
 import logging
+import os
+import signal
+import subprocess
+import sys
 import threading
 import time
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from webmap.gate import messages
-from webmap.gate.display.child import Child
-from webmap.gate.display.restarts import Restarts, in_words
-from webmap.gate.messages import FromGate
+import msgspec
+
+from webmap.base.children import python_command
+from webmap.base.errors import WireError
+from webmap.base.outside_text import one_line
+from webmap.gate import pipe, protocol
+from webmap.gate.protocol import FromGate
+
+FIRST_PAUSE = 0.25
+"""Seconds until a gate that has ended twice in a row is started again."""
+
+LONGEST_PAUSE = 4.0
+"""Seconds between the end of a gate and the next one at most."""
+
+LIVED = 10.0
+"""Seconds that a gate must have lived for its end to be the first in a row."""
+
+
+class Restarts:
+    """The starts and ends of the gates of one display."""
+
+    def __init__(self) -> None:
+        self.failing = False
+        """Whether one gate after the other ended soon."""
+        self._pause = 0.0
+        self._due = float("-inf")
+        self._started_at = float("-inf")
+
+    def due(self, now: float) -> bool:
+        """Return whether it is time to start one."""
+        return now >= self._due
+
+    def started(self, now: float) -> None:
+        """Note that one was started, or that this was tried."""
+        self._started_at = now
+
+    def ended(self, now: float) -> None:
+        """Note that it has ended.
+
+        The next one is started at once, because what the robots do now nobody knows;
+        if that one ends soon as well, after a pause that doubles.
+        """
+        lived = now - self._started_at >= LIVED
+        self.failing = self._pause > 0.0 and not lived
+        if lived:
+            self._pause = 0.0
+        self._due = now + self._pause
+        self._pause = min(max(2 * self._pause, FIRST_PAUSE), LONGEST_PAUSE)
+
+    def lives(self, now: float) -> None:
+        """Note that it runs still."""
+        if self.failing and now - self._started_at >= LIVED:
+            self.failing = False
+
+
+def in_words(epitaph: str, *, spoke: bool) -> str:
+    """Return what is to be said of gates that end one after the other.
+
+    Args:
+        epitaph: What the last one ended of.
+        spoke: Whether it had come to run.
+
+    """
+    what = "ended repeatedly" if spoke else "does not start"
+    return (
+        f"The gate {what}: {epitaph}. WebMap starts it again. Until then no robot "
+        "can be driven from here; a STOP is kept and sent then."
+    )
+
 
 log = logging.getLogger("webmap.gate")
+
+MAX_UNSENT = 1 << 20
+"""Bytes that a gate may leave unread before it is taken for hung."""
+
+END_PATIENCE = 2.0
+"""Seconds for which a gate may send zeros and end, until it is killed."""
+
+MAX_WORDS = 300
+"""The longest line of a gate that is kept as its last words, in characters."""
+
+
+class Child:
+    """A running gate.
+
+    Args:
+        hear: Called with each message, in a thread of the child's own.
+        ended: Called once, in that thread, when the gate has closed its end.
+        command: What is run; a gate, if nothing is said.
+
+    """
+
+    def __init__(
+        self,
+        hear: Callable[["Child", FromGate], None],
+        ended: Callable[["Child"], None],
+        command: Sequence[str] | None = None,
+    ) -> None:
+        self._hear = hear
+        self._ended = ended
+        self._lock = threading.Lock()
+        self._unsent = bytearray()
+        # A session of its own: Ctrl-C in the terminal reaches the display, which
+        # lets the gate stop the robots in order.
+        self._process = subprocess.Popen(
+            command or python_command("webmap.gate"),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        assert self._process.stderr is not None
+        self._in = self._process.stdin.fileno()
+        self._out = self._process.stdout.fileno()
+        if sys.platform != "win32":
+            os.set_blocking(self._in, False)
+        self._err = self._process.stderr
+        self._last_words = b""
+        self._reader = threading.Thread(
+            target=self._read, name="webmap-gate-reader", daemon=True
+        )
+        self._listener = threading.Thread(
+            target=self._listen, name="webmap-gate-stderr", daemon=True
+        )
+
+    @property
+    def pid(self) -> int:
+        """The process's number."""
+        return self._process.pid
+
+    @property
+    def epitaph(self) -> str:
+        """What it ended of, in words, after :meth:`stop`."""
+        code = self._process.returncode
+        if code is not None and code < 0:
+            return f"ended by {signal.Signals(-code).name}"
+        self._listener.join(1.0)
+        said = one_line(self._last_words.decode("utf-8", "replace").strip(), MAX_WORDS)
+        return said or f"exit code {code}, no message"
+
+    def start(self) -> None:
+        """Begin to read."""
+        self._listener.start()
+        self._reader.start()
+
+    def send(self, *messages: msgspec.Struct) -> None:
+        """Write messages without waiting; what does not fit goes with the next."""
+        data = b"".join(map(pipe.pack, messages))
+        with self._lock:
+            if self._in < 0:
+                return
+            self._unsent += data
+            try:
+                while self._unsent:
+                    del self._unsent[: os.write(self._in, self._unsent)]
+            except BlockingIOError:
+                if len(self._unsent) > MAX_UNSENT:
+                    self.kill("it does not read")
+            except OSError:
+                self._unsent.clear()  # it is gone; the reader says so
+
+    def kill(self, why: str) -> None:
+        """End the process at once: only for one that does not work any more."""
+        log.error("the gate (process %d) is killed: %s", self.pid, why)
+        self._process.kill()
+
+    def stop(self, timeout: float) -> None:
+        """Close the pipe, by which the gate stops its robots and ends."""
+        assert self._process.stdin is not None
+        with self._lock:
+            self._in = -1
+            self._process.stdin.close()
+        try:
+            self._process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            self.kill(f"it has not ended within {timeout:g} s")
+            self._process.wait()
+        if self._reader is not threading.current_thread():
+            self._reader.join(1.0)
+
+    def _listen(self) -> None:
+        """Pass on what it says to people, and keep the last line."""
+        with self._err, contextlib.suppress(ValueError):  # closed at our own end
+            for line in self._err:
+                if line.strip():
+                    self._last_words = line
+                said = one_line(line.decode("utf-8", "replace").rstrip("\r\n"))
+                with contextlib.suppress(OSError):
+                    os.write(2, f"{said}\n".encode())
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        unpacker = pipe.Unpacker(FromGate)
+        try:
+            while data := os.read(self._out, 1 << 16):
+                for message in unpacker.feed(data):
+                    self._hear(self, message)
+        except WireError as error:
+            self.kill(str(error))
+        except Exception:
+            # A fault of this side: the gate can still send its robots zero.
+            log.exception("the gate's words could not be dealt with: it is ended")
+            self.stop(END_PATIENCE)
+        finally:
+            self._process.stdout.close()
+            self._ended(self)
+
 
 HEARTBEAT = 0.05
 """Seconds between two signs of life to the gate."""
@@ -28,13 +237,13 @@ STOP_TIMEOUT = 2.0
 class Owner(Protocol):
     """Whom the gate talks to."""
 
-    def introduction(self) -> list[messages.ToGate]:
+    def introduction(self) -> list[protocol.ToGate]:
         """Return what a new gate must hear first."""
 
     def hear(self, message: FromGate) -> None:
         """Take in what it says, in a thread of the gate's own."""
 
-    def gone(self, down: messages.GateDown) -> None:
+    def gone(self, down: protocol.GateDown) -> None:
         """Note that it is gone, in any thread."""
 
 
@@ -89,7 +298,7 @@ class Supervisor:
         if child is not None:
             child.stop(STOP_TIMEOUT)
         self.ready = False
-        self._owner.gone(messages.GateDown("the gate was ended"))
+        self._owner.gone(protocol.GateDown("the gate was ended"))
 
     def end_heartbeat(self, heart: threading.Thread | None = None) -> None:
         """Give no sign of life any more, and have the gate find out by itself."""
@@ -98,14 +307,14 @@ class Supervisor:
         if thread is not None:
             thread.join()
 
-    def tell(self, message: messages.ToGate) -> None:
+    def tell(self, message: protocol.ToGate) -> None:
         """Send a message to the gate, if it runs."""
         with self._lock:
             if self._child is not None:
                 self._child.send(message)
 
     def _beat(self) -> None:
-        beat = messages.Heartbeat()
+        beat = protocol.Heartbeat()
         while not self._ending.is_set():
             child, now = self._child, time.monotonic()
             if child is not None:
@@ -135,7 +344,7 @@ class Supervisor:
             return
         with self._lock:
             self._child, self._silent_beats = child, 0
-            child.send(messages.Heartbeat(), *self._owner.introduction())
+            child.send(protocol.Heartbeat(), *self._owner.introduction())
         child.start()
 
     def _hear(self, child: Child, message: FromGate) -> None:
@@ -143,7 +352,7 @@ class Supervisor:
             if child is not self._child:
                 return
             self._silent_beats = 0
-            if isinstance(message, messages.Ready):
+            if isinstance(message, protocol.Ready):
                 self.ready = True
         self._owner.hear(message)
 
@@ -162,4 +371,4 @@ class Supervisor:
         failing = self._restarts.failing
         self.trouble = in_words(epitaph, spoke=spoke) if failing else None
         why = self.trouble or f"the gate has ended: {epitaph}"
-        self._owner.gone(messages.GateDown(why, failing))
+        self._owner.gone(protocol.GateDown(why, failing))

@@ -13,11 +13,10 @@ from webmap.gate.events import (
     WroteGoal,
     WrotePose,
 )
-from webmap.gate.lanes.calls import Calls
 from webmap.gate.lanes.control import ControlLane
-from webmap.gate.lanes.tasks import TasksLane, Topic, goal_topics, hook_topics
+from webmap.gate.lanes.tasks import Calls, TasksLane, Topic, goal_topics, hook_topics
 from webmap.gate.lanes.witness import WitnessLane
-from webmap.gate.messages import RobotSpec
+from webmap.gate.protocol import RobotSpec
 from webmap.gate.rules.motion import ZERO
 
 

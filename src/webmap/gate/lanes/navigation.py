@@ -1,4 +1,4 @@
-"""What a robot's navigation says of a goal, as a bridge passes it on. No I/O.
+"""Goals as actions: what is written, and what the answers mean. No I/O.
 
 A ``NavigateToPose`` action answers on the socket that sent the goal, by
 ``action_feedback`` and ``action_result``. move_base answers by three topics of
@@ -7,14 +7,14 @@ that is not about this goal, or makes no sense, is passed over.
 """
 
 import math
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import msgspec
 
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import GoalEnded, GoalProgress, Outcome
-from webmap.gate.lanes.reading import plain
-from webmap.gate.messages import RobotSpec
+from webmap.gate.lanes.rosbridge import plain
+from webmap.gate.protocol import RobotSpec
 
 Word = GoalProgress | GoalEnded
 T = TypeVar("T")
@@ -239,3 +239,52 @@ def _as(value: Any, type: type[T]) -> T | None:
         return msgspec.convert(value, type)
     except msgspec.ValidationError:
         return None
+
+
+class Answer(NamedTuple):
+    """How a call went."""
+
+    why: str | None
+    """Why it failed, in words; ``None`` if it did not."""
+
+
+class _Answer(msgspec.Struct):
+    op: str = ""
+    id: str | int | None = None
+    result: Any = None
+    values: Any = None
+    level: str = ""
+    msg: Any = None
+
+
+def answer_to(data: bytes, id: str) -> Answer | None:
+    """Return what a message says of the call ``id``; ``None`` if nothing.
+
+    Only what says that the call failed is taken for that: old bridges leave out
+    ``result``, and a service of another type than Trigger has no ``success``.
+
+    Raises:
+        ProtocolError: If it holds too many values or is nested too deeply.
+
+    """
+    try:
+        frame = msgspec.convert(plain(data), _Answer)
+    except ValueError:  # msgspec's own errors are of that kind too
+        return None
+    if str(frame.id) != id:
+        return None
+    if frame.op == "status" and frame.level == "error":
+        return Answer(_because("refused", frame.msg))
+    if frame.op != "service_response":
+        return None
+    if frame.result is False:
+        return Answer(_because("refused", frame.values))
+    values = frame.values
+    if isinstance(values, dict) and values.get("success") is False:
+        return Answer(_because("the service reported a failure", values.get("message")))
+    return Answer(None)
+
+
+def _because(what: str, said: Any) -> str:
+    words = readable(said) if isinstance(said, str) else ""
+    return f"{what} ({words})" if words else what

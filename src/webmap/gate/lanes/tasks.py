@@ -1,4 +1,4 @@
-"""The tasks lane: goals and their cancelling, which may hang.
+"""The socket for goals, cancels, poses and stop hooks of one bridge.
 
 Some bridges do nothing else for a socket until the action goal that came through it
 has ended. So a goal of an action uses up a socket: it is kept for the result, and the
@@ -13,20 +13,127 @@ itself, its status only while a goal of ours is followed.
 import asyncio
 import logging
 from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import TypeVar
 
+from websockets.exceptions import WebSocketException
+
+from webmap.base.errors import BridgeClosed
+from webmap.base.geometry import Pose
 from webmap.base.identifiers import generate_id
 from webmap.gate.actions import SendGoal, TellPose
 from webmap.gate.events import Event, GoalEnded, GoalLost, LinkDown, LinkUp
-from webmap.gate.lanes import navigation, words
-from webmap.gate.lanes.calls import Calls, Ended
+from webmap.gate.lanes import navigation, rosbridge
+from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.lane import Lane
-from webmap.gate.lanes.own_map import in_own_map
-from webmap.gate.lanes.sockets import Ears, Socket
-from webmap.gate.messages import RobotSpec
+from webmap.gate.lanes.navigation import answer_to, readable
+from webmap.gate.lanes.sockets import Ears, Socket, open_socket
+from webmap.gate.protocol import RobotSpec
 from webmap.gate.rules.goals import is_move_base
 from webmap.ros.rosbridge import ops
 
+Place = TypeVar("Place", SendGoal, TellPose)
+
+_COMMON = (0.0, 0.0, 0.0)
+
+
+def in_own_map(spec: RobotSpec, at: Place) -> Place:
+    """Return what a robot is told, with its numbers in the robot's own map.
+
+    Args:
+        spec: The robot.
+        at: What it is told, with numbers on the common map.
+
+    """
+    if spec.own_map == _COMMON:
+        return at
+    own = Pose(*spec.own_map).inverse @ Pose(at.x, at.y, at.yaw)
+    return replace(at, x=own.x, y=own.y, yaw=own.yaw)
+
+
 log = logging.getLogger("webmap.gate")
+
+CALL_TIMEOUT = 2.0
+"""How long a service is given to answer, in seconds, the way there included."""
+
+Ended = Callable[[str | None], None]
+"""Takes why something failed, in words, or ``None`` if it did not."""
+
+
+class Calls:
+    """Calls services of one bridge and looks after the calls.
+
+    Args:
+        url: The bridge's address.
+
+    """
+
+    def __init__(self, url: str) -> None:
+        self._url = url
+        self._budget = Budget()
+        self._calling: set[asyncio.Task[None]] = set()
+
+    def call(
+        self, request: bytes, id: str, what: str, ended: Ended = lambda why: None
+    ) -> None:
+        """Call a service without waiting for its answer.
+
+        Args:
+            request: The operation that calls it.
+            id: The name that the answer will bear.
+            what: What is called, for people.
+            ended: Is told what came of it, unless it is given up by :meth:`close`.
+
+        """
+        call = self._call(request, id, what, ended)
+        task = asyncio.get_running_loop().create_task(call)
+        self._calling.add(task)
+        task.add_done_callback(self._calling.discard)
+
+    async def settle(self) -> None:
+        """Wait until every call is answered, or will not be."""
+        if self._calling:
+            await asyncio.wait(self._calling)
+
+    def close(self) -> None:
+        """Give up what is not answered yet."""
+        for task in self._calling:
+            task.cancel()
+
+    async def _call(self, request: bytes, id: str, what: str, ended: Ended) -> None:
+        why = await self._ask(request, id)
+        if why is not None:
+            log.warning("%s: %s", what, why)
+        ended(why)
+
+    async def _ask(self, request: bytes, id: str) -> str | None:
+        """Call a service and return why that failed, ``None`` if it did not."""
+        outcomes: asyncio.Queue[str | None] = asyncio.Queue()
+
+        def hear(data: bytes) -> None:
+            answer = answer_to(data, id)
+            if answer is not None:
+                outcomes.put_nowait(answer.why)
+
+        def lost(why: str) -> None:
+            reason = readable(f"no answer: connection lost: {why}")
+            outcomes.put_nowait(reason)
+
+        ears = Ears(text=hear, pong=lambda _: None, lost=lost)
+        try:
+            async with asyncio.timeout(CALL_TIMEOUT):
+                link = await open_socket(self._url, ears, self._budget)
+                try:
+                    link.send(request)
+                    return await outcomes.get()
+                finally:
+                    link.close()
+        # The latter of a bridge that closes the link in the breath that opens it.
+        except (BridgeClosed, WebSocketException) as error:
+            return readable(f"no connection: {error}")
+        except TimeoutError:
+            return f"no answer within {CALL_TIMEOUT:g} s"
+
 
 MAX_SPENT = 8
 """How many sockets of action goals are kept for their results at most."""
@@ -91,7 +198,7 @@ class TasksLane:
         if goal.way == "move_base":
             # First, so that no word is missed: they may be on their way at once.
             self._follow(spec, goal)
-        said = words.goal(spec, goal)
+        said = rosbridge.goal(spec, goal)
         done = self.lane.write(said, only_if_clear=True, until=goal.until)
         if done and goal.way == "navigate_to_pose":
             self._keep_for_result(goal)
@@ -101,22 +208,22 @@ class TasksLane:
 
     def tell_pose(self, spec: RobotSpec, at: TellPose) -> bool:
         """Tell where the robot is, now or not; return whether it went out."""
-        estimate = words.pose_estimate(spec, in_own_map(spec, at))
+        estimate = rosbridge.pose_estimate(spec, in_own_map(spec, at))
         return self.lane.write(estimate, only_if_clear=True, until=at.until)
 
     def cancel(self, spec: RobotSpec) -> None:
         """Cancel every goal of the robot, by every way that it has."""
         if spec.cancel_topic is not None:
             self.lane.write(
-                words.cancel_by_topic(spec.cancel_topic), only_if_clear=False
+                rosbridge.cancel_by_topic(spec.cancel_topic), only_if_clear=False
             )
         if spec.action is not None and is_move_base(spec):
             topic = f"{spec.action}/cancel"
             if topic != spec.cancel_topic:
-                self.lane.write(words.cancel_by_topic(topic), only_if_clear=False)
+                self.lane.write(rosbridge.cancel_by_topic(topic), only_if_clear=False)
         elif spec.action is not None:
             id, what = generate_id(), f"cancelling the goals of {spec.action}"
-            self._calls.call(words.cancel_by_service(spec.action, id), id, what)
+            self._calls.call(rosbridge.cancel_by_service(spec.action, id), id, what)
 
     def run_hook(self, hook: dict[str, str], stopped: bool, ended: Ended) -> None:
         """Publish the Bool of a stop hook, or call its service.
@@ -130,9 +237,11 @@ class TasksLane:
         """
         if "service" in hook:
             id, service = generate_id(), hook["service"]
-            request = words.trigger(service, hook["type"], id)
+            request = rosbridge.trigger(service, hook["type"], id)
             self._calls.call(request, id, f"stop hook {service}", ended)
-        elif self.lane.write(words.flag(hook["topic"], stopped), only_if_clear=False):
+        elif self.lane.write(
+            rosbridge.flag(hook["topic"], stopped), only_if_clear=False
+        ):
             ended(None)
         else:
             why = "not sent: no connection"

@@ -1,18 +1,138 @@
-"""The witness lane: odometry in, of which only the velocity is read, and scans.
+"""The socket for odometry, echoes and scans of one bridge.
+
+Over JSON a bridge writes ``null`` for "nothing there" and for "broken" alike, so scans
+are asked for in CBOR, and one that comes in JSON is no scan here: the robot is blind.
+One of many beams is folded to at most 720 here, once; one of far too many is refused
+before its numbers are read, and the socket takes no frame of more than a mebibyte.
 
 What a link has kept back is as old as that, and nothing in it says so: a robot's clock
 is not the gate's. But a bridge answers a ping behind what it has said before. So what
 comes after an answer was said after that ping went out, and no earlier.
 """
 
+import re
 from collections.abc import Callable
+from typing import Any
 
+from webmap.base.errors import ProtocolError
 from webmap.gate.clock import now
-from webmap.gate.events import Event, Key, LinkDown, LinkUp, Measured, Scanned
-from webmap.gate.lanes import scans, words
+from webmap.gate.events import Event, Key, LinkDown, LinkUp, Measured, Scanned, Sweep
+from webmap.gate.lanes import rosbridge
 from webmap.gate.lanes.lane import Lane
+from webmap.gate.rules.scan_geometry import folded, too_long
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.cbor import looks_like_cbor
+
+SCAN_THROTTLE = 100
+"""Milliseconds between two scans at least."""
+
+SCAN_TYPE = "sensor_msgs/LaserScan"
+
+FRAME_NAME = 80
+"""The longest name of a frame that is kept, in characters."""
+
+MOST_PARTS = 1000
+"""Maps, lists, texts and typed arrays in the message of a scan; a scan has about 40."""
+
+MOST_NUMBERS = 250_000
+"""Numbers in its lists and maps: enough for two lists of the longest scan."""
+
+# A run of integers, floats and the like in CBOR (RFC 8949, 3.1), each with its head.
+_NUMBERS = re.compile(
+    rb"(?:[\x00-\x17\x20-\x37\xf4-\xf7]*+(?:\xfb.{8})*+(?:\xfa.{4})*+"
+    rb"(?:[\x19\x39\xf9]..)*+(?:[\x18\x38].)*+(?:[\x1a\x3a].{4})*+"
+    rb"(?:[\x1b\x3b].{8})*+)*+",
+    re.DOTALL,
+)
+_FURTHER = {24: 1, 25: 2, 26: 4, 27: 8}
+"""By the low bits of a head, in how many further bytes its number stands."""
+_STRINGS, _LISTS_AND_MAPS = (2, 3), (4, 5)
+_ENDLESS = 31
+"""The low bits of a head whose length is not told."""
+
+_FIELDS = ("angle_min", "angle_increment", "range_min", "range_max")
+
+
+def subscribe(topic: str, id: str) -> bytes:
+    """Return the operation that asks for the scans of a topic."""
+    return ops.subscribe(
+        topic,
+        id=id,
+        type=SCAN_TYPE,
+        throttle_rate=SCAN_THROTTLE,
+        queue_length=1,
+        compression="cbor",
+    )
+
+
+def check_parts(frame: bytes) -> None:
+    """Let CBOR pass that holds few things besides numbers.
+
+    A mebibyte of empty lists takes 0.6 s to decode, one of numbers 10 ms. So what is
+    no number is counted first, which costs at most a millisecond.
+
+    Raises:
+        ProtocolError: If there is too much of it.
+
+    """
+    at = parts = numbers = 0
+    while (at := _NUMBERS.match(frame, at).end()) < len(frame):  # type: ignore[union-attr]
+        kind, low = frame[at] >> 5, frame[at] & 31
+        further = _FURTHER.get(low, 0)
+        at += 1 + further
+        size = int.from_bytes(frame[at - further : at], "big") if further else low
+        parts += 1
+        if kind in _STRINGS:
+            at = min(at + size, len(frame))  # it may claim 2**64 bytes
+        elif kind in _LISTS_AND_MAPS:
+            numbers += size
+        if parts > MOST_PARTS or numbers > MOST_NUMBERS or low == _ENDLESS:
+            raise ProtocolError(
+                f"a scan in CBOR with lists of unknown length, more than {MOST_PARTS} "
+                f"lists, maps and texts, or more than {MOST_NUMBERS} numbers"
+            )
+
+
+def hear_scan(frame: bytes, now: float) -> tuple[str, Sweep] | None:
+    """Return the topic and the scan of a frame; None if it is anything else.
+
+    A scan of more than 720 beams comes folded; what is ``refused`` has no ranges.
+
+    Raises:
+        ProtocolError: If it is no CBOR, nested too deeply, or of too many parts.
+
+    """
+    from webmap.ros.rosbridge import cbor
+
+    if not cbor.looks_like_cbor(frame):
+        return None
+    check_parts(frame)
+    operation = cbor.decode(frame)
+    topic, message = operation.get("topic"), operation.get("msg")
+    if operation.get("op") != "publish" or not isinstance(topic, str):
+        return None
+    if not isinstance(message, dict):
+        return None
+    numbers = [message.get(field) for field in _FIELDS]
+    ranges = message.get("ranges") or ()
+    if not all(isinstance(number, float | int) for number in numbers):
+        return None
+    try:
+        refused = too_long(len(ranges))
+        values = [] if refused else [float(reach) for reach in ranges]
+        about = [float(number) for number in numbers if number is not None]
+    except (TypeError, ValueError, OverflowError):
+        return None
+    least, step, near, far = about
+    frame_id = _frame_of(message.get("header"))
+    sweep = Sweep(least, step, near, far, values, now, refused=refused, frame=frame_id)
+    return topic, folded(sweep)
+
+
+def _frame_of(header: Any) -> str:
+    frame = header.get("frame_id") if isinstance(header, dict) else None
+    return frame[:FRAME_NAME].removeprefix("/") if isinstance(frame, str) else ""
+
 
 THROTTLE = 50
 """Milliseconds between two messages at least."""
@@ -71,7 +191,7 @@ class WitnessLane:
         """Hear what the scanner of the machine ``key`` sees."""
         self._scanners.setdefault(topic, []).append(key)
         id = f"webmap-gate scan {topic}"
-        self.lane.hold(id, scans.subscribe(topic, id), ops.unsubscribe(topic, id=id))
+        self.lane.hold(id, subscribe(topic, id), ops.unsubscribe(topic, id=id))
         self._pace()
 
     def unwatch_scan(self, topic: str, key: Key) -> None:
@@ -102,7 +222,7 @@ class WitnessLane:
         if self._scanners and looks_like_cbor(data):
             self._hear_scan(data)
             return
-        heard = words.hear(data)
+        heard = rosbridge.hear(data)
         if heard is None or heard.op != "publish" or heard.topic is None:
             return
         for key in self._watchers.get(heard.topic, ()):
@@ -110,7 +230,7 @@ class WitnessLane:
 
     def _hear_scan(self, data: bytes) -> None:
         # A ping more is granted: the next answer would often have come with the scan.
-        heard = scans.hear_scan(data, min(self._said_after + BUSY_PING, now()))
+        heard = hear_scan(data, min(self._said_after + BUSY_PING, now()))
         if heard is not None:
             topic, sweep = heard
             for key in self._scanners.get(topic, ()):

@@ -1,12 +1,8 @@
-"""What the gate decides, without any I/O: told what came and when, it says what to do.
+"""All decisions of the gate, without I/O: events and times in, actions out.
 
-Read ``gate`` first, then ``fleet`` and ``base``, which is one machine with all of its
-rules. What one rule needs: ``ticks``, ``lease``, ``ages``, ``loopage``, ``deadman``,
-``health``, ``sight``, ``arming``, ``goals``, ``latch``, ``confirm``, ``handover``,
-``stoptest``, ``obedience``, ``assist``. What one machine does with them: ``speeds``,
-``motion``, ``stoptesting``, ``hands`` (who has it), ``driving`` (what commands come
-to), ``standing`` (a STOP that stands). What comes in: ``orders`` of pages and
-``programorders``.
-
-Nothing here knows a socket, a file or a clock; the linter sees to it.
+A rule that decides about motion belongs here; a socket, a file or a clock does not, and
+an import contract refuses them. Open ``gate`` first, then ``machine``, which combines
+the rules of one machine: ``authority`` (who has control), ``driving`` (its commands),
+``motion`` (what is written), ``stop``, ``stop_test``, ``goals`` and ``assist``.
+``report`` says what is shown of a machine.
 """

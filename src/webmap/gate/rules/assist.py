@@ -1,4 +1,4 @@
-"""Scan assist: slower before what a laser scanner sees in the way.
+"""Scan assist: slows a robot down before obstacles that a laser scanner sees (S17).
 
 It assists a driver and is no safety function: a planar scanner sees neither glass, nor
 stairs, nor a table's edge, and what it says passes a network.
@@ -8,9 +8,9 @@ meets the first point of the scan. In the robot's own frame it is the points tha
 each on a circle about the centre of the turn, so that where they meet the edges of the
 footprint is exact.
 
-All of it runs with every command, and all robots of the gate wait for it. So a scan has
-few beams when it comes here (see :mod:`webmap.gate.rules.folding`), and a point too far
-away to matter is passed over before anything is reckoned of it.
+All of it runs with every command, and all robots of the gate wait for it. So a scan is
+folded to few beams before (see :mod:`webmap.gate.rules.scan_geometry`), and points that
+are too far away to matter are left out first.
 """
 
 import math
@@ -20,10 +20,15 @@ import msgspec
 
 from webmap.base.geometry import Twist
 from webmap.gate.events import Sweep
-from webmap.gate.messages import AssistSpec, Point
-from webmap.gate.rules import folding
-from webmap.gate.rules.sweptway import Fan, looks_ahead
-from webmap.gate.rules.touching import time_straight, time_turning
+from webmap.gate.protocol import AssistSpec, Point
+from webmap.gate.rules import scan_geometry
+from webmap.gate.rules.aliases import Robots
+from webmap.gate.rules.scan_geometry import (
+    Fan,
+    looks_ahead,
+    time_straight,
+    time_turning,
+)
 
 FRESH = 0.3
 """The oldest scan that counts, in seconds since it arrived."""
@@ -207,7 +212,7 @@ def _blindness(
     if not (math.isfinite(sweep.angle_min) and math.isfinite(step) and step != 0.0):
         return "the scan has no angles"
     towards = _rays_towards(spec, sweep, wanted)
-    known, asked = folding.known(sweep, towards)
+    known, asked = scan_geometry.known(sweep, towards)
     if not asked:
         return "the scan does not cover the direction of motion"
     if known < KNOWN * asked:
@@ -255,3 +260,67 @@ def _blind(spec: AssistSpec, speed: float, reason: str) -> Verdict:
     if spec.blind == "stop":
         return Verdict(0.0, why)
     return FREE if speed <= spec.creep else Verdict(spec.creep / speed, why)
+
+
+MIXED = 2.0
+"""Seconds for which no scan of a topic counts after its frame was seen to change."""
+
+
+class Guard:
+    """Keeps the newest scans of one machine and slows it down before what they see.
+
+    Args:
+        robots: The robots that are the machine; each may have a scanner.
+
+    """
+
+    def __init__(self, robots: Robots) -> None:
+        self._robots = robots
+        self._sweeps: dict[str, Sweep] = {}
+        self._changed: dict[str, float] = {}
+        """When the frame of a topic's scans was last another than before."""
+        self._verdict = FREE
+
+    @property
+    def why(self) -> tuple[str, ...]:
+        """Why the last command was not let through as it was, in words."""
+        return () if self._verdict.why is None else (self._verdict.why,)
+
+    def saw(self, topic: str, sweep: Sweep) -> None:
+        """Note that a scan came; of a topic where two scanners speak none counts."""
+        before = self._sweeps.get(topic)
+        if before is not None and before.frame != sweep.frame:
+            self._changed[topic] = sweep.arrived
+        changed = self._changed.get(topic)
+        if changed is not None and sweep.arrived - changed < MIXED:
+            sweep = msgspec.structs.replace(
+                sweep, refused="the scans have two different frames"
+            )
+        self._sweeps[topic] = sweep
+
+    def forget(self) -> None:
+        """Know nothing of before: nobody listens to the scans any more."""
+        self._sweeps.clear()
+        self._changed.clear()
+        self._verdict = FREE
+
+    def limit(self, wanted: Twist, now: float) -> Twist:
+        """Return what every scanner's robot may do of a velocity."""
+        verdict = min(
+            (
+                assist(spec.assist, self._sweeps.get(spec.assist.topic), wanted, now)
+                for spec in self._robots.specs.values()
+                if spec.assist is not None
+            ),
+            key=_scale,
+            default=FREE,
+        )
+        self._verdict = verdict
+        if verdict.scale >= 1.0:
+            return wanted
+        s = verdict.scale
+        return Twist(*(s * part for part in wanted.numbers))
+
+
+def _scale(verdict: Verdict) -> float:
+    return verdict.scale

@@ -1,14 +1,12 @@
 """What the commands of a machine's driver come to. No I/O."""
 
 from webmap.base.geometry import Twist
-from webmap.gate.refusal import Refusal
-from webmap.gate.rules.arming import Arming
-from webmap.gate.rules.hands import Hands
-from webmap.gate.rules.lease import Lease
+from webmap.gate.commands import Refusal
+from webmap.gate.rules.aliases import Robots
+from webmap.gate.rules.authority import Arming, Hands
+from webmap.gate.rules.connections import Lease
 from webmap.gate.rules.motion import Motion
-from webmap.gate.rules.robots import Robots
-from webmap.gate.rules.stoptest import CREEP, StopTest
-from webmap.gate.rules.stoptesting import StopTesting
+from webmap.gate.rules.stop_test import CREEP, StopTest, StopTesting
 
 
 class Driving:

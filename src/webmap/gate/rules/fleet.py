@@ -9,7 +9,8 @@ import msgspec
 from webmap.base.errors import ConfigError
 from webmap.gate import events
 from webmap.gate.actions import Attach, CutLink, Emit, Lock, Say, Unlock
-from webmap.gate.messages import (
+from webmap.gate.commands import Refusal
+from webmap.gate.protocol import (
     Forget,
     RobotGone,
     RobotSpec,
@@ -17,13 +18,12 @@ from webmap.gate.messages import (
     SentPose,
     WriterNodes,
 )
-from webmap.gate.refusal import Refusal
-from webmap.gate.rules.base import Base
+from webmap.gate.rules.connections import Epochs
 from webmap.gate.rules.goals import Goals
 from webmap.gate.rules.health import Health, Pulse
-from webmap.gate.rules.latch import Latch
-from webmap.gate.rules.lease import Epochs
-from webmap.gate.rules.reporting import Reporter, report
+from webmap.gate.rules.machine import Base
+from webmap.gate.rules.report import Reporter, report
+from webmap.gate.rules.stop import Latch
 from webmap.gate.specs import check_twist_type, checked, key_of
 
 log = logging.getLogger("webmap.gate")

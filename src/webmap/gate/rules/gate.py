@@ -1,4 +1,7 @@
-"""The gate's decisions: events in, actions out. No I/O and no clock of its own.
+"""All decisions of the gate: events in, actions out. No I/O, and no clock of its own.
+
+The age is measured between two moments of one clock, this process's own; no clock of
+a browser or a robot has a part in it.
 
 The shell calls :meth:`Gate.handle` for whatever happens and :meth:`Gate.step` every
 10 ms, and does what they return, in that order. What came of a write it tells with a
@@ -9,20 +12,14 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from webmap.gate import events, messages
+from webmap.gate import events, protocol
 from webmap.gate.actions import Action, Say
-from webmap.gate.commands import Stop, op_of, parse
-from webmap.gate.malformed_stop import begins_like_stop, robot_in
-from webmap.gate.messages import PROGRAM
-from webmap.gate.refusal import Refusal
-from webmap.gate.rules.connection import Connection
+from webmap.gate.commands import Refusal, Stop, begins_like_stop, op_of, parse, robot_in
+from webmap.gate.protocol import PROGRAM
+from webmap.gate.rules.connections import Connection, Epochs, People, Ticks
 from webmap.gate.rules.fleet import Fleet
 from webmap.gate.rules.health import Pulse
-from webmap.gate.rules.lease import Epochs
-from webmap.gate.rules.orders import Orders
-from webmap.gate.rules.people import People
-from webmap.gate.rules.programorders import ProgramOrders
-from webmap.gate.rules.ticks import Ticks
+from webmap.gate.rules.orders import Orders, ProgramOrders
 
 log = logging.getLogger("webmap.gate")
 
@@ -54,15 +51,15 @@ class Gate:
         self._handlers: dict[type, Callable[[Any, float], None]] = {
             **self._fleet.handlers,
             **self._program.handlers,
-            messages.Connect: self._connect,
-            messages.Disconnect: self._disconnect,
-            messages.FromBrowser: self._from_browser,
-            messages.Speeds: self._speeds,
-            messages.Heartbeat: self._beat,
+            protocol.Connect: self._connect,
+            protocol.Disconnect: self._disconnect,
+            protocol.FromBrowser: self._from_browser,
+            protocol.Speeds: self._speeds,
+            protocol.Heartbeat: self._beat,
             events.Shutdown: self._shut_down,
         }
 
-    def handle(self, event: messages.ToGate | events.Event, now: float) -> list[Action]:
+    def handle(self, event: protocol.ToGate | events.Event, now: float) -> list[Action]:
         """Take in one event and return what is to be done, in order."""
         self._handlers[type(event)](event, now)
         return self._actions(now)
@@ -77,7 +74,7 @@ class Gate:
         self._people.count(now)
         tick = self._ticks.issue(now)
         if tick is not None:
-            self._out.append(Say(messages.Tick(tick, self._people.acks)))
+            self._out.append(Say(protocol.Tick(tick, self._people.acks)))
         return self._actions(now)
 
     @property
@@ -98,7 +95,7 @@ class Gate:
 
     # The display and its pages.
 
-    def _beat(self, message: messages.Heartbeat, now: float) -> None:
+    def _beat(self, message: protocol.Heartbeat, now: float) -> None:
         self._pulse.beat(now)
         if not self._display_there:
             self._display_there = True
@@ -116,18 +113,18 @@ class Gate:
             for goals in base.robots.goals.values():
                 goals.lost(now)
 
-    def _connect(self, message: messages.Connect, now: float) -> None:
+    def _connect(self, message: protocol.Connect, now: float) -> None:
         if message.connection != PROGRAM:
-            self._disconnect(messages.Disconnect(message.connection), now)
+            self._disconnect(protocol.Disconnect(message.connection), now)
             self._people.add(message)
 
-    def _disconnect(self, message: messages.Disconnect, now: float) -> None:
+    def _disconnect(self, message: protocol.Disconnect, now: float) -> None:
         if message.connection == PROGRAM or not self._people.remove(message.connection):
             return
         for base in self._fleet:
             base.lost(message.connection, now)
 
-    def _speeds(self, message: messages.Speeds, now: float) -> None:
+    def _speeds(self, message: protocol.Speeds, now: float) -> None:
         connection = self._people.find(message.connection)
         if connection is None:
             return
@@ -136,7 +133,7 @@ class Gate:
             if base.hands.is_held_by(connection.id):
                 base.hands.set_cap(connection.cap)
 
-    def _from_browser(self, message: messages.FromBrowser, now: float) -> None:
+    def _from_browser(self, message: protocol.FromBrowser, now: float) -> None:
         connection = self._people.find(message.connection)
         if connection is None or connection.program:
             return

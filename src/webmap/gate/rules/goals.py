@@ -4,9 +4,9 @@ import msgspec
 
 from webmap.base.identifiers import generate_id
 from webmap.gate.actions import CancelGoals, Emit, SendGoal, TellPose
+from webmap.gate.commands import Refusal
 from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, WroteGoal
-from webmap.gate.messages import GoalReport, RobotSpec, Way
-from webmap.gate.refusal import Refusal
+from webmap.gate.protocol import GoalReport, RobotSpec, Way
 from webmap.gate.rules.health import Health
 from webmap.gate.rules.motion import WAIT_LIMIT
 from webmap.ros.names import is_type

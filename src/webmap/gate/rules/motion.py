@@ -1,4 +1,4 @@
-"""What is written to one machine: commands as they come, then zeros, then silence.
+"""What is written to one machine: commands, then zeros, then silence. No I/O.
 
 The only thing that a timer writes here is zero.
 """
@@ -10,9 +10,150 @@ from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, MarkDriven, WriteTwist
 from webmap.gate.events import Key, Wrote
 from webmap.gate.limits import PLANE, Axes, Speed, fit, ramp
-from webmap.gate.rules.burst import HELD_LENGTH, HELD_PERIOD, NEW_LINK_LENGTH, Burst
+from webmap.gate.rules.connections import Lease
 from webmap.gate.rules.health import Health
-from webmap.gate.rules.lease import Lease
+
+PERIOD = 0.05
+"""Seconds between two zeros."""
+
+LENGTH = 0.5
+"""Seconds from the first zero to silence."""
+
+NEW_LINK_LENGTH = 3.0
+"""The same on a link that is new, where a zero is owed.
+
+A bridge that was only just started has yet to find the robot, and loses what it is told
+until then: up to 1.6 s were seen.
+"""
+
+
+HELD_PERIOD = 0.1
+"""Seconds between two zeros while STOP stands (S8)."""
+
+HELD_LENGTH = 600.0
+"""Seconds for which they go on.
+
+Longer than anybody needs to get to the robot, and not for ever: a STOP that was
+forgotten over night should not fill its topic, or a robot's battery, until Monday.
+They begin anew with another STOP and with every new link.
+"""
+
+
+class Burst:
+    """When the zeros that stop a machine are due.
+
+    Args:
+        period: Seconds between two zeros.
+        length: Seconds from the first zero to silence.
+
+    """
+
+    def __init__(self, period: float = PERIOD, length: float = LENGTH) -> None:
+        self._period = period
+        self._length = self._usual = length
+        self.running = False
+        self.started_at = float("-inf")
+        self._due = float("-inf")
+
+    def start(self, now: float, length: float | None = None) -> None:
+        """Begin, or begin again; the first zero is due at once.
+
+        Silence never comes earlier by that than it would have come without.
+
+        Args:
+            now: Seconds, monotonic.
+            length: Seconds from here to silence, in place of the usual ones.
+
+        """
+        length = self._usual if length is None else length
+        left = self.started_at + self._length - now if self.running else 0.0
+        self._length = max(length, left)
+        self.running = True
+        self.started_at = self._due = now
+
+    def end(self) -> None:
+        """Stop sending zeros."""
+        self.running = False
+
+    def zero_due(self, now: float) -> bool:
+        """Return whether a zero is to be written at ``now``, and count on it."""
+        if self.running and now >= self.started_at + self._length:
+            self.running = False
+        if not self.running or now < self._due:
+            return False
+        # Zeros that a sleeping process missed are not made up for.
+        self._due = max(self._due + self._period, now + self._period / 2)
+        return True
+
+
+DEADMAN = 0.2
+"""Seconds for which an accepted command holds (S1)."""
+
+NEUTRAL = 0.2
+"""Seconds of released inputs that must be seen before anything moves (S6)."""
+
+
+class DeadMan:
+    """Whether the holder of a lease may move the machine, and until when.
+
+    A new dead-man is disarmed. It arms when every input was seen released for
+    ``NEUTRAL`` seconds without a gap, and disarms on any doubt.
+
+    A command holds if it echoes a newer tick than the one before it did. So it is fed
+    by the whole loop: a hand that still sends but hears nothing feeds it no longer.
+
+    Args:
+        needs_neutral: A hand on a stick or a key may be held through an outage, so it
+            must be seen released. A program's call is an act of its own each time;
+            for it the lease ends on doubt instead.
+
+    """
+
+    def __init__(self, *, needs_neutral: bool = True) -> None:
+        self.armed = not needs_neutral
+        self._needs_neutral = needs_neutral
+        self._neutral_since: float | None = None
+        self._accepted_at: float | None = None
+        self._tick = -1
+
+    @property
+    def expires_at(self) -> float:
+        """When the newest accepted command ends; in the past if there is none."""
+        return (
+            float("-inf")
+            if self._accepted_at is None
+            else (self._accepted_at + DEADMAN)
+        )
+
+    def expired(self, now: float) -> bool:
+        """Return whether no accepted command holds at ``now``."""
+        return now >= self.expires_at
+
+    def accept(self, neutral: bool, tick: int, now: float) -> None:
+        """Count an accepted command.
+
+        Args:
+            neutral: Whether every input is released.
+            tick: The tick that it echoes.
+            now: The time.
+
+        """
+        if self.expired(now) and self._needs_neutral:
+            self.disarm()
+        if tick > self._tick:
+            self._tick, self._accepted_at = tick, now
+        if not neutral:
+            self._neutral_since = None
+        elif self._neutral_since is None:
+            self._neutral_since = now
+        elif now - self._neutral_since >= NEUTRAL:
+            self.armed = True
+
+    def disarm(self) -> None:
+        """Ask for released inputs before anything moves again."""
+        self.armed = not self._needs_neutral
+        self._neutral_since = None
+
 
 WRITE_INTERVAL = 0.02
 """The shortest time between two moving commands on the wire, in seconds."""

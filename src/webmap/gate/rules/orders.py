@@ -1,8 +1,13 @@
-"""What the commands of pages and of the program come to. No I/O."""
+"""Carries out the commands of pages and of the display's own program. No I/O."""
 
 import logging
+import math
+from collections.abc import Callable
+from typing import Any
 
 from webmap.base.geometry import Twist
+from webmap.gate import protocol
+from webmap.gate.actions import Emit, Say
 from webmap.gate.commands import (
     Ask,
     Command,
@@ -11,6 +16,7 @@ from webmap.gate.commands import (
     Goal,
     Grant,
     Locate,
+    Refusal,
     Release,
     Renew,
     Reset,
@@ -18,13 +24,18 @@ from webmap.gate.commands import (
     StopTest,
     Take,
 )
-from webmap.gate.refusal import Refusal
-from webmap.gate.rules.base import Base
-from webmap.gate.rules.connection import Connection
+from webmap.gate.protocol import PROGRAM
+from webmap.gate.rules.connections import (
+    Connection,
+    People,
+    Ticks,
+    check_lease,
+    check_role,
+    check_take,
+)
 from webmap.gate.rules.fleet import Fleet
-from webmap.gate.rules.latch import new_press
-from webmap.gate.rules.lease import check_lease, check_role, check_take
-from webmap.gate.rules.ticks import Ticks
+from webmap.gate.rules.machine import Base
+from webmap.gate.rules.stop import new_press
 
 log = logging.getLogger("webmap.gate")
 
@@ -201,3 +212,160 @@ class Orders:
         wanted = Twist(drive.x * speed.v, drive.y * speed.v, drive.turn * speed.w)
         if reason := base.driving.drive(wanted, drive.neutral, drive.tick, now):
             raise Refusal(reason)
+
+
+Vector = tuple[float, float, float]
+
+SETTLE = 1.5
+"""Seconds for which a program waits at most until a robot that it took would move."""
+
+
+class ProgramOrders:
+    """Takes what the program says.
+
+    Args:
+        fleet: The machines.
+        people: Everybody who may say something, the program among them.
+        orders: Does what is ordered.
+        emit: Takes the actions.
+
+    """
+
+    def __init__(
+        self, fleet: Fleet, people: People, orders: Orders, emit: Emit
+    ) -> None:
+        self._fleet = fleet
+        self._people = people
+        self._orders = orders
+        self._emit = emit
+        self._takes: list[tuple[protocol.ProgramTake, int, float]] = []
+        self.handlers: dict[type, Callable[[Any, float], None]] = {
+            protocol.Stop: self._stop,
+            protocol.Reset: self._reset,
+            protocol.ProgramTake: self._take,
+            protocol.ProgramRelease: self._release,
+            protocol.ProgramTwist: self._twist,
+            protocol.ProgramMove: self._move,
+            protocol.ProgramLocate: self._locate,
+            protocol.ProgramCancel: self._cancel,
+        }
+
+    def _stop(self, message: protocol.Stop, now: float) -> None:
+        program, robot = self._people.program, message.robot
+        self._people.attempt(
+            program.id,
+            robot,
+            "stop",
+            lambda: self._orders.stop(robot, program, now),
+            now,
+        )
+
+    def _reset(self, message: protocol.Reset, now: float) -> None:
+        program, robot = self._people.program, message.robot
+        self._people.attempt(
+            program.id,
+            robot,
+            "reset",
+            lambda: self._orders.reset(robot, message.stop, program, now),
+            now,
+        )
+
+    def _take(self, message: protocol.ProgramTake, now: float) -> None:
+        try:
+            epoch = self._orders.take(self._people.program, message.robot, now)
+        except Refusal as refusal:
+            self._reply(message, None, refusal.why)
+        else:
+            assert epoch is not None  # a program never waits for another to let go
+            self._takes.append((message, epoch, now + SETTLE))
+            self.answer_takes(now)
+
+    def answer_takes(self, now: float) -> None:
+        """Answer the program once its robot would move, not before.
+
+        A page waits for its hands to be seen; a program that drives at once would
+        lose its first words to a link that has not been asked yet whether it lives.
+        """
+        waiting, self._takes = self._takes, []
+        for take, epoch, until in waiting:
+            try:
+                base = self._fleet.find(take.robot)
+                check_lease(base.hands.lease, PROGRAM, epoch)
+            except Refusal as refusal:
+                self._reply(take, None, refusal.why)
+                continue
+            if now < until and base.robots.drivable and base.arming.doubt(now):
+                self._takes.append((take, epoch, until))
+            else:
+                self._reply(take, epoch, None)
+
+    def _reply(
+        self, take: protocol.ProgramTake, epoch: int | None, why: str | None
+    ) -> None:
+        self._emit(Say(protocol.TakeReply(take.request, take.robot, epoch, why)))
+
+    def _release(self, message: protocol.ProgramRelease, now: float) -> None:
+        program, robot = self._people.program, message.robot
+        self._people.attempt(
+            program.id,
+            robot,
+            "release",
+            lambda: self._orders.release(program, robot, now),
+            now,
+        )
+
+    def _twist(self, message: protocol.ProgramTwist, now: float) -> None:
+        program, robot = self._people.program, message.robot
+
+        def drive() -> None:
+            base, age = self._orders.checked(
+                program, robot, message.epoch, message.tick, now
+            )
+            base.speeds.ages.add(age, now)
+            twist = Twist(*message.velocity)
+            if not twist.is_finite:
+                raise Refusal(f"expected finite numbers, got {message.velocity}")
+            if reason := base.robots.axes.refusal(twist):
+                raise Refusal(reason)
+            if reason := base.driving.drive(twist, twist.is_zero, message.tick, now):
+                raise Refusal(reason)
+
+        self._people.attempt(program.id, robot, "drive", drive, now)
+
+    def _move(self, message: protocol.ProgramMove, now: float) -> None:
+        program, robot = self._people.program, message.robot
+
+        def move() -> None:
+            base, _ = self._orders.checked(
+                program, robot, message.epoch, message.tick, now
+            )
+            base.driving.goal(robot, _finite(message.pose), program.id, now)
+
+        self._people.attempt(program.id, robot, "goal", move, now)
+
+    def _locate(self, message: protocol.ProgramLocate, now: float) -> None:
+        program, robot = self._people.program, message.robot
+
+        def locate() -> None:
+            base, _ = self._orders.checked(
+                program, robot, message.epoch, message.tick, now
+            )
+            base.driving.locate(robot, _finite(message.pose), program.id, now)
+
+        self._people.attempt(program.id, robot, "locate", locate, now)
+
+    def _cancel(self, message: protocol.ProgramCancel, now: float) -> None:
+        program, robot = self._people.program, message.robot
+        self._people.attempt(
+            program.id,
+            robot,
+            "cancel",
+            lambda: self._orders.cancel(program, robot, now),
+            now,
+        )
+
+
+def _finite(numbers: Vector) -> Vector:
+    if not all(map(math.isfinite, numbers)):
+        raise Refusal(f"expected finite numbers, got {numbers}")
+    return numbers

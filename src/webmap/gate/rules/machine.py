@@ -20,24 +20,20 @@ from typing import Literal
 
 from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, Say
+from webmap.gate.commands import Refusal
 from webmap.gate.events import Key, LockState, Press, Wrote, WroteGoal
-from webmap.gate.messages import RobotSpec, SentTwist
-from webmap.gate.refusal import Refusal
-from webmap.gate.rules.arming import Arming
+from webmap.gate.protocol import RobotSpec, SentTwist
+from webmap.gate.rules.aliases import Robots
+from webmap.gate.rules.assist import Guard
+from webmap.gate.rules.authority import Arming, Hands
+from webmap.gate.rules.connections import Epochs
 from webmap.gate.rules.driving import Driving
-from webmap.gate.rules.guard import Guard
-from webmap.gate.rules.hands import Hands
-from webmap.gate.rules.health import Health, Pulse
-from webmap.gate.rules.latch import Latch
-from webmap.gate.rules.lease import Epochs
+from webmap.gate.rules.health import Health, Pulse, Sight
 from webmap.gate.rules.motion import Motion
-from webmap.gate.rules.obedience import Obedience
-from webmap.gate.rules.other_writer import GRACE, OtherWriter
-from webmap.gate.rules.robots import Robots
-from webmap.gate.rules.sight import Sight
+from webmap.gate.rules.obedience import EXPECTED_FOR, Obedience, OtherWriter
 from webmap.gate.rules.speeds import Speeds
-from webmap.gate.rules.standing import StandingStop
-from webmap.gate.rules.stoptesting import StopTesting
+from webmap.gate.rules.stop import Latch, StandingStop
+from webmap.gate.rules.stop_test import StopTesting
 
 OWED_PATIENCE = 60.0
 """Seconds for which a robot that was removed is kept for a zero that it is owed. After
@@ -251,7 +247,7 @@ class Base:
         self.tests.heard(twist, now)
         if self.arming.lock.elsewhere or self.robots.follow_goals:
             # Another gate on this computer drives it, or what follows its goal does.
-            self.other_writer.expect(now + GRACE)
+            self.other_writer.expect(now + EXPECTED_FOR)
         self.other_writer.heard(twist, now)
 
     def saw(self, measured: Twist | None, said_after: float, now: float) -> None:
@@ -283,7 +279,7 @@ class Base:
         if not self.control.up:
             return
         # What an earlier gate, or an earlier link, wrote may be heard still.
-        self.other_writer.expect(now + GRACE)
+        self.other_writer.expect(now + EXPECTED_FOR)
         if self.motion.owes_zero:
             self.obedience.expect(now)  # also of an earlier gate, whose word was motion
         self.motion.pay(now)

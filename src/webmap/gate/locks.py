@@ -10,8 +10,8 @@ import sys
 import time
 from pathlib import Path
 
+from webmap.gate.disk import path_of
 from webmap.gate.events import Key, LockState
-from webmap.gate.kept.records import path_of
 
 log = logging.getLogger("webmap.gate")
 

@@ -1,4 +1,7 @@
-"""What the gate says to a robot's ROS and what it understands of the answers. No I/O.
+"""The rosbridge messages that the gate writes and reads. No I/O.
+
+Python needs a tenth of a second for a mebibyte of empty lists, and what nests deeply
+exhausts its stack wherever it is gone through later.
 
 A type written ``package/msg/Name`` is of ROS 2, whose stamps have ``sec`` and
 ``nanosec``; else they have ``secs`` and ``nsecs``. Every stamp sent is zero: a robot
@@ -11,12 +14,56 @@ from typing import Any
 
 import msgspec
 
+from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Quaternion, Twist
+from webmap.base.nesting import MAX_DEPTH
 from webmap.gate.actions import SendGoal, TellPose
-from webmap.gate.lanes.reading import check_parts, plain, too_deep
-from webmap.gate.messages import RobotSpec
+from webmap.gate.protocol import RobotSpec
+from webmap.ros.decoding import check_depth
 from webmap.ros.names import is_type
 from webmap.ros.rosbridge import ops
+
+MOST_PARTS = 20_000
+"""Values in the longest message that is read. A dense scan in JSON has 7,200, anything
+that the gate asks for in JSON a few hundred."""
+
+
+def check_parts(data: bytes) -> None:
+    """Let a message pass if it does not hold too many values.
+
+    Raises:
+        ProtocolError: If it does.
+
+    """
+    # Each value but the first comes behind one of these; texts may hold some, too.
+    parts = sum(map(data.count, (b"[", b"{", b",")))
+    if parts > MOST_PARTS:
+        raise ProtocolError(
+            f"a message of about {parts} values was sent where at most {MOST_PARTS} "
+            "are read"
+        )
+
+
+def too_deep() -> ProtocolError:
+    """Return the error for a message that Python cannot go through."""
+    return ProtocolError(f"a message nested deeper than {MAX_DEPTH} levels")
+
+
+def plain(data: bytes) -> Any:
+    """Return the JSON in a message, with a bare NaN where bridges write one.
+
+    Raises:
+        ProtocolError: If it holds too many values or is nested too deeply.
+        ValueError: If it is no JSON.
+
+    """
+    check_parts(data)
+    try:
+        value = json.loads(data)
+    except RecursionError:
+        raise too_deep() from None
+    check_depth(value)
+    return value
 
 
 def velocity(topic: str, type: str, twist: Twist, frame: str = "") -> bytes:

@@ -1,4 +1,4 @@
-"""What the gate says to the display, and to its log, without ever waiting for them.
+"""The pipe between the display and the gate: its frames, and what waits in the gate.
 
 A display that does not read, or a terminal that was stopped with Ctrl-S, must not hold
 up the process that stops robots. So writing is a thread's work.
@@ -8,10 +8,76 @@ import contextlib
 import logging
 import os
 import queue
+import struct
 import threading
+from typing import Any
 
-from webmap.gate import framing
-from webmap.gate.messages import FromGate, RobotReport, SentTwist, Tick
+import msgspec
+
+from webmap.base.errors import WireError
+from webmap.gate.protocol import FromGate, RobotReport, SentTwist, Tick
+
+log = logging.getLogger("webmap.gate")
+
+MAX_FRAME = 1 << 20
+"""The longest message that either side takes, in bytes."""
+
+_length = struct.Struct("<I")
+_encode = msgspec.msgpack.Encoder().encode
+
+
+def pack(message: msgspec.Struct) -> bytes:
+    """Return ``message`` as it goes down the pipe."""
+    body = _encode(message)
+    return _length.pack(len(body)) + body
+
+
+class Unpacker:
+    """Cuts the bytes of a pipe into messages.
+
+    Args:
+        type: The union of message types that may come.
+
+    """
+
+    def __init__(self, type: Any) -> None:
+        self._decode = msgspec.msgpack.Decoder(type).decode
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> list[Any]:
+        """Return the messages that ``data`` completes, oldest first.
+
+        What is no message is logged and left out.
+
+        Raises:
+            WireError: If the bytes are no frames; the pipe is then of no more use.
+
+        """
+        buffer = self._buffer
+        buffer += data
+        messages: list[Any] = []
+        start = 0
+        while len(buffer) - start >= _length.size:
+            (length,) = _length.unpack_from(buffer, start)
+            if length > MAX_FRAME:
+                raise WireError(
+                    f"a message of {length} bytes on the gate's pipe "
+                    f"(at most {MAX_FRAME})"
+                )
+            end = start + _length.size + length
+            if len(buffer) < end:
+                break
+            self._read(bytes(buffer[start + _length.size : end]), messages)
+            start = end
+        del buffer[:start]
+        return messages
+
+    def _read(self, body: bytes, messages: list[Any]) -> None:
+        try:
+            messages.append(self._decode(body))
+        except (msgspec.DecodeError, RecursionError) as error:
+            log.error("not a message on the gate's pipe: %s", error)
+
 
 FULL = 1000
 """Messages waiting, from which on those are dropped that newer ones replace."""
@@ -43,7 +109,7 @@ class Outbox:
             return
         if waiting > FULL and isinstance(message, Tick | RobotReport | SentTwist):
             return
-        self._queue.put(framing.pack(message))
+        self._queue.put(pack(message))
 
     def close(self, timeout: float) -> None:
         """Write what is waiting, for ``timeout`` seconds at most."""

@@ -1,17 +1,163 @@
-"""In whose hands one machine is, and how it goes from one to another. No I/O."""
+"""Who has control of one machine, and how control changes. No I/O.
+
+::
+
+    asked ── granted, or 10 s without an answer, or the holder let go ──▶ changing
+      │                                                                     │
+      └─ denied, withdrawn, STOP ──▶ nobody                standstill ──────┴──▶ given
+
+While it changes hands nobody has it, and zero is all that is written.
+"""
 
 from collections.abc import Callable
 
+from webmap.base.geometry import Twist
+from webmap.gate.commands import Refusal
+from webmap.gate.events import Key, LockState
 from webmap.gate.limits import Cap, page_cap
-from webmap.gate.refusal import Refusal
-from webmap.gate.rules.arming import Arming
-from webmap.gate.rules.connection import Connection
-from webmap.gate.rules.deadman import DeadMan
-from webmap.gate.rules.handover import HandOver
-from webmap.gate.rules.lease import Epochs, Lease
-from webmap.gate.rules.motion import Motion
-from webmap.gate.rules.robots import Robots
+from webmap.gate.rules.aliases import Robots
+from webmap.gate.rules.connections import Connection, Epochs, Lease
+from webmap.gate.rules.health import Health, Pulse, Sight, Standstill, Video
+from webmap.gate.rules.motion import DeadMan, Motion
 from webmap.gate.rules.speeds import Speeds
+from webmap.gate.rules.stop import Latch
+
+
+class Arming:
+    """Everything outside of the driver's hands that stands against motion.
+
+    Args:
+        key: The machine.
+        robots: The robots that it is.
+        latch: Its STOP.
+        control: The link that velocity goes to.
+        pulse: Whether the display is there.
+        sight: What is heard of it.
+
+    """
+
+    def __init__(
+        self,
+        key: Key,
+        robots: Robots,
+        latch: Latch,
+        control: Health,
+        pulse: Pulse,
+        sight: Sight,
+    ) -> None:
+        self.lock = LockState(key, held=False)
+        """Whether this gate alone on this computer has it."""
+        self.video = Video()
+        self._url = key.url
+        self._robots = robots
+        self._latch = latch
+        self._control = control
+        self._pulse = pulse
+        self._sight = sight
+
+    @property
+    def stopped(self) -> bool:
+        """Whether STOP stands."""
+        return self._latch.on
+
+    def obstacle(self, now: float) -> str | None:
+        """Return why nobody can have the machine, in words."""
+        if self._latch.on:
+            return f"STOP by {self._latch.by} is active: reset it first"
+        if not self.lock.held:
+            return self.lock.why
+        if doubt := self._pulse.doubt(now):
+            return doubt
+        if self._robots.drivable:
+            return None if self._control.up else f"no connection to {self._url}"
+        goals = self._robots.goals[self._robots.newest.id]
+        if not goals.can_send:
+            return "the robot has no velocity topic and no goal topic"
+        return None if goals.link.up else "no connection to the bridge of its goals"
+
+    def doubt(self, now: float) -> str | None:
+        """Return why the machine must not be driven now, in words."""
+        if reason := self.obstacle(now):
+            return reason
+        if not self._robots.drivable:
+            return "the robot has no velocity topic"
+        if not self._control.fresh(now):
+            return f"no answer from {self._url}"
+        if self._robots.has_odometry and (blind := self._sight.doubt(now)):
+            return blind
+        return self.video.doubt(now)
+
+
+ASKING = 10.0
+"""Seconds after which a holder who does not answer has granted it."""
+
+WITHOUT_SIGHT = 1.0
+"""Seconds after zero that are taken for standstill where no odometry tells."""
+
+
+class HandOver:
+    """The way of one machine from one pair of hands to another."""
+
+    def __init__(self) -> None:
+        self.asker: Connection | None = None
+        self.heir: Connection | None = None
+        """Who gets it as soon as it stands."""
+        self._asked_at = float("-inf")
+        self.since = float("-inf")
+        """When zero was written to have it stand."""
+        self._still = Standstill()
+
+    @property
+    def going_on(self) -> bool:
+        """Whether time may make a difference."""
+        return self.asker is not None or self.heir is not None
+
+    def ask(self, who: Connection, now: float) -> None:
+        """Ask the holder; asked again, nothing changes.
+
+        Raises:
+            Refusal: If somebody else is asking.
+
+        """
+        if self.asker is None:
+            self.asker, self._asked_at = who, now
+        elif self.asker is not who:
+            raise Refusal(
+                f"{self.asker.name or self.asker.id} has already requested control"
+            )
+
+    def left(self, now: float) -> float:
+        """Return the seconds until it is granted by itself."""
+        return max(0.0, self._asked_at + ASKING - now)
+
+    def begin(self, heir: Connection, now: float) -> None:
+        """Wait for standstill, zero having been written at ``now``."""
+        self.asker, self.heir, self.since = None, heir, now
+        self._still.begin()
+
+    def saw(self, twist: Twist | None, now: float) -> None:
+        """Take in a message of odometry."""
+        self._still.saw(twist, now)
+
+    def stands(self, now: float) -> bool:
+        """Return whether it is standing, as far as anybody can tell."""
+        if self._still.reached:
+            return True
+        heard = max(self.since, self._still.heard_at)
+        return now - heard >= WITHOUT_SIGHT
+
+    def end(self) -> Connection | None:
+        """Have nobody get it; return who is disappointed by that."""
+        who = self.heir or self.asker
+        self.asker = self.heir = None
+        return who
+
+    def withdraw(self, connection: str) -> None:
+        """Forget that this connection wanted it."""
+        for who in (self.asker, self.heir):
+            if who is not None and who.id == connection:
+                self.end()
+
 
 UNUSED = 120.0
 """Seconds after which a person's lease expires that was neither used nor renewed. A

@@ -5,7 +5,7 @@ from typing import Literal
 import msgspec
 
 from webmap.base.geometry import Twist
-from webmap.gate.messages import (
+from webmap.gate.protocol import (
     AskerReport,
     Doing,
     Holder,
@@ -15,11 +15,10 @@ from webmap.gate.messages import (
     TestReport,
     Velocity,
 )
-from webmap.gate.rules.base import Base
-from webmap.gate.rules.health import Health
-from webmap.gate.rules.loopage import reaction
+from webmap.gate.rules.health import Health, moves
+from webmap.gate.rules.machine import Base
 from webmap.gate.rules.obedience import MOVES, TURNS
-from webmap.gate.rules.standstill import moves
+from webmap.gate.rules.speeds import reaction
 
 INTERVAL = 0.1
 """The shortest time between two reports that differ only in numbers that flow."""

@@ -1,0 +1,337 @@
+"""Who may send commands: connections, their roles, leases and refusals. No I/O."""
+
+import logging
+import secrets
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from webmap.gate.actions import Emit, Say
+from webmap.gate.commands import Refusal
+from webmap.gate.limits import page_cap
+from webmap.gate.protocol import (
+    PROGRAM,
+    CloseConnection,
+    Connect,
+    Hello,
+    Refused,
+    RefusedCount,
+    Role,
+)
+
+PERIOD = 0.05
+"""Seconds between two ticks."""
+
+MAX_AGE = 0.3
+"""The oldest tick that a command may echo, in seconds (S2)."""
+
+_REMEMBERED = 64
+
+
+class Ticks:
+    """Issues ticks and knows how old each of the newest ones is.
+
+    Args:
+        first: The first number. A random one, unless said, so that the ticks of
+            another session of the gate are unknown here.
+
+    """
+
+    def __init__(self, first: int | None = None) -> None:
+        self.newest = (secrets.randbits(32) if first is None else first) - 1
+        self._issued: deque[float] = deque(maxlen=_REMEMBERED)
+        self._due = float("-inf")
+
+    def issue(self, now: float) -> int | None:
+        """Return a new tick if one is due at ``now``."""
+        if now < self._due:
+            return None
+        # Late by more than one period means that the process stood still; there is
+        # nothing to catch up on.
+        self._due = self._due + PERIOD if now < self._due + PERIOD else now + PERIOD
+        self.newest += 1
+        self._issued.append(now)
+        return self.newest
+
+    def age(self, tick: int, now: float) -> float | None:
+        """Return the seconds since ``tick`` was issued; ``None`` if it is unknown."""
+        back = self.newest - tick
+        if not 0 <= back < len(self._issued):
+            return None
+        return now - self._issued[-1 - back]
+
+    def check(self, tick: int, now: float) -> float:
+        """Let a command pass that echoes a tick which is young enough.
+
+        Returns:
+            The tick's age in seconds.
+
+        Raises:
+            Refusal: If the tick is too old or was never issued here.
+
+        """
+        age = self.age(tick, now)
+        if age is None:
+            raise Refusal("unknown tick: too old, or from another session")
+        if age > MAX_AGE:
+            raise Refusal(f"command too old (over {MAX_AGE * 1000:.0f} ms): ignored")
+        return age
+
+
+@dataclass(frozen=True, slots=True)
+class Lease:
+    """The right of one connection to move one machine."""
+
+    connection: str
+    name: str
+    """Who that is, for people."""
+    epoch: int
+    program: bool = False
+    """Whether a program holds it; any operator may take it from one."""
+
+
+class Epochs:
+    """Numbers for leases, each larger than the one before.
+
+    They start at a random number, so that a command of an earlier session of the
+    gate cannot meet a lease of this one.
+    """
+
+    def __init__(self, first: int | None = None) -> None:
+        self._next = secrets.randbits(31) if first is None else first
+
+    def next(self) -> int:
+        """Return the next number."""
+        self._next += 1
+        return self._next
+
+
+def check_take(
+    lease: Lease | None, role: Literal["viewer", "operator", "admin"], program: bool
+) -> None:
+    """Let somebody who holds no lease on a machine take it, or not.
+
+    Args:
+        lease: The lease that there is now, of another connection.
+        role: The role of the one who asks.
+        program: Whether a program asks.
+
+    Raises:
+        Refusal: If the machine is not to be had.
+
+    """
+    check_role(role)
+    if lease is None or (lease.program and not program):
+        return
+    raise Refusal(f"{lease.name or lease.connection} has control")
+
+
+def check_lease(lease: Lease | None, connection: str, epoch: int) -> None:
+    """Let the holder of the lease pass, under the lease's own epoch.
+
+    Raises:
+        Refusal: If somebody else holds it, or nobody, or the epoch is another.
+
+    """
+    if lease is None:
+        raise Refusal("nobody has control: take control first")
+    if lease.connection != connection:
+        raise Refusal(f"{lease.name or lease.connection} has control")
+    if lease.epoch != epoch:
+        raise Refusal(
+            f"got epoch {epoch}, expected {lease.epoch}, the epoch of the lease"
+        )
+
+
+def check_role(role: Literal["viewer", "operator", "admin"]) -> None:
+    """Let operators and administrators pass.
+
+    Raises:
+        Refusal: If ``role`` is that of a viewer.
+
+    """
+    if role == "viewer":
+        raise Refusal("viewers can only look and press STOP; driving needs an operator")
+
+
+GARBAGE_LIMIT = 20
+"""Senseless messages in a second at which a connection is closed (S10)."""
+
+FLOOD_LIMIT = 400
+"""Messages in a second at which a connection is closed.
+
+A page that was cut off for some seconds may rightly deliver a few hundred at once.
+"""
+
+COUNT_EVERY = 1.0
+"""Seconds between two counts of what was refused."""
+
+QUIET = 1.0
+"""Seconds for which the same refusal is not said again."""
+
+
+class Rate:
+    """Counts what happened within the last second.
+
+    Args:
+        limit: How often is too often.
+
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._times: deque[float] = deque(maxlen=limit)
+
+    def too_often(self, now: float) -> bool:
+        """Count one more at ``now``; return whether the limit is reached."""
+        times = self._times
+        times.append(now)
+        return len(times) == times.maxlen and now - times[0] < 1.0
+
+
+class Connection:
+    """What one connection may do and how far its words were taken.
+
+    Args:
+        id: The display's name for it.
+        name: Who that is, for people.
+        role: What they may do.
+
+    """
+
+    def __init__(self, id: str, name: str, role: Role) -> None:
+        self.id = id
+        self.name = name
+        self.role = role
+        self.acked = -1
+        """The newest accepted ``seq``."""
+        self.cap = page_cap()
+        self.garbage = Rate(GARBAGE_LIMIT)
+        self.messages = Rate(FLOOD_LIMIT)
+        self.closing = False
+        self.flagged = False
+        """Whether it was logged that this page asks for more than full speed."""
+        self._refused = 0
+        self._last_refused = ""
+        self._counted_at = float("-inf")
+        self._told: dict[tuple[str | None, str, str], float] = {}
+
+    @property
+    def program(self) -> bool:
+        """Whether this is the display's own Python code."""
+        return self.id == PROGRAM
+
+    def set_speeds(self, v: float, w: float) -> None:
+        """Take over what the page's ``Teleop`` asks for; nonsense means standstill."""
+        self.cap = page_cap(v, w)
+
+    def note_refused(self, what: str, why: str) -> None:
+        """Count a message that was refused."""
+        self._refused += 1
+        self._last_refused = f"{what}: {why}"
+
+    def count_refused(self, now: float) -> RefusedCount | None:
+        """Return what was refused since the last count, if there is something to say.
+
+        Args:
+            now: Seconds, monotonic; infinity for the last count of all.
+
+        """
+        if not self._refused or now - self._counted_at < COUNT_EVERY:
+            return None
+        count = RefusedCount(self.name, self._refused, self._last_refused)
+        self._refused, self._counted_at = 0, now
+        return count
+
+    def news(self, robot: str | None, what: str, why: str, now: float) -> bool:
+        """Return whether a refusal is worth saying, or was said just now."""
+        told = {key: at for key, at in self._told.items() if now - at < QUIET}
+        self._told = told
+        key = (robot, what, why)
+        if key in told:
+            return False
+        told[key] = now
+        return True
+
+
+log = logging.getLogger("webmap.gate")
+
+
+class People:
+    """The connections that there are, and what they are told.
+
+    Args:
+        emit: Takes the actions.
+
+    """
+
+    def __init__(self, emit: Emit) -> None:
+        self.program = Connection(PROGRAM, PROGRAM, "operator")
+        self._emit = emit
+        self._all = {PROGRAM: self.program}
+
+    @property
+    def acks(self) -> dict[str, int]:
+        """The newest accepted ``seq`` of each connection."""
+        return {connection.id: connection.acked for connection in self._all.values()}
+
+    def find(self, id: str) -> Connection | None:
+        """Return the connection of that name, if there is one."""
+        return self._all.get(id)
+
+    def add(self, message: Connect) -> None:
+        """Take in a page."""
+        self._all[message.connection] = Connection(
+            message.connection, message.name, message.role
+        )
+        self._emit(Say(Hello(message.connection)))
+
+    def remove(self, id: str) -> bool:
+        """Forget a page; return whether there was one."""
+        connection = self._all.pop(id, None)
+        if connection is None:
+            return False
+        self._count(connection, float("inf"))
+        return True
+
+    def count(self, now: float) -> None:
+        """Tell the display how much was refused; now and then is enough."""
+        for connection in self._all.values():
+            self._count(connection, now)
+
+    def _count(self, connection: Connection, now: float) -> None:
+        count = connection.count_refused(now)
+        if count is not None:
+            self._emit(Say(count))
+
+    def refuse(
+        self, id: str, robot: str | None, what: str, why: str, now: float
+    ) -> None:
+        """Tell somebody that a command was not taken; not twice in a second."""
+        connection = self._all.get(id)
+        if connection is None:
+            return
+        connection.note_refused(what, why)
+        if connection.news(robot, what, why, now):
+            self._emit(Say(Refused(id, robot, what, why)))
+
+    def attempt(
+        self,
+        id: str,
+        robot: str | None,
+        what: str,
+        act: Callable[[], object],
+        now: float,
+    ) -> None:
+        """Do what somebody commands; they are told if it is refused."""
+        try:
+            act()
+        except Refusal as refusal:
+            self.refuse(id, robot, what, refusal.why, now)
+
+    def close(self, connection: Connection, why: str) -> None:
+        """Ask the display to close the page's socket."""
+        if not connection.closing:
+            connection.closing = True
+            log.warning("connection %s is to be closed: %s", connection.id, why)
+            self._emit(Say(CloseConnection(connection.id, why)))

@@ -1,0 +1,277 @@
+"""The geometry of scan assist: scans, footprints and paths. No I/O.
+
+The gate judges a scan with every command, and all its robots wait for that. So a dense
+scan is folded once, when it comes. A beam of the fold stands for the beams up to its
+neighbours on either side: it says the least of what they hit. So each hit of the scan
+lies on a beam of the fold, or between two that say at least as near: a hit can move
+aside, at a range r by less than r times the fold's step, but only to both sides at
+once, and never out of the way of a robot that is wider than that. What is free beside
+a hit looks narrower by as much: with 720 beams or more all around, less than a degree.
+
+What a scanner sees of its own robot is left out only when the scan is judged. Behind
+such a hit may lie others, of the same beam of the fold: the nearest of the next three
+things, each two centimetres or more behind the one before it, are kept too.
+
+A scanner that looks forward through a slit says nothing of what stands beside the
+slit. So the places that the footprint is about to come to are asked for one by one:
+does any ray look there? What is within the stop distance of the robot's front is left
+out: it was farther ahead a moment ago, and most scanners cannot see their own bumper.
+
+All is in the robot's own frame, where the robot stands and the points move.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+
+import msgspec
+
+from webmap.base.geometry import Twist
+from webmap.gate.events import Fold, Sweep
+from webmap.gate.protocol import Point
+
+MOST = 720
+"""The most beams of a scan that is judged."""
+
+LIMIT = 100_000
+"""The most beams of a scan that is looked at."""
+
+DEPTH = 0.02
+"""How far behind the nearest hit another is another thing, in metres."""
+
+_THINGS = 4
+_MOST_TURNS = 2.0
+
+
+def folded(sweep: Sweep) -> Sweep:
+    """Return a scan of at most 720 beams that says nothing farther than this one.
+
+    One of more than 100,000 beams, or a dense one that goes round more than twice, is
+    returned without ranges and with the reason in ``refused``.
+    """
+    count = len(sweep.ranges)
+    if count <= MOST:
+        return sweep
+    if reason := _refusal(count, sweep.angle_increment):
+        return _without(sweep, reason)
+    each = math.ceil((count - 1) / (MOST - 1))
+    return _folded(sweep, each)
+
+
+def too_long(count: int) -> str | None:
+    """Return in words why a scan of so many beams is not looked at."""
+    if count <= LIMIT:
+        return None
+    return f"the scan has {count} beams, more than {LIMIT}"
+
+
+def _refusal(count: int, step: float) -> str | None:
+    if abs(step) * count > _MOST_TURNS * math.tau:
+        return f"the {count} beams of the scan cover more than two turns"
+    return too_long(count)
+
+
+def _without(sweep: Sweep, reason: str) -> Sweep:
+    return msgspec.structs.replace(sweep, ranges=(), refused=reason)
+
+
+def _folded(sweep: Sweep, each: int) -> Sweep:
+    ranges, near = sweep.ranges, sweep.range_min
+    first, behind, said, asked = [], [], [], []
+    before: list[float] = []
+    for start in range(0, len(ranges) + each - 1, each):
+        group = ranges[start : start + each]
+        known = _saying(group, near)
+        hits = _hits(group, near)
+        nearest, *others = _things([*before, *hits]) or (math.inf,)
+        unknown = nearest == math.inf and 2 * known < len(group)
+        first.append(math.nan if unknown else nearest)
+        behind.append(others)
+        said.append(known)
+        asked.append(len(group))
+        # The beam that stands where the fold's does is no neighbour of the next one.
+        before = hits[1:] if _hits(group[:1], near) else hits
+    return msgspec.structs.replace(
+        sweep,
+        angle_increment=sweep.angle_increment * each,
+        ranges=first,
+        fold=Fold(each, len(ranges), behind, said, asked),
+    )
+
+
+def _hits(group: Sequence[float], near: float) -> list[float]:
+    """Return what beams hit; ``-inf``, too near to measure, is a hit."""
+    return [r for r in group if near <= r < math.inf or r == -math.inf]
+
+
+def _saying(group: Sequence[float], near: float) -> int:
+    """Return how many beams say anything."""
+    return sum([_says_something(r, near) for r in group])
+
+
+def known(sweep: Sweep, rays: Sequence[int]) -> tuple[int, int]:
+    """Return how many of these rays say anything, and of how many.
+
+    Of a fold it is the rays that were folded that are counted.
+    """
+    if (fold := sweep.fold) is not None:
+        return sum(fold.said[ray] for ray in rays), sum(fold.asked[ray] for ray in rays)
+    return _saying([sweep.ranges[ray] for ray in rays], sweep.range_min), len(rays)
+
+
+def _says_something(reach: float, near: float) -> bool:
+    """Return whether a beam says anything, be it that nothing is there."""
+    # Below the least range lies what a covered scanner says; -inf is a driver's word.
+    return math.isinf(reach) or reach >= max(near, 1e-6)
+
+
+def _things(hits: list[float]) -> list[float]:
+    """Return the nearest hits of the nearest few things, nearest first."""
+    found: list[float] = []
+    while hits and len(found) < _THINGS:
+        nearest = min(hits)
+        found.append(nearest)
+        hits = [hit for hit in hits if hit > nearest + DEPTH]
+    return found
+
+
+_STEP = 0.1
+"""Metres, or radians of a turn, between two places on the way that are asked for."""
+
+_MOST_STEPS = 40
+_STRAIGHT = 1e-6
+
+
+class Fan:
+    """The directions that a scan has rays in.
+
+    Args:
+        first: The angle of the first ray, in radians.
+        step: From one ray to the next, which may be negative.
+        count: How many there are.
+
+    """
+
+    def __init__(self, first: float, step: float, count: int) -> None:
+        self._width = abs(step) * (count - 1)
+        self._low = first if step > 0 else first - self._width
+        self._slack = abs(step)
+
+    @property
+    def share(self) -> float:
+        """How much of the full circle it covers, from 0 to 1."""
+        return min(1.0, (self._width + self._slack) / math.tau)
+
+    def covers(self, bearing: float) -> bool:
+        """Return whether a ray looks there, or two on either side of it."""
+        beyond = (bearing - self._low + self._slack) % math.tau
+        return beyond <= self._width + 2 * self._slack
+
+
+def looks_ahead(
+    fan: Fan,
+    footprint: Sequence[Point],
+    sensor: tuple[float, float, float],
+    twist: Twist,
+    seconds: float,
+    margin: float,
+) -> bool:
+    """Return whether the fan covers every place where the robot is about to go.
+
+    Args:
+        fan: What the scanner looks at, from its own x.
+        footprint: The robot's corners in its own frame, in metres.
+        sensor: Where the scanner is: x, y in metres, yaw in radians.
+        twist: How the robot goes on; not on the spot.
+        seconds: For how long it is asked.
+        margin: Metres before the robot's front that need not be seen.
+
+    """
+    x0, y0, yaw = sensor
+    return all(
+        fan.covers(math.atan2(y - y0, x - x0) - yaw)
+        for x, y in _way(footprint, twist, seconds, margin)
+    )
+
+
+def _way(
+    footprint: Sequence[Point], twist: Twist, seconds: float, margin: float
+) -> Iterator[Point]:
+    """Go through the places ahead that the outline comes to."""
+    speed = math.hypot(twist.vx, twist.vy)
+    ahead = (twist.vx / speed, twist.vy / speed)
+    front = max(x * ahead[0] + y * ahead[1] for x, y in footprint) + margin
+    outline = list(_outline(footprint))
+    length = max(speed, abs(twist.wz)) * seconds
+    steps = min(_MOST_STEPS, max(1, math.ceil(length / _STEP)))
+    for step in range(1, steps + 1):
+        moved = _moved(outline, twist, seconds * step / steps)
+        for x, y in moved:
+            if x * ahead[0] + y * ahead[1] >= front:
+                yield x, y
+
+
+def _outline(footprint: Sequence[Point]) -> Iterator[Point]:
+    """Go through the corners, and the middles between them."""
+    for (ax, ay), (bx, by) in zip(
+        footprint, (*footprint[1:], footprint[0]), strict=True
+    ):
+        yield ax, ay
+        yield (ax + bx) / 2, (ay + by) / 2
+
+
+def _moved(points: Sequence[Point], twist: Twist, seconds: float) -> Iterator[Point]:
+    """Go through where points of the robot are after some time."""
+    turned = twist.wz * seconds
+    if abs(turned) < _STRAIGHT:
+        dx, dy = twist.vx * seconds, twist.vy * seconds
+    else:
+        s, c = math.sin(turned) / twist.wz, (1.0 - math.cos(turned)) / twist.wz
+        dx, dy = twist.vx * s - twist.vy * c, twist.vx * c + twist.vy * s
+    sin, cos = math.sin(turned), math.cos(turned)
+    for x, y in points:
+        yield dx + cos * x - sin * y, dy + sin * x + cos * y
+
+
+_TOUCHING = 1e-9
+
+
+def time_straight(point: Point, edge: tuple[Point, Point], twist: Twist) -> float:
+    """Return when a point that comes by ``-twist`` crosses an edge."""
+    (ax, ay), (bx, by) = edge
+    dx, dy = -twist.vx, -twist.vy
+    ex, ey = bx - ax, by - ay
+    across = dx * ey - dy * ex
+    if across == 0.0:
+        return math.inf
+    px, py = ax - point[0], ay - point[1]
+    time = (px * ey - py * ex) / across
+    along = (px * dy - py * dx) / across
+    return time if time >= 0 and 0 <= along <= 1 else math.inf
+
+
+def time_turning(
+    point: Point, edge: tuple[Point, Point], center: Point, turn: float
+) -> float:
+    """Return when a point that goes round ``center`` at ``-turn`` crosses an edge."""
+    cx, cy = center
+    (ax, ay), (bx, by) = edge
+    px, py = point[0] - cx, point[1] - cy
+    ax, ay, bx, by = ax - cx, ay - cy, bx - cx, by - cy
+    ex, ey = bx - ax, by - ay
+    length = ex * ex + ey * ey
+    middle = ax * ex + ay * ey
+    apart = ax * ax + ay * ay - (px * px + py * py)
+    root = middle * middle - length * apart
+    if length == 0.0 or root < 0:
+        return math.inf
+    start = math.atan2(py, px)
+    best = math.inf
+    for sign in (-1.0, 1.0):
+        along = (-middle + sign * math.sqrt(root)) / length
+        if 0 <= along <= 1:
+            at = math.atan2(ay + along * ey, ax + along * ex)
+            angle = (start - at if turn > 0 else at - start) % math.tau
+            if math.tau - angle < _TOUCHING:
+                angle = 0.0
+            best = min(best, angle / abs(turn))
+    return best
