@@ -1,4 +1,4 @@
-"""Child processes: what they import, and what ends them."""
+"""GateProcess processes: what they import, and what ends them."""
 
 import ast
 import asyncio
@@ -14,7 +14,7 @@ from bag_making import ODOMETRY, Made
 from webmap.base.children import python_command
 from webmap.cli.demo import simulator
 from webmap.cli.play import replay
-from webmap.gate.display.supervisor import Child
+from webmap.gate.display.supervisor import GateProcess
 from webmap.gate.protocol import Ready
 from webmap.ros.offload import Offload
 from webmap.ros.rosbridge.events import Publish
@@ -75,7 +75,9 @@ def test_the_decoder_imports_nothing_from_the_working_folder(hostile):
 
 def test_the_gate_imports_nothing_from_the_working_folder(hostile):
     heard = []
-    child = Child(lambda child, message: heard.append(message), lambda child: None)
+    child = GateProcess(
+        lambda child, message: heard.append(message), lambda child: None
+    )
     child.start()
     child.stop(15.0)
     assert isinstance(heard[0], Ready)

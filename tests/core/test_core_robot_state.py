@@ -9,7 +9,7 @@ import pytest
 from webmap.base.geometry import Twist
 from webmap.console.words import LOOKS
 from webmap.core.robot_state import WORDS, Facts, state_of
-from webmap.gate.protocol import Doing
+from webmap.gate.protocol import Activity
 
 MOVES = (0.4, 0.0, 0.0)
 ANN = SimpleNamespace(connection="c2", name="Ann")
@@ -33,7 +33,7 @@ def robot(doing="free", *, seen=None, age=0.1, silent=0.1, over=None, **changes)
 
 
 def test_every_state_of_the_gate_has_words_and_a_look():
-    for doing in get_args(Doing):
+    for doing in get_args(Activity):
         found = state_of(robot(doing, holder=ANN))
         assert found.name == doing
         assert "{" not in found.text + found.mine

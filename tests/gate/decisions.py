@@ -31,6 +31,8 @@ from webmap.gate.rules.gate import Gate
 FILE = Path(__file__).with_name("decisions.json")
 FOLDER = os.environ.get("WEBMAP_DECISIONS", "")
 
+REPORT = "SendToDisplay(message=RobotReport"
+
 LENGTH = 12
 """Hexadecimal digits of a digest."""
 
@@ -114,7 +116,7 @@ def text_of(actions: Any) -> str:
         return ""
     texts = []
     for is_report, found in itertools.groupby(
-        map(repr, actions), lambda text: text.startswith("Say(message=RobotReport")
+        map(repr, actions), lambda text: text.startswith(REPORT)
     ):
         group = list(found)
         texts += sorted(group) if is_report else group

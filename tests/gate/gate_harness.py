@@ -92,7 +92,7 @@ class Bench:
             if self.beating:
                 self.tell(protocol.Heartbeat())
             if self.answering and self.up:
-                self.tell(events.Alive(URL, self.now - self.rtt))
+                self.tell(events.PingAnswered(URL, self.now - self.rtt))
             if each is not None and n % round(0.05 / step) == 0:
                 each()
             self._do(self.gate.step(self.now))
@@ -103,7 +103,7 @@ class Bench:
         for action in todo:
             self.done.append(action)
             match action:
-                case actions.Say(message):
+                case actions.SendToDisplay(message):
                     self.said.append(message)
                     if isinstance(message, protocol.Tick):
                         self.tick = message.tick
@@ -119,7 +119,7 @@ class Bench:
                             self.tests.get(key),
                         )
                     )
-                case actions.KeepLatch() | actions.KeepStopTest():
+                case actions.SaveStop() | actions.SaveStopTest():
                     # In a thread: never answered within an action.
                     if not self.slow_disk:
                         self.to_keep.append(action)
@@ -135,21 +135,21 @@ class Bench:
                     write = Written(self.now, key, twist, epoch, by)
                     log.append(write)
                     self.attempts.append(write)
-                    self.tell(events.Wrote(key, twist, epoch, by, out))
+                    self.tell(events.TwistWritten(key, twist, epoch, by, out))
                 case actions.SendGoal(_, robot, id, x, y, yaw, by, _, until):
                     self.now += self.held_up
                     out = self.clear and self.now <= until
-                    self.tell(events.WroteGoal(robot, id, x, y, yaw, by, out))
+                    self.tell(events.GoalWritten(robot, id, x, y, yaw, by, out))
                 case actions.CutLink(url):
                     self.up = False
                     self.tell(events.LinkDown(url, "control"))
 
     def keep(self, latch):
         """Have the disk do as it is told, and say so."""
-        if isinstance(latch, actions.KeepStopTest):
+        if isinstance(latch, actions.SaveStopTest):
             record = events.StopRecord(latch.seconds, "2026-11-21")
             self.tests[latch.key] = record
-            self.tell(events.StopTestKept(latch.key, record))
+            self.tell(events.StopTestSaved(latch.key, record))
             return
         error = "the disk is full" if self.full_disk else None
         if not self.full_disk and latch.press is not None:
@@ -158,7 +158,7 @@ class Bench:
             ours = self.disk[latch.key].id in latch.ids
             if ours:
                 del self.disk[latch.key]
-        self.tell(events.LatchKept(latch.key, latch.number, error))
+        self.tell(events.StopSaved(latch.key, latch.number, error))
 
     # What happens outside.
 
@@ -187,7 +187,7 @@ class Bench:
     def say(self, who, **command):
         if command["op"] == "reset":
             command.setdefault("stop", self.stop_of(command["robot"]))
-        self.tell(protocol.FromBrowser(who, json.dumps(command).encode()))
+        self.tell(protocol.FromPage(who, json.dumps(command).encode()))
 
     def take(self, who="a", robot="r1"):
         """Take the robot and return the epoch, if it was given."""

@@ -10,7 +10,7 @@ class Page:
     """Speaks the pages' side of ``/drive`` at 20 Hz, as long as it is told to."""
 
     def __init__(self, client, name="Ann", role="operator"):
-        self.heard = []
+        self.on_echo = []
         self.closed = []
         self.robots = {}
         self.tick = self.ack = None
@@ -29,9 +29,9 @@ class Page:
                 self.tick, self.ack = message["tick"], message["ack"]
             case "robot":
                 self.robots[message["robot"]] = message
-                self.heard.append(message)
+                self.on_echo.append(message)
             case _:
-                self.heard.append(message)
+                self.on_echo.append(message)
 
     def say(self, **command):
         if command["op"] == "reset" and "stop" not in command:
@@ -72,7 +72,7 @@ class Page:
                 self.drive(self.x)
 
     def of(self, op):
-        return [message for message in self.heard if message["op"] == op]
+        return [message for message in self.on_echo if message["op"] == op]
 
     def robot(self, robot="r1"):
         return self.robots.get(robot, {})

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from bridge_notes import Noting, Told
 
 from webmap.gate.lanes.lane import Lane
-from webmap.gate.lanes.sockets import Ears
+from webmap.gate.lanes.sockets import SocketHandlers
 from webmap.testing.witness import WitnessBridge
 
 TIMEOUT = 30.0
@@ -154,7 +154,7 @@ TEXT, MORE, CLOSE, PING, PONG = 1, 0, 8, 9, 10
 
 
 @dataclass
-class Heard:
+class Received:
     """Notes what comes on a socket."""
 
     texts: list[bytes] = field(default_factory=list)
@@ -163,7 +163,7 @@ class Heard:
 
     @property
     def ears(self):
-        return Ears(self.texts.append, self.pongs.append, self.lost.append)
+        return SocketHandlers(self.texts.append, self.pongs.append, self.lost.append)
 
 
 @contextlib.contextmanager

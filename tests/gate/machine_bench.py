@@ -37,7 +37,9 @@ class PacedBench(Bench):
                     self.tell(protocol.Heartbeat())
                 if self.answering and self.up:
                     self.tell(
-                        events.Alive(next(iter(self.gate._fleet._bases)).url, self.now)
+                        events.PingAnswered(
+                            next(iter(self.gate._machines._bases)).url, self.now
+                        )
                     )
             if each is not None and self.now >= self.each_at + BEAT - 1e-6:
                 self.each_at = self.now

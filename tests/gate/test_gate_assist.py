@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
-from webmap.gate.events import Sweep
+from webmap.gate.events import Scan
 from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import assist, free_way, inside, points_of, polygon_around
 
@@ -22,7 +22,7 @@ def sweep_of(distance_at, arrived=0.0, **more):
     step = math.tau / BEAMS
     ranges = [distance_at(-math.pi + ray * step) for ray in range(BEAMS)]
     about = {"angle_min": -math.pi, "angle_increment": step}
-    return Sweep(**about, range_min=0.05, range_max=8.0, ranges=ranges, arrived=arrived)
+    return Scan(**about, range_min=0.05, range_max=8.0, ranges=ranges, arrived=arrived)
 
 
 def wall(distance, facing=0.0):
@@ -127,10 +127,10 @@ def test_too_near_to_measure_is_an_obstacle():
         (sweep_of(lambda b: math.nan), "unknown"),
         (sweep_of(lambda b: 0.0), "unknown"),
         (sweep_of(lambda b: math.nan if abs(b) < 0.6 else math.inf), "unknown"),
-        (Sweep(math.nan, 0.1, 0.1, 8.0, [1.0] * 10, 0.0), "no angles"),
-        (Sweep(0.0, 0.0, 0.1, 8.0, [math.inf] * 10, 0.0), "no angles"),
-        (Sweep(0.0, 0.1, 0.1, 8.0, [], 0.0), "does not cover the direction"),
-        (Sweep(2.0, 0.01, 0.1, 8.0, [1.0] * 10, 0.0), "does not cover the direction"),
+        (Scan(math.nan, 0.1, 0.1, 8.0, [1.0] * 10, 0.0), "no angles"),
+        (Scan(0.0, 0.0, 0.1, 8.0, [math.inf] * 10, 0.0), "no angles"),
+        (Scan(0.0, 0.1, 0.1, 8.0, [], 0.0), "does not cover the direction"),
+        (Scan(2.0, 0.01, 0.1, 8.0, [1.0] * 10, 0.0), "does not cover the direction"),
     ],
 )
 def test_a_blind_robot_stops_or_creeps_as_configured(sweep, said):
@@ -144,7 +144,7 @@ def test_a_blind_robot_stops_or_creeps_as_configured(sweep, said):
 
 
 def test_a_lidar_that_does_not_look_behind_lets_nobody_back():
-    front = Sweep(-1.5, 0.01, 0.05, 8.0, [math.inf] * 300, 0.0)
+    front = Scan(-1.5, 0.01, 0.05, 8.0, [math.inf] * 300, 0.0)
     assert assist(SPEC, front, Twist(0.5, 0.0, 0.0), 0.1).scale == 1.0
     assert assist(SPEC, front, Twist(-0.5, 0.0, 0.0), 0.1).scale == 0.0
 

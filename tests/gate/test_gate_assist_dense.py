@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
-from webmap.gate.events import Sweep
-from webmap.gate.lanes.witness import hear_scan
+from webmap.gate.events import Scan
+from webmap.gate.lanes.odometry import hear_scan
 from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import FREE, assist, free_way, points_of, polygon_around
 from webmap.gate.rules.scan_geometry import LIMIT, MOST, folded
@@ -31,7 +31,7 @@ PROFILES = st.lists(
 
 def dense(ranges, *, low=-math.pi, span=math.tau, **more):
     about = {"range_min": 0.05, "range_max": 30.0, "arrived": 0.0, **more}
-    return Sweep(
+    return Scan(
         angle_min=low, angle_increment=span / len(ranges), ranges=ranges, **about
     )
 

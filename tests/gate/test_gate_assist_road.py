@@ -44,7 +44,7 @@ def ranges_seen(bridge):
     """What the scanner sees now, by a client of its own."""
     from websockets.sync.client import connect
 
-    from webmap.gate.lanes.witness import hear_scan, subscribe
+    from webmap.gate.lanes.odometry import hear_scan, subscribe
 
     with connect(bridge, max_size=None) as link:
         link.send(subscribe("/base_scan", "t").decode())

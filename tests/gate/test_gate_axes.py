@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.gate import events, protocol
-from webmap.gate.events import Sweep
+from webmap.gate.events import Scan
 from webmap.gate.limits import Axes, Speed, fit, ramp
 from webmap.gate.protocol import PROGRAM, AssistSpec
 from webmap.gate.specs import checked
@@ -37,7 +37,7 @@ def twist(bench, wanted):
 
 def measure(bench, seconds, seen, drive=None):
     def each():
-        bench.tell(events.Measured(KEY, seen))
+        bench.tell(events.OdometryReceived(KEY, seen))
         if drive is not None:
             twist(bench, drive)
 
@@ -187,8 +187,8 @@ class TestWithLimits:
         assist = AssistSpec(topic="/scan", footprint=BOX)
         bench = begin(assist=assist)
         ranges = [0.4] * 72
-        sweep = Sweep(-math.pi, math.tau / 72, 0.05, 8.0, ranges, bench.now)
-        bench.tell(events.Scanned(KEY, "/scan", sweep))
+        sweep = Scan(-math.pi, math.tau / 72, 0.05, 8.0, ranges, bench.now)
+        bench.tell(events.ScanReceived(KEY, "/scan", sweep))
         twist(bench, Twist(vz=0.4))
         assert bench.written[-1].twist == Twist(vz=0.4)
 
@@ -249,7 +249,7 @@ class TestStanding:
         bench.take("a")
 
         def each():
-            bench.tell(events.Measured(KEY, self.CLIMBING))
+            bench.tell(events.OdometryReceived(KEY, self.CLIMBING))
             bench.drive()
 
         bench.run(0.5, each)
@@ -261,7 +261,7 @@ class TestStanding:
         seen = [ZERO]
 
         def each():
-            bench.tell(events.Measured(KEY, seen[0]))
+            bench.tell(events.OdometryReceived(KEY, seen[0]))
             bench.drive()
 
         bench.run(0.5, each)

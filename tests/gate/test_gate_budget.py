@@ -134,14 +134,14 @@ class TestAttempts:
 
     def test_a_trouble_is_news_once_until_a_link_has_lasted(self):
         attempts = Attempts()
-        assert attempts.is_news("refused")
-        assert not attempts.is_news("refused")
+        assert attempts.is_new("refused")
+        assert not attempts.is_new("refused")
         attempts.ended(0.1, flooded=False)
-        assert not attempts.is_news("refused")
+        assert not attempts.is_new("refused")
         attempts.ended(waits.STEADY, flooded=False)
-        assert attempts.is_news("refused")
+        assert attempts.is_new("refused")
 
     def test_a_bridge_that_always_names_another_trouble_does_not_fill_the_log(self):
         attempts = Attempts()
-        news = sum(attempts.is_news(f"trouble {n}") for n in range(1000))
+        news = sum(attempts.is_new(f"trouble {n}") for n in range(1000))
         assert news == waits.MOST_TROUBLES

@@ -11,7 +11,7 @@ from gate_robot import eventually
 
 from webmap.gate import pipe
 from webmap.gate.display import supervisor as supervisor_module
-from webmap.gate.display.supervisor import Child
+from webmap.gate.display.supervisor import GateProcess
 from webmap.gate.protocol import Ready, RefusedCount, Tick
 
 
@@ -19,16 +19,16 @@ class Watched:
     """A process, and what it said."""
 
     def __init__(self, *command):
-        self.heard = []
+        self.on_echo = []
         self.ends = []
         self.may_go_on = threading.Event()
         self.may_go_on.set()
-        self.child = Child(self._hear, self._ended, command)
+        self.child = GateProcess(self._hear, self._ended, command)
         self.child.start()
 
     def _hear(self, child, message):
         self.may_go_on.wait(60)
-        self.heard.append(message)
+        self.on_echo.append(message)
 
     def _ended(self, child):
         self.ends.append(child)
@@ -60,8 +60,8 @@ def test_messages_go_both_ways_whole_and_in_order(run):
     mirror = run("/bin/cat")
     mirror.child.send(Ready(1), Ready(2))
     mirror.child.send(Tick(3, {}))
-    eventually(lambda: len(mirror.heard) == 3, "all of them")
-    assert mirror.heard == [Ready(1), Ready(2), Tick(3, {})]
+    eventually(lambda: len(mirror.on_echo) == 3, "all of them")
+    assert mirror.on_echo == [Ready(1), Ready(2), Tick(3, {})]
     assert mirror.child.pid > 0
 
 
@@ -69,16 +69,16 @@ def test_one_that_is_told_to_end_ends_and_is_told_nothing_more(run):
     mirror = run("/bin/cat")
     mirror.child.stop(30.0)
     assert mirror.ends == [mirror.child]
-    assert mirror.child.epitaph == "exit code 0, no message"
+    assert mirror.child.end_reason == "exit code 0, no message"
     mirror.child.send(Ready(1))
-    assert mirror.heard == []
+    assert mirror.on_echo == []
 
 
 def test_its_last_words_are_kept_and_all_of_them_passed_on(run, capfd):
     gate = run(*shell("echo first >&2; echo 'no such module' >&2; echo >&2; exit 3"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
-    assert gate.child.epitaph == "no such module"
+    assert gate.child.end_reason == "no such module"
     assert capfd.readouterr().err == "first\nno such module\n\n"
 
 
@@ -86,7 +86,7 @@ def test_its_last_words_steer_no_terminal(run, capfd):
     gate = run(*shell(r"printf 'ValueError: \033[2J\r\302\233 \377\n' >&2; exit 3"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
-    assert gate.child.epitaph == r"ValueError: \x1b[2J\r\x9b �"
+    assert gate.child.end_reason == r"ValueError: \x1b[2J\r\x9b �"
     assert capfd.readouterr().err == "ValueError: \\x1b[2J\\r\\x9b �\n"
 
 
@@ -94,13 +94,13 @@ def test_one_that_was_killed_is_said_to_have_been(run):
     gate = run(*shell("kill -9 $$"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
-    assert gate.child.epitaph == "ended by SIGKILL"
+    assert gate.child.end_reason == "ended by SIGKILL"
 
 
 def test_one_that_does_not_end_is_killed(run, caplog):
     gate = run(*ENDLESS)
     gate.child.stop(0.05)
-    assert gate.child.epitaph == "ended by SIGKILL"
+    assert gate.child.end_reason == "ended by SIGKILL"
     assert "it has not ended within 0.05 s" in caplog.text
 
 
@@ -130,10 +130,10 @@ def test_what_it_did_not_read_in_time_comes_later_and_in_order(run):
 
     def through():
         mirror.child.send()  # as the next heartbeat does
-        return len(mirror.heard) == len(sent)
+        return len(mirror.on_echo) == len(sent)
 
     eventually(through, "all of it")
-    assert mirror.heard == sent
+    assert mirror.on_echo == sent
 
 
 def test_one_that_is_gone_can_be_written_to(run):
@@ -147,7 +147,7 @@ def test_one_that_talks_nonsense_is_killed(run, caplog):
     gate = run(*shell(r"printf '\377\377\377\377'; exec sleep 600"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
-    assert gate.child.epitaph == "ended by SIGKILL"
+    assert gate.child.end_reason == "ended by SIGKILL"
     assert "a message of 4294967295 bytes" in caplog.text
 
 
@@ -159,11 +159,11 @@ def test_one_whose_words_cannot_be_dealt_with_is_killed(run, caplog):
         raise LookupError(message)
 
     ended = threading.Event()
-    gate = Child(hear, lambda _: ended.set(), (sys.executable, "-c", words))
+    gate = GateProcess(hear, lambda _: ended.set(), (sys.executable, "-c", words))
     gate.start()
     assert ended.wait(30)
     gate.stop(30.0)
-    assert gate.epitaph == "ended by SIGKILL"
+    assert gate.end_reason == "ended by SIGKILL"
     assert "the gate's words could not be dealt with" in caplog.text
     assert "LookupError: Ready(pid=5)" in caplog.text
 
@@ -175,11 +175,11 @@ def test_a_gate_that_its_display_cannot_deal_with_ends_in_good_order():
         raise LookupError(message)
 
     ended = threading.Event()
-    gate = Child(hear, lambda _: ended.set())
+    gate = GateProcess(hear, lambda _: ended.set())
     gate.start()
     assert ended.wait(60)
     gate.stop(30.0)
-    assert gate.epitaph == "exit code 0, no message"
+    assert gate.end_reason == "exit code 0, no message"
 
 
 def test_who_hears_of_its_end_may_stop_it_there_and_then():
@@ -187,8 +187,8 @@ def test_who_hears_of_its_end_may_stop_it_there_and_then():
 
     def ended(gate):
         gate.stop(30.0)
-        epitaphs.append(gate.epitaph)
+        epitaphs.append(gate.end_reason)
 
-    gate = Child(lambda *_: None, ended, shell("echo 'full disk' >&2; exit 1"))
+    gate = GateProcess(lambda *_: None, ended, shell("echo 'full disk' >&2; exit 1"))
     gate.start()
     eventually(lambda: epitaphs == ["full disk"], "its last words")

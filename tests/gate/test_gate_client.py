@@ -137,7 +137,7 @@ class TestPages:
         eventually(lambda: page.robot(), "the first report")
         late = Page(client, "Late")
         eventually(lambda: late.robot(), "the report")
-        assert [m["op"] for m in late.heard[:2]] == ["hello", "robot"]
+        assert [m["op"] for m in late.on_echo[:2]] == ["hello", "robot"]
         client.forget("r1")
         eventually(lambda: late.of("gone"), "the end of the robot")
         client.forget("r1")

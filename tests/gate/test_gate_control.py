@@ -8,7 +8,7 @@ from link_bench import PONG, frame, in_loop, noting_bridge, raw_bridge, until
 
 from webmap.base.geometry import Twist
 from webmap.gate.clock import now
-from webmap.gate.events import Alive, Echoed, Key, LinkDown, LinkUp
+from webmap.gate.events import EchoReceived, Key, LinkDown, LinkUp, PingAnswered
 from webmap.gate.lanes import control
 from webmap.gate.lanes.control import BUSY_PING, ECHO, IDLE_PING, MOST, ControlLane
 
@@ -51,10 +51,10 @@ async def test_an_echo_says_what_the_robot_was_told_and_not_that_the_link_lives(
         lane = await noting.up()
         assert noting.of(LinkUp) == [LinkUp(bridge.url, "control")]
         lane.listen("/cmd_vel")
-        await until(lambda: noting.of(Alive), "the answer to the only ping")
+        await until(lambda: noting.of(PingAnswered), "the answer to the only ping")
         noting.events.clear()
         assert lane.write("/cmd_vel", SLOW)
-        echo = Echoed(Key(bridge.url, "/cmd_vel"), SLOW)
+        echo = EchoReceived(Key(bridge.url, "/cmd_vel"), SLOW)
         await until(lambda: echo in noting.events, "the echo")
         assert noting.events == [echo]
 
@@ -76,7 +76,7 @@ async def test_an_answer_tells_when_it_was_asked_for_and_not_when_it_came():
         asked_by = now()
         await until(lambda: now() > asked_by, "another moment")
         go_on.set()
-        (alive,) = await until(lambda: noting.of(Alive), "the answer")
+        (alive,) = await until(lambda: noting.of(PingAnswered), "the answer")
         assert before < alive.asked_at <= asked_by
 
 
@@ -88,11 +88,11 @@ async def test_what_another_says_on_the_topic_is_told_and_proves_nothing(monkeyp
         lane = await noting.up()
         lane.listen("/cmd_vel")
         await until(lambda: bridge.of("subscribe"), "that it listens")
-        await until(lambda: noting.of(Alive), "the answer to the only ping")
+        await until(lambda: noting.of(PingAnswered), "the answer to the only ping")
         noting.events.clear()
         foreign = {"linear": {"x": 3.0, "y": 0.0}, "angular": {"z": 0.0}}
         await bridge.publish("/cmd_vel", foreign)
-        told = [Echoed(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
+        told = [EchoReceived(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
         await until(lambda: noting.events == told, "what was said, and only that")
 
 
@@ -107,8 +107,8 @@ async def test_others_are_heard_before_anybody_listens_fifty_times_a_second_at_m
         assert first[0].message["throttle_rate"] == ECHO
         foreign = {"linear": {"x": 3.0, "y": 0.0}, "angular": {"z": 0.0}}
         await bridge.publish("/cmd_vel", foreign)
-        told = [Echoed(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
-        await until(lambda: noting.of(Echoed) == told, "what was said")
+        told = [EchoReceived(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
+        await until(lambda: noting.of(EchoReceived) == told, "what was said")
         assert lane.lane.ping_period == IDLE_PING
         lane.listen("/cmd_vel")
         lane.ignore("/cmd_vel")
@@ -133,8 +133,10 @@ async def test_what_is_no_velocity_of_its_own_machines_is_passed_over():
             json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": zero}),
         ):
             await bridge.send(1, words)
-        await until(lambda: noting.of(Echoed), "the last of them")
-        assert noting.of(Echoed) == [Echoed(Key(bridge.url, "/cmd_vel"), ZERO)]
+        await until(lambda: noting.of(EchoReceived), "the last of them")
+        assert noting.of(EchoReceived) == [
+            EchoReceived(Key(bridge.url, "/cmd_vel"), ZERO)
+        ]
 
 
 @in_loop
@@ -217,7 +219,7 @@ async def test_an_answer_to_a_ping_makes_room_and_a_new_link_begins_anew():
         lane = await noting.up()
         while lane.write("/cmd_vel", SLOW):
             pass
-        lane.lane.hurry(0.01)
+        lane.lane.ping_every(0.01)
         await until(lambda: lane.write("/cmd_vel", SLOW), "room for one more")
         lane.lane.cut("no longer used")
         assert noting.events[-1] == LinkDown(bridge.url, "control")

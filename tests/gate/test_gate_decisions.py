@@ -335,7 +335,7 @@ class TestGarbage:
 
         def mixed():
             for _ in range(9):
-                bench.tell(protocol.FromBrowser("a", b'{"op":"drive","x":NaN}'))
+                bench.tell(protocol.FromPage("a", b'{"op":"drive","x":NaN}'))
 
         bench.run(0.4, mixed)
         first = next(w for w in bench.since(last) if w.twist == ZERO)
@@ -343,7 +343,7 @@ class TestGarbage:
 
     def test_much_of_it_closes_the_connection_once(self, bench):
         for _ in range(50):
-            bench.tell(protocol.FromBrowser("a", b"rubbish"))
+            bench.tell(protocol.FromPage("a", b"rubbish"))
         (close,) = bench.of(protocol.CloseConnection)
         assert close.connection == "a"
         refused = [r for r in bench.refusals() if r.what == "command"]
@@ -538,7 +538,7 @@ class TestLinks:
         released = bench.now
         assert bench.written[-1].twist == ZERO
         bench.now += 0.003
-        bench.tell(events.Alive(URL, released - 0.03))
+        bench.tell(events.PingAnswered(URL, released - 0.03))
         bench.run(1.5)
         assert bench.did(actions.CutLink) == [actions.CutLink(URL)]
         assert bench.did(actions.MarkDriven) == [actions.MarkDriven(KEY, True)]
@@ -551,15 +551,15 @@ class TestLinks:
 
     def test_a_stop_is_confirmed_only_by_a_bridge_that_was_asked_since(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
-        stands = lambda: bench.tell(events.Measured(KEY, ZERO))  # noqa: E731
+        stands = lambda: bench.tell(events.OdometryReceived(KEY, ZERO))  # noqa: E731
         bench.answering = False
         bench.say("b", op="stop", robot="r1")
         pressed = bench.now
         bench.run(0.1)
-        bench.tell(events.Alive(URL, pressed - 0.01))
+        bench.tell(events.PingAnswered(URL, pressed - 0.01))
         bench.run(0.5, stands)
         assert bench.report().stop.confirmed is None
-        bench.tell(events.Alive(URL, pressed + 0.01))
+        bench.tell(events.PingAnswered(URL, pressed + 0.01))
         bench.run(0.1, stands)
         assert bench.report().stop.confirmed
 
@@ -577,11 +577,11 @@ class TestLinks:
 
     def test_events_of_machines_that_are_gone_do_nothing(self, bench):
         gone = Key(URL, "/gone")
-        bench.tell(events.Wrote(gone, ZERO, 1, "a", True))
-        bench.tell(events.Echoed(gone, ZERO))
-        bench.tell(events.Measured(gone, ZERO))
+        bench.tell(events.TwistWritten(gone, ZERO, 1, "a", True))
+        bench.tell(events.EchoReceived(gone, ZERO))
+        bench.tell(events.OdometryReceived(gone, ZERO))
         bench.tell(events.LockState(gone, held=True))
-        bench.tell(events.WroteGoal("r9", "g", 0, 0, 0, "a", True))
+        bench.tell(events.GoalWritten("r9", "g", 0, 0, 0, "a", True))
         bench.tell(events.GoalEnded("r9", "g"))
         bench.tell(events.LinkUp("ws://other", "witness"))
         bench.tell(events.LinkDown("ws://other", "witness"))
@@ -628,7 +628,7 @@ class TestBlindness:
     def moves(self, bench, *, seen):
         def each():
             if seen:
-                bench.tell(events.Measured(KEY, Twist(0.1)))
+                bench.tell(events.OdometryReceived(KEY, Twist(0.1)))
             bench.drive(x=x)
 
         at = bench.now
@@ -657,7 +657,7 @@ class TestBlindness:
         at = bench.now
 
         def each():
-            bench.tell(events.Measured(KEY, None))
+            bench.tell(events.OdometryReceived(KEY, None))
             bench.drive(x=1.0)
 
         bench.run(2.0, each)
@@ -665,19 +665,19 @@ class TestBlindness:
         assert bench.report().measured is None
 
     def test_it_is_listened_to_only_while_it_matters(self, bench):
-        bench.tell(events.Measured(KEY, Twist(0.1)))
+        bench.tell(events.OdometryReceived(KEY, Twist(0.1)))
         assert bench.report().measured is None
         bench.take()
         assert bench.did(actions.Watch) == [actions.Watch(KEY, True)]
-        bench.tell(events.Measured(KEY, Twist(0.1)))
-        bench.tell(events.Echoed(KEY, Twist(0.2, 0, -0.0)))
+        bench.tell(events.OdometryReceived(KEY, Twist(0.1)))
+        bench.tell(events.EchoReceived(KEY, Twist(0.2, 0, -0.0)))
         bench.run(0.2)
         report = bench.report()
         assert report.measured == Twist(0.1).numbers
         assert report.echoed == Twist(0.2).numbers
         bench.say("a", op="release", robot="r1")
         assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
-        bench.tell(events.Echoed(KEY, Twist(0.2)))
+        bench.tell(events.EchoReceived(KEY, Twist(0.2)))
         bench.run(0.2)
         assert bench.report().measured is None
         assert bench.report().echoed is None
@@ -690,7 +690,7 @@ class TestReports:
         n = iter(range(1000))
 
         def each():
-            bench.tell(events.Measured(KEY, Twist(next(n) / 100)))
+            bench.tell(events.OdometryReceived(KEY, Twist(next(n) / 100)))
             bench.drive(x=1.0)
 
         bench.run(1.0, each)

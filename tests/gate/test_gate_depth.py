@@ -5,15 +5,15 @@ import struct
 
 import cbor2
 import pytest
-from link_bench import TEXT, Heard, frame, in_loop, raw_bridge, until
+from link_bench import TEXT, Received, frame, in_loop, raw_bridge, until
 
 from webmap.base.errors import ProtocolError
 from webmap.gate import pipe, protocol
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import Key
-from webmap.gate.lanes import navigation, rosbridge, witness
+from webmap.gate.lanes import navigation, odometry, rosbridge
 from webmap.gate.lanes.budget import Budget
-from webmap.gate.lanes.sockets import Ears, open_socket
+from webmap.gate.lanes.sockets import SocketHandlers, open_socket
 
 DEEP = [
     b'{"op":"x","a":' + b"[" * 1000,
@@ -85,12 +85,12 @@ def list_of(count, each):
 )
 def test_a_scan_of_many_parts_is_refused_before_it_is_decoded(ranges):
     with pytest.raises(ProtocolError, match="more than 1000 lists, maps and texts"):
-        witness.hear_scan(scan(ranges), 0.0)
+        odometry.hear_scan(scan(ranges), 0.0)
 
 
 def test_a_scan_that_nests_too_deeply_is_refused():
     with pytest.raises(ProtocolError, match="not CBOR"):
-        witness.hear_scan(scan(b"\x81" * 900 + b"\x00"), 0.0)
+        odometry.hear_scan(scan(b"\x81" * 900 + b"\x00"), 0.0)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_a_scan_that_nests_too_deeply_is_refused():
     ids=["doubles", "singles", "mixed", "typed", "longest typed"],
 )
 def test_a_scan_of_many_numbers_is_not(ranges):
-    witness.check_parts(scan(ranges))
+    odometry.check_parts(scan(ranges))
 
 
 def test_what_nests_too_deeply_on_the_pipe_is_logged_and_left_out(caplog):
@@ -120,7 +120,7 @@ def test_what_nests_too_deeply_on_the_pipe_is_logged_and_left_out(caplog):
 
 @in_loop
 async def test_a_link_that_brings_such_goes_on_and_says_so_once(caplog):
-    heard = Heard()
+    heard = Received()
 
     def hear(data):
         rosbridge.hear(data)
@@ -133,7 +133,7 @@ async def test_a_link_that_brings_such_goes_on_and_says_so_once(caplog):
         await link.reader.read()
 
     async with raw_bridge(talk) as url:
-        ears = Ears(hear, heard.pongs.append, heard.lost.append)
+        ears = SocketHandlers(hear, heard.pongs.append, heard.lost.append)
         link = await open_socket(url, ears, Budget())
         await until(lambda: heard.texts == [b"{}"], "what came after it")
         await asyncio.sleep(0)

@@ -5,9 +5,9 @@ import datetime
 
 import pytest
 
-from webmap.gate.actions import KeepLatch, KeepStopTest
+from webmap.gate.actions import SaveStop, SaveStopTest
 from webmap.gate.disk import Disk, Records
-from webmap.gate.events import Key, LatchKept, LockState, Press, StopTestKept
+from webmap.gate.events import Key, LockState, Press, StopSaved, StopTestSaved
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
 ANN = Press("Ann", "a1")
@@ -22,16 +22,16 @@ def test_what_is_kept_is_told_in_order_and_recalled(disk, tmp_path):
     told = []
 
     async def scenario():
-        disk.keep(KeepLatch(KEY, 1, ANN, frozenset()), told.append)
-        disk.keep(KeepStopTest(KEY, 0.4), told.append)
+        disk.keep(SaveStop(KEY, 1, ANN, frozenset()), told.append)
+        disk.keep(SaveStopTest(KEY, 0.4), told.append)
         assert told == []
         await disk.settle()
         await asyncio.sleep(0)
 
     asyncio.run(scenario())
     latched, tested = told
-    assert latched == LatchKept(KEY, 1, None)
-    assert isinstance(tested, StopTestKept)
+    assert latched == StopSaved(KEY, 1, None)
+    assert isinstance(tested, StopTestSaved)
     assert tested.record.seconds == 0.4
     assert datetime.date.fromisoformat(tested.record.date)
     again = Disk(Records(tmp_path)).recall(LockState(KEY, held=True))
@@ -46,7 +46,7 @@ def test_what_was_given_up_tells_nothing(disk):
     told = []
 
     async def scenario():
-        disk.keep(KeepLatch(KEY, 1, ANN, frozenset()), told.append)
+        disk.keep(SaveStop(KEY, 1, ANN, frozenset()), told.append)
         (work,) = disk._under_way
         work.cancel()
         await disk.settle()

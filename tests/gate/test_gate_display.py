@@ -14,16 +14,16 @@ from webmap.base.geometry import Twist
 from webmap.gate import protocol
 from webmap.gate.display import supervisor
 from webmap.gate.display.client import GateClient
-from webmap.gate.display.program import ProgramRoad
+from webmap.gate.display.program import ProgramCommands
 from webmap.gate.protocol import PROGRAM, Holder
 
 
-class FakeChild:
+class FakeGateProcess:
     """A gate's process that notes what it is told."""
 
     pid = 4711
-    epitaph = "ended by SIGKILL"
-    made: list["FakeChild"] = []
+    end_reason = "ended by SIGKILL"
+    made: list["FakeGateProcess"] = []
 
     def __init__(self, hear, ended):
         self._hear, self._ended = hear, ended
@@ -55,9 +55,9 @@ class FakeChild:
 
 @pytest.fixture
 def made(monkeypatch):
-    monkeypatch.setattr(FakeChild, "made", [])
-    monkeypatch.setattr(supervisor, "Child", FakeChild)
-    return FakeChild.made
+    monkeypatch.setattr(FakeGateProcess, "made", [])
+    monkeypatch.setattr(supervisor, "GateProcess", FakeGateProcess)
+    return FakeGateProcess.made
 
 
 def test_what_cannot_be_said_to_a_gate_is_refused_and_not_kept_for_the_next():
@@ -100,9 +100,9 @@ class TestQuickProgram:
     @pytest.fixture
     def road(self):
         self.now, self.told = 100.0, []
-        road = ProgramRoad(self.told.append, threading.RLock(), lambda: self.now)
-        road.hear_tick(7)
-        road.hear_robot(held())
+        road = ProgramCommands(self.told.append, threading.RLock(), lambda: self.now)
+        road.on_tick(7)
+        road.on_report(held())
         return road
 
     def speeds(self):
@@ -129,10 +129,10 @@ class TestQuickProgram:
             road.twist("r1", Twist(math.nan))
         with pytest.raises(NoLease):
             road.twist("r2", Twist(0.2))
-        road.hear_robot(report())
+        road.on_report(report())
         with pytest.raises(NoLease):
             road.twist("r1", Twist(0.2))
-        road.hear_robot(held())
+        road.on_report(held())
         road.twist("r1", Twist(0.4))
         assert self.speeds() == [0.2, 0.4], "with another lease it begins anew"
 
@@ -234,7 +234,7 @@ class TestPages:
     def test_what_it_says_is_handed_on_and_no_more_after_its_end(self, page, gate):
         page.receive('{"op": "take"}')
         page.receive(b"x" * 5000)
-        assert [len(m.text) for m in gate.of(protocol.FromBrowser)] == [14, 2048]
+        assert [len(m.text) for m in gate.of(protocol.FromPage)] == [14, 2048]
         page.set_speeds(0.5, 1.0)
         assert gate.told[-1] == protocol.Speeds(page.id, 0.5, 1.0)
         page.close()
@@ -267,9 +267,9 @@ class TestPages:
     def test_a_stop_is_kept_and_what_looks_like_one_is_not(self, page, client, gate):
         page.receive('{"op": "stop-test", "robot": "r1"}')
         page.receive('{"op": "stop-test"')
-        assert list(client._unheard) == []
+        assert list(client._pending_stops) == []
         page.receive('{"op": "stop", "robot": "*"}')
-        assert list(client._unheard) == [(page.id, None)]
+        assert list(client._pending_stops) == [(page.id, None)]
 
     @pytest.mark.parametrize(
         ("text", "robot"),
@@ -286,10 +286,10 @@ class TestPages:
         self, page, client, made, gate, text, robot
     ):
         page.receive(text)
-        assert list(client._unheard) == [(page.id, robot)]
+        assert list(client._pending_stops) == [(page.id, robot)]
         gate.die()
         second = eventually(lambda: client.pid and made[1], "a second gate")
-        (again,) = second.of(protocol.FromBrowser)
+        (again,) = second.of(protocol.FromPage)
         assert json.loads(again.text) == {"op": "stop", "robot": robot or "*"}
 
     def test_a_stop_of_a_robot_that_is_gone_is_not_said_to_the_next_gate(
@@ -299,7 +299,7 @@ class TestPages:
         client.forget("r1")
         gate.die()
         second = eventually(lambda: client.pid and made[1], "a second gate")
-        assert second.of(protocol.FromBrowser) == []
+        assert second.of(protocol.FromPage) == []
 
 
 class TestLife:
@@ -326,7 +326,7 @@ class TestLife:
         client.stop_robot("r1")
         client.reset("r1", "s1")
         assert gate.told[-1] == protocol.Reset("r1", "s1")
-        assert list(client._unheard) == [(None, "r1")]
+        assert list(client._pending_stops) == [(None, "r1")]
 
     def test_the_nodes_of_other_programs_are_told(self, client, gate):
         client.name_writers("r1", ("/teleop",))

@@ -20,7 +20,7 @@ def run(bench, seconds, speed=0.0, x=None, turn=0.0):
     """Let time pass with odometry, driven or not."""
 
     def each():
-        bench.tell(events.Measured(KEY, Twist(speed, 0.0, turn)))
+        bench.tell(events.OdometryReceived(KEY, Twist(speed, 0.0, turn)))
         if x is not None:
             bench.drive(x=x)
 
@@ -95,7 +95,7 @@ def test_it_is_handed_over(bench):
 
 def test_another_program_drives_a_robot_that_nobody_drives(bench):
     bench.run(EXPECTED_FOR)
-    bench.run(0.5, lambda: bench.tell(events.Echoed(KEY, OTHERS)))
+    bench.run(0.5, lambda: bench.tell(events.EchoReceived(KEY, OTHERS)))
     assert bench.report().doing == "other"
     bench.take("a")
     assert run(bench, 0.1) == "held"

@@ -10,7 +10,7 @@ from link_bench import (
     PING,
     PONG,
     TEXT,
-    Heard,
+    Received,
     frame,
     in_loop,
     noting_bridge,
@@ -73,7 +73,7 @@ FLOODS = {
 @pytest.mark.parametrize("name", FLOODS)
 @in_loop
 async def test_a_flood_is_held_to_its_budget_and_then_dropped(name):
-    heard = Heard()
+    heard = Received()
     async with raw_bridge(flood(FLOODS[name])) as url:
         link = await open_socket(url, heard.ears, Budget())
         begun = time.monotonic()
@@ -90,7 +90,7 @@ async def test_a_flood_is_held_to_its_budget_and_then_dropped(name):
 async def test_the_loop_goes_on_while_ten_links_are_flooded():
     from webmap.testing import Sentinel
 
-    heard = Heard()
+    heard = Received()
     with Sentinel() as sentinel:
         async with raw_bridge(flood(FLOODS["tiny texts"])) as url:
             links = [await open_socket(url, heard.ears, Budget()) for _ in range(10)]
@@ -110,7 +110,7 @@ async def test_the_loop_goes_on_while_ten_links_are_flooded():
 async def test_a_message_of_frames_without_end_is_dropped_with_a_sentence(
     patient, piece
 ):
-    heard = Heard()
+    heard = Received()
 
     async def talk(link):
         await link.accept(frame(TEXT, b"x", final=False))
@@ -128,7 +128,7 @@ async def test_a_message_of_frames_without_end_is_dropped_with_a_sentence(
 
 @in_loop
 async def test_who_takes_no_answers_is_not_asked_for_more(patient):
-    heard = Heard()
+    heard = Received()
     async with raw_bridge(flood(FLOODS["pings"], reads=False)) as url:
         link = await open_socket(url, heard.ears, Budget())
         sock = link._transport.get_extra_info("socket")
@@ -143,7 +143,7 @@ async def test_who_takes_no_answers_is_not_asked_for_more(patient):
 
 @in_loop
 async def test_who_takes_the_answers_again_is_read_again():
-    heard, go_on = Heard(), asyncio.Event()
+    heard, go_on = Received(), asyncio.Event()
 
     async def talk(link):
         await link.accept()
@@ -165,7 +165,7 @@ async def test_who_takes_the_answers_again_is_read_again():
 
 @in_loop
 async def test_bytes_one_by_one_are_a_message_all_the_same():
-    heard = Heard()
+    heard = Received()
 
     async def talk(link):
         answer = await link.request()
@@ -194,12 +194,12 @@ async def test_headers_without_end_are_refused(header):
 
     async with raw_bridge(talk) as url:
         with pytest.raises(BridgeClosed, match="no WebSocket at this address"):
-            await open_socket(url, Heard().ears, Budget())
+            await open_socket(url, Received().ears, Budget())
 
 
 @in_loop
 async def test_what_came_before_the_end_is_heard():
-    heard = Heard()
+    heard = Received()
 
     async def talk(link):
         await link.accept(frame(TEXT, b"{}") * 2000)
@@ -213,7 +213,7 @@ async def test_what_came_before_the_end_is_heard():
 
 @in_loop
 async def test_what_nobody_can_deal_with_ends_the_link_with_a_sentence():
-    heard = Heard()
+    heard = Received()
 
     def fail(data):
         raise RecursionError("maximum recursion depth exceeded")
@@ -273,7 +273,7 @@ async def test_a_lane_that_is_cut_while_it_is_behind_counts_as_flooded(caplog):
 @in_loop
 async def test_zero_is_written_to_a_link_that_floods_as_long_as_it_is_open():
     """Reading from it ends; writing does not."""
-    heard, told = Heard(), []
+    heard, told = Received(), []
 
     async def talk(link):
         await link.accept()
@@ -302,7 +302,7 @@ async def test_zero_is_written_to_a_link_that_floods_as_long_as_it_is_open():
 
 @in_loop
 async def test_an_honest_link_beside_a_flood_is_heard_at_once():
-    flooded, heard = Heard(), Heard()
+    flooded, heard = Received(), Received()
     async with raw_bridge(flood(FLOODS["tiny texts"])) as url, noting_bridge() as good:
         bad = await open_socket(url, flooded.ears, Budget())
         link = await open_socket(good.url, heard.ears, Budget())

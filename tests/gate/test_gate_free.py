@@ -33,7 +33,7 @@ def join(pages, *speeds):
     connection = pages.connect("Ann", "operator", said.append, print)
     if speeds:
         connection.set_speeds(*speeds)
-    pages.greet(protocol.Hello(connection.id))
+    pages.on_hello(protocol.Hello(connection.id))
     return connection, said
 
 
@@ -55,10 +55,10 @@ def test_a_free_robot_without_limits_is_not_said_to_be_slow():
 def test_a_page_is_told_what_it_would_have(pages):
     _, quick = join(pages, 0.8, 1.2)
     _, slow = join(pages, 0.2, 0.4)
-    pages.hear_robot(free(v_max=None, w_max=None))
+    pages.on_report(free(v_max=None, w_max=None))
     assert cap_of(quick) == (0.8, 1.2, ["limit of the page"])
     assert cap_of(slow) == (0.2, 0.4, ["limit of the page"])
-    pages.hear_robot(free(v_max=0.5, w_max=1.0))
+    pages.on_report(free(v_max=0.5, w_max=1.0))
     assert cap_of(quick) == (0.5, 1.0, ["limit of the robot"])
 
 
@@ -72,7 +72,7 @@ def test_a_page_is_told_so_when_it_is_taken_too():
 
 def test_a_page_that_asks_for_another_speed_is_told_at_once(pages):
     connection, said = join(pages)
-    pages.hear_robot(free(v_max=None, w_max=None))
+    pages.on_report(free(v_max=None, w_max=None))
     assert cap_of(said) == (0.3, 0.6, ["no limit stated"])
     connection.set_speeds(0.8, 1.2)
     assert cap_of(said) == (0.8, 1.2, ["limit of the page"])
@@ -82,7 +82,7 @@ def test_of_a_robot_that_somebody_has_the_gate_tells_alone(pages):
     bench = Bench().begin()
     bench.take("b")
     connection, said = join(pages, 0.2, 0.2)
-    pages.hear_robot(bench.report())
+    pages.on_report(bench.report())
     assert cap_of(said) == (1.0, 1.5, ["limit of the robot"])
     heard = len(said)
     connection.set_speeds(0.1, 0.1)

@@ -172,7 +172,7 @@ def test_a_goal_that_could_not_be_written_is_told(bench):
     assert "held up" in bench.refusals()[-1].why
     assert bench.of(protocol.SentGoal) == []
     bench.tell(protocol.Disconnect("a"))
-    bench.tell(events.WroteGoal("r1", "g", 0, 0, 0, "a", False))
+    bench.tell(events.GoalWritten("r1", "g", 0, 0, 0, "a", False))
 
 
 def test_a_robot_without_ways_for_goals_says_so():
@@ -589,7 +589,7 @@ class TestWhereItIs:
 
     def locate(self, bench, who="a", **changes):
         bench.goal(who, **{"op": "locate", **changes})
-        return bench.did(actions.TellPose)
+        return bench.did(actions.SendPose)
 
     def why(self, bench, who="a"):
         return bench.refusals(who)[-1].why
@@ -600,11 +600,11 @@ class TestWhereItIs:
         bench.hold(0.1)
         (told,) = self.locate(bench)
         assert (told.robot, told.x, told.y, told.yaw) == ("r1", 1.0, 2.0, 0.5)
-        bench.tell(events.WrotePose("r1", 1.0, 2.0, 0.5, "a", done=True))
+        bench.tell(events.PoseWritten("r1", 1.0, 2.0, 0.5, "a", done=True))
         assert bench.of(protocol.SentPose) == [
             protocol.SentPose("r1", 1.0, 2.0, 0.5, "a")
         ]
-        bench.tell(events.WrotePose("r1", 1.0, 2.0, 0.5, "a", done=False))
+        bench.tell(events.PoseWritten("r1", 1.0, 2.0, 0.5, "a", done=False))
         assert "dropped" in self.why(bench)
 
     @pytest.mark.parametrize(
@@ -668,12 +668,12 @@ class TestWhereItIs:
     def test_a_program_with_the_lease_tells_it_too(self, bench):
         told = protocol.ProgramLocate("r1", 0, bench.tick, (1.0, 2.0, 0.5))
         bench.tell(told)
-        assert bench.did(actions.TellPose) == []
+        assert bench.did(actions.SendPose) == []
         bench.tell(protocol.ProgramTake(1, "r1"))
         bench.run(0.1)
         epoch = bench.report().epoch
         bench.tell(msgspec.structs.replace(told, epoch=epoch, tick=bench.tick))
-        assert len(bench.did(actions.TellPose)) == 1
+        assert len(bench.did(actions.SendPose)) == 1
 
     @pytest.mark.parametrize(
         ("changes", "what"),

@@ -10,7 +10,7 @@ from gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.gate import events
-from webmap.gate.events import Sweep
+from webmap.gate.events import Scan
 from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import free_way, points_of
 from webmap.gate.specs import checked
@@ -27,8 +27,8 @@ def bench():
 def scan(bench, reach, frame=""):
     step = math.tau / 72
     ranges = [reach] * 72
-    sweep = Sweep(-math.pi, step, 0.05, 8.0, ranges, bench.now, frame=frame)
-    bench.tell(events.Scanned(KEY, "/scan", sweep))
+    sweep = Scan(-math.pi, step, 0.05, 8.0, ranges, bench.now, frame=frame)
+    bench.tell(events.ScanReceived(KEY, "/scan", sweep))
 
 
 def hold_seeing(bench, reach, seconds, **axes):
@@ -78,11 +78,11 @@ def test_what_is_judged_is_what_is_sent_also_while_it_speeds_up():
     bench = Bench().begin(spec(assist=about, v_max=0.5, w_max=1.0, a_max=0.5))
     ranges = [math.hypot(*point)] + [math.inf] * 719
     bearing = math.atan2(point[1], point[0])
-    sweep = Sweep(bearing, math.tau / 720, 0.05, 8.0, ranges, 0.0)
+    sweep = Scan(bearing, math.tau / 720, 0.05, 8.0, ranges, 0.0)
 
     def each(**axes):
         seen = msgspec.structs.replace(sweep, arrived=bench.now)
-        bench.tell(events.Scanned(KEY, "/scan", seen))
+        bench.tell(events.ScanReceived(KEY, "/scan", seen))
         bench.drive(**axes)
 
     bench.take()
@@ -172,7 +172,9 @@ def test_a_scan_of_another_frame_than_was_asked_for_is_no_sight():
 
 def test_a_scan_for_a_machine_that_is_gone_is_nothing(bench):
     key = events.Key("ws://other:9090", "/cmd_vel")
-    bench.tell(events.Scanned(key, "/scan", Sweep(0.0, 0.1, 0.1, 8.0, [], bench.now)))
+    bench.tell(
+        events.ScanReceived(key, "/scan", Scan(0.0, 0.1, 0.1, 8.0, [], bench.now))
+    )
 
 
 @pytest.mark.parametrize(

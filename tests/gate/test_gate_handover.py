@@ -38,7 +38,7 @@ def holder(bench):
 
 def moving(bench, seconds, speed, turn=0.0):
     twist = Twist(speed, 0.0, turn)
-    bench.run(seconds, lambda: bench.tell(events.Measured(KEY, twist)))
+    bench.run(seconds, lambda: bench.tell(events.OdometryReceived(KEY, twist)))
 
 
 class TestAsking:

@@ -104,7 +104,7 @@ class TestCall:
         assert "no connection" in why
 
 
-class Doing:
+class Activity:
     """The links of one robot with both kinds of hooks, and what they tell."""
 
     def __init__(self, url):
@@ -134,7 +134,7 @@ class TestLinks:
     @in_loop
     async def test_tell_how_every_hook_ended(self, monkeypatch):
         monkeypatch.setattr(tasks, "CALL_TIMEOUT", 0.5)
-        async with noting_bridge() as bridge, Doing(bridge.url) as doing:
+        async with noting_bridge() as bridge, Activity(bridge.url) as doing:
             doing.run(LOCK, 1)
             assert doing.of(events.HookEnded) == [events.HookEnded("r1", LOCK, 1, None)]
             doing.run(E_STOP, 2)
@@ -150,7 +150,7 @@ class TestLinks:
 
     @in_loop
     async def test_tell_that_a_flag_had_no_link_to_go_over(self, caplog):
-        async with noting_bridge() as bridge, Doing(bridge.url) as doing:
+        async with noting_bridge() as bridge, Activity(bridge.url) as doing:
             doing.links._tasks[bridge.url].lane.cut("no longer used")
             doing.run(LOCK, 1)
             (ended,) = doing.of(events.HookEnded)
@@ -274,7 +274,7 @@ def test_a_stop_that_was_reset_elsewhere_is_not_said_to_the_robot_any_more(bench
     bench.tell(events.LinkDown(URL, "tasks"))
     stop(bench)
     bench.tell(events.LockState(KEY, held=False, why="it has", elsewhere=True))
-    bench.tell(events.LatchSeen(KEY, None))
+    bench.tell(events.StopFileChanged(KEY, None))
     assert bench.report().hooks == ()
     bench.tell(events.LinkUp(URL, "tasks"))
     assert bench.did(actions.RunHook) == []

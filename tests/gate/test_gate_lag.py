@@ -10,8 +10,8 @@ from link_bench import in_loop, noting_bridge, until
 
 from webmap.base.geometry import Twist
 from webmap.gate.clock import now
-from webmap.gate.events import LinkUp, Measured, Scanned
-from webmap.gate.lanes.witness import WitnessLane
+from webmap.gate.events import LinkUp, OdometryReceived, ScanReceived
+from webmap.gate.lanes.odometry import OdometryLane
 from webmap.testing import FaultProxy, Shape
 
 STANDING, CREEPING = Twist(), Twist(0.1)
@@ -26,7 +26,7 @@ def lagging(bench, seconds, lag, twist=CREEPING, x=None):
     """Have odometry come at 20 Hz that was said ``lag`` seconds before, or later."""
 
     def each():
-        bench.tell(Measured(KEY, twist, bench.now - lag))
+        bench.tell(OdometryReceived(KEY, twist, bench.now - lag))
         if x is not None:
             bench.drive(x=x)
 
@@ -56,7 +56,7 @@ class TestDriving:
         at = bench.now
 
         def each():
-            bench.tell(Measured(KEY, CREEPING, at))
+            bench.tell(OdometryReceived(KEY, CREEPING, at))
             bench.drive(x=1.0)
 
         bench.run(2.0, each)
@@ -73,7 +73,7 @@ class TestStandstill:
     def test_what_was_said_before_stop_confirms_nothing(self, bench):
         bench.say("b", op="stop", robot="r1")
         at = bench.now
-        bench.run(1.0, lambda: bench.tell(Measured(KEY, STANDING, at - 0.01)))
+        bench.run(1.0, lambda: bench.tell(OdometryReceived(KEY, STANDING, at - 0.01)))
         assert bench.report().stop.confirmed is None
         lagging(bench, 0.5, 0.1, STANDING)
         assert bench.report().stop.confirmed is True
@@ -91,7 +91,7 @@ class TestStandstill:
         bench.say("b", op="ask", robot="r1")
         bench.say("a", op="grant", robot="r1")
         at = bench.now
-        bench.run(0.6, lambda: bench.tell(Measured(KEY, STANDING, at - 0.01)))
+        bench.run(0.6, lambda: bench.tell(OdometryReceived(KEY, STANDING, at - 0.01)))
         assert bench.report().holder is None
         lagging(bench, 0.4, 0.0, STANDING)
         assert bench.report().holder.connection == "b"
@@ -122,18 +122,18 @@ async def test_behind_a_narrow_link_nothing_is_taken_for_younger_than_it_is():
 
     async with noting_bridge() as bridge:
         with FaultProxy(bridge.port) as proxy:
-            witness = WitnessLane(f"ws://127.0.0.1:{proxy.port}", events.append)
+            witness = OdometryLane(f"ws://127.0.0.1:{proxy.port}", events.append)
             try:
                 witness.watch("/odom", None, KEY)
                 witness.watch_scan("/scan", KEY)
                 await until(lambda: bridge.of("subscribe", "/scan"), "that it listens")
                 assert of(LinkUp)
                 watched = now()
-                await until(lambda: witness._said_after > watched, "an answer")
+                await until(lambda: witness._sent_after > watched, "an answer")
                 (link,) = bridge.links
                 await bridge.send(link, ODOMETRY)
-                await until(lambda: of(Measured), "odometry at once")
-                assert of(Measured)[-1].said_after > watched
+                await until(lambda: of(OdometryReceived), "odometry at once")
+                assert of(OdometryReceived)[-1].sent_after > watched
 
                 proxy.shape(Shape(bandwidth=4000), "down")
                 frame = {"op": "publish", "topic": "/scan", "msg": SCAN}
@@ -141,9 +141,9 @@ async def test_behind_a_narrow_link_nothing_is_taken_for_younger_than_it_is():
                     await bridge.send(link, ODOMETRY)
                 await bridge.send(link, cbor2.dumps(frame))
                 said, at = now(), time.monotonic()
-                await until(lambda: of(Scanned), "a scan behind sixty of odometry")
+                await until(lambda: of(ScanReceived), "a scan behind sixty of odometry")
                 assert time.monotonic() - at > 1.0, "the link was narrow"
-                assert all(one.said_after <= said for one in of(Measured))
-                assert of(Scanned)[0].sweep.arrived <= said + 0.05
+                assert all(one.sent_after <= said for one in of(OdometryReceived))
+                assert of(ScanReceived)[0].sweep.arrived <= said + 0.05
             finally:
                 witness.lane.close()

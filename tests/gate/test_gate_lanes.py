@@ -16,7 +16,7 @@ from link_bench import (
 
 from webmap.gate.lanes import lane as lanes
 from webmap.gate.lanes import lane as waits
-from webmap.gate.lanes.sockets import Ears
+from webmap.gate.lanes.sockets import SocketHandlers
 
 
 def advertise(topic):
@@ -47,11 +47,11 @@ async def test_what_is_held_is_said_whenever_the_lane_opens_and_taken_back_once(
             await until(lambda: happened == ["up", "down", "up"], "another link")
             await until(lambda: len(bridge.told) == 4, "both hellos again")
             assert [t.topic for t in bridge.told] == ["/a", "/b", "/a", "/b"]
-            lane.let_go("a")
-            lane.let_go("b")
-            lane.let_go("silent")
+            lane.release_hold("a")
+            lane.release_hold("b")
+            lane.release_hold("silent")
             assert lane.wanted, "it was held twice"
-            lane.let_go("a")
+            lane.release_hold("a")
             assert not lane.wanted
             await until(lambda: bridge.of("unadvertise", "/a"), "the goodbye")
             assert len(bridge.told) == 5
@@ -89,7 +89,7 @@ async def test_a_link_whose_pings_are_not_answered_is_cut_and_made_anew(
 
     async with raw_bridge(talk) as url:
         with noting_lane(url, happened) as lane:
-            lane.hurry(0.02)
+            lane.ping_every(0.02)
             await until(lambda: happened[:3] == ["up", "down", "up"], "another link")
     assert "no answer for 0.1 s" in caplog.text
 
@@ -113,7 +113,7 @@ async def test_only_an_answer_to_a_ping_of_ours_proves_that_the_link_lives():
     async with raw_bridge(talk) as url:
         notes = {"pinged": pings.append, "pong": pongs.append}
         with noting_lane(url, happened, **notes) as lane:
-            lane.hurry(60.0)
+            lane.ping_every(60.0)
             await until(lambda: happened == ["up", b"said"], "all that nobody asked")
             assert (pings, pongs) == ([1], [])
             go_on.set()
@@ -126,12 +126,12 @@ async def test_a_lane_in_a_hurry_pings_at_once_and_then_more_often():
     pings = []
     async with noting_bridge() as bridge:
         with noting_lane(bridge.url, [], pinged=pings.append) as lane:
-            lane.hurry(60.0)
+            lane.ping_every(60.0)
             await until(lambda: pings == [1], "the first ping")
-            lane.hurry(0.01)
+            lane.ping_every(0.01)
             await until(lambda: len(pings) >= 5, "more of them")
             await until(lambda: not lane._changed.is_set(), "a ping under way")
-            lane.hurry(30.0)
+            lane.ping_every(30.0)
             assert not lane._changed.is_set(), "slower: no reason to ping now"
 
 
@@ -212,7 +212,7 @@ async def test_a_socket_that_closes_behind_a_stall_is_cut_before_the_next_one():
             while not first.unsent:
                 lane.write(b"x" * (1 << 20), only_if_clear=False)
             happened.append(b"full")
-            lane.hurry(0.01)
+            lane.ping_every(0.01)
             await until(lambda: len(links) == 2, "another link")
             assert first.unsent == 0, "it was thrown away"
             await until(lambda: happened[-1] == "up", "the word of it")
@@ -226,7 +226,9 @@ async def test_a_socket_that_is_handed_over_goes_on_and_the_lane_has_another():
         with noting_lane(bridge.url, happened) as lane:
             await until(lambda: happened == ["up"], "the link")
             lane.write(b'{"op": "subscribe", "topic": "/t"}', only_if_clear=True)
-            link = lane.spend(Ears(texts.append, lambda _: None, lambda _: None))
+            link = lane.spend(
+                SocketHandlers(texts.append, lambda _: None, lambda _: None)
+            )
             assert happened == ["up", "down"]
             await until(lambda: happened == ["up", "down", "up"], "another")
             await until(lambda: bridge.told, "the subscription")

@@ -8,10 +8,10 @@ from link_bench import in_loop
 
 from hanging_bridge import hanging_bridge, until
 from webmap.gate.actions import SendGoal
-from webmap.gate.events import Echoed, Key, LinkUp
+from webmap.gate.events import EchoReceived, Key, LinkUp
 from webmap.gate.lanes.control import ControlLane
+from webmap.gate.lanes.odometry import OdometryLane
 from webmap.gate.lanes.tasks import Calls, TasksLane
-from webmap.gate.lanes.witness import WitnessLane
 
 KEY = Key("ws://x", "/cmd_vel")
 MOVE_BASE = spec(
@@ -35,12 +35,12 @@ async def control(url, events):
     lane = ControlLane(url, events.append)
     lane.attach("/cmd_vel", "geometry_msgs/Twist")
     lane.listen("/cmd_vel")
-    await of(events, Echoed)
+    await of(events, EchoReceived)
     return lane, lambda: lane.ignore("/cmd_vel")
 
 
 async def witness(url, events):
-    lane = WitnessLane(url, events.append)
+    lane = OdometryLane(url, events.append)
     lane.watch("/odom", "nav_msgs/Odometry", KEY)
     lane.watch_scan("/scan", KEY)
     await of(events, LinkUp)

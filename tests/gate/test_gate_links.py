@@ -6,7 +6,14 @@ from link_bench import in_loop, noting_bridge, until
 from webmap.base.geometry import Twist
 from webmap.gate import actions
 from webmap.gate.clock import now
-from webmap.gate.events import Echoed, Key, LinkDown, LinkUp, Measured, Wrote
+from webmap.gate.events import (
+    EchoReceived,
+    Key,
+    LinkDown,
+    LinkUp,
+    OdometryReceived,
+    TwistWritten,
+)
 from webmap.gate.lanes.links import Links
 from webmap.gate.protocol import AssistSpec
 
@@ -82,11 +89,13 @@ async def test_a_velocity_goes_out_now_or_is_said_to_be_dropped():
     async with noting_bridge() as bridge, Noting() as noting:
         key = Key(bridge.url, "/cmd_vel")
         write = actions.WriteTwist(key, SLOW, 7, "a")
-        assert noting.do(write) == Wrote(key, SLOW, 7, "a", False), "no such robot"
+        assert noting.do(write) == TwistWritten(key, SLOW, 7, "a", False), (
+            "no such robot"
+        )
         noting.attach(spec(bridge_url=bridge.url))
-        assert noting.do(write) == Wrote(key, SLOW, 7, "a", False), "no link yet"
+        assert noting.do(write) == TwistWritten(key, SLOW, 7, "a", False), "no link yet"
         await noting.up("control", "tasks")
-        assert noting.do(write) == Wrote(key, SLOW, 7, "a", True)
+        assert noting.do(write) == TwistWritten(key, SLOW, 7, "a", True)
         await until(lambda: bridge.of("publish", "/cmd_vel"), "the velocity")
 
 
@@ -97,9 +106,9 @@ async def test_a_velocity_that_was_decided_before_a_pause_is_dropped_and_no_zero
         noting.attach(spec(bridge_url=bridge.url))
         await noting.up("control", "tasks")
         late = actions.WriteTwist(key, SLOW, 7, "a", now() - 0.001)
-        assert noting.do(late) == Wrote(key, SLOW, 7, "a", False)
+        assert noting.do(late) == TwistWritten(key, SLOW, 7, "a", False)
         zero = actions.WriteTwist(key, ZERO, 7, "a", now() - 0.001)
-        assert noting.do(zero) == Wrote(key, ZERO, 7, "a", True)
+        assert noting.do(zero) == TwistWritten(key, ZERO, 7, "a", True)
         await until(lambda: bridge.of("publish", "/cmd_vel"), "the zero")
         [told] = bridge.of("publish", "/cmd_vel")
         assert told.message["msg"]["linear"]["x"] == 0.0
@@ -167,9 +176,9 @@ async def test_of_two_robots_on_one_machine_the_other_stays_watched():
         await bridge.publish("/odom", MOVING)
         await bridge.publish("/odom2", MOVING)
         await bridge.publish("/cmd_vel", MOVING["twist"]["twist"])
-        await until(lambda: noting.of(Echoed), "what is said to the machine")
-        await until(lambda: noting.of(Measured), "how it moves")
-        seen = [(one.key, one.twist) for one in noting.of(Measured)]
+        await until(lambda: noting.of(EchoReceived), "what is said to the machine")
+        await until(lambda: noting.of(OdometryReceived), "how it moves")
+        seen = [(one.key, one.twist) for one in noting.of(OdometryReceived)]
         assert seen == [(key, Twist(0.5))], "of the second only"
         noting.do(actions.Detach(key, "r2"))
         await until(lambda: not bridge.links, "the end of it")
@@ -210,7 +219,7 @@ async def test_goals_poses_and_cancels_go_where_the_robot_takes_them():
         await noting.up("control", "tasks")
         sent = actions.SendGoal(key, "r1", "g1", 1.0, 2.0, 0.0, "a", "topic")
         assert noting.do(sent).done
-        assert noting.do(actions.TellPose(key, "r1", 1.0, 2.0, 0.5, "a")).done
+        assert noting.do(actions.SendPose(key, "r1", 1.0, 2.0, 0.5, "a")).done
         noting.do(actions.CancelGoals(key, "r1"))
         await until(lambda: bridge.of("publish", "/cancel"), "the cancel")
         assert [t.topic for t in bridge.of("publish")] == [

@@ -107,7 +107,7 @@ class Motion(RuleBasedStateMachine):
         if not self.bench.report().changing:
             return
         assert self._attempts()[-1].twist.is_zero
-        seen = events.Measured(self.bench_key, Twist(speed))
+        seen = events.OdometryReceived(self.bench_key, Twist(speed))
         self.bench.run(0.6, lambda: self.bench.tell(seen) if self.odometry else None)
         self._doubt()
         if speed or not self.odometry:
@@ -124,7 +124,7 @@ class Motion(RuleBasedStateMachine):
             last = bench.written[-1] if bench.written else None
             moves = last is not None and not (stops and bench.now - last.at > 0.2)
             twist = last.twist if moves else Twist()
-            bench.tell(events.Measured(self.bench_key, twist))
+            bench.tell(events.OdometryReceived(self.bench_key, twist))
             if not lets_go:
                 self._command(who, 0.0)
 
@@ -221,7 +221,7 @@ class Motion(RuleBasedStateMachine):
         holder = self.bench.report().holder
         self.bench.goal(who)
         if len(self.bench.did(actions.SendGoal)) > before:
-            assert not self.stands, "no goal starts while STOP stands"
+            assert not self.is_still, "no goal starts while STOP stands"
             assert holder is not None
             assert holder.connection == who, "only who has it sends it somewhere"
             self.last_seq[who] = self.bench.seq
@@ -232,7 +232,7 @@ class Motion(RuleBasedStateMachine):
         at, before = self.bench.now, len(self._attempts())
         self.bench.say(who, op="stop", robot=robot)
         assert self.bench.report().holder is None
-        self.stands = True
+        self.is_still = True
         self._doubt()
         zeros = [w for w in self._attempts() if w.at == at and w.twist.is_zero]
         assert zeros, "STOP is zero at once"
@@ -249,17 +249,17 @@ class Motion(RuleBasedStateMachine):
         named = self.seen if late else newest
         self.bench.say(who, op="reset", robot="r1", stop=named)
         assert len(self._attempts()) == before, "reset moves nothing"
-        assert self.bench.report().holder is None or not self.stands
+        assert self.bench.report().holder is None or not self.is_still
         if named == newest:
-            self.stands = False
+            self.is_still = False
 
     @rule(by=st.sampled_from(["Ann", "Ben"]))
     def another_gate_is_told_stop(self, by):
         """Its file is found where this gate's own STOP may be."""
         self.others += 1
         self.bench.disk[KEY] = Press(by, f"other-{self.others}")
-        self.bench.tell(events.LatchSeen(KEY, self.bench.disk[KEY]))
-        self.stands = True
+        self.bench.tell(events.StopFileChanged(KEY, self.bench.disk[KEY]))
+        self.is_still = True
         self._doubt()
 
     @rule()
@@ -267,7 +267,10 @@ class Motion(RuleBasedStateMachine):
         """Nothing is left of it but the disk."""
         old = self.bench
         driven = [a.driven for a in old.did(actions.MarkDriven)]
-        ticks, epochs = Ticks(old.tick + 1000), Epochs(old.gate._fleet._epochs.next())
+        ticks, epochs = (
+            Ticks(old.tick + 1000),
+            Epochs(old.gate._machines._epochs.next()),
+        )
         self.bench = PacedBench(
             now=old.now,
             beating=old.beating,
@@ -298,7 +301,7 @@ class Motion(RuleBasedStateMachine):
 
     @rule(who=st.sampled_from(PEOPLE), words=st.binary(max_size=30))
     def garbage(self, who, words):
-        self.bench.tell(protocol.FromBrowser(who, words))
+        self.bench.tell(protocol.FromPage(who, words))
 
     # The program.
 
@@ -334,7 +337,7 @@ class Motion(RuleBasedStateMachine):
 
         def fiftieth():
             if sees:
-                self.bench.tell(events.Measured(self.bench_key, Twist()))
+                self.bench.tell(events.OdometryReceived(self.bench_key, Twist()))
             if each is not None:
                 each()
 
@@ -344,7 +347,7 @@ class Motion(RuleBasedStateMachine):
 
     @property
     def bench_key(self):
-        return next(iter(self.bench.gate._fleet._bases))
+        return next(iter(self.bench.gate._machines._bases))
 
     def _rest(self, seconds):
         """Let time pass in which nobody does anything, and the gate is looked at less.
@@ -396,7 +399,7 @@ class Motion(RuleBasedStateMachine):
         self._rest(4.0)  # zeros on a new link go on for three seconds
         assert not self.bench.report().changing or not self.bench.up
         late = [w for w in self._attempts() if w.at > self.bench.now - 0.7]
-        if self.stands:
+        if self.is_still:
             assert all(w.twist.is_zero for w in late)
             assert len(late) >= 6 or not self.bench.up, "zeros while STOP stands"
         else:
@@ -497,9 +500,9 @@ class Motion(RuleBasedStateMachine):
 
     @invariant()
     def a_stop_stands_until_a_reset(self):
-        assert self.bench.report().latched == self.stands
-        assert (KEY in self.bench.disk) == self.stands
-        if self.stands:
+        assert self.bench.report().latched == self.is_still
+        assert (KEY in self.bench.disk) == self.is_still
+        if self.is_still:
             assert self.bench.report().holder is None
             assert all(w.twist.is_zero for w in self.bench.written[self.checked :])
 

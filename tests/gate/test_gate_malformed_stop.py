@@ -87,7 +87,7 @@ def two():
 
 
 def send(bench, data, who="b"):
-    bench.tell(protocol.FromBrowser(who, data))
+    bench.tell(protocol.FromPage(who, data))
 
 
 NAMES_ONE = [

@@ -33,7 +33,7 @@ def writer():
 
 def hear(writer, twist, times, now=100.0, every=0.1):
     for n in range(times):
-        writer.heard(twist, now + n * every)
+        writer.on_echo(twist, now + n * every)
 
 
 class TestWhatIsAnothers:
@@ -60,21 +60,21 @@ class TestWhatIsAnothers:
     def test_while_the_gate_writes_too_it_is_found(self, writer):
         for n in range(40):
             now = 100.0 + n * 0.05
-            writer.wrote(OURS, now)
-            writer.heard(OURS, now)
+            writer.on_written(OURS, now)
+            writer.on_echo(OURS, now)
             if n % 2:
-                writer.heard(THEIRS, now)
+                writer.on_echo(THEIRS, now)
         assert writer.seen == THEIRS
 
     def test_also_of_the_very_value_that_the_gate_writes(self, writer):
         for n in range(200):
             now = 100.0 + n * 0.05
-            writer.wrote(OURS, now)
+            writer.on_written(OURS, now)
             hear(writer, OURS, ECHOES + 1, now, 0.0)
         assert writer.seen == OURS
 
     def test_or_wrote_long_ago(self, writer):
-        writer.wrote(OURS, 100.0)
+        writer.on_written(OURS, 100.0)
         hear(writer, OURS, 2, 100.0 + REMEMBERED + 0.1)
         assert writer.seen == OURS
 
@@ -121,14 +121,14 @@ class TestWhatIsNot:
             now = 100.0 + n * 0.05
             if n < 200:
                 parts = rng.normal(size=3).round(rng.integers(1, 8)).tolist()
-                writer.wrote(Twist(*parts), now)
+                writer.on_written(Twist(*parts), now)
                 way.extend([(now + late, Twist(*map(echo, parts)))] * each)
             while way and way[0][0] <= now:
-                writer.heard(way.popleft()[1], now)
+                writer.on_echo(way.popleft()[1], now)
             writer.step(now)
             assert writer.seen is None
         for _, twist in way:  # a burst, after a stall
-            writer.heard(twist, now + 15.0)
+            writer.on_echo(twist, now + 15.0)
         assert writer.seen is None
 
     @settings(deadline=None, max_examples=200)
@@ -149,11 +149,11 @@ class TestWhatIsNot:
             now = next(clock)
             # As many as a link and its bridge hold.
             if sum(not twist.is_zero for twist in way) < MOST_ECHOES - ECHOES:
-                writer.wrote(Twist(speed), now)
+                writer.on_written(Twist(speed), now)
                 way.extend([Twist(speed)] * each)
             if held_up < 3:
                 while way:
-                    writer.heard(way.popleft(), now)
+                    writer.on_echo(way.popleft(), now)
         assert writer.seen is None
 
     def test_what_is_expected_is_no_news(self, writer):
@@ -166,7 +166,7 @@ class TestWhatIsNot:
 
     def test_what_was_written_long_ago_takes_no_memory(self, writer):
         for n in range(5000):
-            writer.wrote(Twist(n / 1000), 100.0 + n * 0.05)
+            writer.on_written(Twist(n / 1000), 100.0 + n * 0.05)
         assert len(writer._own) < 1.1 * REMEMBERED / 0.05
 
 
@@ -184,7 +184,7 @@ def publish(bench, seconds=0.5, twist=THEIRS, key=KEY):
 
     def each():
         if next(turn) % 2:
-            bench.tell(events.Echoed(key, twist))
+            bench.tell(events.EchoReceived(key, twist))
 
     bench.run(seconds, each)
 
@@ -203,14 +203,14 @@ class TestReport:
 
         def each():
             bench.drive(x=1.0)
-            bench.tell(events.Echoed(KEY, bench.written[-1].twist))
+            bench.tell(events.EchoReceived(KEY, bench.written[-1].twist))
 
         bench.run(1.0, each)
         assert bench.report().other_writer is None
 
         def both():
             each()
-            bench.tell(events.Echoed(KEY, THEIRS))
+            bench.tell(events.EchoReceived(KEY, THEIRS))
 
         bench.run(0.5, both)
         report = bench.report()
@@ -219,11 +219,11 @@ class TestReport:
     def test_it_is_said_beside_the_alarm(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
         bench.run(EXPECTED_FOR)
-        seen = events.Measured(KEY, Twist(0.4))
+        seen = events.OdometryReceived(KEY, Twist(0.4))
 
         def each():
             bench.tell(seen)
-            bench.tell(events.Echoed(KEY, THEIRS))
+            bench.tell(events.EchoReceived(KEY, THEIRS))
 
         bench.say("a", op="stop", robot="r1")
         bench.run(1.5, each)
@@ -245,7 +245,7 @@ class TestReport:
 
         def each():
             for _ in range(5):
-                bench.tell(events.Echoed(KEY, Twist(0.1 + next(turn) / 1000)))
+                bench.tell(events.EchoReceived(KEY, Twist(0.1 + next(turn) / 1000)))
 
         bench.run(1.0, each)
         assert 5 <= len(bench.of(protocol.RobotReport)) <= 11

@@ -99,5 +99,7 @@ class TestFraming:
         assert found == [Ready(5), Ready(5)]
 
     def test_a_length_that_makes_no_sense_ends_the_pipe(self):
-        with pytest.raises(pipe_module.WireError, match="a message of 4294967295 bytes"):
+        with pytest.raises(
+            pipe_module.WireError, match="a message of 4294967295 bytes"
+        ):
             Unpacker(FromGate).feed(b"\xff" * 8)

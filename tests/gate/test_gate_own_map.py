@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
-from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.events import Key
 from webmap.gate.lanes.tasks import in_own_map
 from webmap.gate.protocol import RobotSpec
@@ -47,7 +47,7 @@ def test_its_own_map_laid_on_the_common_one_gives_the_goal_again(x, y, a, gx, gy
 
 
 def test_a_pose_that_it_is_told_to_be_at_is_in_its_own_map_too():
-    at = TellPose(KEY, "r1", 10.0, 3.0, QUARTER, "c1")
+    at = SendPose(KEY, "r1", 10.0, 3.0, QUARTER, "c1")
     told = in_own_map(robot(own_map=(10.0, 0.0, QUARTER)), at)
     assert (told.x, told.y, told.yaw) == pytest.approx((3.0, 0.0, 0.0))
 

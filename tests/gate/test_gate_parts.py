@@ -15,14 +15,14 @@ from webmap.gate.rules.connections import (
     Connection,
     Epochs,
     Lease,
-    Rate,
+    RateLimit,
     Ticks,
     check_lease,
     check_role,
     check_take,
 )
-from webmap.gate.rules.health import Health, Pulse
-from webmap.gate.rules.motion import DEADMAN, NEUTRAL, Burst, DeadMan
+from webmap.gate.rules.health import DisplayPulse, LinkHealth
+from webmap.gate.rules.motion import DEADMAN, NEUTRAL, DeadMan, ZeroBurst
 
 axis = st.floats(-1e308, 1e308)
 positive = st.floats(0, 1e6)
@@ -256,7 +256,7 @@ class TestDeadMan:
 
 class TestBurst:
     def zeros(self, times, burst=None):
-        burst = burst or Burst()
+        burst = burst or ZeroBurst()
         burst.start(times[0])
         return [t for t in times if burst.zero_due(t)], burst
 
@@ -273,7 +273,7 @@ class TestBurst:
         assert zeros == [0.0, 0.32, 0.36]
 
     def test_can_be_ended(self):
-        burst = Burst()
+        burst = ZeroBurst()
         burst.start(0.0)
         burst.end()
         assert not burst.zero_due(0.0)
@@ -281,7 +281,7 @@ class TestBurst:
 
 class TestHealth:
     def test_only_a_link_that_answered_just_now_is_fresh(self):
-        link = Health()
+        link = LinkHealth()
         assert not link.fresh(0.0)
         link.opened(0.0)
         assert not link.fresh(0.0), "nothing was asked yet"
@@ -295,7 +295,7 @@ class TestHealth:
         assert not link.stalled(9.0)
 
     def test_an_answer_that_was_long_under_way_does_not_make_a_link_fresh(self):
-        link = Health()
+        link = LinkHealth()
         link.opened(0.0)
         for asked_at in (0.0, 0.05, 0.1):
             link.answered(asked_at, asked_at + 0.4)
@@ -303,7 +303,7 @@ class TestHealth:
         assert link.trips.p95 == pytest.approx(0.4)
 
     def test_a_link_that_says_nothing_for_a_second_is_stalled(self):
-        link = Health()
+        link = LinkHealth()
         link.opened(0.0)
         assert not link.stalled(1.0)
         assert link.stalled(1.01)
@@ -312,7 +312,7 @@ class TestHealth:
         assert link.stalled(2.01)
 
     def test_an_answer_counts_for_what_came_before_its_question(self):
-        link = Health()
+        link = LinkHealth()
         link.opened(1.0)
         assert not link.answered_since(0.9), "a handshake says nothing of when"
         link.answered(2.0, 2.5)
@@ -326,7 +326,7 @@ class TestHealth:
         assert link.trips.p95 is None
 
     def test_a_display_is_there_for_250_ms_after_its_heartbeat(self):
-        pulse = Pulse()
+        pulse = DisplayPulse()
         assert pulse.doubt(0.0)
         pulse.beat(0.0)
         assert pulse.doubt(0.25) is None
@@ -338,7 +338,7 @@ class TestHealth:
 
 class TestConnection:
     def test_too_often_is_the_limit_within_a_second(self):
-        rate = Rate(3)
+        rate = RateLimit(3)
         assert [rate.too_often(t) for t in (0.0, 0.5, 1.1, 1.2)] == [
             False,
             False,
@@ -355,7 +355,7 @@ class TestConnection:
 
     def test_the_same_refusal_is_news_once_a_second(self):
         connection = Connection("c1", "Ann", "operator")
-        news = connection.news
+        news = connection.is_new_refusal
         assert news("r1", "drive", "why", 0.0)
         assert not news("r1", "drive", "why", 0.9)
         assert news("r1", "drive", "another", 0.9)
@@ -363,7 +363,7 @@ class TestConnection:
 
 
 def test_a_burst_that_begins_again_ends_no_earlier_than_it_would_have():
-    burst = Burst(period=0.05, length=0.5)
+    burst = ZeroBurst(period=0.05, length=0.5)
     burst.start(0.0, 3.0)
     burst.start(1.0)
     assert due_until(burst, 1.0, 5.0) == pytest.approx(3.0, abs=0.06)
@@ -371,7 +371,7 @@ def test_a_burst_that_begins_again_ends_no_earlier_than_it_would_have():
     assert due_until(burst, 6.0, 9.0) == pytest.approx(6.5, abs=0.06)
 
 
-def due_until(burst: Burst, now: float, end: float) -> float:
+def due_until(burst: ZeroBurst, now: float, end: float) -> float:
     """Return when a burst wrote its last zero."""
     last = now
     while now < end:

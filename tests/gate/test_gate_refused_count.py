@@ -2,8 +2,8 @@
 
 import pytest
 
-from webmap.gate.actions import Say
-from webmap.gate.protocol import Connect, Disconnect, FromBrowser, RefusedCount
+from webmap.gate.actions import SendToDisplay
+from webmap.gate.protocol import Connect, Disconnect, FromPage, RefusedCount
 from webmap.gate.rules.gate import Gate
 
 
@@ -15,7 +15,7 @@ def gate() -> Gate:
 
 
 def counts(actions):
-    said = [action.message for action in actions if isinstance(action, Say)]
+    said = [action.message for action in actions if isinstance(action, SendToDisplay)]
     return [message for message in said if isinstance(message, RefusedCount)]
 
 
@@ -23,7 +23,7 @@ def garbage(gate, texts, at):
     return [
         count
         for text in texts
-        for count in counts(gate.handle(FromBrowser("c1", text.encode()), at))
+        for count in counts(gate.handle(FromPage("c1", text.encode()), at))
     ]
 
 

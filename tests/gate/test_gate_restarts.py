@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.gate.display.client import HEEDED, Unheard
+from webmap.gate.display.client import HEEDED, PendingStops
 from webmap.gate.display.supervisor import LIVED, LONGEST_PAUSE, Restarts, in_words
 
 
@@ -65,7 +65,7 @@ class TestRestarts:
 class TestUnheard:
     @pytest.fixture
     def unheard(self):
-        unheard = Unheard()
+        unheard = PendingStops()
         unheard.say(None, "r1", 10.0)
         unheard.say("c1", None, 10.5)
         return unheard

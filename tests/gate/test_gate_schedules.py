@@ -69,7 +69,7 @@ def reset(bench, chance):
 
 def stop_elsewhere(bench, chance):
     bench.disk[KEY] = Press("Ann", f"other-{chance.randrange(1000)}")
-    bench.tell(events.LatchSeen(KEY, bench.disk[KEY]))
+    bench.tell(events.StopFileChanged(KEY, bench.disk[KEY]))
 
 
 def goal(bench, chance):
@@ -77,12 +77,12 @@ def goal(bench, chance):
 
 
 def odometry(bench, chance):
-    seen = events.Measured(KEY, Twist(chance.choice([0.0, 0.02, 0.3, 1.0])))
+    seen = events.OdometryReceived(KEY, Twist(chance.choice([0.0, 0.02, 0.3, 1.0])))
     bench.run(chance.choice([0.3, 1.2]), lambda: bench.tell(seen))
 
 
 def echo(bench, chance):
-    bench.tell(events.Echoed(KEY, Twist(chance.choice([0.0, 0.5]))))
+    bench.tell(events.EchoReceived(KEY, Twist(chance.choice([0.0, 0.5]))))
 
 
 def speeds(bench, chance):

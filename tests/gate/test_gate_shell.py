@@ -67,7 +67,7 @@ class Running:
 
     def say(self, **command):
         text = json.dumps(command).encode()
-        self.shell.tell(protocol.FromBrowser("a", text))
+        self.shell.tell(protocol.FromPage("a", text))
 
     @property
     def tick(self):

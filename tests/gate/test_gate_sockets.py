@@ -13,7 +13,7 @@ from link_bench import (
     PING,
     PONG,
     TEXT,
-    Heard,
+    Received,
     frame,
     in_loop,
     noting_bridge,
@@ -41,7 +41,7 @@ async def forever(link):
 class TestOpen:
     @in_loop
     async def test_what_is_sent_arrives_and_the_answer_is_heard(self):
-        heard = Heard()
+        heard = Received()
         async with noting_bridge() as bridge:
             link = await opened(bridge.url, heard)
             assert link.is_open
@@ -57,7 +57,7 @@ class TestOpen:
 
     @in_loop
     async def test_a_message_in_pieces_is_heard_once_and_whole(self):
-        heard = Heard()
+        heard = Received()
 
         async def talk(link):
             await link.accept()
@@ -75,7 +75,7 @@ class TestOpen:
 
     @in_loop
     async def test_a_ping_of_the_bridge_is_answered_and_heard_by_nobody(self):
-        heard, answers = Heard(), []
+        heard, answers = Received(), []
 
         async def talk(link):
             await link.accept(frame(PING, b"there?"))
@@ -99,7 +99,7 @@ class TestOpen:
             return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
 
         monkeypatch.setattr(ssl, "create_default_context", slow_disk)
-        asking = asyncio.create_task(opened("wss://127.0.0.1:1", Heard()))
+        asking = asyncio.create_task(opened("wss://127.0.0.1:1", Received()))
         await until(reading.is_set, "the reading")  # which another robot's loop sees
         may_end.set()
         with pytest.raises(BridgeClosed):
@@ -129,9 +129,9 @@ class TestOpen:
                 port = server.sockets[0].getsockname()[1]
                 url = f"wss://localhost:{port}"
                 with pytest.raises(BridgeClosed, match="certificate"):
-                    await opened(url, Heard())
+                    await opened(url, Received())
                 monkeypatch.setenv("SSL_CERT_FILE", cert)
-                heard = Heard()
+                heard = Received()
                 link = await opened(url, heard)
                 link.send(b"hello")
                 await until(lambda: heard.lost, "the end of it")
@@ -147,7 +147,7 @@ class TestRefused:
             taken.bind(("127.0.0.1", 0))
             url = f"ws://127.0.0.1:{taken.getsockname()[1]}"
             with pytest.raises(BridgeClosed, match=f"{url}: .*Connect call failed"):
-                await opened(url, Heard())
+                await opened(url, Received())
 
     @pytest.mark.parametrize(
         "answer",
@@ -159,7 +159,7 @@ class TestRefused:
     )
     @in_loop
     async def test_what_speaks_no_websocket_is_refused_with_the_reason(self, answer):
-        heard = Heard()
+        heard = Received()
 
         async def talk(link):
             await link.request()
@@ -173,7 +173,7 @@ class TestRefused:
 
     @in_loop
     async def test_a_bridge_that_hangs_up_before_the_handshake_is_refused(self):
-        heard = Heard()
+        heard = Received()
 
         async def talk(link):
             await link.request()
@@ -189,7 +189,7 @@ class TestRefused:
         self, monkeypatch
     ):
         monkeypatch.setattr(sockets, "CONNECT_TIMEOUT", 0.1)
-        heard, ended = Heard(), []
+        heard, ended = Received(), []
 
         async def talk(link):
             await link.request()
@@ -206,7 +206,7 @@ class TestRefused:
 
     @in_loop
     async def test_an_attempt_that_is_no_longer_wanted_leaves_nothing_behind(self):
-        heard, asked, ended = Heard(), asyncio.Event(), []
+        heard, asked, ended = Received(), asyncio.Event(), []
 
         async def talk(link):
             await link.request()
@@ -227,7 +227,7 @@ class TestRefused:
 
     @in_loop
     async def test_a_socket_that_never_connected_is_closed_without_a_word(self):
-        heard = Heard()
+        heard = Received()
         link = Socket("ws://127.0.0.1:1", heard.ears, Budget())
         assert link.unsent == 0
         link.close()
@@ -239,7 +239,7 @@ class TestRefused:
 class TestEnd:
     @in_loop
     async def test_of_a_socket_that_is_cut_what_was_not_sent_never_arrives(self):
-        heard, arrived, go_on = Heard(), [], asyncio.Event()
+        heard, arrived, go_on = Received(), [], asyncio.Event()
 
         async def talk(link):
             await link.accept()
@@ -268,7 +268,7 @@ class TestEnd:
 
     @in_loop
     async def test_a_goodbye_is_said_and_what_comes_after_it_is_heard_by_nobody(self):
-        heard, goodbyes, go_on = Heard(), [], asyncio.Event()
+        heard, goodbyes, go_on = Received(), [], asyncio.Event()
 
         async def talk(link):
             await link.accept()
@@ -287,7 +287,7 @@ class TestEnd:
 
     @in_loop
     async def test_a_bridge_that_says_goodbye_is_lost(self):
-        heard = Heard()
+        heard = Received()
 
         async def talk(link):
             await link.accept()
@@ -301,7 +301,7 @@ class TestEnd:
 
     @in_loop
     async def test_a_bridge_that_only_stops_sending_is_lost(self):
-        heard = Heard()
+        heard = Received()
 
         async def talk(link):
             await link.accept()
@@ -316,7 +316,7 @@ class TestEnd:
 
     @in_loop
     async def test_a_bridge_that_dies_is_lost_with_the_reason_of_the_system(self):
-        heard = Heard()
+        heard = Received()
         async with noting_bridge() as bridge:
             link = await opened(bridge.url, heard)
             link.send(b'{"op": "x"}')
@@ -330,7 +330,7 @@ class TestEnd:
     @in_loop
     async def test_a_message_that_is_too_long_ends_the_link(self, monkeypatch):
         monkeypatch.setattr(sockets, "MAX_FRAME", 100)
-        heard = Heard()
+        heard = Received()
 
         async def talk(link):
             await link.accept()

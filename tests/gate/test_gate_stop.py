@@ -45,7 +45,7 @@ def watch_it(bench, seconds, *speeds):
 
     def each():
         now[0] = next(wanted, now[0])
-        bench.tell(events.Measured(KEY, Twist(now[0])))
+        bench.tell(events.OdometryReceived(KEY, Twist(now[0])))
 
     bench.run(seconds, each)
 
@@ -108,7 +108,7 @@ class TestLatch:
         bench.done.clear()
         stop(bench)
         kinds = [type(each) for each in bench.done]
-        disk = (actions.MarkDriven, actions.KeepLatch)
+        disk = (actions.MarkDriven, actions.SaveStop)
         first = min(kinds.index(kind) for kind in disk)
         assert kinds.index(actions.WriteTwist) < first
 
@@ -301,9 +301,9 @@ class TestByAnotherKey:
         bench.tell(spec(id="r2", twist_topic=None))
         reset(bench, robot="r2")
         bench.tell(protocol.Forget("r2"))
-        kept = len(bench.did(actions.KeepLatch))
+        kept = len(bench.did(actions.SaveStop))
         reset(bench)
-        assert len(bench.did(actions.KeepLatch)) == kept + 1
+        assert len(bench.did(actions.SaveStop)) == kept + 1
 
     def test_one_that_is_not_stopped_is_not(self):
         bench = Bench().begin(self.ONLY_GOALS)
@@ -317,7 +317,7 @@ class TestOnDisk:
         bench = Bench(slow_disk=True).begin()
         bench.drive_off()
         stop(bench)
-        kept = (actions.WriteTwist, actions.KeepLatch)
+        kept = (actions.WriteTwist, actions.SaveStop)
         last = [a for a in bench.done if isinstance(a, kept)][-2:]
         assert last[0].twist == ZERO
         assert (last[1].number, last[1].press.by) == (1, "B")
@@ -332,12 +332,12 @@ class TestOnDisk:
         bench = Bench(slow_disk=True).begin()
         for who in "babab":
             stop(bench, who)
-        (first,) = bench.did(actions.KeepLatch)
+        (first,) = bench.did(actions.SaveStop)
         bench.keep(first)
         assert bench.report().stop.by == "B"
-        _, newest = bench.did(actions.KeepLatch)
+        _, newest = bench.did(actions.SaveStop)
         bench.keep(newest)
-        assert len(bench.did(actions.KeepLatch)) == 2
+        assert len(bench.did(actions.SaveStop)) == 2
         assert bench.report().stop.id == newest.press.id
         assert newest.press.id != first.press.id
 
@@ -354,10 +354,10 @@ class TestOnDisk:
     def test_an_answer_of_the_disk_that_was_overtaken_does_not_count(self):
         bench = Bench(slow_disk=True).begin()
         stop(bench)
-        (only,) = bench.did(actions.KeepLatch)
+        (only,) = bench.did(actions.SaveStop)
         bench.say("b", op="reset", robot="r1", stop=only.press.id)
         stop(bench)
-        first, second, third = bench.did(actions.KeepLatch)
+        first, second, third = bench.did(actions.SaveStop)
         bench.keep(first)
         bench.keep(second)
         bench.run(0.1)
@@ -370,7 +370,7 @@ class TestOnDisk:
         stop(bench)
         bench.tell(protocol.Forget("r1"))
         bench.run(1.0)
-        bench.keep(bench.did(actions.KeepLatch)[-1])
+        bench.keep(bench.did(actions.SaveStop)[-1])
         bench.tell(spec())
         assert bench.report().latched
 
@@ -391,7 +391,7 @@ class TestOnDisk:
         bench.begin()
         assert bench.written[0].twist == ZERO
         assert bench.did(actions.CancelGoals)
-        assert bench.did(actions.KeepLatch) == []
+        assert bench.did(actions.SaveStop) == []
         report = bench.report()
         assert (report.latched, report.stop.by) == (True, "B")
         assert bench.drive_off() is None
@@ -488,15 +488,15 @@ class TestConfirmation:
 
     def test_a_turn_is_a_motion_too(self, seen):
         stop(seen)
-        seen.run(1.0, lambda: seen.tell(events.Measured(KEY, Twist(0, 0, 0.1))))
+        seen.run(1.0, lambda: seen.tell(events.OdometryReceived(KEY, Twist(0, 0, 0.1))))
         assert seen.report().stop.confirmed is None
-        seen.run(1.1, lambda: seen.tell(events.Measured(KEY, Twist(0, 0, 0.1))))
+        seen.run(1.1, lambda: seen.tell(events.OdometryReceived(KEY, Twist(0, 0, 0.1))))
         assert seen.report().stop.why == "still turning at 0.10 rad/s"
 
     def test_odometry_with_gaps_proves_nothing(self, seen):
         stop(seen)
         for _ in range(3):
-            seen.tell(events.Measured(KEY, ZERO))
+            seen.tell(events.OdometryReceived(KEY, ZERO))
             seen.run(0.6)
         assert seen.report().stop.confirmed is None
 
@@ -511,7 +511,7 @@ class TestConfirmation:
     def test_odometry_that_does_not_come_confirms_nothing(self, seen, told):
         stop(seen)
         for twist in told:
-            seen.tell(events.Measured(KEY, twist))
+            seen.tell(events.OdometryReceived(KEY, twist))
         seen.run(2.2)
         assert verdict(seen) == ("B", False, "no odometry")
 
@@ -672,7 +672,7 @@ class TestResetNamesAStop:
         stop(bench)
         seen = bench.stop_of()
         bench.disk[KEY] = Press("Ann", "a1")
-        bench.tell(events.LatchSeen(KEY, Press("Ann", "a1")))
+        bench.tell(events.StopFileChanged(KEY, Press("Ann", "a1")))
         assert bench.report().stop.by == "Ann"
         bench.say("b", op="reset", robot="r1", stop=seen)
         assert bench.report().latched
@@ -685,7 +685,7 @@ class TestResetNamesAStop:
         bench.disk[KEY] = Press("Ann", "a1")
         reset(bench)
         assert bench.stops == {KEY: "Ann"}, "its file is not taken away"
-        bench.tell(events.LatchSeen(KEY, Press("Ann", "a1")))
+        bench.tell(events.StopFileChanged(KEY, Press("Ann", "a1")))
         assert bench.report().latched
 
     def test_of_a_python_program_likewise(self, bench):
@@ -709,7 +709,7 @@ class TestResetNamesAStop:
         stop(bench)
         for stated in ({}, {"stop": ""}, {"stop": 7}, {"stop": "x" * 65}):
             command = {"op": "reset", "robot": "r1", **stated}
-            bench.tell(protocol.FromBrowser("b", json.dumps(command).encode()))
+            bench.tell(protocol.FromPage("b", json.dumps(command).encode()))
             bench.run(1.1)
         assert len(bench.refusals("b")) == 4
         assert bench.report().latched
@@ -718,10 +718,10 @@ class TestResetNamesAStop:
         bench = Bench(slow_disk=True).begin()
         stop(bench)
         stop(bench, "a")
-        bench.tell(events.LatchSeen(KEY, bench.did(actions.KeepLatch)[0].press))
-        assert len(bench.did(actions.KeepLatch)) == 1
-        bench.keep(bench.did(actions.KeepLatch)[0])
-        bench.keep(bench.did(actions.KeepLatch)[1])
+        bench.tell(events.StopFileChanged(KEY, bench.did(actions.SaveStop)[0].press))
+        assert len(bench.did(actions.SaveStop)) == 1
+        bench.keep(bench.did(actions.SaveStop)[0])
+        bench.keep(bench.did(actions.SaveStop)[1])
         assert bench.report().stop.by == "A"
 
     def test_of_a_robot_that_has_another_topic_now_the_newer_stop_stands(self, bench):

@@ -8,7 +8,7 @@ from webmap.gate import actions, events, protocol
 from webmap.gate.events import StopRecord
 
 
-class Base:
+class Machine:
     """A base behind the bench that has, or has not, a timeout of its own."""
 
     def __init__(self, bench, timeout=0.3):
@@ -33,7 +33,7 @@ class Base:
                 self.said += 1
                 between = self.coarse and self.said % self.coarse == 0
                 speed = 0.0 if between else self.speed
-                self.bench.tell(events.Measured(KEY, Twist(speed)))
+                self.bench.tell(events.OdometryReceived(KEY, Twist(speed)))
             if x is not None:
                 self.bench.drive(who, x=x)
 
@@ -45,13 +45,13 @@ def bench():
     """A has the robot, its hands were seen, and nobody knows whether it stops."""
     bench = Bench().begin(spec(odometry_topic="/odom", stops_within=None))
     bench.take("a")
-    Base(bench).run(0.4)
+    Machine(bench).run(0.4)
     return bench
 
 
 @pytest.fixture
 def base(bench):
-    return Base(bench)
+    return Machine(bench)
 
 
 def begin(bench, who="a"):
@@ -93,7 +93,7 @@ class TestRunning:
         assert len(bench.since(at - 0.01)) == 1
 
     def test_a_base_that_moves_on_is_found_and_gets_zero(self, bench):
-        base = Base(bench, timeout=None)
+        base = Machine(bench, timeout=None)
         begin(bench)
         base.run(0.2)
         left = bench.written[-1].at
@@ -111,7 +111,7 @@ class TestRunning:
         assert report.why == ("stop test failed on 2026-11-21",)
 
     def test_a_coarse_encoder_does_not_stop_a_base_that_moves_on(self, bench):
-        base = Base(bench, timeout=None)
+        base = Machine(bench, timeout=None)
         base.coarse = 6
         begin(bench)
         base.run(3.5)
@@ -119,7 +119,7 @@ class TestRunning:
         assert bench.report().stop_time is None
 
     def test_it_stopped_when_the_standstill_began_that_lasted(self, bench):
-        base = Base(bench, timeout=0.8)
+        base = Machine(bench, timeout=0.8)
         base.coarse = 6
         begin(bench)
         base.run(1.6)
@@ -128,7 +128,7 @@ class TestRunning:
     def test_a_base_that_stops_at_the_last_moment_is_looked_at_until_it_is_sure(
         self, bench
     ):
-        base = Base(bench, timeout=2.8)
+        base = Machine(bench, timeout=2.8)
         begin(bench)
         base.run(3.1)
         assert state(bench) == "waiting"
@@ -141,21 +141,21 @@ class TestRunning:
         base.run(0.1)
         assert state(bench) == "waiting"
         for write in bench.written:
-            bench.tell(events.Echoed(KEY, write.twist))
+            bench.tell(events.EchoReceived(KEY, write.twist))
         assert state(bench) == "waiting", "those are ours"
-        bench.tell(events.Echoed(KEY, foreign))
+        bench.tell(events.EchoReceived(KEY, foreign))
         assert "another program sent commands" in bench.report().test.text
         assert state(bench) == "failed"
         assert bench.written[-1].twist == ZERO
-        assert bench.did(actions.KeepStopTest) == []
+        assert bench.did(actions.SaveStopTest) == []
 
     def test_what_others_say_while_it_creeps_ends_nothing_yet(self, bench, base):
         begin(bench)
-        bench.tell(events.Echoed(KEY, ZERO))
+        bench.tell(events.EchoReceived(KEY, ZERO))
         assert state(bench) == "creeping"
 
     def test_a_base_that_stops_late_stays_slow(self, bench):
-        base = Base(bench, timeout=1.0)
+        base = Machine(bench, timeout=1.0)
         begin(bench)
         base.run(1.5)
         assert state(bench) == "done"
@@ -163,11 +163,11 @@ class TestRunning:
         assert "command timeout of the base over 0.5 s: 1" in bench.report().why[0]
 
     def test_a_base_that_does_not_move_proves_nothing(self, bench):
-        base = Base(bench, timeout=0.0)
+        base = Machine(bench, timeout=0.0)
         begin(bench)
         base.run(1.6)
         assert bench.report().test.text == "the robot did not move within 1.5 s"
-        assert bench.did(actions.KeepStopTest) == []
+        assert bench.did(actions.SaveStopTest) == []
         assert bench.written[-1].twist == ZERO
         assert bench.report().stop_source is None
 
@@ -187,7 +187,7 @@ class TestRunning:
         base.run(1.5)
         begin(bench)
         base.run(1.5)
-        assert len(bench.did(actions.KeepStopTest)) == 2
+        assert len(bench.did(actions.SaveStopTest)) == 2
 
     def test_a_machine_stays_marked_while_nothing_is_sent(self, bench, base):
         begin(bench)
@@ -200,7 +200,7 @@ class TestRunning:
     def test_odometry_without_a_velocity_tells_nothing(self, bench, base):
         begin(bench)
         base.run(0.2)
-        bench.tell(events.Measured(KEY, None))
+        bench.tell(events.OdometryReceived(KEY, None))
         assert state(bench) == "waiting"
 
 
@@ -221,7 +221,7 @@ class TestDoubt:
         ],
     )
     def test_ends_it_with_zero(self, bench, phase, doubt, text):
-        base = Base(bench, timeout=None)
+        base = Machine(bench, timeout=None)
         begin(bench)
         base.run(0.05)
         if phase == "creeping":
@@ -255,7 +255,7 @@ class TestDoubt:
                 bench.connect_links()
         assert bench.report().test == protocol.TestReport("failed", text)
         assert bench.written[-1].twist == ZERO
-        assert bench.did(actions.KeepStopTest) == []
+        assert bench.did(actions.SaveStopTest) == []
         base.run(0.5, x=1.0)
         pressed = [w for w in bench.moving_since(at) if w.twist != Twist(0.1)]
         assert pressed == []
@@ -265,7 +265,7 @@ class TestDoubt:
         base.run(0.05)
         bench.now += 0.25
         bench.tell(protocol.Heartbeat())
-        bench.tell(events.Alive(KEY.url, bench.now))
+        bench.tell(events.PingAnswered(KEY.url, bench.now))
         bench.drive(x=0.0)
         assert bench.report().test.text == "the page stopped sending commands"
         assert bench.written[-1].twist == ZERO
@@ -302,7 +302,7 @@ class TestRefused:
 
     @pytest.mark.parametrize("motion", [Twist(0.2), Twist(0.0, 0.0, 0.3)])
     def test_while_something_else_moves_it(self, bench, motion):
-        bench.tell(events.Measured(KEY, motion))
+        bench.tell(events.OdometryReceived(KEY, motion))
         assert self.why(bench) == "the robot is already moving"
 
     def test_without_odometry(self):
@@ -333,7 +333,7 @@ class TestKept:
     def test_a_result_for_a_machine_that_is_gone_does_no_harm(self, bench):
         bench.tell(protocol.Forget("r1"))
         bench.run(1.0)
-        bench.tell(events.StopTestKept(KEY, StopRecord(0.2, "2026-11-20")))
+        bench.tell(events.StopTestSaved(KEY, StopRecord(0.2, "2026-11-20")))
 
     def test_what_was_stated_is_shown_as_that(self):
         bench = Bench().begin(spec(stops_within=0.25))

@@ -100,7 +100,9 @@ class Links:
         if not isinstance(action, actions.WriteTwist):
             return None
         self.written.append((action.key, action.twist))
-        return events.Wrote(action.key, action.twist, action.epoch, action.by, True)
+        return events.TwistWritten(
+            action.key, action.twist, action.epoch, action.by, True
+        )
 
 
 class Outbox:

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
-from webmap.gate.events import Sweep
+from webmap.gate.events import Scan
 from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import assist, polygon_around
-from webmap.gate.rules.scan_geometry import Fan, looks_ahead
+from webmap.gate.rules.scan_geometry import ScanDirections, looks_ahead
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 PART = "scan assist: the scan covers only a part of the path"
@@ -27,7 +27,7 @@ def scan(first, last, *, step=1.0):
     count = round((last - first) / step) + 1
     ranges = [math.inf] * count
     low, each = math.radians(first), math.radians(step)
-    return Sweep(low, each, 0.05, 8.0, ranges, 0.0)
+    return Scan(low, each, 0.05, 8.0, ranges, 0.0)
 
 
 def verdict(sweep, wanted, **more):
@@ -69,7 +69,7 @@ class TestAhead:
 
     def test_rays_may_run_the_other_way_round(self):
         there = scan(-90, 90)
-        back = Sweep(
+        back = Scan(
             -there.angle_min, -there.angle_increment, 0.05, 8.0, there.ranges, 0
         )
         assert verdict(back, AHEAD).scale == 1.0
@@ -106,24 +106,24 @@ class TestOtherWays:
 class TestFan:
     @given(st.floats(-10, 10), st.floats(0.001, 0.5), st.integers(1, 400))
     def test_covers_each_of_its_rays_and_the_way_to_the_next(self, first, step, count):
-        fan = Fan(first, step, count)
+        fan = ScanDirections(first, step, count)
         for ray in range(count):
             assert fan.covers(first + (ray + 0.4) * step)
             assert fan.covers(first + ray * step - math.tau)
 
     @given(st.floats(-math.pi, math.pi), st.floats(0.001, 0.1), st.floats(-0.9, 0.9))
     def test_covers_nothing_on_the_other_side(self, first, step, aside):
-        fan = Fan(first, step, 2)
+        fan = ScanDirections(first, step, 2)
         other = first + math.pi + aside * (math.pi - 0.4)
         assert not fan.covers(other)
 
     def test_a_whole_circle_covers_everything(self):
-        fan = Fan(-math.pi, math.radians(1), 360)
+        fan = ScanDirections(-math.pi, math.radians(1), 360)
         assert fan.share == 1.0
         assert all(fan.covers(math.radians(angle / 3)) for angle in range(-999, 999))
 
 
 def test_a_robot_that_goes_nowhere_needs_no_eyes():
-    nothing = Fan(3.0, 0.01, 1)
+    nothing = ScanDirections(3.0, 0.01, 1)
     assert looks_ahead(nothing, BOX, (0.0, 0.0, 0.0), AHEAD, 0.1, 0.15)
     assert not looks_ahead(nothing, BOX, (0.0, 0.0, 0.0), AHEAD, 1.0, 0.15)

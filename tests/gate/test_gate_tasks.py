@@ -5,7 +5,7 @@ import json
 from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
-from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, LinkDown, LinkUp
 from webmap.gate.lanes import tasks
 from webmap.gate.lanes.tasks import Calls, TasksLane, goal_topics, hook_topics
@@ -110,8 +110,8 @@ class TestTopicGoals:
             assert not noting.tasks.send(spec(), goal("g2"))
             await noting.up(2)
             located = spec(pose_topic="/initialpose")
-            at = TellPose(Key("ws://x", "/cmd_vel"), "r1", 1.0, 2.0, 0.0, "a")
-            assert noting.tasks.tell_pose(located, at)
+            at = SendPose(Key("ws://x", "/cmd_vel"), "r1", 1.0, 2.0, 0.0, "a")
+            assert noting.tasks.send_pose(located, at)
             await until(lambda: bridge.of("publish", "/initialpose"), "the pose")
             assert len(bridge.of("publish", "/goal")) == 1
 

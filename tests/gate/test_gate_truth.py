@@ -22,7 +22,7 @@ class TestAlarm:
 
     def run(self, bench, seconds, speed, x=None, turn=0.0):
         def each():
-            bench.tell(events.Measured(KEY, Twist(speed, 0.0, turn)))
+            bench.tell(events.OdometryReceived(KEY, Twist(speed, 0.0, turn)))
             if x is not None:
                 bench.drive(x=x)
 
@@ -82,10 +82,10 @@ class TestAlarm:
 
     def test_odometry_after_a_long_silence_tells_nothing_of_that_zero(self):
         obedience = Obedience()
-        obedience.wrote(ZERO, Twist(0.5), 0.0)
-        obedience.saw(None, 0.5)
+        obedience.on_written(ZERO, Twist(0.5), 0.0)
+        obedience.observe(None, 0.5)
         assert obedience.alarm(1.5) is None
-        obedience.saw(Twist(0.5), 9.0)
+        obedience.observe(Twist(0.5), 9.0)
         assert obedience.alarm(9.5) is None
         assert not obedience.watching(9.5)
 
@@ -131,44 +131,44 @@ class TestAlarm:
 
     def test_the_second_counts_from_the_first_zero(self):
         obedience = Obedience()
-        obedience.wrote(ZERO, Twist(0.5), 0.0)
-        obedience.wrote(ZERO, ZERO, 0.5)
+        obedience.on_written(ZERO, Twist(0.5), 0.0)
+        obedience.on_written(ZERO, ZERO, 0.5)
         obedience.expect(0.6)
-        obedience.saw(Twist(0.2), 0.9)
+        obedience.observe(Twist(0.2), 0.9)
         assert obedience.alarm(0.95) is None
         assert obedience.alarm(1.0) == "zero sent, still moving at 0.20 m/s"
 
     def test_one_message_that_says_it_stands_in_every_six_excuses_nobody(self):
         obedience = Obedience()
-        obedience.wrote(ZERO, Twist(0.5), 0.0)
+        obedience.on_written(ZERO, Twist(0.5), 0.0)
         for n in range(1, 200):
             now = n * 0.02
-            obedience.saw(ZERO if n % 6 == 0 else Twist(0.5), now)
+            obedience.observe(ZERO if n % 6 == 0 else Twist(0.5), now)
             expected = "zero sent, still moving at 0.50 m/s" if now >= 1.0 else None
             assert obedience.alarm(now) == expected, now
 
     def test_it_ends_when_the_robot_has_stood_for_a_while(self):
         obedience = Obedience()
-        obedience.wrote(ZERO, Twist(0.5), 0.0)
-        obedience.saw(Twist(0.5), 0.9)
-        obedience.saw(Twist(0.0, 0.0, 0.4), 1.4)
+        obedience.on_written(ZERO, Twist(0.5), 0.0)
+        obedience.observe(Twist(0.5), 0.9)
+        obedience.observe(Twist(0.0, 0.0, 0.4), 1.4)
         assert obedience.alarm(1.4) == "zero sent, still turning at 0.40 rad/s"
-        obedience.saw(Twist(0.04), 1.5)
+        obedience.observe(Twist(0.04), 1.5)
         assert obedience.alarm(1.6) == "zero sent, still turning at 0.40 rad/s"
-        obedience.saw(Twist(0.04), 1.85)
+        obedience.observe(Twist(0.04), 1.85)
         assert obedience.alarm(1.85) is None
-        obedience.saw(Twist(0.5), 1.9)
+        obedience.observe(Twist(0.5), 1.9)
         assert obedience.alarm(2.0) is None, "it is somebody else's business"
 
     def test_one_that_braked_in_time_raises_none_while_it_is_looked_at(self):
         obedience = Obedience()
-        obedience.wrote(ZERO, Twist(0.5), 0.0)
-        obedience.saw(Twist(0.3), 0.9)
-        obedience.saw(ZERO, 0.98)
+        obedience.on_written(ZERO, Twist(0.5), 0.0)
+        obedience.observe(Twist(0.3), 0.9)
+        obedience.observe(ZERO, 0.98)
         assert obedience.alarm(1.1) is None
-        obedience.saw(ZERO, 1.1)
+        obedience.observe(ZERO, 1.1)
         assert obedience.alarm(1.1) is None
-        obedience.saw(Twist(0.3), 1.2)
+        obedience.observe(Twist(0.3), 1.2)
         assert obedience.alarm(1.2) == "zero sent, still moving at 0.30 m/s"
 
 

@@ -11,7 +11,7 @@ from gate_robot import eventually
 from webmap.gate import actions
 from webmap.gate.disk import Disk, Records
 from webmap.gate.display.client import GateClient
-from webmap.gate.events import Key, LatchKept, LatchSeen, LockState, Press
+from webmap.gate.events import Key, LockState, Press, StopFileChanged, StopSaved
 
 ANN, BEN = Press("Ann", "a1"), Press("Ben", "b1")
 IDS = frozenset({"a1", "b1"})
@@ -36,7 +36,7 @@ class TestTheOneThatHasIt:
     def test_takes_over_a_stop_that_was_said_to_the_other(self, owner):
         owner.drive_off()
         at = owner.now
-        owner.tell(LatchSeen(KEY, ANN))
+        owner.tell(StopFileChanged(KEY, ANN))
         assert owner.written[-1].twist == ZERO
         assert (owner.state, owner.report().holder) == ("stopped", None)
         assert owner.report().stop.by == "Ann"
@@ -47,25 +47,25 @@ class TestTheOneThatHasIt:
     def test_cancels_goals_and_says_hooks_then_too(self):
         hook = {"topic": "/lock", "type": "std_msgs/Bool"}
         bench = Bench().begin(spec(stop_hooks=(hook,)))
-        bench.tell(LatchSeen(KEY, ANN))
+        bench.tell(StopFileChanged(KEY, ANN))
         assert bench.did(actions.CancelGoals)
         assert [hook.stopped for hook in bench.did(actions.RunHook)] == [True]
 
     def test_stops_what_takes_goals_only(self):
         bench = Bench().begin(spec(twist_topic=None, cancel_topic=None))
-        bench.tell(LatchSeen(Key(URL, "goal /goal"), ANN))
+        bench.tell(StopFileChanged(Key(URL, "goal /goal"), ANN))
         assert bench.state == "stopped"
 
     def test_hears_its_own_stop_without_a_stir(self, owner):
         owner.say("a", op="stop", robot="r1")
         before = len(owner.done)
-        owner.tell(LatchSeen(KEY, owner.disk[KEY]))
+        owner.tell(StopFileChanged(KEY, owner.disk[KEY]))
         assert owner.done[before:] == []
 
     def test_keeps_a_stop_whose_file_is_gone(self, owner):
         owner.say("a", op="stop", robot="r1")
         owner.disk.clear()
-        owner.tell(LatchSeen(KEY, None))
+        owner.tell(StopFileChanged(KEY, None))
         assert owner.stops == {KEY: "A"}
         assert owner.state == "stopped"
 
@@ -74,13 +74,13 @@ class TestTheOneThatHasIt:
         owner.slow_disk = True
         owner.say("a", op="reset", robot="r1")
         owner.tell(
-            LatchSeen(KEY, owner.disk[KEY])
+            StopFileChanged(KEY, owner.disk[KEY])
         )  # looked at before it was taken away
         owner.run(0.1)
         assert not owner.report().latched
 
     def test_hears_of_a_machine_that_is_gone(self, owner):
-        owner.tell(LatchSeen(Key(URL, "/gone"), ANN))
+        owner.tell(StopFileChanged(Key(URL, "/gone"), ANN))
         assert owner.state == "free"
 
 
@@ -99,7 +99,7 @@ class TestTheOther:
         onlooker.say("a", op="stop", robot="r1")
         onlooker.run(1.0)
         onlooker.disk.clear()
-        onlooker.tell(LatchSeen(KEY, None))
+        onlooker.tell(StopFileChanged(KEY, None))
         at = onlooker.now
         onlooker.run(1.0)
         assert onlooker.since(at) == []
@@ -107,7 +107,7 @@ class TestTheOther:
         assert not onlooker.report().latched
 
     def test_writes_nothing_for_a_stop_that_was_said_there(self, onlooker):
-        onlooker.tell(LatchSeen(KEY, ANN))
+        onlooker.tell(StopFileChanged(KEY, ANN))
         onlooker.run(0.2)
         assert onlooker.written == []
 
@@ -115,15 +115,15 @@ class TestTheOther:
         onlooker.say("a", op="stop", robot="r1")
         onlooker.run(1.0)
         onlooker.disk[KEY] = ANN
-        onlooker.tell(LatchSeen(KEY, ANN))
+        onlooker.tell(StopFileChanged(KEY, ANN))
         assert onlooker.report().stop.by == "Ann"
         assert onlooker.stop_of() == ANN.id
 
     def test_trusts_no_look_for_a_file_that_it_is_writing(self, onlooker):
         onlooker.slow_disk = True
         onlooker.say("a", op="stop", robot="r1")
-        onlooker.tell(LatchSeen(KEY, None))
-        onlooker.keep(onlooker.did(actions.KeepLatch)[-1])
+        onlooker.tell(StopFileChanged(KEY, None))
+        onlooker.keep(onlooker.did(actions.SaveStop)[-1])
         assert onlooker.report().latched
 
     def test_has_a_stop_of_its_own_stand_when_it_gets_the_machine(self, onlooker):
@@ -143,12 +143,12 @@ def test_a_disk_tells_of_each_file_that_changed_once(tmp_path):
         theirs.keep_latch(KEY, ANN, IDS)
         # Recalled again, it is news all the same.
         assert mine.recall(LockState(KEY, held=False)).latched == ANN
-        assert await mine.look() == [LatchSeen(KEY, ANN)]
+        assert await mine.look() == [StopFileChanged(KEY, ANN)]
         assert await mine.look() == []
         theirs.keep_latch(KEY, BEN, IDS)
-        assert await mine.look() == [LatchSeen(KEY, BEN)]
+        assert await mine.look() == [StopFileChanged(KEY, BEN)]
         theirs.keep_latch(KEY, None, IDS)
-        assert await mine.look() == [LatchSeen(KEY, None)]
+        assert await mine.look() == [StopFileChanged(KEY, None)]
         mine.forget(KEY)
         theirs.keep_latch(KEY, ANN, IDS)
         assert await mine.look() == []
@@ -168,10 +168,10 @@ def test_a_stop_that_is_said_while_another_is_reset_is_not_overlooked(tmp_path):
 
         disk, told = Disk(Slow(tmp_path)), []
         disk.recall(LockState(KEY, held=True))
-        disk.keep(actions.KeepLatch(KEY, 1, None, IDS), told.append)
+        disk.keep(actions.SaveStop(KEY, 1, None, IDS), told.append)
         await disk.settle()
-        assert await disk.look() == [LatchSeen(KEY, BEN)]
-        assert told == [LatchKept(KEY, 1, None)]
+        assert await disk.look() == [StopFileChanged(KEY, BEN)]
+        assert told == [StopSaved(KEY, 1, None)]
 
     asyncio.run(scenario())
 
@@ -180,10 +180,10 @@ def test_what_comes_and_goes_between_two_looks_is_seen_by_who_wrote_it(tmp_path)
     async def scenario():
         disk = Disk(Records(tmp_path))
         disk.recall(LockState(KEY, held=False))
-        disk.keep(actions.KeepLatch(KEY, 1, ANN, IDS), lambda event: None)
+        disk.keep(actions.SaveStop(KEY, 1, ANN, IDS), lambda event: None)
         await disk.settle()
         Records(tmp_path).keep_latch(KEY, None, IDS)
-        assert await disk.look() == [LatchSeen(KEY, None)]
+        assert await disk.look() == [StopFileChanged(KEY, None)]
 
     asyncio.run(scenario())
 

@@ -4,8 +4,8 @@ import cbor2
 from link_bench import in_loop, noting_bridge, until
 
 from webmap.base.geometry import Twist
-from webmap.gate.events import Key, LinkDown, LinkUp, Measured, Scanned
-from webmap.gate.lanes.witness import WitnessLane
+from webmap.gate.events import Key, LinkDown, LinkUp, OdometryReceived, ScanReceived
+from webmap.gate.lanes.odometry import OdometryLane
 
 ANN, BEN = Key("ws://a", "/cmd_vel"), Key("ws://b", "/cmd_vel")
 MOVING = {"twist": {"twist": {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": 0.0}}}}
@@ -23,7 +23,7 @@ SCAN = {
 class Noting:
     def __init__(self, url):
         self.events = []
-        self.witness = WitnessLane(url, self.events.append)
+        self.witness = OdometryLane(url, self.events.append)
 
     async def __aenter__(self):
         return self
@@ -48,8 +48,8 @@ async def test_odometry_is_told_of_every_machine_that_it_is_of():
         assert noting.events == [LinkUp(bridge.url, "witness")]
         assert bridge.of("subscribe")[0].message["throttle_rate"] == 50
         await bridge.publish("/odom", MOVING)
-        await until(lambda: noting.of(Measured), "odometry")
-        assert [(m.key, m.twist) for m in noting.of(Measured)] == [
+        await until(lambda: noting.of(OdometryReceived), "odometry")
+        assert [(m.key, m.twist) for m in noting.of(OdometryReceived)] == [
             (ANN, Twist(0.5)),
             (BEN, Twist(0.5)),
         ]
@@ -75,10 +75,10 @@ async def test_words_that_are_no_odometry_are_passed_over():
             '{"op": "publish", "topic": "/odom", "msg": {"data": 1}}',
         ):
             await bridge.send(1, words)
-        await until(lambda: noting.of(Measured), "the last of them")
-        assert [(m.key, m.twist) for m in noting.of(Measured)] == [(ANN, None)], (
-            "a robot that tells nothing"
-        )
+        await until(lambda: noting.of(OdometryReceived), "the last of them")
+        assert [(m.key, m.twist) for m in noting.of(OdometryReceived)] == [
+            (ANN, None)
+        ], "a robot that tells nothing"
 
 
 @in_loop
@@ -95,13 +95,13 @@ async def test_a_scan_is_told_of_the_machines_that_are_assisted_by_it():
             scan_of("/scan"),
         ):
             await bridge.send(1, words)
-        await until(lambda: len(noting.of(Scanned)) == 2, "the scan")
-        assert [(s.key, s.topic) for s in noting.of(Scanned)] == [
+        await until(lambda: len(noting.of(ScanReceived)) == 2, "the scan")
+        assert [(s.key, s.topic) for s in noting.of(ScanReceived)] == [
             (ANN, "/scan"),
             (BEN, "/scan"),
         ]
         await bridge.publish("/odom", MOVING)
-        await until(lambda: noting.of(Measured), "odometry beside it")
+        await until(lambda: noting.of(OdometryReceived), "odometry beside it")
         noting.witness.unwatch_scan("/scan", ANN)
         assert not bridge.of("unsubscribe")
         noting.witness.unwatch_scan("/scan", BEN)

@@ -7,7 +7,7 @@ import pytest
 from gate_harness import KEY, spec
 
 from webmap.base.geometry import Twist
-from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.lanes import rosbridge
 
 
@@ -114,7 +114,7 @@ def test_everything_else_is_said():
     )
     located = spec(pose_topic="/initialpose", pose_covariance=(0.1, 0.2, 0.3))
     pose = said(
-        rosbridge.pose_estimate(located, TellPose(KEY, "r1", 1.0, 2.0, 0.0, "a"))
+        rosbridge.pose_estimate(located, SendPose(KEY, "r1", 1.0, 2.0, 0.0, "a"))
     )
     covariance = pose["msg"]["pose"]["covariance"]
     assert (covariance[0], covariance[7], covariance[35]) == (0.1, 0.2, 0.3)

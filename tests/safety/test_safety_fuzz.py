@@ -46,7 +46,7 @@ def pickled():
 
 def moved(bench):
     """Return all that a robot was told since it was armed that may move it."""
-    kinds = (actions.SendGoal, actions.TellPose)
+    kinds = (actions.SendGoal, actions.SendPose)
     told = [each for kind in kinds for each in bench.did(kind)]
     return [*told, *(w for w in bench.did(actions.WriteTwist) if not w.twist.is_zero)]
 
@@ -65,7 +65,7 @@ def filled(bench, text):
 
 def say(bench, text):
     data = text if isinstance(text, bytes) else text.encode(errors="surrogatepass")
-    bench.tell(protocol.FromBrowser("a", data))
+    bench.tell(protocol.FromPage("a", data))
 
 
 def good(bench, op="drive"):
@@ -263,4 +263,4 @@ def test_nothing_of_the_corpus_moves_the_robot_through_all_processes(bench):
     assert result["refused"] > 0
     assert [t for t in bench.robot.log.told[before:] if not t.is_zero] == []
     bench.drive_off()
-    bench.let_go()
+    bench.release_hold()

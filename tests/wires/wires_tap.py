@@ -12,7 +12,7 @@ import msgspec
 from wires_words import ANY, Names, goal_number, is_zero, lines, thinned, tree
 
 from webmap.gate import pipe
-from webmap.gate.display.supervisor import Child
+from webmap.gate.display.supervisor import GateProcess
 
 PERIODIC = ("drive", "program-twist", "robot", "sent-twist", "tick", "writer-nodes")
 """What is said again and again: each distinct message is shown once."""
@@ -48,7 +48,7 @@ class Tap:
         the last: how a program configures a robot, step by step or at once, is its
         own matter."""
         self._lock = threading.RLock()
-        self._child_send = Child.send
+        self._child_send = GateProcess.send
         self._unpacker_read = pipe.Unpacker._read
 
     def begin(self) -> None:
@@ -63,7 +63,7 @@ class Tap:
         """Note from now on what goes over the pipe."""
         tap, send, read = self, self._child_send, self._unpacker_read
 
-        def noted_send(child: Child, *messages: msgspec.Struct) -> None:
+        def noted_send(child: GateProcess, *messages: msgspec.Struct) -> None:
             for message in messages:
                 tap.note(TO_GATE, unpacked(pipe.pack(message)[4:]))
             send(child, *messages)
@@ -72,7 +72,7 @@ class Tap:
             tap.note(FROM_GATE, unpacked(body))
             read(unpacker, body, messages)
 
-        Child.send = noted_send  # type: ignore[method-assign]
+        GateProcess.send = noted_send  # type: ignore[method-assign]
         pipe.Unpacker._read = noted_read  # type: ignore[method-assign]
 
     def note(self, channel: str, message: dict[str, Any]) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from webmap.base.geometry import Twist
 from webmap.gate.events import Key, Press
-from webmap.gate.protocol import FromGate, RobotSpec, Way
+from webmap.gate.protocol import FromGate, GoalMethod, RobotSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Watch:
 
 @dataclass(frozen=True, slots=True)
 class WriteTwist:
-    """Write a velocity now or drop it; answered by ``Wrote``.
+    """Write a velocity now or drop it; answered by ``TwistWritten``.
 
     Zero is written whenever the link is open. Anything else is written only if
     nothing is waiting to be sent before it, and before it is too old.
@@ -52,7 +52,7 @@ class WriteTwist:
 
 @dataclass(frozen=True, slots=True)
 class SendGoal:
-    """Write a goal now or drop it; answered by ``WroteGoal``."""
+    """Write a goal now or drop it; answered by ``GoalWritten``."""
 
     key: Key
     robot: str
@@ -61,14 +61,14 @@ class SendGoal:
     y: float
     yaw: float
     by: str
-    way: Way
+    way: GoalMethod
     until: float = math.inf
     """When it is too old, by the gate's clock."""
 
 
 @dataclass(frozen=True, slots=True)
-class TellPose:
-    """Tell the robot where it is, now or not at all; answered by ``WrotePose``."""
+class SendPose:
+    """Tell the robot where it is, now or not at all; answered by ``PoseWritten``."""
 
     key: Key
     robot: str
@@ -118,10 +118,10 @@ class MarkDriven:
 
 
 @dataclass(frozen=True, slots=True)
-class KeepLatch:
+class SaveStop:
     """Keep on disk that STOP stands, or (``press`` is ``None``) that it does not.
 
-    Answered by ``LatchKept`` when the disk has it; nothing waits for that.
+    Answered by ``StopSaved`` when the disk has it; nothing waits for that.
     """
 
     key: Key
@@ -133,8 +133,8 @@ class KeepLatch:
 
 
 @dataclass(frozen=True, slots=True)
-class KeepStopTest:
-    """Keep what a stop test found; answered by ``StopTestKept``."""
+class SaveStopTest:
+    """Keep what a stop test found; answered by ``StopTestSaved``."""
 
     key: Key
     seconds: float | None
@@ -156,7 +156,7 @@ class RunHook:
 
 
 @dataclass(frozen=True, slots=True)
-class Say:
+class SendToDisplay:
     """Tell the display."""
 
     message: FromGate
@@ -168,16 +168,16 @@ Action = (
     | Watch
     | WriteTwist
     | SendGoal
-    | TellPose
+    | SendPose
     | CancelGoals
     | CutLink
     | Lock
     | Unlock
     | MarkDriven
-    | KeepLatch
-    | KeepStopTest
+    | SaveStop
+    | SaveStopTest
     | RunHook
-    | Say
+    | SendToDisplay
 )
 
 Emit = Callable[[Action], None]

@@ -22,17 +22,17 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from webmap.gate.actions import KeepLatch, KeepStopTest
+from webmap.gate.actions import SaveStop, SaveStopTest
 from webmap.gate.events import (
     MAX_ID,
     Event,
     Key,
-    LatchKept,
-    LatchSeen,
     LockState,
     Press,
+    StopFileChanged,
     StopRecord,
-    StopTestKept,
+    StopSaved,
+    StopTestSaved,
 )
 from webmap.ros.names import spellings_of
 
@@ -243,7 +243,7 @@ class Disk:
         """Look at the files of a machine no longer."""
         self._stamps.pop(key, None)
 
-    async def look(self) -> list[LatchSeen]:
+    async def look(self) -> list[StopFileChanged]:
         """Return the STOPs whose files are others than when they were looked at last.
 
         In the same thread as :meth:`keep`, so that what was kept before is seen, and
@@ -252,17 +252,17 @@ class Disk:
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, self._look)
 
-    def _look(self) -> list[LatchSeen]:
+    def _look(self) -> list[StopFileChanged]:
         seen = []
         for key, before in list(self._stamps.items()):
             stamp = self._records.stamp_of(key)
             if stamp != before and key in self._stamps:
                 self._stamps[key] = stamp
-                seen.append(LatchSeen(key, self._records.latch_of(key)))
+                seen.append(StopFileChanged(key, self._records.latch_of(key)))
         return seen
 
     def keep(
-        self, action: KeepLatch | KeepStopTest, tell: Callable[[Event], None]
+        self, action: SaveStop | SaveStopTest, tell: Callable[[Event], None]
     ) -> None:
         """Keep something; ``tell`` hears of it when the disk has it."""
         loop = asyncio.get_running_loop()
@@ -281,8 +281,8 @@ class Disk:
         if self._under_way:
             await asyncio.wait(self._under_way)
 
-    def _do(self, action: KeepLatch | KeepStopTest) -> Event:
-        if isinstance(action, KeepLatch):
+    def _do(self, action: SaveStop | SaveStopTest) -> Event:
+        if isinstance(action, SaveStop):
             error = self._records.keep_latch(action.key, action.press, action.ids)
             if action.key in self._stamps:
                 # What another gate does from here on is news, also what it did while
@@ -290,8 +290,8 @@ class Disk:
                 stands = action.press is not None
                 kept = self._records.stamp_of(action.key) if stands else None
                 self._stamps[action.key] = kept
-            return LatchKept(action.key, action.number, error)
+            return StopSaved(action.key, action.number, error)
         today = datetime.datetime.now().astimezone().date().isoformat()
         record = StopRecord(action.seconds, today)
         self._records.keep_stop_test(action.key, record)
-        return StopTestKept(action.key, record)
+        return StopTestSaved(action.key, record)

@@ -32,7 +32,7 @@ class Press(NamedTuple):
     """The identity, which a reset must name."""
 
 
-class Fold(msgspec.Struct, frozen=True):
+class ScanFold(msgspec.Struct, frozen=True):
     """What a scan that was folded to fewer beams was before."""
 
     each: int
@@ -47,7 +47,7 @@ class Fold(msgspec.Struct, frozen=True):
     """For each beam of the fold, how many were folded into it."""
 
 
-class Sweep(msgspec.Struct, frozen=True):
+class Scan(msgspec.Struct, frozen=True):
     """The newest scan."""
 
     angle_min: float
@@ -58,7 +58,7 @@ class Sweep(msgspec.Struct, frozen=True):
     """In metres: inf is nothing there, -inf too near, NaN unknown (REP 117)."""
     arrived: float
     """When it came, on the gate's clock."""
-    fold: Fold | None = None
+    fold: ScanFold | None = None
     """What it was before it was folded, if it was."""
     refused: str | None = None
     """Why nobody looked at it, in words, if nobody did."""
@@ -85,7 +85,7 @@ class LinkDown:
 
 
 @dataclass(frozen=True, slots=True)
-class Alive:
+class PingAnswered:
     """The bridge answered a ping on the control socket."""
 
     url: str
@@ -94,7 +94,7 @@ class Alive:
 
 
 @dataclass(frozen=True, slots=True)
-class Wrote:
+class TwistWritten:
     """What became of a velocity that was to be written."""
 
     key: Key
@@ -106,7 +106,7 @@ class Wrote:
 
 
 @dataclass(frozen=True, slots=True)
-class WroteGoal:
+class GoalWritten:
     """What became of a goal that was to be written."""
 
     robot: str
@@ -119,7 +119,7 @@ class WroteGoal:
 
 
 @dataclass(frozen=True, slots=True)
-class WrotePose:
+class PoseWritten:
     """What became of a word on where the robot is."""
 
     robot: str
@@ -181,7 +181,7 @@ class HookEnded:
 
 
 @dataclass(frozen=True, slots=True)
-class Echoed:
+class EchoReceived:
     """A velocity came back on the topic that the gate writes to."""
 
     key: Key
@@ -189,7 +189,7 @@ class Echoed:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class OdometryReceived:
     """Odometry came; ``twist`` is ``None`` if it says nothing of velocity.
 
     Its numbers are finite for motion in the plane, and may be NaN for the others.
@@ -197,18 +197,18 @@ class Measured:
 
     key: Key
     twist: Twist | None
-    said_after: float = float("inf")
+    sent_after: float = float("inf")
     """A moment after which the bridge said it, on the gate's clock; one that is yet to
     come counts for the moment when it came."""
 
 
 @dataclass(frozen=True, slots=True)
-class Scanned:
+class ScanReceived:
     """A laser scan came."""
 
     key: Key
     topic: str
-    sweep: Sweep
+    sweep: Scan
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,7 +239,7 @@ class LockState:
 
 
 @dataclass(frozen=True, slots=True)
-class LatchSeen:
+class StopFileChanged:
     """The file of a STOP is another than before, or there is none any more."""
 
     key: Key
@@ -248,8 +248,8 @@ class LatchSeen:
 
 
 @dataclass(frozen=True, slots=True)
-class LatchKept:
-    """What became of a ``KeepLatch``."""
+class StopSaved:
+    """What became of a ``SaveStop``."""
 
     key: Key
     number: int
@@ -258,7 +258,7 @@ class LatchKept:
 
 
 @dataclass(frozen=True, slots=True)
-class StopTestKept:
+class StopTestSaved:
     """The result of a stop test has its date."""
 
     key: Key
@@ -275,20 +275,20 @@ class Shutdown:
 Event = (
     LinkUp
     | LinkDown
-    | Alive
-    | Wrote
-    | WroteGoal
-    | WrotePose
+    | PingAnswered
+    | TwistWritten
+    | GoalWritten
+    | PoseWritten
     | GoalProgress
     | GoalEnded
     | GoalLost
     | HookEnded
-    | Echoed
-    | Measured
-    | Scanned
+    | EchoReceived
+    | OdometryReceived
+    | ScanReceived
     | LockState
-    | LatchKept
-    | LatchSeen
-    | StopTestKept
+    | StopSaved
+    | StopFileChanged
+    | StopTestSaved
     | Shutdown
 )

@@ -17,7 +17,7 @@ Velocity = tuple[float, float, float, float, float, float]
 """Forward, left and counter-clockwise; then upward, and about the forward and the left
 axis, which are 0 for a robot that moves in the plane."""
 
-Way = Literal["topic", "navigate_to_pose", "move_base"]
+GoalMethod = Literal["topic", "navigate_to_pose", "move_base"]
 """How goals are sent: as PoseStamped on a topic, by the action of ROS 2, or by that of
 ROS 1."""
 
@@ -142,7 +142,7 @@ class Disconnect(msgspec.Struct, frozen=True, tag="disconnect"):
     connection: str
 
 
-class FromBrowser(msgspec.Struct, frozen=True, tag="browser"):
+class FromPage(msgspec.Struct, frozen=True, tag="browser"):
     """A page's own words, not looked at by the display."""
 
     connection: str
@@ -233,7 +233,7 @@ ToGate = (
     | Forget
     | Connect
     | Disconnect
-    | FromBrowser
+    | FromPage
     | Speeds
     | Heartbeat
     | Stop
@@ -293,7 +293,7 @@ class GoalReport(msgspec.Struct, frozen=True, kw_only=True):
     yaw: float
     by: str
     """The connection that sent it."""
-    way: Way
+    way: GoalMethod
     state: Literal[
         "sent",
         "accepted",
@@ -317,7 +317,7 @@ class GoalReport(msgspec.Struct, frozen=True, kw_only=True):
     """How often the robot had to free itself."""
 
 
-Doing = Literal[
+Activity = Literal[
     "stopped",
     "unconfirmed",
     "down",
@@ -345,7 +345,7 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     name: str
     state: Literal["free", "held", "driving", "stopping", "stopped"]
     """``stopping``: zeros are being sent; ``stopped``: STOP stands."""
-    doing: Doing
+    doing: Activity
     """The same in the words of an operator, see ``webmap.core.robot_state``."""
     latched: bool
     """Whether STOP stands, and will after a restart: until a reset nothing moves."""
@@ -388,7 +388,7 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     armable: bool
     reason: str | None
     """Why the robot cannot be taken or moved now, in words."""
-    way: Way | None = None
+    way: GoalMethod | None = None
     """How goals are sent to it, ``None`` if none can be."""
     cancels: bool = False
     """Whether they can be called off."""

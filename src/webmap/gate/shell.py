@@ -127,7 +127,7 @@ class Shell:
 
     def _perform(self, action: actions.Action) -> events.Event | None:
         match action:
-            case actions.Say(message):
+            case actions.SendToDisplay(message):
                 self._outbox.put(message)
             case actions.Lock(key):
                 return self._lock(key)
@@ -139,7 +139,7 @@ class Shell:
                 self._disk.forget(key)
             case actions.MarkDriven(key, driven):
                 self._locks.mark(key, driven)
-            case actions.KeepLatch() | actions.KeepStopTest():
+            case actions.SaveStop() | actions.SaveStopTest():
                 self._disk.keep(action, self.tell)
             case actions.Watch(key, on):
                 self._watched = self._watched | {key} if on else self._watched - {key}

@@ -22,7 +22,7 @@ from webmap.base.scope import Removal
 from webmap.gate import commands, pipe, protocol
 from webmap.gate.commands import Refusal, begins_like_stop, robot_in
 from webmap.gate.display.pages import DriveConnection, Pages
-from webmap.gate.display.program import ProgramRoad
+from webmap.gate.display.program import ProgramCommands
 from webmap.gate.display.supervisor import Supervisor
 from webmap.gate.protocol import FromGate, Report, RobotSpec, Role
 from webmap.gate.specs import checked
@@ -31,7 +31,7 @@ HEEDED = 2.0
 """Seconds for which a gate must have gone on since it was told."""
 
 
-class Unheard:
+class PendingStops:
     """The STOPs that are kept, each with who said it."""
 
     def __init__(self) -> None:
@@ -79,9 +79,9 @@ class GateClient:
     def __init__(self) -> None:
         self._lock = threading.RLock()
         self._supervisor = Supervisor(self, self._lock)
-        self._pages = Pages(self.tell, self._lock, self._heed)
-        self._program = ProgramRoad(self.tell, self._lock)
-        self._unheard = Unheard()
+        self._pages = Pages(self.tell, self._lock, self._keep_stop_of_page)
+        self._program = ProgramCommands(self.tell, self._lock)
+        self._pending_stops = PendingStops()
         self._numbers = itertools.count(1)
         self._specs: dict[str, RobotSpec] = {}
         self._listeners: dict[int, Callable[[Report], None]] = {}
@@ -241,7 +241,7 @@ class GateClient:
 
     # STOPs that may not have been heard.
 
-    def _heed(self, message: protocol.FromBrowser) -> None:
+    def _keep_stop_of_page(self, message: protocol.FromPage) -> None:
         """Keep a page's STOP, in case that no gate hears it."""
         if b"stop" not in message.text:
             return
@@ -262,13 +262,13 @@ class GateClient:
     def _keep_stop(self, by: str | None, robot: str | None) -> None:
         if not self.ready:
             log.error("STOP: the gate is not running; STOP is sent as soon as it runs")
-        self._unheard.say(by, robot, time.monotonic())
+        self._pending_stops.say(by, robot, time.monotonic())
 
     def _stop_again(self, by: str | None, robot: str | None) -> protocol.ToGate:
         if by is None or not self._pages.knows(by):
             return protocol.Stop(robot)
         text = json.dumps({"op": "stop", "robot": robot or "*"})
-        return protocol.FromBrowser(by, text.encode())
+        return protocol.FromPage(by, text.encode())
 
     # The gate.
 
@@ -276,7 +276,7 @@ class GateClient:
         """Return what a new gate must hear first."""
         stops = [
             self._stop_again(by, robot)
-            for by, robot in self._unheard
+            for by, robot in self._pending_stops
             if robot is None or robot in self._specs  # or it is gone since
         ]
         return [*self._specs.values(), *self._pages.introduction, *stops]
@@ -285,29 +285,29 @@ class GateClient:
         """Take in what the gate says."""
         match message:
             case protocol.Tick(tick):
-                self._program.hear_tick(tick)
-                self._pages.hear_tick(message)
+                self._program.on_tick(tick)
+                self._pages.on_tick(message)
                 with self._lock:
-                    self._unheard.lives(time.monotonic())
+                    self._pending_stops.lives(time.monotonic())
             case protocol.RobotReport():
-                self._program.hear_robot(message)
-                self._pages.hear_robot(message)
+                self._program.on_report(message)
+                self._pages.on_report(message)
                 self._report(message)
             case protocol.Hello():
-                self._pages.greet(message)
+                self._pages.on_hello(message)
             case protocol.Refused():
-                self._pages.hear_refusal(message)
+                self._pages.on_refusal(message)
                 self._report(message)
             case protocol.CloseConnection():
-                self._pages.hear_close(message)
+                self._pages.on_close(message)
             case protocol.TakeReply():
-                self._program.hear_take(message)
+                self._program.on_take_reply(message)
             case protocol.RobotGone():
-                self._pages.hear_gone(message)
+                self._pages.on_robot_gone(message)
                 self._report(message)
             case protocol.Ready():
                 with self._lock:
-                    self._unheard.told(time.monotonic())
+                    self._pending_stops.told(time.monotonic())
                 self._report(protocol.GateUp())
             case _:  # for listeners alone
                 self._report(message)

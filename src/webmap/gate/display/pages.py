@@ -166,13 +166,13 @@ class DriveConnection:
     def say(self, text: str) -> None:
         """Send a text to the page, unless it has not been greeted yet."""
         if self.greeted:
-            self._guard(self._send, text)
+            self._scan_assist(self._send, text)
 
     def end(self, why: str) -> None:
         """Ask for the page's socket to be closed."""
-        self._guard(self._close, why)
+        self._scan_assist(self._close, why)
 
-    def _guard(self, fn: Callable[[str], None], text: str) -> None:
+    def _scan_assist(self, fn: Callable[[str], None], text: str) -> None:
         try:
             fn(text)
         except Exception:
@@ -193,11 +193,11 @@ class Pages:
         self,
         tell: Callable[[protocol.ToGate], None],
         lock: "threading.RLock",
-        heed: Callable[[protocol.FromBrowser], None],
+        heed: Callable[[protocol.FromPage], None],
     ) -> None:
         self.tell = tell
         self._lock = lock
-        self._heed = heed
+        self._keep_stop_of_page = heed
         self._numbers = itertools.count(1)
         self._connections: dict[str, DriveConnection] = {}
         self._latest: dict[str, protocol.RobotReport] = {}
@@ -234,9 +234,9 @@ class Pages:
 
     def said(self, id: str, data: bytes) -> None:
         """Hand on what a page says."""
-        message = protocol.FromBrowser(id, data)
+        message = protocol.FromPage(id, data)
         with self._lock:
-            self._heed(message)
+            self._keep_stop_of_page(message)
             self.tell(message)
 
     def drop(self, connection: DriveConnection) -> None:
@@ -255,14 +255,14 @@ class Pages:
 
     # What the gate says.
 
-    def hear_tick(self, tick: protocol.Tick) -> None:
+    def on_tick(self, tick: protocol.Tick) -> None:
         """Tell everybody the newest tick, and how far their words were taken."""
         for connection in self._everybody():
             ack = tick.acks.get(connection.id)
             if ack is not None:
                 connection.say(tick_text(tick.tick, ack))
 
-    def hear_robot(self, report: protocol.RobotReport) -> None:
+    def on_report(self, report: protocol.RobotReport) -> None:
         """Tell everybody how it stands with a robot."""
         holder = None if report.holder is None else report.holder.connection
         texts: dict[tuple[bool, Cap], str] = {}
@@ -275,26 +275,26 @@ class Pages:
                     texts[mine, page] = text
                 connection.say(texts[mine, page])
 
-    def hear_gone(self, gone: protocol.RobotGone) -> None:
+    def on_robot_gone(self, gone: protocol.RobotGone) -> None:
         """Tell everybody that a robot is gone."""
         with self._lock:
             self._latest.pop(gone.robot, None)
         for connection in self._everybody():
             connection.say(gone_text(gone))
 
-    def hear_refusal(self, refused: protocol.Refused) -> None:
+    def on_refusal(self, refused: protocol.Refused) -> None:
         """Tell one page what is not done."""
         connection = self._connections.get(refused.connection)
         if connection is not None:
             connection.say(refused_text(refused))
 
-    def hear_close(self, close: protocol.CloseConnection) -> None:
+    def on_close(self, close: protocol.CloseConnection) -> None:
         """Have a page's socket closed."""
         connection = self._connections.get(close.connection)
         if connection is not None:
             connection.end(close.why)
 
-    def greet(self, hello: protocol.Hello) -> None:
+    def on_hello(self, hello: protocol.Hello) -> None:
         """Tell a page that the gate knows it, and everything that there is."""
         with self._lock:
             connection = self._connections.get(hello.connection)

@@ -17,7 +17,7 @@ LEAST_PAUSE = 0.01
 them without a pause would delay every robot's STOP."""
 
 
-class ProgramRoad:
+class ProgramCommands:
     """What the display's own Python code may ask of the gate.
 
     Args:
@@ -136,11 +136,11 @@ class ProgramRoad:
 
     # What the gate says.
 
-    def hear_tick(self, tick: int) -> None:
+    def on_tick(self, tick: int) -> None:
         """Note the newest tick."""
         self._tick = tick
 
-    def hear_robot(self, report: protocol.RobotReport) -> None:
+    def on_report(self, report: protocol.RobotReport) -> None:
         """Note whose a robot is now."""
         holder = None if report.holder is None else report.holder.connection
         with self._lock:
@@ -150,7 +150,7 @@ class ProgramRoad:
                 self._epochs.pop(report.robot, None)
                 self._passed_on.pop(report.robot, None)
 
-    def hear_take(self, reply: protocol.TakeReply) -> None:
+    def on_take_reply(self, reply: protocol.TakeReply) -> None:
         """Answer who asked for a lease."""
         with self._lock:
             future = self._takes.pop(reply.request, None)

@@ -93,7 +93,7 @@ MAX_WORDS = 300
 """The longest line of a gate that is kept as its last words, in characters."""
 
 
-class Child:
+class GateProcess:
     """A running gate.
 
     Args:
@@ -105,8 +105,8 @@ class Child:
 
     def __init__(
         self,
-        hear: Callable[["Child", FromGate], None],
-        ended: Callable[["Child"], None],
+        hear: Callable[["GateProcess", FromGate], None],
+        ended: Callable[["GateProcess"], None],
         command: Sequence[str] | None = None,
     ) -> None:
         self._hear = hear
@@ -130,7 +130,7 @@ class Child:
         if sys.platform != "win32":
             os.set_blocking(self._in, False)
         self._err = self._process.stderr
-        self._last_words = b""
+        self._last_line = b""
         self._reader = threading.Thread(
             target=self._read, name="webmap-gate-reader", daemon=True
         )
@@ -144,13 +144,13 @@ class Child:
         return self._process.pid
 
     @property
-    def epitaph(self) -> str:
+    def end_reason(self) -> str:
         """What it ended of, in words, after :meth:`stop`."""
         code = self._process.returncode
         if code is not None and code < 0:
             return f"ended by {signal.Signals(-code).name}"
         self._listener.join(1.0)
-        said = one_line(self._last_words.decode("utf-8", "replace").strip(), MAX_WORDS)
+        said = one_line(self._last_line.decode("utf-8", "replace").strip(), MAX_WORDS)
         return said or f"exit code {code}, no message"
 
     def start(self) -> None:
@@ -198,7 +198,7 @@ class Child:
         with self._err, contextlib.suppress(ValueError):  # closed at our own end
             for line in self._err:
                 if line.strip():
-                    self._last_words = line
+                    self._last_line = line
                 said = one_line(line.decode("utf-8", "replace").rstrip("\r\n"))
                 with contextlib.suppress(OSError):
                     os.write(2, f"{said}\n".encode())
@@ -234,7 +234,7 @@ STOP_TIMEOUT = 2.0
 """Seconds that the gate is given to end; it needs half a second for its zeros."""
 
 
-class Owner(Protocol):
+class GateListener(Protocol):
     """Whom the gate talks to."""
 
     def introduction(self) -> list[protocol.ToGate]:
@@ -256,14 +256,14 @@ class Supervisor:
 
     """
 
-    def __init__(self, owner: Owner, lock: "threading.RLock") -> None:
+    def __init__(self, owner: GateListener, lock: "threading.RLock") -> None:
         self.ready = False
         """Whether the gate that runs now has said so."""
         self.trouble: str | None = None
         """Why there is none, in words, if one after the other ends."""
         self._owner = owner
         self._lock = lock
-        self._child: Child | None = None
+        self._child: GateProcess | None = None
         self._silent_beats = 0
         self._ending = threading.Event()
         self._heart: threading.Thread | None = None
@@ -326,7 +326,7 @@ class Supervisor:
                 self._spawn()
             self._ending.wait(HEARTBEAT)
 
-    def _check_words(self, child: Child) -> None:
+    def _check_words(self, child: GateProcess) -> None:
         """Kill a gate that runs and says nothing; counted in our own heartbeats.
 
         A clock would also count the time in which this process stood still.
@@ -338,7 +338,7 @@ class Supervisor:
 
     def _spawn(self) -> None:
         try:
-            child = Child(self._hear, self._ended)
+            child = GateProcess(self._hear, self._ended)
         except OSError as error:
             self._note_end(str(error))
             return
@@ -347,7 +347,7 @@ class Supervisor:
             child.send(protocol.Heartbeat(), *self._owner.introduction())
         child.start()
 
-    def _hear(self, child: Child, message: FromGate) -> None:
+    def _hear(self, child: GateProcess, message: FromGate) -> None:
         with self._lock:
             if child is not self._child:
                 return
@@ -356,13 +356,13 @@ class Supervisor:
                 self.ready = True
         self._owner.hear(message)
 
-    def _ended(self, child: Child) -> None:
+    def _ended(self, child: GateProcess) -> None:
         with self._lock:
             if child is not self._child:
                 return
             self._child = None
         child.stop(STOP_TIMEOUT)
-        self._note_end(child.epitaph)
+        self._note_end(child.end_reason)
 
     def _note_end(self, epitaph: str) -> None:
         self._restarts.ended(time.monotonic())

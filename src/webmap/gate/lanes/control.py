@@ -18,7 +18,7 @@ from collections.abc import Callable
 
 from webmap.base.geometry import Twist
 from webmap.gate.clock import now
-from webmap.gate.events import Alive, Echoed, Event, Key, LinkDown, LinkUp
+from webmap.gate.events import EchoReceived, Event, Key, LinkDown, LinkUp, PingAnswered
 from webmap.gate.lanes import rosbridge
 from webmap.gate.lanes.lane import Lane
 from webmap.ros.rosbridge import ops
@@ -33,7 +33,7 @@ REMEMBERED = 16
 """Velocities whose echo is still waited for, whether they are proven or not."""
 
 
-class Unproven:
+class UnconfirmedWrites:
     """The velocities of one link that nobody knows to have arrived."""
 
     def __init__(self) -> None:
@@ -47,7 +47,7 @@ class Unproven:
         waiting = self._on_the_way.get(topic, ())
         return sum(not twist.is_zero for _, twist in waiting) < MOST
 
-    def wrote(self, topic: str, twist: Twist) -> None:
+    def on_written(self, topic: str, twist: Twist) -> None:
         """Note a velocity that went out."""
         self._written += 1
         self._on_the_way.setdefault(topic, deque()).append((self._written, twist))
@@ -55,11 +55,11 @@ class Unproven:
             unechoed = self._unechoed.setdefault(topic, deque(maxlen=REMEMBERED))
             unechoed.append((self._written, twist))
 
-    def pinged(self, number: int, now: float) -> None:
+    def on_ping(self, number: int, now: float) -> None:
         """Note that a ping goes out at ``now``; their numbers grow."""
         self._pings.append((number, self._written, now))
 
-    def ponged(self, number: int) -> float:
+    def on_pong(self, number: int) -> float:
         """Note that a ping was answered, and so all before it.
 
         Returns:
@@ -124,7 +124,7 @@ class ControlLane:
         self._types: dict[str, str] = {}
         """The type that each topic is written as."""
         self._listened: set[str] = set()
-        self._unproven = Unproven()
+        self._unconfirmed = UnconfirmedWrites()
         self.lane = Lane(
             url,
             up=self._open,
@@ -133,7 +133,7 @@ class ControlLane:
             pinged=self._ping,
             pong=self._answer,
         )
-        self.lane.hurry(IDLE_PING)
+        self.lane.ping_every(IDLE_PING)
 
     def attach(self, topic: str, type: str, assumed: bool = False) -> None:
         """Announce that velocity will be written to ``topic``.
@@ -166,8 +166,8 @@ class ControlLane:
         if type == said:
             return
         if said is not None:
-            self.lane.let_go(f"webmap-gate advertise {topic} {said}")
-            self.lane.let_go(f"webmap-gate echo {topic} {said}")
+            self.lane.release_hold(f"webmap-gate advertise {topic} {said}")
+            self.lane.release_hold(f"webmap-gate echo {topic} {said}")
             del self._types[topic]
         if type is not None:
             echo = f"webmap-gate echo {topic} {type}"
@@ -181,13 +181,13 @@ class ControlLane:
     def listen(self, topic: str) -> None:
         """Ask often whether the bridge answers: ``topic`` may be written to."""
         self._listened.add(topic)
-        self.lane.hurry(BUSY_PING)
+        self.lane.ping_every(BUSY_PING)
 
     def ignore(self, topic: str) -> None:
         """Undo :meth:`listen`."""
         self._listened.remove(topic)
         if not self._listened:
-            self.lane.hurry(IDLE_PING)
+            self.lane.ping_every(IDLE_PING)
 
     def write(
         self, topic: str, twist: Twist, until: float = math.inf, frame: str = ""
@@ -205,25 +205,25 @@ class ControlLane:
 
         """
         type = self._types.get(topic)
-        if type is None or not (twist.is_zero or self._unproven.room(topic)):
+        if type is None or not (twist.is_zero or self._unconfirmed.room(topic)):
             return False
         data = rosbridge.velocity(topic, type, twist, frame)
         if twist.is_zero:
             until = math.inf
         done = self.lane.write(data, only_if_clear=not twist.is_zero, until=until)
         if done:
-            self._unproven.wrote(topic, twist)
+            self._unconfirmed.on_written(topic, twist)
         return done
 
     def _open(self) -> None:
-        self._unproven.begin()  # what the link before held went with it
+        self._unconfirmed.begin()  # what the link before held went with it
         self._tell(LinkUp(self._url, "control"))
 
     def _ping(self, number: int) -> None:
-        self._unproven.pinged(number, now())
+        self._unconfirmed.on_ping(number, now())
 
     def _answer(self, number: int) -> None:
-        self._tell(Alive(self._url, self._unproven.ponged(number)))
+        self._tell(PingAnswered(self._url, self._unconfirmed.on_pong(number)))
 
     def _hear(self, data: bytes) -> None:
         heard = rosbridge.hear(data)
@@ -231,5 +231,5 @@ class ControlLane:
             return
         if not heard.twist.is_finite:
             return
-        self._unproven.echoed(heard.topic, heard.twist)
-        self._tell(Echoed(Key(self._url, heard.topic), heard.twist))
+        self._unconfirmed.echoed(heard.topic, heard.twist)
+        self._tell(EchoReceived(Key(self._url, heard.topic), heard.twist))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from webmap.base.errors import BridgeClosed
 from webmap.gate.lanes.budget import Budget
-from webmap.gate.lanes.sockets import Ears, Socket, open_socket
+from webmap.gate.lanes.sockets import Socket, SocketHandlers, open_socket
 
 FIRST_WAIT = 0.1
 """Seconds until the first attempt to connect again."""
@@ -71,7 +71,7 @@ class Attempts:
             return wait
         return self.failed()
 
-    def is_news(self, trouble: str) -> bool:
+    def is_new(self, trouble: str) -> bool:
         """Return whether a trouble is to be logged, and note that it was."""
         if trouble in self._troubles or len(self._troubles) == MOST_TROUBLES:
             return False
@@ -86,7 +86,7 @@ DEAD = 3.0
 
 
 @dataclass(slots=True)
-class Hold:
+class Announcement:
     """Something that is said whenever the lane opens, and how to take it back."""
 
     hello: bytes
@@ -127,7 +127,7 @@ class Lane:
         self._text = text
         self._pinged = pinged
         self._pong = pong
-        self._holds: dict[str, Hold] = {}
+        self._holds: dict[str, Announcement] = {}
         self._socket: Socket | None = None
         self._budget = Budget()
         self._trouble: str | None = None
@@ -149,10 +149,10 @@ class Lane:
         if held is not None:
             held.count += 1
             return
-        self._holds[id] = Hold(hello, goodbye)
+        self._holds[id] = Announcement(hello, goodbye)
         self._say(hello)
 
-    def let_go(self, id: str) -> None:
+    def release_hold(self, id: str) -> None:
         """Undo one :meth:`hold`; after the last one ``goodbye`` is said."""
         held = self._holds[id]
         held.count -= 1
@@ -185,7 +185,7 @@ class Lane:
         elif link is not None:
             link.abort(why)
 
-    def spend(self, ears: Ears) -> Socket:
+    def spend(self, ears: SocketHandlers) -> Socket:
         """Hand over the open socket to somebody else and connect anew."""
         link = self._socket
         assert link is not None  # it has just been written to
@@ -226,10 +226,10 @@ class Lane:
         attempts, loop = Attempts(), asyncio.get_running_loop()
         while True:
             try:
-                ears = Ears(self._text, self._on_pong, self._lost)
+                ears = SocketHandlers(self._text, self._on_pong, self._lost)
                 link = await open_socket(self.url, ears, self._budget)
             except BridgeClosed as error:
-                if attempts.is_news(str(error)):
+                if attempts.is_new(str(error)):
                     log.warning("no connection: %s", error)
                 await _sleep_about(attempts.failed())
                 continue
@@ -246,7 +246,7 @@ class Lane:
                 await _sleep_about(FIRST_WAIT)
                 continue
             wait = attempts.ended(loop.time() - begun, flooded=link.flooded)
-            if attempts.is_news(self._trouble):
+            if attempts.is_new(self._trouble):
                 log.warning(
                     "lost the connection to %s: %s; next attempt within %.1f s",
                     self.url,
@@ -271,7 +271,7 @@ class Lane:
                 async with asyncio.timeout(self.ping_period):
                     await self._changed.wait()
 
-    def hurry(self, period: float) -> None:
+    def ping_every(self, period: float) -> None:
         """Ping every ``period`` seconds from now on, beginning now."""
         if period < self.ping_period:
             self._changed.set()

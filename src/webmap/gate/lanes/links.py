@@ -6,16 +6,16 @@ from collections.abc import Callable
 from webmap.gate import actions
 from webmap.gate.events import (
     Event,
+    GoalWritten,
     HookEnded,
     Key,
     LinkDown,
-    Wrote,
-    WroteGoal,
-    WrotePose,
+    PoseWritten,
+    TwistWritten,
 )
 from webmap.gate.lanes.control import ControlLane
+from webmap.gate.lanes.odometry import OdometryLane
 from webmap.gate.lanes.tasks import Calls, TasksLane, Topic, goal_topics, hook_topics
-from webmap.gate.lanes.witness import WitnessLane
 from webmap.gate.protocol import RobotSpec
 from webmap.gate.rules.motion import ZERO
 
@@ -31,7 +31,7 @@ class Links:
     def __init__(self, tell: Callable[[Event], None]) -> None:
         self._tell = tell
         self._control: dict[str, ControlLane] = {}
-        self._witness: dict[str, WitnessLane] = {}
+        self._witness: dict[str, OdometryLane] = {}
         self._tasks: dict[str, TasksLane] = {}
         self._calls: dict[str, Calls] = {}
         """By bridge; a call goes on when the lane of who made it has ended."""
@@ -45,13 +45,13 @@ class Links:
                 lane = self._control.get(key.url)
                 frame = self._base_frame(key)
                 done = lane is not None and lane.write(key.topic, twist, until, frame)
-                return Wrote(key, twist, epoch, by, done)
+                return TwistWritten(key, twist, epoch, by, done)
             case actions.SendGoal():
                 return self._send_goal(action)
-            case actions.TellPose(key, robot, x, y, yaw, by):
+            case actions.SendPose(key, robot, x, y, yaw, by):
                 spec = self._robots[key][robot]
-                done = self._tasks[_goal_url(spec)].tell_pose(spec, action)
-                return WrotePose(robot, x, y, yaw, by, done)
+                done = self._tasks[_goal_url(spec)].send_pose(spec, action)
+                return PoseWritten(robot, x, y, yaw, by, done)
             case actions.CancelGoals(key, robot):
                 spec = self._robots[key][robot]
                 self._tasks[_goal_url(spec)].cancel(spec)
@@ -99,10 +99,10 @@ class Links:
         for control in self._control.values():
             control.lane.close()
 
-    def _send_goal(self, goal: actions.SendGoal) -> WroteGoal:
+    def _send_goal(self, goal: actions.SendGoal) -> GoalWritten:
         spec = self._robots[goal.key][goal.robot]
         done = self._tasks[_goal_url(spec)].send(spec, goal)
-        return WroteGoal(goal.robot, goal.id, goal.x, goal.y, goal.yaw, goal.by, done)
+        return GoalWritten(goal.robot, goal.id, goal.x, goal.y, goal.yaw, goal.by, done)
 
     def _run_hook(self, run: actions.RunHook) -> None:
         def ended(why: str | None) -> None:
@@ -154,10 +154,10 @@ class Links:
                 spec.twist_topic, spec.twist_type, spec.twist_type_assumed
             )
         for url in _witnesses_of(spec):
-            self._witness_at(url).lane.let_go("robots")
+            self._witness_at(url).lane.release_hold("robots")
         for url, topics in _tasks_of(spec).items():
             self._tasks[url].detach(topics)
-            self._tasks[url].lane.let_go("robots")
+            self._tasks[url].lane.release_hold("robots")
 
     def _watch(self, key: Key) -> None:
         specs = list(self._robots[key].values())
@@ -183,9 +183,9 @@ class Links:
             if spec.assist is not None:
                 self._witness_at(spec.bridge_url).unwatch_scan(spec.assist.topic, key)
 
-    def _witness_at(self, url: str) -> WitnessLane:
+    def _witness_at(self, url: str) -> OdometryLane:
         if url not in self._witness:
-            self._witness[url] = WitnessLane(url, self._tell)
+            self._witness[url] = OdometryLane(url, self._tell)
         return self._witness[url]
 
     def _close_unwanted(self) -> None:

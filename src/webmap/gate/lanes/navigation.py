@@ -16,7 +16,7 @@ from webmap.gate.events import GoalEnded, GoalProgress, Outcome
 from webmap.gate.lanes.rosbridge import plain
 from webmap.gate.protocol import RobotSpec
 
-Word = GoalProgress | GoalEnded
+GoalNews = GoalProgress | GoalEnded
 T = TypeVar("T")
 
 MOST_WORDS = 200
@@ -107,7 +107,7 @@ class _Frame(msgspec.Struct):
     msg: Any = None
 
 
-def of_action(data: bytes, goal: SendGoal) -> Word | None:
+def of_action(data: bytes, goal: SendGoal) -> GoalNews | None:
     """Return what came for a goal on the socket that sent it as an action.
 
     Raises:
@@ -136,7 +136,7 @@ def of_action(data: bytes, goal: SendGoal) -> Word | None:
     return _ended(goal, outcome, why)
 
 
-def of_topics(data: bytes, spec: RobotSpec, goal: SendGoal) -> Word | None:
+def of_topics(data: bytes, spec: RobotSpec, goal: SendGoal) -> GoalNews | None:
     """Return what came for a goal on one of move_base's topics.
 
     Raises:
@@ -160,7 +160,7 @@ def of_topics(data: bytes, spec: RobotSpec, goal: SendGoal) -> Word | None:
     return _progress(said.feedback or _Feedback(), goal, spec.goal_frame)
 
 
-def _of_status(status: _Status, goal: SendGoal) -> Word | None:
+def _of_status(status: _Status, goal: SendGoal) -> GoalNews | None:
     outcome = _ACTIONLIB.get(status.status)
     if outcome is not None:
         why = status.text or _ACTIONLIB_WORDS.get(status.status, "")

@@ -17,7 +17,7 @@ import msgspec
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Quaternion, Twist
 from webmap.base.nesting import MAX_DEPTH
-from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.protocol import RobotSpec
 from webmap.ros.decoding import check_depth
 from webmap.ros.names import is_type
@@ -132,7 +132,7 @@ def trigger(service: str, type: str, id: str) -> bytes:
     return ops.call_service(service, {}, id=id, type=type)
 
 
-def pose_estimate(spec: RobotSpec, at: TellPose) -> bytes:
+def pose_estimate(spec: RobotSpec, at: SendPose) -> bytes:
     """Return the operation that tells the robot where it is."""
     covariance = [0.0] * 36
     covariance[0], covariance[7], covariance[35] = spec.pose_covariance
@@ -141,7 +141,7 @@ def pose_estimate(spec: RobotSpec, at: TellPose) -> bytes:
     return ops.publish(spec.pose_topic or "", message)
 
 
-def _pose(at: SendGoal | TellPose) -> dict[str, Any]:
+def _pose(at: SendGoal | SendPose) -> dict[str, Any]:
     q = Quaternion.from_yaw(at.yaw)
     return {
         "position": {"x": at.x, "y": at.y, "z": 0.0},
@@ -183,7 +183,7 @@ class _Frame(msgspec.Struct):
 _decode_frame = msgspec.json.Decoder(_Frame).decode
 
 
-class Heard(msgspec.Struct, frozen=True):
+class Received(msgspec.Struct, frozen=True):
     """What came from a bridge, as far as the gate cares."""
 
     op: str
@@ -194,7 +194,7 @@ class Heard(msgspec.Struct, frozen=True):
     made of finite numbers. The other numbers are NaN where the message has none."""
 
 
-def hear(data: bytes) -> Heard | None:
+def hear(data: bytes) -> Received | None:
     """Return what a message from a bridge says; ``None`` if it makes no sense.
 
     Raises:
@@ -212,7 +212,7 @@ def hear(data: bytes) -> Heard | None:
     if frame is None:
         return None
     id = None if frame.id is None else str(frame.id)
-    return Heard(frame.op, id, frame.topic, _velocity(frame.msg))
+    return Received(frame.op, id, frame.topic, _velocity(frame.msg))
 
 
 def _lenient(data: bytes) -> _Frame | None:

@@ -52,7 +52,7 @@ _LINGER = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 
 
 @dataclass(slots=True)
-class Ears:
+class SocketHandlers:
     """Who hears what comes on a socket; may be changed while it is open."""
 
     text: Callable[[bytes], None]
@@ -72,7 +72,7 @@ class Socket(asyncio.Protocol):
 
     """
 
-    def __init__(self, url: str, ears: Ears, budget: Budget) -> None:
+    def __init__(self, url: str, ears: SocketHandlers, budget: Budget) -> None:
         self.url = url
         self.ears = ears
         self.flooded = False
@@ -307,7 +307,7 @@ class Socket(asyncio.Protocol):
             self.ears.lost(why)
 
 
-async def open_socket(url: str, ears: Ears, budget: Budget) -> Socket:
+async def open_socket(url: str, ears: SocketHandlers, budget: Budget) -> Socket:
     """Connect to a bridge.
 
     Args:

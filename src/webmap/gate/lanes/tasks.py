@@ -21,18 +21,18 @@ from websockets.exceptions import WebSocketException
 from webmap.base.errors import BridgeClosed
 from webmap.base.geometry import Pose
 from webmap.base.identifiers import generate_id
-from webmap.gate.actions import SendGoal, TellPose
+from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.events import Event, GoalEnded, GoalLost, LinkDown, LinkUp
 from webmap.gate.lanes import navigation, rosbridge
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.lane import Lane
 from webmap.gate.lanes.navigation import answer_to, readable
-from webmap.gate.lanes.sockets import Ears, Socket, open_socket
+from webmap.gate.lanes.sockets import Socket, SocketHandlers, open_socket
 from webmap.gate.protocol import RobotSpec
 from webmap.gate.rules.goals import is_move_base
 from webmap.ros.rosbridge import ops
 
-Place = TypeVar("Place", SendGoal, TellPose)
+Place = TypeVar("Place", SendGoal, SendPose)
 
 _COMMON = (0.0, 0.0, 0.0)
 
@@ -119,7 +119,7 @@ class Calls:
             reason = readable(f"no answer: connection lost: {why}")
             outcomes.put_nowait(reason)
 
-        ears = Ears(text=hear, pong=lambda _: None, lost=lost)
+        ears = SocketHandlers(text=hear, pong=lambda _: None, lost=lost)
         try:
             async with asyncio.timeout(CALL_TIMEOUT):
                 link = await open_socket(self._url, ears, self._budget)
@@ -190,7 +190,7 @@ class TasksLane:
     def detach(self, topics: Iterable[Topic]) -> None:
         """Undo one :meth:`attach`."""
         for topic, type in topics:
-            self.lane.let_go(_advertisement(topic, type))
+            self.lane.release_hold(_advertisement(topic, type))
 
     def send(self, spec: RobotSpec, goal: SendGoal) -> bool:
         """Write a goal now or drop it; return whether it went out."""
@@ -206,7 +206,7 @@ class TasksLane:
             self.forget(goal.robot)
         return done
 
-    def tell_pose(self, spec: RobotSpec, at: TellPose) -> bool:
+    def send_pose(self, spec: RobotSpec, at: SendPose) -> bool:
         """Tell where the robot is, now or not; return whether it went out."""
         estimate = rosbridge.pose_estimate(spec, in_own_map(spec, at))
         return self.lane.write(estimate, only_if_clear=True, until=at.until)
@@ -256,7 +256,7 @@ class TasksLane:
         self._spent.clear()
 
     def _keep_for_result(self, goal: SendGoal) -> None:
-        polite = Pace()
+        polite = FeedbackThrottle()
 
         # A socket is taken out once: of one that was closed or lost nothing is heard.
         def hear(data: bytes) -> None:
@@ -272,7 +272,9 @@ class TasksLane:
             self._tell(GoalLost(goal.robot, goal.id, f"connection lost: {why}"))
 
         self._spending = True
-        link = self.lane.spend(Ears(text=hear, pong=lambda _: None, lost=lost))
+        link = self.lane.spend(
+            SocketHandlers(text=hear, pong=lambda _: None, lost=lost)
+        )
         self._spending = False
         self._spent[link] = goal
         if len(self._spent) > MAX_SPENT:
@@ -299,7 +301,7 @@ class TasksLane:
         if found is not None:
             for part in _ACTIONLIB:
                 topic = f"{found[0].action}/{part}"
-                self.lane.let_go(f"webmap-gate follow {topic} {robot}")
+                self.lane.release_hold(f"webmap-gate follow {topic} {robot}")
 
     def _hear(self, data: bytes) -> None:
         for robot, (spec, goal) in list(self._followed.items()):
@@ -318,13 +320,13 @@ class TasksLane:
             self._tell(GoalLost(goal.robot, goal.id, why))
 
 
-class Pace:
+class FeedbackThrottle:
     """Thins out what a robot may say of a goal a hundred times a second."""
 
     def __init__(self) -> None:
         self._at = float("-inf")
 
-    def __call__(self, word: navigation.Word) -> bool:
+    def __call__(self, word: navigation.GoalNews) -> bool:
         """Return whether the display should hear this word."""
         now = asyncio.get_running_loop().time()
         if isinstance(word, GoalEnded) or now - self._at >= FEEDBACK_PERIOD:

@@ -2,18 +2,18 @@
 
 from operator import attrgetter
 
-from webmap.gate.actions import Detach, Emit, RunHook, Say
+from webmap.gate.actions import Detach, Emit, RunHook, SendToDisplay
 from webmap.gate.events import HookEnded, Key
 from webmap.gate.limits import Axes, axes_of
 from webmap.gate.protocol import Refused, RobotSpec
 from webmap.gate.rules.goals import Goals
-from webmap.gate.rules.health import Health
+from webmap.gate.rules.health import LinkHealth
 from webmap.gate.specs import place_of
 
 NO_LINK = "not sent yet: no connection"
 
 
-class Hooks:
+class StopHooks:
     """The hooks of one robot: said on STOP and reset, now or when there is a link.
 
     Args:
@@ -24,7 +24,7 @@ class Hooks:
 
     """
 
-    def __init__(self, key: Key, spec: RobotSpec, link: Health, emit: Emit) -> None:
+    def __init__(self, key: Key, spec: RobotSpec, link: LinkHealth, emit: Emit) -> None:
         self.spec = spec
         self.link = link
         self._key = key
@@ -100,7 +100,7 @@ _terms = attrgetter(
 """What one robot says for the whole machine."""
 
 
-class Robots:
+class Aliases:
     """Everything that was declared for one machine. No I/O.
 
     Args:
@@ -113,7 +113,7 @@ class Robots:
         self.specs: dict[str, RobotSpec] = {}
         """By the name that the display has for each; the newest is the last."""
         self.goals: dict[str, Goals] = {}
-        self.hooks: dict[str, Hooks] = {}
+        self.hooks: dict[str, StopHooks] = {}
         self.leaving: set[str] = set()
         """Those that were forgotten and are there until the machine has stopped."""
         self._key = key
@@ -177,7 +177,7 @@ class Robots:
         return any(_terms(spec) == terms for spec in staying)
 
     def declare(
-        self, spec: RobotSpec, tasks: Health, hooks: Health, now: float
+        self, spec: RobotSpec, tasks: LinkHealth, hooks: LinkHealth, now: float
     ) -> None:
         """Take in a robot, or what changed of it.
 
@@ -195,11 +195,11 @@ class Robots:
         if goals is None:
             self.goals[spec.id] = Goals(self._key, spec, tasks, self._emit)
         else:
-            goals.vacate(spec, now)
+            goals.cancel_unless_reachable(spec, now)
             goals.spec, goals.link = spec, tasks
         said = self.hooks.get(spec.id)
         if said is None or said.spec.stop_hooks != spec.stop_hooks:
-            self.hooks[spec.id] = Hooks(self._key, spec, hooks, self._emit)
+            self.hooks[spec.id] = StopHooks(self._key, spec, hooks, self._emit)
         else:  # a reset may be owed, and an answer on its way
             said.spec, said.link = spec, hooks
 
@@ -209,12 +209,12 @@ class Robots:
         del self.specs[robot], self.goals[robot], self.hooks[robot]
         self._emit(Detach(self._key, robot))
 
-    def make_way(self, now: float) -> None:
+    def cancel_for_driving(self, now: float) -> None:
         """Cancel a goal that may be running: somebody is going to drive."""
         for goals in self.goals.values():
-            goals.make_way(now)
+            goals.cancel_for_driving(now)
 
     def refuse(self, connection: str, what: str, why: str) -> None:
         """Tell somebody what does not happen, under each of the names."""
         for robot in self.specs:
-            self._emit(Say(Refused(connection, robot, what, why)))
+            self._emit(SendToDisplay(Refused(connection, robot, what, why)))

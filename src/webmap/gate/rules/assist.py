@@ -19,12 +19,12 @@ from collections.abc import Iterable, Sequence
 import msgspec
 
 from webmap.base.geometry import Twist
-from webmap.gate.events import Sweep
+from webmap.gate.events import Scan
 from webmap.gate.protocol import AssistSpec, Point
 from webmap.gate.rules import scan_geometry
-from webmap.gate.rules.aliases import Robots
+from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.scan_geometry import (
-    Fan,
+    ScanDirections,
     looks_ahead,
     time_straight,
     time_turning,
@@ -45,7 +45,7 @@ _ON_THE_SPOT = 1e-6
 _ROUNDING = 1e-9
 
 
-class Verdict(msgspec.Struct, frozen=True):
+class AllowedShare(msgspec.Struct, frozen=True):
     """How much of a commanded velocity is let through."""
 
     scale: float
@@ -54,10 +54,12 @@ class Verdict(msgspec.Struct, frozen=True):
     """In words, if it is less than 1."""
 
 
-FREE = Verdict(1.0, None)
+FREE = AllowedShare(1.0, None)
 
 
-def assist(spec: AssistSpec, sweep: Sweep | None, wanted: Twist, now: float) -> Verdict:
+def assist(
+    spec: AssistSpec, sweep: Scan | None, wanted: Twist, now: float
+) -> AllowedShare:
     """Return how much of a velocity the scan allows.
 
     Args:
@@ -81,10 +83,10 @@ def assist(spec: AssistSpec, sweep: Sweep | None, wanted: Twist, now: float) -> 
     allowed = math.sqrt(2 * spec.brake * room) if room > 0 else 0.0
     if allowed >= speed:
         return FREE
-    return Verdict(allowed / speed, f"scan assist: obstacle {gap:.1f} m ahead")
+    return AllowedShare(allowed / speed, f"scan assist: obstacle {gap:.1f} m ahead")
 
 
-def points_of(spec: AssistSpec, sweep: Sweep, within: float = math.inf) -> list[Point]:
+def points_of(spec: AssistSpec, sweep: Scan, within: float = math.inf) -> list[Point]:
     """Return what the scan hit, in the robot's frame; hits of its own body left out.
 
     Args:
@@ -108,7 +110,7 @@ def points_of(spec: AssistSpec, sweep: Sweep, within: float = math.inf) -> list[
     return points
 
 
-def _point(spec: AssistSpec, sweep: Sweep, ray: int, reach: float) -> Point | None:
+def _point(spec: AssistSpec, sweep: Scan, ray: int, reach: float) -> Point | None:
     """Return what a ray hit; None if it is nothing, or the robot's own body."""
     if reach == -math.inf:
         reach = max(sweep.range_min, 0.0)
@@ -167,7 +169,7 @@ def inside(corners: Sequence[Point], point: Point) -> bool:
     return odd
 
 
-def _turned_over(sweep: Sweep) -> Sweep:
+def _turned_over(sweep: Scan) -> Scan:
     """Return what a scanner that hangs head down would say if it stood upright."""
     return msgspec.structs.replace(
         sweep,
@@ -196,7 +198,7 @@ def _outer(spec: AssistSpec) -> float:
 
 
 def _blindness(
-    spec: AssistSpec, sweep: Sweep | None, wanted: Twist, now: float
+    spec: AssistSpec, sweep: Scan | None, wanted: Twist, now: float
 ) -> str | None:
     if sweep is None:
         return "no scan yet"
@@ -222,7 +224,7 @@ def _blindness(
     return None
 
 
-def _covers_the_way(spec: AssistSpec, sweep: Sweep, wanted: Twist) -> bool:
+def _covers_the_way(spec: AssistSpec, sweep: Scan, wanted: Twist) -> bool:
     """Return whether the scan looks where the robot is until it could stand."""
     fan = _fan(sweep)
     speed = math.hypot(wanted.vx, wanted.vy)
@@ -234,14 +236,16 @@ def _covers_the_way(spec: AssistSpec, sweep: Sweep, wanted: Twist) -> bool:
     )
 
 
-def _fan(sweep: Sweep) -> Fan:
+def _fan(sweep: Scan) -> ScanDirections:
     """Return where the scanner has rays, be they folded or not."""
     if (fold := sweep.fold) is not None:
-        return Fan(sweep.angle_min, sweep.angle_increment / fold.each, fold.beams)
-    return Fan(sweep.angle_min, sweep.angle_increment, len(sweep.ranges))
+        return ScanDirections(
+            sweep.angle_min, sweep.angle_increment / fold.each, fold.beams
+        )
+    return ScanDirections(sweep.angle_min, sweep.angle_increment, len(sweep.ranges))
 
 
-def _rays_towards(spec: AssistSpec, sweep: Sweep, wanted: Twist) -> Sequence[int]:
+def _rays_towards(spec: AssistSpec, sweep: Scan, wanted: Twist) -> Sequence[int]:
     """Return the rays that look where the robot goes; all of them if it turns."""
     rays = range(len(sweep.ranges))
     if math.hypot(wanted.vx, wanted.vy) < _ON_THE_SPOT:
@@ -255,18 +259,18 @@ def _rays_towards(spec: AssistSpec, sweep: Sweep, wanted: Twist) -> Sequence[int
     ]
 
 
-def _blind(spec: AssistSpec, speed: float, reason: str) -> Verdict:
+def _blind(spec: AssistSpec, speed: float, reason: str) -> AllowedShare:
     why = f"scan assist: {reason}"
     if spec.blind == "stop":
-        return Verdict(0.0, why)
-    return FREE if speed <= spec.creep else Verdict(spec.creep / speed, why)
+        return AllowedShare(0.0, why)
+    return FREE if speed <= spec.creep else AllowedShare(spec.creep / speed, why)
 
 
 MIXED = 2.0
 """Seconds for which no scan of a topic counts after its frame was seen to change."""
 
 
-class Guard:
+class ScanAssist:
     """Keeps the newest scans of one machine and slows it down before what they see.
 
     Args:
@@ -274,9 +278,9 @@ class Guard:
 
     """
 
-    def __init__(self, robots: Robots) -> None:
+    def __init__(self, robots: Aliases) -> None:
         self._robots = robots
-        self._sweeps: dict[str, Sweep] = {}
+        self._sweeps: dict[str, Scan] = {}
         self._changed: dict[str, float] = {}
         """When the frame of a topic's scans was last another than before."""
         self._verdict = FREE
@@ -286,7 +290,7 @@ class Guard:
         """Why the last command was not let through as it was, in words."""
         return () if self._verdict.why is None else (self._verdict.why,)
 
-    def saw(self, topic: str, sweep: Sweep) -> None:
+    def observe(self, topic: str, sweep: Scan) -> None:
         """Note that a scan came; of a topic where two scanners speak none counts."""
         before = self._sweeps.get(topic)
         if before is not None and before.frame != sweep.frame:
@@ -322,5 +326,5 @@ class Guard:
         return Twist(*(s * part for part in wanted.numbers))
 
 
-def _scale(verdict: Verdict) -> float:
+def _scale(verdict: AllowedShare) -> float:
     return verdict.scale

@@ -15,15 +15,21 @@ from webmap.base.geometry import Twist
 from webmap.gate.commands import Refusal
 from webmap.gate.events import Key, LockState
 from webmap.gate.limits import Cap, page_cap
-from webmap.gate.rules.aliases import Robots
+from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.connections import Connection, Epochs, Lease
-from webmap.gate.rules.health import Health, Pulse, Sight, Standstill, Video
+from webmap.gate.rules.health import (
+    DisplayPulse,
+    LinkHealth,
+    Observation,
+    Standstill,
+    Video,
+)
 from webmap.gate.rules.motion import DeadMan, Motion
 from webmap.gate.rules.speeds import Speeds
-from webmap.gate.rules.stop import Latch
+from webmap.gate.rules.stop import StopLatch
 
 
-class Arming:
+class MotionConditions:
     """Everything outside of the driver's hands that stands against motion.
 
     Args:
@@ -39,11 +45,11 @@ class Arming:
     def __init__(
         self,
         key: Key,
-        robots: Robots,
-        latch: Latch,
-        control: Health,
-        pulse: Pulse,
-        sight: Sight,
+        robots: Aliases,
+        latch: StopLatch,
+        control: LinkHealth,
+        pulse: DisplayPulse,
+        sight: Observation,
     ) -> None:
         self.lock = LockState(key, held=False)
         """Whether this gate alone on this computer has it."""
@@ -52,21 +58,21 @@ class Arming:
         self._robots = robots
         self._latch = latch
         self._control = control
-        self._pulse = pulse
-        self._sight = sight
+        self._display_pulse = pulse
+        self._observation = sight
 
     @property
     def stopped(self) -> bool:
         """Whether STOP stands."""
         return self._latch.on
 
-    def obstacle(self, now: float) -> str | None:
+    def why_unavailable(self, now: float) -> str | None:
         """Return why nobody can have the machine, in words."""
         if self._latch.on:
             return f"STOP by {self._latch.by} is active: reset it first"
         if not self.lock.held:
             return self.lock.why
-        if doubt := self._pulse.doubt(now):
+        if doubt := self._display_pulse.doubt(now):
             return doubt
         if self._robots.drivable:
             return None if self._control.up else f"no connection to {self._url}"
@@ -77,13 +83,13 @@ class Arming:
 
     def doubt(self, now: float) -> str | None:
         """Return why the machine must not be driven now, in words."""
-        if reason := self.obstacle(now):
+        if reason := self.why_unavailable(now):
             return reason
         if not self._robots.drivable:
             return "the robot has no velocity topic"
         if not self._control.fresh(now):
             return f"no answer from {self._url}"
-        if self._robots.has_odometry and (blind := self._sight.doubt(now)):
+        if self._robots.has_odometry and (blind := self._observation.doubt(now)):
             return blind
         return self.video.doubt(now)
 
@@ -95,12 +101,12 @@ WITHOUT_SIGHT = 1.0
 """Seconds after zero that are taken for standstill where no odometry tells."""
 
 
-class HandOver:
+class Handover:
     """The way of one machine from one pair of hands to another."""
 
     def __init__(self) -> None:
         self.asker: Connection | None = None
-        self.heir: Connection | None = None
+        self.successor: Connection | None = None
         """Who gets it as soon as it stands."""
         self._asked_at = float("-inf")
         self.since = float("-inf")
@@ -110,7 +116,7 @@ class HandOver:
     @property
     def going_on(self) -> bool:
         """Whether time may make a difference."""
-        return self.asker is not None or self.heir is not None
+        return self.asker is not None or self.successor is not None
 
     def ask(self, who: Connection, now: float) -> None:
         """Ask the holder; asked again, nothing changes.
@@ -130,16 +136,16 @@ class HandOver:
         """Return the seconds until it is granted by itself."""
         return max(0.0, self._asked_at + ASKING - now)
 
-    def begin(self, heir: Connection, now: float) -> None:
+    def begin(self, successor: Connection, now: float) -> None:
         """Wait for standstill, zero having been written at ``now``."""
-        self.asker, self.heir, self.since = None, heir, now
+        self.asker, self.successor, self.since = None, successor, now
         self._still.begin()
 
-    def saw(self, twist: Twist | None, now: float) -> None:
+    def observe(self, twist: Twist | None, now: float) -> None:
         """Take in a message of odometry."""
-        self._still.saw(twist, now)
+        self._still.observe(twist, now)
 
-    def stands(self, now: float) -> bool:
+    def is_still(self, now: float) -> bool:
         """Return whether it is standing, as far as anybody can tell."""
         if self._still.reached:
             return True
@@ -148,13 +154,13 @@ class HandOver:
 
     def end(self) -> Connection | None:
         """Have nobody get it; return who is disappointed by that."""
-        who = self.heir or self.asker
-        self.asker = self.heir = None
+        who = self.successor or self.asker
+        self.asker = self.successor = None
         return who
 
     def withdraw(self, connection: str) -> None:
         """Forget that this connection wanted it."""
-        for who in (self.asker, self.heir):
+        for who in (self.asker, self.successor):
             if who is not None and who.id == connection:
                 self.end()
 
@@ -165,12 +171,12 @@ page gives back sooner what it does not need; one that hangs does not, and other
 wait. Browsers let a page that nobody sees act once a minute."""
 
 
-class Hands:
+class Authority:
     """The lease of one machine, and who is to have it next.
 
     Args:
         robots: The robots that it is.
-        arming: What stands against its motion.
+        conditions: What stands against its motion.
         motion: Writes to it.
         speeds: How fast it may go.
         epochs: The epochs to give to leases.
@@ -181,8 +187,8 @@ class Hands:
 
     def __init__(
         self,
-        robots: Robots,
-        arming: Arming,
+        robots: Aliases,
+        conditions: MotionConditions,
         motion: Motion,
         speeds: Speeds,
         epochs: Epochs,
@@ -190,10 +196,10 @@ class Hands:
         changed: Callable[[float], None],
     ) -> None:
         self.lease: Lease | None = None
-        self.handover = HandOver()
+        self.handover = Handover()
         self.deadman = DeadMan()
         self._robots = robots
-        self._arming = arming
+        self._conditions = conditions
         self._motion = motion
         self._speeds = speeds
         self._epochs = epochs
@@ -201,12 +207,13 @@ class Hands:
         self._changed = changed
         self._used_at = float("-inf")
 
-    def unarmable(self, now: float) -> str | None:
+    def why_unavailable(self, now: float) -> str | None:
         """Return why nobody can take the machine now, in words."""
-        heir = self.handover.heir
-        if heir is not None and not self._arming.stopped:
-            return f"control goes to {heir.name or heir.id} when the robot has stopped"
-        return self._arming.obstacle(now)
+        successor = self.handover.successor
+        if successor is not None and not self._conditions.stopped:
+            name = successor.name or successor.id
+            return f"control goes to {name} when the robot has stopped"
+        return self._conditions.why_unavailable(now)
 
     def is_held_by(self, connection: str) -> bool:
         """Return whether this connection has the lease."""
@@ -225,7 +232,7 @@ class Hands:
         """Forget what held for the hands before."""
         self._speeds.page_cap = cap
         self._speeds.ages.clear()
-        self._arming.video.forget()
+        self._conditions.video.forget()
         self._changed(now)
 
     def renew(self, now: float) -> None:
@@ -278,7 +285,7 @@ class Hands:
             Refusal: If it can be taken without asking, or not at all.
 
         """
-        if reason := self.unarmable(now):
+        if reason := self.why_unavailable(now):
             raise Refusal(reason)
         if self.lease is None or self.lease.program:
             raise Refusal("no operator has control: take control")
@@ -290,13 +297,15 @@ class Hands:
         assert asker is not None  # only then is there anything to deny
         self._robots.refuse(asker.id, "ask", why)
 
-    def hand_over(self, heir: Connection, now: float) -> None:
-        """Zero first; ``heir`` gets the machine when it stands (S5)."""
-        self._end(f"control goes to {heir.name or heir.id}", now)
+    def hand_over(self, successor: Connection, now: float) -> None:
+        """Zero first; ``successor`` gets the machine when it stands (S5)."""
+        self._end(f"control goes to {successor.name or successor.id}", now)
         if self._robots.drivable:
             self._motion.zero(now)
-        self._robots.make_way(now)  # what follows a goal does not come to stand
-        self.handover.begin(heir, now)
+        self._robots.cancel_for_driving(
+            now
+        )  # what follows a goal does not come to stand
+        self.handover.begin(successor, now)
         self._changed(now)
 
     def step(self, now: float) -> None:
@@ -306,14 +315,14 @@ class Hands:
             self.end(f"not used for {UNUSED:g} s", now)
         if handover.asker is not None and handover.left(now) == 0:
             self.hand_over(handover.asker, now)
-        heir = handover.heir
-        if heir is None:
+        successor = handover.successor
+        if successor is None:
             return
-        if reason := self._arming.obstacle(now):
+        if reason := self._conditions.why_unavailable(now):
             self.end(reason, now)
-        elif handover.stands(now):
+        elif handover.is_still(now):
             handover.end()
-            self.give(heir, now)
+            self.give(successor, now)
         elif self._robots.drivable and not self._motion.stopping:
             self._motion.zero(now)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from webmap.gate.actions import Emit, Say
+from webmap.gate.actions import Emit, SendToDisplay
 from webmap.gate.commands import Refusal
 from webmap.gate.limits import page_cap
 from webmap.gate.protocol import (
@@ -171,7 +171,7 @@ QUIET = 1.0
 """Seconds for which the same refusal is not said again."""
 
 
-class Rate:
+class RateLimit:
     """Counts what happened within the last second.
 
     Args:
@@ -206,15 +206,15 @@ class Connection:
         self.acked = -1
         """The newest accepted ``seq``."""
         self.cap = page_cap()
-        self.garbage = Rate(GARBAGE_LIMIT)
-        self.messages = Rate(FLOOD_LIMIT)
+        self.garbage = RateLimit(GARBAGE_LIMIT)
+        self.messages = RateLimit(FLOOD_LIMIT)
         self.closing = False
         self.flagged = False
         """Whether it was logged that this page asks for more than full speed."""
         self._refused = 0
         self._last_refused = ""
         self._counted_at = float("-inf")
-        self._told: dict[tuple[str | None, str, str], float] = {}
+        self._sent_at: dict[tuple[str | None, str, str], float] = {}
 
     @property
     def program(self) -> bool:
@@ -243,10 +243,12 @@ class Connection:
         self._refused, self._counted_at = 0, now
         return count
 
-    def news(self, robot: str | None, what: str, why: str, now: float) -> bool:
+    def is_new_refusal(
+        self, robot: str | None, what: str, why: str, now: float
+    ) -> bool:
         """Return whether a refusal is worth saying, or was said just now."""
-        told = {key: at for key, at in self._told.items() if now - at < QUIET}
-        self._told = told
+        told = {key: at for key, at in self._sent_at.items() if now - at < QUIET}
+        self._sent_at = told
         key = (robot, what, why)
         if key in told:
             return False
@@ -257,7 +259,7 @@ class Connection:
 log = logging.getLogger("webmap.gate")
 
 
-class People:
+class Connections:
     """The connections that there are, and what they are told.
 
     Args:
@@ -284,7 +286,7 @@ class People:
         self._all[message.connection] = Connection(
             message.connection, message.name, message.role
         )
-        self._emit(Say(Hello(message.connection)))
+        self._emit(SendToDisplay(Hello(message.connection)))
 
     def remove(self, id: str) -> bool:
         """Forget a page; return whether there was one."""
@@ -302,7 +304,7 @@ class People:
     def _count(self, connection: Connection, now: float) -> None:
         count = connection.count_refused(now)
         if count is not None:
-            self._emit(Say(count))
+            self._emit(SendToDisplay(count))
 
     def refuse(
         self, id: str, robot: str | None, what: str, why: str, now: float
@@ -312,10 +314,10 @@ class People:
         if connection is None:
             return
         connection.note_refused(what, why)
-        if connection.news(robot, what, why, now):
-            self._emit(Say(Refused(id, robot, what, why)))
+        if connection.is_new_refusal(robot, what, why, now):
+            self._emit(SendToDisplay(Refused(id, robot, what, why)))
 
-    def attempt(
+    def run_or_refuse(
         self,
         id: str,
         robot: str | None,
@@ -334,4 +336,4 @@ class People:
         if not connection.closing:
             connection.closing = True
             log.warning("connection %s is to be closed: %s", connection.id, why)
-            self._emit(Say(CloseConnection(connection.id, why)))
+            self._emit(SendToDisplay(CloseConnection(connection.id, why)))

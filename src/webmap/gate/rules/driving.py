@@ -2,11 +2,11 @@
 
 from webmap.base.geometry import Twist
 from webmap.gate.commands import Refusal
-from webmap.gate.rules.aliases import Robots
-from webmap.gate.rules.authority import Arming, Hands
+from webmap.gate.rules.aliases import Aliases
+from webmap.gate.rules.authority import Authority, MotionConditions
 from webmap.gate.rules.connections import Lease
 from webmap.gate.rules.motion import Motion
-from webmap.gate.rules.stop_test import CREEP, StopTest, StopTesting
+from webmap.gate.rules.stop_test import CREEP, StopTest, StopTests
 
 
 class Driving:
@@ -14,8 +14,8 @@ class Driving:
 
     Args:
         robots: The robots that it is.
-        hands: Who has it.
-        arming: What stands against its motion.
+        authority: Who has it.
+        conditions: What stands against its motion.
         motion: Writes to it.
         tests: Its stop tests.
 
@@ -23,15 +23,15 @@ class Driving:
 
     def __init__(
         self,
-        robots: Robots,
-        hands: Hands,
-        arming: Arming,
+        robots: Aliases,
+        authority: Authority,
+        conditions: MotionConditions,
         motion: Motion,
-        tests: StopTesting,
+        tests: StopTests,
     ) -> None:
         self._robots = robots
-        self._hands = hands
-        self._arming = arming
+        self._authority = authority
+        self._conditions = conditions
         self._motion = motion
         self._tests = tests
 
@@ -48,18 +48,18 @@ class Driving:
             Why nothing moves although something should, in words, or ``None``.
 
         """
-        lease = self._hands.lease
+        lease = self._authority.lease
         assert lease is not None
-        if reason := self._arming.doubt(now):
+        if reason := self._conditions.doubt(now):
             self._fault(reason, now)
             return None if neutral else reason
-        self._hands.deadman.accept(neutral, tick, now)
-        if self._hands.deadman.expired(now):
+        self._authority.deadman.accept(neutral, tick, now)
+        if self._authority.deadman.expired(now):
             self._lapse("the page receives no ticks", now)
             return None if neutral else "the page received no new tick"
         if self._tests.running is not None:
             return self._go_on_with_test(self._tests.running, lease, neutral, now)
-        if neutral or not self._hands.deadman.armed:
+        if neutral or not self._authority.deadman.armed:
             self._motion.halt(now)
             return None if neutral else "release all inputs first"
         self._drive(wanted, lease, now)
@@ -71,9 +71,9 @@ class Driving:
         return self._motion.silent and self._tests.running is None
 
     def _drive(self, wanted: Twist, lease: Lease, now: float) -> None:
-        self._hands.renew(now)
+        self._authority.renew(now)
         if not self._motion.driving:
-            self._robots.make_way(now)
+            self._robots.cancel_for_driving(now)
         self._motion.drive(wanted, lease, now)
 
     def late(self, now: float) -> None:
@@ -92,9 +92,9 @@ class Driving:
         """
         if self._tests.running is not None:
             raise Refusal("a stop test is running")
-        if reason := self._arming.doubt(now):
+        if reason := self._conditions.doubt(now):
             raise Refusal(reason)
-        self._tests.begin(self._hands.deadman.armed, now)
+        self._tests.begin(self._authority.deadman.armed, now)
 
     def _go_on_with_test(
         self, test: StopTest, lease: Lease, neutral: bool, now: float
@@ -102,7 +102,7 @@ class Driving:
         if not neutral:
             self._lapse("a key was pressed", now)
             return "a stop test was running: release all inputs first"
-        if not self._hands.deadman.armed:
+        if not self._authority.deadman.armed:
             self._lapse("the page stopped sending commands", now)
         if test.state == "creeping":
             self._drive(CREEP, lease, now)
@@ -117,11 +117,11 @@ class Driving:
             Refusal: If it cannot be sent now.
 
         """
-        if reason := self._hands.unarmable(now):
+        if reason := self._authority.why_unavailable(now):
             raise Refusal(reason)
         self._lapse("a goal was sent", now)
         self._robots.goals[robot].send(*pose, by, now)
-        self._hands.renew(now)
+        self._authority.renew(now)
 
     def locate(
         self, robot: str, pose: tuple[float, float, float], by: str, now: float
@@ -132,38 +132,38 @@ class Driving:
             Refusal: If it cannot be told now.
 
         """
-        if reason := self._hands.unarmable(now):
+        if reason := self._authority.why_unavailable(now):
             raise Refusal(reason)
         if not self.silent:
             raise Refusal("the robot is moving: stop it first")
         self._robots.goals[robot].locate(*pose, by, now)
-        self._hands.renew(now)
+        self._authority.renew(now)
 
     def link_down(self, why: str, now: float) -> None:
         """The link that velocity goes to is gone."""
-        if self._hands.lease is not None:
+        if self._authority.lease is not None:
             self._fault(why, now)
 
     def step(self, now: float) -> None:
         """Let time pass."""
-        if self._hands.lease is not None:
-            if reason := self._arming.doubt(now):
+        if self._authority.lease is not None:
+            if reason := self._conditions.doubt(now):
                 self._fault(reason, now)
-            elif self._hands.deadman.expired(now):
+            elif self._authority.deadman.expired(now):
                 self._lapse("the page stopped sending commands", now)
         self._tests.step(now)
 
     def _lapse(self, why: str, now: float) -> None:
-        self._hands.deadman.disarm()
+        self._authority.deadman.disarm()
         self._tests.halt(why, now)
 
     def _fault(self, reason: str, now: float) -> None:
         """Stop and disarm, because something may not be as it should."""
         self._lapse(reason, now)
-        lease = self._hands.lease
+        lease = self._authority.lease
         if lease is None or not lease.program:
             return
         # A program is not seen to let go of anything, so once it has driven it has to
         # take it again: it may stand still with its display, and go on where it was.
         if self._motion.sent_epoch == lease.epoch:
-            self._hands.end(reason, now)
+            self._authority.end(reason, now)

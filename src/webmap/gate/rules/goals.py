@@ -3,11 +3,11 @@
 import msgspec
 
 from webmap.base.identifiers import generate_id
-from webmap.gate.actions import CancelGoals, Emit, SendGoal, TellPose
+from webmap.gate.actions import CancelGoals, Emit, SendGoal, SendPose
 from webmap.gate.commands import Refusal
-from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, WroteGoal
-from webmap.gate.protocol import GoalReport, RobotSpec, Way
-from webmap.gate.rules.health import Health
+from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, GoalWritten, Key
+from webmap.gate.protocol import GoalMethod, GoalReport, RobotSpec
+from webmap.gate.rules.health import LinkHealth
 from webmap.gate.rules.motion import WAIT_LIMIT
 from webmap.ros.names import is_type
 
@@ -44,7 +44,7 @@ class Goals:
 
     """
 
-    def __init__(self, key: Key, spec: RobotSpec, link: Health, emit: Emit) -> None:
+    def __init__(self, key: Key, spec: RobotSpec, link: LinkHealth, emit: Emit) -> None:
         self.spec = spec
         self.link = link
         self.report: GoalReport | None = None
@@ -63,7 +63,7 @@ class Goals:
         """Whether the bridge said that it takes no goals of actions."""
 
     @property
-    def way(self) -> Way | None:
+    def way(self) -> GoalMethod | None:
         """How goals are sent to this robot; ``None`` if they cannot be."""
         spec = self.spec
         if spec.action is None or (self._no_actions and spec.goal_topic is not None):
@@ -100,7 +100,7 @@ class Goals:
             self.following and report is not None and (report.way != "topic" or moving)
         )
 
-    def brakes(self, now: float) -> bool:
+    def may_still_move(self, now: float) -> bool:
         """Return whether motion at ``now`` may come from a goal that has ended."""
         return now - self._over_at < BRAKES
 
@@ -135,9 +135,9 @@ class Goals:
         if not self.link.up:
             raise Refusal("no connection to the bridge of its initial pose")
         until = now + WAIT_LIMIT
-        self._emit(TellPose(self._key, self.spec.id, x, y, yaw, by, until))
+        self._emit(SendPose(self._key, self.spec.id, x, y, yaw, by, until))
 
-    def wrote(self, goal: WroteGoal) -> None:
+    def on_written(self, goal: GoalWritten) -> None:
         """Note that a goal went out."""
         self._running, self._by, self._perhaps = goal.id, goal.by, True
         self._cancelled_at = float("-inf")  # that was of the goals before
@@ -185,7 +185,7 @@ class Goals:
                 why = report.why if report.state == "cancelling" else why
             self._show(end.outcome, why or _OTHERWISE[end.outcome], now)
 
-    def gone_dark(self, lost: GoalLost, now: float) -> None:
+    def on_progress_lost(self, lost: GoalLost, now: float) -> None:
         """Note that nobody tells any more how a goal goes."""
         report = self._about(lost.id)
         if report is None or report.state in OVER:
@@ -217,7 +217,7 @@ class Goals:
             waits = self._cancel_owed or self.report.way != "topic"
             self._show("cancelling" if waits else "cancelled", why, now)
 
-    def insist(self, news: GoalProgress, stopped: bool, now: float) -> None:
+    def cancel_again(self, news: GoalProgress, stopped: bool, now: float) -> None:
         """Cancel again, because a goal is said to go on that should not.
 
         A cancel may be quicker than the goal that it is meant for, which comes by
@@ -236,7 +236,7 @@ class Goals:
             self._insisted_at = now
             self._emit(CancelGoals(self._key, self.spec.id))
 
-    def make_way(self, now: float) -> None:
+    def cancel_for_driving(self, now: float) -> None:
         """Cancel a goal that may be running, because somebody is going to drive.
 
         Others send goals to a robot too, and nobody tells the gate. So whoever drives
@@ -265,7 +265,7 @@ class Goals:
         if self.spec.on_operator_loss == "cancel" and self._perhaps and self.can_cancel:
             self.cancel(now, "the sender of the goal is gone")
 
-    def vacate(self, spec: RobotSpec, now: float) -> None:
+    def cancel_unless_reachable(self, spec: RobotSpec, now: float) -> None:
         """Call off what is under way, unless that can be done under ``spec`` as well.
 
         Args:

@@ -57,7 +57,7 @@ BEAT_LIMIT = 0.25
 """The longest silence of the display that is not yet taken for its end, in seconds."""
 
 
-class Health:
+class LinkHealth:
     """Whether a link is up, and which question its far end last answered.
 
     An answer tells of the moment when it was asked for, and of nothing after that: it
@@ -103,7 +103,7 @@ class Health:
         return self.up and now - self._heard_at > STALL_LIMIT
 
 
-class Pulse:
+class DisplayPulse:
     """Whether the display process, and so everybody behind it, is there."""
 
     def __init__(self) -> None:
@@ -175,7 +175,7 @@ class Standstill:
         self.speed, self.heard_at, self.since = None, float("-inf"), None
         self.gap = 0.0
 
-    def saw(self, twist: Twist | None, now: float) -> None:
+    def observe(self, twist: Twist | None, now: float) -> None:
         """Take in a message of odometry; ``None`` is one without a velocity."""
         if twist is None:
             return
@@ -201,7 +201,7 @@ in seconds (S16). A velocity is as old as the newest question that was answered 
 it came: a link may have kept both."""
 
 
-class Sight:
+class Observation:
     """The newest echo and the newest odometry of one machine.
 
     Args:
@@ -227,18 +227,18 @@ class Sight:
         if not on:
             self.measured = self.echoed = self._seen = None
 
-    def saw(self, measured: Twist | None, said_after: float, now: float) -> None:
+    def observe(self, measured: Twist | None, sent_after: float, now: float) -> None:
         """Note that odometry came; what tells no velocity shows nobody anything.
 
         Args:
             measured: The velocity that it tells, if it tells one.
-            said_after: A moment after which it was said.
+            sent_after: A moment after which it was said.
             now: The time, at which it came.
 
         """
         self.measured = measured
         if measured is not None:
-            self._seen = (min(said_after, now), now)
+            self._seen = (min(sent_after, now), now)
 
     def shown(self, now: float) -> Twist | None:
         """Return the newest velocity that odometry told, unless that is long ago."""
@@ -250,14 +250,14 @@ class Sight:
         """Return why nobody knows by odometry how it moves now, in words."""
         if self._seen is None:
             return "no odometry yet"
-        said_after, came_at = self._seen
+        sent_after, came_at = self._seen
         if now - came_at > BLIND_LIMIT:
             return f"no odometry for {BLIND_LIMIT:g} s"
-        if now - said_after > BLIND_LIMIT:
+        if now - sent_after > BLIND_LIMIT:
             return f"odometry is more than {BLIND_LIMIT:g} s late"
         return None
 
-    def tells_since(self, then: float) -> bool:
+    def shows_since(self, then: float) -> bool:
         """Return whether the newest odometry tells anything of the time after ``then``.
 
         Of standstill it does if it was said after that. Motion counts however late it
@@ -267,7 +267,7 @@ class Sight:
             return False
         return self._seen[0] >= then or moves(self.measured)
 
-    def saw_echo(self, twist: Twist) -> None:
+    def on_echo(self, twist: Twist) -> None:
         """Note what the robot's ROS says on the velocity topic."""
         if self.on:
             self.echoed = twist
@@ -284,7 +284,7 @@ class Video:
     def __init__(self) -> None:
         self._taken_at: float | None = None
 
-    def saw(self, age: float | None, now: float) -> None:
+    def observe(self, age: float | None, now: float) -> None:
         """Note the age of the picture in seconds, or that no camera was chosen."""
         self._taken_at = None if age is None else now - age
 

@@ -19,21 +19,21 @@ until a reset, which leads to *free*.
 from typing import Literal
 
 from webmap.base.geometry import Twist
-from webmap.gate.actions import Emit, Say
+from webmap.gate.actions import Emit, SendToDisplay
 from webmap.gate.commands import Refusal
-from webmap.gate.events import Key, LockState, Press, Wrote, WroteGoal
+from webmap.gate.events import GoalWritten, Key, LockState, Press, TwistWritten
 from webmap.gate.protocol import RobotSpec, SentTwist
-from webmap.gate.rules.aliases import Robots
-from webmap.gate.rules.assist import Guard
-from webmap.gate.rules.authority import Arming, Hands
+from webmap.gate.rules.aliases import Aliases
+from webmap.gate.rules.assist import ScanAssist
+from webmap.gate.rules.authority import Authority, MotionConditions
 from webmap.gate.rules.connections import Epochs
 from webmap.gate.rules.driving import Driving
-from webmap.gate.rules.health import Health, Pulse, Sight
+from webmap.gate.rules.health import DisplayPulse, LinkHealth, Observation
 from webmap.gate.rules.motion import Motion
 from webmap.gate.rules.obedience import EXPECTED_FOR, Obedience, OtherWriter
 from webmap.gate.rules.speeds import Speeds
-from webmap.gate.rules.stop import Latch, StandingStop
-from webmap.gate.rules.stop_test import StopTesting
+from webmap.gate.rules.stop import ActiveStop, StopLatch
+from webmap.gate.rules.stop_test import StopTests
 
 OWED_PATIENCE = 60.0
 """Seconds for which a robot that was removed is kept for a zero that it is owed. After
@@ -42,7 +42,7 @@ that the file on disk still says so, and whoever has the machine next sends it."
 State = Literal["free", "held", "driving", "stopping", "stopped"]
 
 
-class Base:
+class Machine:
     """The machine behind one velocity topic of one bridge.
 
     Args:
@@ -58,30 +58,34 @@ class Base:
     def __init__(
         self,
         key: Key,
-        control: Health,
-        pulse: Pulse,
-        latch: Latch,
+        control: LinkHealth,
+        pulse: DisplayPulse,
+        latch: StopLatch,
         epochs: Epochs,
         emit: Emit,
     ) -> None:
         self.key = key
         self.control = control
         self.latch = latch
-        self.robots = Robots(key, emit)
+        self.robots = Aliases(key, emit)
         """The robots that this machine goes by."""
         self.known = False
         """Whether it was asked if this gate alone has it, and if STOP stands."""
         self.speeds = Speeds(self.robots, control)
-        self.guard = Guard(self.robots)
-        self.motion = Motion(key, control, self.speeds.bounds, self.guard.limit, emit)
-        self.sight = Sight(key, emit)
+        self.scan_assist = ScanAssist(self.robots)
+        self.motion = Motion(
+            key, control, self.speeds.bounds, self.scan_assist.limit, emit
+        )
+        self.observation = Observation(key, emit)
         self.obedience = Obedience()
         self.other_writer = OtherWriter()
-        self.tests = StopTesting(key, self.motion, self.sight, emit)
-        self.arming = Arming(key, self.robots, latch, control, pulse, self.sight)
-        self.hands = Hands(
+        self.tests = StopTests(key, self.motion, self.observation, emit)
+        self.conditions = MotionConditions(
+            key, self.robots, latch, control, pulse, self.observation
+        )
+        self.authority = Authority(
             self.robots,
-            self.arming,
+            self.conditions,
             self.motion,
             self.speeds,
             epochs,
@@ -90,12 +94,12 @@ class Base:
         )
         self.driving = Driving(
             self.robots,
-            self.hands,
-            self.arming,
+            self.authority,
+            self.conditions,
             self.motion,
             self.tests,
         )
-        self.standing = StandingStop(key, latch, self.robots, control, self.motion)
+        self.active_stop = ActiveStop(key, latch, self.robots, control, self.motion)
         self._emit = emit
         self._left_at = float("-inf")
 
@@ -108,7 +112,7 @@ class Base:
             return "driving"
         if self.motion.stopping:
             return "stopping"
-        return "free" if self.hands.lease is None else "held"
+        return "free" if self.authority.lease is None else "held"
 
     @property
     def silent(self) -> bool:
@@ -119,35 +123,35 @@ class Base:
     def active(self) -> bool:
         """Whether time alone may make a difference."""
         return (
-            self.hands.lease is not None
+            self.authority.lease is not None
             or not self.silent
             or self.motion.owes_zero
             or self.latch.on
             or self.motion.held
-            or self.hands.handover.going_on
-            or self.sight.on
+            or self.authority.handover.going_on
+            or self.observation.on
             or self.other_writer.seen is not None
         )
 
     # The robots that it is.
 
     def declare(
-        self, spec: RobotSpec, tasks: Health, hooks: Health, now: float
+        self, spec: RobotSpec, tasks: LinkHealth, hooks: LinkHealth, now: float
     ) -> None:
         """Take in a robot, or what changed of it; a change ends the lease."""
-        self.hands.end("the robot was declared again", now)
+        self.authority.end("the robot was declared again", now)
         self.robots.declare(spec, tasks, hooks, now)
 
     def attached(self, now: float) -> None:
         """Note that the robot can be spoken to, as soon as there are links."""
         if self.latch.on:
-            self._say_stop(now)
+            self._send_stop(now)
 
     def forget(self, robot: str, now: float) -> None:
         """Drop a robot; the last one stays until its machine has stopped."""
         self.robots.leaving.add(robot)
         if not self.robots.holds_without(robot):
-            self.hands.end(
+            self.authority.end(
                 "the robot, or one on the same velocity topic, was removed", now
             )
         self.robots.goals[robot].lost(now)
@@ -161,12 +165,12 @@ class Base:
             if len(self.robots.specs) == 1:
                 if not self.silent or patient:
                     return
-                self.sight.update(False)
+                self.observation.update(False)
             self.robots.drop(robot)
 
     def lost(self, connection: str, now: float) -> None:
         """A page is gone: what it drove stops."""
-        self.hands.release(connection, now)
+        self.authority.release(connection, now)
         for goals in self.robots.goals.values():
             goals.lost(now, connection)
 
@@ -174,20 +178,23 @@ class Base:
 
     def stop(self, press: Press, now: float) -> None:
         """STOP: zero at once, whoever drives it or nobody; no lease, no goals."""
-        self.hands.end(f"STOP by {press.by}", now)
-        self.standing.press(press, now)
+        self.authority.end(f"STOP by {press.by}", now)
+        self.active_stop.press(press, now)
         self._expect_standstill(now)
 
-    def saw_stop_file(self, press: Press | None, now: float) -> None:
+    def on_stop_file_changed(self, press: Press | None, now: float) -> None:
         """Note that the file of its STOP changed by another hand."""
-        lock = self.arming.lock
-        if self.standing.saw_file(press, lock.elsewhere) and press is not None:
-            self.hands.end(f"STOP by {press.by}", now)
-            self.standing.take_over(press, now)
+        lock = self.conditions.lock
+        if (
+            self.active_stop.on_file_changed(press, lock.elsewhere)
+            and press is not None
+        ):
+            self.authority.end(f"STOP by {press.by}", now)
+            self.active_stop.take_over(press, now)
             self._expect_standstill(now)
 
-    def _say_stop(self, now: float) -> None:
-        self.standing.say_all(now)
+    def _send_stop(self, now: float) -> None:
+        self.active_stop.send_all(now)
         self._expect_standstill(now)
 
     def _expect_standstill(self, now: float) -> None:
@@ -205,74 +212,76 @@ class Base:
             Refusal: If none stands, a newer one does, or another gate has the machine.
 
         """
-        if self.arming.lock.elsewhere:
-            raise Refusal(f"{self.arming.lock.why}: reset its STOP there")
-        self.standing.reset(stop)
+        if self.conditions.lock.elsewhere:
+            raise Refusal(f"{self.conditions.lock.why}: reset its STOP there")
+        self.active_stop.reset(stop)
         self._update_watch(now)
 
     def step(self, now: float) -> None:
         """Let time have its say."""
         self.driving.step(now)
         self.speeds.ages.forget_old(now)
-        self.hands.step(now)
+        self.authority.step(now)
         self.motion.step(now)
         self.other_writer.step(now)
         if self.latch.on:
-            self.standing.confirm(now)
+            self.active_stop.confirm(now)
         self._update_watch(now)
         self._drop_leaving(now)
 
     # What is heard of it.
 
-    def wrote_goal(self, write: WroteGoal) -> None:
+    def on_goal_written(self, write: GoalWritten) -> None:
         """Note that a goal went out: what moves from here on moves by itself."""
-        self.robots.goals[write.robot].wrote(write)
+        self.robots.goals[write.robot].on_written(write)
         self.obedience.excuse()
 
-    def wrote(self, write: Wrote, now: float) -> None:
+    def on_written(self, write: TwistWritten, now: float) -> None:
         """Note what became of a velocity."""
         if not write.done:
             return
-        self.obedience.wrote(write.twist, self.motion.sent, now)
-        self.motion.wrote(write, now)
-        self.tests.wrote(write.twist)
-        self.other_writer.wrote(write.twist, now)
+        self.obedience.on_written(write.twist, self.motion.sent, now)
+        self.motion.on_written(write, now)
+        self.tests.on_written(write.twist)
+        self.other_writer.on_written(write.twist, now)
         vx, vy, wz, *others = write.twist.numbers
         for robot in self.robots.specs:
-            self._emit(Say(SentTwist(robot, vx, vy, wz, write.by, *others)))
+            self._emit(SendToDisplay(SentTwist(robot, vx, vy, wz, write.by, *others)))
 
-    def heard(self, twist: Twist, now: float) -> None:
+    def on_echo(self, twist: Twist, now: float) -> None:
         """Note what came back on the velocity topic, ours or another's."""
-        self.sight.saw_echo(twist)
-        self.tests.heard(twist, now)
-        if self.arming.lock.elsewhere or self.robots.follow_goals:
+        self.observation.on_echo(twist)
+        self.tests.on_echo(twist, now)
+        if self.conditions.lock.elsewhere or self.robots.follow_goals:
             # Another gate on this computer drives it, or what follows its goal does.
             self.other_writer.expect(now + EXPECTED_FOR)
-        self.other_writer.heard(twist, now)
+        self.other_writer.on_echo(twist, now)
 
-    def saw(self, measured: Twist | None, said_after: float, now: float) -> None:
+    def observe(self, measured: Twist | None, sent_after: float, now: float) -> None:
         """Note that odometry came, which was said after a moment, maybe long ago."""
-        if not self.sight.on:
+        if not self.observation.on:
             return
         measured = self.robots.axes.seen(measured)
-        self.sight.saw(measured, said_after, now)
-        seen, handover = self.standing.confirmation, self.hands.handover
-        if self.latch.on and self.sight.tells_since(seen.since):
-            seen.saw(measured, now)
-        if handover.heir is not None and self.sight.tells_since(handover.since):
-            handover.saw(measured, now)
-        self.obedience.saw(measured, now)
-        self.tests.saw(measured, now)
+        self.observation.observe(measured, sent_after, now)
+        seen, handover = self.active_stop.confirmation, self.authority.handover
+        if self.latch.on and self.observation.shows_since(seen.since):
+            seen.observe(measured, now)
+        if handover.successor is not None and self.observation.shows_since(
+            handover.since
+        ):
+            handover.observe(measured, now)
+        self.obedience.observe(measured, now)
+        self.tests.observe(measured, now)
 
     def locked(self, lock: LockState, now: float) -> None:
         """Note whether this gate alone has the machine."""
-        self.arming.lock, self.known, self.speeds.tested = lock, True, lock.tested
+        self.conditions.lock, self.known, self.speeds.tested = lock, True, lock.tested
         if lock.driven:
-            self.motion.owe_from_before()
+            self.motion.owe_zero()
             self.link_up(now)
-        if lock.held and lock.latched is not None and self.latch.is_news(lock.latched):
+        if lock.held and lock.latched is not None and self.latch.is_new(lock.latched):
             self.latch.found(lock.latched)
-            self._say_stop(now)
+            self._send_stop(now)
 
     def link_up(self, now: float) -> None:
         """A zero that may not have arrived goes first."""
@@ -282,21 +291,21 @@ class Base:
         self.other_writer.expect(now + EXPECTED_FOR)
         if self.motion.owes_zero:
             self.obedience.expect(now)  # also of an earlier gate, whose word was motion
-        self.motion.pay(now)
+        self.motion.send_owed_zero(now)
         if self.latch.on:
-            self._say_stop(now)
+            self._send_stop(now)
 
     def link_down(self, now: float) -> None:
         """The control link is gone."""
         self.driving.link_down(f"no connection to {self.key.url}", now)
 
     def _update_watch(self, now: float) -> None:
-        self.sight.update(
-            self.hands.lease is not None
+        self.observation.update(
+            self.authority.lease is not None
             or not self.silent
             or self.latch.on
-            or self.hands.handover.heir is not None
+            or self.authority.handover.successor is not None
             or (self.robots.has_odometry and self.obedience.watching(now))
         )
-        if not self.sight.on:
-            self.guard.forget()
+        if not self.observation.on:
+            self.scan_assist.forget()

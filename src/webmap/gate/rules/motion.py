@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, MarkDriven, WriteTwist
-from webmap.gate.events import Key, Wrote
+from webmap.gate.events import Key, TwistWritten
 from webmap.gate.limits import PLANE, Axes, Speed, fit, ramp
 from webmap.gate.rules.connections import Lease
-from webmap.gate.rules.health import Health
+from webmap.gate.rules.health import LinkHealth
 
 PERIOD = 0.05
 """Seconds between two zeros."""
@@ -39,7 +39,7 @@ They begin anew with another STOP and with every new link.
 """
 
 
-class Burst:
+class ZeroBurst:
     """When the zeros that stop a machine are due.
 
     Args:
@@ -193,7 +193,7 @@ class Motion:
     def __init__(
         self,
         key: Key,
-        control: Health,
+        control: LinkHealth,
         bounds: Callable[[], Bounds],
         guard: Callable[[Twist, float], Twist],
         emit: Emit,
@@ -206,10 +206,10 @@ class Motion:
         self._key = key
         self._control = control
         self._bounds = bounds
-        self._guard = guard
+        self._scan_assist = guard
         self._emit = emit
-        self._burst = Burst()
-        self._held = Burst(HELD_PERIOD, HELD_LENGTH)
+        self._burst = ZeroBurst()
+        self._held = ZeroBurst(HELD_PERIOD, HELD_LENGTH)
         self._left_alone = False
         self._pending: tuple[Twist, Lease, float] | None = None
         self._tried_at = float("-inf")
@@ -236,7 +236,7 @@ class Motion:
         self._pending = (wanted, lease, now)
         self._flush(now)
 
-    def leave_alone(self) -> None:
+    def send_nothing(self) -> None:
         """Write nothing more, not even zero, though it moves (stop test only)."""
         self.driving, self._pending = False, None
         self._left_alone = True
@@ -271,7 +271,7 @@ class Motion:
         self.zero(now)
         self._held.start(now)
 
-    def let_go(self) -> None:
+    def release_hold(self) -> None:
         """STOP stands no longer; nothing moves by that."""
         self._held.end()
 
@@ -280,13 +280,13 @@ class Motion:
         """Whether zeros are written because STOP stands."""
         return self._held.running
 
-    def pay(self, now: float) -> None:
+    def send_owed_zero(self, now: float) -> None:
         """Write the zero that is owed, now that there is a link again."""
         if self.owes_zero:
             self._burst.end()  # what it wrote just now went to the link before
             self.zero(now, NEW_LINK_LENGTH)
 
-    def owe_from_before(self) -> None:
+    def owe_zero(self) -> None:
         """Note that an earlier gate may have left the machine moving."""
         self._owe_zero()
 
@@ -300,7 +300,7 @@ class Motion:
             self.owes_zero = False
             self._emit(MarkDriven(self._key, False))
 
-    def wrote(self, write: Wrote, now: float) -> None:
+    def on_written(self, write: TwistWritten, now: float) -> None:
         """Note a velocity that went out."""
         self.sent, self._sent_at, self.sent_epoch = write.twist, now, write.epoch
         if not write.twist.is_zero:
@@ -334,7 +334,7 @@ class Motion:
             return
         self._pending, self._tried_at = None, now
         # The scanners judge what is written and nothing else: a ramp bends the way.
-        twist = self._guard(self._bounded(wanted, now), now)
+        twist = self._scan_assist(self._bounded(wanted, now), now)
         until = since + WAIT_LIMIT
         by = lease.connection
         self._emit(WriteTwist(self._key, twist, lease.epoch, by, until))

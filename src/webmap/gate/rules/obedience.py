@@ -51,7 +51,7 @@ class Obedience:
         self._stuck: tuple[float, float] | None = None
         """When odometry first and last showed a standstill that no zero asked for."""
 
-    def wrote(self, twist: Twist, last: Twist, now: float) -> None:
+    def on_written(self, twist: Twist, last: Twist, now: float) -> None:
         """Note that ``twist`` went out after ``last``."""
         self._told_to_move = moves(twist, MOVES, TURNS)
         if not self._told_to_move:
@@ -79,7 +79,7 @@ class Obedience:
         self._zero_at = self._moving = None
         self._firm = False
 
-    def saw(self, twist: Twist | None, now: float) -> None:
+    def observe(self, twist: Twist | None, now: float) -> None:
         """Take in a message of odometry."""
         if twist is None:
             return
@@ -93,7 +93,7 @@ class Obedience:
             self.excuse()  # nobody looked for a while: it may be driven by others
             return
         self._seen_at = now
-        self._calm.saw(twist, now)
+        self._calm.observe(twist, now)
         if self._calm.reached:
             self.excuse()
         elif self._calm.since is None:
@@ -180,7 +180,7 @@ class OtherWriter:
         self._heard_at: deque[float] = deque(maxlen=SURE)
         self._expected_until = float("-inf")
 
-    def wrote(self, twist: Twist, now: float) -> None:
+    def on_written(self, twist: Twist, now: float) -> None:
         """Note a velocity that the gate wrote."""
         if twist.is_zero:
             return
@@ -194,7 +194,7 @@ class OtherWriter:
         """Note that until then velocities of others are no news."""
         self._expected_until = max(self._expected_until, until)
 
-    def heard(self, twist: Twist, now: float) -> None:
+    def on_echo(self, twist: Twist, now: float) -> None:
         """Take in a velocity that was heard on the topic."""
         if twist.is_zero:
             return

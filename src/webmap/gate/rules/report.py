@@ -6,8 +6,8 @@ import msgspec
 
 from webmap.base.geometry import Twist
 from webmap.gate.protocol import (
+    Activity,
     AskerReport,
-    Doing,
     Holder,
     RobotReport,
     RobotSpec,
@@ -15,8 +15,8 @@ from webmap.gate.protocol import (
     TestReport,
     Velocity,
 )
-from webmap.gate.rules.health import Health, moves
-from webmap.gate.rules.machine import Base
+from webmap.gate.rules.health import LinkHealth, moves
+from webmap.gate.rules.machine import Machine
 from webmap.gate.rules.obedience import MOVES, TURNS
 from webmap.gate.rules.speeds import reaction
 
@@ -29,12 +29,12 @@ BRAKE = 0.5
 _DIGITS = 3
 
 
-def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
+def report(base: Machine, spec: RobotSpec, now: float) -> RobotReport:
     """Return how it stands with one robot at ``now``."""
-    lease = base.hands.lease
+    lease = base.authority.lease
     speed = base.speeds.own if lease is None else base.speeds.speed
     age, test = base.speeds.ages.p95, base.tests.last
-    echoed, measured = base.sight.echoed, base.sight.shown(now)
+    echoed, measured = base.observation.echoed, base.observation.shown(now)
     holder = None if lease is None else Holder(lease.connection, lease.name)
     goals = base.robots.goals[spec.id]
     return RobotReport(
@@ -47,11 +47,11 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         holder=holder,
         epoch=None if lease is None else lease.epoch,
         asker=_asker(base, now),
-        changing=base.hands.handover.heir is not None,
-        armed=lease is not None and base.hands.deadman.armed,
+        changing=base.authority.handover.successor is not None,
+        armed=lease is not None and base.authority.deadman.armed,
         v=speed.v,
         w=speed.w,
-        why=speed.why + base.guard.why,
+        why=speed.why + base.scan_assist.why,
         link="up" if _link(base, spec).up else "down",
         sent=_velocity(base.motion.sent),
         echoed=None if echoed is None else _velocity(echoed),
@@ -65,7 +65,7 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
         stop_source=_stop_source(base),
         stop_date=None if base.speeds.tested is None else base.speeds.tested.date,
         test=None if test is None else TestReport(test.state, test.text),
-        armable=base.hands.unarmable(now) is None,
+        armable=base.authority.why_unavailable(now) is None,
         reason=_reason(base, now),
         way=goals.way,
         cancels=goals.can_cancel,
@@ -75,15 +75,15 @@ def report(base: Base, spec: RobotSpec, now: float) -> RobotReport:
     )
 
 
-def _doing(base: Base, spec: RobotSpec, now: float) -> Doing:
+def _doing(base: Machine, spec: RobotSpec, now: float) -> Activity:
     """Return what one robot does: the first that is true."""
     state, goals = base.state, base.robots.goals[spec.id]
     if state == "stopped":
-        confirmed = base.latch.shown and base.standing.confirmation.confirmed
+        confirmed = base.latch.shown and base.active_stop.confirmation.confirmed
         return "unconfirmed" if confirmed is False else "stopped"
     if not _link(base, spec).up:
         return "down"
-    if base.hands.handover.heir is not None:
+    if base.authority.handover.successor is not None:
         return "changing"
     if base.other_writer.words(base.key.topic) and state in ("free", "stopping"):
         return "other"
@@ -91,12 +91,12 @@ def _doing(base: Base, spec: RobotSpec, now: float) -> Doing:
         return "stopping"
     if state == "driving":
         return "blocked" if base.obedience.blocked(now) else "driven"
-    measured, held = base.sight.shown(now), state == "held"
+    measured, held = base.observation.shown(now), state == "held"
     moving = measured is not None and moves(measured, MOVES, TURNS)
     if goals.navigates(moving=moving):
         return "navigating_held" if held else "navigating"
     if moving:
-        braking = base.obedience.watching(now) or goals.brakes(now)
+        braking = base.obedience.watching(now) or goals.may_still_move(now)
         return "settling" if braking else "moving"
     barred = _reason(base, now) is not None
     if held:
@@ -104,36 +104,38 @@ def _doing(base: Base, spec: RobotSpec, now: float) -> Doing:
     return "barred" if barred else "free"
 
 
-def _reason(base: Base, now: float) -> str | None:
+def _reason(base: Machine, now: float) -> str | None:
     """Return why nobody can move the machine now, in words."""
-    if base.hands.lease is None:
-        return base.hands.unarmable(now)
-    return base.arming.doubt(now)
+    if base.authority.lease is None:
+        return base.authority.why_unavailable(now)
+    return base.conditions.doubt(now)
 
 
-def _link(base: Base, spec: RobotSpec) -> Health:
+def _link(base: Machine, spec: RobotSpec) -> LinkHealth:
     """Return the link that moves the robot."""
     return base.control if spec.twist_topic else base.robots.goals[spec.id].link
 
 
-def _stop_source(base: Base) -> Literal["stated", "tested"] | None:
+def _stop_source(base: Machine) -> Literal["stated", "tested"] | None:
     if base.speeds.tested is not None:
         return "tested"
     return None if base.speeds.stop_time is None else "stated"
 
 
-def _asker(base: Base, now: float) -> AskerReport | None:
-    asker = base.hands.handover.asker
+def _asker(base: Machine, now: float) -> AskerReport | None:
+    asker = base.authority.handover.asker
     if asker is None:
         return None
-    return AskerReport(asker.id, asker.name, round(base.hands.handover.left(now), 1))
+    return AskerReport(
+        asker.id, asker.name, round(base.authority.handover.left(now), 1)
+    )
 
 
-def _stop(base: Base) -> StopReport | None:
+def _stop(base: Machine) -> StopReport | None:
     press = base.latch.shown
     if press is None:
         return None
-    seen = base.standing.confirmation
+    seen = base.active_stop.confirmation
     why = seen.why
     if base.latch.trouble is not None:
         why = f"{why}; a restart would end this STOP: {base.latch.trouble}"

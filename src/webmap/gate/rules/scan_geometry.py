@@ -26,7 +26,7 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from webmap.base.geometry import Twist
-from webmap.gate.events import Fold, Sweep
+from webmap.gate.events import Scan, ScanFold
 from webmap.gate.protocol import Point
 
 MOST = 720
@@ -42,7 +42,7 @@ _THINGS = 4
 _MOST_TURNS = 2.0
 
 
-def folded(sweep: Sweep) -> Sweep:
+def folded(sweep: Scan) -> Scan:
     """Return a scan of at most 720 beams that says nothing farther than this one.
 
     One of more than 100,000 beams, or a dense one that goes round more than twice, is
@@ -70,11 +70,11 @@ def _refusal(count: int, step: float) -> str | None:
     return too_long(count)
 
 
-def _without(sweep: Sweep, reason: str) -> Sweep:
+def _without(sweep: Scan, reason: str) -> Scan:
     return msgspec.structs.replace(sweep, ranges=(), refused=reason)
 
 
-def _folded(sweep: Sweep, each: int) -> Sweep:
+def _folded(sweep: Scan, each: int) -> Scan:
     ranges, near = sweep.ranges, sweep.range_min
     first, behind, said, asked = [], [], [], []
     before: list[float] = []
@@ -94,7 +94,7 @@ def _folded(sweep: Sweep, each: int) -> Sweep:
         sweep,
         angle_increment=sweep.angle_increment * each,
         ranges=first,
-        fold=Fold(each, len(ranges), behind, said, asked),
+        fold=ScanFold(each, len(ranges), behind, said, asked),
     )
 
 
@@ -108,7 +108,7 @@ def _saying(group: Sequence[float], near: float) -> int:
     return sum([_says_something(r, near) for r in group])
 
 
-def known(sweep: Sweep, rays: Sequence[int]) -> tuple[int, int]:
+def known(sweep: Scan, rays: Sequence[int]) -> tuple[int, int]:
     """Return how many of these rays say anything, and of how many.
 
     Of a fold it is the rays that were folded that are counted.
@@ -141,7 +141,7 @@ _MOST_STEPS = 40
 _STRAIGHT = 1e-6
 
 
-class Fan:
+class ScanDirections:
     """The directions that a scan has rays in.
 
     Args:
@@ -168,7 +168,7 @@ class Fan:
 
 
 def looks_ahead(
-    fan: Fan,
+    fan: ScanDirections,
     footprint: Sequence[Point],
     sensor: tuple[float, float, float],
     twist: Twist,

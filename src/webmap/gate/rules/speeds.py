@@ -18,8 +18,8 @@ from webmap.gate.limits import (
     page_cap,
     speed_in_force,
 )
-from webmap.gate.rules.aliases import Robots
-from webmap.gate.rules.health import Ages, Health
+from webmap.gate.rules.aliases import Aliases
+from webmap.gate.rules.health import Ages, LinkHealth
 from webmap.gate.rules.motion import DEADMAN, Bounds
 
 SLOW = 0.15
@@ -113,7 +113,7 @@ class Speeds:
 
     """
 
-    def __init__(self, robots: Robots, control: Health) -> None:
+    def __init__(self, robots: Aliases, control: LinkHealth) -> None:
         self.ages = LoopAge(control.trips)
         """How old its driver's picture of it is."""
         self.tested: StopRecord | None = None

@@ -14,16 +14,16 @@ press that a person saw, so it cannot end a newer one.
 import secrets
 
 from webmap.base.geometry import Twist
-from webmap.gate.actions import Emit, KeepLatch
+from webmap.gate.actions import Emit, SaveStop
 from webmap.gate.commands import Refusal
-from webmap.gate.events import Key, LatchKept, Press
-from webmap.gate.rules.aliases import Robots
+from webmap.gate.events import Key, Press, StopSaved
+from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.health import (
     GAP,
     STILL_FOR,
     STILL_V,
     STILL_W,
-    Health,
+    LinkHealth,
     Standstill,
     moves,
 )
@@ -40,7 +40,7 @@ def new_press(by: str) -> Press:
     return Press(by, secrets.token_hex(8))
 
 
-class Latch:
+class StopLatch:
     """Whether STOP stands for one machine, and whether the disk knows.
 
     Args:
@@ -94,7 +94,7 @@ class Latch:
         self.press = self.shown = press
         self._ids.add(press.id)
 
-    def is_news(self, press: Press | None) -> bool:
+    def is_new(self, press: Press | None) -> bool:
         """Return whether the file has a press that this gate does not know.
 
         Args:
@@ -111,7 +111,7 @@ class Latch:
         """Whether the disk has what holds here, as far as it can."""
         return self._kept
 
-    def keep_again(self) -> None:
+    def save_again(self) -> None:
         """Keep what holds: somebody took the file away."""
         self._keep()
 
@@ -144,7 +144,7 @@ class Latch:
         self._keep()
         self._ids.clear()
 
-    def kept(self, event: LatchKept) -> None:
+    def kept(self, event: StopSaved) -> None:
         """Note what became of keeping it; only the newest state counts."""
         if event.number != self._number:
             return
@@ -162,7 +162,7 @@ class Latch:
         if self.press is not None:
             self._ids.add(self.press.id)
         ids = frozenset(self._ids)
-        self._emit(KeepLatch(self._key, self._number, self.press, ids))
+        self._emit(SaveStop(self._key, self._number, self.press, ids))
 
 
 PATIENCE = 2.0
@@ -189,9 +189,9 @@ class Confirmation:
         self._stood = False
         self._still.begin()
 
-    def saw(self, twist: Twist | None, now: float) -> None:
+    def observe(self, twist: Twist | None, now: float) -> None:
         """Take in a message of odometry; one that moves again is not confirmed."""
-        self._still.saw(twist, now)
+        self._still.observe(twist, now)
         if self.confirmed and twist is not None and moves(twist):
             self.confirmed, self.why = False, self._moving()
 
@@ -239,7 +239,7 @@ class Confirmation:
         return f"still moving at {speed:.2f} m/s"
 
 
-class StandingStop:
+class ActiveStop:
     """The STOP of one machine, from the first zero to the reset.
 
     Args:
@@ -254,9 +254,9 @@ class StandingStop:
     def __init__(
         self,
         key: Key,
-        latch: Latch,
-        robots: Robots,
-        control: Health,
+        latch: StopLatch,
+        robots: Aliases,
+        control: LinkHealth,
         motion: Motion,
     ) -> None:
         self.latch = latch
@@ -271,9 +271,9 @@ class StandingStop:
         if self._robots.drivable:
             self._motion.zero(now)
         self.latch.set(press)
-        self.say_all(now)
+        self.send_all(now)
 
-    def say_all(self, now: float) -> None:
+    def send_all(self, now: float) -> None:
         """Say everything that it has to say, as far as there are links."""
         if self._robots.drivable:
             self._motion.hold(now)
@@ -296,11 +296,11 @@ class StandingStop:
         """
         self.latch.check(stop)
         self.latch.reset()
-        self._motion.let_go()
+        self._motion.release_hold()
         for hooks in self._robots.hooks.values():
             hooks.say(stopped=False)
 
-    def saw_file(self, press: Press | None, elsewhere: bool) -> bool:
+    def on_file_changed(self, press: Press | None, elsewhere: bool) -> bool:
         """Note that the file of the STOP changed, by another hand than this gate's.
 
         Args:
@@ -313,7 +313,7 @@ class StandingStop:
         """
         latch = self.latch
         if press is not None:
-            news = latch.is_news(press)
+            news = latch.is_new(press)
             if news and elsewhere and latch.on:
                 latch.found(press)
             return news and not elsewhere
@@ -321,11 +321,11 @@ class StandingStop:
             return False
         if elsewhere:  # it was reset where the machine is, and this is an onlooker
             latch.drop()
-            self._motion.let_go()
+            self._motion.release_hold()
             for hooks in self._robots.hooks.values():
                 hooks.drop()
         else:
-            latch.keep_again()  # a file that is gone is no reset
+            latch.save_again()  # a file that is gone is no reset
         return False
 
     def take_over(self, press: Press, now: float) -> None:
@@ -333,15 +333,15 @@ class StandingStop:
         if self._robots.drivable:
             self._motion.zero(now)
         self.latch.found(press)
-        self.say_all(now)
+        self.send_all(now)
 
-    def tasks_down(self, link: Health, now: float) -> None:
+    def tasks_down(self, link: LinkHealth, now: float) -> None:
         """Note that what was said last may not have arrived: a link is lost."""
         for goals in self._robots.goals.values():
             if goals.link is link:
                 goals.link_down(now)
 
-    def tasks_up(self, link: Health, now: float) -> None:
+    def tasks_up(self, link: LinkHealth, now: float) -> None:
         """Say what could not be said, or may not have arrived, for want of a link."""
         for goals in self._robots.goals.values():
             if goals.link is link and self.latch.on:

@@ -20,10 +20,10 @@ from collections import Counter
 from typing import Literal
 
 from webmap.base.geometry import Twist
-from webmap.gate.actions import Emit, KeepStopTest
+from webmap.gate.actions import Emit, SaveStopTest
 from webmap.gate.commands import Refusal
 from webmap.gate.events import Key
-from webmap.gate.rules.health import Sight, Standstill, moves
+from webmap.gate.rules.health import Observation, Standstill, moves
 from webmap.gate.rules.motion import Motion
 
 CREEP = Twist(0.1)
@@ -72,17 +72,17 @@ class StopTest:
         """Whether it goes on."""
         return self.state in ("creeping", "waiting")
 
-    def wrote(self, twist: Twist) -> None:
+    def on_written(self, twist: Twist) -> None:
         """Note what was written to the machine, of which an echo may come."""
         self._unechoed[twist] += 1
 
-    def heard(self, twist: Twist) -> None:
+    def on_echo(self, twist: Twist) -> None:
         """Take in a velocity that was said to the machine, by whomever."""
         self._unechoed[twist] -= 1
         if self.state == "waiting" and self._unechoed[twist] < 0:
             self.abort(NOT_ALONE)
 
-    def saw(self, twist: Twist | None, last_command_at: float, now: float) -> None:
+    def observe(self, twist: Twist | None, last_command_at: float, now: float) -> None:
         """Take in a message of odometry.
 
         Args:
@@ -100,7 +100,7 @@ class StopTest:
             )
             self._left_alone_at = last_command_at
         elif self.state == "waiting":
-            self._still.saw(twist, now)
+            self._still.observe(twist, now)
             if self._still.reached:
                 assert self._still.since is not None  # since when it stands
                 self.state, self.concluded = "done", True
@@ -124,7 +124,7 @@ class StopTest:
         self.state, self.text = "failed", why
 
 
-class StopTesting:
+class StopTests:
     """Runs stop tests, one after the other.
 
     Args:
@@ -135,12 +135,14 @@ class StopTesting:
 
     """
 
-    def __init__(self, key: Key, motion: Motion, sight: Sight, emit: Emit) -> None:
+    def __init__(
+        self, key: Key, motion: Motion, sight: Observation, emit: Emit
+    ) -> None:
         self.last: StopTest | None = None
         """The last one, which may be going on."""
         self._key = key
         self._motion = motion
-        self._sight = sight
+        self._observation = sight
         self._emit = emit
 
     @property
@@ -161,32 +163,32 @@ class StopTesting:
         """
         if not armed or not self._motion.silent:
             raise Refusal("release all inputs first")
-        measured = self._sight.measured
+        measured = self._observation.measured
         if measured is None:
             raise Refusal("no odometry: the stop test needs odometry")
         if moves(measured):
             raise Refusal("the robot is already moving")
         self.last = StopTest(now)
 
-    def wrote(self, twist: Twist) -> None:
+    def on_written(self, twist: Twist) -> None:
         """Note what was written to the machine."""
         if self.running is not None:
-            self.running.wrote(twist)
+            self.running.on_written(twist)
 
-    def heard(self, twist: Twist, now: float) -> None:
+    def on_echo(self, twist: Twist, now: float) -> None:
         """Take in a velocity that came back on the topic, ours or another's."""
         test = self.running
         if test is not None:
-            test.heard(twist)
+            test.on_echo(twist)
             if not test.running:
                 self._after(test, now)
 
-    def saw(self, measured: Twist | None, now: float) -> None:
+    def observe(self, measured: Twist | None, now: float) -> None:
         """Take in a message of odometry."""
         test = self.running
         if test is not None:
             state = test.state
-            test.saw(measured, self._motion.moved_at, now)
+            test.observe(measured, self._motion.moved_at, now)
             if test.state != state:
                 self._after(test, now)
 
@@ -201,11 +203,11 @@ class StopTesting:
     def _after(self, test: StopTest, now: float) -> None:
         """Do what the stop test has come to."""
         if test.state == "waiting":
-            self._motion.leave_alone()
+            self._motion.send_nothing()
         else:
             self._motion.zero(now)
             if test.concluded:
-                self._emit(KeepStopTest(self._key, test.seconds))
+                self._emit(SaveStopTest(self._key, test.seconds))
 
     def halt(self, why: str, now: float) -> None:
         """Go to zeros if it was driven or tested, for the reason in words."""

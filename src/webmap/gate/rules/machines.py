@@ -8,7 +8,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.gate import events
-from webmap.gate.actions import Attach, CutLink, Emit, Lock, Say, Unlock
+from webmap.gate.actions import Attach, CutLink, Emit, Lock, SendToDisplay, Unlock
 from webmap.gate.commands import Refusal
 from webmap.gate.protocol import (
     Forget,
@@ -20,10 +20,10 @@ from webmap.gate.protocol import (
 )
 from webmap.gate.rules.connections import Epochs
 from webmap.gate.rules.goals import Goals
-from webmap.gate.rules.health import Health, Pulse
-from webmap.gate.rules.machine import Base
+from webmap.gate.rules.health import DisplayPulse, LinkHealth
+from webmap.gate.rules.machine import Machine
 from webmap.gate.rules.report import Reporter, report
-from webmap.gate.rules.stop import Latch
+from webmap.gate.rules.stop import StopLatch
 from webmap.gate.specs import check_twist_type, checked, key_of
 
 log = logging.getLogger("webmap.gate")
@@ -31,7 +31,7 @@ log = logging.getLogger("webmap.gate")
 Refuse = Callable[[str, str | None, str, str, float], None]
 
 
-class Fleet:
+class Machines:
     """The machines, by key and by the names that the display has for them.
 
     Args:
@@ -43,19 +43,19 @@ class Fleet:
     """
 
     def __init__(
-        self, pulse: Pulse, epochs: Epochs, emit: Emit, refuse: Refuse
+        self, pulse: DisplayPulse, epochs: Epochs, emit: Emit, refuse: Refuse
     ) -> None:
-        self._pulse = pulse
+        self._display_pulse = pulse
         self._epochs = epochs
         self._emit = emit
         self._refuse = refuse
-        self._bases: dict[events.Key, Base] = {}
-        self._latches: dict[events.Key, Latch] = {}
+        self._bases: dict[events.Key, Machine] = {}
+        self._latches: dict[events.Key, StopLatch] = {}
         self._stopped_as: dict[events.Key, dict[events.Key, str]] = {}
         """By what other keys the STOP of a machine stands, from when it had those, and
         the identity of the STOP that stood by each."""
-        self._by_robot: dict[str, Base] = {}
-        self._links: dict[tuple[str, events.Lane], Health] = {}
+        self._by_robot: dict[str, Machine] = {}
+        self._links: dict[tuple[str, events.Lane], LinkHealth] = {}
         self._reporters: dict[str, Reporter] = {}
         self._touched: set[events.Key] = set()
         self.handlers: dict[type, Callable[[Any, float], None]] = {
@@ -64,24 +64,24 @@ class Fleet:
             WriterNodes: self._writer_nodes,
             events.LinkUp: self._link_up,
             events.LinkDown: self._link_down,
-            events.Alive: self._alive,
-            events.Wrote: self._wrote,
-            events.WroteGoal: self._wrote_goal,
-            events.WrotePose: self._wrote_pose,
+            events.PingAnswered: self._alive,
+            events.TwistWritten: self._wrote,
+            events.GoalWritten: self._wrote_goal,
+            events.PoseWritten: self._wrote_pose,
             events.GoalProgress: self._goal_progress,
             events.GoalLost: self._goal_lost,
             events.GoalEnded: self._goal_ended,
             events.HookEnded: self._hook_ended,
-            events.Echoed: self._echoed,
-            events.Measured: self._measured,
-            events.Scanned: self._scanned,
+            events.EchoReceived: self._echoed,
+            events.OdometryReceived: self._measured,
+            events.ScanReceived: self._scanned,
             events.LockState: self._locked,
-            events.LatchKept: self._latch_kept,
-            events.LatchSeen: self._latch_seen,
-            events.StopTestKept: self._stop_test_kept,
+            events.StopSaved: self._latch_kept,
+            events.StopFileChanged: self._latch_seen,
+            events.StopTestSaved: self._stop_test_kept,
         }
 
-    def __iter__(self) -> Iterator[Base]:
+    def __iter__(self) -> Iterator[Machine]:
         """Go through the machines, which may all change by that."""
         for base in list(self._bases.values()):
             self._touched.add(base.key)
@@ -101,7 +101,7 @@ class Fleet:
         """Whether no machine is driven or being stopped."""
         return all(base.silent for base in self._bases.values())
 
-    def find(self, robot: str) -> Base:
+    def find(self, robot: str) -> Machine:
         """Return the machine behind a robot, which may change by that.
 
         Raises:
@@ -123,7 +123,7 @@ class Fleet:
         if robot is not None and robot not in self._by_robot:
             raise Refusal(f"there is no robot {robot!r}")
 
-    def reset(self, base: Base, stop: str, now: float) -> None:
+    def reset(self, base: Machine, stop: str, now: float) -> None:
         """End the STOP of a machine, also where it stands by a key that it had before.
 
         Args:
@@ -166,14 +166,14 @@ class Fleet:
                 for spec in list(base.robots.specs.values()):
                     self._report(base, spec, now)
 
-    def _report(self, base: Base, spec: RobotSpec, now: float) -> None:
+    def _report(self, base: Machine, spec: RobotSpec, now: float) -> None:
         reporter = self._reporters.get(spec.id)
         if reporter is None:  # forgotten already, and only there until it stands
             return
         news = report(base, spec, now)
         said = reporter.worth_saying(news, now)
         if said:
-            self._emit(Say(news))
+            self._emit(SendToDisplay(news))
         elif said is None:
             self._touched.add(base.key)
 
@@ -191,7 +191,7 @@ class Fleet:
         stopped = None
         if earlier is not None and earlier.key != key:
             stopped = earlier.latch.press
-            earlier.robots.goals[spec.id].vacate(spec, now)
+            earlier.robots.goals[spec.id].cancel_unless_reachable(spec, now)
             self._forget(Forget(spec.id), now)
         elif earlier is not None and before is not None:
             if before == spec:
@@ -240,11 +240,13 @@ class Fleet:
         by_robot = self._by_robot.items()
         return [base.robots.specs[robot] for robot, base in by_robot]
 
-    def _new_base(self, key: events.Key) -> Base:
+    def _new_base(self, key: events.Key) -> Machine:
         if key not in self._latches:
-            self._latches[key] = Latch(key, self._emit)
+            self._latches[key] = StopLatch(key, self._emit)
         control, latch = self._link(key.url, "control"), self._latches[key]
-        base = Base(key, control, self._pulse, latch, self._epochs, self._emit)
+        base = Machine(
+            key, control, self._display_pulse, latch, self._epochs, self._emit
+        )
         self._bases[key] = base
         return base
 
@@ -253,20 +255,20 @@ class Fleet:
         if base is None:
             return
         del self._reporters[message.robot]
-        self._emit(Say(RobotGone(message.robot)))
+        self._emit(SendToDisplay(RobotGone(message.robot)))
         base.forget(message.robot, now)
         self._touched.add(base.key)
         self._drop_if_empty(base)
 
-    def _drop_if_empty(self, base: Base) -> None:
+    def _drop_if_empty(self, base: Machine) -> None:
         if not base.robots.specs:
             del self._bases[base.key]
             self._emit(Unlock(base.key))
 
     # What the shell hears.
 
-    def _link(self, url: str, lane: events.Lane) -> Health:
-        return self._links.setdefault((url, lane), Health())
+    def _link(self, url: str, lane: events.Lane) -> LinkHealth:
+        return self._links.setdefault((url, lane), LinkHealth())
 
     def _link_up(self, event: events.LinkUp, now: float) -> None:
         link = self._link(event.url, event.lane)
@@ -274,7 +276,7 @@ class Fleet:
         for base in self:
             if base.control is link:
                 base.link_up(now)
-            base.standing.tasks_up(link, now)
+            base.active_stop.tasks_up(link, now)
 
     def _link_down(self, event: events.LinkDown, now: float) -> None:
         link = self._link(event.url, event.lane)
@@ -283,37 +285,37 @@ class Fleet:
             if base.control is link:
                 base.link_down(now)
             if not event.spent:
-                base.standing.tasks_down(link, now)
+                base.active_stop.tasks_down(link, now)
 
-    def _alive(self, event: events.Alive, now: float) -> None:
+    def _alive(self, event: events.PingAnswered, now: float) -> None:
         self._link(event.url, "control").answered(event.asked_at, now)
 
-    def _wrote(self, event: events.Wrote, now: float) -> None:
+    def _wrote(self, event: events.TwistWritten, now: float) -> None:
         base = self._of_key(event.key)
         if base is None:
             return
-        base.wrote(event, now)
+        base.on_written(event, now)
         if event.by is not None and not event.done:
             why = "a command was dropped: the connection or the gate was held up"
             self._refuse(event.by, base.robots.newest.id, "drive", why, now)
 
-    def _wrote_goal(self, event: events.WroteGoal, now: float) -> None:
+    def _wrote_goal(self, event: events.GoalWritten, now: float) -> None:
         base = self._by_robot.get(event.robot)
         if base is None:
             return
         if event.done:
             self._touched.add(base.key)
-            base.wrote_goal(event)
+            base.on_goal_written(event)
             sent = SentGoal(event.robot, event.x, event.y, event.yaw, event.by)
-            self._emit(Say(sent))
+            self._emit(SendToDisplay(sent))
         else:
             why = "the goal was dropped: the connection or the gate was held up"
             self._refuse(event.by, event.robot, "goal", why, now)
 
-    def _wrote_pose(self, event: events.WrotePose, now: float) -> None:
+    def _wrote_pose(self, event: events.PoseWritten, now: float) -> None:
         if event.done:
             told = SentPose(event.robot, event.x, event.y, event.yaw, event.by)
-            self._emit(Say(told))
+            self._emit(SendToDisplay(told))
         else:
             why = "the pose was dropped: the connection or the gate was held up"
             self._refuse(event.by, event.robot, "locate", why, now)
@@ -321,7 +323,7 @@ class Fleet:
     def _goal_progress(self, event: events.GoalProgress, now: float) -> None:
         if goals := self._goals_of(event.robot):
             goals.progress(event)
-            goals.insist(event, self._by_robot[event.robot].latch.on, now)
+            goals.cancel_again(event, self._by_robot[event.robot].latch.on, now)
 
     def _goal_ended(self, event: events.GoalEnded, now: float) -> None:
         if goals := self._goals_of(event.robot):
@@ -329,7 +331,7 @@ class Fleet:
 
     def _goal_lost(self, event: events.GoalLost, now: float) -> None:
         if goals := self._goals_of(event.robot):
-            goals.gone_dark(event, now)
+            goals.on_progress_lost(event, now)
 
     def _hook_ended(self, event: events.HookEnded, now: float) -> None:
         base = self._by_robot.get(event.robot)
@@ -345,37 +347,37 @@ class Fleet:
         self._touched.add(base.key)
         return base.robots.goals[robot]
 
-    def _echoed(self, event: events.Echoed, now: float) -> None:
+    def _echoed(self, event: events.EchoReceived, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
-            base.heard(event.twist, now)
+            base.on_echo(event.twist, now)
 
-    def _measured(self, event: events.Measured, now: float) -> None:
+    def _measured(self, event: events.OdometryReceived, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
-            base.saw(event.twist, event.said_after, now)
+            base.observe(event.twist, event.sent_after, now)
 
-    def _scanned(self, event: events.Scanned, now: float) -> None:
+    def _scanned(self, event: events.ScanReceived, now: float) -> None:
         base = self._of_key(event.key)
-        if base is not None and base.sight.on:
-            base.guard.saw(event.topic, event.sweep)
+        if base is not None and base.observation.on:
+            base.scan_assist.observe(event.topic, event.sweep)
 
     def _locked(self, event: events.LockState, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.locked(event, now)
 
-    def _latch_kept(self, event: events.LatchKept, now: float) -> None:
+    def _latch_kept(self, event: events.StopSaved, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.latch.kept(event)
         else:  # the robot was forgotten meanwhile; its STOP was not
             self._latches[event.key].kept(event)
 
-    def _latch_seen(self, event: events.LatchSeen, now: float) -> None:
+    def _latch_seen(self, event: events.StopFileChanged, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
-            base.saw_stop_file(event.press, now)
+            base.on_stop_file_changed(event.press, now)
 
     def _writer_nodes(self, message: WriterNodes, now: float) -> None:
         base = self._by_robot.get(message.robot)
@@ -383,12 +385,12 @@ class Fleet:
             self._touched.add(base.key)
             base.other_writer.named(message.nodes)
 
-    def _stop_test_kept(self, event: events.StopTestKept, now: float) -> None:
+    def _stop_test_kept(self, event: events.StopTestSaved, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.speeds.tested = event.record
 
-    def _of_key(self, key: events.Key) -> Base | None:
+    def _of_key(self, key: events.Key) -> Machine | None:
         """Return a machine, which may change by that; it may be gone meanwhile."""
         self._touched.add(key)
         return self._bases.get(key)

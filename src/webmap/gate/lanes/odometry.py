@@ -16,7 +16,15 @@ from typing import Any
 
 from webmap.base.errors import ProtocolError
 from webmap.gate.clock import now
-from webmap.gate.events import Event, Key, LinkDown, LinkUp, Measured, Scanned, Sweep
+from webmap.gate.events import (
+    Event,
+    Key,
+    LinkDown,
+    LinkUp,
+    OdometryReceived,
+    Scan,
+    ScanReceived,
+)
 from webmap.gate.lanes import rosbridge
 from webmap.gate.lanes.lane import Lane
 from webmap.gate.rules.scan_geometry import folded, too_long
@@ -93,7 +101,7 @@ def check_parts(frame: bytes) -> None:
             )
 
 
-def hear_scan(frame: bytes, now: float) -> tuple[str, Sweep] | None:
+def hear_scan(frame: bytes, now: float) -> tuple[str, Scan] | None:
     """Return the topic and the scan of a frame; None if it is anything else.
 
     A scan of more than 720 beams comes folded; what is ``refused`` has no ranges.
@@ -125,7 +133,7 @@ def hear_scan(frame: bytes, now: float) -> tuple[str, Sweep] | None:
         return None
     least, step, near, far = about
     frame_id = _frame_of(message.get("header"))
-    sweep = Sweep(least, step, near, far, values, now, refused=refused, frame=frame_id)
+    sweep = Scan(least, step, near, far, values, now, refused=refused, frame=frame_id)
     return topic, folded(sweep)
 
 
@@ -141,7 +149,7 @@ BUSY_PING = 0.05
 """Seconds between pings while anything is watched."""
 
 
-class WitnessLane:
+class OdometryLane:
     """The socket of one bridge that odometry comes through.
 
     Args:
@@ -155,7 +163,7 @@ class WitnessLane:
         self._tell = tell
         self._pings: dict[int, float] = {}
         """When each ping that is not answered yet went out."""
-        self._said_after = float("-inf")
+        self._sent_after = float("-inf")
         """What comes now was said after this moment."""
         self._watchers: dict[str, list[Key]] = {}
         self._scanners: dict[str, list[Key]] = {}
@@ -184,7 +192,7 @@ class WitnessLane:
         self._watchers[topic].remove(key)
         if not self._watchers[topic]:
             del self._watchers[topic]
-        self.lane.let_go(f"webmap-gate odometry {topic}")
+        self.lane.release_hold(f"webmap-gate odometry {topic}")
         self._pace()
 
     def watch_scan(self, topic: str, key: Key) -> None:
@@ -199,23 +207,23 @@ class WitnessLane:
         self._scanners[topic].remove(key)
         if not self._scanners[topic]:
             del self._scanners[topic]
-        self.lane.let_go(f"webmap-gate scan {topic}")
+        self.lane.release_hold(f"webmap-gate scan {topic}")
         self._pace()
 
     def _pace(self) -> None:
         watched = self._watchers or self._scanners
-        self.lane.hurry(BUSY_PING if watched else Lane.PING)
+        self.lane.ping_every(BUSY_PING if watched else Lane.PING)
 
     def _open(self) -> None:
         self._pings.clear()  # what the link before held went with it
-        self._said_after = now()
+        self._sent_after = now()
         self._tell(LinkUp(self._url, "witness"))
 
     def _ping(self, number: int) -> None:
         self._pings[number] = now()
 
     def _answer(self, number: int) -> None:
-        self._said_after = self._pings[number]
+        self._sent_after = self._pings[number]
         self._pings = {n: at for n, at in self._pings.items() if n > number}
 
     def _hear(self, data: bytes) -> None:
@@ -226,12 +234,12 @@ class WitnessLane:
         if heard is None or heard.op != "publish" or heard.topic is None:
             return
         for key in self._watchers.get(heard.topic, ()):
-            self._tell(Measured(key, heard.twist, self._said_after))
+            self._tell(OdometryReceived(key, heard.twist, self._sent_after))
 
     def _hear_scan(self, data: bytes) -> None:
         # A ping more is granted: the next answer would often have come with the scan.
-        heard = hear_scan(data, min(self._said_after + BUSY_PING, now()))
+        heard = hear_scan(data, min(self._sent_after + BUSY_PING, now()))
         if heard is not None:
             topic, sweep = heard
             for key in self._scanners.get(topic, ()):
-                self._tell(Scanned(key, topic, sweep))
+                self._tell(ScanReceived(key, topic, sweep))

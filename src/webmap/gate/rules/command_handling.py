@@ -7,7 +7,7 @@ from typing import Any
 
 from webmap.base.geometry import Twist
 from webmap.gate import protocol
-from webmap.gate.actions import Emit, Say
+from webmap.gate.actions import Emit, SendToDisplay
 from webmap.gate.commands import (
     Ask,
     Command,
@@ -27,20 +27,20 @@ from webmap.gate.commands import (
 from webmap.gate.protocol import PROGRAM
 from webmap.gate.rules.connections import (
     Connection,
-    People,
+    Connections,
     Ticks,
     check_lease,
     check_role,
     check_take,
 )
-from webmap.gate.rules.fleet import Fleet
-from webmap.gate.rules.machine import Base
+from webmap.gate.rules.machine import Machine
+from webmap.gate.rules.machines import Machines
 from webmap.gate.rules.stop import new_press
 
 log = logging.getLogger("webmap.gate")
 
 
-class Orders:
+class CommandHandler:
     """Does what is ordered, or refuses it whole.
 
     Args:
@@ -49,11 +49,11 @@ class Orders:
 
     """
 
-    def __init__(self, fleet: Fleet, ticks: Ticks) -> None:
-        self._fleet = fleet
+    def __init__(self, fleet: Machines, ticks: Ticks) -> None:
+        self._machines = fleet
         self._ticks = ticks
 
-    def obey(self, connection: Connection, command: Command, now: float) -> None:
+    def handle(self, connection: Connection, command: Command, now: float) -> None:
         """Do what a page commands.
 
         Raises:
@@ -81,16 +81,16 @@ class Orders:
             case Release(robot):
                 self.release(connection, robot, now)
             case Renew(robot, epoch):
-                hands = self._fleet.find(robot).hands
-                check_lease(hands.lease, connection.id, epoch)
-                hands.renew(now)
+                authority = self._machines.find(robot).authority
+                check_lease(authority.lease, connection.id, epoch)
+                authority.renew(now)
             case Ask(robot):
                 self._ask(connection, robot, now)
             case Grant() | Deny():
                 self._answer(connection, command, now)
             case StopTest(robot):
-                base = self._fleet.find(robot)
-                if not base.hands.is_held_by(connection.id):
+                base = self._machines.find(robot)
+                if not base.authority.is_held_by(connection.id):
                     raise Refusal("take control first")
                 base.driving.begin_test(now)
             case _:
@@ -100,15 +100,15 @@ class Orders:
         """Call off a robot's goals; that needs no lease."""
         check_role(connection.role)
         why = f"by {connection.name or connection.id}"
-        self._fleet.find(robot).robots.goals[robot].cancel(now, why)
+        self._machines.find(robot).robots.goals[robot].cancel(now, why)
 
     def stop(self, robot: str | None, by: Connection, now: float) -> None:
         """STOP a robot or, with ``None``, all."""
         press = new_press(by.name or by.id)
-        for base in self._fleet if robot is None else [self._fleet.find(robot)]:
+        for base in self._machines if robot is None else [self._machines.find(robot)]:
             base.stop(press, now)
 
-    def stop_meant(self, robot: str | None, by: Connection, now: float) -> str:
+    def stop_malformed(self, robot: str | None, by: Connection, now: float) -> str:
         """STOP what a malformed STOP names, or all if that is not known.
 
         Args:
@@ -121,7 +121,7 @@ class Orders:
 
         """
         try:
-            self._fleet.check_known(robot)
+            self._machines.check_known(robot)
         except Refusal:
             robot = None
         self.stop(robot, by, now)
@@ -130,56 +130,56 @@ class Orders:
     def reset(self, robot: str, stop: str, by: Connection, now: float) -> None:
         """End the STOP of a robot that has this identity."""
         check_role(by.role)
-        self._fleet.reset(self._fleet.find(robot), stop, now)
+        self._machines.reset(self._machines.find(robot), stop, now)
 
     def take(self, connection: Connection, robot: str, now: float) -> int | None:
         """Give somebody the lease; ``None`` if it comes when the machine stands."""
-        base = self._fleet.find(robot)
-        if base.hands.is_held_by(connection.id):
-            return base.hands.lease.epoch  # type: ignore[union-attr]
-        if base.hands.handover.heir is connection:
+        base = self._machines.find(robot)
+        if base.authority.is_held_by(connection.id):
+            return base.authority.lease.epoch  # type: ignore[union-attr]
+        if base.authority.handover.successor is connection:
             return None
-        check_take(base.hands.lease, connection.role, connection.program)
-        if reason := base.hands.unarmable(now):
+        check_take(base.authority.lease, connection.role, connection.program)
+        if reason := base.authority.why_unavailable(now):
             raise Refusal(reason)
-        if base.hands.lease is not None:
-            base.hands.hand_over(connection, now)
+        if base.authority.lease is not None:
+            base.authority.hand_over(connection, now)
             return None
-        return base.hands.give(connection, now)
+        return base.authority.give(connection, now)
 
     def release(self, connection: Connection, robot: str, now: float) -> None:
         """Have somebody let go of a robot."""
-        self._fleet.find(robot).hands.release(connection.id, now)
+        self._machines.find(robot).authority.release(connection.id, now)
 
     def _ask(self, connection: Connection, robot: str, now: float) -> None:
         check_role(connection.role)
-        base = self._fleet.find(robot)
-        if base.hands.is_held_by(connection.id):
+        base = self._machines.find(robot)
+        if base.authority.is_held_by(connection.id):
             raise Refusal("you already have control")
-        base.hands.ask(connection, now)
+        base.authority.ask(connection, now)
 
     def _answer(self, connection: Connection, answer: Grant | Deny, now: float) -> None:
-        base = self._fleet.find(answer.robot)
-        if not base.hands.is_held_by(connection.id):
+        base = self._machines.find(answer.robot)
+        if not base.authority.is_held_by(connection.id):
             raise Refusal("only the operator who has control can answer")
-        asker = base.hands.handover.asker
+        asker = base.authority.handover.asker
         if asker is None:
             raise Refusal("nobody requests control")
         if isinstance(answer, Grant):
-            base.hands.hand_over(asker, now)
+            base.authority.hand_over(asker, now)
         else:
-            base.hands.deny(f"{connection.name or connection.id} keeps control")
-            base.hands.renew(now)
+            base.authority.deny(f"{connection.name or connection.id} keeps control")
+            base.authority.renew(now)
 
     def checked(
         self, connection: Connection, robot: str, epoch: int, tick: int, now: float
-    ) -> tuple[Base, float]:
+    ) -> tuple[Machine, float]:
         """Return the machine if this connection may move it by this command.
 
         Besides it, the age of the command's loop in seconds.
         """
-        base = self._fleet.find(robot)
-        check_lease(base.hands.lease, connection.id, epoch)
+        base = self._machines.find(robot)
+        check_lease(base.authority.lease, connection.id, epoch)
         try:
             return base, self._ticks.check(tick, now)
         except Refusal:
@@ -190,7 +190,7 @@ class Orders:
 
     def _licensed(
         self, connection: Connection, command: Drive | Goal | Locate, now: float
-    ) -> tuple[Base, float]:
+    ) -> tuple[Machine, float]:
         base, age = self.checked(
             connection, command.robot, command.epoch, command.tick, now
         )
@@ -207,7 +207,7 @@ class Orders:
             log.warning("connection %s asks for more than full speed", connection.id)
         # What the page showed when it spoke has aged on the way here.
         seen = None if drive.video is None else drive.video + age
-        base.arming.video.saw(seen, now)
+        base.conditions.video.observe(seen, now)
         speed = base.speeds.speed
         wanted = Twist(drive.x * speed.v, drive.y * speed.v, drive.turn * speed.w)
         if reason := base.driving.drive(wanted, drive.neutral, drive.tick, now):
@@ -220,7 +220,7 @@ SETTLE = 1.5
 """Seconds for which a program waits at most until a robot that it took would move."""
 
 
-class ProgramOrders:
+class ProgramCommandHandler:
     """Takes what the program says.
 
     Args:
@@ -232,11 +232,11 @@ class ProgramOrders:
     """
 
     def __init__(
-        self, fleet: Fleet, people: People, orders: Orders, emit: Emit
+        self, fleet: Machines, people: Connections, orders: CommandHandler, emit: Emit
     ) -> None:
-        self._fleet = fleet
-        self._people = people
-        self._orders = orders
+        self._machines = fleet
+        self._connections = people
+        self._commands = orders
         self._emit = emit
         self._takes: list[tuple[protocol.ProgramTake, int, float]] = []
         self.handlers: dict[type, Callable[[Any, float], None]] = {
@@ -251,36 +251,36 @@ class ProgramOrders:
         }
 
     def _stop(self, message: protocol.Stop, now: float) -> None:
-        program, robot = self._people.program, message.robot
-        self._people.attempt(
+        program, robot = self._connections.program, message.robot
+        self._connections.run_or_refuse(
             program.id,
             robot,
             "stop",
-            lambda: self._orders.stop(robot, program, now),
+            lambda: self._commands.stop(robot, program, now),
             now,
         )
 
     def _reset(self, message: protocol.Reset, now: float) -> None:
-        program, robot = self._people.program, message.robot
-        self._people.attempt(
+        program, robot = self._connections.program, message.robot
+        self._connections.run_or_refuse(
             program.id,
             robot,
             "reset",
-            lambda: self._orders.reset(robot, message.stop, program, now),
+            lambda: self._commands.reset(robot, message.stop, program, now),
             now,
         )
 
     def _take(self, message: protocol.ProgramTake, now: float) -> None:
         try:
-            epoch = self._orders.take(self._people.program, message.robot, now)
+            epoch = self._commands.take(self._connections.program, message.robot, now)
         except Refusal as refusal:
             self._reply(message, None, refusal.why)
         else:
             assert epoch is not None  # a program never waits for another to let go
             self._takes.append((message, epoch, now + SETTLE))
-            self.answer_takes(now)
+            self.reply_to_takes(now)
 
-    def answer_takes(self, now: float) -> None:
+    def reply_to_takes(self, now: float) -> None:
         """Answer the program once its robot would move, not before.
 
         A page waits for its hands to be seen; a program that drives at once would
@@ -289,12 +289,12 @@ class ProgramOrders:
         waiting, self._takes = self._takes, []
         for take, epoch, until in waiting:
             try:
-                base = self._fleet.find(take.robot)
-                check_lease(base.hands.lease, PROGRAM, epoch)
+                base = self._machines.find(take.robot)
+                check_lease(base.authority.lease, PROGRAM, epoch)
             except Refusal as refusal:
                 self._reply(take, None, refusal.why)
                 continue
-            if now < until and base.robots.drivable and base.arming.doubt(now):
+            if now < until and base.robots.drivable and base.conditions.doubt(now):
                 self._takes.append((take, epoch, until))
             else:
                 self._reply(take, epoch, None)
@@ -302,23 +302,25 @@ class ProgramOrders:
     def _reply(
         self, take: protocol.ProgramTake, epoch: int | None, why: str | None
     ) -> None:
-        self._emit(Say(protocol.TakeReply(take.request, take.robot, epoch, why)))
+        self._emit(
+            SendToDisplay(protocol.TakeReply(take.request, take.robot, epoch, why))
+        )
 
     def _release(self, message: protocol.ProgramRelease, now: float) -> None:
-        program, robot = self._people.program, message.robot
-        self._people.attempt(
+        program, robot = self._connections.program, message.robot
+        self._connections.run_or_refuse(
             program.id,
             robot,
             "release",
-            lambda: self._orders.release(program, robot, now),
+            lambda: self._commands.release(program, robot, now),
             now,
         )
 
     def _twist(self, message: protocol.ProgramTwist, now: float) -> None:
-        program, robot = self._people.program, message.robot
+        program, robot = self._connections.program, message.robot
 
         def drive() -> None:
-            base, age = self._orders.checked(
+            base, age = self._commands.checked(
                 program, robot, message.epoch, message.tick, now
             )
             base.speeds.ages.add(age, now)
@@ -330,37 +332,37 @@ class ProgramOrders:
             if reason := base.driving.drive(twist, twist.is_zero, message.tick, now):
                 raise Refusal(reason)
 
-        self._people.attempt(program.id, robot, "drive", drive, now)
+        self._connections.run_or_refuse(program.id, robot, "drive", drive, now)
 
     def _move(self, message: protocol.ProgramMove, now: float) -> None:
-        program, robot = self._people.program, message.robot
+        program, robot = self._connections.program, message.robot
 
         def move() -> None:
-            base, _ = self._orders.checked(
+            base, _ = self._commands.checked(
                 program, robot, message.epoch, message.tick, now
             )
             base.driving.goal(robot, _finite(message.pose), program.id, now)
 
-        self._people.attempt(program.id, robot, "goal", move, now)
+        self._connections.run_or_refuse(program.id, robot, "goal", move, now)
 
     def _locate(self, message: protocol.ProgramLocate, now: float) -> None:
-        program, robot = self._people.program, message.robot
+        program, robot = self._connections.program, message.robot
 
         def locate() -> None:
-            base, _ = self._orders.checked(
+            base, _ = self._commands.checked(
                 program, robot, message.epoch, message.tick, now
             )
             base.driving.locate(robot, _finite(message.pose), program.id, now)
 
-        self._people.attempt(program.id, robot, "locate", locate, now)
+        self._connections.run_or_refuse(program.id, robot, "locate", locate, now)
 
     def _cancel(self, message: protocol.ProgramCancel, now: float) -> None:
-        program, robot = self._people.program, message.robot
-        self._people.attempt(
+        program, robot = self._connections.program, message.robot
+        self._connections.run_or_refuse(
             program.id,
             robot,
             "cancel",
-            lambda: self._orders.cancel(program, robot, now),
+            lambda: self._commands.cancel(program, robot, now),
             now,
         )
 
