@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
 from webmap.gate.events import Scan
-from webmap.gate.lanes.odometry import hear_scan
+from webmap.gate.lanes.odometry import parse_scan
 from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import FREE, assist, free_way, points_of, polygon_around
 from webmap.gate.rules.scan_geometry import LIMIT, MOST, folded
@@ -43,7 +43,7 @@ def heard(sweep):
     message = {field: getattr(sweep, field) for field in fields}
     message["ranges"] = numbers
     frame = cbor2.dumps({"op": "publish", "topic": "/scan", "msg": message})
-    return hear_scan(frame, 0.0)[1]
+    return parse_scan(frame, 0.0)[1]
 
 
 def spread(profile, count, seed):

@@ -44,14 +44,14 @@ def ranges_seen(bridge):
     """What the scanner sees now, by a client of its own."""
     from websockets.sync.client import connect
 
-    from webmap.gate.lanes.odometry import hear_scan, subscribe
+    from webmap.gate.lanes.odometry import parse_scan, subscribe
 
     with connect(bridge, max_size=None) as link:
         link.send(subscribe("/base_scan", "t").decode())
         heard = None
         while heard is None:
             frame = link.recv(timeout=10)
-            heard = hear_scan(frame if isinstance(frame, bytes) else b"", 0.0)
+            heard = parse_scan(frame if isinstance(frame, bytes) else b"", 0.0)
     return [reach for reach in heard[1].ranges if math.isfinite(reach)]
 
 

@@ -583,8 +583,8 @@ class TestLinks:
         bench.tell(events.LockState(gone, held=True))
         bench.tell(events.GoalWritten("r9", "g", 0, 0, 0, "a", True))
         bench.tell(events.GoalEnded("r9", "g"))
-        bench.tell(events.LinkUp("ws://other", "witness"))
-        bench.tell(events.LinkDown("ws://other", "witness"))
+        bench.tell(events.LinkUp("ws://other", "odometry"))
+        bench.tell(events.LinkDown("ws://other", "odometry"))
         assert bench.written == []
 
 

@@ -24,7 +24,7 @@ GOAL = SendGoal(
     Key("ws://r", "/cmd_vel"), "r1", "g1", "navigate_to_pose", 0, 0, 0, "A", 9
 )
 READERS = {
-    "words": rosbridge.hear,
+    "words": rosbridge.parse,
     "answers": lambda data: navigation.answer_to(data, "a"),
     "navigation": lambda data: navigation.of_action(data, GOAL),
 }
@@ -47,7 +47,7 @@ def test_what_holds_too_many_values_is_refused_before_it_is_read(reader):
 def test_a_dense_scan_in_json_is_read():
     ranges = b",".join([b"1.25"] * 7200)
     data = b'{"op":"publish","topic":"/s","msg":{"ranges":[' + ranges + b"]}}"
-    assert rosbridge.hear(data).topic == "/s"
+    assert rosbridge.parse(data).topic == "/s"
 
 
 def test_what_nests_a_little_is_read():
@@ -85,12 +85,12 @@ def list_of(count, each):
 )
 def test_a_scan_of_many_parts_is_refused_before_it_is_decoded(ranges):
     with pytest.raises(ProtocolError, match="more than 1000 lists, maps and texts"):
-        odometry.hear_scan(scan(ranges), 0.0)
+        odometry.parse_scan(scan(ranges), 0.0)
 
 
 def test_a_scan_that_nests_too_deeply_is_refused():
     with pytest.raises(ProtocolError, match="not CBOR"):
-        odometry.hear_scan(scan(b"\x81" * 900 + b"\x00"), 0.0)
+        odometry.parse_scan(scan(b"\x81" * 900 + b"\x00"), 0.0)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ async def test_a_link_that_brings_such_goes_on_and_says_so_once(caplog):
     heard = Received()
 
     def hear(data):
-        rosbridge.hear(data)
+        rosbridge.parse(data)
         heard.texts.append(data)
 
     async def talk(link):

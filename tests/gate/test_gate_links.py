@@ -58,7 +58,7 @@ async def test_a_robot_has_the_links_that_it_needs_and_only_as_long_as_it_needs_
     async with noting_bridge() as bridge, Noting() as noting:
         robot = spec(bridge_url=bridge.url, odometry_topic="/odom")
         key = noting.attach(robot)
-        await noting.up("control", "witness", "tasks")
+        await noting.up("control", "odometry", "tasks")
         await until(lambda: len(bridge.links) == 3, "three sockets")
         blind = spec(bridge_url=bridge.url, id="r1")
         noting.attach(blind)
@@ -144,7 +144,7 @@ async def test_bridges_of_odometry_and_goals_may_be_others_than_that_of_velocity
             assist=AssistSpec(topic="/scan", footprint=((0.1, 0.1), (-0.1, 0.0))),
         )
         key = noting.attach(robot)
-        await noting.up("control", "witness", "witness", "tasks", "tasks")
+        await noting.up("control", "odometry", "odometry", "tasks", "tasks")
         noting.do(actions.Watch(key, True))
         await until(lambda: len(a.of("subscribe")) == 2, "echo and scan")
         assert {t.topic for t in a.of("subscribe")} == {"/cmd_vel", "/scan"}
@@ -250,9 +250,9 @@ async def test_a_cancel_gets_through_though_its_link_is_wanted_no_longer():
 async def test_of_each_link_that_is_wanted_no_longer_it_is_told_that_it_is_down():
     async with noting_bridge() as bridge, Noting() as noting:
         key = noting.attach(spec(bridge_url=bridge.url, odometry_topic="/odom"))
-        await noting.up("control", "witness", "tasks")
+        await noting.up("control", "odometry", "tasks")
         noting.do(actions.Detach(key, "r1"))
-        lanes = ("control", "witness", "tasks")
+        lanes = ("control", "odometry", "tasks")
         assert noting.of(LinkDown) == [LinkDown(bridge.url, lane) for lane in lanes]
 
 
@@ -289,7 +289,7 @@ async def test_in_the_end_zero_goes_to_all_that_may_be_driven_and_to_nothing_els
             still = noting.attach(
                 spec(bridge_url=other.url, twist_topic=None, odometry_topic="/odom")
             )
-            await noting.up("control", "tasks", "tasks", "witness")
+            await noting.up("control", "tasks", "tasks", "odometry")
             noting.do(actions.Watch(watched, True))
             noting.do(actions.Watch(still, True))
             noting.links.zero_all()
@@ -305,7 +305,7 @@ async def test_the_end_of_the_gate_is_the_end_of_every_link():
     async with noting_bridge() as bridge:
         async with Noting() as noting:
             noting.attach(spec(bridge_url=bridge.url, odometry_topic="/odom"))
-            await noting.up("control", "witness", "tasks")
+            await noting.up("control", "odometry", "tasks")
             await until(lambda: len(bridge.links) == 3, "three sockets")
         await until(lambda: not bridge.links, "the end of all of them")
         assert noting.of(LinkDown) == []

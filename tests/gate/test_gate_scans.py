@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from captured_frames import frame_file
 from webmap.base.errors import ProtocolError
-from webmap.gate.lanes.odometry import hear_scan, subscribe
+from webmap.gate.lanes.odometry import parse_scan, subscribe
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_a_real_bridge_s_scan_keeps_nothing_apart_from_unknown(dialect):
     frame = frame_file(dialect, "cbor_scan_inf_nan.bin").read_bytes()
-    topic, sweep = hear_scan(frame, 5.0)
+    topic, sweep = parse_scan(frame, 5.0)
     assert topic.endswith("base_scan")
     assert any(map(math.isnan, sweep.ranges))
     assert any(map(math.isinf, sweep.ranges))
@@ -47,7 +47,7 @@ def scan(**changed):
 
 
 def test_a_scan_is_read():
-    topic, sweep = hear_scan(scan(), 1.0)
+    topic, sweep = parse_scan(scan(), 1.0)
     assert (topic, sweep.ranges) == ("/scan", [1.0, 2.0])
 
 
@@ -64,13 +64,13 @@ def test_a_scan_is_read():
     ],
 )
 def test_the_frame_of_a_scan_is_what_its_header_says(header, frame):
-    assert hear_scan(scan(header=header), 1.0)[1].frame == frame
+    assert parse_scan(scan(header=header), 1.0)[1].frame == frame
 
 
 def test_a_dense_scan_keeps_its_frame():
     numbers = cbor2.CBORTag(85, array("f", [1.0] * 2000).tobytes())
     dense = scan(header={"frame_id": "laser"}, ranges=numbers, angle_increment=0.001)
-    sweep = hear_scan(dense, 1.0)[1]
+    sweep = parse_scan(dense, 1.0)[1]
     assert (sweep.frame, len(sweep.ranges) <= 720) == ("laser", True)
 
 
@@ -87,15 +87,15 @@ def test_a_dense_scan_keeps_its_frame():
     ],
 )
 def test_anything_else_is_no_scan(frame):
-    assert hear_scan(frame, 1.0) is None
+    assert parse_scan(frame, 1.0) is None
 
 
 def test_a_scan_without_ranges_is_empty():
-    assert hear_scan(scan(ranges=None), 1.0)[1].ranges == []
+    assert parse_scan(scan(ranges=None), 1.0)[1].ranges == []
 
 
 @given(st.binary(max_size=200))
 @example(b"\xa0[\x80" + bytes(7))  # a byte string that claims 2**63 bytes
 def test_no_bytes_do_any_harm(frame):
     with contextlib.suppress(ProtocolError):
-        hear_scan(frame, 1.0)
+        parse_scan(frame, 1.0)

@@ -34,7 +34,7 @@ class Running:
     async def __aenter__(self):
         self.work = asyncio.create_task(self.shell.run())
         self._hand = asyncio.create_task(self._stream())
-        self.shell.tell(protocol.Connect("a", "Ann", "operator"))
+        self.shell.deliver(protocol.Connect("a", "Ann", "operator"))
         return self
 
     async def __aexit__(self, *_):
@@ -44,13 +44,13 @@ class Running:
     async def end(self):
         """End it as the end of the pipe does."""
         if not self.work.done():
-            self.shell.tell(events.Shutdown("the display process has ended"))
+            self.shell.deliver(events.Shutdown("the display process has ended"))
         await self.work
 
     async def _stream(self):
         while True:
             await asyncio.sleep(0.05)
-            self.shell.tell(protocol.Heartbeat())
+            self.shell.deliver(protocol.Heartbeat())
             report, tick = self.report(), self.tick
             if self.x is not None and report is not None and tick is not None:
                 self._seq += 1
@@ -67,7 +67,7 @@ class Running:
 
     def say(self, **command):
         text = json.dumps(command).encode()
-        self.shell.tell(protocol.FromPage("a", text))
+        self.shell.deliver(protocol.FromPage("a", text))
 
     @property
     def tick(self):
@@ -101,7 +101,7 @@ def robot(bridge, **more):
 @contextlib.asynccontextmanager
 async def driving(folder, **more):
     async with noting_bridge() as bridge, Running(folder) as gate:
-        gate.shell.tell(robot(bridge, **more))
+        gate.shell.deliver(robot(bridge, **more))
         await gate.drive_off(bridge)
         yield bridge, gate
 
@@ -123,7 +123,7 @@ async def test_goals_that_are_to_be_cancelled_are_before_the_gate_ends(
 ):
     monkeypatch.setattr(shell, "DRAIN", 30.0)
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
-        gate.shell.tell(
+        gate.shell.deliver(
             robot(bridge, action="/go", cancel_topic=None, on_operator_loss="cancel")
         )
         await gate.reported(lambda r: r.armable, "a robot to be had")
@@ -146,7 +146,7 @@ async def test_a_hook_that_hangs_does_not_keep_the_gate_alive(tmp_path):
     hook = {"service": "/e_stop", "type": "std_srvs/Trigger"}
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         bridge.answers_services = False
-        gate.shell.tell(robot(bridge, stop_hooks=(hook,)))
+        gate.shell.deliver(robot(bridge, stop_hooks=(hook,)))
         await gate.reported(lambda r: r.armable, "a link")
         gate.say(op="stop", robot="r1")
         await until(lambda: bridge.of("call_service"), "the call")
@@ -169,7 +169,7 @@ async def test_a_gate_that_fails_sends_zero_and_ends(
         gate.x = None
         moves = len(speeds(bridge))
         monkeypatch.setattr(gate.shell._gate, where, fail)
-        gate.shell.tell(protocol.Heartbeat())
+        gate.shell.deliver(protocol.Heartbeat())
         await gate.work
         assert gate.shell.failed
         assert "every driven robot is stopped" in caplog.text
@@ -195,7 +195,7 @@ async def test_a_link_that_breaks_on_the_last_zero_keeps_none_from_the_others(
 
     async with driving(tmp_path) as (bridge, gate):
         gate.x = None
-        gate.shell.tell(robot(bridge, id="r2", twist_topic="/second"))
+        gate.shell.deliver(robot(bridge, id="r2", twist_topic="/second"))
         await gate.reported(lambda r: r.robot == "r2" and r.armable, "the second")
         gate.say(op="take", robot="r2")
         await until(lambda: len(gate.shell._watched) == 2, "both that are watched")
@@ -203,7 +203,7 @@ async def test_a_link_that_breaks_on_the_last_zero_keeps_none_from_the_others(
         before = len(bridge.of("publish", "/second"))
         monkeypatch.setattr(ControlLane, "write", break_on_the_first)
         monkeypatch.setattr(gate.shell._gate, "handle", lambda *_: 1 / 0)
-        gate.shell.tell(protocol.Heartbeat())
+        gate.shell.deliver(protocol.Heartbeat())
         async with asyncio.timeout(5):
             await gate.work
         assert broken
@@ -225,7 +225,7 @@ async def test_a_gate_that_has_failed_writes_nothing_but_zero_whoever_goes_on(
         await until(lambda: bridge.of("call_service"), "a call that hangs")
         with monkeypatch.context() as patch:
             patch.setattr(gate.shell._gate, "handle", lambda *_: 1 / 0)
-            gate.shell.tell(protocol.Heartbeat())
+            gate.shell.deliver(protocol.Heartbeat())
         assert gate.shell.failed
         before = len(speeds(bridge))
         await gate.work
@@ -265,7 +265,7 @@ async def robot_of_another_gate(tmp_path, monkeypatch):
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         key = Key(bridge.url, "/cmd_vel")
         assert other.acquire(key).held
-        gate.shell.tell(robot(bridge))
+        gate.shell.deliver(robot(bridge))
         yield gate, other, key
 
 
@@ -288,7 +288,7 @@ async def test_a_robot_that_is_forgotten_meanwhile_is_left_to_the_other_gate(
 ):
     async with robot_of_another_gate(tmp_path, monkeypatch) as (gate, other, key):
         await gate.reported(lambda r: not r.armable, "that it is not to be had")
-        gate.shell.tell(protocol.Forget("r1"))
+        gate.shell.deliver(protocol.Forget("r1"))
         gone = protocol.RobotGone("r1")
         await until(lambda: gone in gate.said, "the end of the robot")
         assert gate.shell._waiting_for_lock == {}
@@ -300,10 +300,10 @@ async def test_a_robot_that_is_forgotten_meanwhile_is_left_to_the_other_gate(
 async def test_a_robot_that_is_forgotten_may_be_had_by_another_gate(tmp_path):
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         key = Key(bridge.url, "/cmd_vel")
-        gate.shell.tell(robot(bridge))
+        gate.shell.deliver(robot(bridge))
         await gate.reported(lambda r: r.armable, "a robot to be had")
         assert not Locks(tmp_path).acquire(key).held
-        gate.shell.tell(protocol.Forget("r1"))
+        gate.shell.deliver(protocol.Forget("r1"))
         await until(lambda: Locks(tmp_path).acquire(key).held, "the lock")
 
 
@@ -312,11 +312,11 @@ async def test_a_state_file_that_cannot_be_read_is_a_stop_that_stands(tmp_path, 
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         path = path_of(tmp_path, Key(bridge.url, "/cmd_vel"), "stop")
         path.write_bytes(b"\xff{")
-        gate.shell.tell(robot(bridge))
+        gate.shell.deliver(robot(bridge))
         await gate.reported(lambda r: r.latched, "the STOP")
         assert gate.report().stop.by == UNKNOWN
         assert "cannot be read" in caplog.text
-        gate.shell.tell(protocol.Reset("r1", gate.report().stop.id))
+        gate.shell.deliver(protocol.Reset("r1", gate.report().stop.id))
         await gate.reported(lambda r: r.armable, "a robot to be had")
         await until(lambda: not path.exists(), "no file")
         assert not any(speeds(bridge))
@@ -330,7 +330,7 @@ async def test_a_stop_of_another_gate_is_seen_and_one_of_its_own_is_kept(tmp_pat
         await gate.reported(lambda r: r.latched and r.stop.by == "Ben", "the STOP")
         await until(lambda: speeds(bridge)[-1] == 0.0, "the zero")
         gate.x = None
-        gate.shell.tell(protocol.Reset("r1", gate.report().stop.id))
+        gate.shell.deliver(protocol.Reset("r1", gate.report().stop.id))
         await gate.reported(lambda r: not r.latched, "the reset")
         await until(lambda: Records(tmp_path).latch_of(key) is None, "no file")
         gate.say(op="stop", robot="r1")
@@ -343,7 +343,7 @@ async def test_a_robot_is_one_however_this_computer_is_spelled(tmp_path):
     async with driving(tmp_path) as (bridge, gate):
         url = bridge.url.replace("127.0.0.1", "localhost")
         assert url != bridge.url
-        gate.shell.tell(spec(id="r2", bridge_url=url))
+        gate.shell.deliver(spec(id="r2", bridge_url=url))
         await gate.reported(
             lambda r: r.robot == "r2" and r.reason, "why it is not to be had"
         )

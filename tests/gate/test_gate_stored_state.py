@@ -120,10 +120,10 @@ def test_a_robot_that_was_driven_is_told_zero_first_however_this_computer_is_spe
 
     async def scenario():
         gate = shell.Shell(Outbox(), Locks(stored), Disk(Records(stored)))
-        gate.tell(msgspec.structs.replace(specs["Driven"], bridge_url=url))
-        gate.tell(specs["Untouched"])
+        gate.deliver(msgspec.structs.replace(specs["Driven"], bridge_url=url))
+        gate.deliver(specs["Untouched"])
         for there in (url, other):
-            gate.tell(events.LinkUp(there, "control"))
+            gate.deliver(events.LinkUp(there, "control"))
         return gate._links.written
 
     assert asyncio.run(scenario()) == [(Key(url, "/driven/cmd_vel"), ZERO)]

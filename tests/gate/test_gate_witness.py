@@ -45,7 +45,7 @@ async def test_odometry_is_told_of_every_machine_that_it_is_of():
         noting.witness.watch("/odom", "nav_msgs/Odometry", ANN)
         noting.witness.watch("/odom", "nav_msgs/Odometry", BEN)
         await until(lambda: bridge.of("subscribe", "/odom"), "that it listens")
-        assert noting.events == [LinkUp(bridge.url, "witness")]
+        assert noting.events == [LinkUp(bridge.url, "odometry")]
         assert bridge.of("subscribe")[0].message["throttle_rate"] == 50
         await bridge.publish("/odom", MOVING)
         await until(lambda: noting.of(OdometryReceived), "odometry")

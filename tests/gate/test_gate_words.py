@@ -53,7 +53,7 @@ def heard_with(**changes):
         "angular": {axis: numbers[f"r{axis}"] for axis in "xyz"},
     }
     frame = {"op": "publish", "topic": "/odom", "msg": {"twist": {"twist": message}}}
-    return rosbridge.hear(json.dumps(frame).encode()).twist
+    return rosbridge.parse(json.dumps(frame).encode()).twist
 
 
 def test_odometry_tells_all_six_numbers():
@@ -130,7 +130,7 @@ FLAT = {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": -1.0}}
 
 @pytest.mark.parametrize("message", [FLAT, {"twist": FLAT}, {"twist": {"twist": FLAT}}])
 def test_a_velocity_is_found_in_what_has_one(message):
-    assert rosbridge.hear(frame(message)).twist == Twist(0.5, 0.0, -1.0)
+    assert rosbridge.parse(frame(message)).twist == Twist(0.5, 0.0, -1.0)
 
 
 @pytest.mark.parametrize(
@@ -145,11 +145,11 @@ def test_a_velocity_is_found_in_what_has_one(message):
     ],
 )
 def test_no_velocity_is_found_in_what_has_none(message):
-    assert rosbridge.hear(frame(message)).twist is None
+    assert rosbridge.parse(frame(message)).twist is None
 
 
 def test_a_bare_nan_is_read_and_is_no_velocity():
-    heard = rosbridge.hear(frame({"linear": {"x": math.nan}, "angular": {"z": 0.0}}))
+    heard = rosbridge.parse(frame({"linear": {"x": math.nan}, "angular": {"z": 0.0}}))
     assert (heard.topic, heard.twist) == ("/odom", None)
 
 
@@ -157,9 +157,9 @@ def test_a_bare_nan_is_read_and_is_no_velocity():
     "data", [b"", b"{", b"\xff", b"[]", b'{"op": 5}', b'{"op": NaN}']
 )
 def test_what_makes_no_sense_is_nothing(data):
-    assert rosbridge.hear(data) is None
+    assert rosbridge.parse(data) is None
 
 
 def test_a_number_for_an_id_is_a_text():
-    assert rosbridge.hear(b'{"op": "service_response", "id": 7}').id == "7"
-    assert rosbridge.hear(b'{"op": "status"}').id is None
+    assert rosbridge.parse(b'{"op": "service_response", "id": 7}').id == "7"
+    assert rosbridge.parse(b'{"op": "status"}').id is None

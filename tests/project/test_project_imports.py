@@ -58,12 +58,12 @@ def test_what_moves_a_robot_is_configured_without_a_display() -> None:
 def test_a_scan_costs_the_gate_cbor_and_nothing_else_that_is_heavy() -> None:
     loaded = loaded_by(
         "import webmap.gate.__main__, cbor2\n"
-        "from webmap.gate.lanes.odometry import hear_scan\n"
+        "from webmap.gate.lanes.odometry import parse_scan\n"
         "fields = ('angle_min', 'angle_increment', 'range_min', 'range_max')\n"
         "scan = dict.fromkeys(fields, 1.0)\n"
         "scan['ranges'] = cbor2.CBORTag(85, bytes(8))\n"
         "frame = cbor2.dumps({'op': 'publish', 'topic': '/s', 'msg': scan})\n"
-        "assert hear_scan(frame, 0.0)[1].ranges == [0.0, 0.0]\n"
+        "assert parse_scan(frame, 0.0)[1].ranges == [0.0, 0.0]\n"
     )
     assert loaded & HEAVY == {"cbor2"}
 

@@ -8,7 +8,7 @@ import msgspec
 
 from webmap.base.geometry import Twist
 
-Lane = Literal["control", "witness", "tasks"]
+Lane = Literal["control", "odometry", "tasks"]
 Outcome = Literal["reached", "failed", "cancelled"]
 
 

@@ -69,7 +69,7 @@ async def _serve(pipe_in: int, outbox: Outbox) -> int:
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         why = f"the gate was ended by {signal.Signals(number).name}"
-        loop.call_soon_threadsafe(shell.tell, events.Shutdown(why))
+        loop.call_soon_threadsafe(shell.deliver, events.Shutdown(why))
 
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, on_signal)
@@ -90,11 +90,11 @@ def _read(file: int, loop: asyncio.AbstractEventLoop, shell: Shell) -> None:
         try:
             while data := os.read(file, 1 << 16):
                 for message in unpacker.feed(data):
-                    loop.call_soon_threadsafe(shell.tell, message)
+                    loop.call_soon_threadsafe(shell.deliver, message)
         except (OSError, WireError) as error:
             why = f"the pipe from the display is broken: {error}"
         finally:  # whatever it was: a gate that hears no STOP must not go on
-            loop.call_soon_threadsafe(shell.tell, events.Shutdown(why))
+            loop.call_soon_threadsafe(shell.deliver, events.Shutdown(why))
 
 
 def _take_pipes() -> tuple[int, int]:

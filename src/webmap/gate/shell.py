@@ -52,7 +52,7 @@ class Shell:
         self._outbox = outbox
         self._locks = locks
         self._disk = disk
-        self._links = Links(self.tell)
+        self._links = Links(self.deliver)
         self._inbox: deque[protocol.ToGate | events.Event] = deque()
         self._working = False
         self._ending = asyncio.Event()
@@ -61,7 +61,7 @@ class Shell:
         self._watched: set[events.Key] = set()
         """The machines that may be driven."""
 
-    def tell(self, event: protocol.ToGate | events.Event) -> None:
+    def deliver(self, event: protocol.ToGate | events.Event) -> None:
         """Bring an event; called from within an action, it waits its turn.
 
         A gate that has failed takes in nothing more: its last word was zero.
@@ -117,7 +117,7 @@ class Shell:
         while True:
             await asyncio.sleep(LOOK)
             for seen in await self._disk.look():
-                self.tell(seen)
+                self.deliver(seen)
 
     def _do(self, todo: list[actions.Action]) -> None:
         for action in todo:
@@ -140,7 +140,7 @@ class Shell:
             case actions.MarkDriven(key, driven):
                 self._locks.mark(key, driven)
             case actions.SaveStop() | actions.SaveStopTest():
-                self._disk.keep(action, self.tell)
+                self._disk.keep(action, self.deliver)
             case actions.Watch(key, on):
                 self._watched = self._watched | {key} if on else self._watched - {key}
                 return self._links.perform(action)
@@ -154,7 +154,7 @@ class Shell:
         if not state.held:
             loop = asyncio.get_running_loop()
             self._waiting_for_lock[key] = loop.call_later(
-                LOCK_RETRY, lambda: self.tell(self._lock(key))
+                LOCK_RETRY, lambda: self.deliver(self._lock(key))
             )
         return state
 

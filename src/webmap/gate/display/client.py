@@ -79,8 +79,8 @@ class GateClient:
     def __init__(self) -> None:
         self._lock = threading.RLock()
         self._supervisor = Supervisor(self, self._lock)
-        self._pages = Pages(self.tell, self._lock, self._keep_stop_of_page)
-        self._program = ProgramCommands(self.tell, self._lock)
+        self._pages = Pages(self.send, self._lock, self._keep_stop_of_page)
+        self._program = ProgramCommands(self.send, self._lock)
         self._pending_stops = PendingStops()
         self._numbers = itertools.count(1)
         self._specs: dict[str, RobotSpec] = {}
@@ -122,13 +122,13 @@ class GateClient:
             raise ConfigError(f"robot {spec.name!r}: {error}") from error
         with self._lock:
             self._specs[spec.id] = spec
-            self.tell(spec)
+            self.send(spec)
 
     def forget(self, robot_id: str) -> None:
         """Have the gate drop a robot; it is stopped if it is driven."""
         with self._lock:
             if self._specs.pop(robot_id, None) is not None:
-                self.tell(protocol.Forget(robot_id))
+                self.send(protocol.Forget(robot_id))
 
     def connect(
         self,
@@ -215,7 +215,7 @@ class GateClient:
         """STOP a robot or, with ``None``, all of them."""
         with self._lock:
             self._keep_stop(None, robot_id)
-            self.tell(protocol.Stop(robot_id))
+            self.send(protocol.Stop(robot_id))
 
     def reset(self, robot_id: str, stop: str) -> None:
         """End the STOP of a robot that has this identity; moves nothing.
@@ -227,17 +227,17 @@ class GateClient:
 
         """
         if self.ready:
-            self.tell(protocol.Reset(robot_id, stop))
+            self.send(protocol.Reset(robot_id, stop))
         else:
             log.error("the gate is not running: the reset is lost")
 
     def name_writers(self, robot_id: str, nodes: tuple[str, ...]) -> None:
         """Tell which nodes besides the bridge publish to a robot's velocity topic."""
-        self.tell(protocol.WriterNodes(robot_id, nodes))
+        self.send(protocol.WriterNodes(robot_id, nodes))
 
-    def tell(self, message: protocol.ToGate) -> None:
+    def send(self, message: protocol.ToGate) -> None:
         """Send a message to the gate, if it runs."""
-        self._supervisor.tell(message)
+        self._supervisor.send(message)
 
     # STOPs that may not have been heard.
 

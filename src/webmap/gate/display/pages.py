@@ -183,7 +183,7 @@ class Pages:
     """Every page that speaks with the gate.
 
     Args:
-        tell: Sends a message to the gate, if it runs.
+        send: Sends a message to the gate, if it runs.
         lock: Held while anything here changes.
         heed: Looks at what a page says before the gate does.
 
@@ -191,11 +191,11 @@ class Pages:
 
     def __init__(
         self,
-        tell: Callable[[protocol.ToGate], None],
+        send: Callable[[protocol.ToGate], None],
         lock: "threading.RLock",
         heed: Callable[[protocol.FromPage], None],
     ) -> None:
-        self.tell = tell
+        self.send = send
         self._lock = lock
         self._keep_stop_of_page = heed
         self._numbers = itertools.count(1)
@@ -225,7 +225,7 @@ class Pages:
             hello = protocol.Connect(f"c{next(self._numbers)}", name, role)
             connection = DriveConnection(self, hello, send, close)
             self._connections[connection.id] = connection
-            self.tell(hello)
+            self.send(hello)
         return connection
 
     def knows(self, id: str) -> bool:
@@ -237,18 +237,18 @@ class Pages:
         message = protocol.FromPage(id, data)
         with self._lock:
             self._keep_stop_of_page(message)
-            self.tell(message)
+            self.send(message)
 
     def drop(self, connection: DriveConnection) -> None:
         """Forget a connection; the second call does nothing."""
         with self._lock:
             if self._connections.pop(connection.id, None) is not None:
-                self.tell(protocol.Disconnect(connection.id))
+                self.send(protocol.Disconnect(connection.id))
 
     def new_speeds(self, connection: DriveConnection, speeds: protocol.Speeds) -> None:
         """Tell the gate what a page asks for at most, and the page what it gets."""
         with self._lock:  # so that nothing older comes after what the gate says now
-            self.tell(speeds)
+            self.send(speeds)
             for report in list(self._latest.values()):
                 if report.holder is None:  # of the one that it has, the gate says so
                     self._show(connection, report)

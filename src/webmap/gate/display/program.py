@@ -21,7 +21,7 @@ class ProgramCommands:
     """What the display's own Python code may ask of the gate.
 
     Args:
-        tell: Sends a message to the gate, if it runs.
+        send: Sends a message to the gate, if it runs.
         lock: Held while anything here changes.
         clock: Gives the time, in seconds.
 
@@ -29,11 +29,11 @@ class ProgramCommands:
 
     def __init__(
         self,
-        tell: Callable[[protocol.ToGate], None],
+        send: Callable[[protocol.ToGate], None],
         lock: "threading.RLock",
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._tell = tell
+        self._send = send
         self._lock = lock
         self._clock = clock
         self._numbers = itertools.count(1)
@@ -65,14 +65,14 @@ class ProgramCommands:
                 return future
             request = next(self._numbers)
             self._takes[request] = future
-            self._tell(protocol.ProgramTake(request, robot_id))
+            self._send(protocol.ProgramTake(request, robot_id))
         return future
 
     def release(self, robot_id: str) -> None:
         """Give the program's lease back; the robot is stopped if it is driven."""
         with self._lock:
             self._epochs.pop(robot_id, None)
-            self._tell(protocol.ProgramRelease(robot_id))
+            self._send(protocol.ProgramRelease(robot_id))
 
     def twist(self, robot_id: str, twist: Twist) -> None:
         """Send one velocity; without another within 200 ms the robot is stopped.
@@ -96,7 +96,7 @@ class ProgramCommands:
             if now - at < LEAST_PAUSE and (any(velocity) or not any(last)):
                 return
             self._passed_on[robot_id] = (now, velocity)
-            self._tell(protocol.ProgramTwist(robot_id, epoch, tick, velocity))
+            self._send(protocol.ProgramTwist(robot_id, epoch, tick, velocity))
 
     def move(self, robot_id: str, x: float, y: float, yaw: float) -> None:
         """Send a goal: metres and radians in the robot's ``goal_frame``.
@@ -109,7 +109,7 @@ class ProgramCommands:
         pose = _finite(x, y, yaw)
         with self._lock:
             epoch, tick = self._licence(robot_id)
-            self._tell(protocol.ProgramMove(robot_id, epoch, tick, pose))
+            self._send(protocol.ProgramMove(robot_id, epoch, tick, pose))
 
     def locate(self, robot_id: str, x: float, y: float, yaw: float) -> None:
         """Tell where a robot is: metres and radians in its ``goal_frame``.
@@ -122,11 +122,11 @@ class ProgramCommands:
         pose = _finite(x, y, yaw)
         with self._lock:
             epoch, tick = self._licence(robot_id)
-            self._tell(protocol.ProgramLocate(robot_id, epoch, tick, pose))
+            self._send(protocol.ProgramLocate(robot_id, epoch, tick, pose))
 
     def cancel(self, robot_id: str) -> None:
         """Cancel the robot's goals; needs no lease."""
-        self._tell(protocol.ProgramCancel(robot_id))
+        self._send(protocol.ProgramCancel(robot_id))
 
     def _licence(self, robot_id: str) -> tuple[int, int]:
         epoch = self._epochs.get(robot_id)

@@ -307,7 +307,7 @@ class Supervisor:
         if thread is not None:
             thread.join()
 
-    def tell(self, message: protocol.ToGate) -> None:
+    def send(self, message: protocol.ToGate) -> None:
         """Send a message to the gate, if it runs."""
         with self._lock:
             if self._child is not None:

@@ -112,13 +112,13 @@ class ControlLane:
 
     Args:
         url: The bridge's address.
-        tell: Takes the events.
+        emit: Takes the events.
 
     """
 
-    def __init__(self, url: str, tell: Callable[[Event], None]) -> None:
+    def __init__(self, url: str, emit: Callable[[Event], None]) -> None:
         self._url = url
-        self._tell = tell
+        self._emit = emit
         self._attached: dict[str, list[tuple[str, bool]]] = {}
         """For each topic the types that were said, and whether they are assumed."""
         self._types: dict[str, str] = {}
@@ -128,8 +128,8 @@ class ControlLane:
         self.lane = Lane(
             url,
             up=self._open,
-            down=lambda: tell(LinkDown(url, "control")),
-            text=self._hear,
+            down=lambda: emit(LinkDown(url, "control")),
+            text=self._on_message,
             pinged=self._ping,
             pong=self._answer,
         )
@@ -217,19 +217,19 @@ class ControlLane:
 
     def _open(self) -> None:
         self._unconfirmed.begin()  # what the link before held went with it
-        self._tell(LinkUp(self._url, "control"))
+        self._emit(LinkUp(self._url, "control"))
 
     def _ping(self, number: int) -> None:
         self._unconfirmed.on_ping(number, now())
 
     def _answer(self, number: int) -> None:
-        self._tell(PingAnswered(self._url, self._unconfirmed.on_pong(number)))
+        self._emit(PingAnswered(self._url, self._unconfirmed.on_pong(number)))
 
-    def _hear(self, data: bytes) -> None:
-        heard = rosbridge.hear(data)
+    def _on_message(self, data: bytes) -> None:
+        heard = rosbridge.parse(data)
         if heard is None or heard.topic not in self._types or heard.twist is None:
             return
         if not heard.twist.is_finite:
             return
         self._unconfirmed.echoed(heard.topic, heard.twist)
-        self._tell(EchoReceived(Key(self._url, heard.topic), heard.twist))
+        self._emit(EchoReceived(Key(self._url, heard.topic), heard.twist))

@@ -24,14 +24,14 @@ class Links:
     """Does what the decisions ask for on the links to the bridges.
 
     Args:
-        tell: Takes the events; may be called from within :meth:`perform`.
+        emit: Takes the events; may be called from within :meth:`perform`.
 
     """
 
-    def __init__(self, tell: Callable[[Event], None]) -> None:
-        self._tell = tell
+    def __init__(self, emit: Callable[[Event], None]) -> None:
+        self._emit = emit
         self._control: dict[str, ControlLane] = {}
-        self._witness: dict[str, OdometryLane] = {}
+        self._odometry: dict[str, OdometryLane] = {}
         self._tasks: dict[str, TasksLane] = {}
         self._calls: dict[str, Calls] = {}
         """By bridge; a call goes on when the lane of who made it has ended."""
@@ -94,8 +94,8 @@ class Links:
             tasks.close()
         for calls in self._calls.values():
             calls.close()
-        for witness in self._witness.values():
-            witness.lane.close()
+        for odometry in self._odometry.values():
+            odometry.lane.close()
         for control in self._control.values():
             control.lane.close()
 
@@ -106,7 +106,7 @@ class Links:
 
     def _run_hook(self, run: actions.RunHook) -> None:
         def ended(why: str | None) -> None:
-            self._tell(HookEnded(run.robot, run.hook, run.number, why))
+            self._emit(HookEnded(run.robot, run.hook, run.number, why))
 
         spec = self._robots[run.key][run.robot]
         self._tasks[spec.bridge_url].run_hook(run.hook, run.stopped, ended)
@@ -127,16 +127,16 @@ class Links:
         if spec.twist_topic is not None:
             control = self._control.get(spec.bridge_url)
             if control is None:
-                control = ControlLane(spec.bridge_url, self._tell)
+                control = ControlLane(spec.bridge_url, self._emit)
                 self._control[spec.bridge_url] = control
             control.attach(spec.twist_topic, spec.twist_type, spec.twist_type_assumed)
-        for url in _witnesses_of(spec):
-            self._witness_at(url).lane.hold("robots")
+        for url in _odometry_urls_of(spec):
+            self._odometry_at(url).lane.hold("robots")
         for url, topics in _tasks_of(spec).items():
             tasks = self._tasks.get(url)
             if tasks is None:
                 calls = self._calls.setdefault(url, Calls(url))
-                tasks = self._tasks[url] = TasksLane(url, self._tell, calls)
+                tasks = self._tasks[url] = TasksLane(url, self._emit, calls)
             tasks.lane.hold("robots")
             tasks.attach(topics)
         if earlier is not None:
@@ -153,8 +153,8 @@ class Links:
             self._control[spec.bridge_url].detach(
                 spec.twist_topic, spec.twist_type, spec.twist_type_assumed
             )
-        for url in _witnesses_of(spec):
-            self._witness_at(url).lane.release_hold("robots")
+        for url in _odometry_urls_of(spec):
+            self._odometry_at(url).lane.release_hold("robots")
         for url, topics in _tasks_of(spec).items():
             self._tasks[url].detach(topics)
             self._tasks[url].lane.release_hold("robots")
@@ -166,11 +166,11 @@ class Links:
             self._control[key.url].listen(key.topic)
         for spec in specs:
             if spec.odometry_topic is not None:
-                self._witness_at(_odometry_url(spec)).watch(
+                self._odometry_at(_odometry_url(spec)).watch(
                     spec.odometry_topic, spec.odometry_type, key
                 )
             if spec.assist is not None:
-                self._witness_at(spec.bridge_url).watch_scan(spec.assist.topic, key)
+                self._odometry_at(spec.bridge_url).watch_scan(spec.assist.topic, key)
 
     def _unwatch(self, key: Key) -> None:
         specs = self._watched.pop(key, [])
@@ -178,36 +178,36 @@ class Links:
             self._control[key.url].ignore(key.topic)
         for spec in specs:
             if spec.odometry_topic is not None:
-                witness = self._witness_at(_odometry_url(spec))
-                witness.unwatch(spec.odometry_topic, key)
+                odometry = self._odometry_at(_odometry_url(spec))
+                odometry.unwatch(spec.odometry_topic, key)
             if spec.assist is not None:
-                self._witness_at(spec.bridge_url).unwatch_scan(spec.assist.topic, key)
+                self._odometry_at(spec.bridge_url).unwatch_scan(spec.assist.topic, key)
 
-    def _witness_at(self, url: str) -> OdometryLane:
-        if url not in self._witness:
-            self._witness[url] = OdometryLane(url, self._tell)
-        return self._witness[url]
+    def _odometry_at(self, url: str) -> OdometryLane:
+        if url not in self._odometry:
+            self._odometry[url] = OdometryLane(url, self._emit)
+        return self._odometry[url]
 
     def _close_unwanted(self) -> None:
         for url, control in list(self._control.items()):
             if not control.lane.wanted:
                 self._control.pop(url).lane.close()
-                self._tell(LinkDown(url, "control"))
-        for url, witness in list(self._witness.items()):
-            if not witness.lane.wanted:
-                self._witness.pop(url).lane.close()
-                self._tell(LinkDown(url, "witness"))
+                self._emit(LinkDown(url, "control"))
+        for url, odometry in list(self._odometry.items()):
+            if not odometry.lane.wanted:
+                self._odometry.pop(url).lane.close()
+                self._emit(LinkDown(url, "odometry"))
         for url, tasks in list(self._tasks.items()):
             if not tasks.lane.wanted:
                 self._tasks.pop(url).close()
-                self._tell(LinkDown(url, "tasks"))
+                self._emit(LinkDown(url, "tasks"))
 
 
 def _odometry_url(spec: RobotSpec) -> str:
     return spec.odometry_url or spec.bridge_url
 
 
-def _witnesses_of(spec: RobotSpec) -> list[str]:
+def _odometry_urls_of(spec: RobotSpec) -> list[str]:
     """Return the bridges that odometry and scans of a robot come from."""
     urls = [] if spec.odometry_topic is None else [_odometry_url(spec)]
     return urls if spec.assist is None else [*urls, spec.bridge_url]

@@ -101,7 +101,7 @@ def check_parts(frame: bytes) -> None:
             )
 
 
-def hear_scan(frame: bytes, now: float) -> tuple[str, Scan] | None:
+def parse_scan(frame: bytes, now: float) -> tuple[str, Scan] | None:
     """Return the topic and the scan of a frame; None if it is anything else.
 
     A scan of more than 720 beams comes folded; what is ``refused`` has no ranges.
@@ -154,13 +154,13 @@ class OdometryLane:
 
     Args:
         url: The bridge's address.
-        tell: Takes the events.
+        emit: Takes the events.
 
     """
 
-    def __init__(self, url: str, tell: Callable[[Event], None]) -> None:
+    def __init__(self, url: str, emit: Callable[[Event], None]) -> None:
         self._url = url
-        self._tell = tell
+        self._emit = emit
         self._pings: dict[int, float] = {}
         """When each ping that is not answered yet went out."""
         self._sent_after = float("-inf")
@@ -170,8 +170,8 @@ class OdometryLane:
         self.lane = Lane(
             url,
             up=self._open,
-            down=lambda: tell(LinkDown(url, "witness")),
-            text=self._hear,
+            down=lambda: emit(LinkDown(url, "odometry")),
+            text=self._on_message,
             pinged=self._ping,
             pong=self._answer,
         )
@@ -217,7 +217,7 @@ class OdometryLane:
     def _open(self) -> None:
         self._pings.clear()  # what the link before held went with it
         self._sent_after = now()
-        self._tell(LinkUp(self._url, "witness"))
+        self._emit(LinkUp(self._url, "odometry"))
 
     def _ping(self, number: int) -> None:
         self._pings[number] = now()
@@ -226,20 +226,20 @@ class OdometryLane:
         self._sent_after = self._pings[number]
         self._pings = {n: at for n, at in self._pings.items() if n > number}
 
-    def _hear(self, data: bytes) -> None:
+    def _on_message(self, data: bytes) -> None:
         if self._scanners and looks_like_cbor(data):
-            self._hear_scan(data)
+            self._on_scan(data)
             return
-        heard = rosbridge.hear(data)
+        heard = rosbridge.parse(data)
         if heard is None or heard.op != "publish" or heard.topic is None:
             return
         for key in self._watchers.get(heard.topic, ()):
-            self._tell(OdometryReceived(key, heard.twist, self._sent_after))
+            self._emit(OdometryReceived(key, heard.twist, self._sent_after))
 
-    def _hear_scan(self, data: bytes) -> None:
+    def _on_scan(self, data: bytes) -> None:
         # A ping more is granted: the next answer would often have come with the scan.
-        heard = hear_scan(data, min(self._sent_after + BUSY_PING, now()))
+        heard = parse_scan(data, min(self._sent_after + BUSY_PING, now()))
         if heard is not None:
             topic, sweep = heard
             for key in self._scanners.get(topic, ()):
-                self._tell(ScanReceived(key, topic, sweep))
+                self._emit(ScanReceived(key, topic, sweep))

@@ -194,7 +194,7 @@ class Received(msgspec.Struct, frozen=True):
     made of finite numbers. The other numbers are NaN where the message has none."""
 
 
-def hear(data: bytes) -> Received | None:
+def parse(data: bytes) -> Received | None:
     """Return what a message from a bridge says; ``None`` if it makes no sense.
 
     Raises:

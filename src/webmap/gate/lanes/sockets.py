@@ -256,7 +256,7 @@ class Socket(asyncio.Protocol):
                 self._shake_hands()
             else:
                 assert isinstance(event, Frame)
-                self._hear(event)
+                self._on_frame(event)
         if self._protocol.handshake_exc is not None:
             self.abort(f"no WebSocket at this address: {self._protocol.handshake_exc}")
         elif self._protocol.close_expected() and self._transport is not None:
@@ -267,7 +267,7 @@ class Socket(asyncio.Protocol):
         if self._protocol.handshake_exc is None and not self.opened.done():
             self.opened.set_result(None)
 
-    def _hear(self, frame: Frame) -> None:
+    def _on_frame(self, frame: Frame) -> None:
         if frame.opcode is Opcode.PONG:
             self.ears.pong(bytes(frame.data))
         elif frame.opcode in (Opcode.TEXT, Opcode.BINARY, Opcode.CONT):

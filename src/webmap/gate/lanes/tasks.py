@@ -110,7 +110,7 @@ class Calls:
         """Call a service and return why that failed, ``None`` if it did not."""
         outcomes: asyncio.Queue[str | None] = asyncio.Queue()
 
-        def hear(data: bytes) -> None:
+        def on_text(data: bytes) -> None:
             answer = answer_to(data, id)
             if answer is not None:
                 outcomes.put_nowait(answer.why)
@@ -119,7 +119,7 @@ class Calls:
             reason = readable(f"no answer: connection lost: {why}")
             outcomes.put_nowait(reason)
 
-        ears = SocketHandlers(text=hear, pong=lambda _: None, lost=lost)
+        ears = SocketHandlers(text=on_text, pong=lambda _: None, lost=lost)
         try:
             async with asyncio.timeout(CALL_TIMEOUT):
                 link = await open_socket(self._url, ears, self._budget)
@@ -159,14 +159,14 @@ class TasksLane:
 
     Args:
         url: The bridge's address.
-        tell: Takes the events.
+        emit: Takes the events.
         calls: Calls the services of the bridge.
 
     """
 
-    def __init__(self, url: str, tell: Callable[[Event], None], calls: Calls) -> None:
+    def __init__(self, url: str, emit: Callable[[Event], None], calls: Calls) -> None:
         self._url = url
-        self._tell = tell
+        self._emit = emit
         self._calls = calls
         self._spent: dict[Socket, SendGoal] = {}
         """The sockets of action goals that are under way, the oldest first."""
@@ -175,9 +175,9 @@ class TasksLane:
         self._spending = False
         self.lane = Lane(
             url,
-            up=lambda: tell(LinkUp(url, "tasks")),
+            up=lambda: emit(LinkUp(url, "tasks")),
             down=self._down,
-            text=self._hear,
+            text=self._on_message,
         )
 
     def attach(self, topics: Iterable[Topic]) -> None:
@@ -259,21 +259,21 @@ class TasksLane:
         polite = FeedbackThrottle()
 
         # A socket is taken out once: of one that was closed or lost nothing is heard.
-        def hear(data: bytes) -> None:
+        def on_text(data: bytes) -> None:
             word = navigation.of_action(data, goal)
             if isinstance(word, GoalEnded):
                 del self._spent[link]
                 link.close()
             if word is not None and polite(word):
-                self._tell(word)
+                self._emit(word)
 
         def lost(why: str) -> None:
             del self._spent[link]
-            self._tell(GoalLost(goal.robot, goal.id, f"connection lost: {why}"))
+            self._emit(GoalLost(goal.robot, goal.id, f"connection lost: {why}"))
 
         self._spending = True
         link = self.lane.spend(
-            SocketHandlers(text=hear, pong=lambda _: None, lost=lost)
+            SocketHandlers(text=on_text, pong=lambda _: None, lost=lost)
         )
         self._spending = False
         self._spent[link] = goal
@@ -282,7 +282,7 @@ class TasksLane:
             del self._spent[oldest]
             oldest.close()
             why = f"more than {MAX_SPENT} goals are under way at {self._url}"
-            self._tell(GoalLost(given_up.robot, given_up.id, why))
+            self._emit(GoalLost(given_up.robot, given_up.id, why))
 
     # move_base.
 
@@ -303,21 +303,21 @@ class TasksLane:
                 topic = f"{found[0].action}/{part}"
                 self.lane.release_hold(f"webmap-gate follow {topic} {robot}")
 
-    def _hear(self, data: bytes) -> None:
+    def _on_message(self, data: bytes) -> None:
         for robot, (spec, goal) in list(self._followed.items()):
             word = navigation.of_topics(data, spec, goal)
             if isinstance(word, GoalEnded):
                 self.forget(robot)
             if word is not None:
-                self._tell(word)
+                self._emit(word)
 
     def _down(self) -> None:
-        self._tell(LinkDown(self._url, "tasks", self._spending))
+        self._emit(LinkDown(self._url, "tasks", self._spending))
         if self._spending:
             return  # the socket goes on for the goal that it was spent on
         for _, goal in list(self._followed.values()):
             why = f"no connection to {self._url}"
-            self._tell(GoalLost(goal.robot, goal.id, why))
+            self._emit(GoalLost(goal.robot, goal.id, why))
 
 
 class FeedbackThrottle:
