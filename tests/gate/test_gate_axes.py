@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
-from webmap.gate import events, protocol
+from webmap.gate import commands, events, protocol
 from webmap.gate.events import Scan
 from webmap.gate.limits import Axes, Speed, fit, ramp
 from webmap.gate.protocol import PROGRAM, AssistSpec
@@ -25,13 +25,15 @@ limit = st.floats(0.0, 10.0)
 
 def begin(*specs, **changes):
     bench = Bench().begin(*specs or (spec(**{**FLYING, "holonomic": True, **changes}),))
-    bench.tell(protocol.ProgramTake(7, "r1"))
+    bench.tell(protocol.FromProgram(commands.Take("r1"), 7))
     return bench
 
 
 def twist(bench, wanted):
     epoch = bench.report().epoch or 0
-    command = protocol.ProgramTwist("r1", epoch, bench.tick, wanted.numbers)
+    command = protocol.FromProgram(
+        commands.SetVelocity("r1", epoch, bench.tick, wanted.numbers)
+    )
     bench.tell(command)
 
 

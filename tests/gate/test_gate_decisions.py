@@ -7,7 +7,7 @@ import pytest
 from gate_harness import KEY, URL, ZERO, Bench, spec
 
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, protocol
+from webmap.gate import actions, commands, events, protocol
 from webmap.gate.events import Key
 from webmap.gate.protocol import PROGRAM
 
@@ -265,7 +265,11 @@ class TestFreshness:
         old = driving.report().epoch - 1
         driving.drive("b", x=0.5, **stale)
         driving.drive("a", x=0.5, epoch=old, **stale)
-        driving.tell(protocol.ProgramTwist("r1", old + 1, 1, (0.0, 0.0, 0.0)))
+        driving.tell(
+            protocol.FromProgram(
+                commands.SetVelocity("r1", old + 1, 1, (0.0, 0.0, 0.0))
+            )
+        )
         assert driving.since(self.at) == []
         assert driving.state == "driving"
 
@@ -365,7 +369,7 @@ class TestGarbage:
         bench.tell(protocol.Connect(PROGRAM, "x", "viewer"))
         bench.tell(protocol.Disconnect(PROGRAM))
         bench.tell(protocol.Disconnect("nobody"))
-        bench.tell(protocol.ProgramTake(1, "r1"))
+        bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
         assert bench.state == "held"
 
 
@@ -416,15 +420,15 @@ class TestStop:
 
     def test_python_can_do_it(self, bench):
         bench.drive_off()
-        bench.tell(protocol.Stop(None))
+        bench.tell(protocol.FromProgram(commands.Stop(None)))
         assert bench.written[-1].twist == ZERO
-        bench.tell(protocol.Reset("r1", bench.stop_of()))
+        bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
         bench.drive_off()
         assert bench.written[-1].twist != ZERO
-        bench.tell(protocol.Stop("r1"))
+        bench.tell(protocol.FromProgram(commands.Stop("r1")))
         assert bench.written[-1].twist == ZERO
-        bench.tell(protocol.Stop("r9"))
-        bench.tell(protocol.Reset("r1", bench.stop_of()))
+        bench.tell(protocol.FromProgram(commands.Stop("r9")))
+        bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
         assert bench.state == "stopping"
 
     def test_without_a_link_it_is_the_first_thing_sent_when_there_is_one(self, bench):

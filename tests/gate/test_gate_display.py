@@ -11,7 +11,7 @@ from gate_robot import eventually
 
 from webmap.base.errors import ConfigError, MotionError, NoLease
 from webmap.base.geometry import Twist
-from webmap.gate import protocol
+from webmap.gate import commands, protocol
 from webmap.gate.display import supervisor
 from webmap.gate.display.client import GateClient
 from webmap.gate.display.program import ProgramCommands
@@ -106,7 +106,7 @@ class TestQuickProgram:
         return road
 
     def speeds(self):
-        return [told.velocity[0] for told in self.told]
+        return [told.command.velocity[0] for told in self.told]
 
     def test_is_heard_every_10_ms(self, road):
         for _ in range(1000):
@@ -140,25 +140,31 @@ class TestQuickProgram:
 class TestProgram:
     def test_a_lease_is_asked_for_and_given(self, client, gate):
         future = client.take("r1")
-        (asked,) = gate.of(protocol.ProgramTake)
+        (asked,) = gate.of(protocol.FromProgram)
         gate.say(protocol.TakeReply(asked.request, "r1", 3, None))
         assert future.result(1) == 3
         client.twist("r1", Twist(0.5))
-        assert gate.told[-1] == protocol.ProgramTwist("r1", 3, 7, Twist(0.5).numbers)
+        assert gate.told[-1] == protocol.FromProgram(
+            commands.SetVelocity("r1", 3, 7, Twist(0.5).numbers)
+        )
         client.move("r1", 1.0, 2.0, 0.5)
-        assert gate.told[-1] == protocol.ProgramMove("r1", 3, 7, (1.0, 2.0, 0.5))
+        assert gate.told[-1] == protocol.FromProgram(
+            commands.Goal("r1", 3, 0, 7, 1.0, 2.0, 0.5)
+        )
         client.locate("r1", 1.0, 2.0, 0.5)
-        assert gate.told[-1] == protocol.ProgramLocate("r1", 3, 7, (1.0, 2.0, 0.5))
+        assert gate.told[-1] == protocol.FromProgram(
+            commands.Locate("r1", 3, 0, 7, 1.0, 2.0, 0.5)
+        )
         client.cancel("r1")
-        assert gate.told[-1] == protocol.ProgramCancel("r1")
+        assert gate.told[-1] == protocol.FromProgram(commands.Cancel("r1"))
         client.release("r1")
-        assert gate.told[-1] == protocol.ProgramRelease("r1")
+        assert gate.told[-1] == protocol.FromProgram(commands.Release("r1"))
         with pytest.raises(NoLease):
             client.twist("r1", Twist(0.5))
 
     def test_a_lease_is_asked_for_and_refused(self, client, gate):
         future = client.take("r1")
-        (asked,) = gate.of(protocol.ProgramTake)
+        (asked,) = gate.of(protocol.FromProgram)
         gate.say(protocol.TakeReply(asked.request, "r1", None, "Ann has control"))
         gate.say(protocol.TakeReply(99, "r1", None, "nobody asked"))
         with pytest.raises(NoLease, match="Ann has control"):
@@ -316,7 +322,8 @@ class TestLife:
         assert [one.id for one in second.of(protocol.RobotSpec)] == ["r1"]
         assert second.of(protocol.Connect)
         assert second.of(protocol.Speeds)
-        assert second.of(protocol.Stop) == [protocol.Stop("r1")]
+        stops = second.of(protocol.FromProgram)
+        assert stops == [protocol.FromProgram(commands.Stop("r1"))]
         gate.say(protocol.Ready(1))  # it is dead, and counts no more
         assert not client.ready
 
@@ -325,7 +332,7 @@ class TestLife:
     ):
         client.stop_robot("r1")
         client.reset("r1", "s1")
-        assert gate.told[-1] == protocol.Reset("r1", "s1")
+        assert gate.told[-1] == protocol.FromProgram(commands.Reset("r1", "s1"))
         assert list(client._pending_stops) == [(None, "r1")]
 
     def test_the_nodes_of_other_programs_are_told(self, client, gate):

@@ -6,7 +6,7 @@ from gate_harness import URL, ZERO, Bench, spec
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, protocol
+from webmap.gate import actions, commands, events, protocol
 from webmap.gate.rules.goals import ELSEWHERE, IN_VAIN
 from webmap.gate.rules.goals import MOVE_BASE as MOVE_BASE_TYPE
 from webmap.gate.specs import checked
@@ -666,13 +666,14 @@ class TestWhereItIs:
         assert len(self.locate(bench)) == 1
 
     def test_a_program_with_the_lease_tells_it_too(self, bench):
-        told = protocol.ProgramLocate("r1", 0, bench.tick, (1.0, 2.0, 0.5))
-        bench.tell(told)
+        told = commands.Locate("r1", 0, 0, bench.tick, 1.0, 2.0, 0.5)
+        bench.tell(protocol.FromProgram(told))
         assert bench.did(actions.SendPose) == []
-        bench.tell(protocol.ProgramTake(1, "r1"))
+        bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
         bench.run(0.1)
         epoch = bench.report().epoch
-        bench.tell(msgspec.structs.replace(told, epoch=epoch, tick=bench.tick))
+        told = msgspec.structs.replace(told, epoch=epoch, tick=bench.tick)
+        bench.tell(protocol.FromProgram(told))
         assert len(bench.did(actions.SendPose)) == 1
 
     @pytest.mark.parametrize(

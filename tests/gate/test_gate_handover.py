@@ -4,7 +4,7 @@ import pytest
 from gate_harness import KEY, ZERO, Bench, spec
 
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, protocol
+from webmap.gate import actions, commands, events, protocol
 
 
 @pytest.fixture
@@ -218,7 +218,7 @@ class TestChanging:
         )
         ask(bench, "c")
         assert "control goes to B" in bench.refusals("c")[-1].why
-        bench.tell(protocol.ProgramTake(1, "r1"))
+        bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
         assert bench.of(protocol.TakeReply)[-1].epoch is None
 
     @pytest.mark.parametrize("going", ["release", "lost"])

@@ -36,7 +36,7 @@ from hypothesis.stateful import (
 from machine_bench import PacedBench
 
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, protocol
+from webmap.gate import actions, commands, events, protocol
 from webmap.gate.events import Press
 from webmap.gate.protocol import PROGRAM
 from webmap.gate.rules.connections import Epochs, Ticks
@@ -308,7 +308,7 @@ class Motion(RuleBasedStateMachine):
     @rule()
     def program_takes(self):
         self.request += 1
-        self.bench.tell(protocol.ProgramTake(self.request, "r1"))
+        self.bench.tell(protocol.FromProgram(commands.Take("r1"), self.request))
 
     @rule(vx=st.sampled_from([0.0, 0.4, 2.0]), old=st.sampled_from([0, 0, 8]))
     def program_twists(self, vx, old):
@@ -318,7 +318,11 @@ class Motion(RuleBasedStateMachine):
         age = bench.gate._ticks.age(tick, bench.now)
         valid = held and age is not None and age <= 0.3
         self.sent.append(Sent(bench.now, PROGRAM, epoch, vx == 0, valid))
-        bench.tell(protocol.ProgramTwist("r1", epoch, tick, (vx, 0.0, 0.0)))
+        bench.tell(
+            protocol.FromProgram(
+                commands.SetVelocity("r1", epoch, tick, (vx, 0.0, 0.0))
+            )
+        )
 
     @rule(v_max=st.sampled_from([0.4, 1.0]))
     def declared_anew(self, v_max):

@@ -6,7 +6,7 @@ import pytest
 from gate_harness import ZERO, Bench, spec
 
 from webmap.base.geometry import Twist
-from webmap.gate import actions, protocol
+from webmap.gate import actions, commands, protocol
 from webmap.gate.protocol import PROGRAM
 
 
@@ -16,14 +16,14 @@ def bench():
 
 
 def take(bench):
-    bench.tell(protocol.ProgramTake(7, "r1"))
+    bench.tell(protocol.FromProgram(commands.Take("r1"), 7))
     return bench.of(protocol.TakeReply)[-1]
 
 
 def twist(bench, *velocity, epoch=None, tick=None):
     epoch = bench.report().epoch or 0 if epoch is None else epoch
     tick = bench.tick if tick is None else tick
-    bench.tell(protocol.ProgramTwist("r1", epoch, tick, velocity))
+    bench.tell(protocol.FromProgram(commands.SetVelocity("r1", epoch, tick, velocity)))
 
 
 def test_a_program_takes_and_is_answered(bench):
@@ -92,7 +92,9 @@ def test_what_is_not_right_is_refused(bench, bad):
 
 def test_without_a_lease_nothing_moves(bench):
     twist(bench, 0.5, 0.0, 0.0)
-    bench.tell(protocol.ProgramMove("r1", 0, bench.tick, (1.0, 2.0, 0.0)))
+    bench.tell(
+        protocol.FromProgram(commands.Goal("r1", 0, 0, bench.tick, 1.0, 2.0, 0.0))
+    )
     assert bench.written == []
     assert not bench.did(actions.SendGoal)
 
@@ -146,7 +148,7 @@ class TestTheAnswerToATake:
     def ask(self, bench):
         bench.answering = False
         bench.run(0.4)
-        bench.tell(protocol.ProgramTake(7, "r1"))
+        bench.tell(protocol.FromProgram(commands.Take("r1"), 7))
         assert not bench.of(protocol.TakeReply)
 
     def test_comes_once_the_robot_would_move(self, bench):
@@ -157,7 +159,7 @@ class TestTheAnswerToATake:
 
     def test_comes_in_any_case_after_a_while(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
-        bench.tell(protocol.ProgramTake(7, "r1"))
+        bench.tell(protocol.FromProgram(commands.Take("r1"), 7))
         bench.run(1.4)
         assert not bench.of(protocol.TakeReply)
         bench.run(0.2)
@@ -177,24 +179,30 @@ class TestTheAnswerToATake:
 def test_it_gives_the_lease_back(bench):
     take(bench)
     twist(bench, 0.5, 0.0, 0.0)
-    bench.tell(protocol.ProgramRelease("r1"))
+    bench.tell(protocol.FromProgram(commands.Release("r1")))
     assert bench.written[-1].twist == ZERO
     assert bench.report().holder is None
-    bench.tell(protocol.ProgramRelease("r1"))
-    bench.tell(protocol.ProgramRelease("r9"))
+    bench.tell(protocol.FromProgram(commands.Release("r1")))
+    bench.tell(protocol.FromProgram(commands.Release("r9")))
 
 
 def test_it_sends_goals_and_cancels_them(bench):
     epoch = take(bench).epoch
-    bench.tell(protocol.ProgramMove("r1", epoch, bench.tick, (1.0, 2.0, 0.5)))
+    bench.tell(
+        protocol.FromProgram(commands.Goal("r1", epoch, 0, bench.tick, 1.0, 2.0, 0.5))
+    )
     assert bench.of(protocol.SentGoal) == [
         protocol.SentGoal("r1", 1.0, 2.0, 0.5, PROGRAM)
     ]
-    bench.tell(protocol.ProgramMove("r1", epoch, bench.tick, (math.nan, 2.0, 0.5)))
+    bench.tell(
+        protocol.FromProgram(
+            commands.Goal("r1", epoch, 0, bench.tick, math.nan, 2.0, 0.5)
+        )
+    )
     assert len(bench.did(actions.SendGoal)) == 1
-    bench.tell(protocol.ProgramCancel("r1"))
+    bench.tell(protocol.FromProgram(commands.Cancel("r1")))
     assert len(bench.did(actions.CancelGoals)) == 1
-    bench.tell(protocol.ProgramCancel("r9"))
+    bench.tell(protocol.FromProgram(commands.Cancel("r9")))
 
 
 def test_its_own_twist_of_zero_is_a_release(bench):

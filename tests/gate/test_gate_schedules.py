@@ -11,7 +11,7 @@ from gate_harness import KEY, spec
 from machine_bench import PacedBench
 
 from webmap.base.geometry import Twist
-from webmap.gate import events, protocol
+from webmap.gate import commands, events, protocol
 from webmap.gate.events import Press
 
 PEOPLE = ("a", "b")
@@ -91,9 +91,13 @@ def speeds(bench, chance):
 
 
 def program(bench, chance):
-    bench.tell(protocol.ProgramTake(chance.randrange(1000), "r1"))
+    bench.tell(protocol.FromProgram(commands.Take("r1"), chance.randrange(1000)))
     epoch = bench.report().epoch or 0
-    bench.tell(protocol.ProgramTwist("r1", epoch, bench.tick, (0.4, 0.0, 0.0)))
+    bench.tell(
+        protocol.FromProgram(
+            commands.SetVelocity("r1", epoch, bench.tick, (0.4, 0.0, 0.0))
+        )
+    )
 
 
 def declare(bench, chance):

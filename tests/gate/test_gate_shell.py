@@ -8,7 +8,7 @@ import pytest
 from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
-from webmap.gate import actions, events, protocol, shell
+from webmap.gate import actions, commands, events, protocol, shell
 from webmap.gate.disk import UNKNOWN, Disk, Records, path_of
 from webmap.gate.events import Key, Press
 from webmap.gate.lanes.control import ControlLane
@@ -316,7 +316,9 @@ async def test_a_state_file_that_cannot_be_read_is_a_stop_that_stands(tmp_path, 
         await gate.reported(lambda r: r.latched, "the STOP")
         assert gate.report().stop.by == UNKNOWN
         assert "cannot be read" in caplog.text
-        gate.shell.deliver(protocol.Reset("r1", gate.report().stop.id))
+        gate.shell.deliver(
+            protocol.FromProgram(commands.Reset("r1", gate.report().stop.id))
+        )
         await gate.reported(lambda r: r.armable, "a robot to be had")
         await until(lambda: not path.exists(), "no file")
         assert not any(speeds(bridge))
@@ -330,7 +332,9 @@ async def test_a_stop_of_another_gate_is_seen_and_one_of_its_own_is_kept(tmp_pat
         await gate.reported(lambda r: r.latched and r.stop.by == "Ben", "the STOP")
         await until(lambda: speeds(bridge)[-1] == 0.0, "the zero")
         gate.x = None
-        gate.shell.deliver(protocol.Reset("r1", gate.report().stop.id))
+        gate.shell.deliver(
+            protocol.FromProgram(commands.Reset("r1", gate.report().stop.id))
+        )
         await gate.reported(lambda r: not r.latched, "the reset")
         await until(lambda: Records(tmp_path).latch_of(key) is None, "no file")
         gate.say(op="stop", robot="r1")

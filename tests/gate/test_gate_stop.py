@@ -7,7 +7,7 @@ from gate_harness import KEY, URL, ZERO, Bench, spec
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
-from webmap.gate import actions, events, protocol
+from webmap.gate import actions, commands, events, protocol
 from webmap.gate.events import Key, Press
 from webmap.gate.protocol import PROGRAM
 from webmap.gate.specs import checked
@@ -61,7 +61,7 @@ class TestLatch:
         assert bench.take("a") is None
         bench.run(5.0)
         assert bench.take("b") is None
-        bench.tell(protocol.ProgramTake(1, "r1"))
+        bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
         assert bench.of(protocol.TakeReply)[-1].epoch is None
         assert bench.report().latched
 
@@ -71,8 +71,14 @@ class TestLatch:
         at = bench.now
         bench.run(1.0, lambda: bench.drive(x=1.0, epoch=epoch))
         bench.goal(epoch=epoch)
-        bench.tell(protocol.ProgramTwist("r1", epoch, bench.tick, (1.0, 0, 0)))
-        bench.tell(protocol.ProgramMove("r1", epoch, bench.tick, (1.0, 0, 0)))
+        bench.tell(
+            protocol.FromProgram(
+                commands.SetVelocity("r1", epoch, bench.tick, (1.0, 0, 0))
+            )
+        )
+        bench.tell(
+            protocol.FromProgram(commands.Goal("r1", epoch, 0, bench.tick, 1.0, 0, 0))
+        )
         assert bench.moving_since(at) == []
         assert bench.did(actions.SendGoal) == []
 
@@ -175,11 +181,11 @@ class TestLatch:
         assert bench.refusals("b") == []
 
     def test_python_stops_and_resets(self, bench):
-        bench.tell(protocol.Stop("r1"))
+        bench.tell(protocol.FromProgram(commands.Stop("r1")))
         assert bench.report().stop.by == PROGRAM
-        bench.tell(protocol.Reset("r1", bench.stop_of()))
+        bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
         assert not bench.report().latched
-        bench.tell(protocol.Reset("r1", bench.stop_of()))
+        bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
         assert bench.refusals(PROGRAM)[-1].what == "reset"
 
     def test_a_robot_that_is_declared_anew_is_still_stopped(self, bench):
@@ -689,10 +695,10 @@ class TestResetNamesAStop:
         assert bench.report().latched
 
     def test_of_a_python_program_likewise(self, bench):
-        bench.tell(protocol.Stop("r1"))
+        bench.tell(protocol.FromProgram(commands.Stop("r1")))
         seen = bench.stop_of()
         stop(bench)
-        bench.tell(protocol.Reset("r1", seen))
+        bench.tell(protocol.FromProgram(commands.Reset("r1", seen)))
         assert bench.report().latched
         assert "B pressed STOP" in bench.refusals(PROGRAM)[-1].why
 

@@ -3,7 +3,7 @@
 import pytest
 from gate_harness import Bench, spec
 
-from webmap.gate import protocol
+from webmap.gate import commands, protocol
 from webmap.gate.rules import authority
 
 UNUSED = 15.0
@@ -93,6 +93,6 @@ def test_who_asks_for_it_gets_it_as_ever(bench):
 
 def test_a_programs_lease_stays_as_any_person_may_take_it():
     bench = Bench().begin()
-    bench.tell(protocol.ProgramTake(1, "r1"))
+    bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
     bench.run(2 * UNUSED)
     assert held(bench)

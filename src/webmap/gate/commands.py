@@ -49,11 +49,11 @@ import math
 import re
 import reprlib
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NoReturn, TypeVar
 
+import msgspec
+
 from webmap.base.errors import MotionError
-from webmap.gate.events import MAX_ID
 
 
 class Refusal(MotionError):
@@ -81,6 +81,9 @@ MAX_INTEGER = 2**53 - 1
 MAX_COORDINATE = 1e6
 """The farthest goal, in metres from the frame's origin along an axis."""
 
+MAX_ID = 64
+"""The longest identity of a press of STOP, in characters."""
+
 MAX_NAME = 64
 """The longest name of a robot, in characters."""
 
@@ -91,30 +94,31 @@ second of each metre per second is less than any base does, and no input that is
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Take:
+Velocity = tuple[float, float, float, float, float, float]
+"""Forward, left, counter-clockwise, upward, about the forward and about the left axis:
+metres and radians per second in the robot's own frame."""
+
+
+class Take(msgspec.Struct, frozen=True, tag_field="op", tag="take"):
     """The page asks for the lease of a robot."""
 
     robot: str
 
 
-@dataclass(frozen=True, slots=True)
-class Release:
+class Release(msgspec.Struct, frozen=True, tag_field="op", tag="release"):
     """The page gives the lease back."""
 
     robot: str
 
 
-@dataclass(frozen=True, slots=True)
-class Renew:
+class Renew(msgspec.Struct, frozen=True, tag_field="op", tag="renew"):
     """The page needs its lease still, though it does nothing with it now."""
 
     robot: str
     epoch: int
 
 
-@dataclass(frozen=True, slots=True)
-class Drive:
+class Drive(msgspec.Struct, frozen=True, tag_field="op", tag="drive"):
     """How the page's inputs stand now."""
 
     robot: str
@@ -135,8 +139,16 @@ class Drive:
         return all(abs(axis) < RELEASED for axis in (self.x, self.y, self.turn))
 
 
-@dataclass(frozen=True, slots=True)
-class Goal:
+class SetVelocity(msgspec.Struct, frozen=True, tag_field="op", tag="drive"):
+    """A velocity of a program, which ends with the dead-man timeout."""
+
+    robot: str
+    epoch: int
+    tick: int
+    velocity: Velocity
+
+
+class Goal(msgspec.Struct, frozen=True, tag_field="op", tag="goal"):
     """Where the page sends a robot: metres and radians in its goal frame."""
 
     robot: str
@@ -148,8 +160,7 @@ class Goal:
     yaw: float
 
 
-@dataclass(frozen=True, slots=True)
-class Locate:
+class Locate(msgspec.Struct, frozen=True, tag_field="op", tag="locate"):
     """Where the robot is, as somebody sees it: metres and radians in its goal frame."""
 
     robot: str
@@ -161,57 +172,50 @@ class Locate:
     yaw: float
 
 
-@dataclass(frozen=True, slots=True)
-class Cancel:
+class Cancel(msgspec.Struct, frozen=True, tag_field="op", tag="cancel"):
     """The robot should give up its goals."""
 
     robot: str
 
 
-@dataclass(frozen=True, slots=True)
-class Stop:
+class Stop(msgspec.Struct, frozen=True, tag_field="op", tag="stop"):
     """The robot, or every robot (``None``), should stop at once."""
 
     robot: str | None
 
 
-@dataclass(frozen=True, slots=True)
-class Reset:
+class Reset(msgspec.Struct, frozen=True, tag_field="op", tag="reset"):
     """The STOP of the robot that has this identity should stand no longer."""
 
     robot: str
     stop: str
 
 
-@dataclass(frozen=True, slots=True)
-class Ask:
+class Ask(msgspec.Struct, frozen=True, tag_field="op", tag="ask"):
     """The page asks the holder of the lease for it."""
 
     robot: str
 
 
-@dataclass(frozen=True, slots=True)
-class Grant:
+class Grant(msgspec.Struct, frozen=True, tag_field="op", tag="grant"):
     """The holder gives the lease to who asks."""
 
     robot: str
 
 
-@dataclass(frozen=True, slots=True)
-class Deny:
+class Deny(msgspec.Struct, frozen=True, tag_field="op", tag="deny"):
     """The holder keeps the lease."""
 
     robot: str
 
 
-@dataclass(frozen=True, slots=True)
-class StopTest:
+class StopTest(msgspec.Struct, frozen=True, tag_field="op", tag="stop-test"):
     """The page asks to measure whether the base stops by itself."""
 
     robot: str
 
 
-Command = (
+PageCommand = (
     Take
     | Release
     | Renew
@@ -227,11 +231,15 @@ Command = (
     | StopTest
 )
 
+ProgramCommand = Take | Release | SetVelocity | Goal | Locate | Cancel | Stop | Reset
+
+Command = PageCommand | ProgramCommand
+
 
 P = TypeVar("P", Goal, Locate)
 
 
-def parse(data: bytes) -> Command:
+def parse(data: bytes) -> PageCommand:
     """Return the command that ``data`` says.
 
     Raises:
@@ -252,9 +260,7 @@ def parse(data: bytes) -> Command:
 
 def op_of(command: Command) -> str:
     """Return the ``op`` of a command."""
-    if isinstance(command, StopTest):
-        return "stop-test"
-    return type(command).__name__.lower()
+    return str(command.__struct_config__.tag)
 
 
 def _object(data: bytes) -> dict[str, Any]:
@@ -363,7 +369,7 @@ def _one_or_all(fields: _Fields) -> str | None:
     return None if robot == "*" else robot
 
 
-_READERS: dict[str, Callable[[_Fields], Command]] = {
+_READERS: dict[str, Callable[[_Fields], PageCommand]] = {
     "take": lambda fields: Take(fields.robot()),
     "release": lambda fields: Release(fields.robot()),
     "renew": lambda fields: Renew(fields.robot(), fields.whole("epoch")),

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from webmap.gate.actions import SaveStop, SaveStopTest
+from webmap.gate.commands import MAX_ID
 from webmap.gate.events import (
-    MAX_ID,
     Event,
     Key,
     LockState,

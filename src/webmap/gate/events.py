@@ -19,10 +19,6 @@ class Key(NamedTuple):
     topic: str
 
 
-MAX_ID = 64
-"""The longest identity of a press, in characters."""
-
-
 class Press(NamedTuple):
     """One press of STOP. Every press has an identity that no other one has."""
 

@@ -9,13 +9,12 @@ from typing import Literal
 
 import msgspec
 
+from webmap.gate.commands import ProgramCommand, Velocity
+
 PROGRAM = "program"
 """The connection of the display's own Python code."""
 
 Role = Literal["viewer", "operator", "admin"]
-Velocity = tuple[float, float, float, float, float, float]
-"""Forward, left and counter-clockwise; then upward, and about the forward and the left
-axis, which are 0 for a robot that moves in the plane."""
 
 GoalMethod = Literal["topic", "navigate_to_pose", "move_base"]
 """How goals are sent: as PoseStamped on a topic, by the action of ROS 2, or by that of
@@ -161,20 +160,6 @@ class Heartbeat(msgspec.Struct, frozen=True, tag="beat"):
     """The display lives; sent every 50 ms."""
 
 
-class Stop(msgspec.Struct, frozen=True, tag="stop"):
-    """STOP from Python, for one robot or (``None``) for all."""
-
-    robot: str | None = None
-
-
-class Reset(msgspec.Struct, frozen=True, tag="reset"):
-    """From Python: the STOP of a robot that has this identity stands no longer."""
-
-    robot: str
-    stop: str
-    """As :class:`StopReport` tells it."""
-
-
 class WriterNodes(msgspec.Struct, frozen=True, tag="writer-nodes"):
     """Which nodes besides the bridge publish to a robot's velocity topic."""
 
@@ -182,50 +167,12 @@ class WriterNodes(msgspec.Struct, frozen=True, tag="writer-nodes"):
     nodes: tuple[str, ...]
 
 
-class ProgramTake(msgspec.Struct, frozen=True, tag="program-take"):
-    """Python asks for the lease; answered by :class:`TakeReply`."""
+class FromProgram(msgspec.Struct, frozen=True, tag="program"):
+    """A command of the display's Python code; its ``seq`` is not checked."""
 
-    request: int
-    robot: str
-
-
-class ProgramRelease(msgspec.Struct, frozen=True, tag="program-release"):
-    """Python gives the lease back."""
-
-    robot: str
-
-
-class ProgramTwist(msgspec.Struct, frozen=True, tag="program-twist"):
-    """One velocity from Python; it holds until the dead-man and is never repeated."""
-
-    robot: str
-    epoch: int
-    tick: int
-    velocity: Velocity
-
-
-class ProgramMove(msgspec.Struct, frozen=True, tag="program-move"):
-    """One goal from Python: metres and radians in the robot's ``goal_frame``."""
-
-    robot: str
-    epoch: int
-    tick: int
-    pose: tuple[float, float, float]
-
-
-class ProgramLocate(msgspec.Struct, frozen=True, tag="program-locate"):
-    """From Python: where the robot is, in metres and radians in its goal frame."""
-
-    robot: str
-    epoch: int
-    tick: int
-    pose: tuple[float, float, float]
-
-
-class ProgramCancel(msgspec.Struct, frozen=True, tag="program-cancel"):
-    """Python cancels the robot's goals; needs no lease."""
-
-    robot: str
+    command: ProgramCommand
+    request: int = 0
+    """Number of a ``Take``, which :class:`TakeReply` answers."""
 
 
 ToGate = (
@@ -236,15 +183,8 @@ ToGate = (
     | FromPage
     | Speeds
     | Heartbeat
-    | Stop
-    | Reset
     | WriterNodes
-    | ProgramTake
-    | ProgramRelease
-    | ProgramTwist
-    | ProgramMove
-    | ProgramLocate
-    | ProgramCancel
+    | FromProgram
 )
 
 
@@ -457,7 +397,7 @@ class CloseConnection(msgspec.Struct, frozen=True, tag="close"):
 
 
 class TakeReply(msgspec.Struct, frozen=True, tag="take-reply"):
-    """The answer to :class:`ProgramTake`."""
+    """The answer to :class:`FromProgram` with a ``Take``."""
 
     request: int
     robot: str

@@ -24,7 +24,7 @@ from webmap.gate.commands import Refusal, begins_like_stop, robot_in
 from webmap.gate.display.pages import DriveConnection, Pages
 from webmap.gate.display.program import ProgramCommands
 from webmap.gate.display.supervisor import Supervisor
-from webmap.gate.protocol import FromGate, Report, RobotSpec, Role
+from webmap.gate.protocol import FromGate, FromProgram, Report, RobotSpec, Role
 from webmap.gate.specs import checked
 
 HEEDED = 2.0
@@ -215,7 +215,7 @@ class GateClient:
         """STOP a robot or, with ``None``, all of them."""
         with self._lock:
             self._keep_stop(None, robot_id)
-            self.send(protocol.Stop(robot_id))
+            self.send(FromProgram(commands.Stop(robot_id)))
 
     def reset(self, robot_id: str, stop: str) -> None:
         """End the STOP of a robot that has this identity; moves nothing.
@@ -227,7 +227,7 @@ class GateClient:
 
         """
         if self.ready:
-            self.send(protocol.Reset(robot_id, stop))
+            self.send(FromProgram(commands.Reset(robot_id, stop)))
         else:
             log.error("the gate is not running: the reset is lost")
 
@@ -266,7 +266,7 @@ class GateClient:
 
     def _stop_again(self, by: str | None, robot: str | None) -> protocol.ToGate:
         if by is None or not self._pages.knows(by):
-            return protocol.Stop(robot)
+            return FromProgram(commands.Stop(robot))
         text = json.dumps({"op": "stop", "robot": robot or "*"})
         return protocol.FromPage(by, text.encode())
 

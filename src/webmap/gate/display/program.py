@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 from webmap.base.errors import MotionError, NoLease
 from webmap.base.geometry import Twist
-from webmap.gate import protocol
-from webmap.gate.protocol import PROGRAM
+from webmap.gate import commands, protocol
+from webmap.gate.protocol import PROGRAM, FromProgram
 
 LEAST_PAUSE = 0.01
 """The least time between two velocities for one robot, in seconds; a program that gives
@@ -39,7 +39,7 @@ class ProgramCommands:
         self._numbers = itertools.count(1)
         self._takes: dict[int, concurrent.futures.Future[int]] = {}
         self._epochs: dict[str, int] = {}
-        self._passed_on: dict[str, tuple[float, protocol.Velocity]] = {}
+        self._passed_on: dict[str, tuple[float, commands.Velocity]] = {}
         """By robot, the last velocity that the gate was told, and when."""
         self._tick: int | None = None
 
@@ -65,14 +65,14 @@ class ProgramCommands:
                 return future
             request = next(self._numbers)
             self._takes[request] = future
-            self._send(protocol.ProgramTake(request, robot_id))
+            self._send(FromProgram(commands.Take(robot_id), request))
         return future
 
     def release(self, robot_id: str) -> None:
         """Give the program's lease back; the robot is stopped if it is driven."""
         with self._lock:
             self._epochs.pop(robot_id, None)
-            self._send(protocol.ProgramRelease(robot_id))
+            self._send(FromProgram(commands.Release(robot_id)))
 
     def twist(self, robot_id: str, twist: Twist) -> None:
         """Send one velocity; without another within 200 ms the robot is stopped.
@@ -96,7 +96,8 @@ class ProgramCommands:
             if now - at < LEAST_PAUSE and (any(velocity) or not any(last)):
                 return
             self._passed_on[robot_id] = (now, velocity)
-            self._send(protocol.ProgramTwist(robot_id, epoch, tick, velocity))
+            command = commands.SetVelocity(robot_id, epoch, tick, velocity)
+            self._send(FromProgram(command))
 
     def move(self, robot_id: str, x: float, y: float, yaw: float) -> None:
         """Send a goal: metres and radians in the robot's ``goal_frame``.
@@ -109,7 +110,7 @@ class ProgramCommands:
         pose = _finite(x, y, yaw)
         with self._lock:
             epoch, tick = self._licence(robot_id)
-            self._send(protocol.ProgramMove(robot_id, epoch, tick, pose))
+            self._send(FromProgram(commands.Goal(robot_id, epoch, 0, tick, *pose)))
 
     def locate(self, robot_id: str, x: float, y: float, yaw: float) -> None:
         """Tell where a robot is: metres and radians in its ``goal_frame``.
@@ -122,11 +123,11 @@ class ProgramCommands:
         pose = _finite(x, y, yaw)
         with self._lock:
             epoch, tick = self._licence(robot_id)
-            self._send(protocol.ProgramLocate(robot_id, epoch, tick, pose))
+            self._send(FromProgram(commands.Locate(robot_id, epoch, 0, tick, *pose)))
 
     def cancel(self, robot_id: str) -> None:
         """Cancel the robot's goals; needs no lease."""
-        self._send(protocol.ProgramCancel(robot_id))
+        self._send(FromProgram(commands.Cancel(robot_id)))
 
     def _licence(self, robot_id: str) -> tuple[int, int]:
         epoch = self._epochs.get(robot_id)

@@ -2,11 +2,8 @@
 
 import logging
 import math
-from collections.abc import Callable
-from typing import Any
 
 from webmap.base.geometry import Twist
-from webmap.gate import protocol
 from webmap.gate.actions import Emit, SendToDisplay
 from webmap.gate.commands import (
     Ask,
@@ -20,11 +17,13 @@ from webmap.gate.commands import (
     Release,
     Renew,
     Reset,
+    SetVelocity,
     Stop,
     StopTest,
     Take,
+    op_of,
 )
-from webmap.gate.protocol import PROGRAM
+from webmap.gate.protocol import PROGRAM, FromProgram, TakeReply
 from webmap.gate.rules.connections import (
     Connection,
     Connections,
@@ -39,19 +38,30 @@ from webmap.gate.rules.stop import new_press
 
 log = logging.getLogger("webmap.gate")
 
+SETTLE = 1.5
+"""Seconds for which a program waits at most until a robot that it took would move."""
+
 
 class CommandHandler:
     """Does what is ordered, or refuses it whole.
 
     Args:
-        fleet: The machines.
+        machines: The machines.
+        connections: Who may send commands; they are told what is refused.
         ticks: The ticks that commands echo.
+        emit: Called with each action.
 
     """
 
-    def __init__(self, fleet: Machines, ticks: Ticks) -> None:
-        self._machines = fleet
+    def __init__(
+        self, machines: Machines, connections: Connections, ticks: Ticks, emit: Emit
+    ) -> None:
+        self._machines = machines
+        self._connections = connections
         self._ticks = ticks
+        self._emit = emit
+        self._takes: list[tuple[int, str, int, float]] = []
+        """Request, robot, epoch, and until when the reply may wait."""
 
     def handle(self, connection: Connection, command: Command, now: float) -> None:
         """Do what a page commands.
@@ -68,14 +78,14 @@ class CommandHandler:
                 self.reset(robot, stop, connection, now)
             case Drive():
                 self._drive(connection, command, now)
+            case SetVelocity():
+                self._set_velocity(connection, command, now)
             case Goal(robot):
                 base, _ = self._licensed(connection, command, now)
-                pose = (command.x, command.y, command.yaw)
-                base.driving.goal(robot, pose, connection.id, now)
+                base.driving.goal(robot, _pose(command), connection.id, now)
             case Locate(robot):
                 base, _ = self._licensed(connection, command, now)
-                pose = (command.x, command.y, command.yaw)
-                base.driving.locate(robot, pose, connection.id, now)
+                base.driving.locate(robot, _pose(command), connection.id, now)
             case Take(robot):
                 self.take(connection, robot, now)
             case Release(robot):
@@ -194,9 +204,10 @@ class CommandHandler:
         base, age = self.checked(
             connection, command.robot, command.epoch, command.tick, now
         )
-        if command.seq <= connection.acked:
-            raise Refusal("seq is not larger than the previous seq")
-        connection.acked = command.seq
+        if not connection.program:
+            if command.seq <= connection.acked:
+                raise Refusal("seq is not larger than the previous seq")
+            connection.acked = command.seq
         return base, age
 
     def _drive(self, connection: Connection, drive: Drive, now: float) -> None:
@@ -213,161 +224,69 @@ class CommandHandler:
         if reason := base.driving.drive(wanted, drive.neutral, drive.tick, now):
             raise Refusal(reason)
 
-
-Vector = tuple[float, float, float]
-
-SETTLE = 1.5
-"""Seconds for which a program waits at most until a robot that it took would move."""
-
-
-class ProgramCommandHandler:
-    """Takes what the program says.
-
-    Args:
-        fleet: The machines.
-        people: Everybody who may say something, the program among them.
-        orders: Does what is ordered.
-        emit: Takes the actions.
-
-    """
-
-    def __init__(
-        self, fleet: Machines, people: Connections, orders: CommandHandler, emit: Emit
+    def _set_velocity(
+        self, connection: Connection, command: SetVelocity, now: float
     ) -> None:
-        self._machines = fleet
-        self._connections = people
-        self._commands = orders
-        self._emit = emit
-        self._takes: list[tuple[protocol.ProgramTake, int, float]] = []
-        self.handlers: dict[type, Callable[[Any, float], None]] = {
-            protocol.Stop: self._stop,
-            protocol.Reset: self._reset,
-            protocol.ProgramTake: self._take,
-            protocol.ProgramRelease: self._release,
-            protocol.ProgramTwist: self._twist,
-            protocol.ProgramMove: self._move,
-            protocol.ProgramLocate: self._locate,
-            protocol.ProgramCancel: self._cancel,
-        }
+        base, age = self.checked(
+            connection, command.robot, command.epoch, command.tick, now
+        )
+        base.speeds.ages.add(age, now)
+        wanted = Twist(*command.velocity)
+        if not wanted.is_finite:
+            raise Refusal(f"expected finite numbers, got {command.velocity}")
+        if reason := base.robots.axes.refusal(wanted):
+            raise Refusal(reason)
+        if reason := base.driving.drive(wanted, wanted.is_zero, command.tick, now):
+            raise Refusal(reason)
 
-    def _stop(self, message: protocol.Stop, now: float) -> None:
-        program, robot = self._connections.program, message.robot
+    # Programs.
+
+    def handle_program(self, message: FromProgram, now: float) -> None:
+        """Carry out a command of the program, which is told if it is refused."""
+        program, command = self._connections.program, message.command
+        if isinstance(command, Take):
+            self._take_for_program(message.request, command.robot, now)
+            return
         self._connections.run_or_refuse(
             program.id,
-            robot,
-            "stop",
-            lambda: self._commands.stop(robot, program, now),
+            command.robot,
+            op_of(command),
+            lambda: self.handle(program, command, now),
             now,
         )
 
-    def _reset(self, message: protocol.Reset, now: float) -> None:
-        program, robot = self._connections.program, message.robot
-        self._connections.run_or_refuse(
-            program.id,
-            robot,
-            "reset",
-            lambda: self._commands.reset(robot, message.stop, program, now),
-            now,
-        )
-
-    def _take(self, message: protocol.ProgramTake, now: float) -> None:
+    def _take_for_program(self, request: int, robot: str, now: float) -> None:
         try:
-            epoch = self._commands.take(self._connections.program, message.robot, now)
+            epoch = self.take(self._connections.program, robot, now)
         except Refusal as refusal:
-            self._reply(message, None, refusal.why)
+            self._emit(SendToDisplay(TakeReply(request, robot, None, refusal.why)))
         else:
-            assert epoch is not None  # a program never waits for another to let go
-            self._takes.append((message, epoch, now + SETTLE))
+            assert epoch is not None  # a program never waits for a handover
+            self._takes.append((request, robot, epoch, now + SETTLE))
             self.reply_to_takes(now)
 
     def reply_to_takes(self, now: float) -> None:
-        """Answer the program once its robot would move, not before.
+        """Reply to the program once its robot would move, not before.
 
-        A page waits for its hands to be seen; a program that drives at once would
-        lose its first words to a link that has not been asked yet whether it lives.
+        A page waits until its inputs were seen released. A program that drives at once
+        would lose its first commands to a link that has not answered a ping yet.
         """
         waiting, self._takes = self._takes, []
-        for take, epoch, until in waiting:
+        for request, robot, epoch, until in waiting:
             try:
-                base = self._machines.find(take.robot)
+                base = self._machines.find(robot)
                 check_lease(base.authority.lease, PROGRAM, epoch)
             except Refusal as refusal:
-                self._reply(take, None, refusal.why)
+                self._emit(SendToDisplay(TakeReply(request, robot, None, refusal.why)))
                 continue
             if now < until and base.robots.drivable and base.conditions.doubt(now):
-                self._takes.append((take, epoch, until))
+                self._takes.append((request, robot, epoch, until))
             else:
-                self._reply(take, epoch, None)
-
-    def _reply(
-        self, take: protocol.ProgramTake, epoch: int | None, why: str | None
-    ) -> None:
-        self._emit(
-            SendToDisplay(protocol.TakeReply(take.request, take.robot, epoch, why))
-        )
-
-    def _release(self, message: protocol.ProgramRelease, now: float) -> None:
-        program, robot = self._connections.program, message.robot
-        self._connections.run_or_refuse(
-            program.id,
-            robot,
-            "release",
-            lambda: self._commands.release(program, robot, now),
-            now,
-        )
-
-    def _twist(self, message: protocol.ProgramTwist, now: float) -> None:
-        program, robot = self._connections.program, message.robot
-
-        def drive() -> None:
-            base, age = self._commands.checked(
-                program, robot, message.epoch, message.tick, now
-            )
-            base.speeds.ages.add(age, now)
-            twist = Twist(*message.velocity)
-            if not twist.is_finite:
-                raise Refusal(f"expected finite numbers, got {message.velocity}")
-            if reason := base.robots.axes.refusal(twist):
-                raise Refusal(reason)
-            if reason := base.driving.drive(twist, twist.is_zero, message.tick, now):
-                raise Refusal(reason)
-
-        self._connections.run_or_refuse(program.id, robot, "drive", drive, now)
-
-    def _move(self, message: protocol.ProgramMove, now: float) -> None:
-        program, robot = self._connections.program, message.robot
-
-        def move() -> None:
-            base, _ = self._commands.checked(
-                program, robot, message.epoch, message.tick, now
-            )
-            base.driving.goal(robot, _finite(message.pose), program.id, now)
-
-        self._connections.run_or_refuse(program.id, robot, "goal", move, now)
-
-    def _locate(self, message: protocol.ProgramLocate, now: float) -> None:
-        program, robot = self._connections.program, message.robot
-
-        def locate() -> None:
-            base, _ = self._commands.checked(
-                program, robot, message.epoch, message.tick, now
-            )
-            base.driving.locate(robot, _finite(message.pose), program.id, now)
-
-        self._connections.run_or_refuse(program.id, robot, "locate", locate, now)
-
-    def _cancel(self, message: protocol.ProgramCancel, now: float) -> None:
-        program, robot = self._connections.program, message.robot
-        self._connections.run_or_refuse(
-            program.id,
-            robot,
-            "cancel",
-            lambda: self._commands.cancel(program, robot, now),
-            now,
-        )
+                self._emit(SendToDisplay(TakeReply(request, robot, epoch, None)))
 
 
-def _finite(numbers: Vector) -> Vector:
-    if not all(map(math.isfinite, numbers)):
-        raise Refusal(f"expected finite numbers, got {numbers}")
-    return numbers
+def _pose(command: Goal | Locate) -> tuple[float, float, float]:
+    pose = (command.x, command.y, command.yaw)
+    if not all(map(math.isfinite, pose)):
+        raise Refusal(f"expected finite numbers, got {pose}")
+    return pose

@@ -16,7 +16,7 @@ from webmap.gate import events, protocol
 from webmap.gate.actions import Action, SendToDisplay
 from webmap.gate.commands import Refusal, Stop, begins_like_stop, op_of, parse, robot_in
 from webmap.gate.protocol import PROGRAM
-from webmap.gate.rules.command_handling import CommandHandler, ProgramCommandHandler
+from webmap.gate.rules.command_handling import CommandHandler
 from webmap.gate.rules.connections import Connection, Connections, Epochs, Ticks
 from webmap.gate.rules.health import DisplayPulse
 from webmap.gate.rules.machines import Machines
@@ -47,16 +47,15 @@ class Gate:
             self._connections.refuse,
         )
         self._display_there = False
-        self._commands = CommandHandler(self._machines, self._ticks)
-        self._program = ProgramCommandHandler(
-            self._machines, self._connections, self._commands, self._out.append
+        self._commands = CommandHandler(
+            self._machines, self._connections, self._ticks, self._out.append
         )
         self._handlers: dict[type, Callable[[Any, float], None]] = {
             **self._machines.handlers,
-            **self._program.handlers,
             protocol.Connect: self._connect,
             protocol.Disconnect: self._disconnect,
-            protocol.FromPage: self._from_browser,
+            protocol.FromPage: self._from_page,
+            protocol.FromProgram: self._commands.handle_program,
             protocol.Speeds: self._speeds,
             protocol.Heartbeat: self._beat,
             events.Shutdown: self._shut_down,
@@ -73,7 +72,7 @@ class Gate:
             self._display_there = False
             self._goals_lost(now)
         self._machines.step(now)
-        self._program.reply_to_takes(now)
+        self._commands.reply_to_takes(now)
         self._connections.count(now)
         tick = self._ticks.issue(now)
         if tick is not None:
@@ -138,7 +137,7 @@ class Gate:
             if base.authority.is_held_by(connection.id):
                 base.authority.set_cap(connection.cap)
 
-    def _from_browser(self, message: protocol.FromPage, now: float) -> None:
+    def _from_page(self, message: protocol.FromPage, now: float) -> None:
         connection = self._connections.find(message.connection)
         if connection is None or connection.program:
             return

@@ -5,6 +5,7 @@ from typing import Literal
 import msgspec
 
 from webmap.base.geometry import Twist
+from webmap.gate.commands import Velocity
 from webmap.gate.protocol import (
     Activity,
     AskerReport,
@@ -13,7 +14,6 @@ from webmap.gate.protocol import (
     RobotSpec,
     StopReport,
     TestReport,
-    Velocity,
 )
 from webmap.gate.rules.health import LinkHealth, moves
 from webmap.gate.rules.machine import Machine
