@@ -20,7 +20,7 @@ class StopHooks:
         key: The machine.
         spec: The robot.
         link: The link that hooks go to.
-        emit: Takes the actions.
+        emit: Called with each action.
 
     """
 
@@ -105,7 +105,7 @@ class Aliases:
 
     Args:
         key: The machine.
-        emit: Takes the actions.
+        emit: Called with each action.
 
     """
 

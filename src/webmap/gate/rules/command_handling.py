@@ -227,7 +227,7 @@ class ProgramCommandHandler:
         fleet: The machines.
         people: Everybody who may say something, the program among them.
         orders: Does what is ordered.
-        emit: Takes the actions.
+        emit: Called with each action.
 
     """
 

@@ -263,7 +263,7 @@ class Connections:
     """The connections that there are, and what they are told.
 
     Args:
-        emit: Takes the actions.
+        emit: Called with each action.
 
     """
 

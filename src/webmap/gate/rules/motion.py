@@ -186,7 +186,7 @@ class Motion:
         control: The link that they go to.
         bounds: Gives the bounds that hold now.
         guard: Gives what its scanners leave of a velocity that is about to be written.
-        emit: Takes the actions.
+        emit: Called with each action.
 
     """
 
