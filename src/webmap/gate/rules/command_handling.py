@@ -1,4 +1,4 @@
-"""Carries out the commands of pages and of the display's own program. No I/O."""
+"""Executes the commands of pages and of the program. No I/O."""
 
 import logging
 import math
@@ -41,7 +41,7 @@ log = logging.getLogger("webmap.gate")
 
 
 class CommandHandler:
-    """Does what is ordered, or refuses it whole.
+    """Executes a command completely, or refuses it.
 
     Args:
         fleet: The machines.
@@ -54,15 +54,15 @@ class CommandHandler:
         self._ticks = ticks
 
     def handle(self, connection: Connection, command: Command, now: float) -> None:
-        """Do what a page commands.
+        """Execute the command of a page.
 
         Raises:
-            Refusal: If that is not done.
+            Refusal: If the command is not executed.
 
         """
         match command:
             case Stop(robot):
-                # Before any check: a stop is always allowed.
+                # No check comes first: STOP is always allowed.
                 self.stop(robot, connection, now)
             case Reset(robot, stop):
                 self.reset(robot, stop, connection, now)
@@ -97,27 +97,27 @@ class CommandHandler:
                 self.cancel(connection, command.robot, now)
 
     def cancel(self, connection: Connection, robot: str, now: float) -> None:
-        """Call off a robot's goals; that needs no lease."""
+        """Cancel a robot's goals; this needs no lease."""
         check_role(connection.role)
         why = f"by {connection.name or connection.id}"
         self._machines.find(robot).robots.goals[robot].cancel(now, why)
 
     def stop(self, robot: str | None, by: Connection, now: float) -> None:
-        """STOP a robot or, with ``None``, all."""
+        """STOP a robot or, with ``None``, all robots."""
         press = new_press(by.name or by.id)
         for base in self._machines if robot is None else [self._machines.find(robot)]:
             base.stop(press, now)
 
     def stop_malformed(self, robot: str | None, by: Connection, now: float) -> str:
-        """STOP what a malformed STOP names, or all if that is not known.
+        """STOP the robot that a malformed STOP names, or all if that is unknown.
 
         Args:
-            robot: The robot that it names, if that could be read.
-            by: Who sent it.
-            now: The time.
+            robot: The robot's name, if the message has a readable one.
+            by: The connection that sent the message.
+            now: Seconds, monotonic.
 
         Returns:
-            What is stopped, in words.
+            What is stopped, as text for people.
 
         """
         try:
@@ -128,12 +128,12 @@ class CommandHandler:
         return "all robots are stopped" if robot is None else f"{robot!r} is stopped"
 
     def reset(self, robot: str, stop: str, by: Connection, now: float) -> None:
-        """End the STOP of a robot that has this identity."""
+        """End the STOP with the identity ``stop`` of a robot."""
         check_role(by.role)
         self._machines.reset(self._machines.find(robot), stop, now)
 
     def take(self, connection: Connection, robot: str, now: float) -> int | None:
-        """Give somebody the lease; ``None`` if it comes when the machine stands."""
+        """Give the lease and return its epoch; ``None`` if a standstill comes first."""
         base = self._machines.find(robot)
         if base.authority.is_held_by(connection.id):
             return base.authority.lease.epoch  # type: ignore[union-attr]
@@ -148,7 +148,7 @@ class CommandHandler:
         return base.authority.give(connection, now)
 
     def release(self, connection: Connection, robot: str, now: float) -> None:
-        """Have somebody let go of a robot."""
+        """Release a connection's control of a robot."""
         self._machines.find(robot).authority.release(connection.id, now)
 
     def _ask(self, connection: Connection, robot: str, now: float) -> None:
@@ -174,18 +174,19 @@ class CommandHandler:
     def checked(
         self, connection: Connection, robot: str, epoch: int, tick: int, now: float
     ) -> tuple[Machine, float]:
-        """Return the machine if this connection may move it by this command.
+        """Return the machine and the age of the command's tick in seconds.
 
-        Besides it, the age of the command's loop in seconds.
+        Raises:
+            Refusal: If the connection may not move the machine with this command.
+
         """
         base = self._machines.find(robot)
         check_lease(base.authority.lease, connection.id, epoch)
         try:
             return base, self._ticks.check(tick, now)
         except Refusal:
-            base.driving.late(
-                now
-            )  # after the lease was checked: no stranger's word stops it
+            # Only the holder's commands stop the machine: the lease was checked first.
+            base.driving.late(now)
             raise
 
     def _licensed(
@@ -205,7 +206,7 @@ class CommandHandler:
         if drive.clamped and not connection.flagged:
             connection.flagged = True
             log.warning("connection %s asks for more than full speed", connection.id)
-        # What the page showed when it spoke has aged on the way here.
+        # The picture of the page has aged since the page sent the command.
         seen = None if drive.video is None else drive.video + age
         base.conditions.video.observe(seen, now)
         speed = base.speeds.speed
@@ -217,16 +218,16 @@ class CommandHandler:
 Vector = tuple[float, float, float]
 
 SETTLE = 1.5
-"""Seconds for which a program waits at most until a robot that it took would move."""
+"""Seconds for which a program that took control waits at most until it can drive."""
 
 
 class ProgramCommandHandler:
-    """Takes what the program says.
+    """Executes the messages of the program.
 
     Args:
         fleet: The machines.
-        people: Everybody who may say something, the program among them.
-        orders: Does what is ordered.
+        people: All connections, with that of the program.
+        orders: Executes the commands that pages and the program share.
         emit: Called with each action.
 
     """
@@ -276,15 +277,15 @@ class ProgramCommandHandler:
         except Refusal as refusal:
             self._reply(message, None, refusal.why)
         else:
-            assert epoch is not None  # a program never waits for another to let go
+            assert epoch is not None  # a program never waits for another holder
             self._takes.append((message, epoch, now + SETTLE))
             self.reply_to_takes(now)
 
     def reply_to_takes(self, now: float) -> None:
-        """Answer the program once its robot would move, not before.
+        """Answer a program when its robot can be driven, or after ``SETTLE`` seconds.
 
-        A page waits for its hands to be seen; a program that drives at once would
-        lose its first words to a link that has not been asked yet whether it lives.
+        A page waits until its inputs were neutral. A program may drive at once, and
+        would lose its first commands to a link that was not yet pinged.
         """
         waiting, self._takes = self._takes, []
         for take, epoch, until in waiting:

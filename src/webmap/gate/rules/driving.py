@@ -116,7 +116,7 @@ class Driving:
 
         Args:
             robot: The robot.
-            pose: x and y in metres, yaw in radians.
+            pose: x, y and yaw in the robot's goal frame, in metres and radians.
             by: The connection that sends the goal.
             now: Seconds, monotonic.
 
@@ -137,7 +137,7 @@ class Driving:
 
         Args:
             robot: The robot.
-            pose: x and y in metres, yaw in radians.
+            pose: x, y and yaw in the robot's goal frame, in metres and radians.
             by: The connection that sends the pose.
             now: Seconds, monotonic.
 

@@ -1,11 +1,8 @@
 """All decisions of the gate: events in, actions out. No I/O, and no clock of its own.
 
-The age is measured between two moments of one clock, this process's own; no clock of
-a browser or a robot has a part in it.
-
-The shell calls :meth:`Gate.handle` for whatever happens and :meth:`Gate.step` every
-10 ms, and does what they return, in that order. What came of a write it tells with a
-further event before it does anything else.
+The shell calls :meth:`Gate.handle` for each event and :meth:`Gate.step` every 10 ms,
+and executes the returned actions in order. It reports the result of a write as another
+event before it does anything else.
 """
 
 import logging
@@ -25,11 +22,11 @@ log = logging.getLogger("webmap.gate")
 
 
 class Gate:
-    """Decides over every machine of one display.
+    """The rules for all machines of one display.
 
     Args:
-        ticks: The ticks to issue.
-        epochs: The epochs to give to leases.
+        ticks: Issues the ticks.
+        epochs: Gives the epochs of leases.
 
     """
 
@@ -63,12 +60,12 @@ class Gate:
         }
 
     def handle(self, event: protocol.ToGate | events.Event, now: float) -> list[Action]:
-        """Take in one event and return what is to be done, in order."""
+        """Process one event; return the actions to execute, in order."""
         self._handlers[type(event)](event, now)
         return self._actions(now)
 
     def step(self, now: float) -> list[Action]:
-        """Let time pass and return what is to be done, in order."""
+        """Do what is due at ``now``; return the actions to execute, in order."""
         if self._display_there and self._display_pulse.doubt(now):
             self._display_there = False
             self._goals_lost(now)
@@ -82,7 +79,7 @@ class Gate:
 
     @property
     def busy(self) -> bool:
-        """Whether time may make a difference to some machine."""
+        """Whether :meth:`step` has anything to do for any machine."""
         return self._machines.busy
 
     @property
@@ -111,7 +108,7 @@ class Gate:
         self._goals_lost(now)
 
     def _goals_lost(self, now: float) -> None:
-        """Nobody is left who could look after a goal."""
+        """Cancel goals where the robot asks for it: no display supervises them."""
         for base in self._machines:
             for goals in base.robots.goals.values():
                 goals.lost(now)
@@ -164,7 +161,7 @@ class Gate:
         self, connection: Connection, text: bytes, why: str, now: float
     ) -> None:
         what = "command"
-        if begins_like_stop(text):  # before it is counted: STOP is served first (S10)
+        if begins_like_stop(text):  # before the rate limit: STOP comes first (S10)
             stopped = self._commands.stop_malformed(robot_in(text), connection, now)
             what, why = "stop", f"this STOP is not valid ({why}): {stopped}"
         self._connections.refuse(connection.id, None, what, why, now)

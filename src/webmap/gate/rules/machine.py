@@ -173,7 +173,7 @@ class Machine:
             self.robots.drop(robot)
 
     def lost(self, connection: str, now: float) -> None:
-        """Release the control of a page that is gone, and end its goals."""
+        """Release the control of a page that is gone; its goals may be cancelled."""
         self.authority.release(connection, now)
         for goals in self.robots.goals.values():
             goals.lost(now, connection)
