@@ -1,4 +1,4 @@
-"""Control of one machine: who has it, and how it changes. No I/O.
+"""Control of one machine: its holder, and how the holder changes. No I/O.
 
 ::
 
@@ -38,7 +38,7 @@ class MotionConditions:
         latch: The machine's STOP.
         control: The link that carries velocities.
         pulse: Whether the display is alive.
-        sight: What the bridge reports of the machine.
+        sight: The newest odometry and echo of the machine.
 
     """
 

@@ -80,7 +80,7 @@ class Driving:
     def late(self, now: float) -> None:
         """Write zero, because a command of the holder was too old (S1).
 
-        Its content does not matter: with such a delay nobody can drive safely.
+        Its content does not matter: the delay is too long for safe driving.
         """
         self._lapse("the commands of the page are too old", now)
 

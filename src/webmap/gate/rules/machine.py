@@ -108,7 +108,7 @@ class Machine:
 
     @property
     def state(self) -> State:
-        """What the gate does with the machine; see the diagram of the module."""
+        """The state of the machine for the gate; see the diagram of the module."""
         if self.latch.acknowledged:
             return "stopped"
         if self.motion.driving:
@@ -234,7 +234,7 @@ class Machine:
         self._update_watch(now)
         self._drop_leaving(now)
 
-    # What the shell reports of the machine.
+    # Events of the shell.
 
     def on_goal_written(self, write: GoalWritten) -> None:
         """Note that a goal was written: from now on the robot may move by itself."""
@@ -300,7 +300,7 @@ class Machine:
         """Send an owed zero first, then an active STOP: the control link is open."""
         if not self.control.up:
             return
-        # The topic may still carry what an earlier gate, or an earlier link, wrote.
+        # Velocities of an earlier gate or an earlier link may still arrive as echoes.
         self.other_writer.expect(now + EXPECTED_FOR)
         if self.motion.owes_zero:
             self.obedience.expect(now)  # also when an earlier gate wrote the motion
