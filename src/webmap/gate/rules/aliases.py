@@ -170,8 +170,8 @@ class Aliases:
     @property
     def hook_failures(self) -> tuple[str, ...]:
         """The failed stop hooks of all robots, and why each failed."""
-        said = [words for hooks in self.hooks.values() for words in hooks.failures]
-        return tuple(dict.fromkeys(said))
+        failures = [text for hooks in self.hooks.values() for text in hooks.failures]
+        return tuple(dict.fromkeys(failures))
 
     def holds_without(self, robot: str) -> bool:
         """Return whether a remaining robot declares the same for the machine."""
@@ -200,11 +200,11 @@ class Aliases:
         else:
             goals.cancel_unless_reachable(spec, now)
             goals.spec, goals.link = spec, tasks
-        said = self.hooks.get(spec.id)
-        if said is None or said.spec.stop_hooks != spec.stop_hooks:
+        earlier = self.hooks.get(spec.id)
+        if earlier is None or earlier.spec.stop_hooks != spec.stop_hooks:
             self.hooks[spec.id] = StopHooks(self._key, spec, hooks, self._emit)
         else:  # keep an owed reset and an expected answer
-            said.spec, said.link = spec, hooks
+            earlier.spec, earlier.link = spec, hooks
 
     def drop(self, robot: str) -> None:
         """Remove a robot."""

@@ -38,7 +38,7 @@ class MotionConditions:
         latch: The machine's STOP.
         control: The link that carries velocities.
         pulse: Whether the display is alive.
-        sight: The newest odometry and echo of the machine.
+        observation: The newest odometry and echo of the machine.
 
     """
 
@@ -49,7 +49,7 @@ class MotionConditions:
         latch: StopLatch,
         control: LinkHealth,
         pulse: DisplayPulse,
-        sight: Observation,
+        observation: Observation,
     ) -> None:
         self.lock = LockState(key, held=False)
         """Whether this gate alone on this computer has the machine."""
@@ -59,7 +59,7 @@ class MotionConditions:
         self._latch = latch
         self._control = control
         self._display_pulse = pulse
-        self._observation = sight
+        self._observation = observation
 
     @property
     def stopped(self) -> bool:
@@ -94,10 +94,10 @@ class MotionConditions:
         return self.video.doubt(now)
 
 
-ASKING = 10.0
+REQUEST_TIMEOUT = 10.0
 """Seconds without an answer of the holder after which a request is granted."""
 
-WITHOUT_SIGHT = 1.0
+ASSUMED_STANDSTILL = 1.0
 """Seconds after a zero when standstill is assumed if there is no odometry."""
 
 
@@ -134,7 +134,7 @@ class Handover:
 
     def left(self, now: float) -> float:
         """Return the seconds until the request is granted without an answer."""
-        return max(0.0, self._asked_at + ASKING - now)
+        return max(0.0, self._asked_at + REQUEST_TIMEOUT - now)
 
     def begin(self, successor: Connection, now: float) -> None:
         """Begin to wait for standstill; zero was written at ``now``."""
@@ -148,12 +148,12 @@ class Handover:
     def is_still(self, now: float) -> bool:
         """Return whether the machine has stopped, by odometry or by time.
 
-        Without odometry for ``WITHOUT_SIGHT`` seconds after the zero, time decides.
+        Without odometry for ``ASSUMED_STANDSTILL`` seconds, time decides.
         """
         if self._still.reached:
             return True
-        heard = max(self.since, self._still.heard_at)
-        return now - heard >= WITHOUT_SIGHT
+        last = max(self.since, self._still.heard_at)
+        return now - last >= ASSUMED_STANDSTILL
 
     def end(self) -> Connection | None:
         """End the request or the change; return the connection that gets nothing."""
@@ -257,9 +257,9 @@ class Authority:
             now: Seconds, monotonic.
 
         """
-        disappointed = self.handover.end()
-        if disappointed is not None:
-            self._robots.refuse(disappointed.id, "ask", why or "the robot is gone")
+        waiting = self.handover.end()
+        if waiting is not None:
+            self._robots.refuse(waiting.id, "ask", why or "the robot is gone")
         self._end(why, now)
 
     def _end(self, why: str | None, now: float) -> None:

@@ -44,13 +44,13 @@ class CommandHandler:
     """Executes a command completely, or refuses it.
 
     Args:
-        fleet: The machines.
+        machines: The machines.
         ticks: The ticks that commands echo.
 
     """
 
-    def __init__(self, fleet: Machines, ticks: Ticks) -> None:
-        self._machines = fleet
+    def __init__(self, machines: Machines, ticks: Ticks) -> None:
+        self._machines = machines
         self._ticks = ticks
 
     def handle(self, connection: Connection, command: Command, now: float) -> None:
@@ -69,11 +69,11 @@ class CommandHandler:
             case Drive():
                 self._drive(connection, command, now)
             case Goal(robot):
-                base, _ = self._licensed(connection, command, now)
+                base, _ = self._authorized(connection, command, now)
                 pose = (command.x, command.y, command.yaw)
                 base.driving.goal(robot, pose, connection.id, now)
             case Locate(robot):
-                base, _ = self._licensed(connection, command, now)
+                base, _ = self._authorized(connection, command, now)
                 pose = (command.x, command.y, command.yaw)
                 base.driving.locate(robot, pose, connection.id, now)
             case Take(robot):
@@ -164,7 +164,7 @@ class CommandHandler:
             raise Refusal("only the operator who has control can answer")
         asker = base.authority.handover.asker
         if asker is None:
-            raise Refusal("nobody requests control")
+            raise Refusal("no operator requests control")
         if isinstance(answer, Grant):
             base.authority.hand_over(asker, now)
         else:
@@ -189,7 +189,7 @@ class CommandHandler:
             base.driving.late(now)
             raise
 
-    def _licensed(
+    def _authorized(
         self, connection: Connection, command: Drive | Goal | Locate, now: float
     ) -> tuple[Machine, float]:
         base, age = self.checked(
@@ -201,7 +201,7 @@ class CommandHandler:
         return base, age
 
     def _drive(self, connection: Connection, drive: Drive, now: float) -> None:
-        base, age = self._licensed(connection, drive, now)
+        base, age = self._authorized(connection, drive, now)
         base.speeds.ages.add(age, now)
         if drive.clamped and not connection.flagged:
             connection.flagged = True
@@ -225,19 +225,23 @@ class ProgramCommandHandler:
     """Executes the messages of the program.
 
     Args:
-        fleet: The machines.
-        people: All connections, with that of the program.
-        orders: Executes the commands that pages and the program share.
+        machines: The machines.
+        connections: All connections, with that of the program.
+        commands: Executes the commands that pages and the program share.
         emit: Called with each action.
 
     """
 
     def __init__(
-        self, fleet: Machines, people: Connections, orders: CommandHandler, emit: Emit
+        self,
+        machines: Machines,
+        connections: Connections,
+        commands: CommandHandler,
+        emit: Emit,
     ) -> None:
-        self._machines = fleet
-        self._connections = people
-        self._commands = orders
+        self._machines = machines
+        self._connections = connections
+        self._commands = commands
         self._emit = emit
         self._takes: list[tuple[protocol.ProgramTake, int, float]] = []
         self.handlers: dict[type, Callable[[Any, float], None]] = {

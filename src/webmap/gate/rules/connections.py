@@ -138,7 +138,7 @@ def check_lease(lease: Lease | None, connection: str, epoch: int) -> None:
 
     """
     if lease is None:
-        raise Refusal("nobody has control: take control first")
+        raise Refusal("no operator has control: take control first")
     if lease.connection != connection:
         raise Refusal(f"{lease.name or lease.connection} has control")
     if lease.epoch != epoch:
@@ -250,12 +250,12 @@ class Connection:
         self, robot: str | None, what: str, why: str, now: float
     ) -> bool:
         """Return whether this refusal was not sent within the last second."""
-        told = {key: at for key, at in self._sent_at.items() if now - at < QUIET}
-        self._sent_at = told
+        recent = {key: at for key, at in self._sent_at.items() if now - at < QUIET}
+        self._sent_at = recent
         key = (robot, what, why)
-        if key in told:
+        if key in recent:
             return False
-        told[key] = now
+        recent[key] = now
         return True
 
 

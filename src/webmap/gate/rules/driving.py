@@ -56,7 +56,7 @@ class Driving:
             return None if neutral else reason
         self._authority.deadman.accept(neutral, tick, now)
         if self._authority.deadman.expired(now):
-            self._lapse("the page receives no ticks", now)
+            self._disarm_and_halt("the page receives no ticks", now)
             return None if neutral else "the page received no new tick"
         if self._tests.running is not None:
             return self._go_on_with_test(self._tests.running, lease, neutral, now)
@@ -82,7 +82,7 @@ class Driving:
 
         Its content does not matter: the delay is too long for safe driving.
         """
-        self._lapse("the commands of the page are too old", now)
+        self._disarm_and_halt("the commands of the page are too old", now)
 
     def begin_test(self, now: float) -> None:
         """Begin the stop test for the holder.
@@ -101,10 +101,10 @@ class Driving:
         self, test: StopTest, lease: Lease, neutral: bool, now: float
     ) -> str | None:
         if not neutral:
-            self._lapse("a key was pressed", now)
+            self._disarm_and_halt("a key was pressed", now)
             return "a stop test was running: release all inputs first"
         if not self._authority.deadman.armed:
-            self._lapse("the page stopped sending commands", now)
+            self._disarm_and_halt("the page stopped sending commands", now)
         if test.state == "creeping":
             self._drive(CREEP, lease, now)
         return None
@@ -126,7 +126,7 @@ class Driving:
         """
         if reason := self._authority.why_unavailable(now):
             raise Refusal(reason)
-        self._lapse("a goal was sent", now)
+        self._disarm_and_halt("a goal was sent", now)
         self._robots.goals[robot].send(*pose, by, now)
         self._authority.renew(now)
 
@@ -163,16 +163,16 @@ class Driving:
             if reason := self._conditions.doubt(now):
                 self._fault(reason, now)
             elif self._authority.deadman.expired(now):
-                self._lapse("the page stopped sending commands", now)
+                self._disarm_and_halt("the page stopped sending commands", now)
         self._tests.step(now)
 
-    def _lapse(self, why: str, now: float) -> None:
+    def _disarm_and_halt(self, why: str, now: float) -> None:
         self._authority.deadman.disarm()
         self._tests.halt(why, now)
 
     def _fault(self, reason: str, now: float) -> None:
         """Stop and disarm because of a fault; end the lease of a program."""
-        self._lapse(reason, now)
+        self._disarm_and_halt(reason, now)
         lease = self._authority.lease
         if lease is None or not lease.program:
             return

@@ -55,7 +55,7 @@ class Gate:
             protocol.Disconnect: self._disconnect,
             protocol.FromPage: self._from_browser,
             protocol.Speeds: self._speeds,
-            protocol.Heartbeat: self._beat,
+            protocol.Heartbeat: self._heartbeat,
             events.Shutdown: self._shut_down,
         }
 
@@ -68,7 +68,7 @@ class Gate:
         """Do what is due at ``now``; return the actions to execute, in order."""
         if self._display_there and self._display_pulse.doubt(now):
             self._display_there = False
-            self._goals_lost(now)
+            self._end_unsupervised_goals(now)
         self._machines.step(now)
         self._program.reply_to_takes(now)
         self._connections.count(now)
@@ -95,7 +95,7 @@ class Gate:
 
     # The display and its pages.
 
-    def _beat(self, message: protocol.Heartbeat, now: float) -> None:
+    def _heartbeat(self, message: protocol.Heartbeat, now: float) -> None:
         self._display_pulse.beat(now)
         if not self._display_there:
             self._display_there = True
@@ -105,9 +105,9 @@ class Gate:
         self._display_pulse.ended = event.why
         for base in self._machines:
             base.authority.end(event.why, now)
-        self._goals_lost(now)
+        self._end_unsupervised_goals(now)
 
-    def _goals_lost(self, now: float) -> None:
+    def _end_unsupervised_goals(self, now: float) -> None:
         """Cancel goals where the robot asks for it: no display supervises them."""
         for base in self._machines:
             for goals in base.robots.goals.values():
@@ -144,7 +144,7 @@ class Gate:
             if isinstance(command, Stop):
                 self._machines.check_known(command.robot)
         except Refusal as refusal:
-            self._take_garbage(connection, message.text, refusal.why, now)
+            self._refuse_invalid(connection, message.text, refusal.why, now)
         else:
             what = op_of(command)
             self._connections.run_or_refuse(
@@ -157,7 +157,7 @@ class Gate:
         if connection.messages.too_often(now):
             self._connections.close(connection, "too many messages")
 
-    def _take_garbage(
+    def _refuse_invalid(
         self, connection: Connection, text: bytes, why: str, now: float
     ) -> None:
         what = "command"

@@ -64,21 +64,21 @@ class Machines:
             WriterNodes: self._writer_nodes,
             events.LinkUp: self._link_up,
             events.LinkDown: self._link_down,
-            events.PingAnswered: self._alive,
-            events.TwistWritten: self._wrote,
-            events.GoalWritten: self._wrote_goal,
-            events.PoseWritten: self._wrote_pose,
+            events.PingAnswered: self._ping_answered,
+            events.TwistWritten: self._twist_written,
+            events.GoalWritten: self._goal_written,
+            events.PoseWritten: self._pose_written,
             events.GoalProgress: self._goal_progress,
             events.GoalLost: self._goal_lost,
             events.GoalEnded: self._goal_ended,
             events.HookEnded: self._hook_ended,
-            events.EchoReceived: self._echoed,
-            events.OdometryReceived: self._measured,
-            events.ScanReceived: self._scanned,
-            events.LockState: self._locked,
-            events.StopSaved: self._latch_kept,
-            events.StopFileChanged: self._latch_seen,
-            events.StopTestSaved: self._stop_test_kept,
+            events.EchoReceived: self._echo_received,
+            events.OdometryReceived: self._odometry_received,
+            events.ScanReceived: self._scan_received,
+            events.LockState: self._lock_reported,
+            events.StopSaved: self._stop_saved,
+            events.StopFileChanged: self._stop_file_changed,
+            events.StopTestSaved: self._stop_test_saved,
         }
 
     def __iter__(self) -> Iterator[Machine]:
@@ -171,11 +171,11 @@ class Machines:
         reporter = self._reporters.get(spec.id)
         if reporter is None:  # forgotten; it stays only until the machine has stopped
             return
-        news = report(base, spec, now)
-        said = reporter.worth_saying(news, now)
-        if said:
-            self._emit(SendToDisplay(news))
-        elif said is None:
+        latest = report(base, spec, now)
+        due = reporter.worth_saying(latest, now)
+        if due:
+            self._emit(SendToDisplay(latest))
+        elif due is None:
             self._touched.add(base.key)
 
     # Declarations of the display.
@@ -288,10 +288,10 @@ class Machines:
             if not event.spent:
                 base.active_stop.tasks_down(link, now)
 
-    def _alive(self, event: events.PingAnswered, now: float) -> None:
+    def _ping_answered(self, event: events.PingAnswered, now: float) -> None:
         self._link(event.url, "control").answered(event.asked_at, now)
 
-    def _wrote(self, event: events.TwistWritten, now: float) -> None:
+    def _twist_written(self, event: events.TwistWritten, now: float) -> None:
         base = self._of_key(event.key)
         if base is None:
             return
@@ -300,7 +300,7 @@ class Machines:
             why = "a command was dropped: the connection or the gate was held up"
             self._refuse(event.by, base.robots.newest.id, "drive", why, now)
 
-    def _wrote_goal(self, event: events.GoalWritten, now: float) -> None:
+    def _goal_written(self, event: events.GoalWritten, now: float) -> None:
         base = self._by_robot.get(event.robot)
         if base is None:
             return
@@ -313,10 +313,10 @@ class Machines:
             why = "the goal was dropped: the connection or the gate was held up"
             self._refuse(event.by, event.robot, "goal", why, now)
 
-    def _wrote_pose(self, event: events.PoseWritten, now: float) -> None:
+    def _pose_written(self, event: events.PoseWritten, now: float) -> None:
         if event.done:
-            told = SentPose(event.robot, event.x, event.y, event.yaw, event.by)
-            self._emit(SendToDisplay(told))
+            sent = SentPose(event.robot, event.x, event.y, event.yaw, event.by)
+            self._emit(SendToDisplay(sent))
         else:
             why = "the pose was dropped: the connection or the gate was held up"
             self._refuse(event.by, event.robot, "locate", why, now)
@@ -348,34 +348,34 @@ class Machines:
         self._touched.add(base.key)
         return base.robots.goals[robot]
 
-    def _echoed(self, event: events.EchoReceived, now: float) -> None:
+    def _echo_received(self, event: events.EchoReceived, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.on_echo(event.twist, now)
 
-    def _measured(self, event: events.OdometryReceived, now: float) -> None:
+    def _odometry_received(self, event: events.OdometryReceived, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.observe(event.twist, event.sent_after, now)
 
-    def _scanned(self, event: events.ScanReceived, now: float) -> None:
+    def _scan_received(self, event: events.ScanReceived, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None and base.observation.on:
             base.scan_assist.observe(event.topic, event.sweep)
 
-    def _locked(self, event: events.LockState, now: float) -> None:
+    def _lock_reported(self, event: events.LockState, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.locked(event, now)
 
-    def _latch_kept(self, event: events.StopSaved, now: float) -> None:
+    def _stop_saved(self, event: events.StopSaved, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.latch.kept(event)
         else:  # the robot was forgotten in the meantime; its STOP was not
             self._latches[event.key].kept(event)
 
-    def _latch_seen(self, event: events.StopFileChanged, now: float) -> None:
+    def _stop_file_changed(self, event: events.StopFileChanged, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.on_stop_file_changed(event.press, now)
@@ -386,7 +386,7 @@ class Machines:
             self._touched.add(base.key)
             base.other_writer.named(message.nodes)
 
-    def _stop_test_kept(self, event: events.StopTestSaved, now: float) -> None:
+    def _stop_test_saved(self, event: events.StopTestSaved, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.speeds.tested = event.record

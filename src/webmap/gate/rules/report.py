@@ -41,7 +41,7 @@ def report(base: Machine, spec: RobotSpec, now: float) -> RobotReport:
         robot=spec.id,
         name=spec.name,
         state=base.state,
-        doing=_doing(base, spec, now),
+        doing=_activity(base, spec, now),
         latched=base.latch.acknowledged,
         stop=_stop(base),
         holder=holder,
@@ -75,7 +75,7 @@ def report(base: Machine, spec: RobotSpec, now: float) -> RobotReport:
     )
 
 
-def _doing(base: Machine, spec: RobotSpec, now: float) -> Activity:
+def _activity(base: Machine, spec: RobotSpec, now: float) -> Activity:
     """Return the activity of one robot: the first that applies."""
     state, goals = base.state, base.robots.goals[spec.id]
     if state == "stopped":
