@@ -128,7 +128,7 @@ class TestAsking:
         ask(bench, "a")
         assert bench.refusals("a")[-1].why == "you already have control"
         grant(bench)
-        assert bench.refusals("a")[-1].why == "nobody requests control"
+        assert bench.refusals("a")[-1].why == "no operator requests control"
         grant(bench, "b")
         assert (
             bench.refusals("b")[-1].why

@@ -169,7 +169,7 @@ class TestTheAnswerToATake:
         self.ask(bench)
         bench.say("a", op="take", robot="r1")
         bench.run(0.02)
-        assert "nobody has control" in bench.of(protocol.TakeReply)[-1].why
+        assert "no operator has control" in bench.of(protocol.TakeReply)[-1].why
 
     def test_comes_at_once_for_a_robot_that_takes_goals_only(self):
         bench = Bench().begin(spec(twist_topic=None))

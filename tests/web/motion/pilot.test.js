@@ -317,7 +317,7 @@ describe("leases", () => {
     bench.pilot.stopped("r1", bench.now);
     bench.grant("r1", epoch);
     assert.deepEqual(bench.run(500), []);
-    bench.pilot.refuse("r1", "drive", "nobody has control", bench.now);
+    bench.pilot.refuse("r1", "drive", "no operator has control", bench.now);
     assert.equal(bench.pilot.status.refusal, null);
   });
 

@@ -1,4 +1,4 @@
-"""The robots that share one machine, with their stop hooks. No I/O."""
+"""The robots that are declared for one machine, and their stop hooks. No I/O."""
 
 from operator import attrgetter
 
@@ -14,13 +14,13 @@ NO_LINK = "not sent yet: no connection"
 
 
 class StopHooks:
-    """The hooks of one robot: said on STOP and reset, now or when there is a link.
+    """The stop hooks of one robot: sent on STOP and reset, at once or with a new link.
 
     Args:
         key: The machine.
         spec: The robot.
-        link: The link that hooks go to.
-        emit: Takes the actions.
+        link: The link that carries the hooks.
+        emit: Called with each action.
 
     """
 
@@ -30,39 +30,39 @@ class StopHooks:
         self._key = key
         self._emit = emit
         self._stopped = False
-        """What was said last, or is to be said as soon as there is a link."""
+        """Whether the last message is that STOP is active; it may wait for a link."""
         self._number = 0
-        """How often something was said: of an earlier time no answer counts."""
+        """How often the hooks were sent: an answer to an earlier time is ignored."""
         self._owes_reset = False
         self._failed: dict[tuple[str, str], str] = {}
-        """Why what was said last did not arrive, by hook."""
+        """Why the last message did not arrive, by hook."""
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Which hooks the robot does not follow, and why, in words."""
+        """The failed hooks and why each failed, as text for people."""
         what = "stop hook" if self._stopped else "reset of stop hook"
         return tuple(f"{what} {name}: {why}" for (_, name), why in self._failed.items())
 
     def say(self, stopped: bool) -> None:
-        """Tell the robot that STOP stands, or does so no longer."""
+        """Send the robot that STOP is active, or that it was reset."""
         if stopped != self._stopped:
             self._failed.clear()
         self._stopped, self._number = stopped, self._number + 1
         self._owes_reset = not stopped and not self.link.up
         for hook in self.spec.stop_hooks:
-            # A service of type Trigger knows no way back: who has an emergency stop
-            # of its own resets it there.
+            # A service of type Trigger cannot be undone: an emergency stop of the
+            # robot itself is reset at the robot.
             if not stopped and "service" in hook:
                 continue
             if self.link.up:
-                # What failed before is known to have done so until this is answered.
+                # An earlier failure of this hook stays known until the answer.
                 run = RunHook(self._key, self.spec.id, hook, stopped, self._number)
                 self._emit(run)
             else:
                 self._failed[place_of(hook)] = NO_LINK
 
     def ended(self, event: HookEnded) -> None:
-        """Note what became of a hook that was said."""
+        """Note the result of a hook."""
         if event.number != self._number:
             return
         if event.why is None:
@@ -72,12 +72,12 @@ class StopHooks:
             self._owes_reset = not self._stopped
 
     def link_up(self) -> None:
-        """Say that STOP stands no longer, if that could not be said before."""
+        """Send the reset that could not be sent before."""
         if self._owes_reset:
             self.say(stopped=False)
 
     def drop(self) -> None:
-        """Have nothing to say any more: another gate has the machine, and its STOP."""
+        """Send nothing more: another gate has the machine and its STOP."""
         self._number += 1
         self._failed.clear()
 
@@ -97,68 +97,71 @@ _terms = attrgetter(
     "assist",
     "stop_hooks",
 )
-"""What one robot says for the whole machine."""
+"""The part of a robot's declaration that applies to the whole machine."""
 
 
 class Aliases:
-    """Everything that was declared for one machine. No I/O.
+    """All robots that are declared for one machine.
 
     Args:
         key: The machine.
-        emit: Takes the actions.
+        emit: Called with each action.
 
     """
 
     def __init__(self, key: Key, emit: Emit) -> None:
         self.specs: dict[str, RobotSpec] = {}
-        """By the name that the display has for each; the newest is the last."""
+        """By the display's id of each robot; the newest is the last."""
         self.goals: dict[str, Goals] = {}
         self.hooks: dict[str, StopHooks] = {}
         self.leaving: set[str] = set()
-        """Those that were forgotten and are there until the machine has stopped."""
+        """The forgotten robots that stay until the machine has stopped."""
         self._key = key
         self._emit = emit
 
     @property
     def newest(self) -> RobotSpec:
-        """The one that was declared last."""
+        """The robot that was declared last."""
         return next(reversed(self.specs.values()))
 
     @property
     def drivable(self) -> bool:
-        """Whether velocity can be sent to it at all, not goals only."""
+        """Whether the machine has a velocity topic, and not only goals."""
         return self.newest.twist_topic is not None
 
     @property
     def has_odometry(self) -> bool:
-        """Whether its odometry is known."""
+        """Whether a topic of odometry is known."""
         return any(spec.odometry_topic is not None for spec in self.specs.values())
 
     @property
     def holonomic(self) -> bool:
-        """Whether everybody says that it can move sideways."""
+        """Whether every robot is declared to move sideways."""
         return all(spec.holonomic for spec in self.specs.values())
 
     @property
     def axes(self) -> Axes:
-        """The axes out of the plane that it moves along, and how fast at most."""
+        """The axes out of the plane along which it moves, and their speed limits."""
         return axes_of(self.specs.values())
 
     @property
     def a_max(self) -> float | None:
-        """The greatest growth of its speed, in m/s², if one was stated."""
+        """The greatest acceleration in m/s², if one is declared."""
         return min((s.a_max for s in self.specs.values() if s.a_max), default=None)
 
     @property
     def stops_within(self) -> float | None:
-        """The seconds within which everybody says that it stops by itself."""
+        """The seconds until it stops by itself; ``None`` unless every robot has them.
+
+        If they differ, the largest counts.
+        """
         stated = [spec.stops_within for spec in self.specs.values()]
         known = [seconds for seconds in stated if seconds is not None]
         return max(known) if len(known) == len(stated) else None
 
     @property
     def follow_goals(self) -> bool:
-        """Whether a goal is under way whose end would be known."""
+        """Whether a goal is active whose end the gate would notice."""
         return any(
             goals.following and (goals.can_cancel or goals.way != "topic")
             for goals in self.goals.values()
@@ -166,12 +169,12 @@ class Aliases:
 
     @property
     def hook_failures(self) -> tuple[str, ...]:
-        """Which stop hooks it does not follow, under whatever name, and why."""
-        said = [words for hooks in self.hooks.values() for words in hooks.failures]
-        return tuple(dict.fromkeys(said))
+        """The failed stop hooks of all robots, and why each failed."""
+        failures = [text for hooks in self.hooks.values() for text in hooks.failures]
+        return tuple(dict.fromkeys(failures))
 
     def holds_without(self, robot: str) -> bool:
-        """Return whether all that ``robot`` says is said by one that stays, too."""
+        """Return whether a remaining robot declares the same for the machine."""
         terms = _terms(self.specs[robot])
         staying = [spec for id, spec in self.specs.items() if id not in self.leaving]
         return any(_terms(spec) == terms for spec in staying)
@@ -179,13 +182,13 @@ class Aliases:
     def declare(
         self, spec: RobotSpec, tasks: LinkHealth, hooks: LinkHealth, now: float
     ) -> None:
-        """Take in a robot, or what changed of it.
+        """Add a robot, or update its declaration.
 
         Args:
             spec: The robot.
-            tasks: The link that its goals go to.
-            hooks: The link that its stop hooks go to.
-            now: The time.
+            tasks: The link that carries its goals.
+            hooks: The link that carries its stop hooks.
+            now: Seconds, monotonic.
 
         """
         self.leaving.discard(spec.id)
@@ -197,24 +200,24 @@ class Aliases:
         else:
             goals.cancel_unless_reachable(spec, now)
             goals.spec, goals.link = spec, tasks
-        said = self.hooks.get(spec.id)
-        if said is None or said.spec.stop_hooks != spec.stop_hooks:
+        earlier = self.hooks.get(spec.id)
+        if earlier is None or earlier.spec.stop_hooks != spec.stop_hooks:
             self.hooks[spec.id] = StopHooks(self._key, spec, hooks, self._emit)
-        else:  # a reset may be owed, and an answer on its way
-            said.spec, said.link = spec, hooks
+        else:  # keep an owed reset and an expected answer
+            earlier.spec, earlier.link = spec, hooks
 
     def drop(self, robot: str) -> None:
-        """Have a robot gone."""
+        """Remove a robot."""
         self.leaving.discard(robot)
         del self.specs[robot], self.goals[robot], self.hooks[robot]
         self._emit(Detach(self._key, robot))
 
     def cancel_for_driving(self, now: float) -> None:
-        """Cancel a goal that may be running: somebody is going to drive."""
+        """Cancel a goal that may be active, because driving begins."""
         for goals in self.goals.values():
             goals.cancel_for_driving(now)
 
     def refuse(self, connection: str, what: str, why: str) -> None:
-        """Tell somebody what does not happen, under each of the names."""
+        """Send a refusal to a connection, once for each robot."""
         for robot in self.specs:
             self._emit(SendToDisplay(Refused(connection, robot, what, why)))

@@ -1,12 +1,12 @@
-"""Who has control of one machine, and how control changes. No I/O.
+"""Control of one machine: its holder, and how the holder changes. No I/O.
 
 ::
 
-    asked ── granted, or 10 s without an answer, or the holder let go ──▶ changing
-      │                                                                     │
-      └─ denied, withdrawn, STOP ──▶ nobody                standstill ──────┴──▶ given
+    requested ── granted, no answer for 10 s, or released ──▶ changing
+      │                                                          │
+      └─ denied, withdrawn, STOP ──▶ request ends   standstill ──┴──▶ given
 
-While it changes hands nobody has it, and zero is all that is written.
+While control changes, there is no holder, and the gate writes only zeros.
 """
 
 from collections.abc import Callable
@@ -30,15 +30,15 @@ from webmap.gate.rules.stop import StopLatch
 
 
 class MotionConditions:
-    """Everything outside of the driver's hands that stands against motion.
+    """The conditions for motion that do not depend on the operator.
 
     Args:
         key: The machine.
-        robots: The robots that it is.
-        latch: Its STOP.
-        control: The link that velocity goes to.
-        pulse: Whether the display is there.
-        sight: What is heard of it.
+        robots: The robots of the machine.
+        latch: The machine's STOP.
+        control: The link that carries velocities.
+        pulse: Whether the display is alive.
+        observation: The newest odometry and echo of the machine.
 
     """
 
@@ -49,25 +49,25 @@ class MotionConditions:
         latch: StopLatch,
         control: LinkHealth,
         pulse: DisplayPulse,
-        sight: Observation,
+        observation: Observation,
     ) -> None:
         self.lock = LockState(key, held=False)
-        """Whether this gate alone on this computer has it."""
+        """Whether this gate alone on this computer has the machine."""
         self.video = Video()
         self._url = key.url
         self._robots = robots
         self._latch = latch
         self._control = control
         self._display_pulse = pulse
-        self._observation = sight
+        self._observation = observation
 
     @property
     def stopped(self) -> bool:
-        """Whether STOP stands."""
+        """Whether STOP is active."""
         return self._latch.on
 
     def why_unavailable(self, now: float) -> str | None:
-        """Return why nobody can have the machine, in words."""
+        """Return why nothing can have control now, as text for people, or ``None``."""
         if self._latch.on:
             return f"STOP by {self._latch.by} is active: reset it first"
         if not self.lock.held:
@@ -82,7 +82,7 @@ class MotionConditions:
         return None if goals.link.up else "no connection to the bridge of its goals"
 
     def doubt(self, now: float) -> str | None:
-        """Return why the machine must not be driven now, in words."""
+        """Return why the machine must not be driven now, or ``None``."""
         if reason := self.why_unavailable(now):
             return reason
         if not self._robots.drivable:
@@ -94,35 +94,35 @@ class MotionConditions:
         return self.video.doubt(now)
 
 
-ASKING = 10.0
-"""Seconds after which a holder who does not answer has granted it."""
+REQUEST_TIMEOUT = 10.0
+"""Seconds without an answer of the holder after which a request is granted."""
 
-WITHOUT_SIGHT = 1.0
-"""Seconds after zero that are taken for standstill where no odometry tells."""
+ASSUMED_STANDSTILL = 1.0
+"""Seconds after a zero when standstill is assumed if there is no odometry."""
 
 
 class Handover:
-    """The way of one machine from one pair of hands to another."""
+    """The change of control of one machine from its holder to a successor."""
 
     def __init__(self) -> None:
         self.asker: Connection | None = None
         self.successor: Connection | None = None
-        """Who gets it as soon as it stands."""
+        """The connection that gets control when the machine has stopped."""
         self._asked_at = float("-inf")
         self.since = float("-inf")
-        """When zero was written to have it stand."""
+        """When zero was written to stop the machine."""
         self._still = Standstill()
 
     @property
     def going_on(self) -> bool:
-        """Whether time may make a difference."""
+        """Whether a request or a change of control is pending."""
         return self.asker is not None or self.successor is not None
 
     def ask(self, who: Connection, now: float) -> None:
-        """Ask the holder; asked again, nothing changes.
+        """Request control; a second request of the same connection changes nothing.
 
         Raises:
-            Refusal: If somebody else is asking.
+            Refusal: If another connection has already requested control.
 
         """
         if self.asker is None:
@@ -133,55 +133,60 @@ class Handover:
             )
 
     def left(self, now: float) -> float:
-        """Return the seconds until it is granted by itself."""
-        return max(0.0, self._asked_at + ASKING - now)
+        """Return the seconds until the request is granted without an answer."""
+        return max(0.0, self._asked_at + REQUEST_TIMEOUT - now)
 
     def begin(self, successor: Connection, now: float) -> None:
-        """Wait for standstill, zero having been written at ``now``."""
+        """Begin to wait for standstill; zero was written at ``now``."""
         self.asker, self.successor, self.since = None, successor, now
         self._still.begin()
 
     def observe(self, twist: Twist | None, now: float) -> None:
-        """Take in a message of odometry."""
+        """Take a message of odometry into account."""
         self._still.observe(twist, now)
 
     def is_still(self, now: float) -> bool:
-        """Return whether it is standing, as far as anybody can tell."""
+        """Return whether the machine has stopped, by odometry or by time.
+
+        Without odometry for ``ASSUMED_STANDSTILL`` seconds, time decides.
+        """
         if self._still.reached:
             return True
-        heard = max(self.since, self._still.heard_at)
-        return now - heard >= WITHOUT_SIGHT
+        last = max(self.since, self._still.heard_at)
+        return now - last >= ASSUMED_STANDSTILL
 
     def end(self) -> Connection | None:
-        """Have nobody get it; return who is disappointed by that."""
+        """End the request or the change; return the connection that gets nothing."""
         who = self.successor or self.asker
         self.asker = self.successor = None
         return who
 
     def withdraw(self, connection: str) -> None:
-        """Forget that this connection wanted it."""
+        """Withdraw the request of this connection."""
         for who in (self.asker, self.successor):
             if who is not None and who.id == connection:
                 self.end()
 
 
 UNUSED = 120.0
-"""Seconds after which a person's lease expires that was neither used nor renewed. A
-page gives back sooner what it does not need; one that hangs does not, and others would
-wait. Browsers let a page that nobody sees act once a minute."""
+"""Seconds after which an operator's lease expires if it was neither used nor renewed.
+
+A page releases control earlier when it no longer needs it. A page that hangs does not,
+and others would wait. Browsers let a hidden page run code only once a minute.
+"""
 
 
 class Authority:
-    """The lease of one machine, and who is to have it next.
+    """The lease of one machine, and who gets the next one.
 
     Args:
-        robots: The robots that it is.
-        conditions: What stands against its motion.
-        motion: Writes to it.
-        speeds: How fast it may go.
-        epochs: The epochs to give to leases.
-        halt: Has it stop, if it is driven or tested, for a reason in words.
-        changed: Called when it went to other hands.
+        robots: The robots of the machine.
+        conditions: The conditions for its motion.
+        motion: Writes its velocities.
+        speeds: Its speed limits.
+        epochs: Gives the epochs of leases.
+        halt: Stops the machine if it is driven or tested; called with the reason.
+        changed: Called when the holder has changed.
 
     """
 
@@ -208,7 +213,7 @@ class Authority:
         self._used_at = float("-inf")
 
     def why_unavailable(self, now: float) -> str | None:
-        """Return why nobody can take the machine now, in words."""
+        """Return why control cannot be taken now, as text for people, or ``None``."""
         successor = self.handover.successor
         if successor is not None and not self._conditions.stopped:
             name = successor.name or successor.id
@@ -220,7 +225,7 @@ class Authority:
         return self.lease is not None and self.lease.connection == connection
 
     def give(self, to: Connection, now: float) -> int:
-        """Let somebody have the machine; nothing moves by that."""
+        """Give the lease to a connection and return its epoch; nothing moves."""
         epoch = self._epochs.next()
         self.lease = Lease(to.id, to.name, epoch, to.program)
         self.deadman = DeadMan(needs_neutral=not to.program)
@@ -229,32 +234,32 @@ class Authority:
         return epoch
 
     def _new_driver(self, cap: Cap, now: float) -> None:
-        """Forget what held for the hands before."""
+        """Reset everything that belonged to the previous holder."""
         self._speeds.page_cap = cap
         self._speeds.ages.clear()
         self._conditions.video.forget()
         self._changed(now)
 
     def renew(self, now: float) -> None:
-        """Note that its driver does something with it, or says to need it still."""
+        """Note that the holder uses control or renews the lease."""
         self._used_at = now
 
     def set_cap(self, cap: Cap) -> None:
-        """Change what the page of the lease's holder asks for at most."""
+        """Set the speed limit that the holder's page asks for."""
         self._speeds.page_cap = cap
 
     def end(self, why: str | None, now: float) -> None:
-        """Take the machine out of everybody's hands; it stops if it is driven.
+        """End the lease and any request; the machine stops if it is driven.
 
         Args:
-            why: What its driver, and who wanted it, are told, if it is not the
-                driver's own doing.
-            now: The time.
+            why: The reason, sent to the holder and to the connection that requested
+                control; ``None`` if the holder itself ends the lease.
+            now: Seconds, monotonic.
 
         """
-        disappointed = self.handover.end()
-        if disappointed is not None:
-            self._robots.refuse(disappointed.id, "ask", why or "the robot is gone")
+        waiting = self.handover.end()
+        if waiting is not None:
+            self._robots.refuse(waiting.id, "ask", why or "the robot is gone")
         self._end(why, now)
 
     def _end(self, why: str | None, now: float) -> None:
@@ -269,7 +274,7 @@ class Authority:
             self._robots.refuse(lease.connection, "lease", why)
 
     def release(self, connection: str, now: float) -> None:
-        """Give the machine back, or ask for it no longer."""
+        """Release control, or withdraw a request."""
         self.handover.withdraw(connection)
         if not self.is_held_by(connection):
             return
@@ -279,10 +284,10 @@ class Authority:
             self._end(None, now)
 
     def ask(self, who: Connection, now: float) -> None:
-        """Ask the holder for the machine.
+        """Request control from the holder.
 
         Raises:
-            Refusal: If it can be taken without asking, or not at all.
+            Refusal: If control can be taken without a request, or not at all.
 
         """
         if reason := self.why_unavailable(now):
@@ -292,24 +297,23 @@ class Authority:
         self.handover.ask(who, now)
 
     def deny(self, why: str) -> None:
-        """Have the holder keep it."""
+        """Deny the request: the holder keeps control."""
         asker = self.handover.end()
-        assert asker is not None  # only then is there anything to deny
+        assert asker is not None  # the caller has checked that there is a request
         self._robots.refuse(asker.id, "ask", why)
 
     def hand_over(self, successor: Connection, now: float) -> None:
-        """Zero first; ``successor`` gets the machine when it stands (S5)."""
+        """Write zero; ``successor`` gets control when the machine has stopped (S5)."""
         self._end(f"control goes to {successor.name or successor.id}", now)
         if self._robots.drivable:
             self._motion.zero(now)
-        self._robots.cancel_for_driving(
-            now
-        )  # what follows a goal does not come to stand
+        # A robot that follows a goal would not stop.
+        self._robots.cancel_for_driving(now)
         self.handover.begin(successor, now)
         self._changed(now)
 
     def step(self, now: float) -> None:
-        """Let time have its say about who has the machine, and who gets it."""
+        """Do what is due: expire the lease, grant a request, give control."""
         handover = self.handover
         if self._expired(now):
             self.end(f"not used for {UNUSED:g} s", now)
@@ -327,10 +331,10 @@ class Authority:
             self._motion.zero(now)
 
     def _expired(self, now: float) -> bool:
-        """Return whether its driver has forgotten it.
+        """Return whether the lease has expired because it was not used.
 
-        A program's lease stays: any person may take the machine from it. One that is
-        asked for goes to who asks, in seconds.
+        A program's lease does not expire: any operator may take control from it. A
+        lease that is requested goes to the other operator within seconds anyway.
         """
         lease = self.lease
         if lease is None or lease.program or self.handover.asker is not None:

@@ -1,4 +1,4 @@
-"""Carries out the commands of pages and of the display's own program. No I/O."""
+"""Executes the commands of pages and of the program. No I/O."""
 
 import logging
 import math
@@ -43,7 +43,7 @@ SETTLE = 1.5
 
 
 class CommandHandler:
-    """Does what is ordered, or refuses it whole.
+    """Executes a command completely, or refuses it.
 
     Args:
         machines: The machines.
@@ -64,15 +64,15 @@ class CommandHandler:
         """Request, robot, epoch, and until when the reply may wait."""
 
     def handle(self, connection: Connection, command: Command, now: float) -> None:
-        """Do what a page commands.
+        """Execute the command of a page.
 
         Raises:
-            Refusal: If that is not done.
+            Refusal: If the command is not executed.
 
         """
         match command:
             case Stop(robot):
-                # Before any check: a stop is always allowed.
+                # No check comes first: STOP is always allowed.
                 self.stop(robot, connection, now)
             case Reset(robot, stop):
                 self.reset(robot, stop, connection, now)
@@ -81,10 +81,10 @@ class CommandHandler:
             case SetVelocity():
                 self._set_velocity(connection, command, now)
             case Goal(robot):
-                base, _ = self._licensed(connection, command, now)
+                base, _ = self._authorized(connection, command, now)
                 base.driving.goal(robot, _pose(command), connection.id, now)
             case Locate(robot):
-                base, _ = self._licensed(connection, command, now)
+                base, _ = self._authorized(connection, command, now)
                 base.driving.locate(robot, _pose(command), connection.id, now)
             case Take(robot):
                 self.take(connection, robot, now)
@@ -107,27 +107,27 @@ class CommandHandler:
                 self.cancel(connection, command.robot, now)
 
     def cancel(self, connection: Connection, robot: str, now: float) -> None:
-        """Call off a robot's goals; that needs no lease."""
+        """Cancel a robot's goals; this needs no lease."""
         check_role(connection.role)
         why = f"by {connection.name or connection.id}"
         self._machines.find(robot).robots.goals[robot].cancel(now, why)
 
     def stop(self, robot: str | None, by: Connection, now: float) -> None:
-        """STOP a robot or, with ``None``, all."""
+        """STOP a robot or, with ``None``, all robots."""
         press = new_press(by.name or by.id)
         for base in self._machines if robot is None else [self._machines.find(robot)]:
             base.stop(press, now)
 
     def stop_malformed(self, robot: str | None, by: Connection, now: float) -> str:
-        """STOP what a malformed STOP names, or all if that is not known.
+        """STOP the robot that a malformed STOP names, or all if that is unknown.
 
         Args:
-            robot: The robot that it names, if that could be read.
-            by: Who sent it.
-            now: The time.
+            robot: The robot's name, if the message has a readable one.
+            by: The connection that sent the message.
+            now: Seconds, monotonic.
 
         Returns:
-            What is stopped, in words.
+            What is stopped, as text for people.
 
         """
         try:
@@ -138,12 +138,12 @@ class CommandHandler:
         return "all robots are stopped" if robot is None else f"{robot!r} is stopped"
 
     def reset(self, robot: str, stop: str, by: Connection, now: float) -> None:
-        """End the STOP of a robot that has this identity."""
+        """End the STOP with the identity ``stop`` of a robot."""
         check_role(by.role)
         self._machines.reset(self._machines.find(robot), stop, now)
 
     def take(self, connection: Connection, robot: str, now: float) -> int | None:
-        """Give somebody the lease; ``None`` if it comes when the machine stands."""
+        """Give the lease and return its epoch; ``None`` if a standstill comes first."""
         base = self._machines.find(robot)
         if base.authority.is_held_by(connection.id):
             return base.authority.lease.epoch  # type: ignore[union-attr]
@@ -158,7 +158,7 @@ class CommandHandler:
         return base.authority.give(connection, now)
 
     def release(self, connection: Connection, robot: str, now: float) -> None:
-        """Have somebody let go of a robot."""
+        """Release a connection's control of a robot."""
         self._machines.find(robot).authority.release(connection.id, now)
 
     def _ask(self, connection: Connection, robot: str, now: float) -> None:
@@ -174,7 +174,7 @@ class CommandHandler:
             raise Refusal("only the operator who has control can answer")
         asker = base.authority.handover.asker
         if asker is None:
-            raise Refusal("nobody requests control")
+            raise Refusal("no operator requests control")
         if isinstance(answer, Grant):
             base.authority.hand_over(asker, now)
         else:
@@ -184,21 +184,22 @@ class CommandHandler:
     def checked(
         self, connection: Connection, robot: str, epoch: int, tick: int, now: float
     ) -> tuple[Machine, float]:
-        """Return the machine if this connection may move it by this command.
+        """Return the machine and the age of the command's tick in seconds.
 
-        Besides it, the age of the command's loop in seconds.
+        Raises:
+            Refusal: If the connection may not move the machine with this command.
+
         """
         base = self._machines.find(robot)
         check_lease(base.authority.lease, connection.id, epoch)
         try:
             return base, self._ticks.check(tick, now)
         except Refusal:
-            base.driving.late(
-                now
-            )  # after the lease was checked: no stranger's word stops it
+            # Only the holder's commands stop the machine: the lease was checked first.
+            base.driving.late(now)
             raise
 
-    def _licensed(
+    def _authorized(
         self, connection: Connection, command: Drive | Goal | Locate, now: float
     ) -> tuple[Machine, float]:
         base, age = self.checked(
@@ -211,12 +212,12 @@ class CommandHandler:
         return base, age
 
     def _drive(self, connection: Connection, drive: Drive, now: float) -> None:
-        base, age = self._licensed(connection, drive, now)
+        base, age = self._authorized(connection, drive, now)
         base.speeds.ages.add(age, now)
         if drive.clamped and not connection.flagged:
             connection.flagged = True
             log.warning("connection %s asks for more than full speed", connection.id)
-        # What the page showed when it spoke has aged on the way here.
+        # The picture of the page has aged since the page sent the command.
         seen = None if drive.video is None else drive.video + age
         base.conditions.video.observe(seen, now)
         speed = base.speeds.speed

@@ -1,4 +1,4 @@
-"""Who may send commands: connections, their roles, leases and refusals. No I/O."""
+"""Connections, their roles, leases, ticks and refusals. No I/O."""
 
 import logging
 import secrets
@@ -30,11 +30,14 @@ _REMEMBERED = 64
 
 
 class Ticks:
-    """Issues ticks and knows how old each of the newest ones is.
+    """Issues ticks and knows the age of the newest ones.
+
+    An age is the time between two moments on the clock of this process; no clock of a
+    browser or a robot is involved.
 
     Args:
-        first: The first number. A random one, unless said, so that the ticks of
-            another session of the gate are unknown here.
+        first: The first number. It is random by default, so that ticks of another
+            session of the gate are unknown here.
 
     """
 
@@ -47,8 +50,8 @@ class Ticks:
         """Return a new tick if one is due at ``now``."""
         if now < self._due:
             return None
-        # Late by more than one period means that the process stood still; there is
-        # nothing to catch up on.
+        # If a tick is late by more than one period, the process was suspended; missed
+        # ticks are not made up for.
         self._due = self._due + PERIOD if now < self._due + PERIOD else now + PERIOD
         self.newest += 1
         self._issued.append(now)
@@ -62,7 +65,7 @@ class Ticks:
         return now - self._issued[-1 - back]
 
     def check(self, tick: int, now: float) -> float:
-        """Let a command pass that echoes a tick which is young enough.
+        """Check that the tick that a command echoes is recent enough (S2).
 
         Returns:
             The tick's age in seconds.
@@ -85,17 +88,17 @@ class Lease:
 
     connection: str
     name: str
-    """Who that is, for people."""
+    """The name of the holder, for people."""
     epoch: int
     program: bool = False
-    """Whether a program holds it; any operator may take it from one."""
+    """Whether a program is the holder; any operator may take control from it."""
 
 
 class Epochs:
     """Numbers for leases, each larger than the one before.
 
-    They start at a random number, so that a command of an earlier session of the
-    gate cannot meet a lease of this one.
+    They start at a random number, so that the epoch of a command of an earlier session
+    of the gate never equals that of a lease of this session.
     """
 
     def __init__(self, first: int | None = None) -> None:
@@ -110,15 +113,15 @@ class Epochs:
 def check_take(
     lease: Lease | None, role: Literal["viewer", "operator", "admin"], program: bool
 ) -> None:
-    """Let somebody who holds no lease on a machine take it, or not.
+    """Check that a connection without the lease of a machine may take control of it.
 
     Args:
-        lease: The lease that there is now, of another connection.
-        role: The role of the one who asks.
-        program: Whether a program asks.
+        lease: The current lease, of another connection, if there is one.
+        role: The role of the connection that takes control.
+        program: Whether this connection is the program.
 
     Raises:
-        Refusal: If the machine is not to be had.
+        Refusal: If it may not take control.
 
     """
     check_role(role)
@@ -128,14 +131,14 @@ def check_take(
 
 
 def check_lease(lease: Lease | None, connection: str, epoch: int) -> None:
-    """Let the holder of the lease pass, under the lease's own epoch.
+    """Check that a command comes from the holder and has the epoch of the lease.
 
     Raises:
-        Refusal: If somebody else holds it, or nobody, or the epoch is another.
+        Refusal: If the connection is not the holder, or the epoch is a different one.
 
     """
     if lease is None:
-        raise Refusal("nobody has control: take control first")
+        raise Refusal("no operator has control: take control first")
     if lease.connection != connection:
         raise Refusal(f"{lease.name or lease.connection} has control")
     if lease.epoch != epoch:
@@ -145,7 +148,7 @@ def check_lease(lease: Lease | None, connection: str, epoch: int) -> None:
 
 
 def check_role(role: Literal["viewer", "operator", "admin"]) -> None:
-    """Let operators and administrators pass.
+    """Check that the role is that of an operator or an administrator.
 
     Raises:
         Refusal: If ``role`` is that of a viewer.
@@ -156,26 +159,26 @@ def check_role(role: Literal["viewer", "operator", "admin"]) -> None:
 
 
 GARBAGE_LIMIT = 20
-"""Senseless messages in a second at which a connection is closed (S10)."""
+"""Invalid messages in a second at which a connection is closed (S10)."""
 
 FLOOD_LIMIT = 400
 """Messages in a second at which a connection is closed.
 
-A page that was cut off for some seconds may rightly deliver a few hundred at once.
+A page that was offline for some seconds may rightly deliver a few hundred at once.
 """
 
 COUNT_EVERY = 1.0
-"""Seconds between two counts of what was refused."""
+"""Seconds between two reports of how many messages were refused."""
 
 QUIET = 1.0
-"""Seconds for which the same refusal is not said again."""
+"""Seconds for which the same refusal is not sent again."""
 
 
 class RateLimit:
-    """Counts what happened within the last second.
+    """Counts the events of the last second.
 
     Args:
-        limit: How often is too often.
+        limit: The count that is too high.
 
     """
 
@@ -183,19 +186,19 @@ class RateLimit:
         self._times: deque[float] = deque(maxlen=limit)
 
     def too_often(self, now: float) -> bool:
-        """Count one more at ``now``; return whether the limit is reached."""
+        """Count an event at ``now``; return whether the limit is reached."""
         times = self._times
         times.append(now)
         return len(times) == times.maxlen and now - times[0] < 1.0
 
 
 class Connection:
-    """What one connection may do and how far its words were taken.
+    """One connection: its role, its limits, and what it sent.
 
     Args:
-        id: The display's name for it.
-        name: Who that is, for people.
-        role: What they may do.
+        id: The display's name for the connection.
+        name: Its name for people.
+        role: Its role.
 
     """
 
@@ -210,7 +213,7 @@ class Connection:
         self.messages = RateLimit(FLOOD_LIMIT)
         self.closing = False
         self.flagged = False
-        """Whether it was logged that this page asks for more than full speed."""
+        """Whether the log already has that this page asks for more than full speed."""
         self._refused = 0
         self._last_refused = ""
         self._counted_at = float("-inf")
@@ -218,23 +221,23 @@ class Connection:
 
     @property
     def program(self) -> bool:
-        """Whether this is the display's own Python code."""
+        """Whether this is the program, the Python code in the display."""
         return self.id == PROGRAM
 
     def set_speeds(self, v: float, w: float) -> None:
-        """Take over what the page's ``Teleop`` asks for; nonsense means standstill."""
+        """Set the limits of the page's ``Teleop``; invalid ones mean speed 0."""
         self.cap = page_cap(v, w)
 
     def note_refused(self, what: str, why: str) -> None:
-        """Count a message that was refused."""
+        """Count a refused message."""
         self._refused += 1
         self._last_refused = f"{what}: {why}"
 
     def count_refused(self, now: float) -> RefusedCount | None:
-        """Return what was refused since the last count, if there is something to say.
+        """Return the number of refusals since the last count, if it is due and not 0.
 
         Args:
-            now: Seconds, monotonic; infinity for the last count of all.
+            now: Seconds, monotonic; infinity for the last count.
 
         """
         if not self._refused or now - self._counted_at < COUNT_EVERY:
@@ -246,13 +249,13 @@ class Connection:
     def is_new_refusal(
         self, robot: str | None, what: str, why: str, now: float
     ) -> bool:
-        """Return whether a refusal is worth saying, or was said just now."""
-        told = {key: at for key, at in self._sent_at.items() if now - at < QUIET}
-        self._sent_at = told
+        """Return whether this refusal was not sent within the last second."""
+        recent = {key: at for key, at in self._sent_at.items() if now - at < QUIET}
+        self._sent_at = recent
         key = (robot, what, why)
-        if key in told:
+        if key in recent:
             return False
-        told[key] = now
+        recent[key] = now
         return True
 
 
@@ -260,10 +263,10 @@ log = logging.getLogger("webmap.gate")
 
 
 class Connections:
-    """The connections that there are, and what they are told.
+    """All connections, and the refusals that are sent to them.
 
     Args:
-        emit: Takes the actions.
+        emit: Called with each action.
 
     """
 
@@ -278,18 +281,18 @@ class Connections:
         return {connection.id: connection.acked for connection in self._all.values()}
 
     def find(self, id: str) -> Connection | None:
-        """Return the connection of that name, if there is one."""
+        """Return the connection with this id, if there is one."""
         return self._all.get(id)
 
     def add(self, message: Connect) -> None:
-        """Take in a page."""
+        """Add the connection of a page."""
         self._all[message.connection] = Connection(
             message.connection, message.name, message.role
         )
         self._emit(SendToDisplay(Hello(message.connection)))
 
     def remove(self, id: str) -> bool:
-        """Forget a page; return whether there was one."""
+        """Remove the connection of a page; return whether there was one."""
         connection = self._all.pop(id, None)
         if connection is None:
             return False
@@ -297,7 +300,7 @@ class Connections:
         return True
 
     def count(self, now: float) -> None:
-        """Tell the display how much was refused; now and then is enough."""
+        """Send the display the counts of refused messages that are due."""
         for connection in self._all.values():
             self._count(connection, now)
 
@@ -309,7 +312,7 @@ class Connections:
     def refuse(
         self, id: str, robot: str | None, what: str, why: str, now: float
     ) -> None:
-        """Tell somebody that a command was not taken; not twice in a second."""
+        """Send a refusal to a connection, the same one at most once in a second."""
         connection = self._all.get(id)
         if connection is None:
             return
@@ -325,7 +328,7 @@ class Connections:
         act: Callable[[], object],
         now: float,
     ) -> None:
-        """Do what somebody commands; they are told if it is refused."""
+        """Execute a command; if it is refused, send the refusal to the connection."""
         try:
             act()
         except Refusal as refusal:

@@ -1,4 +1,4 @@
-"""What the commands of a machine's driver come to. No I/O."""
+"""Turns the commands of a machine's holder into motion, goals and tests. No I/O."""
 
 from webmap.base.geometry import Twist
 from webmap.gate.commands import Refusal
@@ -10,13 +10,13 @@ from webmap.gate.rules.stop_test import CREEP, StopTest, StopTests
 
 
 class Driving:
-    """Takes the accepted commands for one machine, and ends on any doubt.
+    """Executes the accepted commands for one machine, and stops it on any fault.
 
     Args:
-        robots: The robots that it is.
-        authority: Who has it.
-        conditions: What stands against its motion.
-        motion: Writes to it.
+        robots: The robots of the machine.
+        authority: Who has control of it.
+        conditions: The conditions for its motion.
+        motion: Writes its velocities.
         tests: Its stop tests.
 
     """
@@ -36,16 +36,17 @@ class Driving:
         self._tests = tests
 
     def drive(self, wanted: Twist, neutral: bool, tick: int, now: float) -> str | None:
-        """Take in an accepted command of the lease's holder.
+        """Execute an accepted command of the holder.
 
         Args:
             wanted: The velocity asked for, not yet limited.
             neutral: Whether every input is released.
-            tick: The tick that it echoes.
-            now: The time.
+            tick: The tick that the command echoes.
+            now: Seconds, monotonic.
 
         Returns:
-            Why nothing moves although something should, in words, or ``None``.
+            Why the machine does not move although the command asks for motion, or
+            ``None``.
 
         """
         lease = self._authority.lease
@@ -55,7 +56,7 @@ class Driving:
             return None if neutral else reason
         self._authority.deadman.accept(neutral, tick, now)
         if self._authority.deadman.expired(now):
-            self._lapse("the page receives no ticks", now)
+            self._disarm_and_halt("the page receives no ticks", now)
             return None if neutral else "the page received no new tick"
         if self._tests.running is not None:
             return self._go_on_with_test(self._tests.running, lease, neutral, now)
@@ -67,7 +68,7 @@ class Driving:
 
     @property
     def silent(self) -> bool:
-        """Whether nothing is written now and nothing will be by itself."""
+        """Whether no velocity is written now, nor later without a new event."""
         return self._motion.silent and self._tests.running is None
 
     def _drive(self, wanted: Twist, lease: Lease, now: float) -> None:
@@ -77,14 +78,14 @@ class Driving:
         self._motion.drive(wanted, lease, now)
 
     def late(self, now: float) -> None:
-        """A command of the lease's holder came too late: that is doubt, so zero (S1).
+        """Write zero, because a command of the holder was too old (S1).
 
-        Whatever it says, its way takes too long for anybody to drive by.
+        Its content does not matter: the delay is too long for safe driving.
         """
-        self._lapse("the commands of the page are too old", now)
+        self._disarm_and_halt("the commands of the page are too old", now)
 
     def begin_test(self, now: float) -> None:
-        """Begin the stop test for the holder of the lease.
+        """Begin the stop test for the holder.
 
         Raises:
             Refusal: If the machine cannot be tested now.
@@ -100,10 +101,10 @@ class Driving:
         self, test: StopTest, lease: Lease, neutral: bool, now: float
     ) -> str | None:
         if not neutral:
-            self._lapse("a key was pressed", now)
+            self._disarm_and_halt("a key was pressed", now)
             return "a stop test was running: release all inputs first"
         if not self._authority.deadman.armed:
-            self._lapse("the page stopped sending commands", now)
+            self._disarm_and_halt("the page stopped sending commands", now)
         if test.state == "creeping":
             self._drive(CREEP, lease, now)
         return None
@@ -111,25 +112,37 @@ class Driving:
     def goal(
         self, robot: str, pose: tuple[float, float, float], by: str, now: float
     ) -> None:
-        """Send the machine somewhere by itself; that ends driving.
+        """Send a goal to the robot; that ends driving.
+
+        Args:
+            robot: The robot.
+            pose: x, y and yaw in the robot's goal frame, in metres and radians.
+            by: The connection that sends the goal.
+            now: Seconds, monotonic.
 
         Raises:
-            Refusal: If it cannot be sent now.
+            Refusal: If no goal can be sent now.
 
         """
         if reason := self._authority.why_unavailable(now):
             raise Refusal(reason)
-        self._lapse("a goal was sent", now)
+        self._disarm_and_halt("a goal was sent", now)
         self._robots.goals[robot].send(*pose, by, now)
         self._authority.renew(now)
 
     def locate(
         self, robot: str, pose: tuple[float, float, float], by: str, now: float
     ) -> None:
-        """Tell the robot where it is, while nothing moves it.
+        """Send the robot its own pose, while nothing moves it.
+
+        Args:
+            robot: The robot.
+            pose: x, y and yaw in the robot's goal frame, in metres and radians.
+            by: The connection that sends the pose.
+            now: Seconds, monotonic.
 
         Raises:
-            Refusal: If it cannot be told now.
+            Refusal: If no pose can be sent now.
 
         """
         if reason := self._authority.why_unavailable(now):
@@ -140,30 +153,31 @@ class Driving:
         self._authority.renew(now)
 
     def link_down(self, why: str, now: float) -> None:
-        """The link that velocity goes to is gone."""
+        """Stop, because the link that carries velocities is closed."""
         if self._authority.lease is not None:
             self._fault(why, now)
 
     def step(self, now: float) -> None:
-        """Let time pass."""
+        """Check the conditions and the dead-man timeout, and continue a stop test."""
         if self._authority.lease is not None:
             if reason := self._conditions.doubt(now):
                 self._fault(reason, now)
             elif self._authority.deadman.expired(now):
-                self._lapse("the page stopped sending commands", now)
+                self._disarm_and_halt("the page stopped sending commands", now)
         self._tests.step(now)
 
-    def _lapse(self, why: str, now: float) -> None:
+    def _disarm_and_halt(self, why: str, now: float) -> None:
         self._authority.deadman.disarm()
         self._tests.halt(why, now)
 
     def _fault(self, reason: str, now: float) -> None:
-        """Stop and disarm, because something may not be as it should."""
-        self._lapse(reason, now)
+        """Stop and disarm because of a fault; end the lease of a program."""
+        self._disarm_and_halt(reason, now)
         lease = self._authority.lease
         if lease is None or not lease.program:
             return
-        # A program is not seen to let go of anything, so once it has driven it has to
-        # take it again: it may stand still with its display, and go on where it was.
+        # A program has no inputs that it could release. So once it has driven, it must
+        # take control again: it may have hung together with its display, and would
+        # continue where it was.
         if self._motion.sent_epoch == lease.epoch:
             self._authority.end(reason, now)

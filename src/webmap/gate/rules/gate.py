@@ -1,11 +1,8 @@
 """All decisions of the gate: events in, actions out. No I/O, and no clock of its own.
 
-The age is measured between two moments of one clock, this process's own; no clock of
-a browser or a robot has a part in it.
-
-The shell calls :meth:`Gate.handle` for whatever happens and :meth:`Gate.step` every
-10 ms, and does what they return, in that order. What came of a write it tells with a
-further event before it does anything else.
+The shell calls :meth:`Gate.handle` for each event and :meth:`Gate.step` every 10 ms,
+and executes the returned actions in order. It reports the result of a write as another
+event before it does anything else.
 """
 
 import logging
@@ -25,11 +22,11 @@ log = logging.getLogger("webmap.gate")
 
 
 class Gate:
-    """Decides over every machine of one display.
+    """The rules for all machines of one display.
 
     Args:
-        ticks: The ticks to issue.
-        epochs: The epochs to give to leases.
+        ticks: Issues the ticks.
+        epochs: Gives the epochs of leases.
 
     """
 
@@ -57,20 +54,20 @@ class Gate:
             protocol.FromPage: self._from_page,
             protocol.FromProgram: self._commands.handle_program,
             protocol.Speeds: self._speeds,
-            protocol.Heartbeat: self._beat,
+            protocol.Heartbeat: self._heartbeat,
             events.Shutdown: self._shut_down,
         }
 
     def handle(self, event: protocol.ToGate | events.Event, now: float) -> list[Action]:
-        """Take in one event and return what is to be done, in order."""
+        """Process one event; return the actions to execute, in order."""
         self._handlers[type(event)](event, now)
         return self._actions(now)
 
     def step(self, now: float) -> list[Action]:
-        """Let time pass and return what is to be done, in order."""
+        """Do what is due at ``now``; return the actions to execute, in order."""
         if self._display_there and self._display_pulse.doubt(now):
             self._display_there = False
-            self._goals_lost(now)
+            self._end_unsupervised_goals(now)
         self._machines.step(now)
         self._commands.reply_to_takes(now)
         self._connections.count(now)
@@ -81,7 +78,7 @@ class Gate:
 
     @property
     def busy(self) -> bool:
-        """Whether time may make a difference to some machine."""
+        """Whether :meth:`step` has anything to do for any machine."""
         return self._machines.busy
 
     @property
@@ -97,7 +94,7 @@ class Gate:
 
     # The display and its pages.
 
-    def _beat(self, message: protocol.Heartbeat, now: float) -> None:
+    def _heartbeat(self, message: protocol.Heartbeat, now: float) -> None:
         self._display_pulse.beat(now)
         if not self._display_there:
             self._display_there = True
@@ -107,10 +104,10 @@ class Gate:
         self._display_pulse.ended = event.why
         for base in self._machines:
             base.authority.end(event.why, now)
-        self._goals_lost(now)
+        self._end_unsupervised_goals(now)
 
-    def _goals_lost(self, now: float) -> None:
-        """Nobody is left who could look after a goal."""
+    def _end_unsupervised_goals(self, now: float) -> None:
+        """Cancel goals where the robot asks for it: no display supervises them."""
         for base in self._machines:
             for goals in base.robots.goals.values():
                 goals.lost(now)
@@ -146,7 +143,7 @@ class Gate:
             if isinstance(command, Stop):
                 self._machines.check_known(command.robot)
         except Refusal as refusal:
-            self._take_garbage(connection, message.text, refusal.why, now)
+            self._refuse_invalid(connection, message.text, refusal.why, now)
         else:
             what = op_of(command)
             self._connections.run_or_refuse(
@@ -159,11 +156,11 @@ class Gate:
         if connection.messages.too_often(now):
             self._connections.close(connection, "too many messages")
 
-    def _take_garbage(
+    def _refuse_invalid(
         self, connection: Connection, text: bytes, why: str, now: float
     ) -> None:
         what = "command"
-        if begins_like_stop(text):  # before it is counted: STOP is served first (S10)
+        if begins_like_stop(text):  # before the rate limit: STOP comes first (S10)
             stopped = self._commands.stop_malformed(robot_in(text), connection, now)
             what, why = "stop", f"this STOP is not valid ({why}): {stopped}"
         self._connections.refuse(connection.id, None, what, why, now)

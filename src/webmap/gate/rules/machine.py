@@ -1,19 +1,19 @@
-"""One machine: who may move it, and when it must stop.
+"""One machine: who may move it, and when it must stop. No I/O.
 
 ::
 
             take                 neutral 200 ms, then a command
     free ─────────▶ held ───────────────────────────────────────▶ driving
      ▲               ▲                                               │
-     │ (no lease)    │ (lease)                                       │ release, doubt,
+     │ (no lease)    │ (lease)                                       │ neutral, fault,
      └───────────────┴────────────── stopping ◀──────────────────────┘ lease ends, STOP
           silence after 500 ms       zeros at 20 Hz
 
-Doubt (a link that does not answer, a display that is silent, odometry that does not
-come) stops the machine and disarms its driver, whose hands must then be seen to be off.
+A fault (a link that does not answer, a silent display, missing odometry) stops the
+machine and disarms its dead-man; the operator must then release all inputs.
 
-STOP latches: from any state the machine gets zero and nobody has it, and it stays so
-until a reset, which leads to *free*.
+STOP latches: from any state the machine gets zero and the lease ends. It stays so until
+a reset, which leads to *free*.
 """
 
 from typing import Literal
@@ -36,8 +36,11 @@ from webmap.gate.rules.stop import ActiveStop, StopLatch
 from webmap.gate.rules.stop_test import StopTests
 
 OWED_PATIENCE = 60.0
-"""Seconds for which a robot that was removed is kept for a zero that it is owed. After
-that the file on disk still says so, and whoever has the machine next sends it."""
+"""Seconds for which a removed robot is kept because a zero is owed to it.
+
+After that, the file on disk still records the owed zero, and the next gate that has the
+machine sends it.
+"""
 
 State = Literal["free", "held", "driving", "stopping", "stopped"]
 
@@ -47,11 +50,11 @@ class Machine:
 
     Args:
         key: The bridge and the topic.
-        control: The link that velocity goes to.
-        pulse: Whether the display is there.
-        latch: Its STOP, which outlives it.
-        epochs: The epochs to give to leases.
-        emit: Takes the actions.
+        control: The link that carries velocities.
+        pulse: Whether the display is alive.
+        latch: Its STOP, which outlives this object.
+        epochs: Gives the epochs of leases.
+        emit: Called with each action.
 
     """
 
@@ -68,9 +71,9 @@ class Machine:
         self.control = control
         self.latch = latch
         self.robots = Aliases(key, emit)
-        """The robots that this machine goes by."""
+        """The robots that are declared for this machine."""
         self.known = False
-        """Whether it was asked if this gate alone has it, and if STOP stands."""
+        """Whether the shell has reported the lock, and whether STOP is active."""
         self.speeds = Speeds(self.robots, control)
         self.scan_assist = ScanAssist(self.robots)
         self.motion = Motion(
@@ -105,7 +108,7 @@ class Machine:
 
     @property
     def state(self) -> State:
-        """What the machine does, as far as the gate has a hand in it."""
+        """The state of the machine for the gate; see the diagram of the module."""
         if self.latch.acknowledged:
             return "stopped"
         if self.motion.driving:
@@ -116,12 +119,12 @@ class Machine:
 
     @property
     def silent(self) -> bool:
-        """Whether nothing is written now and nothing will be by itself."""
+        """Whether no velocity is written now, nor later without a new event."""
         return self.driving.silent
 
     @property
     def active(self) -> bool:
-        """Whether time alone may make a difference."""
+        """Whether :meth:`step` has anything to do."""
         return (
             self.authority.lease is not None
             or not self.silent
@@ -133,22 +136,22 @@ class Machine:
             or self.other_writer.seen is not None
         )
 
-    # The robots that it is.
+    # The robots of the machine.
 
     def declare(
         self, spec: RobotSpec, tasks: LinkHealth, hooks: LinkHealth, now: float
     ) -> None:
-        """Take in a robot, or what changed of it; a change ends the lease."""
+        """Add a robot or update its declaration; both end the lease."""
         self.authority.end("the robot was declared again", now)
         self.robots.declare(spec, tasks, hooks, now)
 
     def attached(self, now: float) -> None:
-        """Note that the robot can be spoken to, as soon as there are links."""
+        """Send an active STOP to a robot that was just added."""
         if self.latch.on:
             self._send_stop(now)
 
     def forget(self, robot: str, now: float) -> None:
-        """Drop a robot; the last one stays until its machine has stopped."""
+        """Remove a robot; the last one stays until the machine has stopped."""
         self.robots.leaving.add(robot)
         if not self.robots.holds_without(robot):
             self.authority.end(
@@ -159,7 +162,8 @@ class Machine:
         self._drop_leaving(now)
 
     def _drop_leaving(self, now: float) -> None:
-        # What may still move by our doing gets its zero first, if there is a link soon.
+        # A machine that this gate may have left moving gets its zero first, if there is
+        # a link soon enough.
         patient = self.motion.owes_zero and now - self._left_at < OWED_PATIENCE
         for robot in list(self.robots.leaving):
             if len(self.robots.specs) == 1:
@@ -169,7 +173,7 @@ class Machine:
             self.robots.drop(robot)
 
     def lost(self, connection: str, now: float) -> None:
-        """A page is gone: what it drove stops."""
+        """Release the control of a page that is gone; its goals may be cancelled."""
         self.authority.release(connection, now)
         for goals in self.robots.goals.values():
             goals.lost(now, connection)
@@ -177,13 +181,13 @@ class Machine:
     # STOP.
 
     def stop(self, press: Press, now: float) -> None:
-        """STOP: zero at once, whoever drives it or nobody; no lease, no goals."""
+        """Activate STOP: write zero at once, end the lease, cancel the goals."""
         self.authority.end(f"STOP by {press.by}", now)
         self.active_stop.press(press, now)
         self._expect_standstill(now)
 
     def on_stop_file_changed(self, press: Press | None, now: float) -> None:
-        """Note that the file of its STOP changed by another hand."""
+        """Take over a STOP that another process wrote to the machine's file."""
         lock = self.conditions.lock
         if (
             self.active_stop.on_file_changed(press, lock.elsewhere)
@@ -202,14 +206,15 @@ class Machine:
         self._update_watch(now)
 
     def reset(self, stop: str, now: float) -> None:
-        """End the STOP that stands; nothing moves by that, and nobody has it.
+        """End the active STOP; nothing moves, and no operator has control.
 
         Args:
-            stop: The identity of the STOP that is to be ended.
-            now: The time.
+            stop: The identity of the STOP to end.
+            now: Seconds, monotonic.
 
         Raises:
-            Refusal: If none stands, a newer one does, or another gate has the machine.
+            Refusal: If no STOP or a newer STOP is active, or another gate has the
+                machine.
 
         """
         if self.conditions.lock.elsewhere:
@@ -218,7 +223,7 @@ class Machine:
         self._update_watch(now)
 
     def step(self, now: float) -> None:
-        """Let time have its say."""
+        """Do what is due at ``now``."""
         self.driving.step(now)
         self.speeds.ages.forget_old(now)
         self.authority.step(now)
@@ -229,15 +234,15 @@ class Machine:
         self._update_watch(now)
         self._drop_leaving(now)
 
-    # What is heard of it.
+    # Events of the shell.
 
     def on_goal_written(self, write: GoalWritten) -> None:
-        """Note that a goal went out: what moves from here on moves by itself."""
+        """Note that a goal was written: from now on the robot may move by itself."""
         self.robots.goals[write.robot].on_written(write)
         self.obedience.excuse()
 
     def on_written(self, write: TwistWritten, now: float) -> None:
-        """Note what became of a velocity."""
+        """Note the result of writing a velocity."""
         if not write.done:
             return
         self.obedience.on_written(write.twist, self.motion.sent, now)
@@ -249,16 +254,24 @@ class Machine:
             self._emit(SendToDisplay(SentTwist(robot, vx, vy, wz, write.by, *others)))
 
     def on_echo(self, twist: Twist, now: float) -> None:
-        """Note what came back on the velocity topic, ours or another's."""
+        """Note a velocity received on the topic, of this gate or another writer."""
         self.observation.on_echo(twist)
         self.tests.on_echo(twist, now)
         if self.conditions.lock.elsewhere or self.robots.follow_goals:
-            # Another gate on this computer drives it, or what follows its goal does.
+            # Another gate on this computer, or the navigation of a goal, writes too.
             self.other_writer.expect(now + EXPECTED_FOR)
         self.other_writer.on_echo(twist, now)
 
     def observe(self, measured: Twist | None, sent_after: float, now: float) -> None:
-        """Note that odometry came, which was said after a moment, maybe long ago."""
+        """Note a message of odometry.
+
+        Args:
+            measured: The velocity, if the message had a valid one.
+            sent_after: The bridge sent the message after this moment, which may be long
+                ago.
+            now: Seconds, monotonic.
+
+        """
         if not self.observation.on:
             return
         measured = self.robots.axes.seen(measured)
@@ -284,19 +297,19 @@ class Machine:
             self._send_stop(now)
 
     def link_up(self, now: float) -> None:
-        """A zero that may not have arrived goes first."""
+        """Send an owed zero first, then an active STOP: the control link is open."""
         if not self.control.up:
             return
-        # What an earlier gate, or an earlier link, wrote may be heard still.
+        # Velocities of an earlier gate or an earlier link may still arrive as echoes.
         self.other_writer.expect(now + EXPECTED_FOR)
         if self.motion.owes_zero:
-            self.obedience.expect(now)  # also of an earlier gate, whose word was motion
+            self.obedience.expect(now)  # also when an earlier gate wrote the motion
         self.motion.send_owed_zero(now)
         if self.latch.on:
             self._send_stop(now)
 
     def link_down(self, now: float) -> None:
-        """The control link is gone."""
+        """Stop, because the control link is closed."""
         self.driving.link_down(f"no connection to {self.key.url}", now)
 
     def _update_watch(self, now: float) -> None:

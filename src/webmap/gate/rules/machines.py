@@ -1,4 +1,4 @@
-"""Every machine of one display, and what is heard of them. No I/O."""
+"""All machines of one display: declarations, and events for them. No I/O."""
 
 import logging
 from collections.abc import Callable, Iterator
@@ -32,13 +32,13 @@ Refuse = Callable[[str, str | None, str, str, float], None]
 
 
 class Machines:
-    """The machines, by key and by the names that the display has for them.
+    """The machines, by key and by the robots that the display declares.
 
     Args:
-        pulse: Whether the display is there.
-        epochs: The epochs to give to leases.
-        emit: Takes the actions.
-        refuse: Tells a connection that its command was not taken.
+        pulse: Whether the display is alive.
+        epochs: Gives the epochs of leases.
+        emit: Called with each action.
+        refuse: Sends a refusal to a connection.
 
     """
 
@@ -52,8 +52,8 @@ class Machines:
         self._bases: dict[events.Key, Machine] = {}
         self._latches: dict[events.Key, StopLatch] = {}
         self._stopped_as: dict[events.Key, dict[events.Key, str]] = {}
-        """By what other keys the STOP of a machine stands, from when it had those, and
-        the identity of the STOP that stood by each."""
+        """For each machine with a STOP: the keys that it had before and under which the
+        STOP is active too, each with the identity of its STOP."""
         self._by_robot: dict[str, Machine] = {}
         self._links: dict[tuple[str, events.Lane], LinkHealth] = {}
         self._reporters: dict[str, Reporter] = {}
@@ -64,36 +64,36 @@ class Machines:
             WriterNodes: self._writer_nodes,
             events.LinkUp: self._link_up,
             events.LinkDown: self._link_down,
-            events.PingAnswered: self._alive,
-            events.TwistWritten: self._wrote,
-            events.GoalWritten: self._wrote_goal,
-            events.PoseWritten: self._wrote_pose,
+            events.PingAnswered: self._ping_answered,
+            events.TwistWritten: self._twist_written,
+            events.GoalWritten: self._goal_written,
+            events.PoseWritten: self._pose_written,
             events.GoalProgress: self._goal_progress,
             events.GoalLost: self._goal_lost,
             events.GoalEnded: self._goal_ended,
             events.HookEnded: self._hook_ended,
-            events.EchoReceived: self._echoed,
-            events.OdometryReceived: self._measured,
-            events.ScanReceived: self._scanned,
-            events.LockState: self._locked,
-            events.StopSaved: self._latch_kept,
-            events.StopFileChanged: self._latch_seen,
-            events.StopTestSaved: self._stop_test_kept,
+            events.EchoReceived: self._echo_received,
+            events.OdometryReceived: self._odometry_received,
+            events.ScanReceived: self._scan_received,
+            events.LockState: self._lock_reported,
+            events.StopSaved: self._stop_saved,
+            events.StopFileChanged: self._stop_file_changed,
+            events.StopTestSaved: self._stop_test_saved,
         }
 
     def __iter__(self) -> Iterator[Machine]:
-        """Go through the machines, which may all change by that."""
+        """Iterate over the machines; each is reported again, as it may change."""
         for base in list(self._bases.values()):
             self._touched.add(base.key)
             yield base
 
     def look(self) -> None:
-        """Have it said of every machine how it stands, as all may have changed."""
+        """Mark every machine as possibly changed, so that it is reported."""
         self._touched.update(self._bases)
 
     @property
     def busy(self) -> bool:
-        """Whether time may make a difference to some machine."""
+        """Whether :meth:`step` has anything to do for any machine."""
         return any(base.active for base in self._bases.values())
 
     @property
@@ -102,7 +102,7 @@ class Machines:
         return all(base.silent for base in self._bases.values())
 
     def find(self, robot: str) -> Machine:
-        """Return the machine behind a robot, which may change by that.
+        """Return the machine of a robot, and mark it as possibly changed.
 
         Raises:
             Refusal: If there is no such robot.
@@ -114,7 +114,7 @@ class Machines:
         return base
 
     def check_known(self, robot: str | None) -> None:
-        """Let pass what names a robot that is declared, or all (``None``).
+        """Check that a robot is declared; ``None`` means all robots and passes.
 
         Raises:
             Refusal: If there is no such robot.
@@ -124,20 +124,21 @@ class Machines:
             raise Refusal(f"there is no robot {robot!r}")
 
     def reset(self, base: Machine, stop: str, now: float) -> None:
-        """End the STOP of a machine, also where it stands by a key that it had before.
+        """End the STOP of a machine, also under the keys that it had before.
 
         Args:
             base: The machine.
-            stop: The identity of the STOP that is to be ended.
-            now: The time.
+            stop: The identity of the STOP to end.
+            now: Seconds, monotonic.
 
         Raises:
-            Refusal: If none stands, a newer one does, or another gate has the machine.
+            Refusal: If no STOP or a newer STOP is active, or another gate has the
+                machine.
 
         """
         base.reset(stop, now)
         for key, earlier in self._stopped_as.pop(base.key, {}).items():
-            # Where there is a machine still, it stands for another robot, too.
+            # If a machine with that key still has robots, the STOP is theirs too.
             there, latch = self._bases.get(key), self._latches[key]
             left = there is None or set(there.robots.specs) <= there.robots.leaving
             same = latch.press is not None and latch.press.id in (earlier, stop)
@@ -145,7 +146,7 @@ class Machines:
                 latch.reset()
 
     def step(self, now: float) -> None:
-        """Let time pass."""
+        """Do what is due for each machine, and close stalled control links."""
         for base in list(self._bases.values()):
             if base.active:
                 base.step(now)
@@ -157,27 +158,27 @@ class Machines:
                 self._link_down(events.LinkDown(url, lane), now)
 
     def report(self, now: float) -> None:
-        """Say what is new of the machines that may have changed."""
+        """Send a report on each robot whose machine may have changed."""
         touched, self._touched = self._touched, set()
         for key in touched:
             base = self._bases.get(key)
-            # Before it is known whether STOP stands, nothing true can be said of it.
+            # Until the shell reports the lock, it is unknown whether STOP is active.
             if base is not None and base.known:
                 for spec in list(base.robots.specs.values()):
                     self._report(base, spec, now)
 
     def _report(self, base: Machine, spec: RobotSpec, now: float) -> None:
         reporter = self._reporters.get(spec.id)
-        if reporter is None:  # forgotten already, and only there until it stands
+        if reporter is None:  # forgotten; it stays only until the machine has stopped
             return
-        news = report(base, spec, now)
-        said = reporter.worth_saying(news, now)
-        if said:
-            self._emit(SendToDisplay(news))
-        elif said is None:
+        latest = report(base, spec, now)
+        due = reporter.worth_saying(latest, now)
+        if due:
+            self._emit(SendToDisplay(latest))
+        elif due is None:
             self._touched.add(base.key)
 
-    # What the display declares.
+    # Declarations of the display.
 
     def _declare(self, spec: RobotSpec, now: float) -> None:
         try:
@@ -197,7 +198,7 @@ class Machines:
             if before == spec:
                 return
             if before == _assumed(spec, before.twist_type_assumed):
-                # What was assumed is true, which changes nothing for who drives.
+                # The assumed type was right: nothing changes for the operator.
                 earlier.robots.specs[spec.id] = spec
                 self._emit(Attach(key, spec))
                 return
@@ -208,7 +209,7 @@ class Machines:
         if not base.known:
             self._emit(Lock(key))
         if earlier is not None and stopped is not None:
-            # It is the same robot: by whatever it is known, its STOP stands.
+            # It is the same robot under another key: its STOP stays active.
             others = {**self._stopped_as.get(earlier.key, {}), earlier.key: stopped.id}
             self._stopped_as.setdefault(key, {}).update(others)
             base.stop(stopped, now)
@@ -219,11 +220,11 @@ class Machines:
         self._touched.add(key)
 
     def _with_one_type(self, spec: RobotSpec, before: RobotSpec | None) -> RobotSpec:
-        """Return a robot with a type of velocity that goes with those of others.
+        """Return a declaration whose velocity type agrees with those of other robots.
 
-        Where another robot is known to have another type on that topic, what this one
-        says is taken for an assumption, so that it can be stopped all the same. One
-        whose type was known may have changed it, as the other then will.
+        If another robot is known to have a different type on the same topic, the type
+        of this one counts as assumed, so that the robot can still be stopped. A robot
+        whose type was known may change it; the other robot will then change it too.
         """
         known = before is not None and not before.twist_type_assumed
         if before is not None and known and key_of(before) == key_of(spec):
@@ -236,7 +237,7 @@ class Machines:
         return spec
 
     def _staying(self) -> list[RobotSpec]:
-        """Return the robots that are declared now, under the names they go by."""
+        """Return the declarations of the robots that are not forgotten."""
         by_robot = self._by_robot.items()
         return [base.robots.specs[robot] for robot, base in by_robot]
 
@@ -265,7 +266,7 @@ class Machines:
             del self._bases[base.key]
             self._emit(Unlock(base.key))
 
-    # What the shell hears.
+    # Events of the shell.
 
     def _link(self, url: str, lane: events.Lane) -> LinkHealth:
         return self._links.setdefault((url, lane), LinkHealth())
@@ -287,10 +288,10 @@ class Machines:
             if not event.spent:
                 base.active_stop.tasks_down(link, now)
 
-    def _alive(self, event: events.PingAnswered, now: float) -> None:
+    def _ping_answered(self, event: events.PingAnswered, now: float) -> None:
         self._link(event.url, "control").answered(event.asked_at, now)
 
-    def _wrote(self, event: events.TwistWritten, now: float) -> None:
+    def _twist_written(self, event: events.TwistWritten, now: float) -> None:
         base = self._of_key(event.key)
         if base is None:
             return
@@ -299,7 +300,7 @@ class Machines:
             why = "a command was dropped: the connection or the gate was held up"
             self._refuse(event.by, base.robots.newest.id, "drive", why, now)
 
-    def _wrote_goal(self, event: events.GoalWritten, now: float) -> None:
+    def _goal_written(self, event: events.GoalWritten, now: float) -> None:
         base = self._by_robot.get(event.robot)
         if base is None:
             return
@@ -312,10 +313,10 @@ class Machines:
             why = "the goal was dropped: the connection or the gate was held up"
             self._refuse(event.by, event.robot, "goal", why, now)
 
-    def _wrote_pose(self, event: events.PoseWritten, now: float) -> None:
+    def _pose_written(self, event: events.PoseWritten, now: float) -> None:
         if event.done:
-            told = SentPose(event.robot, event.x, event.y, event.yaw, event.by)
-            self._emit(SendToDisplay(told))
+            sent = SentPose(event.robot, event.x, event.y, event.yaw, event.by)
+            self._emit(SendToDisplay(sent))
         else:
             why = "the pose was dropped: the connection or the gate was held up"
             self._refuse(event.by, event.robot, "locate", why, now)
@@ -340,41 +341,41 @@ class Machines:
             base.robots.hooks[event.robot].ended(event)
 
     def _goals_of(self, robot: str) -> Goals | None:
-        """Return a robot's goals, which may change by that; it may be gone."""
+        """Return a robot's goals and mark it as changed; ``None`` if it is gone."""
         base = self._by_robot.get(robot)
         if base is None:
             return None
         self._touched.add(base.key)
         return base.robots.goals[robot]
 
-    def _echoed(self, event: events.EchoReceived, now: float) -> None:
+    def _echo_received(self, event: events.EchoReceived, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.on_echo(event.twist, now)
 
-    def _measured(self, event: events.OdometryReceived, now: float) -> None:
+    def _odometry_received(self, event: events.OdometryReceived, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.observe(event.twist, event.sent_after, now)
 
-    def _scanned(self, event: events.ScanReceived, now: float) -> None:
+    def _scan_received(self, event: events.ScanReceived, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None and base.observation.on:
             base.scan_assist.observe(event.topic, event.sweep)
 
-    def _locked(self, event: events.LockState, now: float) -> None:
+    def _lock_reported(self, event: events.LockState, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.locked(event, now)
 
-    def _latch_kept(self, event: events.StopSaved, now: float) -> None:
+    def _stop_saved(self, event: events.StopSaved, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.latch.kept(event)
-        else:  # the robot was forgotten meanwhile; its STOP was not
+        else:  # the robot was forgotten in the meantime; its STOP was not
             self._latches[event.key].kept(event)
 
-    def _latch_seen(self, event: events.StopFileChanged, now: float) -> None:
+    def _stop_file_changed(self, event: events.StopFileChanged, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.on_stop_file_changed(event.press, now)
@@ -385,17 +386,17 @@ class Machines:
             self._touched.add(base.key)
             base.other_writer.named(message.nodes)
 
-    def _stop_test_kept(self, event: events.StopTestSaved, now: float) -> None:
+    def _stop_test_saved(self, event: events.StopTestSaved, now: float) -> None:
         base = self._of_key(event.key)
         if base is not None:
             base.speeds.tested = event.record
 
     def _of_key(self, key: events.Key) -> Machine | None:
-        """Return a machine, which may change by that; it may be gone meanwhile."""
+        """Return a machine and mark it as changed; ``None`` if it is gone."""
         self._touched.add(key)
         return self._bases.get(key)
 
 
 def _assumed(spec: RobotSpec, assumed: bool) -> RobotSpec:
-    """Return a robot whose type of velocity is assumed, or known."""
+    """Return the declaration with its velocity type marked as assumed or known."""
     return msgspec.structs.replace(spec, twist_type_assumed=assumed)

@@ -1,6 +1,6 @@
-"""What is written to one machine: commands, then zeros, then silence. No I/O.
+"""The velocities of one machine: commands, then zeros, then silence. No I/O.
 
-The only thing that a timer writes here is zero.
+Only zeros are repeated: a timer never repeats a command.
 """
 
 from collections.abc import Callable
@@ -20,27 +20,27 @@ LENGTH = 0.5
 """Seconds from the first zero to silence."""
 
 NEW_LINK_LENGTH = 3.0
-"""The same on a link that is new, where a zero is owed.
+"""The same when a zero is owed on a new link.
 
-A bridge that was only just started has yet to find the robot, and loses what it is told
-until then: up to 1.6 s were seen.
+A bridge that has just started has not found the robot yet, and loses messages until it
+has: up to 1.6 s were measured.
 """
 
 
 HELD_PERIOD = 0.1
-"""Seconds between two zeros while STOP stands (S8)."""
+"""Seconds between two zeros while STOP is active (S8)."""
 
 HELD_LENGTH = 600.0
-"""Seconds for which they go on.
+"""Seconds for which these zeros continue.
 
-Longer than anybody needs to get to the robot, and not for ever: a STOP that was
-forgotten over night should not fill its topic, or a robot's battery, until Monday.
-They begin anew with another STOP and with every new link.
+This is longer than a person needs to get to the robot, but not for ever: a STOP that
+was forgotten on Friday should not fill the topic and empty the robot's battery until
+Monday. The zeros start again with another STOP and with every new link.
 """
 
 
 class ZeroBurst:
-    """When the zeros that stop a machine are due.
+    """The times of the zeros that stop a machine.
 
     Args:
         period: Seconds between two zeros.
@@ -56,13 +56,13 @@ class ZeroBurst:
         self._due = float("-inf")
 
     def start(self, now: float, length: float | None = None) -> None:
-        """Begin, or begin again; the first zero is due at once.
+        """Start, or start again; the first zero is due at once.
 
-        Silence never comes earlier by that than it would have come without.
+        A new start never makes silence come earlier than it would without.
 
         Args:
             now: Seconds, monotonic.
-            length: Seconds from here to silence, in place of the usual ones.
+            length: Seconds from now to silence; by default that of the constructor.
 
         """
         length = self._usual if length is None else length
@@ -76,36 +76,37 @@ class ZeroBurst:
         self.running = False
 
     def zero_due(self, now: float) -> bool:
-        """Return whether a zero is to be written at ``now``, and count on it."""
+        """Return whether a zero is due at ``now``; the caller must then write it."""
         if self.running and now >= self.started_at + self._length:
             self.running = False
         if not self.running or now < self._due:
             return False
-        # Zeros that a sleeping process missed are not made up for.
+        # Zeros that a suspended process missed are not made up for.
         self._due = max(self._due + self._period, now + self._period / 2)
         return True
 
 
 DEADMAN = 0.2
-"""Seconds for which an accepted command holds (S1)."""
+"""The dead-man timeout: seconds for which an accepted command is valid (S1)."""
 
 NEUTRAL = 0.2
-"""Seconds of released inputs that must be seen before anything moves (S6)."""
+"""Seconds for which inputs must be neutral before anything moves (S6)."""
 
 
 class DeadMan:
-    """Whether the holder of a lease may move the machine, and until when.
+    """Whether the holder may move the machine, and until when.
 
-    A new dead-man is disarmed. It arms when every input was seen released for
-    ``NEUTRAL`` seconds without a gap, and disarms on any doubt.
+    A new dead-man is disarmed. It arms when the inputs were neutral for ``NEUTRAL``
+    seconds without a gap, and disarms on any fault.
 
-    A command holds if it echoes a newer tick than the one before it did. So it is fed
-    by the whole loop: a hand that still sends but hears nothing feeds it no longer.
+    A command extends the time only if it echoes a newer tick than the command before.
+    So the whole loop must work: a page that still sends but receives nothing does not
+    extend it.
 
     Args:
-        needs_neutral: A hand on a stick or a key may be held through an outage, so it
-            must be seen released. A program's call is an act of its own each time;
-            for it the lease ends on doubt instead.
+        needs_neutral: Whether neutral inputs are needed to arm. An operator may hold a
+            stick or a key through an outage, so the inputs must be released first. A
+            program makes each call anew; on a fault, its lease ends instead.
 
     """
 
@@ -118,7 +119,7 @@ class DeadMan:
 
     @property
     def expires_at(self) -> float:
-        """When the newest accepted command ends; in the past if there is none."""
+        """When the newest accepted command expires; in the past if there is none."""
         return (
             float("-inf")
             if self._accepted_at is None
@@ -126,16 +127,16 @@ class DeadMan:
         )
 
     def expired(self, now: float) -> bool:
-        """Return whether no accepted command holds at ``now``."""
+        """Return whether no accepted command is valid at ``now``."""
         return now >= self.expires_at
 
     def accept(self, neutral: bool, tick: int, now: float) -> None:
-        """Count an accepted command.
+        """Note an accepted command.
 
         Args:
             neutral: Whether every input is released.
-            tick: The tick that it echoes.
-            now: The time.
+            tick: The tick that the command echoes.
+            now: Seconds, monotonic.
 
         """
         if self.expired(now) and self._needs_neutral:
@@ -150,7 +151,7 @@ class DeadMan:
             self.armed = True
 
     def disarm(self) -> None:
-        """Ask for released inputs before anything moves again."""
+        """Require neutral inputs before anything moves again."""
         self.armed = not self._needs_neutral
         self._neutral_since = None
 
@@ -159,18 +160,20 @@ WRITE_INTERVAL = 0.02
 """The shortest time between two moving commands on the wire, in seconds."""
 
 WAIT_LIMIT = 0.05
-"""The longest time that a moving command waits for its turn, in seconds. Only a gate
-that stood still keeps one longer, and then it is too old to be written (S2)."""
+"""The longest time that a moving command waits to be written, in seconds.
+
+Only a suspended gate keeps a command longer; the command is then too old (S2).
+"""
 
 RAMP_INTERVAL = 0.1
-"""The longest time that the ramp counts between two commands, in seconds."""
+"""The longest time between two commands that the ramp uses, in seconds."""
 
 ZERO = Twist()
 
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What a machine may do at most, now."""
+    """The limits of a machine's motion at this moment."""
 
     speed: Speed
     a_max: float | None
@@ -183,10 +186,10 @@ class Motion:
 
     Args:
         key: The machine.
-        control: The link that they go to.
-        bounds: Gives the bounds that hold now.
-        guard: Gives what its scanners leave of a velocity that is about to be written.
-        emit: Takes the actions.
+        control: The link that carries them.
+        bounds: Returns the limits that apply now.
+        guard: Limits a velocity that is about to be written by the scans.
+        emit: Called with each action.
 
     """
 
@@ -200,9 +203,9 @@ class Motion:
     ) -> None:
         self.driving = False
         self.sent = ZERO
-        """What was written last."""
+        """The velocity that was written last."""
         self.owes_zero = False
-        """Whether it may still move by our doing: it gets a zero in any case."""
+        """Whether a gate may have left the machine moving; it then gets a zero."""
         self._key = key
         self._control = control
         self._bounds = bounds
@@ -215,7 +218,7 @@ class Motion:
         self._tried_at = float("-inf")
         self._sent_at = self._moved_at = float("-inf")
         self.sent_epoch: int | None = None
-        """On whose behalf that was, or the motion that it ended."""
+        """The epoch of the last velocity; that of a zero is that of the motion."""
 
     @property
     def stopping(self) -> bool:
@@ -224,11 +227,11 @@ class Motion:
 
     @property
     def silent(self) -> bool:
-        """Whether nothing is written now and nothing will be by itself."""
+        """Whether no velocity is written now, nor later without a new event."""
         return not (self.driving or self.stopping or self._left_alone)
 
     def drive(self, wanted: Twist, lease: Lease, now: float) -> None:
-        """Write ``wanted``, within the bounds, on behalf of ``lease``."""
+        """Write ``wanted``, within the limits, for the holder of ``lease``."""
         if not self.driving:
             self._burst.end()
             self.driving = True
@@ -237,26 +240,26 @@ class Motion:
         self._flush(now)
 
     def send_nothing(self) -> None:
-        """Write nothing more, not even zero, though it moves (stop test only)."""
+        """Write nothing more, not even zero, although it moves (stop test only)."""
         self.driving, self._pending = False, None
         self._left_alone = True
 
     @property
     def moved_at(self) -> float:
-        """When the machine was last told to move."""
+        """When the last velocity other than zero was written."""
         return self._moved_at
 
     def halt(self, now: float) -> None:
-        """Go from driving to zeros; nothing happens if it was not driven."""
+        """Write zeros if the machine is driven."""
         if self.driving:
             self.zero(now)
 
     def zero(self, now: float, length: float | None = None) -> None:
-        """Write zero at once, whatever was before, and for a moment from here on.
+        """Write zero at once, and continue with zeros for a moment.
 
         Args:
             now: Seconds, monotonic.
-            length: Seconds of that moment, in place of the usual ones.
+            length: Seconds from now to silence; by default :data:`LENGTH`.
 
         """
         if self.stopping and self._burst.started_at == now:
@@ -264,26 +267,26 @@ class Motion:
         self.driving, self._pending, self._left_alone = False, None, False
         self._burst.start(now, length)
         self._write_zero_if_due(now)
-        self._owe_zero()  # afterwards: no disk stands in the way of a stop
+        self._owe_zero()  # after the zero: no disk access may delay a stop
 
     def hold(self, now: float) -> None:
-        """Write zero at once, and go on with that while STOP stands (S8)."""
+        """Write zero at once, and continue while STOP is active (S8)."""
         self.zero(now)
         self._held.start(now)
 
     def release_hold(self) -> None:
-        """STOP stands no longer; nothing moves by that."""
+        """End the zeros of STOP; nothing moves."""
         self._held.end()
 
     @property
     def held(self) -> bool:
-        """Whether zeros are written because STOP stands."""
+        """Whether zeros are written because STOP is active."""
         return self._held.running
 
     def send_owed_zero(self, now: float) -> None:
-        """Write the zero that is owed, now that there is a link again."""
+        """Write an owed zero, because there is a link again."""
         if self.owes_zero:
-            self._burst.end()  # what it wrote just now went to the link before
+            self._burst.end()  # its last zeros went to the previous link
             self.zero(now, NEW_LINK_LENGTH)
 
     def owe_zero(self) -> None:
@@ -291,17 +294,17 @@ class Motion:
         self._owe_zero()
 
     def step(self, now: float) -> None:
-        """Write what is due."""
+        """Write the command or the zero that is due."""
         self._flush(now)
         self._write_zero_if_due(now)
         answered = self._control.answered_since(self._burst.started_at)
         if self.owes_zero and self.silent and answered:
-            # Only now are the zeros believed to have arrived.
+            # Only an answer to a ping sent after the zero shows that it has arrived.
             self.owes_zero = False
             self._emit(MarkDriven(self._key, False))
 
     def on_written(self, write: TwistWritten, now: float) -> None:
-        """Note a velocity that went out."""
+        """Note a velocity that was written."""
         self.sent, self._sent_at, self.sent_epoch = write.twist, now, write.epoch
         if not write.twist.is_zero:
             self._moved_at = now
@@ -322,7 +325,7 @@ class Motion:
         self._emit(WriteTwist(self._key, ZERO, self.sent_epoch, None))
 
     def _flush(self, now: float) -> None:
-        """Write the newest command, unless one has just been written."""
+        """Write the newest command, unless another was written just now."""
         if self._pending is None or now < self._tried_at + WRITE_INTERVAL:
             return
         wanted, lease, since = self._pending
@@ -330,10 +333,10 @@ class Motion:
             self._pending = None
             return
         if lease.epoch != self.sent_epoch and not self.sent.is_zero:
-            self._write_zero()  # between two epochs there is a zero, whatever happened
+            self._write_zero()  # there is always a zero between two epochs
             return
         self._pending, self._tried_at = None, now
-        # The scanners judge what is written and nothing else: a ramp bends the way.
+        # The scan assist checks the final velocity, because a ramp changes the path.
         twist = self._scan_assist(self._bounded(wanted, now), now)
         until = since + WAIT_LIMIT
         by = lease.connection

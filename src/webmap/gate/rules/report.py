@@ -1,4 +1,4 @@
-"""Reports on machines: what changed is said, but not more often than anybody looks."""
+"""Reports on robots: sent when they change, but not too often. No I/O."""
 
 from typing import Literal
 
@@ -21,16 +21,16 @@ from webmap.gate.rules.obedience import MOVES, TURNS
 from webmap.gate.rules.speeds import reaction
 
 INTERVAL = 0.1
-"""The shortest time between two reports that differ only in numbers that flow."""
+"""Seconds between two reports that differ only in steadily changing numbers."""
 
 BRAKE = 0.5
-"""The deceleration that is assumed of a base of which none was stated, in m/s²."""
+"""The deceleration in m/s² that is assumed for a base without a stated one."""
 
 _DIGITS = 3
 
 
 def report(base: Machine, spec: RobotSpec, now: float) -> RobotReport:
-    """Return how it stands with one robot at ``now``."""
+    """Return the report on one robot at ``now``."""
     lease = base.authority.lease
     speed = base.speeds.own if lease is None else base.speeds.speed
     age, test = base.speeds.ages.p95, base.tests.last
@@ -41,7 +41,7 @@ def report(base: Machine, spec: RobotSpec, now: float) -> RobotReport:
         robot=spec.id,
         name=spec.name,
         state=base.state,
-        doing=_doing(base, spec, now),
+        doing=_activity(base, spec, now),
         latched=base.latch.acknowledged,
         stop=_stop(base),
         holder=holder,
@@ -75,8 +75,8 @@ def report(base: Machine, spec: RobotSpec, now: float) -> RobotReport:
     )
 
 
-def _doing(base: Machine, spec: RobotSpec, now: float) -> Activity:
-    """Return what one robot does: the first that is true."""
+def _activity(base: Machine, spec: RobotSpec, now: float) -> Activity:
+    """Return the activity of one robot: the first that applies."""
     state, goals = base.state, base.robots.goals[spec.id]
     if state == "stopped":
         confirmed = base.latch.shown and base.active_stop.confirmation.confirmed
@@ -105,7 +105,7 @@ def _doing(base: Machine, spec: RobotSpec, now: float) -> Activity:
 
 
 def _reason(base: Machine, now: float) -> str | None:
-    """Return why nobody can move the machine now, in words."""
+    """Return why the machine cannot be driven now, or ``None``."""
     if base.authority.lease is None:
         return base.authority.why_unavailable(now)
     return base.conditions.doubt(now)
@@ -148,14 +148,14 @@ def _velocity(twist: Twist) -> Velocity:
 
 
 class Reporter:
-    """Decides for one robot which report is worth saying."""
+    """Decides for one robot which reports are sent."""
 
     def __init__(self) -> None:
         self._last: RobotReport | None = None
         self._at = float("-inf")
 
     def worth_saying(self, report: RobotReport, now: float) -> bool | None:
-        """Return whether to say ``report`` now; ``None`` means later."""
+        """Return whether to send ``report`` now; ``None`` means later."""
         last = self._last
         if report == last:
             return False
@@ -166,12 +166,12 @@ class Reporter:
 
 
 def _alike(one: RobotReport, other: RobotReport) -> bool:
-    """Return whether two reports differ only in numbers that flow."""
+    """Return whether two reports differ only in steadily changing numbers."""
     return _gist(one) == _gist(other)
 
 
 def _gist(report: RobotReport) -> RobotReport:
-    """Return ``report`` without the numbers that change all the time."""
+    """Return ``report`` without the steadily changing numbers."""
     asker, stop, alarm, goal = report.asker, report.stop, report.alarm, report.goal
     if goal is not None:
         goal = msgspec.structs.replace(goal, left=None, time=None, eta=None)

@@ -1,9 +1,9 @@
 """The speed limits in force for one machine, and the age of the control loop. No I/O.
 
-Nobody can react to what has not been seen yet. So over a slow link a robot is let go
-no faster than what carries it a quarter of a metre in the time from a finger to its
-wheels, at worst: the age of the loop, the dead-man, and the base's own time to stop
-(S15). Over a quick link the robot's own limits are in force and nothing else.
+An operator reacts only to what the page shows. So over a slow link, a robot moves at
+most a quarter of a metre in the worst time from an input to its effect on the wheels:
+the age of the loop, the dead-man timeout, and the base's own time to stop (S15). Over a
+fast link, only the limits of the robot and of the page apply.
 """
 
 import math
@@ -23,23 +23,25 @@ from webmap.gate.rules.health import Ages, LinkHealth
 from webmap.gate.rules.motion import DEADMAN, Bounds
 
 SLOW = 0.15
-"""The age of a loop in seconds above which it is slow: it is told, and it counts."""
+"""The age in seconds above which a loop is slow: the speed limit is lower, and the page
+shows why."""
 
 QUICK = 0.13
-"""The age below which it is so no more; between the two nothing changes."""
+"""The age in seconds below which it is no longer slow (hysteresis)."""
 
 BLIND = 0.25
-"""Metres that a robot may go before anything that anybody does can take effect."""
+"""Metres that a robot may move before an operator's reaction takes effect."""
 
 
 class LoopAge:
-    """The ages of the ticks that the holder's accepted commands echoed, and beyond.
+    """The age of the control loop: page to gate, and gate to bridge, both ways.
 
-    What a page shows came from the robot, and what it says has yet to go there. So the
-    way to the robot and back is part of the loop as well.
+    The first part is the age of the ticks that the holder's accepted commands echo. The
+    second is part of the loop because the data that a page shows came from the robot,
+    and the command has yet to get there.
 
     Args:
-        trips: How long questions to the robot's bridge and answers are under way.
+        trips: The round trips of pings to the robot's bridge.
 
     """
 
@@ -49,16 +51,16 @@ class LoopAge:
         self._slow = False
 
     def add(self, age: float, now: float) -> None:
-        """Count one more tick; ``age`` in seconds."""
+        """Add the age of a tick, in seconds."""
         self._ticks.add(age, now)
 
     def forget_old(self, now: float) -> None:
-        """Look at the last two seconds only."""
+        """Drop ages older than two seconds."""
         self._ticks.forget_old(now)
         self._trips.forget_old(now)
 
     def clear(self) -> None:
-        """Forget the ticks: another driver has another way to the gate."""
+        """Forget the ticks: another holder has another connection to the gate."""
         self._ticks.clear()
 
     @property
@@ -69,18 +71,18 @@ class LoopAge:
 
     @property
     def slow(self) -> float | None:
-        """The same if the loop is slow, else None."""
+        """The same age if the loop is slow, else ``None``."""
         age = self.p95
         self._slow = age is not None and age > (QUICK if self._slow else SLOW)
         return age if self._slow else None
 
 
 def reaction(age: float | None, stop_time: float | None) -> float:
-    """Return the seconds from a finger to the robot, at worst.
+    """Return the seconds from an operator's input to its effect, at worst.
 
     Args:
         age: The age of the loop in seconds, if it is known.
-        stop_time: Seconds within which the base stops by itself, if that is known.
+        stop_time: Seconds within which the base stops by itself, if known.
 
     """
     own = STOPS_WITHIN if stop_time is None else stop_time
@@ -88,17 +90,17 @@ def reaction(age: float | None, stop_time: float | None) -> float:
 
 
 def governed(speed: Speed, slow: float | None, stop_time: float | None) -> Speed:
-    """Return ``speed``, or what a slow loop leaves of it.
+    """Return ``speed``, reduced if the loop is slow.
 
     Args:
-        speed: The speeds in force on a quick link.
+        speed: The speeds in force over a fast link.
         slow: The age of the loop in seconds, if it is slow.
-        stop_time: Seconds within which the base stops by itself, if that is known.
+        stop_time: Seconds within which the base stops by itself, if known.
 
     """
     if slow is None:
         return speed
-    # Rounded, so that the speed in force does not tremble with every command.
+    # Rounded, so that the limit does not change with every command.
     v = math.floor(100 * BLIND / reaction(slow, stop_time)) / 100
     why = f"slow connection: {math.ceil(slow * 100) * 10} ms"
     return Speed(min(v, speed.v), speed.w, (*speed.why, why))
@@ -108,23 +110,23 @@ class Speeds:
     """The speeds in force for one machine.
 
     Args:
-        robots: The robots that it is.
-        control: The link that velocity goes to.
+        robots: The robots of the machine.
+        control: The link that carries velocities.
 
     """
 
     def __init__(self, robots: Aliases, control: LinkHealth) -> None:
         self.ages = LoopAge(control.trips)
-        """How old its driver's picture of it is."""
+        """The age of the holder's control loop."""
         self.tested: StopRecord | None = None
-        """What the last stop test that came to an end found, whenever that was."""
+        """The result of the last completed stop test, however old."""
         self.page_cap = page_cap()
-        """What the page of its driver asks for at most."""
+        """The speed limit that the holder's page asks for."""
         self._robots = robots
 
     @property
     def own(self) -> Speed:
-        """What the robot allows, whoever drives it; infinity where it says nothing."""
+        """The robot's own limits, for every holder; infinity where it states none."""
         return least(self._caps())
 
     def _caps(self) -> list[Cap]:
@@ -139,12 +141,12 @@ class Speeds:
 
     @property
     def stop_time(self) -> float | None:
-        """Seconds within which the machine stops by itself, if that is known."""
+        """Seconds within which the machine stops by itself, if known."""
         if self.tested is not None:
             return self.tested.seconds
         return self._robots.stops_within
 
     def bounds(self) -> Bounds:
-        """Return what the machine may do at most now."""
+        """Return the limits that apply now."""
         robots = self._robots
         return Bounds(self.speed, robots.a_max, robots.holonomic, robots.axes)
