@@ -130,7 +130,7 @@ ECHOES = 2
 """Echoes explained by one velocity: two subscriptions may deliver it twice."""
 
 MOST_ECHOES = 32
-"""The most echoes explained by all velocities of one value: more are never late."""
+"""The most echoes that one value explains; more are never in flight."""
 
 REMEMBERED = 60.0
 """Seconds during which a velocity of the gate explains echoes."""
@@ -148,7 +148,7 @@ WITHIN = 3.0
 """Seconds within which these arrive; after as long without one the program is gone."""
 
 EXPECTED_FOR = 2.0
-"""Seconds for which velocities of others are expected after an event like a goal."""
+"""Seconds for which velocities of others are expected after a cause, such as a goal."""
 
 MOST_NODES = 3
 """The most nodes that the report names."""
