@@ -81,7 +81,7 @@ class LinkDown:
     url: str
     lane: Lane
     spent: bool = False
-    """Whether it carries a goal to its end; data written before still arrives."""
+    """Whether the socket stays open for a goal, so that data written before arrives."""
 
 
 @dataclass(frozen=True, slots=True)
