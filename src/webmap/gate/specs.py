@@ -204,7 +204,7 @@ def checked(spec: RobotSpec) -> RobotSpec:
         )
     if spec.pose_topic and not is_type(spec.pose_type, POSE_TYPE):
         raise ConfigError(
-            f"robot {spec.name!r}: its initial pose is told as {POSE_TYPE}, "
+            f"robot {spec.name!r}: its initial pose is sent as {POSE_TYPE}, "
             f"got {spec.pose_type!r}"
         )
     if not all(math.isfinite(v) and v >= 0 for v in spec.pose_covariance):
@@ -308,8 +308,8 @@ def checked_assist(name: str, assist: AssistSpec) -> AssistSpec:
         )
     if assist.blind not in ("stop", "creep"):
         raise ConfigError(
-            f"robot {name!r}: while it is blind a robot is to 'stop' or to 'creep', "
-            f"got {assist.blind!r}"
+            f"robot {name!r}: what a robot does without a usable scan is 'stop' or "
+            f"'creep', got {assist.blind!r}"
         )
     x, y, yaw = map(float, assist.sensor)
     return msgspec.structs.replace(

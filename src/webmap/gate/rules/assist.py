@@ -189,8 +189,8 @@ def _horizon(spec: AssistSpec, speed: float) -> float:
     No part of the robot moves faster than ``speed``, so it stops before a point that is
     farther from its outline than the stopping distance at that speed.
     """
-    way = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
-    return (_outer(spec) + way) * (1 + _ROUNDING) + _ROUNDING
+    length = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
+    return (_outer(spec) + length) * (1 + _ROUNDING) + _ROUNDING
 
 
 def _outer(spec: AssistSpec) -> float:
@@ -214,25 +214,25 @@ def _blindness(
     if not (math.isfinite(sweep.angle_min) and math.isfinite(step) and step != 0.0):
         return "the scan has no angles"
     towards = _rays_towards(spec, sweep, wanted)
-    known, asked = scan_geometry.known(sweep, towards)
-    if not asked:
+    known, total = scan_geometry.known(sweep, towards)
+    if not total:
         return "the scan does not cover the direction of motion"
-    if known < KNOWN * asked:
+    if known < KNOWN * total:
         return "most of the scan is unknown"
-    if not _covers_the_way(spec, sweep, wanted):
+    if not _covers_path(spec, sweep, wanted):
         return "the scan covers only a part of the path"
     return None
 
 
-def _covers_the_way(spec: AssistSpec, sweep: Scan, wanted: Twist) -> bool:
+def _covers_path(spec: AssistSpec, sweep: Scan, wanted: Twist) -> bool:
     """Return whether the scan covers the robot's path until it could stop."""
     fan = _fan(sweep)
     speed = math.hypot(wanted.vx, wanted.vy)
     if speed < _ON_THE_SPOT:
         return fan.share >= KNOWN
-    way = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
+    length = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
     return looks_ahead(
-        fan, spec.footprint, spec.sensor, wanted, way / speed, spec.stop_distance
+        fan, spec.footprint, spec.sensor, wanted, length / speed, spec.stop_distance
     )
 
 

@@ -57,7 +57,7 @@ class Goals:
         self._perhaps = True
         self._cancel_owed = False
         self._cancelled_at = self._insisted_at = float("-inf")
-        self._made_way_at: float | None = None
+        self._driven_off_at: float | None = None
         self._over_at = float("-inf")
         self._no_actions = False
         """Whether the bridge reported that it does not support action goals."""
@@ -81,7 +81,7 @@ class Goals:
         return self.spec.cancel_topic is not None or self.spec.action is not None
 
     @property
-    def _cancels_apart(self) -> bool:
+    def _cancels_by_service(self) -> bool:
         """Whether a cancel is a service call, on a socket of its own."""
         return self.spec.action is not None and not is_move_base(self.spec)
 
@@ -111,13 +111,13 @@ class Goals:
             Refusal: If the robot takes no goals, or its link is down.
 
         """
-        way = self.way
-        if way is None:
+        method = self.way
+        if method is None:
             raise Refusal("no goal topic and no action is set")
         if not self.link.up:
             raise Refusal("no connection to the bridge of its goals")
         id, until = generate_id(), now + WAIT_LIMIT
-        self._emit(SendGoal(self._key, self.spec.id, id, x, y, yaw, by, way, until))
+        self._emit(SendGoal(self._key, self.spec.id, id, x, y, yaw, by, method, until))
 
     def locate(self, x: float, y: float, yaw: float, by: str, now: float) -> None:
         """Send the robot its initial pose; metres and radians in its goal frame.
@@ -141,21 +141,21 @@ class Goals:
         """Note that a goal was written."""
         self._running, self._by, self._perhaps = goal.id, goal.by, True
         self._cancelled_at = float("-inf")  # it was for earlier goals
-        way = self.way or "topic"
+        method = self.way or "topic"
         self.report = GoalReport(
             id=goal.id,
             x=goal.x,
             y=goal.y,
             yaw=goal.yaw,
             by=goal.by,
-            way=way,
+            way=method,
             state="sent",
-            why="this robot reports no progress" if way == "topic" else "",
+            why="this robot reports no progress" if method == "topic" else "",
         )
 
     def progress(self, news: GoalProgress) -> None:
         """Note the progress of a goal; only the newest goal counts."""
-        report = self._about(news.id)
+        report = self._report_on(news.id)
         if report is None or report.state in OVER:
             return
         state = "under way" if news.active else "accepted"
@@ -163,19 +163,19 @@ class Goals:
             report = msgspec.structs.replace(report, state=state, why="")
         # Keep the values that this message does not have: actionlib sends status and
         # feedback on two topics.
-        told = {
+        values = {
             name: value
             for name in ("left", "time", "eta", "recoveries")
             if (value := getattr(news, name)) is not None
         }
-        self.report = msgspec.structs.replace(report, **told)
+        self.report = msgspec.structs.replace(report, **values)
 
     def ended(self, end: GoalEnded, now: float) -> None:
         """Note that the action ended a goal; only the newest goal is reported."""
         if end.id == self._running:
             self._running, self._by, self._perhaps = None, None, False
         self._no_actions |= end.no_actions
-        report = self._about(end.id)
+        report = self._report_on(end.id)
         if report is not None and report.state not in OVER:
             self._cancelled_at = float("-inf")  # a cancel is answered by this
             why = end.why
@@ -183,11 +183,11 @@ class Goals:
                 why = f"{why}; the next goal goes to {self.spec.goal_topic}"
             if end.outcome == "cancelled":
                 why = report.why if report.state == "cancelling" else why
-            self._show(end.outcome, why or _OTHERWISE[end.outcome], now)
+            self._show(end.outcome, why or _DEFAULT_REASONS[end.outcome], now)
 
     def on_progress_lost(self, lost: GoalLost, now: float) -> None:
         """Note that no progress of a goal is received any more."""
-        report = self._about(lost.id)
+        report = self._report_on(lost.id)
         if report is None or report.state in OVER:
             return
         if report.state == "cancelling":  # the cancel may be lost
@@ -210,7 +210,7 @@ class Goals:
             raise Refusal("no cancel topic and no action is set")
         self._running, self._by, self._perhaps = None, None, False
         self._cancel_owed, self._cancelled_at = not self.link.up, now
-        if self.link.up or self._cancels_apart:
+        if self.link.up or self._cancels_by_service:
             self._emit(CancelGoals(self._key, self.spec.id))
         if self.following:
             assert self.report is not None  # because it follows a goal
@@ -229,7 +229,7 @@ class Goals:
             now: The time.
 
         """
-        report = self._about(news.id)
+        report = self._report_on(news.id)
         cancelled = report is not None and report.state == "cancelling"
         due = now - self._insisted_at >= INSIST
         if due and (stopped or cancelled) and self.can_cancel:
@@ -242,9 +242,9 @@ class Goals:
         Others send goals to the robot too, without the gate. So driving off cancels
         goals that may be running, but not again at each press of a key.
         """
-        lately = self._made_way_at is not None and now - self._made_way_at < LATELY
+        lately = self._driven_off_at is not None and now - self._driven_off_at < LATELY
         if self.can_cancel and (self._perhaps or not lately):
-            self._made_way_at = now
+            self._driven_off_at = now
             self.cancel(now, "the robot is being driven")
 
     def stop(self, now: float) -> None:
@@ -273,7 +273,7 @@ class Goals:
             now: The time.
 
         """
-        if _places(self.spec) <= _places(spec):
+        if _goal_places(self.spec) <= _goal_places(spec):
             return
         if self.following:
             self.stop(now)
@@ -295,7 +295,7 @@ class Goals:
         if report is not None and (report.state, report.way) == ("cancelled", "topic"):
             self._show("cancelling", report.why, now)
 
-    def _about(self, id: str) -> GoalReport | None:
+    def _report_on(self, id: str) -> GoalReport | None:
         report = self.report
         return report if report is not None and report.id == id else None
 
@@ -306,14 +306,14 @@ class Goals:
         self.report = msgspec.structs.replace(self.report, state=state, why=why)
 
 
-_OTHERWISE = {
+_DEFAULT_REASONS = {
     "reached": "",
     "failed": "the robot gave no reason",
     "cancelled": "by the robot, or by another program",
 }
 
 
-def _places(spec: RobotSpec) -> set[tuple[str | None, str, str]]:
+def _goal_places(spec: RobotSpec) -> set[tuple[str | None, str, str]]:
     """Return the topics and actions that take and cancel the goals of a robot."""
     action = "move_base" if is_move_base(spec) else "action"
     names = {"goal": spec.goal_topic, "cancel": spec.cancel_topic, action: spec.action}

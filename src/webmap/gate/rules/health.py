@@ -68,13 +68,13 @@ class LinkHealth:
         self.up = False
         self.trips = Ages()
         """The round trips of the pings, in seconds."""
-        self._asked_at = float("-inf")
-        self._heard_at = float("-inf")
+        self._ping_at = float("-inf")
+        self._answered_at = float("-inf")
 
     def opened(self, now: float) -> None:
         """Note that the link is up; none of its pings is answered yet."""
         self.up = True
-        self._asked_at, self._heard_at = float("-inf"), now
+        self._ping_at, self._answered_at = float("-inf"), now
         self.trips.clear()
 
     def closed(self) -> None:
@@ -83,8 +83,8 @@ class LinkHealth:
 
     def answered(self, asked_at: float, now: float) -> None:
         """Note that the ping of ``asked_at`` was answered at ``now``."""
-        self._asked_at = max(self._asked_at, asked_at)
-        self._heard_at = now
+        self._ping_at = max(self._ping_at, asked_at)
+        self._answered_at = now
         self.trips.add(now - asked_at, now)
 
     def answered_since(self, then: float) -> bool:
@@ -92,15 +92,15 @@ class LinkHealth:
 
         If so, the data written at ``then`` has arrived, because the order is kept.
         """
-        return self.up and self._asked_at > then
+        return self.up and self._ping_at > then
 
     def fresh(self, now: float) -> bool:
         """Return whether a velocity other than zero may be written at ``now``."""
-        return self.up and now - self._asked_at <= PROOF_LIMIT
+        return self.up and now - self._ping_at <= PROOF_LIMIT
 
     def stalled(self, now: float) -> bool:
         """Return whether the link is open but carries nothing."""
-        return self.up and now - self._heard_at > STALL_LIMIT
+        return self.up and now - self._answered_at > STALL_LIMIT
 
 
 class DisplayPulse:

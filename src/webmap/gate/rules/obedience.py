@@ -40,14 +40,14 @@ class Obedience:
         self._calm = Standstill(math.nextafter(MOVES, 1), math.nextafter(TURNS, 1))
         self._moving: Twist | None = None
         self._moving_at = self._seen_at = float("-inf")
-        self._told_to_move = False
+        self._driven = False
         self._stuck: tuple[float, float] | None = None
         """When odometry first and last showed standstill of a driven machine."""
 
     def on_written(self, twist: Twist, last: Twist, now: float) -> None:
         """Note that ``twist`` was written after ``last``."""
-        self._told_to_move = moves(twist, MOVES, TURNS)
-        if not self._told_to_move:
+        self._driven = moves(twist, MOVES, TURNS)
+        if not self._driven:
             self._stuck = None
         if not twist.is_zero:
             self.excuse()
@@ -78,7 +78,7 @@ class Obedience:
             return
         if moves(twist):
             self._stuck = None
-        elif self._told_to_move:
+        elif self._driven:
             self._stuck = (self._stuck[0] if self._stuck else now, now)
         if self._zero_at is None:
             return
@@ -173,7 +173,7 @@ class OtherWriter:
         """The nodes that publish it; empty if it comes through the bridge too."""
         self._own: dict[tuple[float, ...], tuple[int, float]] = {}
         """By value, oldest first: echoes left, and when it was written last."""
-        self._heard_at: deque[float] = deque(maxlen=SURE)
+        self._received_at: deque[float] = deque(maxlen=SURE)
         self._expected_until = float("-inf")
 
     def on_written(self, twist: Twist, now: float) -> None:
@@ -201,8 +201,8 @@ class OtherWriter:
                 return
         if now < self._expected_until:
             return
-        self._heard_at.append(now)
-        if len(self._heard_at) == SURE and now - self._heard_at[0] <= WITHIN:
+        self._received_at.append(now)
+        if len(self._received_at) == SURE and now - self._received_at[0] <= WITHIN:
             self.seen = twist
 
     def named(self, nodes: tuple[str, ...]) -> None:
@@ -213,7 +213,7 @@ class OtherWriter:
 
     def step(self, now: float) -> None:
         """Forget a program that publishes no longer."""
-        if self.seen is not None and now - self._heard_at[-1] > WITHIN:
+        if self.seen is not None and now - self._received_at[-1] > WITHIN:
             self.seen = self.nodes = None
 
     def words(self, topic: str) -> str | None:
@@ -222,10 +222,10 @@ class OtherWriter:
             return None
         speed = math.copysign(math.hypot(self.seen.vx, self.seen.vy), self.seen.vx)
         v, w = round(speed, 2) + 0.0, round(self.seen.wz, 2) + 0.0
-        said = f"another program publishes to {topic} ({v:.2f} m/s, {w:.2f} rad/s)"
+        text = f"another program publishes to {topic} ({v:.2f} m/s, {w:.2f} rad/s)"
         if self.nodes is None:
-            return said
-        return f"{said}: {', '.join(self.nodes) or 'another client of the bridge'}"
+            return text
+        return f"{text}: {', '.join(self.nodes) or 'another client of the bridge'}"
 
 
 def _rounded(twist: Twist) -> list[tuple[float, ...]]:

@@ -81,7 +81,7 @@ def _folded(sweep: Scan, each: int) -> Scan:
     before: list[float] = []
     for start in range(0, len(ranges) + each - 1, each):
         group = ranges[start : start + each]
-        known = _saying(group, near)
+        known = _known_count(group, near)
         hits = _hits(group, near)
         nearest, *others = _things([*before, *hits]) or (math.inf,)
         unknown = nearest == math.inf and 2 * known < len(group)
@@ -104,9 +104,9 @@ def _hits(group: Sequence[float], near: float) -> list[float]:
     return [r for r in group if near <= r < math.inf or r == -math.inf]
 
 
-def _saying(group: Sequence[float], near: float) -> int:
+def _known_count(group: Sequence[float], near: float) -> int:
     """Return the number of known beams."""
-    return sum([_says_something(r, near) for r in group])
+    return sum([_is_known(r, near) for r in group])
 
 
 def known(sweep: Scan, rays: Sequence[int]) -> tuple[int, int]:
@@ -116,10 +116,10 @@ def known(sweep: Scan, rays: Sequence[int]) -> tuple[int, int]:
     """
     if (fold := sweep.fold) is not None:
         return sum(fold.said[ray] for ray in rays), sum(fold.asked[ray] for ray in rays)
-    return _saying([sweep.ranges[ray] for ray in rays], sweep.range_min), len(rays)
+    return _known_count([sweep.ranges[ray] for ray in rays], sweep.range_min), len(rays)
 
 
-def _says_something(reach: float, near: float) -> bool:
+def _is_known(reach: float, near: float) -> bool:
     """Return whether a beam is known, also if it hit nothing."""
     # A covered scanner reports less than range_min; a driver reports -inf on purpose.
     return math.isinf(reach) or reach >= max(near, 1e-6)
@@ -190,11 +190,11 @@ def looks_ahead(
     x0, y0, yaw = sensor
     return all(
         fan.covers(math.atan2(y - y0, x - x0) - yaw)
-        for x, y in _way(footprint, twist, seconds, margin)
+        for x, y in _path_places(footprint, twist, seconds, margin)
     )
 
 
-def _way(
+def _path_places(
     footprint: Sequence[Point], twist: Twist, seconds: float, margin: float
 ) -> Iterator[Point]:
     """Yield the places ahead that the outline reaches."""

@@ -60,9 +60,9 @@ class StopLatch:
         self._key = key
         self._emit = emit
         self._number = 0
-        self._kept = True
-        self._keep_next = False
-        self._keeping: Press | None = None
+        self._saved = True
+        self._save_next = False
+        self._saving: Press | None = None
         self._ids: set[str] = set()
         """The identities of the presses of this STOP that may be in the file."""
 
@@ -83,12 +83,12 @@ class StopLatch:
 
     def set(self, press: Press) -> None:
         """Activate STOP, with ``press`` as the newest press."""
-        waiting = self.on and not self._kept
+        waiting = self.on and not self._saved
         self.press = press
         if waiting:  # one write at a time; the next one has the newest press
-            self._keep_next = True
+            self._save_next = True
         else:
-            self._keep()
+            self._save()
 
     def found(self, press: Press) -> None:
         """Take over a press that an earlier or another gate saved on disk."""
@@ -100,16 +100,16 @@ class StopLatch:
         if press is None or press == self.press:
             return False
         # A press that is being saved, or could not be saved, is newer than the file.
-        return self._kept and not (self.on and self.trouble)
+        return self._saved and not (self.on and self.trouble)
 
     @property
     def settled(self) -> bool:
         """Whether no save is pending."""
-        return self._kept
+        return self._saved
 
     def save_again(self) -> None:
         """Save the current state again, because the file was removed."""
-        self._keep()
+        self._save()
 
     def drop(self) -> None:
         """Deactivate STOP here only; another gate is responsible for the file."""
@@ -137,24 +137,24 @@ class StopLatch:
     def reset(self) -> None:
         """Deactivate STOP."""
         self.press = self.shown = None
-        self._keep()
+        self._save()
         self._ids.clear()
 
     def kept(self, event: StopSaved) -> None:
         """Note the result of a save; only the newest save counts."""
         if event.number != self._number:
             return
-        self._kept, self.trouble = True, event.error
-        self.shown = self._keeping
-        if self._keep_next:
-            self._keep()
+        self._saved, self.trouble = True, event.error
+        self.shown = self._saving
+        if self._save_next:
+            self._save()
         elif self.shown is not None and event.error is None:
             self._ids = {self.shown.id}
 
-    def _keep(self) -> None:
+    def _save(self) -> None:
         self._number += 1
-        self._kept, self.trouble, self._keep_next = False, None, False
-        self._keeping = self.press
+        self._saved, self.trouble, self._save_next = False, None, False
+        self._saving = self.press
         if self.press is not None:
             self._ids.add(self.press.id)
         ids = frozenset(self._ids)
@@ -180,12 +180,12 @@ class Confirmation:
         """The reason as text; empty while ``confirmed`` is ``None``."""
         self.since = float("-inf")
         self._still = Standstill()
-        self._stood = False
+        self._stopped = False
 
     def begin(self, now: float) -> None:
         """Start anew at ``now``: odometry from before proves nothing."""
         self.confirmed, self.why, self.since = None, "", now
-        self._stood = False
+        self._stopped = False
         self._still.begin()
 
     def observe(self, twist: Twist | None, now: float) -> None:
@@ -209,7 +209,7 @@ class Confirmation:
             self.confirmed, self.why = False, self._since_then(trouble)
         elif self._still.reached and delivered and not silent:
             self.confirmed, self.why = True, "stopped, confirmed by odometry"
-            self._stood = True
+            self._stopped = True
         elif self.confirmed and not silent:
             pass  # odometry had a gap, which does not mean motion
         elif now - self.since < PATIENCE:
@@ -230,7 +230,7 @@ class Confirmation:
         return self._moving()
 
     def _since_then(self, trouble: str) -> str:
-        return f"it stopped, but since then: {trouble}" if self._stood else trouble
+        return f"it stopped, but since then: {trouble}" if self._stopped else trouble
 
     def _moving(self) -> str:
         speed = self._still.speed or 0.0
@@ -313,10 +313,10 @@ class ActiveStop:
         """
         latch = self.latch
         if press is not None:
-            news = latch.is_new(press)
-            if news and elsewhere and latch.on:
+            new = latch.is_new(press)
+            if new and elsewhere and latch.on:
                 latch.found(press)
-            return news and not elsewhere
+            return new and not elsewhere
         if not latch.settled or not latch.on:
             return False
         if elsewhere:  # the gate that has the machine reset it; this gate only watches
@@ -358,9 +358,9 @@ class ActiveStop:
         """Update the confirmation."""
         since = self.confirmation.since
         delivered = not self._robots.drivable or self._control.answered_since(since)
-        self.confirmation.judge(self._cannot_tell(), delivered, now)
+        self.confirmation.judge(self._why_unobservable(), delivered, now)
 
-    def _cannot_tell(self) -> str | None:
+    def _why_unobservable(self) -> str | None:
         """Return why standstill cannot be observed, as text, or ``None``."""
         robots = self._robots
         link = self._control

@@ -64,7 +64,7 @@ class StopTest:
         self.seconds: float | None = None
         """Seconds from the last command until the base stopped, if it did."""
         self._began_at = now
-        self._left_alone_at = now
+        self._last_command_at = now
         self._still = Standstill()
         self._unechoed: Counter[Twist] = Counter()
 
@@ -99,13 +99,13 @@ class StopTest:
                 "waiting",
                 "no more commands: waiting until the base stops",
             )
-            self._left_alone_at = last_command_at
+            self._last_command_at = last_command_at
         elif self.state == "waiting":
             self._still.observe(twist, now)
             if self._still.reached:
                 assert self._still.since is not None  # when the standstill began
                 self.state, self.concluded = "done", True
-                self.seconds = round(self._still.since - self._left_alone_at, 3)
+                self.seconds = round(self._still.since - self._last_command_at, 3)
                 self.text = f"the base stopped after {self.seconds:.2f} s"
 
     def step(self, now: float) -> None:
@@ -114,7 +114,7 @@ class StopTest:
             self.abort(f"the robot did not move within {CREEP_FOR:g} s")
         elif (
             self.state == "waiting"
-            and now - self._left_alone_at >= WAIT_FOR
+            and now - self._last_command_at >= WAIT_FOR
             and self._still.since is None  # else it may have stopped just now
         ):
             self.abort(MOVES_ON)
@@ -182,7 +182,7 @@ class StopTests:
         if test is not None:
             test.on_echo(twist)
             if not test.running:
-                self._after(test, now)
+                self._apply_state(test, now)
 
     def observe(self, measured: Twist | None, now: float) -> None:
         """Process an odometry message."""
@@ -191,7 +191,7 @@ class StopTests:
             state = test.state
             test.observe(measured, self._motion.moved_at, now)
             if test.state != state:
-                self._after(test, now)
+                self._apply_state(test, now)
 
     def step(self, now: float) -> None:
         """Apply the time limits of the running test."""
@@ -199,9 +199,9 @@ class StopTests:
         if test is not None:
             test.step(now)
             if not test.running:
-                self._after(test, now)
+                self._apply_state(test, now)
 
-    def _after(self, test: StopTest, now: float) -> None:
+    def _apply_state(self, test: StopTest, now: float) -> None:
         """Do what the new state of ``test`` requires."""
         if test.state == "waiting":
             self._motion.send_nothing()
