@@ -15,10 +15,10 @@ from webmap.gate.protocol import RobotSpec
 Vector = tuple[float, float, float]
 
 SLOW_V = 0.3
-"""The speed limit in m/s for a machine with an unknown limit (S9)."""
+"""The slow speed in m/s: without a stated limit or without a verified stop (S9)."""
 
 SLOW_W = 0.6
-"""The limit of the rate of turn in rad/s for a machine with an unknown limit (S9)."""
+"""The slow rate of turn in rad/s: without a stated limit or a verified stop (S9)."""
 
 STOPS_WITHIN = 0.5
 """The longest command timeout of a base, in seconds, for more than slow speed (S12)."""
