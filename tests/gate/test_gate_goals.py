@@ -679,7 +679,7 @@ class TestWhereItIs:
     @pytest.mark.parametrize(
         ("changes", "what"),
         [
-            ({"pose_type": "geometry_msgs/PoseStamped"}, "initial pose is told as"),
+            ({"pose_type": "geometry_msgs/PoseStamped"}, "initial pose is sent as"),
             ({"pose_covariance": (-1.0, 0.0, 0.0)}, "from 0 on"),
             ({"action": "/go", "action_type": "a/Fib"}, "NavigateToPose or"),
         ],

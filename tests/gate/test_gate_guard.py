@@ -186,7 +186,7 @@ def test_a_scan_for_a_machine_that_is_gone_is_nothing(bench):
         ({"brake": 0.0}, "above 0"),
         ({"stop_distance": -1.0}, "from 0 on"),
         ({"creep": math.nan}, "finite"),
-        ({"blind": "hope"}, "'stop' or to 'creep'"),
+        ({"blind": "hope"}, "is 'stop' or 'creep', got 'hope'"),
         ({"sensor": (math.inf, 0.0, 0.0)}, "finite"),
     ],
 )

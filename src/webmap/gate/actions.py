@@ -1,4 +1,4 @@
-"""What the decisions ask of the shell."""
+"""The actions that the rules send to the shell."""
 
 import math
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from webmap.gate.protocol import FromGate, GoalMethod, RobotSpec
 
 @dataclass(frozen=True, slots=True)
 class Attach:
-    """Hold the sockets of this robot open; sent again, it replaces the earlier one."""
+    """Keep the sockets of this robot open; a second one replaces the first."""
 
     key: Key
     spec: RobotSpec
@@ -19,7 +19,7 @@ class Attach:
 
 @dataclass(frozen=True, slots=True)
 class Detach:
-    """The robot's sockets are no longer needed."""
+    """Close the robot's sockets if no other robot needs them."""
 
     key: Key
     robot: str
@@ -27,7 +27,7 @@ class Detach:
 
 @dataclass(frozen=True, slots=True)
 class Watch:
-    """Listen to the machine's echo and odometry, or no longer."""
+    """Subscribe to the machine's echo and odometry, or unsubscribe."""
 
     key: Key
     on: bool
@@ -37,8 +37,8 @@ class Watch:
 class WriteTwist:
     """Write a velocity now or drop it; answered by ``TwistWritten``.
 
-    Zero is written whenever the link is open. Anything else is written only if
-    nothing is waiting to be sent before it, and before it is too old.
+    Zero is written whenever the link is open. Any other velocity is written only if no
+    earlier data waits to be sent, and only until ``until``.
     """
 
     key: Key
@@ -46,8 +46,8 @@ class WriteTwist:
     epoch: int | None
     by: str | None
     until: float = math.inf
-    """When it is too old, by the gate's clock: the process may have been held up
-    between what was decided and what is written."""
+    """When it is too old, by the gate's clock: the process may have been delayed
+    between the decision and the write."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ class SendGoal:
 
 @dataclass(frozen=True, slots=True)
 class SendPose:
-    """Tell the robot where it is, now or not at all; answered by ``PoseWritten``."""
+    """Write an initial pose now or drop it; answered by ``PoseWritten``."""
 
     key: Key
     robot: str
@@ -82,7 +82,7 @@ class SendPose:
 
 @dataclass(frozen=True, slots=True)
 class CancelGoals:
-    """Cancel every goal of the robot, by every way that it has."""
+    """Cancel every goal of the robot, by every method that it has."""
 
     key: Key
     robot: str
@@ -90,28 +90,28 @@ class CancelGoals:
 
 @dataclass(frozen=True, slots=True)
 class CutLink:
-    """Throw the control socket away with all that it has not sent, and reconnect."""
+    """Abort the control socket, discard its unsent data, and reconnect."""
 
     url: str
 
 
 @dataclass(frozen=True, slots=True)
 class Lock:
-    """Try to have the machine for this gate alone; answered by ``LockState``."""
+    """Try to lock the machine for this gate; answered by ``LockState``."""
 
     key: Key
 
 
 @dataclass(frozen=True, slots=True)
 class Unlock:
-    """Let other gates have the machine."""
+    """Release the lock of the machine for other gates."""
 
     key: Key
 
 
 @dataclass(frozen=True, slots=True)
 class MarkDriven:
-    """Keep on disk whether the machine is being driven (S13)."""
+    """Save on disk whether the machine is driven (S13)."""
 
     key: Key
     driven: bool
@@ -119,7 +119,7 @@ class MarkDriven:
 
 @dataclass(frozen=True, slots=True)
 class SaveStop:
-    """Keep on disk that STOP stands, or (``press`` is ``None``) that it does not.
+    """Save on disk that STOP is active, or (``press`` is ``None``) that it is not.
 
     Answered by ``StopSaved`` when the disk has it; nothing waits for that.
     """
@@ -128,13 +128,13 @@ class SaveStop:
     number: int
     press: Press | None
     ids: frozenset[str]
-    """The presses that may be in the file by this gate's doing. If another one is
-    there, another gate was told STOP meanwhile, and the file is not taken away."""
+    """The presses that this gate may have written to the file. If the file has any
+    other press, another gate received STOP meanwhile, and the file is not removed."""
 
 
 @dataclass(frozen=True, slots=True)
 class SaveStopTest:
-    """Keep what a stop test found; answered by ``StopTestSaved``."""
+    """Save the result of a stop test; answered by ``StopTestSaved``."""
 
     key: Key
     seconds: float | None
@@ -142,10 +142,10 @@ class SaveStopTest:
 
 @dataclass(frozen=True, slots=True)
 class RunHook:
-    """Publish the robot's Bool (``stopped``), or call its service.
+    """Publish ``stopped`` as the Bool of a stop hook, or call its service.
 
-    Answered by ``HookEnded``, for a service when it has answered or did not in time;
-    nothing waits for that.
+    Answered by ``HookEnded``, for a service after its answer or its timeout; nothing
+    waits for that.
     """
 
     key: Key
@@ -157,7 +157,7 @@ class RunHook:
 
 @dataclass(frozen=True, slots=True)
 class SendToDisplay:
-    """Tell the display."""
+    """Send a message to the display."""
 
     message: FromGate
 

@@ -1,4 +1,4 @@
-"""What the shell reports to the rules, besides the messages of the pipe."""
+"""The events that the shell sends to the rules, besides the messages of the pipe."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,53 +13,53 @@ Outcome = Literal["reached", "failed", "cancelled"]
 
 
 class Key(NamedTuple):
-    """What makes a machine one machine: its bridge and its velocity topic."""
+    """The key of a machine: its bridge and its velocity topic."""
 
     url: str
     topic: str
 
 
 class Press(NamedTuple):
-    """One press of STOP. Every press has an identity that no other one has."""
+    """One press of STOP, with an identity of its own."""
 
     by: str
-    """Who pressed it, for people."""
+    """The name of who pressed STOP."""
     id: str
     """The identity, which a reset must name."""
 
 
 class ScanFold(msgspec.Struct, frozen=True):
-    """What a scan that was folded to fewer beams was before."""
+    """Facts about a scan from before it was folded to fewer beams."""
 
     each: int
-    """How many beams lie from one beam of the fold to the next."""
+    """The number of beams from one beam of the fold to the next."""
     beams: int
-    """How many there were."""
+    """The number of beams before the fold."""
     behind: Sequence[Sequence[float]]
-    """For each beam of the fold the next things behind its nearest hit, in metres."""
+    """For each beam of the fold, the next things behind its nearest hit, in metres."""
     said: Sequence[int]
-    """For each beam of the fold, how many of those folded into it say anything."""
+    """For each beam of the fold, the number of known beams folded into it."""
     asked: Sequence[int]
-    """For each beam of the fold, how many were folded into it."""
+    """For each beam of the fold, the number of beams folded into it."""
 
 
 class Scan(msgspec.Struct, frozen=True):
-    """The newest scan."""
+    """A laser scan."""
 
     angle_min: float
     angle_increment: float
     range_min: float
     range_max: float
     ranges: Sequence[float]
-    """In metres: inf is nothing there, -inf too near, NaN unknown (REP 117)."""
+    """In metres; inf: nothing there, -inf: too near, NaN: unknown (REP 117)."""
     arrived: float
-    """When it came, on the gate's clock."""
+    """The time of arrival, on the gate's clock."""
     fold: ScanFold | None = None
-    """What it was before it was folded, if it was."""
+    """Set if the scan was folded."""
     refused: str | None = None
-    """Why nobody looked at it, in words, if nobody did."""
+    """Why the scan does not count, as text, if it does not."""
     frame: str = ""
-    """The frame that it says it is in; "" if it names none."""
+    """The frame that the scan names; "" if it names none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +72,12 @@ class LinkUp:
 
 @dataclass(frozen=True, slots=True)
 class LinkDown:
-    """A socket to a bridge is gone."""
+    """A socket to a bridge is closed."""
 
     url: str
     lane: Lane
     spent: bool = False
-    """Whether it goes on for a goal, and what was written before that arrives."""
+    """Whether the socket stays open for a goal, so that data written before arrives."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,24 +86,24 @@ class PingAnswered:
 
     url: str
     asked_at: float
-    """When that ping was sent: what was written before it has arrived."""
+    """When that ping was sent; data written before has arrived."""
 
 
 @dataclass(frozen=True, slots=True)
 class TwistWritten:
-    """What became of a velocity that was to be written."""
+    """The result of a ``WriteTwist``."""
 
     key: Key
     twist: Twist
     epoch: int | None
     by: str | None
     done: bool
-    """Whether it went out; if not, it was dropped and will not go out later."""
+    """Whether it was written; if not, it was dropped and is not written later."""
 
 
 @dataclass(frozen=True, slots=True)
 class GoalWritten:
-    """What became of a goal that was to be written."""
+    """The result of a ``SendGoal``."""
 
     robot: str
     id: str
@@ -116,7 +116,7 @@ class GoalWritten:
 
 @dataclass(frozen=True, slots=True)
 class PoseWritten:
-    """What became of a word on where the robot is."""
+    """The result of a ``SendPose``."""
 
     robot: str
     x: float
@@ -128,16 +128,16 @@ class PoseWritten:
 
 @dataclass(frozen=True, slots=True)
 class GoalProgress:
-    """The robot says how a goal goes; what it does not say is ``None``."""
+    """The robot reports progress of a goal; unreported values are ``None``."""
 
     robot: str
     id: str
     active: bool
-    """Whether it is under way, or only accepted."""
+    """Whether the robot follows it; otherwise it is only accepted."""
     left: float | None = None
     """Metres to go."""
     time: float | None = None
-    """Seconds under way."""
+    """Seconds since the robot began."""
     eta: float | None = None
     """Seconds to go."""
     recoveries: int | None = None
@@ -145,20 +145,20 @@ class GoalProgress:
 
 @dataclass(frozen=True, slots=True)
 class GoalEnded:
-    """The action reported the result of a goal, whatever it is."""
+    """The action reported the result of a goal."""
 
     robot: str
     id: str
     outcome: Outcome = "reached"
     why: str = ""
-    """The robot's reason, in its own words."""
+    """The reason in the text of the robot."""
     no_actions: bool = False
-    """Whether the bridge takes no goals of actions at all."""
+    """Whether the bridge does not support action goals at all."""
 
 
 @dataclass(frozen=True, slots=True)
 class GoalLost:
-    """What would have told how a goal goes is gone; the robot may go on."""
+    """The source of progress of a goal is lost; the robot may still follow it."""
 
     robot: str
     id: str
@@ -167,18 +167,18 @@ class GoalLost:
 
 @dataclass(frozen=True, slots=True)
 class HookEnded:
-    """What became of a ``RunHook``."""
+    """The result of a ``RunHook``."""
 
     robot: str
     hook: dict[str, str]
     number: int
     why: str | None
-    """Why the robot was not told, or did not do it, in words."""
+    """Why it was not sent or the robot refused it, as text; ``None`` on success."""
 
 
 @dataclass(frozen=True, slots=True)
 class EchoReceived:
-    """A velocity came back on the topic that the gate writes to."""
+    """A velocity was received on the topic that the gate writes to."""
 
     key: Key
     twist: Twist
@@ -186,7 +186,7 @@ class EchoReceived:
 
 @dataclass(frozen=True, slots=True)
 class OdometryReceived:
-    """Odometry came; ``twist`` is ``None`` if it says nothing of velocity.
+    """Odometry was received; ``twist`` is ``None`` if it has no velocity.
 
     Its numbers are finite for motion in the plane, and may be NaN for the others.
     """
@@ -194,13 +194,13 @@ class OdometryReceived:
     key: Key
     twist: Twist | None
     sent_after: float = float("inf")
-    """A moment after which the bridge said it, on the gate's clock; one that is yet to
-    come counts for the moment when it came."""
+    """A time after which the bridge sent it, on the gate's clock; a time in the future
+    counts as the time of arrival."""
 
 
 @dataclass(frozen=True, slots=True)
 class ScanReceived:
-    """A laser scan came."""
+    """A laser scan was received."""
 
     key: Key
     topic: str
@@ -209,17 +209,17 @@ class ScanReceived:
 
 @dataclass(frozen=True, slots=True)
 class StopRecord:
-    """What a stop test found."""
+    """The result of a stop test."""
 
     seconds: float | None
-    """How long the machine went on without commands; ``None`` if it did not stop."""
+    """Seconds from the last command to standstill; ``None`` if it did not stop."""
     date: str
     """The day of the test, as ``2026-11-21``."""
 
 
 @dataclass(frozen=True, slots=True)
 class LockState:
-    """Whether this gate alone on this computer has the machine."""
+    """Whether this gate, and so no other gate on this computer, has the machine."""
 
     key: Key
     held: bool
@@ -227,35 +227,35 @@ class LockState:
     """Whether an earlier gate died while it drove the machine (S13)."""
     why: str | None = None
     latched: Press | None = None
-    """The STOP that stands on disk, if one does (S7)."""
+    """The active STOP on disk, if there is one (S7)."""
     tested: StopRecord | None = None
-    """What the last stop test found, if there was one."""
+    """The result of the last stop test, if there is one."""
     elsewhere: bool = False
-    """Whether another gate on this computer has it."""
+    """Whether another gate on this computer has the machine."""
 
 
 @dataclass(frozen=True, slots=True)
 class StopFileChanged:
-    """The file of a STOP is another than before, or there is none any more."""
+    """The file of a STOP has changed or was removed."""
 
     key: Key
     press: Press | None
-    """The STOP that stands on disk now, if one does."""
+    """The active STOP on disk now, if there is one."""
 
 
 @dataclass(frozen=True, slots=True)
 class StopSaved:
-    """What became of a ``SaveStop``."""
+    """The result of a ``SaveStop``."""
 
     key: Key
     number: int
     error: str | None
-    """Why the disk does not have it, in words."""
+    """Why it could not be saved, as text."""
 
 
 @dataclass(frozen=True, slots=True)
 class StopTestSaved:
-    """The result of a stop test has its date."""
+    """The result of a ``SaveStopTest``, with its date."""
 
     key: Key
     record: StopRecord
@@ -263,7 +263,7 @@ class StopTestSaved:
 
 @dataclass(frozen=True, slots=True)
 class Shutdown:
-    """The process is to end: stop what is driven, then be silent."""
+    """The process must end: stop the driven machines, then send nothing more."""
 
     why: str
 

@@ -1,7 +1,7 @@
-"""How fast a machine may go now, and why not faster.
+"""The speed limits of a machine and their reasons.
 
-Every reason to be slow is a :class:`Cap`; the least of them is in force. A further
-reason (latency, scan assist) is one more cap in the list.
+Every limit is a :class:`Cap`; the least cap is in force. A further reason (latency,
+scan assist) is one more cap in the list.
 """
 
 import math
@@ -15,20 +15,20 @@ from webmap.gate.protocol import RobotSpec
 Vector = tuple[float, float, float]
 
 SLOW_V = 0.3
-"""Metres per second for a machine of which too little is known (S9)."""
+"""The slow speed in m/s: without a stated limit or without a verified stop (S9)."""
 
 SLOW_W = 0.6
-"""Radians per second for a machine of which too little is known (S9)."""
+"""The slow rate of turn in rad/s: without a stated limit or a verified stop (S9)."""
 
 STOPS_WITHIN = 0.5
-"""A base that stops by itself within this time, in seconds, may go faster (S12)."""
+"""The longest command timeout of a base, in seconds, for more than slow speed (S12)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Axes:
-    """How fast a machine may move out of the plane, axis by axis.
+    """The limits of motion out of the plane, axis by axis.
 
-    An axis that nobody states a limit for has 0: the machine does not move along it.
+    An axis without a stated limit has 0: the machine does not move along it.
     """
 
     z: float = 0.0
@@ -41,7 +41,7 @@ class Axes:
     """Radians per second about the left axis."""
 
     def refusal(self, twist: Twist) -> str | None:
-        """Return why the machine cannot be told ``twist``, in words, or ``None``."""
+        """Return why ``twist`` cannot be sent to the machine, as text, or ``None``."""
         for axis, wanted, unit, limit in (
             ("z", twist.vz, "m/s", self.z),
             ("rx", twist.wx, "rad/s", self.rx),
@@ -55,13 +55,13 @@ class Axes:
         return None
 
     def seen(self, measured: Twist | None) -> Twist | None:
-        """Return what odometry says of the axes that the machine moves along.
+        """Return the measured velocity, reduced to the axes of the machine.
 
         Args:
-            measured: The velocity that it tells, if it tells one.
+            measured: The velocity in an odometry message, if it has one.
 
         Returns:
-            ``None`` if it tells no finite number for one of those axes.
+            ``None`` if the number of one of those axes is not finite.
 
         """
         if measured is None:
@@ -78,14 +78,14 @@ class Axes:
 
 
 PLANE = Axes()
-"""The axes of a machine that moves in the plane alone."""
+"""The axes of a machine that moves only in the plane."""
 
 
 def axes_of(specs: Iterable[RobotSpec]) -> Axes:
-    """Return the axes of a machine that everybody states a limit for, and the least.
+    """Return the least limit of each axis; 0 if one robot states no limit for it.
 
     Args:
-        specs: The robots that are the machine.
+        specs: The robots that are declared for the machine.
 
     """
     limits = [
@@ -96,7 +96,7 @@ def axes_of(specs: Iterable[RobotSpec]) -> Axes:
 
 @dataclass(frozen=True, slots=True)
 class Cap:
-    """One upper bound: metres and radians per second, and its reason in words."""
+    """One speed limit: metres and radians per second, and its reason as text."""
 
     v: float
     w: float
@@ -105,7 +105,7 @@ class Cap:
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """The speeds in force and the reasons that bind them."""
+    """The speed limits in force and their reasons."""
 
     v: float
     w: float
@@ -113,11 +113,11 @@ class Speed:
 
 
 def caps_of(spec: RobotSpec, tested: StopRecord | None = None) -> list[Cap]:
-    """Return what the robot itself does not allow to exceed.
+    """Return the caps of the robot itself.
 
     Args:
         spec: The robot.
-        tested: What its stop test found; that counts more than what was stated.
+        tested: The result of its stop test; it overrides the stated ``stops_within``.
 
     """
     caps = []
@@ -137,12 +137,12 @@ def caps_of(spec: RobotSpec, tested: StopRecord | None = None) -> list[Cap]:
 
 
 def page_cap(v: float = math.inf, w: float = math.inf) -> Cap:
-    """Return what a page asks for at most; nonsense means standstill."""
+    """Return the cap that a page asks for; a negative or NaN limit becomes 0."""
     return Cap(v if v >= 0 else 0.0, w if w >= 0 else 0.0, "limit of the page")
 
 
 def least(caps: Iterable[Cap]) -> Speed:
-    """Return the least of ``caps``; infinity where none of them says anything."""
+    """Return the least of ``caps``; infinity if there is no limit."""
     caps = list(caps)
     v = min((cap.v for cap in caps), default=math.inf)
     w = min((cap.w for cap in caps), default=math.inf)
@@ -155,7 +155,7 @@ def least(caps: Iterable[Cap]) -> Speed:
 
 
 def in_force(speed: Speed) -> Speed:
-    """Return ``speed``, or what is slow where it says nothing."""
+    """Return ``speed``, or slow speeds if one of its limits is infinite."""
     if math.inf not in (speed.v, speed.w):
         return speed
     v, w = min(speed.v, SLOW_V), min(speed.w, SLOW_W)
@@ -163,7 +163,7 @@ def in_force(speed: Speed) -> Speed:
 
 
 def speed_in_force(caps: Iterable[Cap]) -> Speed:
-    """Return the least of ``caps``; slow where none of them says anything."""
+    """Return the least of ``caps``; slow speeds if a limit is missing."""
     return in_force(least(caps))
 
 
@@ -171,8 +171,8 @@ def offered(own: Speed, page: Cap) -> Speed:
     """Return the speeds that would be in force if a page took a free robot.
 
     Args:
-        own: What the robot allows by itself, perhaps without end.
-        page: What the page asks for at most.
+        own: The limits of the robot itself, perhaps infinite.
+        page: The limits that the page asks for.
 
     """
     v, w = min(own.v, page.v), min(own.w, page.w)
@@ -191,7 +191,7 @@ def fit(wanted: Twist, speed: Speed, *, holonomic: bool, axes: Axes = PLANE) -> 
         speed: The speeds in force, whatever the direction.
         holonomic: Whether the base can move sideways; if not, ``vy`` is exactly 0.
         axes: The limits of the axes that lead out of the plane. A velocity along an
-            axis that has none becomes zero as a whole.
+            axis with the limit 0 becomes zero as a whole.
 
     """
     vx, vy = wanted.vx, wanted.vy if holonomic else 0.0
@@ -203,10 +203,10 @@ def fit(wanted: Twist, speed: Speed, *, holonomic: bool, axes: Axes = PLANE) -> 
 
 
 def _within(parts: Vector, most: float, each: Vector) -> Vector:
-    """Return ``parts``, shortened until its length and each part are small enough.
+    """Return ``parts``, shortened until its length and each part are within limits.
 
     A velocity along one axis is clamped exactly, without rounding. No quotient here is
-    larger than 1: with an infinity a zero would make a NaN.
+    larger than 1: infinity times zero would be NaN.
     """
     length = math.hypot(*parts)
     found = list(parts)
@@ -223,15 +223,15 @@ def _within(parts: Vector, most: float, each: Vector) -> Vector:
 
 
 def ramp(last: Twist, wanted: Twist, a_max: float, elapsed: float) -> Twist:
-    """Return ``wanted`` or, if that speeds up too much, what is allowed of it.
+    """Return ``wanted``, reduced if it accelerates too much.
 
-    Slowing down is never held back; turning round counts as speeding up from
-    standstill. The turning rates are not ramped.
+    Slowing down is never limited; reversing counts as speeding up from standstill. The
+    rates of turn are not ramped.
 
     Args:
-        last: What was written last.
-        wanted: What is wanted now.
-        a_max: Greatest growth of the speed, in m/s², along each axis and in all.
+        last: The velocity that was written last.
+        wanted: The velocity that is wanted now.
+        a_max: The greatest growth of the speed, in m/s², along each axis and in total.
         elapsed: Seconds since ``last`` was written.
 
     """
@@ -239,7 +239,7 @@ def ramp(last: Twist, wanted: Twist, a_max: float, elapsed: float) -> Twist:
     vx, vy = _towards(last.vx, wanted.vx, step), _towards(last.vy, wanted.vy, step)
     vz = _towards(last.vz, wanted.vz, step)
     allowed, length = last.speed + step, math.hypot(vx, vy, vz)
-    if (vx, vy, vz).count(0.0) < 2 and length > allowed:  # aslant, on several axes
+    if (vx, vy, vz).count(0.0) < 2 and length > allowed:  # diagonal, on several axes
         vx, vy, vz = (part / length * allowed for part in (vx, vy, vz))
     return Twist(vx, vy, wanted.wz, vz, wanted.wx, wanted.wy)
 

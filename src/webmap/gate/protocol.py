@@ -1,8 +1,8 @@
 """The messages between the display and the gate, over the pipe.
 
 Speeds are metres and radians per second in the robot's own frame (x forward, y left,
-z up, turn counter-clockwise); times are seconds. The display makes up a short opaque
-text for each robot, and one for each connection (the socket of one page).
+z up, turn counter-clockwise); times are seconds. The display generates a short opaque
+id for each robot and for each connection (the socket of one page).
 """
 
 from typing import Literal
@@ -17,44 +17,44 @@ PROGRAM = "program"
 Role = Literal["viewer", "operator", "admin"]
 
 GoalMethod = Literal["topic", "navigate_to_pose", "move_base"]
-"""How goals are sent: as PoseStamped on a topic, by the action of ROS 2, or by that of
+"""How goals are sent: as PoseStamped on a topic, to the action of ROS 2, or to that of
 ROS 1."""
 
 
 Point = tuple[float, float]
-"""In metres, in the robot's frame: x forward, y left."""
+"""x (forward) and y (left) in metres, in the robot's own frame."""
 
 
 class AssistSpec(msgspec.Struct, frozen=True, kw_only=True):
-    """How a robot is kept from what its scanner sees."""
+    """The scan assist of a robot."""
 
     topic: str
-    """Of ``sensor_msgs/LaserScan``."""
+    """The topic of its ``sensor_msgs/LaserScan``."""
     footprint: tuple[Point, ...]
     """The corners of the robot in its own frame, in order, in metres."""
     sensor: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where the scanner is on it: x, y in metres, yaw in radians."""
+    """The pose of the scanner on the robot: x, y in metres, yaw in radians."""
     upside_down: bool = False
-    """Whether it hangs head down, so that its rays go round the other way."""
+    """Whether the scanner is mounted upside down, so that its rays run clockwise."""
     frame: str = ""
     """The frame that its scans must name, without a leading slash; "" for any."""
     stop_distance: float = 0.15
-    """What stays free before the robot, in metres."""
+    """The distance to keep free before the robot, in metres."""
     brake: float = 0.5
-    """How hard the robot slows down, in metres per second squared."""
+    """The deceleration of the robot, in m/s²."""
     blind: Literal["stop", "creep"] = "stop"
-    """What happens while the scan is old, empty or mostly unknown."""
+    """What the robot does while the scan is old, empty or mostly unknown."""
     creep: float = 0.1
-    """The speed of creeping, in metres per second."""
+    """The speed of creeping, in m/s."""
 
 
 class RobotSpec(
     msgspec.Struct, frozen=True, kw_only=True, tag="declare", omit_defaults=True
 ):
-    """What the gate must know of a robot. Sent again, it replaces the earlier one.
+    """The declaration of a robot. Sent again, it replaces the earlier declaration.
 
-    As long as the robot is the same (bridge and velocity topic) a lease on it ends
-    when anything else here changes.
+    If bridge and velocity topic stay the same and any other value changes, the lease
+    on the robot ends.
     """
 
     id: str
@@ -68,7 +68,7 @@ class RobotSpec(
     base_frame: str = ""
     """The robot's own frame, which a TwistStamped names."""
     twist_type_assumed: bool = False
-    """Whether nobody stated that type and no robot told it: another's word counts."""
+    """Whether that type is a default: a type that another robot states overrides it."""
     holonomic: bool = False
     """Whether the base can move sideways."""
     stops_within: float | None = None
@@ -79,50 +79,50 @@ class RobotSpec(
     """The highest rate of turn in rad/s, whatever the axis."""
     z_max: float | None = None
     """The highest speed upward and downward, in m/s. Without it the robot takes no
-    velocity that has a z."""
+    velocity with a z part."""
     rx_max: float | None = None
     """The highest rate of turn about the forward axis, in rad/s; likewise."""
     ry_max: float | None = None
     """The highest rate of turn about the left axis, in rad/s; likewise."""
     a_max: float | None = None
-    """Greatest growth of the speed, in m/s²; slowing down is never held back."""
+    """Greatest growth of the speed, in m/s²; slowing down is never limited."""
     odometry_topic: str | None = None
     odometry_type: str | None = None
     odometry_url: str | None = None
-    """The bridge of the odometry, if it is another."""
+    """The bridge of the odometry, if it is a different one."""
     goal_topic: str | None = None
     goal_url: str | None = None
-    """The bridge of goals and cancel, if it is another."""
+    """The bridge of goals and cancels, if it is a different one."""
     goal_type: str = "geometry_msgs/PoseStamped"
     goal_frame: str = "map"
     cancel_topic: str | None = None
     """Where an empty ``actionlib_msgs/GoalID`` cancels every goal."""
     action: str | None = None
-    """An action of the type below: it gets the goals, and is told to cancel them. The
-    ``goal_topic`` is then for bridges that take no goals of actions."""
+    """An action of the type below, which receives the goals and their cancels. The
+    ``goal_topic`` is then for bridges that do not support action goals."""
     action_type: str = "nav2_msgs/action/NavigateToPose"
     """``NavigateToPose`` of ``nav2_msgs``, or ``move_base_msgs/MoveBaseAction``."""
     on_operator_loss: Literal["continue", "cancel"] = "continue"
-    """What becomes of a goal when the page (or program) that gave it is lost."""
+    """What happens to a goal when the page (or program) that sent it is lost."""
     pose_topic: str | None = None
-    """Where a ``PoseWithCovarianceStamped`` tells the robot where it is; on the bridge
-    of the goals, in their frame."""
+    """The topic of the initial pose, a ``PoseWithCovarianceStamped``; on the bridge of
+    the goals, in their frame."""
     pose_type: str = "geometry_msgs/PoseWithCovarianceStamped"
     pose_covariance: tuple[float, float, float] = (0.25, 0.25, 0.068)
-    """How sure a person is of it: the variances of x and y in m², of yaw in rad²."""
+    """The variances of the initial pose: x and y in m², yaw in rad²."""
     own_map: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where the origin of its goal frame is on the common map: metres and radians.
-    Goals and poses come on the common map, and are told to the robot in its own."""
+    """The origin of its goal frame on the common map: metres and radians. Goals and
+    poses arrive on the common map, and are sent to the robot in its own map."""
     assist: AssistSpec | None = None
-    """How the robot is slowed down before what its scanner sees; off without it."""
+    """The scan assist of the robot; ``None`` is off."""
     stop_hooks: tuple[dict[str, str], ...] = ()
-    """What else the robot's bridge is told on STOP: ``{"topic": "/lock", "type":
+    """What else is sent to the robot's bridge on STOP: ``{"topic": "/lock", "type":
     "std_msgs/Bool"}`` publishes true (and false on reset), ``{"service": "/e_stop",
     "type": "std_srvs/Trigger"}`` is called."""
 
 
 class Forget(msgspec.Struct, frozen=True, tag="forget"):
-    """The robot is no longer wanted: stop it if it is driven, then drop it."""
+    """Remove the robot; if it is driven, stop it first."""
 
     robot: str
 
@@ -136,20 +136,20 @@ class Connect(msgspec.Struct, frozen=True, tag="connect"):
 
 
 class Disconnect(msgspec.Struct, frozen=True, tag="disconnect"):
-    """The page's socket is gone: what it drove stops."""
+    """The page's socket is closed: the robots that it drives stop."""
 
     connection: str
 
 
 class FromPage(msgspec.Struct, frozen=True, tag="browser"):
-    """A page's own words, not looked at by the display."""
+    """A message of a page, which the display does not read."""
 
     connection: str
     text: bytes
 
 
 class Speeds(msgspec.Struct, frozen=True, tag="speeds"):
-    """The greatest speeds that a page's ``Teleop`` asks for."""
+    """The speed limits that a page's ``Teleop`` asks for."""
 
     connection: str
     v: float
@@ -157,7 +157,7 @@ class Speeds(msgspec.Struct, frozen=True, tag="speeds"):
 
 
 class Heartbeat(msgspec.Struct, frozen=True, tag="beat"):
-    """The display lives; sent every 50 ms."""
+    """The display responds; sent every 50 ms."""
 
 
 class WriterNodes(msgspec.Struct, frozen=True, tag="writer-nodes"):
@@ -189,43 +189,43 @@ ToGate = (
 
 
 class Holder(msgspec.Struct, frozen=True):
-    """Who holds the lease of a robot."""
+    """The holder of the lease of a robot."""
 
     connection: str
     name: str
 
 
 class AskerReport(msgspec.Struct, frozen=True):
-    """Who asks the holder of a robot's lease for it."""
+    """The connection that requests control of a robot from its holder."""
 
     connection: str
     name: str
     left: float
-    """Seconds until it is granted by itself."""
+    """Seconds until the request is granted automatically."""
 
 
 class StopReport(msgspec.Struct, frozen=True):
-    """What is known of a STOP that stands."""
+    """The state of an active STOP."""
 
     by: str
-    """Who said it, for people."""
+    """The name of who pressed STOP."""
     confirmed: bool | None
     """Whether odometry shows standstill; ``None`` while that is not known yet."""
     why: str
-    """The reason in words."""
+    """The reason as text."""
     id: str
-    """Its identity, which a reset must name. Each press of STOP has its own."""
+    """The identity of the newest press, which a reset must name."""
 
 
 class TestReport(msgspec.Struct, frozen=True):
-    """How it stands with the last stop test."""
+    """The state of the last stop test."""
 
     state: Literal["creeping", "waiting", "done", "failed"]
     text: str
 
 
 class GoalReport(msgspec.Struct, frozen=True, kw_only=True):
-    """How it stands with the newest goal; what the robot does not say is ``None``."""
+    """The state of the newest goal; unreported values are ``None``."""
 
     id: str
     x: float
@@ -244,13 +244,13 @@ class GoalReport(msgspec.Struct, frozen=True, kw_only=True):
         "failed",
         "cancelled",
     ]
-    """``unknown``: what told how it goes was lost, and the robot may go on."""
+    """``unknown``: the source of progress was lost; the robot may still follow it."""
     why: str = ""
-    """Why it is so, in words."""
+    """The reason for the state, as text."""
     left: float | None = None
-    """Metres to go; along the path, or as the crow flies where move_base tells."""
+    """Metres to go: along the path, or in a straight line with move_base."""
     time: float | None = None
-    """Seconds under way."""
+    """Seconds since the robot began."""
     eta: float | None = None
     """Seconds to go."""
     recoveries: int | None = None
@@ -275,48 +275,48 @@ Activity = Literal[
     "barred",
     "barred_held",
 ]
-"""What a robot does, as far as the gate knows."""
+"""The states of a robot, see ``webmap.core.robot_state``."""
 
 
 class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
-    """Everything a page shows about a robot's motion."""
+    """Everything that a page shows about a robot's motion."""
 
     robot: str
     name: str
     state: Literal["free", "held", "driving", "stopping", "stopped"]
-    """``stopping``: zeros are being sent; ``stopped``: STOP stands."""
+    """``stopping``: zeros are being sent; ``stopped``: STOP is active."""
     doing: Activity
-    """The same in the words of an operator, see ``webmap.core.robot_state``."""
+    """What the robot does, in the terms of an operator."""
     latched: bool
-    """Whether STOP stands, and will after a restart: until a reset nothing moves."""
+    """Whether STOP is active, also after a restart: nothing moves until a reset."""
     stop: StopReport | None
-    """What became of the STOP that stands."""
+    """The active STOP."""
     holder: Holder | None
     epoch: int | None
     """The epoch of the lease, which commands must name; ``None`` without a lease."""
     asker: AskerReport | None
     changing: bool
-    """Whether the lease goes to somebody else as soon as the robot stands."""
+    """Whether the lease changes to another connection at standstill."""
     armed: bool
-    """Whether a command to move would be taken now."""
+    """Whether a command to move would be accepted now."""
     v: float
     w: float
-    """The speeds in force. Of a robot that nobody has, those that it allows: infinity
-    if none was stated, for who takes it brings a limit along."""
+    """The speed limits in force. For a free robot its own limits: infinity if none was
+    stated, because the page that takes control adds its limit."""
     why: tuple[str, ...]
-    """What holds the speeds down, in words."""
+    """The reasons for the speed limits, as text."""
     link: Literal["up", "down"]
     sent: Velocity
     echoed: Velocity | None
-    """What the robot's ROS last said back on the velocity topic."""
+    """The velocity last received on the velocity topic."""
     measured: Velocity | None
-    """What odometry says, if it is fresh."""
+    """The velocity in the newest odometry, if it is fresh."""
     alarm: str | None
-    """That the robot moves on although zero was sent, in words."""
+    """That the robot still moves although zero was sent, as text."""
     age: float | None
     """The age of the driver's loop in milliseconds, p95 of two seconds."""
     reaction: float
-    """Seconds from a finger to the robot, at worst."""
+    """Seconds from an input to the robot, in the worst case."""
     brake: float
     """The deceleration that is assumed, in m/s²."""
     stop_time: float | None
@@ -327,36 +327,36 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     test: TestReport | None
     armable: bool
     reason: str | None
-    """Why the robot cannot be taken or moved now, in words."""
+    """Why the robot cannot be taken or moved now, as text."""
     way: GoalMethod | None = None
-    """How goals are sent to it, ``None`` if none can be."""
+    """The method for goals; ``None`` if goals cannot be sent."""
     cancels: bool = False
-    """Whether they can be called off."""
+    """Whether goals can be cancelled."""
     locates: bool = False
-    """Whether it can be told where it is."""
+    """Whether the robot takes an initial pose."""
     goal: GoalReport | None = None
     """The newest goal of this gate, also when it has ended."""
     other_writer: str | None = None
-    """That another program publishes velocities to it, which and from where, in
-    words."""
+    """That another program publishes velocities to the robot: which velocity and which
+    nodes, as text."""
     hooks: tuple[str, ...] = ()
-    """Which stop hooks failed, or have not been said yet, and why, in words."""
+    """Which stop hooks failed or were not sent yet, and why, as text."""
 
 
 class RobotGone(msgspec.Struct, frozen=True, tag="gone"):
-    """The robot was forgotten."""
+    """The robot was removed."""
 
     robot: str
 
 
 class Ready(msgspec.Struct, frozen=True, tag="ready"):
-    """The gate's process runs and listens."""
+    """The gate's process runs and reads its pipe."""
 
     pid: int
 
 
 class Hello(msgspec.Struct, frozen=True, tag="hello"):
-    """The gate knows the connection now."""
+    """The answer to :class:`Connect`: the gate accepts messages of the connection."""
 
     connection: str
 
@@ -370,7 +370,7 @@ class Tick(msgspec.Struct, frozen=True, tag="tick"):
 
 
 class Refused(msgspec.Struct, frozen=True, tag="refused"):
-    """A command was not taken."""
+    """A command was refused."""
 
     connection: str
     robot: str | None
@@ -379,18 +379,18 @@ class Refused(msgspec.Struct, frozen=True, tag="refused"):
 
 
 class RefusedCount(msgspec.Struct, frozen=True, tag="refused-count"):
-    """How much of what somebody sent was refused since that was last counted."""
+    """The number of messages of one sender that were refused since the last count."""
 
     by: str
-    """Who sent it, for people."""
+    """The name of the sender."""
 
     count: int
     last: str
-    """What was refused last, and why."""
+    """The last refused message, and why."""
 
 
 class CloseConnection(msgspec.Struct, frozen=True, tag="close"):
-    """The display should close this page's socket: it talks nonsense."""
+    """The display should close this page's socket: the page sends invalid messages."""
 
     connection: str
     why: str
@@ -413,7 +413,7 @@ class SentTwist(msgspec.Struct, frozen=True, tag="sent-twist"):
     vy: float
     wz: float
     by: str | None
-    """The connection that gave it; ``None`` for a zero that the gate sent itself."""
+    """The connection that sent it; ``None`` for a zero of the gate itself."""
     vz: float = 0.0
     wx: float = 0.0
     wy: float = 0.0
@@ -430,7 +430,7 @@ class SentGoal(msgspec.Struct, frozen=True, tag="sent-goal"):
 
 
 class SentPose(msgspec.Struct, frozen=True, tag="sent-pose"):
-    """The robot was told where it is."""
+    """An initial pose was written to the robot's bridge."""
 
     robot: str
     x: float
@@ -444,11 +444,11 @@ class GateUp(msgspec.Struct, frozen=True, tag="up"):
 
 
 class GateDown(msgspec.Struct, frozen=True, tag="down"):
-    """The gate's process is gone: every lease and tick with it (by the client)."""
+    """The gate's process has ended, with all leases and ticks (made by the client)."""
 
     why: str
     failing: bool = False
-    """Whether one gate after the other ends, so that somebody must do something."""
+    """Whether one gate after the other ends, so that a person must find the cause."""
 
 
 FromGate = (

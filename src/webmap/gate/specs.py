@@ -1,7 +1,7 @@
-"""The declaration of a robot, checked: names in one form, numbers that make sense.
+"""Checks the declaration of a robot, and puts its names in one form.
 
-The gate asks which points lie inside the outline and when one touches an edge. Neither
-means anything where edges cross, or where there is no inside.
+Scan assist computes which points lie inside the outline and when a point touches an
+edge. Both need an outline with an area and without crossing edges.
 """
 
 import itertools
@@ -23,23 +23,23 @@ from webmap.ros.names import (
 )
 
 MOST_CORNERS = 100
-"""Corners of an outline: each of them costs time with every command."""
+"""The most corners of an outline: each costs time with every command."""
 
 LEAST_AREA = 1e-4
-"""In square metres: a square of one centimetre."""
+"""The least area in square metres: a square of one centimetre."""
 
 FARTHEST = 1000.0
-"""Metres from the robot's origin to a corner."""
+"""The most metres from the robot's origin to a corner, along x and along y."""
 
 
 def why_no_outline(corners: Sequence[Point]) -> str | None:
-    """Return why corners make no outline, in words that follow a colon.
+    """Return why corners make no outline, as text to follow a colon.
 
     Args:
-        corners: In their order, finite, in metres.
+        corners: The corners in order; finite, in metres.
 
     Returns:
-        None if they make one.
+        ``None`` if they make an outline.
 
     """
     number = len(corners)
@@ -66,11 +66,11 @@ def why_no_outline(corners: Sequence[Point]) -> str | None:
 
 
 def _cross(corners: Sequence[Point], i: int, j: int) -> bool:
-    """Return whether two edges have a point in common that they should not have."""
+    """Return whether two edges meet, other than neighbours in their common corner."""
     number = len(corners)
     a, b = corners[i], corners[(i + 1) % number]
     c, d = corners[j], corners[(j + 1) % number]
-    if b == c:  # neighbours share a corner, and cross if one leads back over the other
+    if b == c:  # neighbours share a corner, and cross if one runs back over the other
         return _turn(a, b, d) == 0.0 and _ahead(a, b, d) < 0.0
     if d == a:
         return _turn(c, d, b) == 0.0 and _ahead(c, d, b) < 0.0
@@ -84,7 +84,7 @@ def _turn(a: Point, b: Point, c: Point) -> float:
 
 
 def _ahead(a: Point, b: Point, c: Point) -> float:
-    """Return whether c lies ahead of b, on the way from a; negative if behind."""
+    """Return how far c lies ahead of b, seen from a; negative if behind."""
     return (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1])
 
 
@@ -96,13 +96,13 @@ def _boxes_meet(a: Point, b: Point, c: Point, d: Point) -> bool:
 
 
 def _area(corners: Sequence[Point]) -> float:
-    """Return the area inside, negative where the corners go clockwise."""
+    """Return the area inside; negative if the corners are in clockwise order."""
     pairs = itertools.pairwise((*corners, corners[0]))
     return sum(ax * by - bx * ay for (ax, ay), (bx, by) in pairs) / 2
 
 
 PLACES = (("topic", "std_msgs/Bool"), ("service", "std_srvs/Trigger"))
-"""What a hook may name, and of which type that is."""
+"""What a stop hook may name, and its ROS type."""
 
 
 def checked_hooks(
@@ -111,12 +111,12 @@ def checked_hooks(
     """Return the stop hooks of the robot called ``name``, with names resolved.
 
     Args:
-        name: The robot, for people.
+        name: The name of the robot, for errors.
         hooks: Any number of hooks, in order.
-        twist_topic: Where its velocity goes, which no hook may write to.
+        twist_topic: The velocity topic, which no hook may write to.
 
     Raises:
-        ConfigError: If something in them cannot be meant.
+        ConfigError: If a hook is invalid.
 
     """
     if isinstance(hooks, str | Mapping) or not isinstance(hooks, Iterable):
@@ -180,7 +180,7 @@ def checked(spec: RobotSpec) -> RobotSpec:
     """Return ``spec`` with its addresses and topics resolved.
 
     Raises:
-        ConfigError: If something in it cannot be meant.
+        ConfigError: If a value is invalid.
 
     """
     if not spec.id or len(spec.id) > 64 or not spec.id.isprintable() or spec.id == "*":
@@ -204,7 +204,7 @@ def checked(spec: RobotSpec) -> RobotSpec:
         )
     if spec.pose_topic and not is_type(spec.pose_type, POSE_TYPE):
         raise ConfigError(
-            f"robot {spec.name!r}: its initial pose is told as {POSE_TYPE}, "
+            f"robot {spec.name!r}: its initial pose is sent as {POSE_TYPE}, "
             f"got {spec.pose_type!r}"
         )
     if not all(math.isfinite(v) and v >= 0 for v in spec.pose_covariance):
@@ -244,10 +244,10 @@ def checked(spec: RobotSpec) -> RobotSpec:
 
 
 def check_twist_type(spec: RobotSpec, others: Iterable[RobotSpec]) -> None:
-    """Let a checked ``spec`` pass if no other robot has velocity of another type there.
+    """Check that the velocity topic of a checked ``spec`` has one type for all robots.
 
     Raises:
-        ConfigError: If one has: one topic has one type.
+        ConfigError: If another robot states another type for that topic.
 
     """
     if spec.twist_topic is None or spec.twist_type_assumed:
@@ -266,9 +266,9 @@ def check_twist_type(spec: RobotSpec, others: Iterable[RobotSpec]) -> None:
 
 
 def key_of(spec: RobotSpec) -> Key:
-    """Return what the machine of a checked ``spec`` is known by.
+    """Return the key of the machine of a checked ``spec``.
 
-    One that takes goals only is known by where they go.
+    A robot without a velocity topic has the place of its goals as its key.
     """
     if spec.twist_topic is not None:
         return Key(spec.bridge_url, spec.twist_topic)
@@ -289,10 +289,10 @@ def _number(spec: RobotSpec, field: str, least: float) -> float | None:
 
 
 def checked_assist(name: str, assist: AssistSpec) -> AssistSpec:
-    """Return how the robot called ``name`` is assisted, with its topic resolved.
+    """Return the scan assist of the robot called ``name``, with its topic resolved.
 
     Raises:
-        ConfigError: If something in it cannot be meant.
+        ConfigError: If a value is invalid.
 
     """
     numbers = [n for corner in assist.footprint for n in corner]
@@ -308,8 +308,8 @@ def checked_assist(name: str, assist: AssistSpec) -> AssistSpec:
         )
     if assist.blind not in ("stop", "creep"):
         raise ConfigError(
-            f"robot {name!r}: while it is blind a robot is to 'stop' or to 'creep', "
-            f"got {assist.blind!r}"
+            f"robot {name!r}: what a robot does without a usable scan is 'stop' or "
+            f"'creep', got {assist.blind!r}"
         )
     x, y, yaw = map(float, assist.sensor)
     return msgspec.structs.replace(

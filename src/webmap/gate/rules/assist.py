@@ -1,16 +1,16 @@
 """Scan assist: slows a robot down before obstacles that a laser scanner sees (S17).
 
-It assists a driver and is no safety function: a planar scanner sees neither glass, nor
-stairs, nor a table's edge, and what it says passes a network.
+Scan assist is no safety function: a planar scanner sees neither glass, nor stairs, nor
+a table's edge, and its scans pass a network.
 
 The footprint is swept along the commanded motion, a straight line or an arc, until it
-meets the first point of the scan. In the robot's own frame it is the points that move,
-each on a circle about the centre of the turn, so that where they meet the edges of the
-footprint is exact.
+meets the first point of the scan. In the robot's own frame the points move, each on a
+circle about the centre of the turn, so their times of contact with the edges of the
+footprint are exact.
 
-All of it runs with every command, and all robots of the gate wait for it. So a scan is
-folded to few beams before (see :mod:`webmap.gate.rules.scan_geometry`), and points that
-are too far away to matter are left out first.
+This runs with every command, and all robots of the gate wait for it. So a scan is
+folded to few beams on arrival (see :mod:`webmap.gate.rules.scan_geometry`), and points
+that are too far away to matter are left out first.
 """
 
 import math
@@ -31,13 +31,13 @@ from webmap.gate.rules.scan_geometry import (
 )
 
 FRESH = 0.3
-"""The oldest scan that counts, in seconds since it arrived."""
+"""The greatest age of a scan that counts, in seconds since it arrived."""
 
 KNOWN = 0.5
-"""The least share of rays towards the motion that must say anything."""
+"""The least share of known rays among the rays towards the motion."""
 
 REACTION = 0.2
-"""Seconds in which the robot goes on as before after the scan was taken."""
+"""Seconds after a scan during which the robot still moves as before."""
 
 _SECTOR = math.radians(60)
 _STRAIGHT = 1e-4
@@ -46,12 +46,12 @@ _ROUNDING = 1e-9
 
 
 class AllowedShare(msgspec.Struct, frozen=True):
-    """How much of a commanded velocity is let through."""
+    """The share of a commanded velocity that scan assist allows."""
 
     scale: float
     """Between 0 and 1."""
     why: str | None
-    """In words, if it is less than 1."""
+    """The reason as text, if the share is less than 1."""
 
 
 FREE = AllowedShare(1.0, None)
@@ -60,13 +60,13 @@ FREE = AllowedShare(1.0, None)
 def assist(
     spec: AssistSpec, sweep: Scan | None, wanted: Twist, now: float
 ) -> AllowedShare:
-    """Return how much of a velocity the scan allows.
+    """Return the share of a velocity that the scan allows.
 
     Args:
         spec: The robot and its scanner.
         sweep: The newest scan, if there is one.
-        wanted: The velocity that is asked for.
-        now: On the clock that the scan arrived by.
+        wanted: The commanded velocity.
+        now: The time, on the clock of ``sweep.arrived``.
 
     """
     speed = _reach_speed(spec, wanted)
@@ -87,12 +87,12 @@ def assist(
 
 
 def points_of(spec: AssistSpec, sweep: Scan, within: float = math.inf) -> list[Point]:
-    """Return what the scan hit, in the robot's frame; hits of its own body left out.
+    """Return the hits of a scan in the robot's frame, without hits of its own body.
 
     Args:
         spec: The robot and its scanner.
-        sweep: The scan; of a fold there is one point for a beam at most.
-        within: How far from the robot's origin a point counts, in metres.
+        sweep: The scan; a folded beam gives at most one point.
+        within: The greatest distance of a point from the robot's origin, in metres.
 
     """
     far = within + math.hypot(spec.sensor[0], spec.sensor[1])
@@ -102,7 +102,7 @@ def points_of(spec: AssistSpec, sweep: Scan, within: float = math.inf) -> list[P
             continue
         point = _point(spec, sweep, ray, reach)
         if point is None and sweep.fold is not None:
-            # The nearest may be the robot's own body: what is behind it?
+            # The nearest hit may be the robot's own body: look behind it.
             behind = (_point(spec, sweep, ray, r) for r in sweep.fold.behind[ray])
             point = next((there for there in behind if there is not None), None)
         if point is not None and math.hypot(*point) <= within:
@@ -111,11 +111,11 @@ def points_of(spec: AssistSpec, sweep: Scan, within: float = math.inf) -> list[P
 
 
 def _point(spec: AssistSpec, sweep: Scan, ray: int, reach: float) -> Point | None:
-    """Return what a ray hit; None if it is nothing, or the robot's own body."""
+    """Return the hit of a ray; ``None`` for no hit, or one of the robot's own body."""
     if reach == -math.inf:
         reach = max(sweep.range_min, 0.0)
     elif not (sweep.range_min <= reach < math.inf):
-        # What is beyond the stated reach counts: that may be wrong, or not stated.
+        # A hit beyond range_max counts: range_max may be wrong or missing.
         return None
     x0, y0, yaw0 = spec.sensor
     bearing = yaw0 + sweep.angle_min + ray * sweep.angle_increment
@@ -131,10 +131,10 @@ def free_way(
     Args:
         footprint: Its corners, in the robot's frame, in metres.
         points: In the same frame, none inside the footprint.
-        twist: The motion, which goes on unchanged.
+        twist: The motion, which stays the same.
 
     Returns:
-        Infinity if it never touches one; within one turn, if it turns.
+        Infinity if it touches no point, or none within one turn if it turns.
 
     """
     edges = list(zip(footprint, (*footprint[1:], footprint[0]), strict=True))
@@ -153,7 +153,7 @@ def free_way(
 
 
 def polygon_around(radius: float, corners: int = 12) -> tuple[Point, ...]:
-    """Return the corners of a regular polygon that holds a disc, in order."""
+    """Return the corners of a regular polygon around a disc, in order."""
     outer = radius / math.cos(math.pi / corners)
     turns = (math.tau * corner / corners for corner in range(corners))
     return tuple((outer * math.cos(turn), outer * math.sin(turn)) for turn in turns)
@@ -170,7 +170,7 @@ def inside(corners: Sequence[Point], point: Point) -> bool:
 
 
 def _turned_over(sweep: Scan) -> Scan:
-    """Return what a scanner that hangs head down would say if it stood upright."""
+    """Return the scan of an upside-down scanner as if the scanner was upright."""
     return msgspec.structs.replace(
         sweep,
         angle_min=-sweep.angle_min,
@@ -179,18 +179,18 @@ def _turned_over(sweep: Scan) -> Scan:
 
 
 def _reach_speed(spec: AssistSpec, twist: Twist) -> float:
-    """Return how fast the fastest corner may go, in metres per second."""
+    """Return an upper bound of the speed of every corner, in metres per second."""
     return math.hypot(twist.vx, twist.vy) + abs(twist.wz) * _outer(spec)
 
 
 def _horizon(spec: AssistSpec, speed: float) -> float:
-    """Return how far from its origin a point can be and yet slow the robot down.
+    """Return the greatest distance from the origin at which a point matters.
 
-    No part of the robot goes faster than ``speed``, so what is farther from its outline
-    than the way that it needs at that speed is not met before it could stand.
+    No part of the robot moves faster than ``speed``, so it stops before a point that is
+    farther from its outline than the stopping distance at that speed.
     """
-    way = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
-    return (_outer(spec) + way) * (1 + _ROUNDING) + _ROUNDING
+    length = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
+    return (_outer(spec) + length) * (1 + _ROUNDING) + _ROUNDING
 
 
 def _outer(spec: AssistSpec) -> float:
@@ -214,30 +214,30 @@ def _blindness(
     if not (math.isfinite(sweep.angle_min) and math.isfinite(step) and step != 0.0):
         return "the scan has no angles"
     towards = _rays_towards(spec, sweep, wanted)
-    known, asked = scan_geometry.known(sweep, towards)
-    if not asked:
+    known, total = scan_geometry.known(sweep, towards)
+    if not total:
         return "the scan does not cover the direction of motion"
-    if known < KNOWN * asked:
+    if known < KNOWN * total:
         return "most of the scan is unknown"
-    if not _covers_the_way(spec, sweep, wanted):
+    if not _covers_path(spec, sweep, wanted):
         return "the scan covers only a part of the path"
     return None
 
 
-def _covers_the_way(spec: AssistSpec, sweep: Scan, wanted: Twist) -> bool:
-    """Return whether the scan looks where the robot is until it could stand."""
+def _covers_path(spec: AssistSpec, sweep: Scan, wanted: Twist) -> bool:
+    """Return whether the scan covers the robot's path until it could stop."""
     fan = _fan(sweep)
     speed = math.hypot(wanted.vx, wanted.vy)
     if speed < _ON_THE_SPOT:
         return fan.share >= KNOWN
-    way = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
+    length = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
     return looks_ahead(
-        fan, spec.footprint, spec.sensor, wanted, way / speed, spec.stop_distance
+        fan, spec.footprint, spec.sensor, wanted, length / speed, spec.stop_distance
     )
 
 
 def _fan(sweep: Scan) -> ScanDirections:
-    """Return where the scanner has rays, be they folded or not."""
+    """Return the directions of the scanner's rays, also of a folded scan."""
     if (fold := sweep.fold) is not None:
         return ScanDirections(
             sweep.angle_min, sweep.angle_increment / fold.each, fold.beams
@@ -246,7 +246,7 @@ def _fan(sweep: Scan) -> ScanDirections:
 
 
 def _rays_towards(spec: AssistSpec, sweep: Scan, wanted: Twist) -> Sequence[int]:
-    """Return the rays that look where the robot goes; all of them if it turns."""
+    """Return the rays towards the motion; all rays if it turns on the spot."""
     rays = range(len(sweep.ranges))
     if math.hypot(wanted.vx, wanted.vy) < _ON_THE_SPOT:
         return rays
@@ -267,14 +267,14 @@ def _blind(spec: AssistSpec, speed: float, reason: str) -> AllowedShare:
 
 
 MIXED = 2.0
-"""Seconds for which no scan of a topic counts after its frame was seen to change."""
+"""Seconds for which no scan of a topic counts after its frame changed."""
 
 
 class ScanAssist:
-    """Keeps the newest scans of one machine and slows it down before what they see.
+    """Keeps the newest scans of one machine and slows it down before obstacles.
 
     Args:
-        robots: The robots that are the machine; each may have a scanner.
+        robots: The robots that are declared for the machine; each may have a scanner.
 
     """
 
@@ -282,16 +282,16 @@ class ScanAssist:
         self._robots = robots
         self._sweeps: dict[str, Scan] = {}
         self._changed: dict[str, float] = {}
-        """When the frame of a topic's scans was last another than before."""
+        """When the frame of a topic's scans last changed."""
         self._verdict = FREE
 
     @property
     def why(self) -> tuple[str, ...]:
-        """Why the last command was not let through as it was, in words."""
+        """Why the last command was slowed down, as text."""
         return () if self._verdict.why is None else (self._verdict.why,)
 
     def observe(self, topic: str, sweep: Scan) -> None:
-        """Note that a scan came; of a topic where two scanners speak none counts."""
+        """Note a scan; if two scanners publish to the topic, no scan of it counts."""
         before = self._sweeps.get(topic)
         if before is not None and before.frame != sweep.frame:
             self._changed[topic] = sweep.arrived
@@ -303,13 +303,13 @@ class ScanAssist:
         self._sweeps[topic] = sweep
 
     def forget(self) -> None:
-        """Know nothing of before: nobody listens to the scans any more."""
+        """Forget all scans: the gate no longer subscribes to them."""
         self._sweeps.clear()
         self._changed.clear()
         self._verdict = FREE
 
     def limit(self, wanted: Twist, now: float) -> Twist:
-        """Return what every scanner's robot may do of a velocity."""
+        """Return the velocity that the scans of all robots allow."""
         verdict = min(
             (
                 assist(spec.assist, self._sweeps.get(spec.assist.topic), wanted, now)

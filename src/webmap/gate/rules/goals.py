@@ -1,4 +1,4 @@
-"""The goals of one robot: sent, perhaps running, to be cancelled. No I/O."""
+"""The goals of one robot: sending, progress, cancelling. No I/O."""
 
 import msgspec
 
@@ -12,35 +12,35 @@ from webmap.gate.rules.motion import WAIT_LIMIT
 from webmap.ros.names import is_type
 
 MOVE_BASE = "move_base_msgs/MoveBaseAction"
-"""The type of the action of ROS 1."""
+"""The action type of ROS 1."""
 
 LATELY = 2.0
-"""Seconds after such a cancel in which another one is not worth it."""
+"""Seconds after a cancel for driving in which driving causes no further cancel."""
 
 IN_VAIN = 5.0
-"""Seconds within which a cancel may have gone to a link that was dead already, which is
-noticed after 4 s; where nobody answers a cancel it is said once more after that."""
+"""Seconds during which a cancel may have gone into a dead link, which is noticed after
+4 s; a cancel without an answer is sent again if the link breaks within this time."""
 
 INSIST = 1.0
-"""Seconds between two cancels of a goal that is said to go on all the same."""
+"""Seconds between two cancels of a goal that is reported as still running."""
 
 BRAKES = 2.0
 """Seconds after the end of a goal in which a robot may still move because of it."""
 
 OVER = ("reached", "failed", "cancelled")
-"""The states of a goal that nothing follows any more."""
+"""The final states of a goal."""
 
 ELSEWHERE = "goals now go elsewhere: the state of this goal is unknown"
 
 
 class Goals:
-    """What is known of the goals that one robot follows by itself.
+    """The goals that one robot follows with its own navigation.
 
     Args:
         key: The machine.
         spec: The robot.
-        link: The link that its goals go to.
-        emit: Takes the actions.
+        link: The link for its goals.
+        emit: Called with each action.
 
     """
 
@@ -48,23 +48,23 @@ class Goals:
         self.spec = spec
         self.link = link
         self.report: GoalReport | None = None
-        """How it stands with the newest goal."""
+        """The report on the newest goal."""
         self._key = key
         self._emit = emit
         self._running: str | None = None
         self._by: str | None = None
-        # An earlier gate may have sent a goal that still runs.
+        # An earlier gate may have sent a goal that is still running.
         self._perhaps = True
         self._cancel_owed = False
         self._cancelled_at = self._insisted_at = float("-inf")
-        self._made_way_at: float | None = None
+        self._driven_off_at: float | None = None
         self._over_at = float("-inf")
         self._no_actions = False
-        """Whether the bridge said that it takes no goals of actions."""
+        """Whether the bridge reported that it does not support action goals."""
 
     @property
     def way(self) -> GoalMethod | None:
-        """How goals are sent to this robot; ``None`` if they cannot be."""
+        """The method for goals of this robot; ``None`` if goals cannot be sent."""
         spec = self.spec
         if spec.action is None or (self._no_actions and spec.goal_topic is not None):
             return None if spec.goal_topic is None else "topic"
@@ -77,12 +77,12 @@ class Goals:
 
     @property
     def can_cancel(self) -> bool:
-        """Whether its goals can be cancelled."""
+        """Whether goals of this robot can be cancelled."""
         return self.spec.cancel_topic is not None or self.spec.action is not None
 
     @property
-    def _cancels_apart(self) -> bool:
-        """Whether that goes by a service, called on a socket of its own."""
+    def _cancels_by_service(self) -> bool:
+        """Whether a cancel is a service call, on a socket of its own."""
         return self.spec.action is not None and not is_move_base(self.spec)
 
     @property
@@ -93,7 +93,7 @@ class Goals:
     def navigates(self, *, moving: bool) -> bool:
         """Return whether the robot follows a goal.
 
-        A plain topic has no feedback: its goal counts while the robot moves.
+        A plain topic has no feedback: a goal on it counts while the robot moves.
         """
         report = self.report
         return (
@@ -101,7 +101,7 @@ class Goals:
         )
 
     def may_still_move(self, now: float) -> bool:
-        """Return whether motion at ``now`` may come from a goal that has ended."""
+        """Return whether a goal that has ended may still cause motion at ``now``."""
         return now - self._over_at < BRAKES
 
     def send(self, x: float, y: float, yaw: float, by: str, now: float) -> None:
@@ -111,25 +111,25 @@ class Goals:
             Refusal: If the robot takes no goals, or its link is down.
 
         """
-        way = self.way
-        if way is None:
+        method = self.way
+        if method is None:
             raise Refusal("no goal topic and no action is set")
         if not self.link.up:
             raise Refusal("no connection to the bridge of its goals")
         id, until = generate_id(), now + WAIT_LIMIT
-        self._emit(SendGoal(self._key, self.spec.id, id, x, y, yaw, by, way, until))
+        self._emit(SendGoal(self._key, self.spec.id, id, x, y, yaw, by, method, until))
 
     def locate(self, x: float, y: float, yaw: float, by: str, now: float) -> None:
-        """Tell the robot where it is; metres and radians in its goal frame.
+        """Send the robot its initial pose; metres and radians in its goal frame.
 
         Raises:
-            Refusal: If it cannot be told, or follows a goal, which it would then
-                follow from another place than it is at.
+            Refusal: If the robot takes no initial pose, its link is down, or it
+                follows a goal, which it would then follow from a wrong pose.
 
         """
         if self.spec.pose_topic is None:
             raise Refusal("no topic for the initial pose is set")
-        # Of a goal that nobody tells of and nobody can cancel there is no end to see.
+        # A goal without feedback and without a cancel would block this for ever.
         if self.following and (self.can_cancel or self.way != "topic"):
             raise Refusal("the robot is navigating: cancel the goal first")
         if not self.link.up:
@@ -138,98 +138,98 @@ class Goals:
         self._emit(SendPose(self._key, self.spec.id, x, y, yaw, by, until))
 
     def on_written(self, goal: GoalWritten) -> None:
-        """Note that a goal went out."""
+        """Note that a goal was written."""
         self._running, self._by, self._perhaps = goal.id, goal.by, True
-        self._cancelled_at = float("-inf")  # that was of the goals before
-        way = self.way or "topic"
+        self._cancelled_at = float("-inf")  # it was for earlier goals
+        method = self.way or "topic"
         self.report = GoalReport(
             id=goal.id,
             x=goal.x,
             y=goal.y,
             yaw=goal.yaw,
             by=goal.by,
-            way=way,
+            way=method,
             state="sent",
-            why="this robot reports no progress" if way == "topic" else "",
+            why="this robot reports no progress" if method == "topic" else "",
         )
 
     def progress(self, news: GoalProgress) -> None:
-        """Note how a goal goes; only the newest one is of interest."""
-        report = self._about(news.id)
+        """Note the progress of a goal; only the newest goal counts."""
+        report = self._report_on(news.id)
         if report is None or report.state in OVER:
             return
         state = "under way" if news.active else "accepted"
         if report.state != "cancelling":
             report = msgspec.structs.replace(report, state=state, why="")
-        # What a word does not tell was told by another: status and feedback of
-        # actionlib come on two topics.
-        told = {
+        # Keep the values that this message does not have: actionlib sends status and
+        # feedback on two topics.
+        values = {
             name: value
             for name in ("left", "time", "eta", "recoveries")
             if (value := getattr(news, name)) is not None
         }
-        self.report = msgspec.structs.replace(report, **told)
+        self.report = msgspec.structs.replace(report, **values)
 
     def ended(self, end: GoalEnded, now: float) -> None:
-        """Note that the action ended a goal; the newest one is what counts."""
+        """Note that the action ended a goal; only the newest goal is reported."""
         if end.id == self._running:
             self._running, self._by, self._perhaps = None, None, False
         self._no_actions |= end.no_actions
-        report = self._about(end.id)
+        report = self._report_on(end.id)
         if report is not None and report.state not in OVER:
-            self._cancelled_at = float("-inf")  # if it was, that is answered now
+            self._cancelled_at = float("-inf")  # a cancel is answered by this
             why = end.why
             if end.no_actions and self.spec.goal_topic is not None:
                 why = f"{why}; the next goal goes to {self.spec.goal_topic}"
             if end.outcome == "cancelled":
                 why = report.why if report.state == "cancelling" else why
-            self._show(end.outcome, why or _OTHERWISE[end.outcome], now)
+            self._show(end.outcome, why or _DEFAULT_REASONS[end.outcome], now)
 
     def on_progress_lost(self, lost: GoalLost, now: float) -> None:
-        """Note that nobody tells any more how a goal goes."""
-        report = self._about(lost.id)
+        """Note that no progress of a goal is received any more."""
+        report = self._report_on(lost.id)
         if report is None or report.state in OVER:
             return
-        if report.state == "cancelling":  # it may not have heard of that
+        if report.state == "cancelling":  # the cancel may be lost
             self.cancel(now, report.why)
         else:
             self._show("unknown", lost.why, now)
 
     def cancel(self, now: float, why: str) -> None:
-        """Cancel every goal, now or as soon as there is a link.
+        """Cancel every goal, now or as soon as the link is up.
 
         Args:
             now: The time.
-            why: By whom or for what reason, in words.
+            why: Who cancels, or the reason, as text.
 
         Raises:
-            Refusal: If the robot has no way to do that.
+            Refusal: If goals of the robot cannot be cancelled.
 
         """
         if not self.can_cancel:
             raise Refusal("no cancel topic and no action is set")
         self._running, self._by, self._perhaps = None, None, False
         self._cancel_owed, self._cancelled_at = not self.link.up, now
-        if self.link.up or self._cancels_apart:
+        if self.link.up or self._cancels_by_service:
             self._emit(CancelGoals(self._key, self.spec.id))
         if self.following:
-            assert self.report is not None  # only then does it follow one
+            assert self.report is not None  # because it follows a goal
             waits = self._cancel_owed or self.report.way != "topic"
             self._show("cancelling" if waits else "cancelled", why, now)
 
     def cancel_again(self, news: GoalProgress, stopped: bool, now: float) -> None:
-        """Cancel again, because a goal is said to go on that should not.
+        """Cancel again if a goal is reported as running that must not run.
 
-        A cancel may be quicker than the goal that it is meant for, which comes by
-        another socket; it then cancels nothing, and the goal begins after it.
+        A cancel may arrive before its goal, which uses another socket; it then cancels
+        nothing, and the goal begins after it.
 
         Args:
-            news: What is said of the goal.
-            stopped: Whether STOP stands: then no goal should go on.
+            news: The reported progress.
+            stopped: Whether STOP is active: then no goal may run.
             now: The time.
 
         """
-        report = self._about(news.id)
+        report = self._report_on(news.id)
         cancelled = report is not None and report.state == "cancelling"
         due = now - self._insisted_at >= INSIST
         if due and (stopped or cancelled) and self.can_cancel:
@@ -237,27 +237,27 @@ class Goals:
             self._emit(CancelGoals(self._key, self.spec.id))
 
     def cancel_for_driving(self, now: float) -> None:
-        """Cancel a goal that may be running, because somebody is going to drive.
+        """Cancel a goal that may be running, because the operator begins to drive.
 
-        Others send goals to a robot too, and nobody tells the gate. So whoever drives
-        off cancels what may run, but not again with each touch of a key.
+        Others send goals to the robot too, without the gate. So driving off cancels
+        goals that may be running, but not again at each press of a key.
         """
-        lately = self._made_way_at is not None and now - self._made_way_at < LATELY
+        lately = self._driven_off_at is not None and now - self._driven_off_at < LATELY
         if self.can_cancel and (self._perhaps or not lately):
-            self._made_way_at = now
+            self._driven_off_at = now
             self.cancel(now, "the robot is being driven")
 
     def stop(self, now: float) -> None:
-        """Cancel every goal if there is a way to."""
+        """Cancel every goal because of STOP, if goals can be cancelled."""
         if self.can_cancel:
             self.cancel(now, "STOP")
 
     def lost(self, now: float, connection: str | None = None) -> None:
-        """Do what the robot's settings say when whoever sent its goal is lost.
+        """Apply ``on_operator_loss`` if the sender of the goal is lost.
 
         Args:
             now: The time.
-            connection: Who is lost; ``None`` is everybody.
+            connection: The lost connection; ``None`` for all connections.
 
         """
         if self._by is None or connection not in (None, self._by):
@@ -266,55 +266,55 @@ class Goals:
             self.cancel(now, "the sender of the goal is gone")
 
     def cancel_unless_reachable(self, spec: RobotSpec, now: float) -> None:
-        """Call off what is under way, unless that can be done under ``spec`` as well.
+        """Cancel the goal, unless it can be cancelled under ``spec`` as well.
 
         Args:
-            spec: What the robot is from now on.
+            spec: The new declaration of the robot.
             now: The time.
 
         """
-        if _places(self.spec) <= _places(spec):
+        if _goal_places(self.spec) <= _goal_places(spec):
             return
         if self.following:
             self.stop(now)
             self._show("failed", ELSEWHERE, now)
-        # Of the new place nothing is known.
+        # Nothing is known about goals at the new place.
         self._perhaps, self._cancel_owed, self._no_actions = True, False, False
         self._cancelled_at = float("-inf")
 
     def link_up(self, now: float) -> None:
-        """Send the cancel that could not be sent before, or not be seen to arrive."""
+        """Send a cancel that could not be sent, or may not have arrived."""
         if self._cancel_owed:
             self.cancel(now, self.report.why if self.report is not None else "")
 
     def link_down(self, now: float) -> None:
-        """Owe a cancel again that the link may not have carried any more."""
+        """Mark a recent cancel for sending again: it may not have arrived."""
         if now - self._cancelled_at >= IN_VAIN:
             return
         self._cancel_owed, report = True, self.report
         if report is not None and (report.state, report.way) == ("cancelled", "topic"):
             self._show("cancelling", report.why, now)
 
-    def _about(self, id: str) -> GoalReport | None:
+    def _report_on(self, id: str) -> GoalReport | None:
         report = self.report
         return report if report is not None and report.id == id else None
 
     def _show(self, state: str, why: str, now: float) -> None:
-        assert self.report is not None  # there is something to be said
+        assert self.report is not None  # callers have a report to change
         if state in OVER:
             self._over_at = now
         self.report = msgspec.structs.replace(self.report, state=state, why=why)
 
 
-_OTHERWISE = {
+_DEFAULT_REASONS = {
     "reached": "",
     "failed": "the robot gave no reason",
     "cancelled": "by the robot, or by another program",
 }
 
 
-def _places(spec: RobotSpec) -> set[tuple[str | None, str, str]]:
-    """Return where the goals of a robot go, and where they are called off."""
+def _goal_places(spec: RobotSpec) -> set[tuple[str | None, str, str]]:
+    """Return the topics and actions that take and cancel the goals of a robot."""
     action = "move_base" if is_move_base(spec) else "action"
     names = {"goal": spec.goal_topic, "cancel": spec.cancel_topic, action: spec.action}
     return {(spec.goal_url, kind, name) for kind, name in names.items() if name}

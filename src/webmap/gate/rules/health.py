@@ -1,4 +1,4 @@
-"""What is known of the other ends: bridge, display, odometry and camera. No I/O."""
+"""The health of the bridge, the display, the odometry and the camera. No I/O."""
 
 import math
 from collections import deque
@@ -8,11 +8,11 @@ from webmap.gate.actions import Emit, Watch
 from webmap.gate.events import Key
 
 WINDOW = 2.0
-"""Seconds over which ages are looked at."""
+"""Seconds over which ages are counted."""
 
 
 class Ages:
-    """Ages in seconds, the newest ones."""
+    """The ages of the last :data:`WINDOW`, in seconds."""
 
     def __init__(self) -> None:
         self._ages: deque[tuple[float, float]] = deque()
@@ -20,13 +20,13 @@ class Ages:
         self._stale = False
 
     def add(self, age: float, now: float) -> None:
-        """Count one more; ``age`` in seconds."""
+        """Add an age in seconds."""
         self._ages.append((now, age))
         self._stale = True
         self.forget_old(now)
 
     def forget_old(self, now: float) -> None:
-        """Look at the last two seconds only."""
+        """Forget the ages from before the window."""
         while self._ages and now - self._ages[0][0] > WINDOW:
             self._ages.popleft()
             self._stale = True
@@ -38,7 +38,7 @@ class Ages:
 
     @property
     def p95(self) -> float | None:
-        """The age in seconds that 95 of 100 stay below, if there is any."""
+        """The 95th percentile in seconds, if there are ages."""
         if self._stale:
             ages = sorted(age for _, age in self._ages)
             self._p95 = ages[math.ceil(0.95 * len(ages)) - 1] if ages else None
@@ -47,75 +47,75 @@ class Ages:
 
 
 PROOF_LIMIT = 0.3
-"""The oldest question whose answer counts when a moving command is written, in seconds:
-how long ago it was asked, however lately the answer came (S11)."""
+"""Seconds since the newest answered ping was sent, at most, for writing a velocity
+other than zero; when the answer arrived does not matter (S11)."""
 
 STALL_LIMIT = 1.0
-"""A link that gave no sign of life for so long is cut, in seconds (S11)."""
+"""Seconds without an answer after which a link is cut (S11)."""
 
 BEAT_LIMIT = 0.25
-"""The longest silence of the display that is not yet taken for its end, in seconds."""
+"""Seconds without a heartbeat after which the display counts as not responding."""
 
 
 class LinkHealth:
-    """Whether a link is up, and which question its far end last answered.
+    """Whether a link is up, and which ping its far end last answered.
 
-    An answer tells of the moment when it was asked for, and of nothing after that: it
-    may have been under way for long, and what was written meanwhile may lie somewhere.
+    An answer proves the state of the link at the time of its ping and not later: it
+    may have been in flight for long, and data written since may be stuck in a buffer.
     """
 
     def __init__(self) -> None:
         self.up = False
         self.trips = Ages()
-        """How long questions and their answers were under way."""
-        self._asked_at = float("-inf")
-        self._heard_at = float("-inf")
+        """The round trips of the pings, in seconds."""
+        self._ping_at = float("-inf")
+        self._answered_at = float("-inf")
 
     def opened(self, now: float) -> None:
-        """The link is up; nothing that was asked on it is answered yet."""
+        """Note that the link is up; none of its pings is answered yet."""
         self.up = True
-        self._asked_at, self._heard_at = float("-inf"), now
+        self._ping_at, self._answered_at = float("-inf"), now
         self.trips.clear()
 
     def closed(self) -> None:
-        """The link is down."""
+        """Note that the link is down."""
         self.up = False
 
     def answered(self, asked_at: float, now: float) -> None:
-        """The far end answered at ``now`` what it was asked at ``asked_at``."""
-        self._asked_at = max(self._asked_at, asked_at)
-        self._heard_at = now
+        """Note that the ping of ``asked_at`` was answered at ``now``."""
+        self._ping_at = max(self._ping_at, asked_at)
+        self._answered_at = now
         self.trips.add(now - asked_at, now)
 
     def answered_since(self, then: float) -> bool:
-        """Return whether something was answered that was asked after ``then``.
+        """Return whether a ping sent after ``then`` was answered.
 
-        What was written at ``then`` has arrived if so, as all goes in order.
+        If so, the data written at ``then`` has arrived, because the order is kept.
         """
-        return self.up and self._asked_at > then
+        return self.up and self._ping_at > then
 
     def fresh(self, now: float) -> bool:
-        """Return whether something that moves may be written at ``now``."""
-        return self.up and now - self._asked_at <= PROOF_LIMIT
+        """Return whether a velocity other than zero may be written at ``now``."""
+        return self.up and now - self._ping_at <= PROOF_LIMIT
 
     def stalled(self, now: float) -> bool:
-        """Return whether the link looks open but carries nothing."""
-        return self.up and now - self._heard_at > STALL_LIMIT
+        """Return whether the link is open but carries nothing."""
+        return self.up and now - self._answered_at > STALL_LIMIT
 
 
 class DisplayPulse:
-    """Whether the display process, and so everybody behind it, is there."""
+    """Whether the display process responds, and with it every page and program."""
 
     def __init__(self) -> None:
         self.ended: str | None = None
         self._beat_at = float("-inf")
 
     def beat(self, now: float) -> None:
-        """A heartbeat came."""
+        """Note a heartbeat."""
         self._beat_at = now
 
     def doubt(self, now: float) -> str | None:
-        """Return why nobody behind the display may move anything, if so."""
+        """Return why no page or program may move a machine, or ``None``."""
         if self.ended is not None:
             return self.ended
         if now - self._beat_at > BEAT_LIMIT:
@@ -124,36 +124,36 @@ class DisplayPulse:
 
 
 STILL_V = 0.02
-"""Metres per second below which a machine stands (S5)."""
+"""Metres per second below which a machine has stopped (S5)."""
 
 STILL_W = 0.05
-"""Radians per second below which a machine stands (S5)."""
+"""Radians per second below which a machine has stopped (S5)."""
 
 STILL_FOR = 0.3
-"""Seconds for which odometry must say so without a gap (S5)."""
+"""Seconds for which odometry must show standstill without a gap (S5)."""
 
 GAP = 0.5
-"""Seconds between two messages that are too many to know what was between."""
+"""Seconds between two odometry messages above which motion may have been missed."""
 
 
 def moves(twist: Twist, still_v: float = STILL_V, still_w: float = STILL_W) -> bool:
-    """Return whether a machine of that velocity does not stand.
+    """Return whether a machine with that velocity moves.
 
     Args:
-        twist: What its odometry tells.
-        still_v: Metres per second from which on it moves.
-        still_w: Radians per second from which on it turns.
+        twist: The velocity that odometry reports.
+        still_v: Metres per second at and above which it moves.
+        still_w: Radians per second at and above which it turns.
 
     """
     return twist.speed >= still_v or twist.turn >= still_w
 
 
 class Standstill:
-    """Listens to odometry from a moment on, until the machine has stood for long.
+    """Watches odometry from :meth:`begin` on for a lasting standstill.
 
     Args:
-        still_v: Metres per second from which on it moves.
-        still_w: Radians per second from which on it turns.
+        still_v: Metres per second at and above which the machine moves.
+        still_w: Radians per second at and above which it turns.
 
     """
 
@@ -162,21 +162,21 @@ class Standstill:
         self.speed: float | None = None
         """The newest speed in m/s; ``None`` before the first."""
         self.turn = 0.0
-        """The newest speed of turning in rad/s, whatever the axis."""
+        """The newest rate of turn in rad/s, whatever the axis."""
         self.heard_at = float("-inf")
-        """When odometry last told a velocity."""
+        """When the last odometry with a velocity arrived."""
         self.gap = 0.0
         """Seconds between the newest two messages; 0 before there are two."""
         self.since: float | None = None
-        """When it was first seen to stand, if it has been seen so ever since."""
+        """When the present standstill began; ``None`` if the machine moves."""
 
     def begin(self) -> None:
-        """Forget what was heard before."""
+        """Forget all earlier odometry."""
         self.speed, self.heard_at, self.since = None, float("-inf"), None
         self.gap = 0.0
 
     def observe(self, twist: Twist | None, now: float) -> None:
-        """Take in a message of odometry; ``None`` is one without a velocity."""
+        """Process an odometry message; ``None`` is a message without a velocity."""
         if twist is None:
             return
         if self.speed is not None:
@@ -191,14 +191,16 @@ class Standstill:
 
     @property
     def reached(self) -> bool:
-        """Whether the machine has stood for :data:`STILL_FOR`."""
+        """Whether the standstill has lasted for :data:`STILL_FOR`."""
         return self.since is not None and self.heard_at - self.since >= STILL_FOR
 
 
 BLIND_LIMIT = 1.0
-"""The oldest velocity that odometry told, or picture, with which a machine is driven,
-in seconds (S16). A velocity is as old as the newest question that was answered before
-it came: a link may have kept both."""
+"""The greatest age of odometry and of the camera picture for driving, in seconds (S16).
+
+Odometry is as old as the newest ping that was answered before it arrived: a link may
+have delayed both.
+"""
 
 
 class Observation:
@@ -206,7 +208,7 @@ class Observation:
 
     Args:
         key: The machine.
-        emit: Takes the actions.
+        emit: Called with each action.
 
     """
 
@@ -215,12 +217,12 @@ class Observation:
         self.echoed: Twist | None = None
         self.measured: Twist | None = None
         self._seen: tuple[float, float] | None = None
-        """After when the newest velocity was said, and when it came."""
+        """A time before the newest velocity was sent, and its time of arrival."""
         self._key = key
         self._emit = emit
 
     def update(self, on: bool) -> None:
-        """Listen, or no longer; what was heard before is forgotten then."""
+        """Subscribe to echo and odometry, or unsubscribe and forget both."""
         if on != self.on:
             self.on = on
             self._emit(Watch(self._key, on))
@@ -228,12 +230,12 @@ class Observation:
             self.measured = self.echoed = self._seen = None
 
     def observe(self, measured: Twist | None, sent_after: float, now: float) -> None:
-        """Note that odometry came; what tells no velocity shows nobody anything.
+        """Process an odometry message; without a velocity it refreshes nothing.
 
         Args:
-            measured: The velocity that it tells, if it tells one.
-            sent_after: A moment after which it was said.
-            now: The time, at which it came.
+            measured: The velocity in the message, if it has one.
+            sent_after: A time after which it was sent.
+            now: The time, at which it arrived.
 
         """
         self.measured = measured
@@ -241,13 +243,13 @@ class Observation:
             self._seen = (min(sent_after, now), now)
 
     def shown(self, now: float) -> Twist | None:
-        """Return the newest velocity that odometry told, unless that is long ago."""
+        """Return the newest velocity of odometry, if it arrived lately enough."""
         if self._seen is None or now - self._seen[1] > BLIND_LIMIT:
             return None
         return self.measured
 
     def doubt(self, now: float) -> str | None:
-        """Return why nobody knows by odometry how it moves now, in words."""
+        """Return why odometry does not show the motion now, as text, or ``None``."""
         if self._seen is None:
             return "no odometry yet"
         sent_after, came_at = self._seen
@@ -258,42 +260,42 @@ class Observation:
         return None
 
     def shows_since(self, then: float) -> bool:
-        """Return whether the newest odometry tells anything of the time after ``then``.
+        """Return whether the newest odometry counts for the time after ``then``.
 
-        Of standstill it does if it was said after that. Motion counts however late it
-        comes: nothing says that it has ended.
+        Standstill counts if it was sent after ``then``. Motion always counts, however
+        late it arrives: nothing shows that it has ended.
         """
         if self.measured is None or self._seen is None:
             return False
         return self._seen[0] >= then or moves(self.measured)
 
     def on_echo(self, twist: Twist) -> None:
-        """Note what the robot's ROS says on the velocity topic."""
+        """Note a velocity received on the velocity topic."""
         if self.on:
             self.echoed = twist
 
 
 class Video:
-    """What the holder of the lease says of the camera that they look at.
+    """The age of the camera picture that the holder of the lease looks at.
 
-    The gate sees no pictures. Each command tells how old the newest one was that its
-    page had shown, so a camera that freezes, a display that hangs and a page that is
-    not sent anything any more are all the same to it.
+    The gate receives no pictures. Each command states the age of the newest picture
+    that its page showed, so a frozen camera, a hanging display and a page that receives
+    nothing all have the same effect.
     """
 
     def __init__(self) -> None:
         self._taken_at: float | None = None
 
     def observe(self, age: float | None, now: float) -> None:
-        """Note the age of the picture in seconds, or that no camera was chosen."""
+        """Note the age of the picture in seconds; ``None`` if no camera is chosen."""
         self._taken_at = None if age is None else now - age
 
     def forget(self) -> None:
-        """Nobody drives any more."""
+        """Forget the picture: the machine is not driven any more."""
         self._taken_at = None
 
     def doubt(self, now: float) -> str | None:
-        """Return that the driver sees nothing, in words."""
+        """Return that the driver sees no picture, as text, or ``None``."""
         if self._taken_at is None or now - self._taken_at <= BLIND_LIMIT:
             return None
         return f"no picture from the camera for {BLIND_LIMIT:g} s"

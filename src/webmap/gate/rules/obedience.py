@@ -1,10 +1,4 @@
-"""Whether a machine obeys the gate (S19), and only the gate. No I/O.
-
-What comes back on the velocity topic is an echo of the gate's own, or another's. An
-echo may come late, twice, with its digits rounded, and many at once after a stall. So
-each velocity that the gate wrote explains two that are heard, within a minute, and what
-none explains is another's.
-"""
+"""Whether a machine obeys the gate (S19), and only the gate. No I/O."""
 
 import math
 from collections import deque
@@ -15,46 +9,45 @@ from webmap.base.geometry import Twist
 from webmap.gate.rules.health import Standstill, moves
 
 GRACE = 1.0
-"""Seconds after zero until a machine that moves on is said not to obey."""
+"""Seconds after zero until a machine that still moves does not obey."""
 
 MOVES = 0.05
-"""Metres per second above which a machine is said to move on."""
+"""Metres per second above which a machine still moves."""
 
 TURNS = 0.1
-"""Radians per second above which it is said to turn on."""
+"""Radians per second above which a machine still turns."""
 
 BLOCKED_AFTER = 1.0
-"""Seconds without motion after which a machine that should move counts as blocked."""
+"""Seconds without motion after which a driven machine is blocked."""
 
 LASTING = 60.0
-"""Seconds without odometry for which the alarm goes on about a machine that was seen
-not to obey."""
+"""Seconds without odometry for which the alarm about a disobeying machine lasts."""
 
 
 class Obedience:
-    """Watches a machine from the zero that stops it until it has stood for a while.
+    """Watches a machine from the zero that stops it until a lasting standstill.
 
-    Once it has, what moves it afterwards is somebody else's business. One message that
-    says it stands proves nothing: coarse encoders send those while it goes on. Nor does
-    silence: a machine that did not obey, or that STOP stands for, is expected to stand
-    until it was seen to.
+    Motion after that has another cause. One odometry message without motion proves
+    nothing: coarse encoders send such messages while the machine moves. Silence proves
+    nothing either: for a machine that did not obey, or while STOP is active, standstill
+    stays expected until odometry shows it.
     """
 
     def __init__(self) -> None:
         self._zero_at: float | None = None
         self._firm = False
-        # Only above these it moves on, and a standstill ends at its own.
+        # Standstill counts its limits as motion; MOVES and TURNS themselves are none.
         self._calm = Standstill(math.nextafter(MOVES, 1), math.nextafter(TURNS, 1))
         self._moving: Twist | None = None
         self._moving_at = self._seen_at = float("-inf")
-        self._told_to_move = False
+        self._driven = False
         self._stuck: tuple[float, float] | None = None
-        """When odometry first and last showed a standstill that no zero asked for."""
+        """When odometry first and last showed standstill of a driven machine."""
 
     def on_written(self, twist: Twist, last: Twist, now: float) -> None:
-        """Note that ``twist`` went out after ``last``."""
-        self._told_to_move = moves(twist, MOVES, TURNS)
-        if not self._told_to_move:
+        """Note that ``twist`` was written after ``last``."""
+        self._driven = moves(twist, MOVES, TURNS)
+        if not self._driven:
             self._stuck = None
         if not twist.is_zero:
             self.excuse()
@@ -62,11 +55,11 @@ class Obedience:
             self.expect(now)
 
     def expect(self, now: float, *, firmly: bool = False) -> None:
-        """Expect standstill from here on, unless that is expected already.
+        """Expect standstill from ``now`` on, if it is not expected yet.
 
         Args:
             now: The time.
-            firmly: Whether it is expected also if nobody looks for a while.
+            firmly: Whether standstill stays expected over a gap in odometry.
 
         """
         if self._zero_at is None:
@@ -75,22 +68,22 @@ class Obedience:
         self._firm |= firmly
 
     def excuse(self) -> None:
-        """Note that it may move: somebody drives it, or it has a goal."""
+        """Expect standstill no longer: the machine is driven or has a goal."""
         self._zero_at = self._moving = None
         self._firm = False
 
     def observe(self, twist: Twist | None, now: float) -> None:
-        """Take in a message of odometry."""
+        """Process an odometry message."""
         if twist is None:
             return
         if moves(twist):
             self._stuck = None
-        elif self._told_to_move:
+        elif self._driven:
             self._stuck = (self._stuck[0] if self._stuck else now, now)
         if self._zero_at is None:
             return
         if not self._firm and not self.watching(now):
-            self.excuse()  # nobody looked for a while: it may be driven by others
+            self.excuse()  # no odometry for a while: others may drive it
             return
         self._seen_at = now
         self._calm.observe(twist, now)
@@ -100,12 +93,12 @@ class Obedience:
             self._moving, self._moving_at = twist, now
             self._firm |= now - self._zero_at >= GRACE
         elif self._moving_at < self._zero_at + GRACE:
-            self._moving = None  # it braked in time, unless it moves again
+            self._moving = None  # it stopped in time, unless it moves again
 
     def blocked(self, now: float) -> bool:
         """Return whether the machine does not move although a velocity was sent.
 
-        It may take :data:`BLOCKED_AFTER` to speed up.
+        :data:`BLOCKED_AFTER` leaves it time to speed up.
         """
         if self._stuck is None:
             return False
@@ -113,14 +106,14 @@ class Obedience:
         return last - first >= BLOCKED_AFTER and now - last <= GRACE
 
     def watching(self, now: float) -> bool:
-        """Return whether odometry could still tell something."""
+        """Return whether standstill is expected and odometry is recent enough."""
         if self._zero_at is None:
             return False
         patience = LASTING if self._firm else GRACE
         return now - max(self._zero_at, self._seen_at) <= patience
 
     def alarm(self, now: float) -> str | None:
-        """Return what is wrong at ``now``, in words."""
+        """Return that the machine does not obey, as text, or ``None``."""
         if self._zero_at is None or self._moving is None:
             return None
         if now - self._zero_at < GRACE or not self.watching(now):
@@ -134,50 +127,53 @@ class Obedience:
 
 
 ECHOES = 2
-"""How many echoes one velocity explains: two subscriptions may say it twice."""
+"""Echoes explained by one velocity: two subscriptions may deliver it twice."""
 
 MOST_ECHOES = 32
-"""How many echoes all velocities of one value explain. More are never under way."""
+"""The most echoes that one value explains; more are never in flight."""
 
 REMEMBERED = 60.0
-"""Seconds after which an own velocity explains no echo any more."""
+"""Seconds during which a velocity of the gate explains echoes."""
 
 DIGITS = 3
 """The decimals to which velocities are compared."""
 
 ROUNDING = 1e-5
-"""What an echo may differ by, as bridges write numbers with fewer digits."""
+"""The most that an echo may differ, because bridges write numbers with fewer digits."""
 
 SURE = 2
-"""How many velocities of another make sure that there is one."""
+"""Unexplained velocities after which another program is reported."""
 
 WITHIN = 3.0
-"""Seconds within which these come, and after the last of which the other is gone."""
+"""Seconds within which these arrive; after as long without one the program is gone."""
 
 EXPECTED_FOR = 2.0
-"""Seconds for which velocities of others are expected after a reason for them."""
+"""Seconds for which velocities of others are expected after a cause, such as a goal."""
 
 MOST_NODES = 3
-"""How many nodes are named."""
+"""The most nodes that the report names."""
 
 MOST_NAME = 80
 """The longest name of a node, in characters."""
 
 
 class OtherWriter:
-    """Tells another's velocities from the echoes of the gate's own.
+    """Finds velocities of other programs among the echoes of the gate's own.
 
-    A zero is never another's: it moves nothing, and many programs send it.
+    An echo may come late, twice, with its digits rounded, and many at once after a
+    stall. So each velocity that the gate wrote explains two received ones, within a
+    minute. An unexplained velocity is from another program. Zeros are ignored: they
+    move nothing, and many programs send them.
     """
 
     def __init__(self) -> None:
         self.seen: Twist | None = None
-        """The newest velocity of another program, while there is one."""
+        """The newest velocity of another program; ``None`` without such a program."""
         self.nodes: tuple[str, ...] | None = None
-        """The nodes that publish it; empty if it comes over the bridge as well."""
+        """The nodes that publish it; empty if it comes through the bridge too."""
         self._own: dict[tuple[float, ...], tuple[int, float]] = {}
-        """By value, oldest first: echoes to come, and when it was written last."""
-        self._heard_at: deque[float] = deque(maxlen=SURE)
+        """By value, oldest first: echoes left, and when it was written last."""
+        self._received_at: deque[float] = deque(maxlen=SURE)
         self._expected_until = float("-inf")
 
     def on_written(self, twist: Twist, now: float) -> None:
@@ -191,11 +187,11 @@ class OtherWriter:
             del self._own[next(iter(self._own))]
 
     def expect(self, until: float) -> None:
-        """Note that until then velocities of others are no news."""
+        """Ignore velocities of others until ``until``: they have a known cause."""
         self._expected_until = max(self._expected_until, until)
 
     def on_echo(self, twist: Twist, now: float) -> None:
-        """Take in a velocity that was heard on the topic."""
+        """Process a velocity received on the topic."""
         if twist.is_zero:
             return
         for value in _rounded(twist):
@@ -205,40 +201,35 @@ class OtherWriter:
                 return
         if now < self._expected_until:
             return
-        self._heard_at.append(now)
-        if len(self._heard_at) == SURE and now - self._heard_at[0] <= WITHIN:
+        self._received_at.append(now)
+        if len(self._received_at) == SURE and now - self._received_at[0] <= WITHIN:
             self.seen = twist
 
     def named(self, nodes: tuple[str, ...]) -> None:
-        """Note which nodes publish to the topic, as the robot's ROS says."""
+        """Note which nodes publish to the topic, as reported by the robot's ROS."""
         if self.seen is not None:
             sound = [name for name in nodes if name.isprintable() and name.strip()]
             self.nodes = tuple(name[:MOST_NAME] for name in sound[:MOST_NODES])
 
     def step(self, now: float) -> None:
-        """Let time pass: one that is not heard any more is gone."""
-        if self.seen is not None and now - self._heard_at[-1] > WITHIN:
+        """Forget a program that publishes no longer."""
+        if self.seen is not None and now - self._received_at[-1] > WITHIN:
             self.seen = self.nodes = None
 
     def words(self, topic: str) -> str | None:
-        """Return who publishes what to the machine, in words.
-
-        Args:
-            topic: The topic of the machine.
-
-        """
+        """Return who publishes what to ``topic``, as text, or ``None``."""
         if self.seen is None:
             return None
         speed = math.copysign(math.hypot(self.seen.vx, self.seen.vy), self.seen.vx)
         v, w = round(speed, 2) + 0.0, round(self.seen.wz, 2) + 0.0
-        said = f"another program publishes to {topic} ({v:.2f} m/s, {w:.2f} rad/s)"
+        text = f"another program publishes to {topic} ({v:.2f} m/s, {w:.2f} rad/s)"
         if self.nodes is None:
-            return said
-        return f"{said}: {', '.join(self.nodes) or 'another client of the bridge'}"
+            return text
+        return f"{text}: {', '.join(self.nodes) or 'another client of the bridge'}"
 
 
 def _rounded(twist: Twist) -> list[tuple[float, ...]]:
-    """Return the rounded values that a velocity may have: one, or more at an edge."""
+    """Return the rounded values of a velocity: one, or more at a rounding edge."""
     parts = [
         {round(part - ROUNDING, DIGITS) + 0.0, round(part + ROUNDING, DIGITS) + 0.0}
         for part in astuple(twist)

@@ -1,23 +1,24 @@
 """The geometry of scan assist: scans, footprints and paths. No I/O.
 
-The gate judges a scan with every command, and all its robots wait for that. So a dense
-scan is folded once, when it comes. A beam of the fold stands for the beams up to its
-neighbours on either side: it says the least of what they hit. So each hit of the scan
-lies on a beam of the fold, or between two that say at least as near: a hit can move
-aside, at a range r by less than r times the fold's step, but only to both sides at
-once, and never out of the way of a robot that is wider than that. What is free beside
-a hit looks narrower by as much: with 720 beams or more all around, less than a degree.
+The gate evaluates a scan with every command, and all its robots wait for that. So a
+dense scan is folded once, on arrival. A beam of the fold replaces the beams up to its
+neighbours on either side: it has the shortest range among them. So each hit of the scan
+lies on a beam of the fold, or between two beams with ranges at most as long: a hit can
+move aside, at a range r by less than r times the fold's step, but only to both sides at
+once, and never out of the path of a robot that is wider than that. The free space
+beside a hit looks narrower by as much: with 720 beams or more all around, less than a
+degree.
 
-What a scanner sees of its own robot is left out only when the scan is judged. Behind
-such a hit may lie others, of the same beam of the fold: the nearest of the next three
-things, each two centimetres or more behind the one before it, are kept too.
+Hits of the robot's own body are left out only when the scan is evaluated. Other hits of
+the same beam of the fold may lie behind such a hit: the nearest hits of the next three
+things, each more than two centimetres behind the one before it, are kept too.
 
-A scanner that looks forward through a slit says nothing of what stands beside the
-slit. So the places that the footprint is about to come to are asked for one by one:
-does any ray look there? What is within the stop distance of the robot's front is left
-out: it was farther ahead a moment ago, and most scanners cannot see their own bumper.
+A scanner that looks forward through a slit sees nothing beside the slit. So each place
+that the footprint is about to reach is checked: does any ray point there? Places within
+the stop distance of the robot's front are left out: they were farther ahead a moment
+ago, and most scanners cannot see their own bumper.
 
-All is in the robot's own frame, where the robot stands and the points move.
+All coordinates are in the robot's own frame, in which the points move.
 """
 
 import math
@@ -30,22 +31,22 @@ from webmap.gate.events import Scan, ScanFold
 from webmap.gate.protocol import Point
 
 MOST = 720
-"""The most beams of a scan that is judged."""
+"""The most beams of a folded scan."""
 
 LIMIT = 100_000
-"""The most beams of a scan that is looked at."""
+"""The most beams of a scan that is accepted."""
 
 DEPTH = 0.02
-"""How far behind the nearest hit another is another thing, in metres."""
+"""Metres behind a hit beyond which the next hit is of another thing."""
 
 _THINGS = 4
 _MOST_TURNS = 2.0
 
 
 def folded(sweep: Scan) -> Scan:
-    """Return a scan of at most 720 beams that says nothing farther than this one.
+    """Return a scan of at most 720 beams with no range longer than in ``sweep``.
 
-    One of more than 100,000 beams, or a dense one that goes round more than twice, is
+    A scan of more than 100,000 beams, or a dense scan of more than two turns, is
     returned without ranges and with the reason in ``refused``.
     """
     count = len(sweep.ranges)
@@ -58,7 +59,7 @@ def folded(sweep: Scan) -> Scan:
 
 
 def too_long(count: int) -> str | None:
-    """Return in words why a scan of so many beams is not looked at."""
+    """Return why a scan of ``count`` beams is refused, as text, or ``None``."""
     if count <= LIMIT:
         return None
     return f"the scan has {count} beams, more than {LIMIT}"
@@ -80,7 +81,7 @@ def _folded(sweep: Scan, each: int) -> Scan:
     before: list[float] = []
     for start in range(0, len(ranges) + each - 1, each):
         group = ranges[start : start + each]
-        known = _saying(group, near)
+        known = _known_count(group, near)
         hits = _hits(group, near)
         nearest, *others = _things([*before, *hits]) or (math.inf,)
         unknown = nearest == math.inf and 2 * known < len(group)
@@ -88,7 +89,7 @@ def _folded(sweep: Scan, each: int) -> Scan:
         behind.append(others)
         said.append(known)
         asked.append(len(group))
-        # The beam that stands where the fold's does is no neighbour of the next one.
+        # The beam at the position of the fold's beam is no neighbour of the next one.
         before = hits[1:] if _hits(group[:1], near) else hits
     return msgspec.structs.replace(
         sweep,
@@ -99,33 +100,33 @@ def _folded(sweep: Scan, each: int) -> Scan:
 
 
 def _hits(group: Sequence[float], near: float) -> list[float]:
-    """Return what beams hit; ``-inf``, too near to measure, is a hit."""
+    """Return the hits of beams; ``-inf``, too near to measure, is a hit."""
     return [r for r in group if near <= r < math.inf or r == -math.inf]
 
 
-def _saying(group: Sequence[float], near: float) -> int:
-    """Return how many beams say anything."""
-    return sum([_says_something(r, near) for r in group])
+def _known_count(group: Sequence[float], near: float) -> int:
+    """Return the number of known beams."""
+    return sum([_is_known(r, near) for r in group])
 
 
 def known(sweep: Scan, rays: Sequence[int]) -> tuple[int, int]:
-    """Return how many of these rays say anything, and of how many.
+    """Return the number of known rays among ``rays``, and the number of all of them.
 
-    Of a fold it is the rays that were folded that are counted.
+    In a folded scan, the rays before the fold are counted.
     """
     if (fold := sweep.fold) is not None:
         return sum(fold.said[ray] for ray in rays), sum(fold.asked[ray] for ray in rays)
-    return _saying([sweep.ranges[ray] for ray in rays], sweep.range_min), len(rays)
+    return _known_count([sweep.ranges[ray] for ray in rays], sweep.range_min), len(rays)
 
 
-def _says_something(reach: float, near: float) -> bool:
-    """Return whether a beam says anything, be it that nothing is there."""
-    # Below the least range lies what a covered scanner says; -inf is a driver's word.
+def _is_known(reach: float, near: float) -> bool:
+    """Return whether a beam is known, also if it hit nothing."""
+    # A covered scanner reports less than range_min; a driver reports -inf on purpose.
     return math.isinf(reach) or reach >= max(near, 1e-6)
 
 
 def _things(hits: list[float]) -> list[float]:
-    """Return the nearest hits of the nearest few things, nearest first."""
+    """Return the nearest hit of each of the nearest four things, nearest first."""
     found: list[float] = []
     while hits and len(found) < _THINGS:
         nearest = min(hits)
@@ -135,19 +136,19 @@ def _things(hits: list[float]) -> list[float]:
 
 
 _STEP = 0.1
-"""Metres, or radians of a turn, between two places on the way that are asked for."""
+"""Metres, or radians of a turn, between two checked places on the path."""
 
 _MOST_STEPS = 40
 _STRAIGHT = 1e-6
 
 
 class ScanDirections:
-    """The directions that a scan has rays in.
+    """The directions in which a scan has rays.
 
     Args:
         first: The angle of the first ray, in radians.
-        step: From one ray to the next, which may be negative.
-        count: How many there are.
+        step: The angle from one ray to the next, in radians; may be negative.
+        count: The number of rays.
 
     """
 
@@ -158,11 +159,11 @@ class ScanDirections:
 
     @property
     def share(self) -> float:
-        """How much of the full circle it covers, from 0 to 1."""
+        """The share of the full circle that the rays cover, from 0 to 1."""
         return min(1.0, (self._width + self._slack) / math.tau)
 
     def covers(self, bearing: float) -> bool:
-        """Return whether a ray looks there, or two on either side of it."""
+        """Return whether a ray points there, or two rays lie on either side."""
         beyond = (bearing - self._low + self._slack) % math.tau
         return beyond <= self._width + 2 * self._slack
 
@@ -175,28 +176,28 @@ def looks_ahead(
     seconds: float,
     margin: float,
 ) -> bool:
-    """Return whether the fan covers every place where the robot is about to go.
+    """Return whether the scan covers every place that the robot is about to reach.
 
     Args:
-        fan: What the scanner looks at, from its own x.
+        fan: The directions of the rays, from the scanner's own x axis.
         footprint: The robot's corners in its own frame, in metres.
-        sensor: Where the scanner is: x, y in metres, yaw in radians.
-        twist: How the robot goes on; not on the spot.
-        seconds: For how long it is asked.
-        margin: Metres before the robot's front that need not be seen.
+        sensor: The pose of the scanner: x, y in metres, yaw in radians.
+        twist: The robot's velocity; not a turn on the spot.
+        seconds: The duration of the motion.
+        margin: Metres before the robot's front that need not be covered.
 
     """
     x0, y0, yaw = sensor
     return all(
         fan.covers(math.atan2(y - y0, x - x0) - yaw)
-        for x, y in _way(footprint, twist, seconds, margin)
+        for x, y in _path_places(footprint, twist, seconds, margin)
     )
 
 
-def _way(
+def _path_places(
     footprint: Sequence[Point], twist: Twist, seconds: float, margin: float
 ) -> Iterator[Point]:
-    """Go through the places ahead that the outline comes to."""
+    """Yield the places ahead that the outline reaches."""
     speed = math.hypot(twist.vx, twist.vy)
     ahead = (twist.vx / speed, twist.vy / speed)
     front = max(x * ahead[0] + y * ahead[1] for x, y in footprint) + margin
@@ -211,7 +212,7 @@ def _way(
 
 
 def _outline(footprint: Sequence[Point]) -> Iterator[Point]:
-    """Go through the corners, and the middles between them."""
+    """Yield the corners, and the middles between them."""
     for (ax, ay), (bx, by) in zip(
         footprint, (*footprint[1:], footprint[0]), strict=True
     ):
@@ -220,7 +221,7 @@ def _outline(footprint: Sequence[Point]) -> Iterator[Point]:
 
 
 def _moved(points: Sequence[Point], twist: Twist, seconds: float) -> Iterator[Point]:
-    """Go through where points of the robot are after some time."""
+    """Yield the positions of points of the robot after ``seconds``."""
     turned = twist.wz * seconds
     if abs(turned) < _STRAIGHT:
         dx, dy = twist.vx * seconds, twist.vy * seconds
@@ -236,7 +237,7 @@ _TOUCHING = 1e-9
 
 
 def time_straight(point: Point, edge: tuple[Point, Point], twist: Twist) -> float:
-    """Return when a point that comes by ``-twist`` crosses an edge."""
+    """Return the time until a point with the velocity ``-twist`` crosses an edge."""
     (ax, ay), (bx, by) = edge
     dx, dy = -twist.vx, -twist.vy
     ex, ey = bx - ax, by - ay
@@ -252,7 +253,15 @@ def time_straight(point: Point, edge: tuple[Point, Point], twist: Twist) -> floa
 def time_turning(
     point: Point, edge: tuple[Point, Point], center: Point, turn: float
 ) -> float:
-    """Return when a point that goes round ``center`` at ``-turn`` crosses an edge."""
+    """Return the time until a point on a circle crosses an edge.
+
+    Args:
+        point: The point.
+        edge: The two ends of the edge.
+        center: The centre of the circle.
+        turn: The robot's rate of turn; the point moves at ``-turn``.
+
+    """
     cx, cy = center
     (ax, ay), (bx, by) = edge
     px, py = point[0] - cx, point[1] - cy

@@ -1,14 +1,15 @@
-"""The STOP of one machine: kept on disk, confirmed by odometry, reset. No I/O.
+"""The STOP of one machine: saved on disk, confirmed by odometry, reset. No I/O.
 
-The file of it is common to all gates on a computer, of which one alone may have the
-machine. A STOP that is said to another one is found there by the gate that has it.
+All gates on a computer share the STOP file of a machine; only one of them has the
+machine. If another gate receives STOP, the gate that has the machine finds it in the
+file.
 
-It holds from the moment it is set. That it is acknowledged is another thing: that
-waits until the disk has it, so that a STOP which was confirmed to anybody is there
-again after whatever happens to this process or this computer.
+STOP is active from the moment it is set. It is acknowledged only when the disk has
+answered: a STOP that was saved is active again after a crash of this process or this
+computer.
 
-Each press is a STOP of its own, also while an earlier one stands. A reset names the
-press that a person saw, so it cannot end a newer one.
+Each press is a STOP with its own identity, also while an earlier one is active. A
+reset names the press that a person saw, so it cannot end a newer one.
 """
 
 import secrets
@@ -31,103 +32,98 @@ from webmap.gate.rules.motion import Motion
 
 
 def new_press(by: str) -> Press:
-    """Return a press of STOP that is unlike every other one.
+    """Return a press of STOP with a new identity.
 
     Args:
-        by: Who pressed STOP, for people.
+        by: The name of the person or program that pressed STOP.
 
     """
     return Press(by, secrets.token_hex(8))
 
 
 class StopLatch:
-    """Whether STOP stands for one machine, and whether the disk knows.
+    """Whether STOP is active for one machine, and whether that is on disk.
 
     Args:
         key: The machine.
-        emit: Takes the actions.
+        emit: Called with each action.
 
     """
 
     def __init__(self, key: Key, emit: Emit) -> None:
         self.press: Press | None = None
-        """The newest press; ``None`` if no STOP stands."""
+        """The newest press; ``None`` if STOP is not active."""
         self.shown: Press | None = None
-        """The newest press that is acknowledged. It is the one that people see."""
+        """The newest acknowledged press, which the pages show."""
         self.trouble: str | None = None
-        """Why the disk does not have it, in words."""
+        """Why it could not be saved on disk, as text."""
         self._key = key
         self._emit = emit
         self._number = 0
-        self._kept = True
-        self._keep_next = False
-        self._keeping: Press | None = None
+        self._saved = True
+        self._save_next = False
+        self._saving: Press | None = None
         self._ids: set[str] = set()
-        """The presses of this STOP that may be in the file."""
+        """The identities of the presses of this STOP that may be in the file."""
 
     @property
     def by(self) -> str | None:
-        """Who pressed STOP last, for people; ``None`` if it does not stand."""
+        """The name of who pressed STOP last; ``None`` if STOP is not active."""
         return None if self.press is None else self.press.by
 
     @property
     def on(self) -> bool:
-        """Whether STOP stands."""
+        """Whether STOP is active."""
         return self.press is not None
 
     @property
     def acknowledged(self) -> bool:
-        """Whether STOP stands and everything was done that it will stand."""
+        """Whether STOP is active and its save has ended, with or without an error."""
         return self.shown is not None
 
     def set(self, press: Press) -> None:
-        """Have STOP stand from now on, by the newest press."""
-        waiting = self.on and not self._kept
+        """Activate STOP, with ``press`` as the newest press."""
+        waiting = self.on and not self._saved
         self.press = press
-        if waiting:  # the disk gets one press after the other, and skips to the newest
-            self._keep_next = True
+        if waiting:  # one write at a time; the next one has the newest press
+            self._save_next = True
         else:
-            self._keep()
+            self._save()
 
     def found(self, press: Press) -> None:
-        """Take over what an earlier gate left on disk, or another one put there."""
+        """Take over a press that an earlier or another gate saved on disk."""
         self.press = self.shown = press
         self._ids.add(press.id)
 
     def is_new(self, press: Press | None) -> bool:
-        """Return whether the file has a press that this gate does not know.
-
-        Args:
-            press: The press in the file, if there is one.
-
-        """
+        """Return whether ``press``, read from the file, is new to this gate."""
         if press is None or press == self.press:
             return False
-        # What is being written, or could not be, is newer than what is in the file.
-        return self._kept and not (self.on and self.trouble)
+        # A press that is being saved, or could not be saved, is newer than the file.
+        return self._saved and not (self.on and self.trouble)
 
     @property
     def settled(self) -> bool:
-        """Whether the disk has what holds here, as far as it can."""
-        return self._kept
+        """Whether no save is pending."""
+        return self._saved
 
     def save_again(self) -> None:
-        """Keep what holds: somebody took the file away."""
-        self._keep()
+        """Save the current state again, because the file was removed."""
+        self._save()
 
     def drop(self) -> None:
-        """Let STOP stand no longer here; what is on disk is another gate's matter."""
+        """Deactivate STOP here only; another gate is responsible for the file."""
         self.press = self.shown = None
         self._ids.clear()
 
     def check(self, stop: str) -> None:
-        """Let a reset pass that names the newest press.
+        """Check that a reset names the newest press.
 
         Args:
-            stop: The identity of the press that the reset is to end.
+            stop: The identity of the press that the reset names.
 
         Raises:
-            Refusal: If no STOP stands, or a newer one does.
+            Refusal: If STOP is not active, or a newer press is.
 
         """
         if self.press is None:
@@ -139,26 +135,26 @@ class StopLatch:
             )
 
     def reset(self) -> None:
-        """Let STOP stand no longer."""
+        """Deactivate STOP."""
         self.press = self.shown = None
-        self._keep()
+        self._save()
         self._ids.clear()
 
     def kept(self, event: StopSaved) -> None:
-        """Note what became of keeping it; only the newest state counts."""
+        """Note the result of a save; only the newest save counts."""
         if event.number != self._number:
             return
-        self._kept, self.trouble = True, event.error
-        self.shown = self._keeping
-        if self._keep_next:
-            self._keep()
+        self._saved, self.trouble = True, event.error
+        self.shown = self._saving
+        if self._save_next:
+            self._save()
         elif self.shown is not None and event.error is None:
             self._ids = {self.shown.id}
 
-    def _keep(self) -> None:
+    def _save(self) -> None:
         self._number += 1
-        self._kept, self.trouble, self._keep_next = False, None, False
-        self._keeping = self.press
+        self._saved, self.trouble, self._save_next = False, None, False
+        self._saving = self.press
         if self.press is not None:
             self._ids.add(self.press.id)
         ids = frozenset(self._ids)
@@ -166,41 +162,45 @@ class StopLatch:
 
 
 PATIENCE = 2.0
-"""Seconds after STOP until "not known yet" becomes "not confirmed"."""
+"""Seconds after STOP during which the confirmation may be unknown (``None``).
+
+After that it is ``False``.
+"""
 
 
 class Confirmation:
-    """Looks at odometry from a STOP on for standstill, and on for motion. No I/O.
+    """Confirms by odometry that the machine has stopped since STOP.
 
-    What was confirmed is so as long as odometry goes on to say it.
+    It stays confirmed as long as odometry keeps coming and shows no motion.
     """
 
     def __init__(self) -> None:
         self.confirmed: bool | None = None
         self.why = ""
-        """The reason in words; empty while it is not known yet."""
+        """The reason as text; empty while ``confirmed`` is ``None``."""
         self.since = float("-inf")
         self._still = Standstill()
-        self._stood = False
+        self._stopped = False
 
     def begin(self, now: float) -> None:
-        """Look (again) from ``now`` on: what was seen before proves nothing."""
+        """Start anew at ``now``: odometry from before proves nothing."""
         self.confirmed, self.why, self.since = None, "", now
-        self._stood = False
+        self._stopped = False
         self._still.begin()
 
     def observe(self, twist: Twist | None, now: float) -> None:
-        """Take in a message of odometry; one that moves again is not confirmed."""
+        """Process an odometry message; motion ends the confirmation."""
         self._still.observe(twist, now)
         if self.confirmed and twist is not None and moves(twist):
             self.confirmed, self.why = False, self._moving()
 
     def judge(self, trouble: str | None, delivered: bool, now: float) -> None:
-        """Decide anew.
+        """Update ``confirmed`` and ``why``.
 
         Args:
-            trouble: Why nothing can be known at all now, in words.
-            delivered: Whether the robot's bridge answered since STOP.
+            trouble: Why standstill cannot be observed at all now, as text, or
+                ``None``.
+            delivered: Whether the machine's bridge answered since STOP.
             now: The time.
 
         """
@@ -209,9 +209,9 @@ class Confirmation:
             self.confirmed, self.why = False, self._since_then(trouble)
         elif self._still.reached and delivered and not silent:
             self.confirmed, self.why = True, "stopped, confirmed by odometry"
-            self._stood = True
+            self._stopped = True
         elif self.confirmed and not silent:
-            pass  # odometry had a gap, which is no motion
+            pass  # odometry had a gap, which does not mean motion
         elif now - self.since < PATIENCE:
             self.confirmed, self.why = None, ""
         else:
@@ -230,7 +230,7 @@ class Confirmation:
         return self._moving()
 
     def _since_then(self, trouble: str) -> str:
-        return f"it stopped, but since then: {trouble}" if self._stood else trouble
+        return f"it stopped, but since then: {trouble}" if self._stopped else trouble
 
     def _moving(self) -> str:
         speed = self._still.speed or 0.0
@@ -244,9 +244,9 @@ class ActiveStop:
 
     Args:
         key: The machine.
-        latch: Whether it stands.
-        robots: The robots that the machine is.
-        control: The link that velocity goes to.
+        latch: Whether STOP is active.
+        robots: The robots that are declared for the machine.
+        control: The link for velocities.
         motion: Writes the zeros.
 
     """
@@ -267,14 +267,14 @@ class ActiveStop:
         self._motion = motion
 
     def press(self, press: Press, now: float) -> None:
-        """Have it stand from now on; zero goes before everything else."""
+        """Activate STOP; zero is sent before everything else."""
         if self._robots.drivable:
             self._motion.zero(now)
         self.latch.set(press)
         self.send_all(now)
 
     def send_all(self, now: float) -> None:
-        """Say everything that it has to say, as far as there are links."""
+        """Send zeros, cancels and stop hooks, as far as links are up."""
         if self._robots.drivable:
             self._motion.hold(now)
         for goals in self._robots.goals.values():
@@ -285,13 +285,13 @@ class ActiveStop:
         self.confirm(now)
 
     def reset(self, stop: str) -> None:
-        """Have it stand no longer; nothing moves by that.
+        """Deactivate STOP; nothing moves by it.
 
         Args:
-            stop: The identity of the STOP that is to be ended.
+            stop: The identity of the press that the reset names.
 
         Raises:
-            Refusal: If none stands, or a newer one does.
+            Refusal: If STOP is not active, or a newer press is.
 
         """
         self.latch.check(stop)
@@ -301,48 +301,48 @@ class ActiveStop:
             hooks.say(stopped=False)
 
     def on_file_changed(self, press: Press | None, elsewhere: bool) -> bool:
-        """Note that the file of the STOP changed, by another hand than this gate's.
+        """Process a change of the STOP file that this gate did not make.
 
         Args:
-            press: The STOP that it says stands, if one does.
+            press: The press in the file, if there is one.
             elsewhere: Whether another gate has the machine.
 
         Returns:
-            Whether a STOP is to be taken over that was said to another gate.
+            Whether this gate must take over ``press``, a STOP of another gate.
 
         """
         latch = self.latch
         if press is not None:
-            news = latch.is_new(press)
-            if news and elsewhere and latch.on:
+            new = latch.is_new(press)
+            if new and elsewhere and latch.on:
                 latch.found(press)
-            return news and not elsewhere
+            return new and not elsewhere
         if not latch.settled or not latch.on:
             return False
-        if elsewhere:  # it was reset where the machine is, and this is an onlooker
+        if elsewhere:  # the gate that has the machine reset it; this gate only watches
             latch.drop()
             self._motion.release_hold()
             for hooks in self._robots.hooks.values():
                 hooks.drop()
         else:
-            latch.save_again()  # a file that is gone is no reset
+            latch.save_again()  # a removed file is no reset
         return False
 
     def take_over(self, press: Press, now: float) -> None:
-        """Have it stand because another gate was told so; zero goes first."""
+        """Activate the STOP of another gate; zero is sent first."""
         if self._robots.drivable:
             self._motion.zero(now)
         self.latch.found(press)
         self.send_all(now)
 
     def tasks_down(self, link: LinkHealth, now: float) -> None:
-        """Note that what was said last may not have arrived: a link is lost."""
+        """Note that the last cancels may not have arrived: their link is down."""
         for goals in self._robots.goals.values():
             if goals.link is link:
                 goals.link_down(now)
 
     def tasks_up(self, link: LinkHealth, now: float) -> None:
-        """Say what could not be said, or may not have arrived, for want of a link."""
+        """Send cancels and stop hooks that could not be sent or may be lost."""
         for goals in self._robots.goals.values():
             if goals.link is link and self.latch.on:
                 goals.stop(now)
@@ -355,13 +355,13 @@ class ActiveStop:
                 hooks.link_up()
 
     def confirm(self, now: float) -> None:
-        """Decide anew whether it is confirmed."""
+        """Update the confirmation."""
         since = self.confirmation.since
         delivered = not self._robots.drivable or self._control.answered_since(since)
-        self.confirmation.judge(self._cannot_tell(), delivered, now)
+        self.confirmation.judge(self._why_unobservable(), delivered, now)
 
-    def _cannot_tell(self) -> str | None:
-        """Return why nobody can tell whether the machine stands, in words."""
+    def _why_unobservable(self) -> str | None:
+        """Return why standstill cannot be observed, as text, or ``None``."""
         robots = self._robots
         link = self._control
         if not robots.drivable:

@@ -2,18 +2,19 @@
 
 ::
 
-    creeping ── odometry shows motion ──▶ waiting ── it stands for 0.3 s ──▶ done
+    creeping ── odometry shows motion ──▶ waiting ── standstill for 0.3 s ──▶ done
         │                                    │
-        └── no motion for 1.5 s              └── it moves on for 3 s
+        └── no motion for 1.5 s              └── still moving after 3 s
                     └──────────▶ failed ◀──────────┘
-                                   ▲ any doubt, any key, STOP, another who commands it
+                                   ▲ any fault, any input, STOP, another program
 
-While it creeps, each creeping command answers one of the driver's own, which say that
-every input is released; the test writes nothing by a timer. While it waits nothing is
-written at all, not even zero: that is what is tested. It always ends with zero.
+While the state is ``creeping``, each creeping command answers a command of the driver
+with all inputs released; the test writes nothing by a timer. While the state is
+``waiting``, the gate writes nothing at all, not even zero: that is what is tested. The
+test always ends with zero.
 
-One message that says "it stands" shows nothing: a coarse encoder says so between two of
-its steps. The base stopped when a standstill began that lasted.
+One odometry message without motion proves nothing: a coarse encoder sends such messages
+between two of its steps. The base stopped when the first lasting standstill began.
 """
 
 from collections import Counter
@@ -27,31 +28,31 @@ from webmap.gate.rules.health import Observation, Standstill, moves
 from webmap.gate.rules.motion import Motion
 
 CREEP = Twist(0.1)
-"""How fast it creeps."""
+"""The velocity while the state is ``creeping``."""
 
 CREEP_FOR = 1.5
-"""Seconds within which odometry must show that it moves."""
+"""Seconds within which odometry must show motion."""
 
 MOVES = 0.05
-"""Metres per second from which it moves."""
+"""Metres per second above which the base moves."""
 
 WAIT_FOR = 3.0
-"""Seconds after the last command for which a base is waited for."""
+"""Seconds after the last command within which the base must stop."""
 
 NOT_ALONE = "another program sent commands: stop that program, then test again"
-"""What is said when the gate was not the only one that commanded the base."""
+"""The result if another program commanded the base too."""
 
 MOVES_ON = f"the base did not stop within {WAIT_FOR:g} s"
-"""What is said of a base that has no timeout of its own."""
+"""The result for a base without a command timeout."""
 
 State = Literal["creeping", "waiting", "done", "failed"]
 
 
 class StopTest:
-    """One test of one machine.
+    """One stop test of one machine.
 
     Args:
-        now: When it begins.
+        now: The time, at which the test begins.
 
     """
 
@@ -59,35 +60,35 @@ class StopTest:
         self.state: State = "creeping"
         self.text = "moving slowly until odometry shows motion"
         self.concluded = False
-        """Whether the base itself decided how it ended."""
+        """Whether the test ended with a result: the base stopped, or did not."""
         self.seconds: float | None = None
-        """How long the base went on after the last command, if it stopped."""
+        """Seconds from the last command until the base stopped, if it did."""
         self._began_at = now
-        self._left_alone_at = now
+        self._last_command_at = now
         self._still = Standstill()
         self._unechoed: Counter[Twist] = Counter()
 
     @property
     def running(self) -> bool:
-        """Whether it goes on."""
+        """Whether the test is running."""
         return self.state in ("creeping", "waiting")
 
     def on_written(self, twist: Twist) -> None:
-        """Note what was written to the machine, of which an echo may come."""
+        """Note a velocity that the gate wrote; its echo may follow."""
         self._unechoed[twist] += 1
 
     def on_echo(self, twist: Twist) -> None:
-        """Take in a velocity that was said to the machine, by whomever."""
+        """Process a velocity on the topic, of the gate or of another program."""
         self._unechoed[twist] -= 1
         if self.state == "waiting" and self._unechoed[twist] < 0:
             self.abort(NOT_ALONE)
 
     def observe(self, twist: Twist | None, last_command_at: float, now: float) -> None:
-        """Take in a message of odometry.
+        """Process an odometry message.
 
         Args:
-            twist: The velocity that it tells, if it tells one.
-            last_command_at: When the machine was last told to move.
+            twist: The velocity in the message, if it has one.
+            last_command_at: When the last velocity other than zero was written.
             now: The time.
 
         """
@@ -98,40 +99,40 @@ class StopTest:
                 "waiting",
                 "no more commands: waiting until the base stops",
             )
-            self._left_alone_at = last_command_at
+            self._last_command_at = last_command_at
         elif self.state == "waiting":
             self._still.observe(twist, now)
             if self._still.reached:
-                assert self._still.since is not None  # since when it stands
+                assert self._still.since is not None  # when the standstill began
                 self.state, self.concluded = "done", True
-                self.seconds = round(self._still.since - self._left_alone_at, 3)
+                self.seconds = round(self._still.since - self._last_command_at, 3)
                 self.text = f"the base stopped after {self.seconds:.2f} s"
 
     def step(self, now: float) -> None:
-        """Let time pass."""
+        """Fail a test that exceeds its time limits."""
         if self.state == "creeping" and now - self._began_at >= CREEP_FOR:
             self.abort(f"the robot did not move within {CREEP_FOR:g} s")
         elif (
             self.state == "waiting"
-            and now - self._left_alone_at >= WAIT_FOR
+            and now - self._last_command_at >= WAIT_FOR
             and self._still.since is None  # else it may have stopped just now
         ):
             self.abort(MOVES_ON)
             self.concluded = True
 
     def abort(self, why: str) -> None:
-        """End it without a result."""
+        """End the test without a result."""
         self.state, self.text = "failed", why
 
 
 class StopTests:
-    """Runs stop tests, one after the other.
+    """Runs the stop tests of one machine, one after the other.
 
     Args:
         key: The machine.
-        motion: Writes to it.
-        sight: What is heard of it.
-        emit: Takes the actions.
+        motion: Writes its velocities.
+        sight: Its newest odometry.
+        emit: Called with each action.
 
     """
 
@@ -139,7 +140,7 @@ class StopTests:
         self, key: Key, motion: Motion, sight: Observation, emit: Emit
     ) -> None:
         self.last: StopTest | None = None
-        """The last one, which may be going on."""
+        """The newest test, which may be running."""
         self._key = key
         self._motion = motion
         self._observation = sight
@@ -147,14 +148,14 @@ class StopTests:
 
     @property
     def running(self) -> StopTest | None:
-        """The one that is going on."""
+        """The running test."""
         return self.last if self.last is not None and self.last.running else None
 
     def begin(self, armed: bool, now: float) -> None:
-        """Begin one.
+        """Begin a test.
 
         Args:
-            armed: Whether the driver's hands were seen to be off.
+            armed: Whether the driver has released all inputs.
             now: The time.
 
         Raises:
@@ -171,37 +172,37 @@ class StopTests:
         self.last = StopTest(now)
 
     def on_written(self, twist: Twist) -> None:
-        """Note what was written to the machine."""
+        """Note a velocity that the gate wrote."""
         if self.running is not None:
             self.running.on_written(twist)
 
     def on_echo(self, twist: Twist, now: float) -> None:
-        """Take in a velocity that came back on the topic, ours or another's."""
+        """Process a velocity on the topic, of the gate or of another program."""
         test = self.running
         if test is not None:
             test.on_echo(twist)
             if not test.running:
-                self._after(test, now)
+                self._apply_state(test, now)
 
     def observe(self, measured: Twist | None, now: float) -> None:
-        """Take in a message of odometry."""
+        """Process an odometry message."""
         test = self.running
         if test is not None:
             state = test.state
             test.observe(measured, self._motion.moved_at, now)
             if test.state != state:
-                self._after(test, now)
+                self._apply_state(test, now)
 
     def step(self, now: float) -> None:
-        """Let time pass."""
+        """Apply the time limits of the running test."""
         test = self.running
         if test is not None:
             test.step(now)
             if not test.running:
-                self._after(test, now)
+                self._apply_state(test, now)
 
-    def _after(self, test: StopTest, now: float) -> None:
-        """Do what the stop test has come to."""
+    def _apply_state(self, test: StopTest, now: float) -> None:
+        """Do what the new state of ``test`` requires."""
         if test.state == "waiting":
             self._motion.send_nothing()
         else:
@@ -210,7 +211,7 @@ class StopTests:
                 self._emit(SaveStopTest(self._key, test.seconds))
 
     def halt(self, why: str, now: float) -> None:
-        """Go to zeros if it was driven or tested, for the reason in words."""
+        """Send zeros if the machine was driven or tested; ``why`` is the reason."""
         test = self.running
         if test is not None:
             test.abort(why)
