@@ -288,8 +288,8 @@ class Disk:
             if action.key in self._stamps:
                 # Every later change is another gate's and is reported, also one that
                 # it made while this gate's file was being removed.
-                stands = action.press is not None
-                kept = self._records.stamp_of(action.key) if stands else None
+                is_active = action.press is not None
+                kept = self._records.stamp_of(action.key) if is_active else None
                 self._stamps[action.key] = kept
             return StopSaved(action.key, action.number, error)
         today = datetime.datetime.now().astimezone().date().isoformat()

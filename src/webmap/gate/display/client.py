@@ -35,11 +35,11 @@ class PendingStops:
     """The STOPs that are kept, each with its sender."""
 
     def __init__(self) -> None:
-        self._said: dict[tuple[str | None, str | None], float] = {}
+        self._sent: dict[tuple[str | None, str | None], float] = {}
 
     def __iter__(self) -> Iterator[tuple[str | None, str | None]]:
         """Yield the connection and the robot of each; see :meth:`say`."""
-        return iter(list(self._said))
+        return iter(list(self._sent))
 
     def say(self, by: str | None, robot: str | None, now: float) -> None:
         """Keep a STOP that is sent now to the gate, if it runs.
@@ -50,17 +50,17 @@ class PendingStops:
             now: The time.
 
         """
-        self._said[by, robot] = now
+        self._sent[by, robot] = now
 
     def told(self, now: float) -> None:
         """Note that a new gate has received all of them only now."""
-        self._said = dict.fromkeys(self._said, now)
+        self._sent = dict.fromkeys(self._sent, now)
 
     def lives(self, now: float) -> None:
         """Note that the gate still runs: drop the STOPs that it has obeyed."""
-        if self._said:
-            self._said = {
-                who: at for who, at in self._said.items() if now - at < HEEDED
+        if self._sent:
+            self._sent = {
+                who: at for who, at in self._sent.items() if now - at < HEEDED
             }
 
 

@@ -186,13 +186,13 @@ class DriveConnection:
     def say(self, text: str) -> None:
         """Send a text to the page, if it has received hello."""
         if self.greeted:
-            self._scan_assist(self._send, text)
+            self._call(self._send, text)
 
     def end(self, why: str) -> None:
         """Close the page's socket."""
-        self._scan_assist(self._close, why)
+        self._call(self._close, why)
 
-    def _scan_assist(self, fn: Callable[[str], None], text: str) -> None:
+    def _call(self, fn: Callable[[str], None], text: str) -> None:
         try:
             fn(text)
         except Exception:
@@ -277,7 +277,7 @@ class Pages:
 
     def on_tick(self, tick: protocol.Tick) -> None:
         """Send each page the newest tick, with its newest accepted ``seq``."""
-        for connection in self._everybody():
+        for connection in self._all():
             ack = tick.acks.get(connection.id)
             if ack is not None:
                 connection.say(tick_text(tick.tick, ack))
@@ -288,7 +288,7 @@ class Pages:
         texts: dict[tuple[bool, Cap], str] = {}
         with self._lock:
             self._latest[report.robot] = report
-            for connection in self._everybody():
+            for connection in self._all():
                 mine, page = connection.id == holder, connection.cap
                 if (mine, page) not in texts:  # most pages receive the same text
                     text = robot_text(report, mine=mine, page=page)
@@ -299,7 +299,7 @@ class Pages:
         """Report to all pages that a robot was removed."""
         with self._lock:
             self._latest.pop(gone.robot, None)
-        for connection in self._everybody():
+        for connection in self._all():
             connection.say(gone_text(gone))
 
     def on_refusal(self, refused: protocol.Refused) -> None:
@@ -337,6 +337,6 @@ class Pages:
         mine = holder == connection.id
         connection.say(robot_text(report, mine=mine, page=connection.cap))
 
-    def _everybody(self) -> list[DriveConnection]:
+    def _all(self) -> list[DriveConnection]:
         with self._lock:
             return list(self._connections.values())

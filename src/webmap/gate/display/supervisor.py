@@ -66,17 +66,17 @@ class Restarts:
             self.failing = False
 
 
-def in_words(epitaph: str, *, spoke: bool) -> str:
+def in_words(reason: str, *, spoke: bool) -> str:
     """Return the message about gates that end repeatedly.
 
     Args:
-        epitaph: Why the last one ended.
+        reason: Why the last one ended.
         spoke: Whether it had reported that it runs.
 
     """
     what = "ended repeatedly" if spoke else "does not start"
     return (
-        f"The gate {what}: {epitaph}. WebMap starts it again. Until then no robot "
+        f"The gate {what}: {reason}. WebMap starts it again. Until then no robot "
         "can be driven from here; a STOP is kept and sent then."
     )
 
@@ -151,8 +151,8 @@ class GateProcess:
         if code is not None and code < 0:
             return f"ended by {signal.Signals(-code).name}"
         self._listener.join(1.0)
-        said = one_line(self._last_line.decode("utf-8", "replace").strip(), MAX_WORDS)
-        return said or f"exit code {code}, no message"
+        text = one_line(self._last_line.decode("utf-8", "replace").strip(), MAX_WORDS)
+        return text or f"exit code {code}, no message"
 
     def start(self) -> None:
         """Start to read."""
@@ -200,9 +200,9 @@ class GateProcess:
             for line in self._err:
                 if line.strip():
                     self._last_line = line
-                said = one_line(line.decode("utf-8", "replace").rstrip("\r\n"))
+                text = one_line(line.decode("utf-8", "replace").rstrip("\r\n"))
                 with contextlib.suppress(OSError):
-                    os.write(2, f"{said}\n".encode())
+                    os.write(2, f"{text}\n".encode())
 
     def _read(self) -> None:
         assert self._process.stdout is not None
@@ -215,7 +215,7 @@ class GateProcess:
             self.kill(str(error))
         except Exception:
             # An error of the display: the gate can still send zeros to its robots.
-            log.exception("the gate's words could not be dealt with: it is ended")
+            log.exception("the gate is ended: its message could not be processed")
             self.stop(END_PATIENCE)
         finally:
             self._process.stdout.close()
@@ -320,14 +320,14 @@ class Supervisor:
             child, now = self._child, time.monotonic()
             if child is not None:
                 child.send(beat)
-                self._check_words(child)
+                self._check_alive(child)
                 self._restarts.lives(now)
             elif self._restarts.due(now):
                 self._restarts.started(now)
                 self._spawn()
             self._ending.wait(HEARTBEAT)
 
-    def _check_words(self, child: GateProcess) -> None:
+    def _check_alive(self, child: GateProcess) -> None:
         """Kill a gate that runs but sends nothing for too many heartbeats.
 
         A clock would also count the time in which this process was stopped.
@@ -365,11 +365,11 @@ class Supervisor:
         child.stop(STOP_TIMEOUT)
         self._note_end(child.end_reason)
 
-    def _note_end(self, epitaph: str) -> None:
+    def _note_end(self, reason: str) -> None:
         self._restarts.ended(time.monotonic())
         spoke, self.ready = self.ready, False
-        log.error("the gate has ended (%s); WebMap starts it again", epitaph)
+        log.error("the gate has ended (%s); WebMap starts it again", reason)
         failing = self._restarts.failing
-        self.trouble = in_words(epitaph, spoke=spoke) if failing else None
-        why = self.trouble or f"the gate has ended: {epitaph}"
+        self.trouble = in_words(reason, spoke=spoke) if failing else None
+        why = self.trouble or f"the gate has ended: {reason}"
         self._owner.gone(protocol.GateDown(why, failing))

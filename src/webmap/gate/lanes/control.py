@@ -161,15 +161,15 @@ class ControlLane:
         operator drives. It subscribes first: a bridge of ROS 2 that already publishes
         would subscribe with a quality of service that most publishers do not match.
         """
-        said, attached = self._types.get(topic), self._attached[topic]
+        announced, attached = self._types.get(topic), self._attached[topic]
         known = [type for type, assumed in attached if not assumed]
         types = known or [type for type, _ in attached]
         type = types[-1] if types else None
-        if type == said:
+        if type == announced:
             return
-        if said is not None:
-            self.lane.release_hold(f"webmap-gate advertise {topic} {said}")
-            self.lane.release_hold(f"webmap-gate echo {topic} {said}")
+        if announced is not None:
+            self.lane.release_hold(f"webmap-gate advertise {topic} {announced}")
+            self.lane.release_hold(f"webmap-gate echo {topic} {announced}")
             del self._types[topic]
         if type is not None:
             echo = f"webmap-gate echo {topic} {type}"
@@ -228,10 +228,10 @@ class ControlLane:
         self._emit(PingAnswered(self._url, self._unconfirmed.on_pong(number)))
 
     def _on_message(self, data: bytes) -> None:
-        heard = rosbridge.parse(data)
-        if heard is None or heard.topic not in self._types or heard.twist is None:
+        message = rosbridge.parse(data)
+        if message is None or message.topic not in self._types or message.twist is None:
             return
-        if not heard.twist.is_finite:
+        if not message.twist.is_finite:
             return
-        self._unconfirmed.echoed(heard.topic, heard.twist)
-        self._emit(EchoReceived(Key(self._url, heard.topic), heard.twist))
+        self._unconfirmed.echoed(message.topic, message.twist)
+        self._emit(EchoReceived(Key(self._url, message.topic), message.twist))

@@ -151,7 +151,7 @@ class Lane:
             held.count += 1
             return
         self._holds[id] = Announcement(hello, goodbye)
-        self._say(hello)
+        self._send_announcement(hello)
 
     def release_hold(self, id: str) -> None:
         """Undo one :meth:`hold`; after the last one ``goodbye`` is sent."""
@@ -159,7 +159,7 @@ class Lane:
         held.count -= 1
         if held.count == 0:
             del self._holds[id]
-            self._say(held.goodbye)
+            self._send_announcement(held.goodbye)
 
     def write(
         self, data: bytes, *, only_if_clear: bool, until: float = math.inf
@@ -202,7 +202,7 @@ class Lane:
         if link is not None:
             link.close()
 
-    def _say(self, data: bytes) -> None:
+    def _send_announcement(self, data: bytes) -> None:
         if data:
             self.write(data, only_if_clear=False)
 
@@ -237,7 +237,7 @@ class Lane:
             begun, self._socket = loop.time(), link
             if link.is_open:  # it may already be closed again
                 for held in list(self._holds.values()):
-                    self._say(held.hello)
+                    self._send_announcement(held.hello)
                 self._up()
                 await self._keep_pinging()
             # A bridge that closes the link but does not read would keep it, and the

@@ -32,7 +32,7 @@ _ACTIONLIB: dict[int, Outcome] = {
     9: "failed",
 }
 _ACTIONLIB_WAITING, _ACTIONLIB_ACTIVE = (0, 7), (1, 6)
-_ACTIONLIB_WORDS = {5: "the robot refused the goal", 9: "the robot lost the goal"}
+_ACTIONLIB_REASONS = {5: "the robot refused the goal", 9: "the robot lost the goal"}
 
 
 class _Duration(msgspec.Struct):
@@ -84,7 +84,7 @@ class _Status(msgspec.Struct):
     text: str = ""
 
 
-class _Said(msgspec.Struct):
+class _ActionlibMessage(msgspec.Struct):
     """A message of one of actionlib's three topics."""
 
     status: _Status | None = None
@@ -147,23 +147,23 @@ def of_topics(data: bytes, spec: RobotSpec, goal: SendGoal) -> GoalNews | None:
     if frame is None or frame.op != "publish":
         return None
     part = frame.topic.removeprefix(f"{spec.action}/")
-    said = _as(frame.msg, _Said)
-    if said is None or part not in ("status", "feedback", "result"):
+    message = _as(frame.msg, _ActionlibMessage)
+    if message is None or part not in ("status", "feedback", "result"):
         return None
     if part == "status":
-        ours = [each for each in said.status_list if each.goal_id.id == goal.id]
+        ours = [each for each in message.status_list if each.goal_id.id == goal.id]
         return _of_status(ours[0], goal) if ours else None
-    if said.status is None or said.status.goal_id.id != goal.id:
+    if message.status is None or message.status.goal_id.id != goal.id:
         return None
     if part == "result":
-        return _of_status(said.status, goal)
-    return _progress(said.feedback or _Feedback(), goal, spec.goal_frame)
+        return _of_status(message.status, goal)
+    return _progress(message.feedback or _Feedback(), goal, spec.goal_frame)
 
 
 def _of_status(status: _Status, goal: SendGoal) -> GoalNews | None:
     outcome = _ACTIONLIB.get(status.status)
     if outcome is not None:
-        why = status.text or _ACTIONLIB_WORDS.get(status.status, "")
+        why = status.text or _ACTIONLIB_REASONS.get(status.status, "")
         return _ended(goal, outcome, "" if outcome == "reached" else why)
     if status.status in _ACTIONLIB_ACTIVE + _ACTIONLIB_WAITING:
         active = status.status in _ACTIONLIB_ACTIVE
@@ -218,10 +218,10 @@ def _ended(goal: SendGoal, outcome: Outcome, why: str) -> GoalEnded:
     return GoalEnded(goal.robot, goal.id, outcome, readable(why))
 
 
-def readable(said: str) -> str:
+def readable(text: str) -> str:
     """Return a robot's text for display: short, printable, on one line."""
     # Cut first: a pass over each character of a megabyte would delay zeros.
-    plain = " ".join(said[: 10 * MOST_WORDS].split())
+    plain = " ".join(text[: 10 * MOST_WORDS].split())
     return "".join(letter for letter in plain if letter.isprintable())[:MOST_WORDS]
 
 
@@ -285,6 +285,6 @@ def answer_to(data: bytes, id: str) -> Answer | None:
     return Answer(None)
 
 
-def _because(what: str, said: Any) -> str:
-    words = readable(said) if isinstance(said, str) else ""
-    return f"{what} ({words})" if words else what
+def _because(what: str, text: Any) -> str:
+    details = readable(text) if isinstance(text, str) else ""
+    return f"{what} ({details})" if details else what

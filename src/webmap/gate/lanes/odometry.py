@@ -134,8 +134,8 @@ def parse_scan(frame: bytes, now: float) -> tuple[str, Scan] | None:
         return None
     least, step, near, far = about
     frame_id = _frame_of(message.get("header"))
-    sweep = Scan(least, step, near, far, values, now, refused=refused, frame=frame_id)
-    return topic, folded(sweep)
+    scan = Scan(least, step, near, far, values, now, refused=refused, frame=frame_id)
+    return topic, folded(scan)
 
 
 def _frame_of(header: Any) -> str:
@@ -231,16 +231,16 @@ class OdometryLane:
         if self._scanners and looks_like_cbor(data):
             self._on_scan(data)
             return
-        heard = rosbridge.parse(data)
-        if heard is None or heard.op != "publish" or heard.topic is None:
+        received = rosbridge.parse(data)
+        if received is None or received.op != "publish" or received.topic is None:
             return
-        for key in self._watchers.get(heard.topic, ()):
-            self._emit(OdometryReceived(key, heard.twist, self._sent_after))
+        for key in self._watchers.get(received.topic, ()):
+            self._emit(OdometryReceived(key, received.twist, self._sent_after))
 
     def _on_scan(self, data: bytes) -> None:
         # One ping period is added: the next answer often comes together with the scan.
-        heard = parse_scan(data, min(self._sent_after + BUSY_PING, now()))
-        if heard is not None:
-            topic, sweep = heard
+        received = parse_scan(data, min(self._sent_after + BUSY_PING, now()))
+        if received is not None:
+            topic, scan = received
             for key in self._scanners.get(topic, ()):
-                self._emit(ScanReceived(key, topic, sweep))
+                self._emit(ScanReceived(key, topic, scan))

@@ -254,7 +254,7 @@ class Socket(asyncio.Protocol):
         self._flush()
         for event in self._protocol.events_received():
             if isinstance(event, Response):
-                self._shake_hands()
+                self._finish_handshake()
             else:
                 assert isinstance(event, Frame)
                 self._on_frame(event)
@@ -264,7 +264,7 @@ class Socket(asyncio.Protocol):
             self._waiting.clear()
             self._transport.close()
 
-    def _shake_hands(self) -> None:
+    def _finish_handshake(self) -> None:
         if self._protocol.handshake_exc is None and not self.opened.done():
             self.opened.set_result(None)
 

@@ -198,8 +198,8 @@ class TasksLane:
         if goal.way == "move_base":
             # First, to miss no message: they may come at once.
             self._follow(spec, goal)
-        said = rosbridge.goal(spec, goal)
-        done = self.lane.write(said, only_if_clear=True, until=goal.until)
+        data = rosbridge.goal(spec, goal)
+        done = self.lane.write(data, only_if_clear=True, until=goal.until)
         if done and goal.way == "navigate_to_pose":
             self._keep_for_result(goal)
         if not done:
@@ -256,16 +256,16 @@ class TasksLane:
         self._spent.clear()
 
     def _keep_for_result(self, goal: SendGoal) -> None:
-        polite = FeedbackThrottle()
+        throttle = FeedbackThrottle()
 
         # A socket is removed once: one that was closed or lost calls nothing.
         def on_text(data: bytes) -> None:
-            word = navigation.of_action(data, goal)
-            if isinstance(word, GoalEnded):
+            news = navigation.of_action(data, goal)
+            if isinstance(news, GoalEnded):
                 del self._spent[link]
                 link.close()
-            if word is not None and polite(word):
-                self._emit(word)
+            if news is not None and throttle(news):
+                self._emit(news)
 
         def lost(why: str) -> None:
             del self._spent[link]
@@ -305,11 +305,11 @@ class TasksLane:
 
     def _on_message(self, data: bytes) -> None:
         for robot, (spec, goal) in list(self._followed.items()):
-            word = navigation.of_topics(data, spec, goal)
-            if isinstance(word, GoalEnded):
+            news = navigation.of_topics(data, spec, goal)
+            if isinstance(news, GoalEnded):
                 self.forget(robot)
-            if word is not None:
-                self._emit(word)
+            if news is not None:
+                self._emit(news)
 
     def _down(self) -> None:
         self._emit(LinkDown(self._url, "tasks", self._spending))
@@ -326,10 +326,10 @@ class FeedbackThrottle:
     def __init__(self) -> None:
         self._at = float("-inf")
 
-    def __call__(self, word: navigation.GoalNews) -> bool:
+    def __call__(self, news: navigation.GoalNews) -> bool:
         """Return whether the news should reach the rules."""
         now = asyncio.get_running_loop().time()
-        if isinstance(word, GoalEnded) or now - self._at >= FEEDBACK_PERIOD:
+        if isinstance(news, GoalEnded) or now - self._at >= FEEDBACK_PERIOD:
             self._at = now
             return True
         return False
