@@ -164,7 +164,7 @@ def test_one_whose_words_cannot_be_dealt_with_is_killed(run, caplog):
     assert ended.wait(30)
     gate.stop(30.0)
     assert gate.end_reason == "ended by SIGKILL"
-    assert "the gate's words could not be dealt with" in caplog.text
+    assert "the gate is ended: its message could not be processed" in caplog.text
     assert "LookupError: Ready(pid=5)" in caplog.text
 
 

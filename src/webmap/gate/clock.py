@@ -1,4 +1,4 @@
-"""The clock of every decision in the gate."""
+"""The clock of the gate."""
 
 import time
 
@@ -6,10 +6,10 @@ _BOOTTIME = getattr(time, "CLOCK_BOOTTIME", None)
 
 
 def now() -> float:
-    """Return seconds that only grow, also while the computer sleeps where it can.
+    """Return monotonic seconds that, on Linux, also count while the computer sleeps.
 
-    On Linux the ordinary monotonic clock stands still during suspend, and a command
-    given before it would look fresh afterwards.
+    The ordinary monotonic clock of Linux does not advance during suspend: a command
+    from before it would look fresh afterwards.
     """
     if _BOOTTIME is None:
         return time.monotonic()

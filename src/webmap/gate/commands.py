@@ -1,9 +1,11 @@
-"""The commands that a page sends on ``/drive``, parsed strictly. No I/O, no state.
+"""The commands that a page sends on ``/drive``, and their strict parser. No I/O.
 
-One JSON object in one text frame of at most 1024 bytes, with exactly these fields::
+A command is one JSON object in one text frame of at most 1024 bytes, with exactly
+these fields::
 
     {"op": "take", "robot": "r1"}
     {"op": "release", "robot": "r1"}
+    {"op": "renew", "robot": "r1", "epoch": 3}
     {"op": "drive", "robot": "r1", "epoch": 3, "seq": 17, "tick": 812,
      "x": 1.0, "y": 0.0, "turn": 0.0}
     {"op": "goal", "robot": "r1", "epoch": 3, "seq": 18, "tick": 813,
@@ -19,29 +21,25 @@ One JSON object in one text frame of at most 1024 bytes, with exactly these fiel
     {"op": "stop-test", "robot": "r1"}
 
 ``drive`` is a state, not an event: a page that holds a lease sends it at 20 Hz, also
-when nothing is pressed, and stops sending it when in doubt. ``x`` is forward, ``y``
-left and ``turn`` counter-clockwise, as parts of the speed in force, each in
-``[-1, 1]``; what lies beyond is clamped, and all below 0.001 are released inputs.
-``epoch`` is the lease's, ``tick`` the newest one that came, and ``seq`` grows with
-every ``drive``, ``goal`` and ``locate`` of the connection. ``goal`` is a pose in the
-robot's goal frame, in metres and radians, that it is to drive to, and ``locate`` one
-that it is at. ``reset`` ends the
-STOP with the identity ``stop``, as the gate reported it; if a newer STOP stands, the
-reset is refused. It moves nothing and gives no lease. ``ask`` asks the holder of the
-lease for it, who answers with ``grant`` or ``deny``, or gives it by saying nothing for
-10 s; ``release`` also takes the question back. ``stop-test`` creeps, stops sending and
-measures whether the base stops by itself; it needs the lease, released inputs, and a
-page that goes on sending ``drive``.
+when no input is pressed, and stops sending it when anything is uncertain. ``x`` is
+forward, ``y`` left and ``turn`` counter-clockwise, as parts of the speed in force, each
+in ``[-1, 1]``; larger values are clamped, and if all are below 0.001 the inputs are
+released. ``epoch`` is the lease's, ``tick`` the newest tick that the page received, and
+``seq`` grows with every ``drive``, ``goal`` and ``locate`` of the connection. ``goal``
+is the pose to drive to and ``locate`` the pose where the robot is, in metres and
+radians in the robot's goal frame. ``reset`` ends the STOP with the identity ``stop``,
+as the gate reported it; if a newer STOP is active, the reset is refused. It moves
+nothing and gives no lease. ``ask`` requests control from the holder, who answers with
+``grant`` or ``deny``; no answer for 10 s grants it. ``release`` also withdraws the
+request. ``stop-test`` creeps, stops sending and measures whether the base stops by
+itself; it needs the lease, released inputs, and a page that goes on sending ``drive``.
 
-A page whose driver goes by a camera adds ``"video"`` to each ``drive``: for how many
-milliseconds the newest picture that the page showed had been there.
+A page whose operator drives by a camera adds ``"video"`` to each ``drive``: the age of
+the newest picture on the page, in milliseconds.
 
-Whatever is not one of these is refused whole, but what begins with ``{"op":"stop"``
-stops robots first (:mod:`webmap.gate.commands`). What the gate says back stands
-in :mod:`webmap.gate.display.pages`.
-
-A frame that begins like a STOP stops robots, whatever follows. Which ones is read from
-it as far as that can be done without doubt.
+Any other frame is refused whole. But a frame that begins with ``{"op":"stop"`` stops
+robots first, whatever follows: the robot that it names, if that can be read for
+certain, otherwise all. :mod:`webmap.gate.display.pages` has the gate's answers.
 """
 
 import json
@@ -57,12 +55,12 @@ from webmap.base.errors import MotionError
 
 
 class Refusal(MotionError):
-    """A command that is refused whole: it changes nothing and feeds no dead-man.
+    """A command that is refused whole: it does not restart a dead-man timeout either.
 
     Args:
         why: One sentence for the person who gave the command.
-        garbage: Whether the words made no sense, rather than coming at the wrong
-            time or from the wrong hand. A page that sends much garbage is closed.
+        garbage: Whether the command is invalid, rather than valid at the wrong time
+            or from the wrong page. A page that sends much garbage is closed.
 
     """
 
@@ -79,7 +77,7 @@ MAX_INTEGER = 2**53 - 1
 """The largest whole number that JavaScript keeps exactly."""
 
 MAX_COORDINATE = 1e6
-"""The farthest goal, in metres from the frame's origin along an axis."""
+"""The farthest goal, in metres from the frame's origin along one axis."""
 
 MAX_ID = 64
 """The longest identity of a press of STOP, in characters."""
@@ -89,8 +87,10 @@ MAX_NAME = 64
 
 
 RELEASED = 1e-3
-"""The part of full speed below which an axis asks for no motion: a millimetre per
-second of each metre per second is less than any base does, and no input that is held.
+"""The part of full speed below which an axis counts as released.
+
+A millimetre per second of each metre per second is slower than any base moves, and less
+than any input that is held.
 """
 
 
@@ -100,26 +100,26 @@ metres and radians per second in the robot's own frame."""
 
 
 class Take(msgspec.Struct, frozen=True, tag_field="op", tag="take"):
-    """The page asks for the lease of a robot."""
+    """The page takes the lease of a robot."""
 
     robot: str
 
 
 class Release(msgspec.Struct, frozen=True, tag_field="op", tag="release"):
-    """The page gives the lease back."""
+    """The page releases the lease, or withdraws its request for control."""
 
     robot: str
 
 
 class Renew(msgspec.Struct, frozen=True, tag_field="op", tag="renew"):
-    """The page needs its lease still, though it does nothing with it now."""
+    """The page keeps its lease, though it sends nothing else now."""
 
     robot: str
     epoch: int
 
 
 class Drive(msgspec.Struct, frozen=True, tag_field="op", tag="drive"):
-    """How the page's inputs stand now."""
+    """The present state of the page's inputs."""
 
     robot: str
     epoch: int
@@ -129,9 +129,9 @@ class Drive(msgspec.Struct, frozen=True, tag_field="op", tag="drive"):
     y: float
     turn: float
     clamped: bool = False
-    """Whether an axis lay beyond ``[-1, 1]``."""
+    """Whether an axis was outside ``[-1, 1]``."""
     video: float | None = None
-    """Seconds since the picture was taken that the driver goes by, if there is one."""
+    """Age in seconds of the camera picture that the operator drives by, if any."""
 
     @property
     def neutral(self) -> bool:
@@ -149,7 +149,7 @@ class SetVelocity(msgspec.Struct, frozen=True, tag_field="op", tag="drive"):
 
 
 class Goal(msgspec.Struct, frozen=True, tag_field="op", tag="goal"):
-    """Where the page sends a robot: metres and radians in its goal frame."""
+    """The page sends the robot to a pose: metres and radians in its goal frame."""
 
     robot: str
     epoch: int
@@ -161,7 +161,7 @@ class Goal(msgspec.Struct, frozen=True, tag_field="op", tag="goal"):
 
 
 class Locate(msgspec.Struct, frozen=True, tag_field="op", tag="locate"):
-    """Where the robot is, as somebody sees it: metres and radians in its goal frame."""
+    """The page states where the robot is: metres and radians in its goal frame."""
 
     robot: str
     epoch: int
@@ -173,32 +173,32 @@ class Locate(msgspec.Struct, frozen=True, tag_field="op", tag="locate"):
 
 
 class Cancel(msgspec.Struct, frozen=True, tag_field="op", tag="cancel"):
-    """The robot should give up its goals."""
+    """The page cancels the robot's goals."""
 
     robot: str
 
 
 class Stop(msgspec.Struct, frozen=True, tag_field="op", tag="stop"):
-    """The robot, or every robot (``None``), should stop at once."""
+    """The page sends STOP to a robot, or to every robot (``None``)."""
 
     robot: str | None
 
 
 class Reset(msgspec.Struct, frozen=True, tag_field="op", tag="reset"):
-    """The STOP of the robot that has this identity should stand no longer."""
+    """The page ends the STOP with this identity."""
 
     robot: str
     stop: str
 
 
 class Ask(msgspec.Struct, frozen=True, tag_field="op", tag="ask"):
-    """The page asks the holder of the lease for it."""
+    """The page requests control from the holder."""
 
     robot: str
 
 
 class Grant(msgspec.Struct, frozen=True, tag_field="op", tag="grant"):
-    """The holder gives the lease to who asks."""
+    """The holder gives the lease to the page that requests control."""
 
     robot: str
 
@@ -210,7 +210,7 @@ class Deny(msgspec.Struct, frozen=True, tag_field="op", tag="deny"):
 
 
 class StopTest(msgspec.Struct, frozen=True, tag_field="op", tag="stop-test"):
-    """The page asks to measure whether the base stops by itself."""
+    """The page starts a stop test: does the base stop by itself?"""
 
     robot: str
 
@@ -243,7 +243,7 @@ def parse(data: bytes) -> PageCommand:
     """Return the command that ``data`` says.
 
     Raises:
-        Refusal: If it says none; nothing else is raised, whatever the bytes.
+        Refusal: If ``data`` is not a command; no bytes raise any other error.
 
     """
     fields = _object(data)
@@ -291,7 +291,7 @@ def _no_constant(name: str) -> NoReturn:
 
 
 class _Fields:
-    """Takes fields out of a command one by one, each of its own type."""
+    """Takes the fields of a command out one by one and checks the type of each."""
 
     def __init__(self, fields: dict[str, Any]) -> None:
         self._fields = fields
@@ -321,7 +321,7 @@ class _Fields:
 
     def whole(self, name: str) -> int:
         value = self._take(name)
-        # A bool is an int to Python, but not to whoever wrote it.
+        # A bool is an int in Python, but not in JSON.
         if type(value) is not int or not 0 <= value <= MAX_INTEGER:
             _refuse(f"{name!r} is {_short(value)}, expected a whole number from 0 on")
         return value
@@ -387,7 +387,7 @@ _READERS: dict[str, Callable[[_Fields], PageCommand]] = {
 
 
 def _short(value: object) -> str:
-    """Return ``value`` as it may stand in a log: ASCII, and not much of it."""
+    """Return ``value`` for a log: ASCII, at most 60 characters."""
     text = reprlib.repr(value).encode("ascii", "backslashreplace").decode()
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -412,14 +412,14 @@ def begins_like_stop(data: bytes) -> bool:
 
 
 def robot_in(data: bytes) -> str | None:
-    """Return the one robot that a frame names, if that can be read without doubt.
+    """Return the one robot that a frame names, if that can be read for certain.
 
     Args:
         data: A frame that begins like a STOP.
 
     Returns:
-        The name, which may be unknown; ``None`` if no robot is named, or several, or
-        the name cannot be read.
+        The name, which may be unknown; ``None`` if the frame names no robot or several,
+        or the name cannot be read.
 
     """
     try:
@@ -432,7 +432,7 @@ def robot_in(data: bytes) -> str | None:
 
 
 def _named_next(data: bytes) -> list[str]:
-    """Return the robot that stands right behind the beginning of what is not JSON."""
+    """Return the robot named right after the beginning of a frame that is not JSON."""
     found = _NAMES_NEXT.match(data)
     if found is None or len(_NAME_KEY.findall(data)) > 1:
         return []

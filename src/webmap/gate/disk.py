@@ -1,11 +1,11 @@
-"""The files that outlive the gate: active STOPs, driven marks and stop test results.
+"""The files that outlive the gate: active STOPs and stop test results.
 
-A file whose name ends in ``.stop`` means that STOP stands for the machine, whatever is
-in it: it tells who said so, but one that is empty or cannot be read stops as well.
+A file whose name ends in ``.stop`` means that STOP is active for the machine, whatever
+is in it. It contains who pressed STOP, but an empty or unreadable file stops as well.
 
-A disk may take a second to say that it has something; a robot that is to be stopped
-meanwhile cannot wait for that. So a thread does it, one thing after the other, and an
-event tells when it is done.
+A disk may take a second to confirm a write, and a robot that must stop meanwhile cannot
+wait for that. So a thread writes one file after the other, and an event reports when
+each is on disk.
 """
 
 import asyncio
@@ -39,31 +39,32 @@ from webmap.ros.names import spellings_of
 log = logging.getLogger("webmap.gate")
 
 UNKNOWN = "an earlier session"
-"""Whose STOP it is if the file does not tell."""
+"""Who pressed STOP if the file does not contain it."""
 
 MAX_NAME = 80
-"""The longest name that is kept, in characters."""
+"""The longest name of a person or page that is kept, in characters."""
 
 
 def path_of(folder: Path, key: Key, kind: str) -> Path:
-    """Return the file of one machine for one kind of thing.
+    """Return the file of one machine for one kind of record.
 
-    However this computer is spelled, it is the same: nobody has a machine twice.
+    All spellings of this computer's address give the same file: otherwise two gates
+    could each have the same machine.
     """
     return _paths_of(folder, key, kind)[0]
 
 
 def _paths_of(folder: Path, key: Key, kind: str) -> list[Path]:
-    """Return the file, and where it was when each spelling had its own."""
+    """Return the file, then its former paths, when each spelling had its own file."""
     keys = [key._replace(url=url) for url in spellings_of(key.url)]
     names = [hashlib.sha256("\n".join(k).encode()).hexdigest()[:24] for k in keys]
     return [folder / f"{name}.{kind}" for name in names]
 
 
 def _found(folder: Path, key: Key, kind: str) -> Path:
-    """Return the file that there is, or else where it would be."""
+    """Return the file that exists, otherwise the path for a new one."""
     paths = _paths_of(folder, key, kind)
-    # One that was being lifted when a gate died has not been lifted.
+    # A STOP that was being lifted when a gate died has not been lifted.
     return next(filter(os.path.lexists, [*paths, *map(_aside, paths)]), paths[0])
 
 
@@ -83,25 +84,25 @@ class Records:
         self._folder = folder
 
     def latch_of(self, key: Key) -> Press | None:
-        """Return the STOP that stands for a machine, if one does."""
+        """Return the active STOP of a machine, if there is one."""
         return _press_in(_found(self._folder, key, "stop"))
 
     def stamp_of(self, key: Key) -> tuple[int, int] | None:
-        """Return what changes with the file of a STOP; ``None`` if there is none."""
+        """Return a value that changes with the STOP file; ``None`` without a file."""
         return _stamp(_found(self._folder, key, "stop"))
 
     def keep_latch(
         self, key: Key, press: Press | None, ids: frozenset[str]
     ) -> str | None:
-        """Have STOP stand on disk, or not; return what went wrong, in words.
+        """Keep a STOP on disk or remove it; return why that failed, if it did.
 
-        When this returns, the disk has it: the file and its place in the folder.
+        When this returns, the disk has both the file and its entry in the folder.
 
         Args:
             key: The machine.
-            press: The STOP; ``None`` if it stands no longer.
+            press: The STOP; ``None`` if it is not active any more.
             ids: The STOPs that this gate may have left in the file. A file with
-                another one is of another gate, and is not taken away.
+                another STOP belongs to another gate and is not removed.
 
         """
         path, *others = _paths_of(self._folder, key, "stop")
@@ -113,7 +114,7 @@ class Records:
             else:
                 who = {"by": press.by, "id": press.id}
                 self._write(path, {**who, "bridge": key.url, "topic": key.topic})
-                for each in others:  # or it would be found when this one is lifted
+                for each in others:  # otherwise found when this one is lifted
                     each.unlink(missing_ok=True)
         except OSError as error:
             log.error("%s: %s", path, error)
@@ -121,7 +122,7 @@ class Records:
         return None
 
     def stop_test_of(self, key: Key) -> StopRecord | None:
-        """Return what the last stop test of a machine found, if there was one."""
+        """Return the result of the last stop test of a machine, if there was one."""
         path = _found(self._folder, key, "test")
         try:
             found = json.loads(path.read_text("utf-8"))
@@ -138,7 +139,7 @@ class Records:
         return StopRecord(seconds, date[:MAX_NAME])
 
     def keep_stop_test(self, key: Key, record: StopRecord) -> None:
-        """Keep what a stop test found."""
+        """Keep the result of a stop test."""
         path = path_of(self._folder, key, "test")
         found = {"seconds": record.seconds, "date": record.date}
         try:
@@ -147,7 +148,7 @@ class Records:
             log.error("%s: %s", path, error)
 
     def _write(self, path: Path, content: dict[str, Any]) -> None:
-        """Write a file so that after a crash it is whole, old or new."""
+        """Write a file so that a crash leaves the whole old or the whole new one."""
         self._folder.mkdir(parents=True, exist_ok=True)
         temporary = path.with_suffix(f"{path.suffix}.new")
         with temporary.open("w", encoding="utf-8") as file:
@@ -159,7 +160,7 @@ class Records:
 
 
 def _press_in(path: Path) -> Press | None:
-    """Return the STOP that a file tells of; ``None`` if there is no such file."""
+    """Return the STOP in a file; ``None`` if there is no such file."""
     try:
         found = json.loads(path.read_text("utf-8"))
         by, id = found["by"], found.get("id")
@@ -171,7 +172,7 @@ def _press_in(path: Path) -> Press | None:
     if not (isinstance(by, str) and by and by.isprintable()):
         by = UNKNOWN
     if not (isinstance(id, str) and id and id.isprintable() and len(id) <= MAX_ID):
-        # Earlier versions wrote none. This one changes when they write the file anew.
+        # Earlier versions wrote no identity. This one changes with each new file.
         id = "file-" + "-".join(f"{part:x}" for part in _stamp(path) or (0,))
     return Press(by[:MAX_NAME], id)
 
@@ -185,10 +186,10 @@ def _stamp(path: Path) -> tuple[int, int] | None:
 
 
 def _lift(path: Path, ids: frozenset[str]) -> None:
-    """Take the file of a STOP away, unless it tells of another one than these."""
+    """Remove the file of a STOP, unless it has a STOP that is not in ``ids``."""
     aside = _aside(path)
     with contextlib.suppress(FileNotFoundError):
-        path.replace(aside)  # from here on nobody else changes it
+        path.replace(aside)  # from here on no other gate changes it
     press = _press_in(aside)
     if press is None:
         return
@@ -203,7 +204,7 @@ def _odd(seconds: float) -> bool:
 
 
 def _flush_folder(folder: Path) -> None:
-    """Have the disk know which files there are; not every system lets us ask."""
+    """Flush the entries of a folder to the disk, on systems that offer it."""
     if os.name == "nt":
         return
     file = os.open(folder, os.O_RDONLY)
@@ -215,7 +216,7 @@ def _flush_folder(folder: Path) -> None:
 
 
 class Disk:
-    """Does what the decisions ask for on the disk.
+    """Performs the actions of the rules that concern the disk.
 
     Args:
         records: The files.
@@ -229,8 +230,8 @@ class Disk:
         self._stamps: dict[Key, tuple[int, int] | None] = {}
 
     def recall(self, state: LockState) -> LockState:
-        """Return ``state`` with what is known of its machine from before."""
-        # Asked for again and again while another gate has the machine.
+        """Return ``state`` with the machine's STOP and stop test from the disk."""
+        # Called again and again while another gate has the machine.
         if state.key not in self._stamps:
             self._stamps[state.key] = self._records.stamp_of(state.key)
         return dataclasses.replace(
@@ -240,14 +241,14 @@ class Disk:
         )
 
     def forget(self, key: Key) -> None:
-        """Look at the files of a machine no longer."""
+        """Stop checking the files of a machine."""
         self._stamps.pop(key, None)
 
     async def look(self) -> list[StopFileChanged]:
-        """Return the STOPs whose files are others than when they were looked at last.
+        """Return the STOPs whose files have changed since the last check.
 
-        In the same thread as :meth:`keep`, so that what was kept before is seen, and
-        what is kept after is not.
+        The check runs in the same thread as :meth:`keep`: it sees what was kept
+        before it, and nothing that is kept after it.
         """
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, self._look)
@@ -264,7 +265,7 @@ class Disk:
     def keep(
         self, action: SaveStop | SaveStopTest, tell: Callable[[Event], None]
     ) -> None:
-        """Keep something; ``tell`` hears of it when the disk has it."""
+        """Write a record; ``tell`` is called with an event when it is on disk."""
         loop = asyncio.get_running_loop()
         work = loop.run_in_executor(self._thread, self._do, action)
         self._under_way.add(work)
@@ -277,7 +278,7 @@ class Disk:
         work.add_done_callback(done)
 
     async def settle(self) -> None:
-        """Wait until the disk has everything."""
+        """Wait until everything is on disk."""
         if self._under_way:
             await asyncio.wait(self._under_way)
 
@@ -285,10 +286,10 @@ class Disk:
         if isinstance(action, SaveStop):
             error = self._records.keep_latch(action.key, action.press, action.ids)
             if action.key in self._stamps:
-                # What another gate does from here on is news, also what it did while
-                # the disk took its time to take the file away.
-                stands = action.press is not None
-                kept = self._records.stamp_of(action.key) if stands else None
+                # Every later change is another gate's and is reported, also one that
+                # it made while this gate's file was being removed.
+                is_active = action.press is not None
+                kept = self._records.stamp_of(action.key) if is_active else None
                 self._stamps[action.key] = kept
             return StopSaved(action.key, action.number, error)
         today = datetime.datetime.now().astimezone().date().isoformat()

@@ -1,7 +1,7 @@
-"""One file for each machine: who on this computer has it, and was it being driven?
+"""One lock file for each machine: which process has it, and was it being driven?
 
-The operating system lets go of a lock when its process ends, however it ends. What
-stands in the file stays: its first letter says whether the machine was being driven.
+The operating system releases a lock when its process ends, however it ends. The content
+of the file stays: its first character is 1 if the machine was being driven.
 """
 
 import logging
@@ -18,16 +18,16 @@ log = logging.getLogger("webmap.gate")
 _RESTS, _DRIVEN = b"0", b"1"
 
 TRIES, PAUSE = 2, 0.002
-"""How often a lock is tried, and the seconds between."""
+"""How many times a lock is tried, and the seconds between."""
 
-# Windows lets nobody else read a locked byte, so the lock lies beyond the text.
+# On Windows no other process can read a locked byte: lock one beyond the text.
 _LOCKED_BYTE = 1 << 20
 
 
 def state_folder() -> Path:
-    """Return the folder for what must outlive the process.
+    """Return the folder for the files that outlive the process.
 
-    ``WEBMAP_STATE_DIR`` names it; else it is where the system keeps such things.
+    ``WEBMAP_STATE_DIR`` names it; otherwise it is the system's folder for user state.
     """
     given = os.environ.get("WEBMAP_STATE_DIR")
     if given:
@@ -38,7 +38,7 @@ def state_folder() -> Path:
 
 
 class Locks:
-    """The machines that this gate alone on this computer may move.
+    """The machines that only this gate, of all on this computer, may move.
 
     Args:
         folder: Where the files are.
@@ -50,7 +50,7 @@ class Locks:
         self._held: dict[Key, int] = {}
 
     def acquire(self, key: Key) -> LockState:
-        """Try to have a machine."""
+        """Try to lock a machine."""
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             file = _open_locked(self._path(key))
@@ -64,18 +64,18 @@ class Locks:
         return LockState(key, held=True, driven=_was_driven(file, key))
 
     def tidy(self) -> None:
-        """Remove the files of machines that nobody has and that were not driven.
+        """Remove the files of machines that no gate has and that were not driven.
 
-        Such a file holds nothing that a new one does not. Each port of a bridge makes
-        another file, so they would pile up.
+        Such a file has nothing that a new one would not have. Each port of a bridge
+        makes another file, so they would accumulate.
         """
         for path in self._folder.glob("*.lock"):
             try:
                 file = os.open(path, os.O_RDWR)
             except OSError:
-                continue  # it is gone, or another user's
+                continue  # it was removed, or belongs to another user
             try:
-                # Another gate may have removed that file, and made it anew, meanwhile.
+                # Another gate may have removed and recreated the file meanwhile.
                 is_ours = _try_lock(file) and _is_at(file, path)
                 if is_ours and os.read(file, 1) == _RESTS:
                     path.unlink()
@@ -85,20 +85,20 @@ class Locks:
                 os.close(file)
 
     def release(self, key: Key) -> None:
-        """Let others have a machine."""
+        """Release the lock of a machine."""
         file = self._held.pop(key, None)
         if file is not None:
             os.close(file)
 
     def mark(self, key: Key, driven: bool) -> None:
-        """Keep on disk whether a machine is being driven."""
+        """Write to the file whether a machine is being driven."""
         file = self._held.get(key)
         if file is None:
             return
         try:
             os.lseek(file, 0, os.SEEK_SET)
             os.write(file, _DRIVEN if driven else _RESTS)
-        except OSError as error:  # a full disk never stands in the way of a stop
+        except OSError as error:  # a full disk must not prevent a stop
             log.warning("%s: %s", self._path(key), error.strerror)
 
     def _why_not(self, key: Key) -> str:
@@ -113,9 +113,9 @@ class Locks:
 
 
 def _open_locked(path: Path) -> int | None:
-    """Open a file, made if there is none, and lock it; None if another has the lock.
+    """Open or create a file and lock it; None if another process has the lock.
 
-    Another process may hold it for a moment and remove it, see :meth:`Locks.tidy`.
+    Another process may lock it for a moment and remove it, see :meth:`Locks.tidy`.
     """
     for left in reversed(range(TRIES)):
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
@@ -128,7 +128,7 @@ def _open_locked(path: Path) -> int | None:
 
 
 def _is_at(file: int, path: Path) -> bool:
-    """Return whether an open file is still the one of that name."""
+    """Return whether an open file is still the file at ``path``."""
     try:
         return os.path.samestat(os.fstat(file), path.stat())
     except FileNotFoundError:
@@ -136,7 +136,7 @@ def _is_at(file: int, path: Path) -> bool:
 
 
 def _was_driven(file: int, key: Key) -> bool:
-    """Return what the file says; one that says nothing clear means yes."""
+    """Return whether the file has the driven mark; an unclear mark counts as driven."""
     try:
         text = os.read(file, 1)
         if text:

@@ -1,7 +1,7 @@
-"""The pipe between the display and the gate: its frames, and what waits in the gate.
+"""The pipe between the display and the gate: its frames, and the gate's queues.
 
-A display that does not read, or a terminal that was stopped with Ctrl-S, must not hold
-up the process that stops robots. So writing is a thread's work.
+A display that does not read, or a terminal that was stopped with Ctrl-S, must not block
+the process that stops robots. So threads do the writing.
 """
 
 import contextlib
@@ -20,20 +20,20 @@ from webmap.gate.protocol import FromGate, RobotReport, SentTwist, Tick
 log = logging.getLogger("webmap.gate")
 
 MAX_FRAME = 1 << 20
-"""The longest message that either side takes, in bytes."""
+"""The longest message that either side accepts, in bytes."""
 
 _length = struct.Struct("<I")
 _encode = msgspec.msgpack.Encoder().encode
 
 
 def pack(message: msgspec.Struct) -> bytes:
-    """Return ``message`` as it goes down the pipe."""
+    """Return the frame of a message."""
     body = _encode(message)
     return _length.pack(len(body)) + body
 
 
 class Unpacker:
-    """Cuts the bytes of a pipe into messages.
+    """Splits the bytes of a pipe into messages.
 
     Args:
         type: The union of message types that may come.
@@ -47,10 +47,10 @@ class Unpacker:
     def feed(self, data: bytes) -> list[Any]:
         """Return the messages that ``data`` completes, oldest first.
 
-        What is no message is logged and left out.
+        A frame that cannot be decoded is logged and left out.
 
         Raises:
-            WireError: If the bytes are no frames; the pipe is then of no more use.
+            WireError: If the bytes are not frames; the pipe is then unusable.
 
         """
         buffer = self._buffer
@@ -80,10 +80,10 @@ class Unpacker:
 
 
 FULL = 1000
-"""Messages waiting, from which on those are dropped that newer ones replace."""
+"""With more messages than this waiting, those that newer ones replace are dropped."""
 
 OVERFULL = 20_000
-"""Messages waiting, from which on every one is dropped."""
+"""With more messages than this waiting, every new one is dropped."""
 
 
 class Outbox:
@@ -103,7 +103,7 @@ class Outbox:
         self._thread.start()
 
     def put(self, message: FromGate) -> None:
-        """Have a message written soon."""
+        """Queue a message."""
         waiting = self._queue.qsize()
         if waiting > OVERFULL:
             return
@@ -112,22 +112,22 @@ class Outbox:
         self._queue.put(pack(message))
 
     def close(self, timeout: float) -> None:
-        """Write what is waiting, for ``timeout`` seconds at most."""
+        """Write the waiting messages, for ``timeout`` seconds at most."""
         self._queue.put(None)
         self._thread.join(timeout)
 
     def _write(self) -> None:
-        with contextlib.suppress(OSError):  # nobody is there to read any more
+        with contextlib.suppress(OSError):  # the display has closed the pipe
             while (data := self._queue.get()) is not None:
                 while data:
                     data = data[os.write(self._file, data) :]
 
 
 class BackgroundHandler(logging.Handler):
-    """Hands records to another handler in a thread of its own; drops what is too much.
+    """Passes records to another handler in a thread; drops them if its queue is full.
 
     Args:
-        handler: What writes the records.
+        handler: Writes the records.
 
     """
 
@@ -139,12 +139,12 @@ class BackgroundHandler(logging.Handler):
         self._thread.start()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Have ``record`` written soon."""
+        """Queue a record."""
         with contextlib.suppress(queue.Full):
             self._records.put_nowait(record)
 
     def drain(self, timeout: float) -> None:
-        """Write what is waiting, for ``timeout`` seconds at most."""
+        """Write the waiting records, for ``timeout`` seconds at most."""
         with contextlib.suppress(queue.Full):
             self._records.put_nowait(None)
         self._thread.join(timeout)

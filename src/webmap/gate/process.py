@@ -1,7 +1,7 @@
 """The process of the gate: its pipe to the display, its signals, its end.
 
-Its end is the end of the pipe, a signal, or an error of its own; in each case it first
-sends zero to whatever is driven, for half a second at most.
+The process ends when the pipe ends, on a signal, or on an error of its own. In each
+case it first sends zero to every driven machine, for half a second at most.
 """
 
 import asyncio
@@ -23,18 +23,18 @@ from webmap.gate.pipe import BackgroundHandler, Outbox
 from webmap.gate.shell import Shell
 
 REAL_TIME = 1
-"""The lowest of the real-time priorities: before every program that has none."""
+"""The lowest real-time priority: before every process that has none."""
 
 
 def rise() -> bool:
-    """Have this thread, and those that it starts, run before what is not urgent.
+    """Give this thread, and those that it starts, a real-time priority.
 
-    The gate needs little of a processor, but needs it soon. Linux gives that to root
-    and to whom ``RLIMIT_RTPRIO`` allows it; on other systems and for other users the
-    gate is one program among all, as it also works.
+    The gate needs little processor time, but needs it soon. Linux allows this to root
+    and to users with ``RLIMIT_RTPRIO``. On other systems and for other users the gate
+    works with the ordinary priority.
 
     Returns:
-        Whether it was allowed.
+        Whether the system allowed it.
 
     """
     if sys.platform != "linux":
@@ -77,13 +77,13 @@ async def _serve(pipe_in: int, outbox: Outbox) -> int:
         target=_read, args=(pipe_in, loop, shell), name="gate-inbox", daemon=True
     ).start()
     outbox.put(protocol.Ready(os.getpid()))
-    gc.freeze()  # what is there now stays; collecting should not look at it again
+    gc.freeze()  # these objects stay; the collector need not look at them again
     await shell.run()
     return 1 if shell.failed else 0
 
 
 def _read(file: int, loop: asyncio.AbstractEventLoop, shell: Shell) -> None:
-    """Bring what comes on the pipe to the loop; runs in a thread of its own."""
+    """Pass the messages of the pipe to the loop; runs in a thread of its own."""
     unpacker = pipe.Unpacker(protocol.ToGate)
     why = "the display process has ended"
     with contextlib.suppress(RuntimeError):  # the loop has ended before the pipe
@@ -93,12 +93,12 @@ def _read(file: int, loop: asyncio.AbstractEventLoop, shell: Shell) -> None:
                     loop.call_soon_threadsafe(shell.deliver, message)
         except (OSError, WireError) as error:
             why = f"the pipe from the display is broken: {error}"
-        finally:  # whatever it was: a gate that hears no STOP must not go on
+        finally:  # on any error: a gate that cannot receive a STOP must not go on
             loop.call_soon_threadsafe(shell.deliver, events.Shutdown(why))
 
 
 def _take_pipes() -> tuple[int, int]:
-    """Return the two pipes for this module alone: no print can get in between."""
+    """Return the two pipes, for this module alone: no print can write into them."""
     pipe_in, pipe_out = os.dup(0), os.dup(1)
     if sys.platform == "win32":
         import msvcrt

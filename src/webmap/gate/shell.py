@@ -1,7 +1,7 @@
-"""The gate's shell: brings the decisions what happens and does what they ask for.
+"""The gate's shell: passes events to the rules and performs their actions.
 
-It takes its time from the event loop, and everything else from those it is given: the
-links to the bridges, the disk, the locks, and the pipe to the display.
+The rules never do I/O. The shell does it through the links to the bridges, the disk,
+the locks and the pipe to the display.
 """
 
 import asyncio
@@ -21,28 +21,28 @@ from webmap.gate.rules.motion import ZERO
 log = logging.getLogger("webmap.gate")
 
 STEP = 0.01
-"""Seconds between two looks at the clock while a machine is held or moves."""
+"""Seconds between two steps of the rules while a machine is held or moves."""
 
 IDLE_STEP = 0.02
-"""Seconds between two looks at the clock otherwise."""
+"""Seconds between two steps of the rules otherwise."""
 
 DRAIN = 0.5
-"""The longest time for zeros at the end, in seconds (S14)."""
+"""Seconds for zeros at the end, at most (S14)."""
 
 LOOK = 0.1
-"""Seconds between two looks at the files of STOPs, which another gate may write."""
+"""Seconds between two checks of the STOP files, which another gate may write."""
 
 LOCK_RETRY = 1.0
-"""Seconds between two attempts to have a machine that another gate has."""
+"""Seconds between two attempts to lock a machine that another gate has."""
 
 
 class Shell:
-    """Runs the decisions: brings them what happens and does what they ask for.
+    """Runs the rules: passes them events and performs their actions.
 
     Args:
-        outbox: Takes what the display is told.
-        locks: The machines of this computer.
-        disk: What outlives the process.
+        outbox: Takes the messages to the display.
+        locks: The locks of this computer's machines.
+        disk: The files that outlive the process.
 
     """
 
@@ -59,12 +59,12 @@ class Shell:
         self._silent = asyncio.Event()
         self._waiting_for_lock: dict[events.Key, asyncio.TimerHandle] = {}
         self._watched: set[events.Key] = set()
-        """The machines that may be driven."""
+        """The machines that may be driven now."""
 
     def deliver(self, event: protocol.ToGate | events.Event) -> None:
-        """Bring an event; called from within an action, it waits its turn.
+        """Pass an event to the rules; one that comes during an action waits its turn.
 
-        A gate that has failed takes in nothing more: its last word was zero.
+        A gate that has failed ignores every event: its last velocity was zero.
         """
         if self.failed:
             return
@@ -83,7 +83,7 @@ class Shell:
             self._working = False
 
     async def run(self) -> None:
-        """Go on until told to end, then send zeros and close the links."""
+        """Run until shutdown, then send zeros and close the links."""
         stepping = asyncio.create_task(self._keep_stepping())
         looking = asyncio.create_task(self._keep_looking())
         await self._ending.wait()
@@ -97,7 +97,7 @@ class Shell:
         if self.failed:
             self._zero_all()  # again: the first may have met a broken link
         self._links.close()
-        await asyncio.sleep(0)  # the loop's chance to write what it still holds
+        await asyncio.sleep(0)  # lets the loop write what it still holds
 
     async def _keep_stepping(self) -> None:
         loop = asyncio.get_running_loop()
@@ -110,7 +110,7 @@ class Shell:
             if self._ending.is_set() and self._gate.silent:
                 self._silent.set()
             due += STEP if self._gate.busy else IDLE_STEP
-            due = max(due, loop.time())  # what is late is not caught up on
+            due = max(due, loop.time())  # a late step is not made up for
             await asyncio.sleep(due - loop.time())
 
     async def _keep_looking(self) -> None:
@@ -159,7 +159,7 @@ class Shell:
         return state
 
     def _fail(self) -> None:
-        """An error of our own: stop everything and let the display start anew."""
+        """Stop every machine after an error of the gate; the display restarts it."""
         log.exception("the gate has failed; every driven robot is stopped")
         self.failed = True
         try:
@@ -169,7 +169,7 @@ class Shell:
             self._silent.set()
 
     def _zero_all(self) -> None:
-        """Write zero to whatever may be driven, also if one of the links is broken."""
+        """Write zero to every machine that may be driven, even if a link is broken."""
         try:
             self._links.zero_all()
         except Exception:

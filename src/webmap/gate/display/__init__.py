@@ -1,5 +1,5 @@
 """The display's end of the pipe to the gate: it starts, watches and uses the gate.
 
-Open ``client`` first. This is the only part of the gate that runs in the display's
+Start with ``client``. This is the only part of the gate that runs in the display's
 process.
 """

@@ -1,11 +1,11 @@
-"""The display's end of the gate: what pages and programs use.
+"""The display's client of the gate, which pages and programs use.
 
-A gate may end in the moment in which somebody says STOP, or not run at all. So a STOP
-is kept until a gate that was told of it has gone on for a while, and every new gate is
-told of it again. A robot that is told to stop twice stands no less.
+A gate may end just when a STOP is sent, or not run at all. So the client keeps each
+STOP until a gate that received it has gone on for a while, and sends it to every new
+gate again. A second STOP does no harm.
 
-Every method may be called from any thread and none waits for the gate. Callbacks come
-in a thread of the client's own and must be quick.
+Every method may be called from any thread and none waits for the gate. Callbacks are
+called in a thread of the client and must be quick.
 """
 
 import concurrent.futures
@@ -28,39 +28,39 @@ from webmap.gate.protocol import FromGate, FromProgram, Report, RobotSpec, Role
 from webmap.gate.specs import checked
 
 HEEDED = 2.0
-"""Seconds for which a gate must have gone on since it was told."""
+"""Seconds for which a gate must go on after it received a STOP."""
 
 
 class PendingStops:
-    """The STOPs that are kept, each with who said it."""
+    """The STOPs that are kept, each with its sender."""
 
     def __init__(self) -> None:
-        self._said: dict[tuple[str | None, str | None], float] = {}
+        self._sent: dict[tuple[str | None, str | None], float] = {}
 
     def __iter__(self) -> Iterator[tuple[str | None, str | None]]:
-        """Go through them: by whose connection, or ``None``, and for which robot."""
-        return iter(list(self._said))
+        """Yield the connection and the robot of each; see :meth:`say`."""
+        return iter(list(self._sent))
 
     def say(self, by: str | None, robot: str | None, now: float) -> None:
-        """Keep one; a gate that runs is told of it now.
+        """Keep a STOP that is sent now to the gate, if it runs.
 
         Args:
-            by: The connection that said it; ``None`` for a program.
-            robot: Which robot; ``None`` for all.
+            by: The connection that sent it; ``None`` for a program.
+            robot: The robot; ``None`` for all.
             now: The time.
 
         """
-        self._said[by, robot] = now
+        self._sent[by, robot] = now
 
     def told(self, now: float) -> None:
-        """Note that a gate has only now been told of all."""
-        self._said = dict.fromkeys(self._said, now)
+        """Note that a new gate has received all of them only now."""
+        self._sent = dict.fromkeys(self._sent, now)
 
     def lives(self, now: float) -> None:
-        """Note that the gate that was told goes on."""
-        if self._said:
-            self._said = {
-                who: at for who, at in self._said.items() if now - at < HEEDED
+        """Note that the gate still runs: drop the STOPs that it has obeyed."""
+        if self._sent:
+            self._sent = {
+                who: at for who, at in self._sent.items() if now - at < HEEDED
             }
 
 
@@ -70,10 +70,10 @@ log = logging.getLogger("webmap.gate")
 
 
 class GateClient:
-    """Starts the gate and talks to it, and starts it again if it ends.
+    """Starts the gate, exchanges messages with it, and restarts it if it ends.
 
-    Robots that were declared, and connections, are told to every new gate; leases are
-    not: they have ended with the old one.
+    Every new gate receives the declared robots and the connections, but no leases: they
+    ended with the old gate.
     """
 
     def __init__(self) -> None:
@@ -86,46 +86,46 @@ class GateClient:
         self._specs: dict[str, RobotSpec] = {}
         self._listeners: dict[int, Callable[[Report], None]] = {}
 
-    # Life.
+    # Start and end.
 
     def start(self) -> None:
-        """Start the gate and keep it running; the second call does nothing."""
+        """Start the gate and keep it running; a second call does nothing."""
         self._supervisor.start()
 
     def stop(self) -> None:
-        """Have every driven robot stopped and the gate ended; returns after that."""
+        """Stop every driven robot and end the gate; return after that."""
         self._supervisor.stop()
 
     @property
     def pid(self) -> int | None:
-        """The number of the gate's process, if it runs."""
+        """The process id of the gate, if it runs."""
         return self._supervisor.pid
 
     @property
     def ready(self) -> bool:
-        """Whether the gate runs and hears."""
+        """Whether the gate runs and receives messages."""
         return self._supervisor.ready
 
     # Robots and pages.
 
     def declare(self, spec: RobotSpec) -> None:
-        """Tell the gate of a robot, or what changed of it.
+        """Declare a robot to the gate, or a change of its declaration.
 
         Raises:
-            ConfigError: If something in ``spec`` cannot be meant.
+            ConfigError: If ``spec`` has an invalid value.
 
         """
         spec = checked(spec)
         try:
             pipe.pack(spec)
-        except TypeError as error:  # a gate that is started anew would not hear it
+        except TypeError as error:  # otherwise no new gate could receive it
             raise ConfigError(f"robot {spec.name!r}: {error}") from error
         with self._lock:
             self._specs[spec.id] = spec
             self.send(spec)
 
     def forget(self, robot_id: str) -> None:
-        """Have the gate drop a robot; it is stopped if it is driven."""
+        """Remove a robot from the gate; it is stopped if it is driven."""
         with self._lock:
             if self._specs.pop(robot_id, None) is not None:
                 self.send(protocol.Forget(robot_id))
@@ -137,13 +137,13 @@ class GateClient:
         send: Callable[[str], None],
         close: Callable[[str], None],
     ) -> DriveConnection:
-        """Introduce a page's socket to the gate.
+        """Register a page's socket with the gate.
 
         Args:
-            name: Who that is, for people.
-            role: What they may do.
-            send: Takes each text for the page, in the client's thread.
-            close: Takes the reason why the socket should be closed, likewise.
+            name: The name of the page's user, for display.
+            role: What the user may do.
+            send: Called with each text for the page, in the client's thread.
+            close: Called with the reason to close the socket, in the same thread.
 
         Raises:
             ConfigError: If there is no such role.
@@ -158,14 +158,14 @@ class GateClient:
             self._listeners[number] = fn
         return Removal(lambda: self._listeners.pop(number, None))
 
-    # The program's road.
+    # For programs.
 
     def take(self, robot_id: str) -> "concurrent.futures.Future[int]":
-        """Ask for the lease of a robot, for this program.
+        """Take the lease of a robot for this program.
 
         Returns:
-            A future of the lease's epoch; its exception is ``NoLease`` if the robot
-            is not to be had.
+            A future of the lease's epoch; its exception is ``NoLease`` if the gate
+            refuses.
 
         """
         trouble = None
@@ -174,7 +174,7 @@ class GateClient:
         return self._program.take(robot_id, trouble)
 
     def release(self, robot_id: str) -> None:
-        """Give the program's lease back; the robot is stopped if it is driven."""
+        """Release the program's lease; the robot is stopped if it is driven."""
         self._program.release(robot_id)
 
     def twist(self, robot_id: str, twist: Twist) -> None:
@@ -182,7 +182,7 @@ class GateClient:
 
         Raises:
             NoLease: If this program does not hold the lease.
-            MotionError: If the velocity is not made of finite numbers.
+            MotionError: If the velocity has a number that is not finite.
 
         """
         self._program.twist(robot_id, twist)
@@ -192,17 +192,17 @@ class GateClient:
 
         Raises:
             NoLease: If this program does not hold the lease.
-            MotionError: If the pose is not made of finite numbers.
+            MotionError: If the pose has a number that is not finite.
 
         """
         self._program.move(robot_id, x, y, yaw)
 
     def locate(self, robot_id: str, x: float, y: float, yaw: float) -> None:
-        """Tell where a robot is: metres and radians in its ``goal_frame``.
+        """State where a robot is: metres and radians in its ``goal_frame``.
 
         Raises:
             NoLease: If this program does not hold the lease.
-            MotionError: If the pose is not made of finite numbers.
+            MotionError: If the pose has a number that is not finite.
 
         """
         self._program.locate(robot_id, x, y, yaw)
@@ -212,18 +212,18 @@ class GateClient:
         self._program.cancel(robot_id)
 
     def stop_robot(self, robot_id: str | None) -> None:
-        """STOP a robot or, with ``None``, all of them."""
+        """Send STOP to a robot or, with ``None``, to all."""
         with self._lock:
             self._keep_stop(None, robot_id)
             self.send(FromProgram(commands.Stop(robot_id)))
 
     def reset(self, robot_id: str, stop: str) -> None:
-        """End the STOP of a robot that has this identity; moves nothing.
+        """End the STOP with this identity; this moves nothing.
 
         Args:
             robot_id: The robot.
-            stop: The identity, as the robot's report tells it. The gate refuses the
-                reset if a newer STOP stands.
+            stop: The identity, from the robot's report. The gate refuses the reset if a
+                newer STOP is active.
 
         """
         if self.ready:
@@ -232,17 +232,17 @@ class GateClient:
             log.error("the gate is not running: the reset is lost")
 
     def name_writers(self, robot_id: str, nodes: tuple[str, ...]) -> None:
-        """Tell which nodes besides the bridge publish to a robot's velocity topic."""
+        """Name the other nodes, not the bridge, that publish a robot's velocity."""
         self.send(protocol.WriterNodes(robot_id, nodes))
 
     def send(self, message: protocol.ToGate) -> None:
         """Send a message to the gate, if it runs."""
         self._supervisor.send(message)
 
-    # STOPs that may not have been heard.
+    # STOPs that no gate may have received.
 
     def _keep_stop_of_page(self, message: protocol.FromPage) -> None:
-        """Keep a page's STOP, in case that no gate hears it."""
+        """Keep a page's STOP, in case no gate receives it."""
         if b"stop" not in message.text:
             return
         try:
@@ -255,7 +255,7 @@ class GateClient:
             if not isinstance(command, commands.Stop):
                 return
             robot = command.robot
-        # As the gate does: what names no robot that is known is for all.
+        # As in the gate: a STOP that names no known robot is for all.
         known = robot in self._specs
         self._keep_stop(message.connection, robot if known else None)
 
@@ -273,16 +273,16 @@ class GateClient:
     # The gate.
 
     def introduction(self) -> list[protocol.ToGate]:
-        """Return what a new gate must hear first."""
+        """Return the first messages for a new gate."""
         stops = [
             self._stop_again(by, robot)
             for by, robot in self._pending_stops
-            if robot is None or robot in self._specs  # or it is gone since
+            if robot is None or robot in self._specs  # it may have been removed
         ]
         return [*self._specs.values(), *self._pages.introduction, *stops]
 
     def hear(self, message: FromGate) -> None:
-        """Take in what the gate says."""
+        """Process a message from the gate."""
         match message:
             case protocol.Tick(tick):
                 self._program.on_tick(tick)
@@ -313,7 +313,7 @@ class GateClient:
                 self._report(message)
 
     def gone(self, down: protocol.GateDown) -> None:
-        """Note that the gate is gone, and every lease with it."""
+        """Note that the gate has ended, and every lease with it."""
         self._pages.gone()
         self._program.gone(down.why)
         self._report(down)

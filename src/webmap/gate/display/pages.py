@@ -1,4 +1,4 @@
-"""The reports that pages receive on ``/drive``.
+"""The messages that the gate sends to pages on ``/drive``.
 
 ::
 
@@ -19,45 +19,66 @@
     {"op": "gone", "robot": "r1"}
     {"op": "refused", "robot": "r1", "what": "take", "why": "Ann drives it"}
 
-``hello`` comes first, also when the gate was started anew (all leases are then gone),
-and after it every robot. ``tick`` comes at 20 Hz; ``ack`` is the newest accepted
-``seq`` of this connection, -1 at first. ``robot`` comes when something changed,
-velocities at 10 Hz at most: ``[forward, left, counter-clockwise, upward, about the
-forward axis, about the left axis]``, in m/s and rad/s. While STOP stands
-``latched`` is true, ``state`` is ``"stopped"``, and ``stop`` tells what is known of it:
-``{"by": "Ann", "confirmed": true, "why": "stopped, confirmed by odometry", "id":
-"5f0c"}``, with the identity that a reset must name and that is new with each press;
-``confirmed`` is null while nobody knows yet and false, with the reason, when nobody
-could tell or the robot still moves. ``asker`` is who asks the holder for the lease:
-``{"connection": "c6", "name": "Ben", "left": 7.5}`` with the seconds until it is
-granted by itself; ``changing`` tells that it goes to somebody else as soon as the robot
-stands. ``holder`` and
-``epoch`` are null without a lease; ``armed`` says whether a command to move would be
-taken now; ``why`` says what binds the speeds ``v`` and ``w`` in force, or, while nobody
-has the robot, those that would be if this page took it; ``armable`` and
-``reason``, whether it can be taken, and what stands against that or against moving it.
-``alarm`` says that the robot moves on a second after zero was sent, ``other_writer``
-that another program publishes velocities to it: ``"another program publishes to
-/cmd_vel (0.10 m/s, -0.20 rad/s): /teleop"``, with its nodes where they are known. It
-comes whether or not somebody drives. ``age`` is the age
-of the driver's loop in milliseconds, ``reaction`` the seconds from a finger to the
-robot at worst, and ``brake`` the deceleration that is assumed, in m/s². ``stop_time``
-is what is known of the base stopping by itself, in seconds: ``"stated"``, or
-``"tested"`` on ``stop_date`` (null if it did not stop then). ``test`` tells of the stop
-test: ``{"state": "creeping", "text": "..."}``, then ``"waiting"``, ``"done"`` or
-``"failed"``. ``way`` is how goals are sent to the robot (null if none can be),
-``cancels`` whether they can be called off, ``locates`` whether it can be told where it
-is. ``goal`` is the newest one, by the connection ``by``, also when it has ended:
-``"sent"``, ``"accepted"``, ``"under way"``, ``"cancelling"``, ``"unknown"`` (what told
-of it was lost), ``"reached"``, ``"failed"`` or ``"cancelled"``, with the reason, the
-metres and seconds to go, the seconds under way and how often the robot had to free
-itself; null is what it does not say. ``hooks`` says which stop hooks failed or are yet
-to be said, and why, one sentence each: ``"stop hook /e_stop: no answer within 2 s"``.
-``refused`` names the ``op`` (``what``) that was refused, or ``"command"`` for words
-that made no sense (``robot`` is then null), or ``"lease"`` when a lease has ended. The
-same refusal is said once a second.
+``hello`` comes first, also after the gate was restarted (all leases have then ended),
+and after it a ``robot`` for every robot. ``tick`` comes at 20 Hz; ``ack`` is the newest
+accepted ``seq`` of this connection, -1 at first. ``gone`` means that the robot was
+removed. ``robot`` comes when something changed, velocities at 10 Hz at most. Its
+fields:
 
-What a page may say stands in :mod:`webmap.gate.commands`.
+``state``, ``latched``, ``stop``
+    While STOP is active, ``latched`` is true, ``state`` is ``"stopped"`` and ``stop``
+    describes it: ``{"by": "Ann", "confirmed": true, "why": "stopped, confirmed by
+    odometry", "id": "5f0c"}``. A reset must name the ``id``, which is new with each
+    press. ``confirmed`` is null while standstill is not known yet, and false, with the
+    reason, if it could not be checked or the robot still moves.
+``holder``, ``mine``, ``epoch``
+    The lease; ``holder`` and ``epoch`` are null without one.
+``asker``, ``changing``
+    Who requests control: ``{"connection": "c6", "name": "Ben", "left": 7.5}``, with the
+    seconds until it is granted without an answer. ``changing`` means that the lease
+    passes to another operator as soon as the machine has stopped.
+``armed``, ``armable``, ``reason``
+    Whether a command to move would be accepted now, whether control can be taken, and
+    the reason against control or against motion.
+``v``, ``w``, ``why``
+    The speeds in force and what limits them; while the robot is free, those that would
+    be in force if this page took it.
+``sent``, ``echoed``, ``measured``
+    Velocities ``[forward, left, counter-clockwise, upward, about the forward axis,
+    about the left axis]``, in m/s and rad/s.
+``alarm``
+    The robot still moves a second after zero was sent.
+``other_writer``
+    Another program publishes velocities to the robot, whether or not an operator
+    drives: ``"another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s):
+    /teleop"``, with its nodes where they are known.
+``age``, ``reaction``, ``brake``
+    The age of the operator's control loop in milliseconds, the longest time from a
+    finger to the robot in seconds, and the assumed deceleration in m/s².
+``stop_time``, ``stop_source``, ``stop_date``
+    The seconds in which the base stops by itself, ``"stated"`` or ``"tested"`` on
+    ``stop_date``; null if it did not stop in the test.
+``test``
+    The stop test: ``{"state": "creeping", "text": "..."}``, then ``"waiting"``,
+    ``"done"`` or ``"failed"``.
+``way``, ``cancels``, ``locates``
+    How goals are sent to the robot (null if it accepts none), whether they can be
+    cancelled, and whether the robot accepts a pose.
+``goal``
+    The newest goal, sent by the connection ``by``, also after its end: ``"sent"``,
+    ``"accepted"``, ``"under way"``, ``"cancelling"``, ``"unknown"`` (the link that
+    reported on it was lost), ``"reached"``, ``"failed"`` or ``"cancelled"``, with the
+    reason, the metres (``left``) and seconds (``eta``) to go, the seconds under way
+    (``time``) and the number of recoveries. What the robot does not report is null.
+``hooks``
+    The stop hooks that failed or have not run yet, and why, one sentence each:
+    ``"stop hook /e_stop: no answer within 2 s"``.
+
+``refused`` names in ``what`` the refused ``op``, or ``"command"`` for an invalid
+command (``robot`` is then null), or ``"lease"`` when a lease has ended. The same
+refusal is sent once a second at most.
+
+:mod:`webmap.gate.commands` has the commands of a page.
 """
 
 import itertools
@@ -76,23 +97,22 @@ from webmap.gate.protocol import Hello, Refused, RobotGone, RobotReport, Role
 
 
 def hello_text(hello: Hello) -> str:
-    """Return the greeting of a connection."""
+    """Return the first message of a connection."""
     return _text("hello", connection=hello.connection)
 
 
 def tick_text(tick: int, ack: int) -> str:
-    """Return a tick, with what was acknowledged on this connection."""
+    """Return a tick, with the newest accepted ``seq`` of the connection."""
     return f'{{"op":"tick","tick":{tick},"ack":{ack}}}'
 
 
 def robot_text(report: RobotReport, *, mine: bool, page: Cap) -> str:
-    """Return a report for one page.
+    """Return a robot's report for one page.
 
     Args:
-        report: How it stands with a robot.
+        report: The report.
         mine: Whether the page has the lease.
-        page: What the page asks for at most, which is in force once it has a robot
-            that is free now.
+        page: The page's own limit, which comes into force when it takes a free robot.
 
     """
     fields = msgspec.to_builtins(report)
@@ -104,12 +124,12 @@ def robot_text(report: RobotReport, *, mine: bool, page: Cap) -> str:
 
 
 def gone_text(gone: RobotGone) -> str:
-    """Return that a robot is no longer there."""
+    """Return the message that a robot was removed."""
     return _text("gone", robot=gone.robot)
 
 
 def refused_text(refused: Refused) -> str:
-    """Return that a command was not taken."""
+    """Return the message that a command was refused."""
     return _text("refused", robot=refused.robot, what=refused.what, why=refused.why)
 
 
@@ -132,47 +152,47 @@ class DriveConnection:
     ) -> None:
         self.id = hello.connection
         self.greeted = False
-        """Whether the gate that runs now has said hello; it is the first word."""
+        """Whether the present gate has sent hello, which must be the first message."""
         self._pages = pages
         self._hello = hello
         self._speeds: protocol.Speeds | None = None
         self.cap = page_cap()
-        """What the page asks for at most."""
+        """The page's own limit."""
         self._send = send
         self._close = close
 
     def receive(self, text: str | bytes) -> None:
-        """Hand over what the page said, whatever it is."""
-        # What is not Unicode must arrive as what it is: the gate refuses and counts it.
+        """Pass a frame of the page to the gate, valid or not."""
+        # Text that is not Unicode is passed on, too: the gate refuses and counts it.
         data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
         too_much = 2 * 1024  # refused as too long all the same
         self._pages.said(self.id, data[:too_much])
 
     def set_speeds(self, v: float, w: float) -> None:
-        """Set the greatest speeds that the page asks for, in m/s and rad/s."""
+        """Set the page's own speed limits, in m/s and rad/s."""
         self._speeds = protocol.Speeds(self.id, v, w)
         self.cap = page_cap(v, w)
         self._pages.new_speeds(self, self._speeds)
 
     def close(self) -> None:
-        """The page is gone: what it drove stops."""
+        """Remove the page, which has closed; the robots that it drove stop."""
         self._pages.drop(self)
 
     @property
     def introduction(self) -> list[protocol.ToGate]:
-        """What a gate must hear to know this connection."""
+        """The messages that make this connection known to a gate."""
         return [self._hello] if self._speeds is None else [self._hello, self._speeds]
 
     def say(self, text: str) -> None:
-        """Send a text to the page, unless it has not been greeted yet."""
+        """Send a text to the page, if it has received hello."""
         if self.greeted:
-            self._scan_assist(self._send, text)
+            self._call(self._send, text)
 
     def end(self, why: str) -> None:
-        """Ask for the page's socket to be closed."""
-        self._scan_assist(self._close, why)
+        """Close the page's socket."""
+        self._call(self._close, why)
 
-    def _scan_assist(self, fn: Callable[[str], None], text: str) -> None:
+    def _call(self, fn: Callable[[str], None], text: str) -> None:
         try:
             fn(text)
         except Exception:
@@ -180,12 +200,12 @@ class DriveConnection:
 
 
 class Pages:
-    """Every page that speaks with the gate.
+    """The pages that are connected to the gate.
 
     Args:
         send: Sends a message to the gate, if it runs.
-        lock: Held while anything here changes.
-        heed: Looks at what a page says before the gate does.
+        lock: Held while the state changes.
+        heed: Called with each message of a page before the gate receives it.
 
     """
 
@@ -204,7 +224,7 @@ class Pages:
 
     @property
     def introduction(self) -> list[protocol.ToGate]:
-        """What a new gate must hear of them."""
+        """The messages that make all connections known to a new gate."""
         return [
             message
             for connection in self._connections.values()
@@ -218,7 +238,7 @@ class Pages:
         send: Callable[[str], None],
         close: Callable[[str], None],
     ) -> DriveConnection:
-        """Introduce a page's socket; see ``GateClient.connect``."""
+        """Register a page's socket; see ``GateClient.connect``."""
         if role not in get_args(Role):
             raise ConfigError(f"role {role!r} is none of {', '.join(get_args(Role))}")
         with self._lock:
@@ -229,73 +249,73 @@ class Pages:
         return connection
 
     def knows(self, id: str) -> bool:
-        """Return whether there is a connection of that name."""
+        """Return whether there is a connection with this id."""
         return id in self._connections
 
     def said(self, id: str, data: bytes) -> None:
-        """Hand on what a page says."""
+        """Pass a page's frame to the gate."""
         message = protocol.FromPage(id, data)
         with self._lock:
             self._keep_stop_of_page(message)
             self.send(message)
 
     def drop(self, connection: DriveConnection) -> None:
-        """Forget a connection; the second call does nothing."""
+        """Remove a connection; a second call does nothing."""
         with self._lock:
             if self._connections.pop(connection.id, None) is not None:
                 self.send(protocol.Disconnect(connection.id))
 
     def new_speeds(self, connection: DriveConnection, speeds: protocol.Speeds) -> None:
-        """Tell the gate what a page asks for at most, and the page what it gets."""
-        with self._lock:  # so that nothing older comes after what the gate says now
+        """Send a page's limits to the gate, and the resulting speeds to the page."""
+        with self._lock:  # so that no older report follows a newer one
             self.send(speeds)
             for report in list(self._latest.values()):
-                if report.holder is None:  # of the one that it has, the gate says so
+                if report.holder is None:  # for a held robot, the gate reports them
                     self._show(connection, report)
 
-    # What the gate says.
+    # Messages from the gate.
 
     def on_tick(self, tick: protocol.Tick) -> None:
-        """Tell everybody the newest tick, and how far their words were taken."""
-        for connection in self._everybody():
+        """Send each page the newest tick, with its newest accepted ``seq``."""
+        for connection in self._all():
             ack = tick.acks.get(connection.id)
             if ack is not None:
                 connection.say(tick_text(tick.tick, ack))
 
     def on_report(self, report: protocol.RobotReport) -> None:
-        """Tell everybody how it stands with a robot."""
+        """Send a robot's report to all pages."""
         holder = None if report.holder is None else report.holder.connection
         texts: dict[tuple[bool, Cap], str] = {}
         with self._lock:
             self._latest[report.robot] = report
-            for connection in self._everybody():
+            for connection in self._all():
                 mine, page = connection.id == holder, connection.cap
-                if (mine, page) not in texts:  # most pages are told the same
+                if (mine, page) not in texts:  # most pages receive the same text
                     text = robot_text(report, mine=mine, page=page)
                     texts[mine, page] = text
                 connection.say(texts[mine, page])
 
     def on_robot_gone(self, gone: protocol.RobotGone) -> None:
-        """Tell everybody that a robot is gone."""
+        """Report to all pages that a robot was removed."""
         with self._lock:
             self._latest.pop(gone.robot, None)
-        for connection in self._everybody():
+        for connection in self._all():
             connection.say(gone_text(gone))
 
     def on_refusal(self, refused: protocol.Refused) -> None:
-        """Tell one page what is not done."""
+        """Send a refusal to its page."""
         connection = self._connections.get(refused.connection)
         if connection is not None:
             connection.say(refused_text(refused))
 
     def on_close(self, close: protocol.CloseConnection) -> None:
-        """Have a page's socket closed."""
+        """Close a page's socket for the gate."""
         connection = self._connections.get(close.connection)
         if connection is not None:
             connection.end(close.why)
 
     def on_hello(self, hello: protocol.Hello) -> None:
-        """Tell a page that the gate knows it, and everything that there is."""
+        """Send a page hello and the newest report of every robot."""
         with self._lock:
             connection = self._connections.get(hello.connection)
             if connection is None:
@@ -306,7 +326,7 @@ class Pages:
                 self._show(connection, report)
 
     def gone(self) -> None:
-        """The gate is gone: what it said counts no longer, and the next one greets."""
+        """Discard the reports of a gate that has ended; the next one sends hello."""
         with self._lock:
             self._latest.clear()
             for connection in self._connections.values():
@@ -317,6 +337,6 @@ class Pages:
         mine = holder == connection.id
         connection.say(robot_text(report, mine=mine, page=connection.cap))
 
-    def _everybody(self) -> list[DriveConnection]:
+    def _all(self) -> list[DriveConnection]:
         with self._lock:
             return list(self._connections.values())

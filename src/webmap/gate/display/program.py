@@ -1,4 +1,4 @@
-"""The program's road to the gate: a lease of its own, and velocities one by one."""
+"""Commands of a program to the gate: its own lease, velocities, goals and poses."""
 
 import concurrent.futures
 import itertools
@@ -13,17 +13,17 @@ from webmap.gate import commands, protocol
 from webmap.gate.protocol import PROGRAM, FromProgram
 
 LEAST_PAUSE = 0.01
-"""The least time between two velocities for one robot, in seconds; a program that gives
-them without a pause would delay every robot's STOP."""
+"""The least time between two velocities for one robot, in seconds. A program that sends
+velocities without a pause would delay every robot's STOP."""
 
 
 class ProgramCommands:
-    """What the display's own Python code may ask of the gate.
+    """The commands that Python code in the display may send to the gate.
 
     Args:
         send: Sends a message to the gate, if it runs.
-        lock: Held while anything here changes.
-        clock: Gives the time, in seconds.
+        lock: Held while the state changes.
+        clock: Returns the time, in seconds.
 
     """
 
@@ -40,21 +40,21 @@ class ProgramCommands:
         self._takes: dict[int, concurrent.futures.Future[int]] = {}
         self._epochs: dict[str, int] = {}
         self._passed_on: dict[str, tuple[float, commands.Velocity]] = {}
-        """By robot, the last velocity that the gate was told, and when."""
+        """By robot, the last velocity sent to the gate, and its time."""
         self._tick: int | None = None
 
     def take(
         self, robot_id: str, trouble: str | None
     ) -> "concurrent.futures.Future[int]":
-        """Ask for the lease of a robot.
+        """Take the lease of a robot.
 
         Args:
             robot_id: The robot.
-            trouble: Why there is no gate to ask, in words.
+            trouble: Why there is no gate; ``None`` if one runs.
 
         Returns:
-            A future of the lease's epoch; its exception is ``NoLease`` if the robot
-            is not to be had.
+            A future of the lease's epoch; its exception is ``NoLease`` if the gate
+            refuses.
 
         """
         future: concurrent.futures.Future[int] = concurrent.futures.Future()
@@ -69,7 +69,7 @@ class ProgramCommands:
         return future
 
     def release(self, robot_id: str) -> None:
-        """Give the program's lease back; the robot is stopped if it is driven."""
+        """Release the program's lease; the robot is stopped if it is driven."""
         with self._lock:
             self._epochs.pop(robot_id, None)
             self._send(FromProgram(commands.Release(robot_id)))
@@ -77,12 +77,12 @@ class ProgramCommands:
     def twist(self, robot_id: str, twist: Twist) -> None:
         """Send one velocity; without another within 200 ms the robot is stopped.
 
-        One that comes less than 10 ms after the last that was sent is left out, unless
-        it is a zero after motion.
+        A velocity less than 10 ms after the last one sent is left out, unless it is a
+        zero after motion.
 
         Raises:
             NoLease: If this program does not hold the lease.
-            MotionError: If the velocity is not made of finite numbers.
+            MotionError: If the velocity has a number that is not finite.
 
         """
         if not twist.is_finite:
@@ -104,7 +104,7 @@ class ProgramCommands:
 
         Raises:
             NoLease: If this program does not hold the lease.
-            MotionError: If the pose is not made of finite numbers.
+            MotionError: If the pose has a number that is not finite.
 
         """
         pose = _finite(x, y, yaw)
@@ -113,11 +113,11 @@ class ProgramCommands:
             self._send(FromProgram(commands.Goal(robot_id, epoch, 0, tick, *pose)))
 
     def locate(self, robot_id: str, x: float, y: float, yaw: float) -> None:
-        """Tell where a robot is: metres and radians in its ``goal_frame``.
+        """State where a robot is: metres and radians in its ``goal_frame``.
 
         Raises:
             NoLease: If this program does not hold the lease.
-            MotionError: If the pose is not made of finite numbers.
+            MotionError: If the pose has a number that is not finite.
 
         """
         pose = _finite(x, y, yaw)
@@ -135,14 +135,14 @@ class ProgramCommands:
             raise NoLease(f"this program does not have control of robot {robot_id!r}")
         return epoch, self._tick
 
-    # What the gate says.
+    # Messages from the gate.
 
     def on_tick(self, tick: int) -> None:
         """Note the newest tick."""
         self._tick = tick
 
     def on_report(self, report: protocol.RobotReport) -> None:
-        """Note whose a robot is now."""
+        """Note whether this program holds a robot's lease now."""
         holder = None if report.holder is None else report.holder.connection
         with self._lock:
             if holder == PROGRAM and report.epoch is not None:
@@ -152,7 +152,7 @@ class ProgramCommands:
                 self._passed_on.pop(report.robot, None)
 
     def on_take_reply(self, reply: protocol.TakeReply) -> None:
-        """Answer who asked for a lease."""
+        """Set the result of a :meth:`take`."""
         with self._lock:
             future = self._takes.pop(reply.request, None)
             if reply.epoch is not None:
@@ -165,7 +165,7 @@ class ProgramCommands:
             future.set_result(reply.epoch)
 
     def gone(self, why: str) -> None:
-        """The gate is gone, and every lease with it."""
+        """Note that the gate has ended, and every lease with it."""
         with self._lock:
             takes, self._takes = self._takes, {}
             self._tick = None

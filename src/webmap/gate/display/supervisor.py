@@ -1,4 +1,4 @@
-"""Starts the gate process, watches it and starts it again."""
+"""Starts the gate's process, watches it and restarts it."""
 
 import contextlib
 import logging
@@ -20,38 +20,38 @@ from webmap.gate import pipe, protocol
 from webmap.gate.protocol import FromGate
 
 FIRST_PAUSE = 0.25
-"""Seconds until a gate that has ended twice in a row is started again."""
+"""Seconds until the next start after a gate has ended twice in a row."""
 
 LONGEST_PAUSE = 4.0
-"""Seconds between the end of a gate and the next one at most."""
+"""Seconds between the end of a gate and the next start, at most."""
 
 LIVED = 10.0
-"""Seconds that a gate must have lived for its end to be the first in a row."""
+"""Seconds after which the end of a gate counts as the first in a row."""
 
 
 class Restarts:
-    """The starts and ends of the gates of one display."""
+    """Decides when the display starts its next gate."""
 
     def __init__(self) -> None:
         self.failing = False
-        """Whether one gate after the other ended soon."""
+        """Whether several gates in a row have ended soon after their start."""
         self._pause = 0.0
         self._due = float("-inf")
         self._started_at = float("-inf")
 
     def due(self, now: float) -> bool:
-        """Return whether it is time to start one."""
+        """Return whether it is time to start a gate."""
         return now >= self._due
 
     def started(self, now: float) -> None:
-        """Note that one was started, or that this was tried."""
+        """Note that a gate was started, or an attempt to start one."""
         self._started_at = now
 
     def ended(self, now: float) -> None:
-        """Note that it has ended.
+        """Note that the gate has ended.
 
-        The next one is started at once, because what the robots do now nobody knows;
-        if that one ends soon as well, after a pause that doubles.
+        The next one is started at once, because no gate controls the robots now. If
+        that one ends soon as well, there is a pause, which doubles each time.
         """
         lived = now - self._started_at >= LIVED
         self.failing = self._pause > 0.0 and not lived
@@ -61,22 +61,22 @@ class Restarts:
         self._pause = min(max(2 * self._pause, FIRST_PAUSE), LONGEST_PAUSE)
 
     def lives(self, now: float) -> None:
-        """Note that it runs still."""
+        """Note that the gate still runs."""
         if self.failing and now - self._started_at >= LIVED:
             self.failing = False
 
 
-def in_words(epitaph: str, *, spoke: bool) -> str:
-    """Return what is to be said of gates that end one after the other.
+def in_words(reason: str, *, spoke: bool) -> str:
+    """Return the message about gates that end repeatedly.
 
     Args:
-        epitaph: What the last one ended of.
-        spoke: Whether it had come to run.
+        reason: Why the last one ended.
+        spoke: Whether it had reported that it runs.
 
     """
     what = "ended repeatedly" if spoke else "does not start"
     return (
-        f"The gate {what}: {epitaph}. WebMap starts it again. Until then no robot "
+        f"The gate {what}: {reason}. WebMap starts it again. Until then no robot "
         "can be driven from here; a STOP is kept and sent then."
     )
 
@@ -84,22 +84,23 @@ def in_words(epitaph: str, *, spoke: bool) -> str:
 log = logging.getLogger("webmap.gate")
 
 MAX_UNSENT = 1 << 20
-"""Bytes that a gate may leave unread before it is taken for hung."""
+"""A gate that leaves more bytes than this unread counts as hung."""
 
 END_PATIENCE = 2.0
-"""Seconds for which a gate may send zeros and end, until it is killed."""
+"""Seconds that a gate has to send zeros and end, before it is killed."""
 
 MAX_WORDS = 300
-"""The longest line of a gate that is kept as its last words, in characters."""
+"""The longest last line of a gate that is kept as the reason of its end, in
+characters."""
 
 
 class GateProcess:
     """A running gate.
 
     Args:
-        hear: Called with each message, in a thread of the child's own.
-        ended: Called once, in that thread, when the gate has closed its end.
-        command: What is run; a gate, if nothing is said.
+        hear: Called with each message, in a thread of this object.
+        ended: Called once, in that thread, when the gate has closed its pipe.
+        command: The command to run; a gate by default.
 
     """
 
@@ -113,8 +114,8 @@ class GateProcess:
         self._ended = ended
         self._lock = threading.Lock()
         self._unsent = bytearray()
-        # A session of its own: Ctrl-C in the terminal reaches the display, which
-        # lets the gate stop the robots in order.
+        # A session of its own: Ctrl-C in the terminal reaches only the display, which
+        # lets the gate stop the robots and end.
         self._process = subprocess.Popen(
             command or python_command("webmap.gate"),
             stdin=subprocess.PIPE,
@@ -140,26 +141,26 @@ class GateProcess:
 
     @property
     def pid(self) -> int:
-        """The process's number."""
+        """The process id."""
         return self._process.pid
 
     @property
     def end_reason(self) -> str:
-        """What it ended of, in words, after :meth:`stop`."""
+        """Why the process ended, after :meth:`stop`."""
         code = self._process.returncode
         if code is not None and code < 0:
             return f"ended by {signal.Signals(-code).name}"
         self._listener.join(1.0)
-        said = one_line(self._last_line.decode("utf-8", "replace").strip(), MAX_WORDS)
-        return said or f"exit code {code}, no message"
+        text = one_line(self._last_line.decode("utf-8", "replace").strip(), MAX_WORDS)
+        return text or f"exit code {code}, no message"
 
     def start(self) -> None:
-        """Begin to read."""
+        """Start to read."""
         self._listener.start()
         self._reader.start()
 
     def send(self, *messages: msgspec.Struct) -> None:
-        """Write messages without waiting; what does not fit goes with the next."""
+        """Write messages without waiting; the rest follows with the next call."""
         data = b"".join(map(pipe.pack, messages))
         with self._lock:
             if self._in < 0:
@@ -172,15 +173,15 @@ class GateProcess:
                 if len(self._unsent) > MAX_UNSENT:
                     self.kill("it does not read")
             except OSError:
-                self._unsent.clear()  # it is gone; the reader says so
+                self._unsent.clear()  # the gate has ended; the reader reports it
 
     def kill(self, why: str) -> None:
-        """End the process at once: only for one that does not work any more."""
+        """Kill a process that does not work any more."""
         log.error("the gate (process %d) is killed: %s", self.pid, why)
         self._process.kill()
 
     def stop(self, timeout: float) -> None:
-        """Close the pipe, by which the gate stops its robots and ends."""
+        """Close the pipe: the gate then stops its robots and ends."""
         assert self._process.stdin is not None
         with self._lock:
             self._in = -1
@@ -194,14 +195,14 @@ class GateProcess:
             self._reader.join(1.0)
 
     def _listen(self) -> None:
-        """Pass on what it says to people, and keep the last line."""
-        with self._err, contextlib.suppress(ValueError):  # closed at our own end
+        """Copy the gate's error output to the display's, and keep the last line."""
+        with self._err, contextlib.suppress(ValueError):  # closed by this process
             for line in self._err:
                 if line.strip():
                     self._last_line = line
-                said = one_line(line.decode("utf-8", "replace").rstrip("\r\n"))
+                text = one_line(line.decode("utf-8", "replace").rstrip("\r\n"))
                 with contextlib.suppress(OSError):
-                    os.write(2, f"{said}\n".encode())
+                    os.write(2, f"{text}\n".encode())
 
     def _read(self) -> None:
         assert self._process.stdout is not None
@@ -213,8 +214,8 @@ class GateProcess:
         except WireError as error:
             self.kill(str(error))
         except Exception:
-            # A fault of this side: the gate can still send its robots zero.
-            log.exception("the gate's words could not be dealt with: it is ended")
+            # An error of the display: the gate can still send zeros to its robots.
+            log.exception("the gate is ended: its message could not be processed")
             self.stop(END_PATIENCE)
         finally:
             self._process.stdout.close()
@@ -222,45 +223,45 @@ class GateProcess:
 
 
 HEARTBEAT = 0.05
-"""Seconds between two signs of life to the gate."""
+"""Seconds between two heartbeats to the gate."""
 
 HUNG = 60
-"""Heartbeats without a word from a gate that runs until it is taken for hung."""
+"""Heartbeats without a message after which a running gate counts as hung."""
 
 SLOW_START = 400
-"""Heartbeats that a gate may take to say its first word."""
+"""Heartbeats that a gate has until its first message."""
 
 STOP_TIMEOUT = 2.0
-"""Seconds that the gate is given to end; it needs half a second for its zeros."""
+"""Seconds that the gate has to end; it needs half a second for its zeros."""
 
 
 class GateListener(Protocol):
-    """Whom the gate talks to."""
+    """The owner of a :class:`Supervisor`, which exchanges messages with the gate."""
 
     def introduction(self) -> list[protocol.ToGate]:
-        """Return what a new gate must hear first."""
+        """Return the first messages for a new gate."""
 
     def hear(self, message: FromGate) -> None:
-        """Take in what it says, in a thread of the gate's own."""
+        """Process a message from the gate, in the gate's reader thread."""
 
     def gone(self, down: protocol.GateDown) -> None:
-        """Note that it is gone, in any thread."""
+        """Note that the gate has ended, in any thread."""
 
 
 class Supervisor:
     """Keeps one gate running.
 
     Args:
-        owner: Whom it talks to.
-        lock: Held while the gate changes and while anything is told to it.
+        owner: Receives the gate's messages.
+        lock: Held while the gate changes and while a message is sent to it.
 
     """
 
     def __init__(self, owner: GateListener, lock: "threading.RLock") -> None:
         self.ready = False
-        """Whether the gate that runs now has said so."""
+        """Whether the present gate has reported that it runs."""
         self.trouble: str | None = None
-        """Why there is none, in words, if one after the other ends."""
+        """Why there is no gate, if several in a row have ended."""
         self._owner = owner
         self._lock = lock
         self._child: GateProcess | None = None
@@ -271,12 +272,12 @@ class Supervisor:
 
     @property
     def pid(self) -> int | None:
-        """The number of the gate's process, if it runs."""
+        """The process id of the gate, if it runs."""
         child = self._child
         return None if child is None else child.pid
 
     def start(self) -> None:
-        """Begin; the second call does nothing."""
+        """Start the gate and keep it running; a second call does nothing."""
         with self._lock:
             if self._heart is not None:
                 return
@@ -287,7 +288,7 @@ class Supervisor:
             self._heart.start()
 
     def stop(self) -> None:
-        """Have every driven robot stopped and the gate ended; returns after that."""
+        """Stop every driven robot and end the gate; return after that."""
         with self._lock:
             heart, self._heart = self._heart, None
         if heart is None:
@@ -301,7 +302,7 @@ class Supervisor:
         self._owner.gone(protocol.GateDown("the gate was ended"))
 
     def end_heartbeat(self, heart: threading.Thread | None = None) -> None:
-        """Give no sign of life any more, and have the gate find out by itself."""
+        """Stop the heartbeats; the gate notices that by itself."""
         self._ending.set()
         thread = heart or self._heart
         if thread is not None:
@@ -319,17 +320,17 @@ class Supervisor:
             child, now = self._child, time.monotonic()
             if child is not None:
                 child.send(beat)
-                self._check_words(child)
+                self._check_alive(child)
                 self._restarts.lives(now)
             elif self._restarts.due(now):
                 self._restarts.started(now)
                 self._spawn()
             self._ending.wait(HEARTBEAT)
 
-    def _check_words(self, child: GateProcess) -> None:
-        """Kill a gate that runs and says nothing; counted in our own heartbeats.
+    def _check_alive(self, child: GateProcess) -> None:
+        """Kill a gate that runs but sends nothing for too many heartbeats.
 
-        A clock would also count the time in which this process stood still.
+        A clock would also count the time in which this process was stopped.
         """
         self._silent_beats += 1
         if self._silent_beats > (HUNG if self.ready else SLOW_START):
@@ -364,11 +365,11 @@ class Supervisor:
         child.stop(STOP_TIMEOUT)
         self._note_end(child.end_reason)
 
-    def _note_end(self, epitaph: str) -> None:
+    def _note_end(self, reason: str) -> None:
         self._restarts.ended(time.monotonic())
         spoke, self.ready = self.ready, False
-        log.error("the gate has ended (%s); WebMap starts it again", epitaph)
+        log.error("the gate has ended (%s); WebMap starts it again", reason)
         failing = self._restarts.failing
-        self.trouble = in_words(epitaph, spoke=spoke) if failing else None
-        why = self.trouble or f"the gate has ended: {epitaph}"
+        self.trouble = in_words(reason, spoke=spoke) if failing else None
+        why = self.trouble or f"the gate has ended: {reason}"
         self._owner.gone(protocol.GateDown(why, failing))

@@ -1,4 +1,4 @@
-"""The gate's sockets to the bridges: what is written to them and read from them.
+"""The gate's sockets to the bridges. The rules decide; nothing is decided here.
 
-Open ``lane`` first, then ``control``, which writes velocity. Nothing is decided here.
+Start with ``lane``, then read ``control``, which writes velocity.
 """

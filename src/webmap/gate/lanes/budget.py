@@ -1,46 +1,46 @@
 """How much a bridge may send, and when its link is dropped for too much. No I/O.
 
-One number holds what a link has used: each piece of data adds the time for which the
-rates below would last for it, and a second takes one second away. So a burst is taken
-at once, and a link that sends more than its rate has to wait.
+One number is the use of a link, in seconds: each piece of data adds the time that it
+would take at the rates below, and each second subtracts one. So a burst is read at
+once, and a link that sends faster than these rates has to wait.
 """
 
 FRAMES = 4000
-"""Frames that are taken from a link each second: four times an odometry of 1 kHz, which
-itself is fifty times what a bridge sends that heeds the throttle rate."""
+"""Frames that are read from a link per second: four times an odometry of 1 kHz, which
+itself is fifty times the rate of a bridge that obeys the throttle rate."""
 
 BYTES = 16 << 20
-"""Bytes that are taken from a link each second: sixteen scans of the longest message,
-where a bridge that heeds the throttle rate sends ten."""
+"""Bytes that are read from a link per second: sixteen scans of the longest message,
+where a bridge that obeys the throttle rate sends ten."""
 
 WORK = 0.25
-"""Seconds of a processor that a link may take each second. An odometry of 1 kHz takes
-about 0.1; the rest of the gate needs what remains."""
+"""Seconds of processor time that a link may use per second. An odometry of 1 kHz uses
+about 0.1; the rest of the gate needs the remainder."""
 
 BURST = 1.0
-"""For how long these rates may be saved up, in seconds. A link that stalls is cut after
-3 s: an odometry of 1 kHz has kept back no more than this when it goes on."""
+"""The largest use, in seconds, before a link has to wait. A link that stalls is cut
+after 3 s: when it goes on, an odometry of 1 kHz has kept back no more than this."""
 
 PAUSE = 0.05
-"""Seconds for which a link is not read when it has used up everything."""
+"""Seconds for which a link is not read after it has used its whole budget."""
 
 PATIENCE = 1.0
-"""A link that has been close to its limit for so long is dropped, in seconds.
+"""A link that stays close to its limit for longer than this is dropped, in seconds.
 
-After a burst a link that sends at less than 3/4 of these rates gets further away from
-the limit than :data:`CLOSE` in this time.
+After a burst, a link that sends at less than 3/4 of these rates gets further from the
+limit than :data:`CLOSE` in this time.
 """
 
 BEHIND = 2.0
-"""A link of which something has waited all the time for so long is dropped, in seconds:
-on a busy computer the gate may take less of it than these rates."""
+"""A link whose data has been waiting without a break for longer than this is dropped,
+in seconds: on a busy computer the gate may read less from it than these rates."""
 
 CLOSE = 0.25
-"""How close to :data:`BURST` is close, in seconds."""
+"""How near to :data:`BURST` counts as close to the limit, in seconds."""
 
 
 class Budget:
-    """What one link has used; it outlives the sockets of the link."""
+    """The use of one link; it outlives the sockets of the link."""
 
     def __init__(self) -> None:
         self._used = 0.0
@@ -51,13 +51,13 @@ class Budget:
         self._work = 0.0
 
     def spend(self, frames: int, size: int, work: float, now: float) -> None:
-        """Note what was taken from the link.
+        """Add what was read from the link.
 
         Args:
-            frames: How many pieces of data.
-            size: How many bytes.
-            work: Seconds of a processor.
-            now: The time, in seconds that only grow.
+            frames: The number of pieces of data.
+            size: The number of bytes.
+            work: Seconds of processor time.
+            now: The time, in monotonic seconds.
 
         """
         self._pass_time(now)
@@ -73,19 +73,19 @@ class Budget:
         self._work += work
 
     def note(self, now: float, *, behind: bool) -> None:
-        """Note whether more of the link waits than was taken."""
+        """Note whether data of the link is still waiting after its turn."""
         if not behind:
             self._behind_since = None
         elif self._behind_since is None:
             self._behind_since = now
 
     def wait(self, now: float) -> float:
-        """Return for how many seconds nothing may be taken; 0.0 if it may be now."""
+        """Return for how many seconds the link must not be read; 0.0 if it may be."""
         self._pass_time(now)
         return 0.0 if self._used < BURST else self._used - BURST + PAUSE
 
     def flood(self, now: float) -> str | None:
-        """Return in words why the link is to be dropped; None if it is not."""
+        """Return why the link must be dropped; None if it need not be."""
         self._pass_time(now)
         if self._behind_since is not None and now - self._behind_since > BEHIND:
             return f"the bridge sends too much: data was waiting for {BEHIND:g} s"

@@ -1,15 +1,17 @@
-"""The socket for velocity of one bridge.
+"""The control lane: the socket of one bridge for velocity.
 
-A link that stalls keeps what TCP has taken and delivers it when it goes on, late. How
-much that can be is bounded here, whatever the link's latency: no more moving velocities
-are written than may lie on the way, and what has arrived is known by two proofs.
+A link that stalls keeps the bytes that TCP has accepted and delivers them late, when it
+goes on. The control lane limits how many these can be, whatever the link's latency: it
+writes no more than :data:`MOST` moving velocities that are not known to have arrived.
+Two things prove arrival.
 
-- The bridge answers a ping. That proves what was written before the ping: a bridge
-  takes what comes on one socket in order.
-- The robot's ROS says a velocity back (an echo). It proves the oldest one of that value
-  that was not said back yet, and all before it. Nothing tells it from what another
-  says there, and others say zero as well: so an echo only makes room, an echo of zero
-  not even that, and neither shows that the link lives or that a zero has arrived.
+- The bridge answers a ping. That proves everything written before the ping, because a
+  bridge processes the messages of one socket in order.
+- The velocity comes back from the robot's ROS (an echo). That proves the oldest
+  velocity of this value that has no echo yet, and all before it. But an echo looks the
+  same as a velocity from another publisher, and others publish zero as well. So an echo
+  only makes room, an echo of zero not even that, and neither proves that the link works
+  or that a zero has arrived.
 """
 
 import math
@@ -24,17 +26,17 @@ from webmap.gate.lanes.lane import Lane
 from webmap.ros.rosbridge import ops
 
 MOST = 6
-"""Moving velocities that may be on their way to one robot at once.
+"""Moving velocities to one topic that may be unconfirmed at once.
 
-At 20 Hz that is a link of 300 ms, beyond which nothing moves anyway.
+At 20 Hz that is a link of 300 ms; at a longer latency nothing moves anyway.
 """
 
 REMEMBERED = 16
-"""Velocities whose echo is still waited for, whether they are proven or not."""
+"""Velocities whose echo is still expected, whether their arrival is proven or not."""
 
 
 class UnconfirmedWrites:
-    """The velocities of one link that nobody knows to have arrived."""
+    """The velocities of one link that are not known to have arrived."""
 
     def __init__(self) -> None:
         self._written = 0
@@ -48,7 +50,7 @@ class UnconfirmedWrites:
         return sum(not twist.is_zero for _, twist in waiting) < MOST
 
     def on_written(self, topic: str, twist: Twist) -> None:
-        """Note a velocity that went out."""
+        """Note a velocity that was written."""
         self._written += 1
         self._on_the_way.setdefault(topic, deque()).append((self._written, twist))
         if not twist.is_zero:
@@ -56,14 +58,14 @@ class UnconfirmedWrites:
             unechoed.append((self._written, twist))
 
     def on_ping(self, number: int, now: float) -> None:
-        """Note that a ping goes out at ``now``; their numbers grow."""
+        """Note that a ping is written at ``now``; the numbers of pings grow."""
         self._pings.append((number, self._written, now))
 
     def on_pong(self, number: int) -> float:
-        """Note that a ping was answered, and so all before it.
+        """Note the answer to a ping, which confirms all that was written before it.
 
         Returns:
-            When that ping went out.
+            When that ping was written.
 
         """
         while self._pings[0][0] < number:
@@ -74,7 +76,7 @@ class UnconfirmedWrites:
         return asked_at
 
     def echoed(self, topic: str, twist: Twist) -> None:
-        """Note what is said on a topic, which may be an echo of ours."""
+        """Note a velocity received from a topic, which may be an echo of the gate's."""
         unechoed = self._unechoed.get(topic, deque())
         for written, sent in unechoed:
             if sent == twist:
@@ -83,36 +85,36 @@ class UnconfirmedWrites:
                 return
 
     def begin(self) -> None:
-        """Begin anew: the link was cut, and what it held with it."""
+        """Start again: the link was cut, and the bytes in it are lost."""
         self._on_the_way.clear()
         self._unechoed.clear()
         self._pings.clear()
 
 
 def _drop(waiting: deque[tuple[int, Twist]], written: int) -> None:
-    """Take what was written up to there for arrived."""
+    """Remove the velocities up to number ``written``: they have arrived."""
     while waiting and waiting[0][0] <= written:
         waiting.popleft()
 
 
 BUSY_PING = 0.05
-"""Seconds between pings while somebody holds a lease on a machine behind the lane."""
+"""Seconds between pings while a machine behind the lane has a holder."""
 
 IDLE_PING = 0.5
 """Seconds between pings otherwise; well below the time after which a stall is cut."""
 
 
 ECHO = 20
-"""Milliseconds between two echoes at least: as quick as the gate writes, and a bound
-for others who write without a pause."""
+"""Milliseconds between two echoes at least: as fast as the gate writes, and a limit
+for other publishers that write without a pause."""
 
 
 class ControlLane:
-    """The socket of one bridge that velocity goes through.
+    """The socket of one bridge for velocity.
 
     Args:
         url: The bridge's address.
-        emit: Takes the events.
+        emit: Called with each event.
 
     """
 
@@ -120,9 +122,9 @@ class ControlLane:
         self._url = url
         self._emit = emit
         self._attached: dict[str, list[tuple[str, bool]]] = {}
-        """For each topic the types that were said, and whether they are assumed."""
+        """For each topic, the declared types and whether each is only assumed."""
         self._types: dict[str, str] = {}
-        """The type that each topic is written as."""
+        """The type that each topic is announced with."""
         self._listened: set[str] = set()
         self._unconfirmed = UnconfirmedWrites()
         self.lane = Lane(
@@ -141,7 +143,7 @@ class ControlLane:
         Args:
             topic: The topic.
             type: Its type.
-            assumed: Whether nobody knows that: the type that somebody does counts.
+            assumed: Whether the type is only assumed: a known type takes precedence.
 
         """
         self._attached.setdefault(topic, []).append((type, assumed))
@@ -153,21 +155,21 @@ class ControlLane:
         self._announce(topic)
 
     def _announce(self, topic: str) -> None:
-        """Announce the type of a topic, if it is another than before.
+        """Announce the type of a topic, if it has changed.
 
-        The topic is listened to as long as it is announced, so that others who publish
-        to it are noticed before anybody drives. It is listened to first: a bridge of
-        ROS 2 that publishes already would subscribe so that most others do not match.
+        The gate also subscribes to the topic, to notice other publishers before an
+        operator drives. It subscribes first: a bridge of ROS 2 that already publishes
+        would subscribe with a quality of service that most publishers do not match.
         """
-        said, attached = self._types.get(topic), self._attached[topic]
+        announced, attached = self._types.get(topic), self._attached[topic]
         known = [type for type, assumed in attached if not assumed]
         types = known or [type for type, _ in attached]
         type = types[-1] if types else None
-        if type == said:
+        if type == announced:
             return
-        if said is not None:
-            self.lane.release_hold(f"webmap-gate advertise {topic} {said}")
-            self.lane.release_hold(f"webmap-gate echo {topic} {said}")
+        if announced is not None:
+            self.lane.release_hold(f"webmap-gate advertise {topic} {announced}")
+            self.lane.release_hold(f"webmap-gate echo {topic} {announced}")
             del self._types[topic]
         if type is not None:
             echo = f"webmap-gate echo {topic} {type}"
@@ -179,7 +181,7 @@ class ControlLane:
             self._types[topic] = type
 
     def listen(self, topic: str) -> None:
-        """Ask often whether the bridge answers: ``topic`` may be written to."""
+        """Ping often from now on: ``topic`` may be written to."""
         self._listened.add(topic)
         self.lane.ping_every(BUSY_PING)
 
@@ -192,16 +194,16 @@ class ControlLane:
     def write(
         self, topic: str, twist: Twist, until: float = math.inf, frame: str = ""
     ) -> bool:
-        """Write a velocity now or drop it; return whether it went out.
+        """Write a velocity now or drop it; return whether it was written.
 
-        Zero may wait behind other bytes and is never too late. Anything else may not
-        wait, nor may it be one more than may lie on the way, nor older than it may be.
+        A zero may wait behind other bytes and is never too old. Any other velocity is
+        dropped if it would wait, if too many are unconfirmed, or if it is too old.
 
         Args:
-            topic: Where to.
+            topic: The velocity topic.
             twist: The velocity.
             until: When it is too old, by the gate's clock.
-            frame: The robot's own frame, which a stamped velocity names.
+            frame: The frame of the robot's base, which a stamped velocity names.
 
         """
         type = self._types.get(topic)
@@ -216,7 +218,7 @@ class ControlLane:
         return done
 
     def _open(self) -> None:
-        self._unconfirmed.begin()  # what the link before held went with it
+        self._unconfirmed.begin()  # the bytes in the previous link are lost
         self._emit(LinkUp(self._url, "control"))
 
     def _ping(self, number: int) -> None:
@@ -226,10 +228,10 @@ class ControlLane:
         self._emit(PingAnswered(self._url, self._unconfirmed.on_pong(number)))
 
     def _on_message(self, data: bytes) -> None:
-        heard = rosbridge.parse(data)
-        if heard is None or heard.topic not in self._types or heard.twist is None:
+        message = rosbridge.parse(data)
+        if message is None or message.topic not in self._types or message.twist is None:
             return
-        if not heard.twist.is_finite:
+        if not message.twist.is_finite:
             return
-        self._unconfirmed.echoed(heard.topic, heard.twist)
-        self._emit(EchoReceived(Key(self._url, heard.topic), heard.twist))
+        self._unconfirmed.echoed(message.topic, message.twist)
+        self._emit(EchoReceived(Key(self._url, message.topic), message.twist))

@@ -1,4 +1,4 @@
-"""One socket to a rosbridge that is opened again when it ends."""
+"""A lane: one socket to a bridge that is opened again when it ends."""
 
 import asyncio
 import contextlib
@@ -19,27 +19,28 @@ LONGEST_WAIT = 3.0
 """Seconds between attempts at most."""
 
 STEADY = 2.0
-"""Only a link that lasted for so long makes the next attempt come soon, in seconds.
+"""A link that lasted for this long resets the wait before the next attempt, in seconds.
 
-That a handshake succeeds is not enough: a bridge that ends each link at once would be
-asked ten times a second for ever.
+A successful handshake is not enough: the gate would connect ten times a second for ever
+to a bridge that ends each link at once.
 """
 
 FIRST_FLOOD_WAIT = 1.0
-"""Seconds until the attempt after a link that was dropped for what it sent."""
+"""Seconds until the next attempt after the first link that was dropped for sending too
+much."""
 
 LONGEST_FLOOD_WAIT = 60.0
-"""The same after many of them, each of which doubles the time."""
+"""The longest such wait, in seconds; each dropped link doubles it."""
 
 TAME = 60.0
-"""A link that lasted for so long makes that short again, in seconds."""
+"""A link that lasted for this long resets that wait, in seconds."""
 
 MOST_TROUBLES = 20
-"""How many different troubles are logged until a link has lasted again."""
+"""How many different errors are logged before a link is steady again."""
 
 
 class Attempts:
-    """Decides how long to wait before each attempt, and what is logged."""
+    """Decides how long to wait before each attempt, and which errors are logged."""
 
     def __init__(self) -> None:
         self._troubles: set[str] = set()
@@ -57,7 +58,7 @@ class Attempts:
 
         Args:
             lasted: For how many seconds it was open.
-            flooded: Whether it was dropped for what it sent.
+            flooded: Whether it was dropped for sending too much.
 
         """
         if lasted >= STEADY:
@@ -72,7 +73,7 @@ class Attempts:
         return self.failed()
 
     def is_new(self, trouble: str) -> bool:
-        """Return whether a trouble is to be logged, and note that it was."""
+        """Return whether an error should be logged, and note that it was."""
         if trouble in self._troubles or len(self._troubles) == MOST_TROUBLES:
             return False
         self._troubles.add(trouble)
@@ -82,12 +83,12 @@ class Attempts:
 log = logging.getLogger("webmap.gate")
 
 DEAD = 3.0
-"""A link whose ping is unanswered for so long is cut, in seconds."""
+"""A link that has not answered a ping for this long is cut, in seconds."""
 
 
 @dataclass(slots=True)
 class Announcement:
-    """Something that is said whenever the lane opens, and how to take it back."""
+    """A message that is sent whenever the lane opens, and the one that undoes it."""
 
     hello: bytes
     goodbye: bytes
@@ -95,15 +96,15 @@ class Announcement:
 
 
 class Lane:
-    """One WebSocket to a bridge and what is said whenever it opens.
+    """One WebSocket to a bridge, and the announcements sent whenever it opens.
 
     Args:
         url: The bridge's address.
-        up: Called when the lane is open and has said what it has to.
-        down: Called when it is not open any more.
+        up: Called when the lane is open and its announcements are sent.
+        down: Called when the lane is not open any more.
         text: Called with each message.
-        pinged: Called with the number of each ping before it goes out; they grow.
-        pong: Called with the number of a ping that the bridge has answered.
+        pinged: Called with the number of each ping before it is sent; they grow.
+        pong: Called with the number of each ping that the bridge has answered.
 
     """
 
@@ -131,7 +132,7 @@ class Lane:
         self._socket: Socket | None = None
         self._budget = Budget()
         self._trouble: str | None = None
-        """Why the last socket was lost; None if it was handed over."""
+        """Why the last socket was lost; None if :meth:`spend` handed it over."""
         self._changed = asyncio.Event()
         self._pings = 0
         self._answered = 0
@@ -140,35 +141,35 @@ class Lane:
 
     @property
     def wanted(self) -> bool:
-        """Whether somebody holds the lane."""
+        """Whether the lane is held."""
         return bool(self._holds)
 
     def hold(self, id: str, hello: bytes = b"", goodbye: bytes = b"") -> None:
-        """Have ``hello`` said now and whenever the lane opens."""
+        """Hold the lane; ``hello`` is sent now and whenever the lane opens."""
         held = self._holds.get(id)
         if held is not None:
             held.count += 1
             return
         self._holds[id] = Announcement(hello, goodbye)
-        self._say(hello)
+        self._send_announcement(hello)
 
     def release_hold(self, id: str) -> None:
-        """Undo one :meth:`hold`; after the last one ``goodbye`` is said."""
+        """Undo one :meth:`hold`; after the last one ``goodbye`` is sent."""
         held = self._holds[id]
         held.count -= 1
         if held.count == 0:
             del self._holds[id]
-            self._say(held.goodbye)
+            self._send_announcement(held.goodbye)
 
     def write(
         self, data: bytes, *, only_if_clear: bool, until: float = math.inf
     ) -> bool:
-        """Write a message now or not at all; return whether it went out.
+        """Write a message now or drop it; return whether it was written.
 
         Args:
             data: The message.
-            only_if_clear: Drop it if anything waits to be sent before it.
-            until: When it is too old to be written, by the gate's clock.
+            only_if_clear: Drop it if other bytes wait to be sent before it.
+            until: When it is too old, by the gate's clock.
 
         """
         link = self._socket
@@ -177,16 +178,16 @@ class Lane:
         return link.send(data, until)
 
     def cut(self, why: str) -> None:
-        """Throw the socket away, with all that it has not sent, and connect anew."""
+        """Discard the socket, with all that it has not sent, and connect again."""
         link = self._socket
         if link is not None and link.is_behind:
-            # The answers that are missed may wait behind all that it sends.
+            # The missing answers may wait behind the other data that it sends.
             link.drop(f"{why}, and it sends more than WebMap can process")
         elif link is not None:
             link.abort(why)
 
     def spend(self, ears: SocketHandlers) -> Socket:
-        """Hand over the open socket to somebody else and connect anew."""
+        """Hand the open socket over to other handlers and connect again."""
         link = self._socket
         assert link is not None  # it has just been written to
         link.ears = ears
@@ -195,13 +196,13 @@ class Lane:
         return link
 
     def close(self) -> None:
-        """End for good."""
+        """Close the lane for good."""
         self._task.cancel()
         link, self._socket = self._socket, None
         if link is not None:
             link.close()
 
-    def _say(self, data: bytes) -> None:
+    def _send_announcement(self, data: bytes) -> None:
         if data:
             self.write(data, only_if_clear=False)
 
@@ -216,7 +217,7 @@ class Lane:
 
     def _on_pong(self, data: bytes) -> None:
         number = int.from_bytes(data, "big")
-        # A bridge may send pongs that nobody asked for; those prove nothing.
+        # A bridge may send pongs without a ping; those prove nothing.
         if self._answered < number <= self._pings:
             self._answered = number
             self._answered_at = asyncio.get_running_loop().time()
@@ -234,15 +235,15 @@ class Lane:
                 await _sleep_about(attempts.failed())
                 continue
             begun, self._socket = loop.time(), link
-            if link.is_open:  # and not closed again in the same breath
+            if link.is_open:  # it may already be closed again
                 for held in list(self._holds.values()):
-                    self._say(held.hello)
+                    self._send_announcement(held.hello)
                 self._up()
                 await self._keep_pinging()
-            # A bridge that closes the link while it reads nothing would keep it, and
-            # what waits in it, beside the next one.
+            # A bridge that closes the link but does not read would keep it, and the
+            # bytes that wait in it, beside the next link.
             self.cut("the bridge is closing the connection")
-            if self._trouble is None:  # it goes on elsewhere
+            if self._trouble is None:  # the socket was handed over
                 await _sleep_about(FIRST_WAIT)
                 continue
             wait = attempts.ended(loop.time() - begun, flooded=link.flooded)
@@ -272,12 +273,12 @@ class Lane:
                     await self._changed.wait()
 
     def ping_every(self, period: float) -> None:
-        """Ping every ``period`` seconds from now on, beginning now."""
+        """Ping every ``period`` seconds from now on; at once if that is more often."""
         if period < self.ping_period:
             self._changed.set()
         self.ping_period = period
 
 
 async def _sleep_about(seconds: float) -> None:
-    """Sleep for up to ``seconds``, so that not all lanes connect at one time."""
+    """Sleep for 50 to 100 % of ``seconds``, so that lanes do not connect together."""
     await asyncio.sleep(seconds * random.uniform(0.5, 1.0))  # noqa: S311

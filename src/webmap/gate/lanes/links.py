@@ -1,4 +1,4 @@
-"""Every lane to every bridge, and which robot needs which of them."""
+"""All lanes to all bridges, and which lanes each robot needs."""
 
 import asyncio
 from collections.abc import Callable
@@ -21,10 +21,10 @@ from webmap.gate.rules.motion import ZERO
 
 
 class Links:
-    """Does what the decisions ask for on the links to the bridges.
+    """Performs the actions of the rules that concern the links to the bridges.
 
     Args:
-        emit: Takes the events; may be called from within :meth:`perform`.
+        emit: Called with each event, also from within :meth:`perform`.
 
     """
 
@@ -34,12 +34,12 @@ class Links:
         self._odometry: dict[str, OdometryLane] = {}
         self._tasks: dict[str, TasksLane] = {}
         self._calls: dict[str, Calls] = {}
-        """By bridge; a call goes on when the lane of who made it has ended."""
+        """By bridge; a call goes on after the lane that made it has closed."""
         self._robots: dict[Key, dict[str, RobotSpec]] = {}
         self._watched: dict[Key, list[RobotSpec]] = {}
 
     def perform(self, action: actions.Action) -> Event | None:
-        """Do one thing; return what came of it, where that matters."""
+        """Perform an action; return the event with its result, if the rules need it."""
         match action:
             case actions.WriteTwist(key, twist, epoch, by, until):
                 lane = self._control.get(key.url)
@@ -78,18 +78,18 @@ class Links:
         return None
 
     def zero_all(self) -> None:
-        """Write zero to whatever may be driven, by itself and without asking."""
+        """Write zero to every machine that may be driven, without the rules."""
         for key in self._watched:
             if key.url in self._control:
                 frame = self._base_frame(key)
                 self._control[key.url].write(key.topic, ZERO, frame=frame)
 
     async def settle(self) -> None:
-        """Wait until cancels that are under way have arrived, or cannot."""
+        """Wait until all service calls, such as cancels, have ended."""
         await asyncio.gather(*(calls.settle() for calls in self._calls.values()))
 
     def close(self) -> None:
-        """End every link for good."""
+        """Close every link for good."""
         for tasks in self._tasks.values():
             tasks.close()
         for calls in self._calls.values():
@@ -112,11 +112,11 @@ class Links:
         self._tasks[spec.bridge_url].run_hook(run.hook, run.stopped, ended)
 
     def _base_frame(self, key: Key) -> str:
-        """Return the frame that velocity is in, as the newest robot has it."""
+        """Return the frame of the base, from the newest robot that declares one."""
         frames = [spec.base_frame for spec in self._robots.get(key, {}).values()]
         return next(filter(None, reversed(frames)), "")
 
-    # Which lane is needed.
+    # The lanes that a robot needs.
 
     def _attach(self, key: Key, spec: RobotSpec) -> None:
         robots = self._robots.setdefault(key, {})
@@ -142,7 +142,7 @@ class Links:
         if earlier is not None:
             if (_goal_url(earlier), earlier.action) != (_goal_url(spec), spec.action):
                 self._tasks[_goal_url(earlier)].forget(spec.id)
-            # Only now, so that what stays is not taken back and said anew.
+            # Only now: what both declarations need stays announced.
             self._detach(key, earlier)
         if watched:
             self._watch(key)
@@ -208,7 +208,7 @@ def _odometry_url(spec: RobotSpec) -> str:
 
 
 def _odometry_urls_of(spec: RobotSpec) -> list[str]:
-    """Return the bridges that odometry and scans of a robot come from."""
+    """Return the bridges that a robot's odometry and scans come from."""
     urls = [] if spec.odometry_topic is None else [_odometry_url(spec)]
     return urls if spec.assist is None else [*urls, spec.bridge_url]
 
@@ -218,7 +218,7 @@ def _goal_url(spec: RobotSpec) -> str:
 
 
 def _tasks_of(spec: RobotSpec) -> dict[str, list[Topic]]:
-    """Return the tasks lanes that a robot needs, and the topics written on each."""
+    """Return, by bridge, the topics of the tasks lanes that a robot needs."""
     needed = {_goal_url(spec): goal_topics(spec)}
     if spec.stop_hooks:
         needed.setdefault(spec.bridge_url, []).extend(hook_topics(spec))

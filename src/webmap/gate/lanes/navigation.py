@@ -1,9 +1,9 @@
-"""Goals as actions: what is written, and what the answers mean. No I/O.
+"""What the answers of a bridge to goals and service calls mean. No I/O.
 
 A ``NavigateToPose`` action answers on the socket that sent the goal, by
-``action_feedback`` and ``action_result``. move_base answers by three topics of
-actionlib, each with the id that the goal was given. Nothing else is believed: a word
-that is not about this goal, or makes no sense, is passed over.
+``action_feedback`` and ``action_result``. move_base answers on three topics of
+actionlib, each message with the id of the goal. A message about another goal, or an
+invalid one, is ignored.
 """
 
 import math
@@ -20,7 +20,7 @@ GoalNews = GoalProgress | GoalEnded
 T = TypeVar("T")
 
 MOST_WORDS = 200
-"""The longest reason that is passed on, in characters."""
+"""The longest reason that is reported, in characters."""
 
 _ROS2: dict[int, Outcome] = {4: "reached", 5: "cancelled", 6: "failed"}
 _ACTIONLIB: dict[int, Outcome] = {
@@ -32,11 +32,11 @@ _ACTIONLIB: dict[int, Outcome] = {
     9: "failed",
 }
 _ACTIONLIB_WAITING, _ACTIONLIB_ACTIVE = (0, 7), (1, 6)
-_ACTIONLIB_WORDS = {5: "the robot refused the goal", 9: "the robot lost the goal"}
+_ACTIONLIB_REASONS = {5: "the robot refused the goal", 9: "the robot lost the goal"}
 
 
 class _Duration(msgspec.Struct):
-    """A duration of ROS 2; move_base tells none."""
+    """A duration of ROS 2; move_base reports none."""
 
     sec: float = 0.0
     nanosec: float = 0.0
@@ -84,7 +84,7 @@ class _Status(msgspec.Struct):
     text: str = ""
 
 
-class _Said(msgspec.Struct):
+class _ActionlibMessage(msgspec.Struct):
     """A message of one of actionlib's three topics."""
 
     status: _Status | None = None
@@ -108,7 +108,7 @@ class _Frame(msgspec.Struct):
 
 
 def of_action(data: bytes, goal: SendGoal) -> GoalNews | None:
-    """Return what came for a goal on the socket that sent it as an action.
+    """Return the news of a goal in a message on the socket that sent it as an action.
 
     Raises:
         ProtocolError: If it holds too many values or is nested too deeply.
@@ -137,7 +137,7 @@ def of_action(data: bytes, goal: SendGoal) -> GoalNews | None:
 
 
 def of_topics(data: bytes, spec: RobotSpec, goal: SendGoal) -> GoalNews | None:
-    """Return what came for a goal on one of move_base's topics.
+    """Return the news of a goal in a message from one of move_base's topics.
 
     Raises:
         ProtocolError: If it holds too many values or is nested too deeply.
@@ -147,23 +147,23 @@ def of_topics(data: bytes, spec: RobotSpec, goal: SendGoal) -> GoalNews | None:
     if frame is None or frame.op != "publish":
         return None
     part = frame.topic.removeprefix(f"{spec.action}/")
-    said = _as(frame.msg, _Said)
-    if said is None or part not in ("status", "feedback", "result"):
+    message = _as(frame.msg, _ActionlibMessage)
+    if message is None or part not in ("status", "feedback", "result"):
         return None
     if part == "status":
-        ours = [each for each in said.status_list if each.goal_id.id == goal.id]
+        ours = [each for each in message.status_list if each.goal_id.id == goal.id]
         return _of_status(ours[0], goal) if ours else None
-    if said.status is None or said.status.goal_id.id != goal.id:
+    if message.status is None or message.status.goal_id.id != goal.id:
         return None
     if part == "result":
-        return _of_status(said.status, goal)
-    return _progress(said.feedback or _Feedback(), goal, spec.goal_frame)
+        return _of_status(message.status, goal)
+    return _progress(message.feedback or _Feedback(), goal, spec.goal_frame)
 
 
 def _of_status(status: _Status, goal: SendGoal) -> GoalNews | None:
     outcome = _ACTIONLIB.get(status.status)
     if outcome is not None:
-        why = status.text or _ACTIONLIB_WORDS.get(status.status, "")
+        why = status.text or _ACTIONLIB_REASONS.get(status.status, "")
         return _ended(goal, outcome, "" if outcome == "reached" else why)
     if status.status in _ACTIONLIB_ACTIVE + _ACTIONLIB_WAITING:
         active = status.status in _ACTIONLIB_ACTIVE
@@ -190,22 +190,22 @@ def _progress(feedback: _Feedback, goal: SendGoal, frame: str) -> GoalProgress:
 
 
 def _sensible(number: float | None) -> float | None:
-    """Return a number for people, None if it is none to show."""
+    """Return a number rounded for display, None if it cannot be shown."""
     if number is None or not math.isfinite(number) or number < 0:
         return None
     return round(number, 1)
 
 
 def _countable(number: int | None) -> int | None:
-    """Return a count, None if a robot could not have counted so far.
+    """Return a count, None if no robot could count this far.
 
-    Robots write numbers of any length, and the way to the display takes 64 bits.
+    Robots write numbers of any length, and the pipe to the display carries 64 bits.
     """
     return number if number is not None and 0 <= number < 2**31 else None
 
 
 def _complaint(text: str, goal: SendGoal) -> GoalEnded | None:
-    """Return what the bridge's error means, if it is about the goal."""
+    """Return the failure of the goal, if the bridge's error is about a goal."""
     if "send_action_goal" not in text:
         return None
     if "unknown operation" in text.lower():
@@ -218,16 +218,16 @@ def _ended(goal: SendGoal, outcome: Outcome, why: str) -> GoalEnded:
     return GoalEnded(goal.robot, goal.id, outcome, readable(why))
 
 
-def readable(said: str) -> str:
-    """Return a robot's own words as people can be shown them: short, on one line."""
-    # Cut first: going through a megabyte, letter by letter, would keep zeros waiting.
-    plain = " ".join(said[: 10 * MOST_WORDS].split())
+def readable(text: str) -> str:
+    """Return a robot's text for display: short, printable, on one line."""
+    # Cut first: a pass over each character of a megabyte would delay zeros.
+    plain = " ".join(text[: 10 * MOST_WORDS].split())
     return "".join(letter for letter in plain if letter.isprintable())[:MOST_WORDS]
 
 
 def _read(data: bytes) -> _Frame | None:
     try:
-        # Bridges write a bare NaN, which msgspec does not take.
+        # Bridges write a bare NaN, which msgspec refuses.
         value = plain(data)
     except ValueError:
         return None
@@ -242,10 +242,10 @@ def _as(value: Any, type: type[T]) -> T | None:
 
 
 class Answer(NamedTuple):
-    """How a call went."""
+    """The outcome of a service call."""
 
     why: str | None
-    """Why it failed, in words; ``None`` if it did not."""
+    """Why the call failed; ``None`` if it did not."""
 
 
 class _Answer(msgspec.Struct):
@@ -258,10 +258,10 @@ class _Answer(msgspec.Struct):
 
 
 def answer_to(data: bytes, id: str) -> Answer | None:
-    """Return what a message says of the call ``id``; ``None`` if nothing.
+    """Return the answer to the call ``id`` in a message; ``None`` if it has none.
 
-    Only what says that the call failed is taken for that: old bridges leave out
-    ``result``, and a service of another type than Trigger has no ``success``.
+    A call has failed only if the answer states so: old bridges leave out ``result``,
+    and a service of another type than Trigger has no ``success``.
 
     Raises:
         ProtocolError: If it holds too many values or is nested too deeply.
@@ -285,6 +285,6 @@ def answer_to(data: bytes, id: str) -> Answer | None:
     return Answer(None)
 
 
-def _because(what: str, said: Any) -> str:
-    words = readable(said) if isinstance(said, str) else ""
-    return f"{what} ({words})" if words else what
+def _because(what: str, text: Any) -> str:
+    details = readable(text) if isinstance(text, str) else ""
+    return f"{what} ({details})" if details else what

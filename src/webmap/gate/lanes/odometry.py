@@ -1,13 +1,13 @@
-"""The socket for odometry, echoes and scans of one bridge.
+"""The odometry lane: the socket of one bridge for odometry and scans.
 
-Over JSON a bridge writes ``null`` for "nothing there" and for "broken" alike, so scans
-are asked for in CBOR, and one that comes in JSON is no scan here: the robot is blind.
-One of many beams is folded to at most 720 here, once; one of far too many is refused
-before its numbers are read, and the socket takes no frame of more than a mebibyte.
+In JSON a bridge writes ``null`` both for "nothing there" and for "broken". So the lane
+subscribes to scans in CBOR and ignores a scan in JSON: the robot is then blind. A scan
+of more than 720 beams is folded here, once. A scan of far too many beams is refused
+before its numbers are read, and the socket accepts no frame of more than a mebibyte.
 
-What a link has kept back is as old as that, and nothing in it says so: a robot's clock
-is not the gate's. But a bridge answers a ping behind what it has said before. So what
-comes after an answer was said after that ping went out, and no earlier.
+A message that a link has kept back is old, and nothing in it shows its age: a robot's
+clock is not the gate's. But a bridge answers a ping after the messages that it sent
+before. So a message that comes after an answer was sent after that ping, not earlier.
 """
 
 import re
@@ -40,12 +40,13 @@ FRAME_NAME = 80
 """The longest name of a frame that is kept, in characters."""
 
 MOST_PARTS = 1000
-"""Maps, lists, texts and typed arrays in the message of a scan; a scan has about 40."""
+"""The most maps, lists, texts and typed arrays in the message of a scan, which has
+about 40."""
 
 MOST_NUMBERS = 250_000
-"""Numbers in its lists and maps: enough for two lists of the longest scan."""
+"""The most numbers in its lists and maps: enough for two lists of the longest scan."""
 
-# A run of integers, floats and the like in CBOR (RFC 8949, 3.1), each with its head.
+# A run of integers, floats and simple values in CBOR (RFC 8949, 3.1), with their heads.
 _NUMBERS = re.compile(
     rb"(?:[\x00-\x17\x20-\x37\xf4-\xf7]*+(?:\xfb.{8})*+(?:\xfa.{4})*+"
     rb"(?:[\x19\x39\xf9]..)*+(?:[\x18\x38].)*+(?:[\x1a\x3a].{4})*+"
@@ -53,16 +54,16 @@ _NUMBERS = re.compile(
     re.DOTALL,
 )
 _FURTHER = {24: 1, 25: 2, 26: 4, 27: 8}
-"""By the low bits of a head, in how many further bytes its number stands."""
+"""By the low bits of a head, how many further bytes contain its number."""
 _STRINGS, _LISTS_AND_MAPS = (2, 3), (4, 5)
 _ENDLESS = 31
-"""The low bits of a head whose length is not told."""
+"""The low bits of a head of indefinite length."""
 
 _FIELDS = ("angle_min", "angle_increment", "range_min", "range_max")
 
 
 def subscribe(topic: str, id: str) -> bytes:
-    """Return the operation that asks for the scans of a topic."""
+    """Return the operation that subscribes to the scans of a topic."""
     return ops.subscribe(
         topic,
         id=id,
@@ -74,13 +75,13 @@ def subscribe(topic: str, id: str) -> bytes:
 
 
 def check_parts(frame: bytes) -> None:
-    """Let CBOR pass that holds few things besides numbers.
+    """Check that CBOR contains little besides numbers.
 
-    A mebibyte of empty lists takes 0.6 s to decode, one of numbers 10 ms. So what is
-    no number is counted first, which costs at most a millisecond.
+    A mebibyte of empty lists takes 0.6 s to decode, one of numbers 10 ms. So everything
+    else is counted first, which takes at most a millisecond.
 
     Raises:
-        ProtocolError: If there is too much of it.
+        ProtocolError: If it contains too much else, or too many numbers in lists.
 
     """
     at = parts = numbers = 0
@@ -102,12 +103,12 @@ def check_parts(frame: bytes) -> None:
 
 
 def parse_scan(frame: bytes, now: float) -> tuple[str, Scan] | None:
-    """Return the topic and the scan of a frame; None if it is anything else.
+    """Return the topic and the scan in a frame; None if the frame has no scan.
 
-    A scan of more than 720 beams comes folded; what is ``refused`` has no ranges.
+    A scan of more than 720 beams is folded; a ``refused`` scan has no ranges.
 
     Raises:
-        ProtocolError: If it is no CBOR, nested too deeply, or of too many parts.
+        ProtocolError: If it is invalid CBOR, nested too deeply, or has too many parts.
 
     """
     from webmap.ros.rosbridge import cbor
@@ -133,8 +134,8 @@ def parse_scan(frame: bytes, now: float) -> tuple[str, Scan] | None:
         return None
     least, step, near, far = about
     frame_id = _frame_of(message.get("header"))
-    sweep = Scan(least, step, near, far, values, now, refused=refused, frame=frame_id)
-    return topic, folded(sweep)
+    scan = Scan(least, step, near, far, values, now, refused=refused, frame=frame_id)
+    return topic, folded(scan)
 
 
 def _frame_of(header: Any) -> str:
@@ -150,11 +151,11 @@ BUSY_PING = 0.05
 
 
 class OdometryLane:
-    """The socket of one bridge that odometry comes through.
+    """The socket of one bridge for odometry and scans.
 
     Args:
         url: The bridge's address.
-        emit: Takes the events.
+        emit: Called with each event.
 
     """
 
@@ -162,9 +163,9 @@ class OdometryLane:
         self._url = url
         self._emit = emit
         self._pings: dict[int, float] = {}
-        """When each ping that is not answered yet went out."""
+        """When each unanswered ping was sent."""
         self._sent_after = float("-inf")
-        """What comes now was said after this moment."""
+        """A message that comes now was sent after this time."""
         self._watchers: dict[str, list[Key]] = {}
         self._scanners: dict[str, list[Key]] = {}
         self.lane = Lane(
@@ -177,7 +178,7 @@ class OdometryLane:
         )
 
     def watch(self, topic: str, type: str | None, key: Key) -> None:
-        """Hear how the machine ``key`` moves."""
+        """Receive the odometry of the machine ``key``."""
         self._watchers.setdefault(topic, []).append(key)
         id = f"webmap-gate odometry {topic}"
         self.lane.hold(
@@ -196,7 +197,7 @@ class OdometryLane:
         self._pace()
 
     def watch_scan(self, topic: str, key: Key) -> None:
-        """Hear what the scanner of the machine ``key`` sees."""
+        """Receive the scans of the machine ``key``."""
         self._scanners.setdefault(topic, []).append(key)
         id = f"webmap-gate scan {topic}"
         self.lane.hold(id, subscribe(topic, id), ops.unsubscribe(topic, id=id))
@@ -215,7 +216,7 @@ class OdometryLane:
         self.lane.ping_every(BUSY_PING if watched else Lane.PING)
 
     def _open(self) -> None:
-        self._pings.clear()  # what the link before held went with it
+        self._pings.clear()  # the previous link's pings are not answered any more
         self._sent_after = now()
         self._emit(LinkUp(self._url, "odometry"))
 
@@ -230,16 +231,16 @@ class OdometryLane:
         if self._scanners and looks_like_cbor(data):
             self._on_scan(data)
             return
-        heard = rosbridge.parse(data)
-        if heard is None or heard.op != "publish" or heard.topic is None:
+        received = rosbridge.parse(data)
+        if received is None or received.op != "publish" or received.topic is None:
             return
-        for key in self._watchers.get(heard.topic, ()):
-            self._emit(OdometryReceived(key, heard.twist, self._sent_after))
+        for key in self._watchers.get(received.topic, ()):
+            self._emit(OdometryReceived(key, received.twist, self._sent_after))
 
     def _on_scan(self, data: bytes) -> None:
-        # A ping more is granted: the next answer would often have come with the scan.
-        heard = parse_scan(data, min(self._sent_after + BUSY_PING, now()))
-        if heard is not None:
-            topic, sweep = heard
+        # One ping period is added: the next answer often comes together with the scan.
+        received = parse_scan(data, min(self._sent_after + BUSY_PING, now()))
+        if received is not None:
+            topic, scan = received
             for key in self._scanners.get(topic, ()):
-                self._emit(ScanReceived(key, topic, sweep))
+                self._emit(ScanReceived(key, topic, scan))

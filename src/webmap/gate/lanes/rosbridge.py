@@ -1,11 +1,11 @@
 """The rosbridge messages that the gate writes and reads. No I/O.
 
-Python needs a tenth of a second for a mebibyte of empty lists, and what nests deeply
-exhausts its stack wherever it is gone through later.
+Messages of too many values or levels are refused: Python needs a tenth of a second for
+a mebibyte of empty lists, and deep nesting exhausts its stack later.
 
-A type written ``package/msg/Name`` is of ROS 2, whose stamps have ``sec`` and
-``nanosec``; else they have ``secs`` and ``nsecs``. Every stamp sent is zero: a robot
-whose clock differs from ours would refuse a command, or take an old one for a new one.
+A type ``package/msg/Name`` belongs to ROS 2, whose stamps have ``sec`` and ``nanosec``;
+otherwise they have ``secs`` and ``nsecs``. The gate sends only stamps of zero: a robot
+whose clock differs would refuse a command, or accept an old one as new.
 """
 
 import json
@@ -24,18 +24,18 @@ from webmap.ros.names import is_type
 from webmap.ros.rosbridge import ops
 
 MOST_PARTS = 20_000
-"""Values in the longest message that is read. A dense scan in JSON has 7,200, anything
-that the gate asks for in JSON a few hundred."""
+"""The most values in a message. A dense scan in JSON has 7,200, any message that the
+gate subscribes to in JSON a few hundred."""
 
 
 def check_parts(data: bytes) -> None:
-    """Let a message pass if it does not hold too many values.
+    """Check that a message does not hold too many values.
 
     Raises:
         ProtocolError: If it does.
 
     """
-    # Each value but the first comes behind one of these; texts may hold some, too.
+    # Each value but the first follows one of these; texts may contain them, too.
     parts = sum(map(data.count, (b"[", b"{", b",")))
     if parts > MOST_PARTS:
         raise ProtocolError(
@@ -45,16 +45,16 @@ def check_parts(data: bytes) -> None:
 
 
 def too_deep() -> ProtocolError:
-    """Return the error for a message that Python cannot go through."""
+    """Return the error for a message that is nested too deeply."""
     return ProtocolError(f"a message nested deeper than {MAX_DEPTH} levels")
 
 
 def plain(data: bytes) -> Any:
-    """Return the JSON in a message, with a bare NaN where bridges write one.
+    """Return the JSON value of a message, which may have the bare NaN of some bridges.
 
     Raises:
         ProtocolError: If it holds too many values or is nested too deeply.
-        ValueError: If it is no JSON.
+        ValueError: If it is not JSON.
 
     """
     check_parts(data)
@@ -67,10 +67,10 @@ def plain(data: bytes) -> Any:
 
 
 def velocity(topic: str, type: str, twist: Twist, frame: str = "") -> bytes:
-    """Return the operation that publishes ``twist``, in the frame of the base.
+    """Return the operation that publishes a velocity, in the frame of the base.
 
-    The stamp of a TwistStamped is zero. A base compares the stamp with its own clock:
-    a stamp of a clock that is ahead would switch off the base's timeout.
+    The stamp of a TwistStamped is zero. A base compares the stamp with its own clock: a
+    stamp from a clock that is ahead would disable the base's timeout.
     """
     message: dict[str, Any] = twist.to_message()
     if is_type(type, "geometry_msgs/TwistStamped"):
@@ -81,7 +81,7 @@ def velocity(topic: str, type: str, twist: Twist, frame: str = "") -> bytes:
 def goal(spec: RobotSpec, goal: SendGoal) -> bytes:
     """Return the operation that sends the robot to a goal."""
     if goal.way == "topic":
-        topic = spec.goal_topic or ""  # there is one, or there were no such goal
+        topic = spec.goal_topic or ""  # never empty: the rules checked it
         return ops.publish(topic, _stamped(spec.goal_type, spec, _pose(goal)))
     if goal.way == "move_base":
         target = _stamped("geometry_msgs/PoseStamped", spec, _pose(goal))
@@ -133,7 +133,7 @@ def trigger(service: str, type: str, id: str) -> bytes:
 
 
 def pose_estimate(spec: RobotSpec, at: SendPose) -> bytes:
-    """Return the operation that tells the robot where it is."""
+    """Return the operation that sends the robot its pose."""
     covariance = [0.0] * 36
     covariance[0], covariance[7], covariance[35] = spec.pose_covariance
     pose = {"pose": _pose(at), "covariance": covariance}
@@ -166,7 +166,7 @@ class _Vector(msgspec.Struct):
 
 
 class _Twist(msgspec.Struct):
-    """A Twist, or something with a twist in it: TwistStamped, Odometry."""
+    """A Twist, or a message that contains one: TwistStamped, Odometry."""
 
     linear: _Vector | None = None
     angular: _Vector | None = None
@@ -184,18 +184,18 @@ _decode_frame = msgspec.json.Decoder(_Frame).decode
 
 
 class Received(msgspec.Struct, frozen=True):
-    """What came from a bridge, as far as the gate cares."""
+    """The parts of a bridge's message that the gate uses."""
 
     op: str
     id: str | None
     topic: str | None
     twist: Twist | None
-    """The velocity in a published message, if there is one whose motion in the plane is
-    made of finite numbers. The other numbers are NaN where the message has none."""
+    """The velocity in a published message, if there is one and its motion in the plane
+    has finite numbers only. The other numbers are NaN where the message has none."""
 
 
 def parse(data: bytes) -> Received | None:
-    """Return what a message from a bridge says; ``None`` if it makes no sense.
+    """Return the parts of a bridge's message; ``None`` if it is invalid.
 
     Raises:
         ProtocolError: If it holds too many values or is nested too deeply.
@@ -216,7 +216,7 @@ def parse(data: bytes) -> Received | None:
 
 
 def _lenient(data: bytes) -> _Frame | None:
-    """Read what is JSON but for a bare NaN, as some bridges write it."""
+    """Read JSON with the bare NaN that some bridges write."""
     try:
         return msgspec.convert(plain(data), _Frame)
     except ValueError:  # msgspec's own errors are of that kind too
@@ -232,7 +232,7 @@ def _velocity(message: _Twist | None) -> Twist | None:
             plane = (linear.x, linear.y, angular.z)
             if any(part is None or not math.isfinite(part) for part in plane):
                 return None
-            # Only who knows the robot knows whether the others matter.
+            # Whether the other numbers matter depends on the robot.
             found = (*plane, linear.z, angular.x, angular.y)
             return Twist(*(math.nan if part is None else part for part in found))
         message = message.twist

@@ -1,8 +1,8 @@
-"""One WebSocket to a bridge, written without waiting and cut without mercy.
+"""One WebSocket to a bridge, which never blocks and can be cut at once.
 
-The usual asyncio client waits while its buffer is full and cannot say what lies in it.
-Here a write happens at once, what is unsent can be asked for, and :meth:`Socket.abort`
-has the kernel throw away what it still holds.
+The usual asyncio client waits while its buffer is full and does not show how much is in
+it. Here a write never waits, :attr:`Socket.unsent` is the size of the buffer, and
+:meth:`Socket.abort` makes the kernel discard the bytes that it still holds.
 """
 
 import asyncio
@@ -38,28 +38,28 @@ CONNECT_TIMEOUT = 3.0
 """Seconds for name lookup, TCP, TLS and handshake together."""
 
 MAX_FRAME = 1 << 20
-"""The longest message that is taken from a bridge, in bytes."""
+"""The longest message that is accepted from a bridge, in bytes."""
 
 MAX_PARTS = 4096
-"""The most frames of one message. Bridges send one, some proxies a few."""
+"""The most frames in one message. Bridges send one, some proxies a few."""
 
 MAX_WAITING = 1 << 16
-"""Bytes that may wait for their turn until no more are read. asyncio reads up to
-256 KiB at once, so at most that much more waits."""
+"""With more bytes than this waiting for their turn, no more are read. asyncio reads up
+to 256 KiB at once, so at most that much more waits."""
 
-# The kernel's "linger 0": closing drops unsent bytes and resets the connection.
+# "Linger 0": the kernel drops unsent bytes on close and resets the connection.
 _LINGER = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 
 
 @dataclass(slots=True)
 class SocketHandlers:
-    """Who hears what comes on a socket; may be changed while it is open."""
+    """The callbacks of a socket; they may be replaced while it is open."""
 
     text: Callable[[bytes], None]
-    """May raise ``ProtocolError``: the message is left out and the log says why."""
+    """May raise ``ProtocolError``: the message is left out and the reason logged."""
     pong: Callable[[bytes], None]
     lost: Callable[[str], None]
-    """Called once, with the reason, when a socket that was open is no longer."""
+    """Called once, with the reason, when a socket that was open has ended."""
 
 
 class Socket(asyncio.Protocol):
@@ -67,8 +67,8 @@ class Socket(asyncio.Protocol):
 
     Args:
         url: The bridge's address.
-        ears: Who hears what comes.
-        budget: How much may come.
+        ears: The callbacks.
+        budget: How much the bridge may send.
 
     """
 
@@ -76,17 +76,17 @@ class Socket(asyncio.Protocol):
         self.url = url
         self.ears = ears
         self.flooded = False
-        """Whether it was dropped for what the bridge sent."""
+        """Whether it was dropped for what the bridge sent: too much or invalid data."""
         self._budget = budget
         self._turns = turns()
         self._pieces = Pieces()
         self._waiting = bytearray()
-        """What came and was not dealt with yet."""
+        """The bytes that were received and not processed yet."""
         self._choked = False
-        """Whether the bridge does not take what is written, as answers to pings."""
+        """Whether the bridge does not read what is written, such as pongs."""
         self._complained = False
         self._ended: str | None = None
-        """Why nothing more comes, as soon as that is known."""
+        """Why nothing more will be received, once that is known."""
         self.opened: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._protocol = ClientProtocol(parse_uri(url), max_size=MAX_FRAME)
         self._transport: asyncio.Transport | None = None
@@ -95,42 +95,42 @@ class Socket(asyncio.Protocol):
 
     @property
     def is_open(self) -> bool:
-        """Whether something can be written now."""
+        """Whether messages can be written now."""
         open = not self._over and self._ended is None
         return open and self._protocol.state is State.OPEN
 
     @property
     def unsent(self) -> int:
-        """Bytes that were written and that the kernel has not taken yet."""
+        """Written bytes that the kernel has not accepted yet."""
         return 0 if self._transport is None else self._transport.get_write_buffer_size()
 
     def send(self, data: bytes, until: float = math.inf) -> bool:
-        """Write one text message; return whether it was still worth it.
+        """Write one text message, unless it is too old; return whether it was written.
 
-        The clock is read at the last moment. A process that is stopped (SIGSTOP, a
-        laptop that sleeps) and goes on later would else write what it had decided
-        before, as the first thing that a robot hears.
+        The clock is read at the last moment. Otherwise a process that was stopped
+        (SIGSTOP, a laptop that sleeps) would first write a velocity that was decided
+        before, when it goes on.
 
         Args:
             data: The message.
-            until: When it is too old to be written, by the gate's clock.
+            until: When it is too old, by the gate's clock.
 
         """
         self._protocol.send_text(data)
         return self._flush(until)
 
     def ping(self, data: bytes) -> None:
-        """Write a ping; the bridge answers with a pong of the same data."""
+        """Write a ping; the bridge answers with a pong that has the same data."""
         self._protocol.send_ping(data)
         self._flush()
 
     @property
     def is_behind(self) -> bool:
-        """Whether more has come than was dealt with."""
+        """Whether received bytes are not processed yet."""
         return bool(self._waiting)
 
     def close(self) -> None:
-        """Say goodbye, send what is unsent, and close."""
+        """Send a close frame and the unsent bytes, then close."""
         if self.is_open:
             self._protocol.send_close(1001)
             self._flush()
@@ -139,7 +139,7 @@ class Socket(asyncio.Protocol):
             self._transport.close()
 
     def abort(self, why: str) -> None:
-        """Throw the socket away with everything that was not sent."""
+        """Discard the socket with all unsent bytes."""
         if self._transport is not None:
             raw = self._transport.get_extra_info("socket")
             with contextlib.suppress(OSError, AttributeError):
@@ -148,44 +148,45 @@ class Socket(asyncio.Protocol):
         self._lose(why)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Ask for a WebSocket."""
+        """Send the handshake of the WebSocket."""
         self._transport = cast("asyncio.Transport", transport)
-        self._budget.note(now(), behind=False)  # as the socket before may have been
+        self._budget.note(now(), behind=False)  # the previous socket may have been
         self._protocol.send_request(self._protocol.connect())
         self._flush()
 
     def data_received(self, data: bytes) -> None:
-        """Keep bytes until the link has its turn."""
+        """Keep the bytes until the link has its turn."""
         self._waiting += data
         if len(self._waiting) > MAX_WAITING:
             self._read_on(False)
         self._turns.ask(self)
 
     def eof_received(self) -> None:
-        """Note the end of the bytes; asyncio closes the connection."""
+        """Note that the bridge sends no more; asyncio closes the connection."""
         self._end("the bridge closed the connection")
 
     def connection_lost(self, error: Exception | None) -> None:
-        """Note the end; what came before it is dealt with first."""
+        """Note the end of the connection; earlier bytes are processed first."""
         self._end(str(error) if error else "the bridge closed the connection")
 
     def pause_writing(self) -> None:
-        """Take in nothing more: it might have to be answered."""
+        """Process nothing more for now: it might need an answer."""
         self._choked = True
 
     def resume_writing(self) -> None:
-        """Take in what comes."""
+        """Process what comes again."""
         self._choked = False
         self._turns.ask(self)
 
     def take(self, until: float) -> float | None:
-        """Deal with what waits, as far as the time and the budget of the link allow.
+        """Process waiting bytes, as far as the time and the link's budget allow.
 
         Args:
             until: When to end, by :func:`time.thread_time`.
 
         Returns:
-            Seconds until it wants another turn; ``None`` if it will ask for one.
+            Seconds until the socket needs another turn; ``None`` if it will ask for
+            one.
 
         """
         at, begun = now(), time.thread_time()
@@ -196,7 +197,7 @@ class Socket(asyncio.Protocol):
         if wait > 0:
             self._read_on(False)
             return wait
-        pieces, size = 1, 0  # one for the turn: a byte at a time costs turns
+        pieces, size = 1, 0  # 1 for the turn: single bytes cost turns
         while length := self._next_piece():
             piece = bytes(self._waiting[:length])
             del self._waiting[:length]
@@ -210,7 +211,7 @@ class Socket(asyncio.Protocol):
                 break
         self._budget.spend(pieces, size, time.thread_time() - begun, at)
         self._budget.note(at, behind=length > 0)
-        # Not only when nothing waits: a flood would seem to pause each time.
+        # Not only when nothing waits: otherwise a flood would look like pauses.
         self._read_on(not self._choked and len(self._waiting) <= MAX_WAITING)
         if length:
             return 0.0
@@ -219,19 +220,19 @@ class Socket(asyncio.Protocol):
         return None
 
     def drop(self, why: str) -> None:
-        """Throw the socket away because of what the bridge sends."""
+        """Discard the socket because of what the bridge sent."""
         self.flooded = True
         self.abort(why)
 
     def _next_piece(self) -> int:
-        """Return how many of the bytes that wait are to be dealt with next."""
+        """Return how many of the waiting bytes to process next."""
         if self._over or self._choked:
             return 0
         shaken = self._protocol.state is not State.CONNECTING
         return self._pieces.next(self._waiting, shaken=shaken)
 
     def _read_on(self, on: bool) -> None:
-        """Have asyncio read from the connection or not."""
+        """Resume or pause reading from the connection."""
         assert self._transport is not None
         if on:
             self._transport.resume_reading()
@@ -244,7 +245,7 @@ class Socket(asyncio.Protocol):
             self._turns.ask(self)
 
     def _finish(self, why: str) -> None:
-        """Note the end, after everything that came before it."""
+        """End the socket, after all earlier bytes were processed."""
         self._protocol.receive_eof()
         self._take_events()
         self._lose(why)
@@ -253,7 +254,7 @@ class Socket(asyncio.Protocol):
         self._flush()
         for event in self._protocol.events_received():
             if isinstance(event, Response):
-                self._shake_hands()
+                self._finish_handshake()
             else:
                 assert isinstance(event, Frame)
                 self._on_frame(event)
@@ -263,7 +264,7 @@ class Socket(asyncio.Protocol):
             self._waiting.clear()
             self._transport.close()
 
-    def _shake_hands(self) -> None:
+    def _finish_handshake(self) -> None:
         if self._protocol.handshake_exc is None and not self.opened.done():
             self.opened.set_result(None)
 
@@ -287,7 +288,7 @@ class Socket(asyncio.Protocol):
                 log.warning("%s: %s; ignored, as are similar messages", self.url, error)
 
     def _flush(self, until: float = math.inf) -> bool:
-        """Hand over what the protocol has to say, unless that is too old."""
+        """Write what the protocol has to send, unless that is too old."""
         assert self._transport is not None
         data = b"".join(self._protocol.data_to_send())
         if now() > until or self._ended is not None:
@@ -300,10 +301,10 @@ class Socket(asyncio.Protocol):
             return
         self._over = True
         self._waiting.clear()
-        why = readable(why)  # it may hold what the bridge sent
+        why = readable(why)  # it may contain text from the bridge
         if not self.opened.done():
             self.opened.set_exception(BridgeClosed(f"{self.url}: {why}"))
-        elif not self.opened.cancelled():  # given up before it was open
+        elif not self.opened.cancelled():  # cancelled: given up before it was open
             self.ears.lost(why)
 
 
@@ -312,18 +313,18 @@ async def open_socket(url: str, ears: SocketHandlers, budget: Budget) -> Socket:
 
     Args:
         url: Its address.
-        ears: Who hears what comes.
-        budget: How much may come, and came on earlier sockets.
+        ears: The callbacks.
+        budget: How much the bridge may send, with the use by earlier sockets.
 
     Raises:
-        BridgeClosed: If that does not succeed in time.
+        BridgeClosed: If no connection is made in time.
 
     """
     uri = parse_uri(url)
     made = Socket(url, ears, budget)
     try:
         async with asyncio.timeout(CONNECT_TIMEOUT):
-            # Reading who may vouch for a name takes 0.1 s: other robots cannot wait.
+            # Loading the certificates takes 0.1 s, and other robots cannot wait.
             tls = await asyncio.to_thread(_trust) if uri.secure else None
             await asyncio.get_running_loop().create_connection(
                 lambda: made,
@@ -346,11 +347,11 @@ async def open_socket(url: str, ears: SocketHandlers, budget: Budget) -> Socket:
 
 
 def _trust() -> ssl.SSLContext:
-    """Return how bridges prove who they are, by the system's authorities of now."""
+    """Return a TLS context with the system's present certificate authorities."""
     return ssl.create_default_context()
 
 
 def _retrieve(future: "asyncio.Future[None]") -> None:
-    """Look at the outcome, so that asyncio does not complain that nobody did."""
+    """Read a future's exception, or asyncio logs that it was never retrieved."""
     if not future.cancelled():
         future.exception()

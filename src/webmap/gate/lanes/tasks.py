@@ -1,13 +1,13 @@
-"""The socket for goals, cancels, poses and stop hooks of one bridge.
+"""The tasks lane: the socket of one bridge for goals, cancels, poses and stop hooks.
 
-Some bridges do nothing else for a socket until the action goal that came through it
-has ended. So a goal of an action uses up a socket: it is kept for the result, and the
-lane opens another for what comes next. For the same reason, and because the handle of
-an action goal belongs to the socket that sent it, the cancel service is called on a
-socket of its own (``calls``).
+Some bridges do nothing else for a socket until the action goal that it sent has ended.
+So an action goal uses up a socket: the lane keeps it for the result and opens another
+for the next messages. For the same reason, and because the handle of an action goal
+belongs to the socket that sent it, :class:`Calls` calls the cancel service on a socket
+of its own.
 
-move_base is an action of topics, which block nothing: its words come on the lane
-itself, its status only while a goal of ours is followed.
+move_base is an action made of topics, which block nothing: its messages come on the
+lane itself, its status only while a goal of the gate is followed.
 """
 
 import asyncio
@@ -38,11 +38,11 @@ _COMMON = (0.0, 0.0, 0.0)
 
 
 def in_own_map(spec: RobotSpec, at: Place) -> Place:
-    """Return what a robot is told, with its numbers in the robot's own map.
+    """Return a goal or pose in the robot's own map.
 
     Args:
         spec: The robot.
-        at: What it is told, with numbers on the common map.
+        at: The goal or pose, in the common map.
 
     """
     if spec.own_map == _COMMON:
@@ -54,14 +54,14 @@ def in_own_map(spec: RobotSpec, at: Place) -> Place:
 log = logging.getLogger("webmap.gate")
 
 CALL_TIMEOUT = 2.0
-"""How long a service is given to answer, in seconds, the way there included."""
+"""The longest time for a service call, in seconds, including the connection."""
 
 Ended = Callable[[str | None], None]
-"""Takes why something failed, in words, or ``None`` if it did not."""
+"""Called with the reason of a failure, or with ``None`` after a success."""
 
 
 class Calls:
-    """Calls services of one bridge and looks after the calls.
+    """Calls services of one bridge and keeps track of the calls.
 
     Args:
         url: The bridge's address.
@@ -80,9 +80,9 @@ class Calls:
 
         Args:
             request: The operation that calls it.
-            id: The name that the answer will bear.
-            what: What is called, for people.
-            ended: Is told what came of it, unless it is given up by :meth:`close`.
+            id: The id of the call, which the answer repeats.
+            what: The purpose of the call, for the log.
+            ended: Called with the outcome, unless :meth:`close` cancels the call.
 
         """
         call = self._call(request, id, what, ended)
@@ -91,12 +91,12 @@ class Calls:
         task.add_done_callback(self._calling.discard)
 
     async def settle(self) -> None:
-        """Wait until every call is answered, or will not be."""
+        """Wait until every call has ended."""
         if self._calling:
             await asyncio.wait(self._calling)
 
     def close(self) -> None:
-        """Give up what is not answered yet."""
+        """Cancel the unanswered calls."""
         for task in self._calling:
             task.cancel()
 
@@ -107,7 +107,7 @@ class Calls:
         ended(why)
 
     async def _ask(self, request: bytes, id: str) -> str | None:
-        """Call a service and return why that failed, ``None`` if it did not."""
+        """Call a service; return why that failed, ``None`` if it did not."""
         outcomes: asyncio.Queue[str | None] = asyncio.Queue()
 
         def on_text(data: bytes) -> None:
@@ -128,7 +128,7 @@ class Calls:
                     return await outcomes.get()
                 finally:
                     link.close()
-        # The latter of a bridge that closes the link in the breath that opens it.
+        # WebSocketException: the bridge closed the link as soon as it was open.
         except (BridgeClosed, WebSocketException) as error:
             return readable(f"no connection: {error}")
         except TimeoutError:
@@ -136,10 +136,10 @@ class Calls:
 
 
 MAX_SPENT = 8
-"""How many sockets of action goals are kept for their results at most."""
+"""The most sockets of action goals that are kept for their results."""
 
 FEEDBACK_PERIOD = 0.2
-"""The least time between two words on how a goal goes, in seconds."""
+"""The least time between two progress events of a goal, in seconds."""
 
 GOAL_ID = "actionlib_msgs/GoalID"
 
@@ -148,18 +148,18 @@ _ACTIONLIB = {
     "feedback": ("move_base_msgs/MoveBaseActionFeedback", 200),
     "result": ("move_base_msgs/MoveBaseActionResult", 0),
 }
-"""What is heard of a goal of move_base: the type, and milliseconds between two."""
+"""The topics of a move_base goal: the type, and milliseconds between two messages."""
 
 Topic = tuple[str, str]
 """The name of a topic and its type."""
 
 
 class TasksLane:
-    """The socket of one bridge that goals go through.
+    """The socket of one bridge for goals, cancels, poses and stop hooks.
 
     Args:
         url: The bridge's address.
-        emit: Takes the events.
+        emit: Called with each event.
         calls: Calls the services of the bridge.
 
     """
@@ -169,7 +169,7 @@ class TasksLane:
         self._emit = emit
         self._calls = calls
         self._spent: dict[Socket, SendGoal] = {}
-        """The sockets of action goals that are under way, the oldest first."""
+        """The sockets of the action goals that are under way, the oldest first."""
         self._followed: dict[str, tuple[RobotSpec, SendGoal]] = {}
         """The goals of move_base that are under way, by robot."""
         self._spending = False
@@ -181,7 +181,7 @@ class TasksLane:
         )
 
     def attach(self, topics: Iterable[Topic]) -> None:
-        """Announce the topics that a robot needs here."""
+        """Announce topics that a robot needs on this lane."""
         for topic, type in topics:
             id = _advertisement(topic, type)
             hello = ops.advertise(topic, type, id=id)
@@ -193,13 +193,13 @@ class TasksLane:
             self.lane.release_hold(_advertisement(topic, type))
 
     def send(self, spec: RobotSpec, goal: SendGoal) -> bool:
-        """Write a goal now or drop it; return whether it went out."""
+        """Write a goal now or drop it; return whether it was written."""
         goal = in_own_map(spec, goal)
         if goal.way == "move_base":
-            # First, so that no word is missed: they may be on their way at once.
+            # First, to miss no message: they may come at once.
             self._follow(spec, goal)
-        said = rosbridge.goal(spec, goal)
-        done = self.lane.write(said, only_if_clear=True, until=goal.until)
+        data = rosbridge.goal(spec, goal)
+        done = self.lane.write(data, only_if_clear=True, until=goal.until)
         if done and goal.way == "navigate_to_pose":
             self._keep_for_result(goal)
         if not done:
@@ -207,12 +207,12 @@ class TasksLane:
         return done
 
     def send_pose(self, spec: RobotSpec, at: SendPose) -> bool:
-        """Tell where the robot is, now or not; return whether it went out."""
+        """Write the robot's pose now or drop it; return whether it was written."""
         estimate = rosbridge.pose_estimate(spec, in_own_map(spec, at))
         return self.lane.write(estimate, only_if_clear=True, until=at.until)
 
     def cancel(self, spec: RobotSpec) -> None:
-        """Cancel every goal of the robot, by every way that it has."""
+        """Cancel every goal of the robot, by every method that it has."""
         if spec.cancel_topic is not None:
             self.lane.write(
                 rosbridge.cancel_by_topic(spec.cancel_topic), only_if_clear=False
@@ -230,9 +230,9 @@ class TasksLane:
 
         Args:
             hook: The hook.
-            stopped: What the Bool says.
-            ended: Is told what came of it: for a Bool, which nobody answers, whether
-                there was a link to write it to.
+            stopped: The value of the Bool.
+            ended: Called with the outcome. A Bool has no answer: it succeeds if there
+                was a link to write it to.
 
         """
         if "service" in hook:
@@ -249,23 +249,23 @@ class TasksLane:
             ended(why)
 
     def close(self) -> None:
-        """End for good, but for the calls that are under way."""
+        """Close the lane for good, but not the calls that are under way."""
         self.lane.close()
         for link in self._spent:
             link.close()
         self._spent.clear()
 
     def _keep_for_result(self, goal: SendGoal) -> None:
-        polite = FeedbackThrottle()
+        throttle = FeedbackThrottle()
 
-        # A socket is taken out once: of one that was closed or lost nothing is heard.
+        # A socket is removed once: one that was closed or lost calls nothing.
         def on_text(data: bytes) -> None:
-            word = navigation.of_action(data, goal)
-            if isinstance(word, GoalEnded):
+            news = navigation.of_action(data, goal)
+            if isinstance(news, GoalEnded):
                 del self._spent[link]
                 link.close()
-            if word is not None and polite(word):
-                self._emit(word)
+            if news is not None and throttle(news):
+                self._emit(news)
 
         def lost(why: str) -> None:
             del self._spent[link]
@@ -296,7 +296,7 @@ class TasksLane:
             self.lane.hold(id, hello, ops.unsubscribe(topic, id=id))
 
     def forget(self, robot: str) -> None:
-        """Listen no more to how a robot's goal goes."""
+        """Stop following a robot's goal of move_base."""
         found = self._followed.pop(robot, None)
         if found is not None:
             for part in _ACTIONLIB:
@@ -305,31 +305,31 @@ class TasksLane:
 
     def _on_message(self, data: bytes) -> None:
         for robot, (spec, goal) in list(self._followed.items()):
-            word = navigation.of_topics(data, spec, goal)
-            if isinstance(word, GoalEnded):
+            news = navigation.of_topics(data, spec, goal)
+            if isinstance(news, GoalEnded):
                 self.forget(robot)
-            if word is not None:
-                self._emit(word)
+            if news is not None:
+                self._emit(news)
 
     def _down(self) -> None:
         self._emit(LinkDown(self._url, "tasks", self._spending))
         if self._spending:
-            return  # the socket goes on for the goal that it was spent on
+            return  # the socket stays open for its action goal
         for _, goal in list(self._followed.values()):
             why = f"no connection to {self._url}"
             self._emit(GoalLost(goal.robot, goal.id, why))
 
 
 class FeedbackThrottle:
-    """Thins out what a robot may say of a goal a hundred times a second."""
+    """Thins out the feedback of a goal, which may come a hundred times a second."""
 
     def __init__(self) -> None:
         self._at = float("-inf")
 
-    def __call__(self, word: navigation.GoalNews) -> bool:
-        """Return whether the display should hear this word."""
+    def __call__(self, news: navigation.GoalNews) -> bool:
+        """Return whether the news should reach the rules."""
         now = asyncio.get_running_loop().time()
-        if isinstance(word, GoalEnded) or now - self._at >= FEEDBACK_PERIOD:
+        if isinstance(news, GoalEnded) or now - self._at >= FEEDBACK_PERIOD:
             self._at = now
             return True
         return False
