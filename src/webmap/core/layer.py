@@ -8,7 +8,7 @@ from webmap.base.scope import Removal, Scope, keep, no_scope
 from webmap.core.problems import Problems
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 
 if TYPE_CHECKING:
     from webmap.core.map import Map

@@ -6,9 +6,8 @@ from webmap.core.registry import Namespace, map_modules
 from webmap.core.robot import Robot
 from webmap.core.world_view import WorldView
 from webmap.scene import svg
-from webmap.scene.element import Element
-from webmap.scene.events import Event
-from webmap.scene.fragment import Fragment
+from webmap.scene.element import Element, Event
+from webmap.scene.node import Fragment
 
 LAYER_ORDER = 10.0
 ROBOT_ORDER = 100.0

@@ -17,9 +17,8 @@ from webmap.core.pictures import Publisher
 from webmap.core.view import initial_view
 from webmap.gate.protocol import Role
 from webmap.scene.bound import BoundElement, Document
-from webmap.scene.element import Element
-from webmap.scene.events import Event, Handler, Listener
-from webmap.scene.fragment import Fragment
+from webmap.scene.element import Element, Event, Handler, Listener
+from webmap.scene.node import Fragment
 from webmap.scene.wire.session import SceneSession
 
 if TYPE_CHECKING:

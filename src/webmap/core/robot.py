@@ -28,7 +28,7 @@ from webmap.poses.placing import PoseReading
 from webmap.ros.bridge import Bridge
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 
 if TYPE_CHECKING:
     from webmap.core.map import Map

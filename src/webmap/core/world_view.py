@@ -15,9 +15,8 @@ from webmap.core.pictures import pixels_across
 from webmap.core.registry import Namespace
 from webmap.core.view import Rect, apply_operation, initial_view
 from webmap.scene import svg
-from webmap.scene.element import Element
-from webmap.scene.events import Handler
-from webmap.scene.fragment import Fragment
+from webmap.scene.element import Element, Handler
+from webmap.scene.node import Fragment
 
 log = logging.getLogger("webmap.map")
 

@@ -15,7 +15,8 @@ from webmap.poses.lasting import Lasting
 from webmap.ros.tf import Transform
 from webmap.ros.tf.transform import alike
 from webmap.scene import svg
-from webmap.scene.element import Child, Element
+from webmap.scene.element import Element
+from webmap.scene.node import Child
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot

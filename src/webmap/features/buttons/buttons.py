@@ -18,8 +18,7 @@ from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field, UnknownType
 from webmap.ros.message_forms import entry_of, filled_in, hint, initial, leaves
 from webmap.scene import html
-from webmap.scene.element import Element
-from webmap.scene.events import Event
+from webmap.scene.element import Element, Event
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot

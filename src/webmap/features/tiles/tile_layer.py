@@ -15,7 +15,7 @@ from webmap.features.tiles.tile_grid import OVERLAP, Tile, TileGrid
 from webmap.features.tiles.tile_source import open_tiles
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 
 if TYPE_CHECKING:
     from webmap.core.map import Map

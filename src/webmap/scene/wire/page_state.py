@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import ClassVar
 
 from webmap.scene.element import Element
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 from webmap.scene.wire.encode import EVENT_NUMBER, encode_snapshot, string, varint
 from webmap.scene.wire.messages import ViewReport
 from webmap.scene.wire.opcodes import PREVENT, STOP, VIEW_OPERATIONS, Op

@@ -11,7 +11,7 @@ import msgspec
 from webmap.base.errors import WireError
 from webmap.scene.allowed import check_event
 from webmap.scene.element import Element, split_classes
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 from webmap.scene.wire.encode import encode_changes, string, varint
 from webmap.scene.wire.messages import (
     ElementEvent,
