@@ -1,23 +1,65 @@
 """The motion methods of a robot; all of them go through the gate."""
 
 import asyncio
+import functools
+import inspect
 import time
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
 
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Quaternion, Twist
 from webmap.base.scope import no_scope
 from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE
 from webmap.config.robot import LINKED, MOTION
-from webmap.core.call_arguments import sets_part
 from webmap.core.extendable import Extendable
 from webmap.core.given_pose import Orientation, Position
+from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.motion import MotionRoad
 from webmap.core.registry import Namespace
 from webmap.gate.protocol import RobotReport
 from webmap.gate.rules.goals import OVER
 from webmap.ros.bridge import Bridge
+
+P = ParamSpec("P")
+D = TypeVar("D", bound="Driven")
+Method = Callable[Concatenate[D, P], None]
+
+
+def sets_part(key: str) -> Callable[[Method[D, P]], Method[D, P]]:
+    """Make a method set one part of the configuration (decorator).
+
+    The method has a signature and a docstring but no code. Its arguments are passed to
+    ``configure`` under the names of its parameters. Unknown arguments and a bridge that
+    is not a ``Bridge`` are refused here; ``configure`` checks the rest.
+
+    Args:
+        key: The name of the part.
+
+    """
+
+    def decorate(method: Method[D, P]) -> Method[D, P]:
+        signature = inspect.signature(method)
+
+        @functools.wraps(method)
+        def setter(owner: D, /, *args: P.args, **kwargs: P.kwargs) -> None:
+            try:
+                check_arguments(method, args, kwargs)
+            except WrongArguments as error:
+                wrong = [each for each in error.wrong if each.name in ("", "bridge")]
+                if wrong:
+                    called = f"robot {owner.name!r}: {method.__name__}"
+                    raise WrongArguments(called, wrong) from None
+            given = signature.bind(owner, *args, **kwargs)
+            given.apply_defaults()
+            _, *values = given.arguments.items()
+            part = dict(values)
+            bridge = part.pop("bridge", None)
+            owner.configure(key, part, bridge)
+
+        return setter
+
+    return decorate
 
 
 class Driven(Extendable):

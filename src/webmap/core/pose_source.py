@@ -7,10 +7,11 @@ clock and the alignment.
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from webmap.base.geometry import Affine, Pose
 from webmap.base.scope import Removal, no_scope
+from webmap.core.driven import Driven
 from webmap.poses.alignment import HERE, alignments
 from webmap.poses.frames import Frames, frames_of
 from webmap.poses.odometry import ODOMETRY, OdometryFeed
@@ -19,19 +20,22 @@ from webmap.poses.placing import Placing, PoseReading
 from webmap.poses.silence import SilenceWatch
 from webmap.ros.bridge import Bridge
 
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
-
 
 class PoseSource:
     """Receives a robot's poses and puts them on the common map.
 
     Args:
-        robot: The robot, which shows its poses and their problems.
+        robot: The robot, which shows the problems of its poses.
+        show_pose: Draws the robot; called with a pose on the common map, and the time
+            when the pose was sent, or None if only the alignment changed.
 
     """
 
-    def __init__(self, robot: "Robot") -> None:
+    def __init__(
+        self,
+        robot: Driven,
+        show_pose: Callable[[PoseReading, float | None], object],
+    ) -> None:
         self.pipeline = PosePipeline()
         self.feed: OdometryFeed | None = None
         """The odometry topic, if there is one."""
@@ -50,6 +54,7 @@ class PoseSource:
         self.expected_at: float | None = None
         """When the newest pose arrived from a source that also sends at rest."""
         self._robot = robot
+        self._show_pose = show_pose
         self._silence = SilenceWatch(lambda: robot.name)
         self._problems: Mapping[str, Problem] = {}
         self._hears_frames = Removal(lambda: None)
@@ -217,7 +222,7 @@ class PoseSource:
         self.common_from_own = Affine.of_pose(self.alignment)
         pipeline.alignment = self.alignment
         if pipeline.newest is not None:
-            self._robot.show_pose(pipeline.on_map(pipeline.newest))
+            self._show_pose(pipeline.on_map(pipeline.newest), None)
         self._robot.motion.set_alignment(self.alignment)
         self._tell()
 
@@ -225,7 +230,7 @@ class PoseSource:
 
     def _show(self, step: Step, stamp: float) -> None:
         assert step.pose is not None  # callers have one
-        self._robot.show_pose(step.pose, stamp)
+        self._show_pose(step.pose, stamp)
         self._tell()
         if step.problems is self.pipeline.problems:  # else a listener ended this source
             self._show_problems(step)

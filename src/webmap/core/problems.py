@@ -7,14 +7,12 @@ import secrets
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from webmap.base.errors import WebMapError
 from webmap.base.scope import Removal, keep
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.page import Page
+from webmap.core.page import Page
+from webmap.core.world_view import WorldView
 
 log = logging.getLogger("webmap.modules")
 
@@ -101,8 +99,8 @@ class Problems:
         worded: Callable[[str], str] = str,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.maps: list[Map] = []
-        self.standing: dict[object, str] = {}
+        self.maps: list[WorldView] = []
+        self.current: dict[object, str] = {}
         """The current problems, by subject."""
         self._log = log
         self._worded = worded
@@ -123,13 +121,13 @@ class Problems:
         the same text once a minute at most, even if the problem ended in between.
         """
         text = cut(text)
-        before = self.standing.get(about)
+        before = self.current.get(about)
         if before == text:
             return
         now = self._clock()
         if before is None:
             self._forget(now)
-        self.standing[about] = text
+        self.current[about] = text
         recurring = self._recurring.setdefault(about, Recurring())
         if not recurring.fails(text):
             return
@@ -140,30 +138,30 @@ class Problems:
 
     def clear(self, about: object) -> None:
         """Remove the problem of ``about``; does nothing if there is none."""
-        if self.standing.pop(about, None) is None:
+        if self.current.pop(about, None) is None:
             return
         recurring = self._recurring[about]
         recurring.mend(self._clock())
         for page in self._pages():
             page.channel.mended(recurring.number)
 
-    def join(self, map: "Map") -> None:
+    def join(self, map: WorldView) -> None:
         """Show a map the current and future problems."""
         self.maps.append(map)
         if map.page.closed:
             return
-        for about, text in self.standing.items():
+        for about, text in self.current.items():
             map.page.channel.problem(self._recurring[about].number, self._worded(text))
 
-    def leave(self, map: "Map") -> None:
+    def leave(self, map: WorldView) -> None:
         """Stop showing problems on a map, and remove those that it shows."""
         self.maps.remove(map)
         if map.page.closed or map.page in self._pages():
             return
-        for about in self.standing:
+        for about in self.current:
             map.page.channel.mended(self._recurring[about].number)
 
-    def _pages(self) -> "list[Page]":
+    def _pages(self) -> list[Page]:
         """Return the open pages of the maps, each of them once."""
         pages = dict.fromkeys(map.page for map in self.maps)
         return [page for page in pages if not page.closed]

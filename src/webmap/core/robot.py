@@ -14,8 +14,7 @@ from webmap.base.geometry import Quaternion, Twist, Vector3
 from webmap.base.scope import Removal, keep
 from webmap.config.reading import read_part
 from webmap.config.robot import OdometryConfig, RobotConfig, TfConfig
-from webmap.core.call_arguments import sets_part
-from webmap.core.driven import Driven
+from webmap.core.driven import Driven, sets_part
 from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
 from webmap.core.registry import Namespace, robot_modules
@@ -75,10 +74,11 @@ class Robot(Driven):
         super().__init__(name, namespace)
         self.base_link = self.motion.base_frame = base_link
         self.model = model
-        self._told = Problems(log, lambda text: f"{self.name}: {text}")
-        self.maps = self._told.maps
-        self.problems: dict[object, str] = self._told.standing
+        self._shown_problems = Problems(log, lambda text: f"{self.name}: {text}")
+        self.problems: dict[object, str] = self._shown_problems.current
         """Current problems, as sentences, by subject."""
+        self.maps: list[Map] = []
+        """The maps that show the robot."""
         self.selected = False
         self.position = Vector3()
         self.orientation = Quaternion()
@@ -89,7 +89,7 @@ class Robot(Driven):
         self.pose_stamp: float | None = None
         """When the newest pose was sent, in seconds of ``time.monotonic()``; None
         before the first one."""
-        self.whereabouts = PoseSource(self)
+        self.whereabouts = PoseSource(self, self.show_pose)
         """The source of its poses, on its own map and on the common one."""
         self.svg = svg.g(svg.title(text=self.name), self.model, class_="robot unplaced")
         self.svg.set("data-name", self.name)
@@ -356,7 +356,7 @@ class Robot(Driven):
 
     def report_error(self, text: str) -> None:
         """Log a failure and show it on every page that has the robot."""
-        self._told.report(text)
+        self._shown_problems.report(text)
 
     def set_problem(self, about: object, text: str) -> None:
         """Show a problem until :meth:`clear_problem`, also to pages opened later.
@@ -366,19 +366,21 @@ class Robot(Driven):
             text: A sentence for people.
 
         """
-        self._told.set(about, text)
+        self._shown_problems.set(about, text)
 
     def clear_problem(self, about: object) -> None:
         """Remove the problem of ``about``; does nothing if there is none."""
-        self._told.clear(about)
+        self._shown_problems.clear(about)
 
     def on_map(self, map: "Map", shown: bool) -> None:
         """Set whether a map shows this robot, and fire ``on_map``."""
         if shown:
             self.model_images.show(map.page)
-            self._told.join(map)
+            self.maps.append(map)
+            self._shown_problems.join(map)
         else:
-            self._told.leave(map)
+            self.maps.remove(map)
+            self._shown_problems.leave(map)
             if not self.maps:
                 self.model_images.end()
         self.update_selected()

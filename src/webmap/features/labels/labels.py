@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from webmap.base.errors import ConfigError
 from webmap.base.scope import Removal, keep
 from webmap.base.tasks import spawn
-from webmap.core.given_pose import robot_and_pose
 from webmap.core.layer import Layer
+from webmap.core.map import robot_and_pose
 from webmap.core.registry import map_modules
 from webmap.features.labels.label_store import (
     ICONS,
