@@ -7,7 +7,7 @@ import pytest
 
 from webmap import Bridge, Robot
 from webmap.base.scope import Removal
-from webmap.core.motion import MotionRoad
+from webmap.core.motion import RobotMotion
 from webmap.poses.type_asking import FEW, LATER, SHARE, SOON
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder
@@ -92,7 +92,7 @@ async def settle():
 def told(monkeypatch):
     """Run what is done with a robot whose velocity topic nobody knows yet."""
     gate = Gate()
-    monkeypatch.setattr(MotionRoad, "gate", gate)
+    monkeypatch.setattr(RobotMotion, "gate", gate)
     clock = SimpleNamespace(monotonic=lambda: 0.0)  # an answer takes no time
     monkeypatch.setattr("webmap.poses.type_asking.time", clock)
 

@@ -49,7 +49,7 @@ class PoseSource:
         """The position and rotation of the robot's own map on the common one."""
         self.common_from_own = Affine()
         """The transform from the robot's own map to the common one."""
-        self.heard_at: float | None = None
+        self.received_at: float | None = None
         """When the newest pose arrived, in seconds of :func:`time.monotonic`."""
         self.expected_at: float | None = None
         """When the newest pose arrived from a source that also sends at rest."""
@@ -57,8 +57,8 @@ class PoseSource:
         self._show_pose = show_pose
         self._silence = SilenceWatch(lambda: robot.name)
         self._problems: Mapping[str, Problem] = {}
-        self._hears_frames = Removal(lambda: None)
-        self._hears_alignment = Removal(lambda: None)
+        self._frames_removal = Removal(lambda: None)
+        self._alignment_removal = Removal(lambda: None)
         self._listeners: dict[int, Callable[[], object]] = {}
 
     # Sources of poses.
@@ -111,12 +111,12 @@ class PoseSource:
         placing = Placing(frames, map_frame, base_frame, quiet=quiet)
         self.pipeline.placing = placing
         self._robot.motion.base_frame = placing.base_frame
-        self._hears_frames = frames.join(self._on_frames)
+        self._frames_removal = frames.join(self._on_frames)
         self._restart()
 
     def unplace(self) -> None:
         """Stop placing poses by TF; does nothing if TF is not set."""
-        self._hears_frames.remove()
+        self._frames_removal.remove()
         self.frames = self.pipeline.placing = None
         self._restart()
 
@@ -146,10 +146,10 @@ class PoseSource:
         """The newest pose, in the robot's own map."""
         return self.pipeline.newest
 
-    def come(self, *, within: float) -> bool:
-        """Return whether a pose of any age arrived in the last ``within`` seconds."""
-        heard = self.heard_at
-        return heard is not None and time.monotonic() - heard <= within
+    def received_within(self, seconds: float) -> bool:
+        """Return whether a pose of any age arrived in the last ``seconds``."""
+        received = self.received_at
+        return received is not None and time.monotonic() - received <= seconds
 
     def align(self, pose: Pose | None) -> None:
         """Set the robot's own alignment; None uses that of its bridge."""
@@ -164,7 +164,7 @@ class PoseSource:
         self._listeners[key] = listener
         return Removal(lambda: self._listeners.pop(key, None))
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         for listener in tuple(self._listeners.values()):
             listener()
 
@@ -192,10 +192,10 @@ class PoseSource:
         feed = self.feed
         if feed is None:
             return
-        self.heard_at = now = time.monotonic()
+        self.received_at = now = time.monotonic()
         if feed.type == ODOMETRY:  # other poses may arrive only while the robot moves
             self.expected_at = now
-            self._silence.hear(now)
+            self._silence.record(now)
         self._show(self.pipeline.step(reading, self.frames, now), now - feed.bridge.lag)
 
     def _on_frames(self) -> None:
@@ -206,14 +206,14 @@ class PoseSource:
         step = self.pipeline.step(None, frames, now)
         if step.pose is not None:
             # The pose may have waited for the next call of listeners.
-            self.heard_at = came = frames.heard_at
+            self.received_at = came = frames.received_at
             if step.pose.stamp:  # otherwise it is fixed to the map, and arrives once
                 self.expected_at = came
-                self._silence.hear(now)
+                self._silence.record(now)
             self._show(step, came - frames.bridge.lag)
         else:
             self._show_problems(step)
-            self._tell()
+            self._notify()
 
     def _on_alignment(self) -> None:
         """Move the robot, and what is drawn by its pose, to a new alignment."""
@@ -224,14 +224,14 @@ class PoseSource:
         if pipeline.newest is not None:
             self._show_pose(pipeline.on_map(pipeline.newest), None)
         self._robot.motion.set_alignment(self.alignment)
-        self._tell()
+        self._notify()
 
     # Display.
 
     def _show(self, step: Step, stamp: float) -> None:
         assert step.pose is not None  # callers have one
         self._show_pose(step.pose, stamp)
-        self._tell()
+        self._notify()
         if step.problems is self.pipeline.problems:  # else a listener ended this source
             self._show_problems(step)
 
@@ -251,7 +251,7 @@ class PoseSource:
                 self._robot.set_problem(about, new.text)
 
     def _restart(self) -> None:
-        """Discard the poses so far; the next ones come from another source."""
+        """Discard the poses so far; the next ones are from another source."""
         feed, frames = self.feed, self.frames
         bridge, topic, period = None, "", None
         if feed is not None:
@@ -263,8 +263,10 @@ class PoseSource:
         self._silence.restart(bridge, topic, period or 0.0)
         self.expected_at = None
         if bridge is not self.bridge:
-            self._hears_alignment.remove()
+            self._alignment_removal.remove()
             self.bridge = bridge
             if bridge is not None:
-                self._hears_alignment = alignments.on_change(bridge, self._on_alignment)
+                self._alignment_removal = alignments.on_change(
+                    bridge, self._on_alignment
+                )
             self._on_alignment()

@@ -41,7 +41,7 @@ def cut(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
-def wording(text: str) -> str:
+def without_numbers(text: str) -> str:
     """Return a sentence with each number or row of numbers replaced by ``#``."""
     return _ROW.sub("#", _NUMBER.sub("#", text))
 
@@ -52,34 +52,34 @@ class Recurring:
     def __init__(self) -> None:
         self.number = next(_numbers)
         """The number by which pages identify it."""
-        self._wording: str | None = None
+        self._shape: str | None = None
         self._mended = 0.0
         self._logged: dict[str, float] = {}
 
     def fails(self, text: str) -> bool:
         """Set the current sentence; return whether more than its numbers changed."""
-        words = wording(text)
-        news = words != self._wording
-        self._wording = words
-        return news
+        shape = without_numbers(text)
+        changed = shape != self._shape
+        self._shape = shape
+        return changed
 
     def mend(self, now: float) -> None:
         """Set that the problem ended, at ``now`` of any monotonic clock."""
-        self._wording, self._mended = None, now
+        self._shape, self._mended = None, now
 
     def is_over(self, now: float) -> bool:
         """Return whether it ended so long ago that the next one is a new problem."""
-        return self._wording is None and now - self._mended >= AGAIN
+        return self._shape is None and now - self._mended >= AGAIN
 
-    def is_worth_a_line(self, now: float) -> bool:
-        """Return whether the current text is to be logged, and record that it is."""
-        for words in [w for w, at in self._logged.items() if now - at >= AGAIN]:
-            del self._logged[words]
-        if self._wording is None or self._wording in self._logged:
+    def should_be_logged(self, now: float) -> bool:
+        """Return whether to log the current text, and record it as logged."""
+        for shape in [s for s, at in self._logged.items() if now - at >= AGAIN]:
+            del self._logged[shape]
+        if self._shape is None or self._shape in self._logged:
             return False
         if len(self._logged) >= WORDINGS:
             return False
-        self._logged[self._wording] = now
+        self._logged[self._shape] = now
         return True
 
 
@@ -88,7 +88,7 @@ class Problems:
 
     Args:
         log: The log for each sentence.
-        worded: Builds the shown sentence, for example with a name in front.
+        format_text: Returns the shown sentence, for example with a name in front.
         clock: A monotonic clock, in seconds.
 
     """
@@ -96,20 +96,20 @@ class Problems:
     def __init__(
         self,
         log: logging.Logger,
-        worded: Callable[[str], str] = str,
+        format_text: Callable[[str], str] = str,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.maps: list[WorldView] = []
         self.current: dict[object, str] = {}
         """The current problems, by subject."""
         self._log = log
-        self._worded = worded
+        self._format_text = format_text
         self._clock = clock
         self._recurring: dict[object, Recurring] = {}
 
     def report(self, text: str) -> None:
         """Log a failure and show it on every current map."""
-        sentence = self._worded(cut(text))
+        sentence = self._format_text(cut(text))
         self._log.warning("%s", sentence)
         for map in self.maps:
             map.show_error(sentence)
@@ -131,10 +131,10 @@ class Problems:
         recurring = self._recurring.setdefault(about, Recurring())
         if not recurring.fails(text):
             return
-        if recurring.is_worth_a_line(now):
-            self._log.warning("%s", self._worded(text))
+        if recurring.should_be_logged(now):
+            self._log.warning("%s", self._format_text(text))
         for page in self._pages():
-            page.channel.problem(recurring.number, self._worded(text))
+            page.channel.problem(recurring.number, self._format_text(text))
 
     def clear(self, about: object) -> None:
         """Remove the problem of ``about``; does nothing if there is none."""
@@ -151,7 +151,9 @@ class Problems:
         if map.page.closed:
             return
         for about, text in self.current.items():
-            map.page.channel.problem(self._recurring[about].number, self._worded(text))
+            map.page.channel.problem(
+                self._recurring[about].number, self._format_text(text)
+            )
 
     def leave(self, map: WorldView) -> None:
         """Stop showing problems on a map, and remove those that it shows."""
@@ -203,9 +205,9 @@ class Refusing:
         self._failure = ""
         keep(Removal(lambda: owner.clear_problem(self)))
 
-    def complain(self, words: str) -> None:
+    def complain(self, text: str) -> None:
         """Set an error of the message that is drawn at present."""
-        self._complaint = words
+        self._complaint = text
 
     def take(self, draw: Callable[[M], object], message: M) -> None:
         """Draw a message; a message for which ``draw`` raises is skipped.

@@ -99,8 +99,8 @@ class WorldView(Extendable):
         if self.page.closed:  # the map would never be destroyed
             raise ConfigError(
                 f"page {self.page.entry.path!r} of {self.page.viewer.name} was closed, "
-                "so no map can be made on it: what goes on beside a page function may "
-                "take longer than the viewer stays"
+                "so no map can be created on it: create maps in the page function, not "
+                "in a task that may end after the viewer has left"
             )
         self.container = container
         width, height = self.page.size_of(container)

@@ -62,7 +62,7 @@ class OdometryFeed:
         self.type: str | None = None
         self._listener = listener
         self._typed = typed
-        self._tell_complaint = complain
+        self._on_complaint = complain
         self._complaint: str | None = None
         self._report = report
         self._scope = Scope(
@@ -71,7 +71,9 @@ class OdometryFeed:
         self._subscription: Removable | None = None
         self._asking: Removable | None = None
         if type is None:
-            self._asking = TypeAsking(bridge, topic, self._told, self._listen_untyped)
+            self._asking = TypeAsking(
+                bridge, topic, self._on_type, self._listen_untyped
+            )
         else:
             self._subscribe(odometry_view(type))
 
@@ -94,7 +96,7 @@ class OdometryFeed:
                     self.topic, self._on_first, throttle=self.throttle
                 )
 
-    def _told(self, type: str) -> None:
+    def _on_type(self, type: str) -> None:
         """Use the type that the bridge returned."""
         if self.type is not None:
             return
@@ -120,21 +122,28 @@ class OdometryFeed:
             view = odometry_view_by_shape(message)
             first = convert(message, view)
         except ProtocolError as error:
-            self._complain(f"topic {self.topic!r}: {error}; say type=... if one does")
+            self._complain(
+                f"topic {self.topic!r}: {error}; if the topic has one of these types, "
+                "set type=..."
+            )
             self._typed("")
             return
         self._use(view)
-        self._hear(first)
+        self._on_message(first)
 
     def _subscribe(self, view: type[OdometryView]) -> None:
         self.type = _NAMES[view]
         self._typed(self.type)
         with self._scope.active():
             self._subscription = self.bridge.subscribe(
-                self.topic, self._hear, self.type, throttle=self.throttle, decode=view
+                self.topic,
+                self._on_message,
+                self.type,
+                throttle=self.throttle,
+                decode=view,
             )
 
-    def _hear(self, message: OdometryView) -> None:
+    def _on_message(self, message: OdometryView) -> None:
         try:
             reading = PoseReading.of(message)
         except ProtocolError as error:
@@ -161,4 +170,4 @@ class OdometryFeed:
     def _complain(self, text: str | None) -> None:
         if text != self._complaint:
             self._complaint = text
-            self._tell_complaint(text)
+            self._on_complaint(text)
