@@ -29,7 +29,7 @@ from webmap.gate.limits import PLANE, Axes
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.assist import polygon_around
 from webmap.gate.specs import checked, checked_assist
-from webmap.poses.type_asking import TypeAsking
+from webmap.poses.type_query import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.moving import STOP
 from webmap.ros.names import is_type
@@ -97,7 +97,7 @@ class RobotMotion:
         self._bridges: Links = {}
         self._odometry: tuple[Bridge, str, str | None] | None = None
         self._own_map = Pose()
-        self._asking: TypeAsking | None = None
+        self._type_query: TypeQuery | None = None
         self._ask_writers_at = 0.0
         robot_motions.add(self)
 
@@ -141,11 +141,11 @@ class RobotMotion:
         self.declare()
 
     def _ask_type(self, twist: TwistConfig | None, bridge: Bridge | None) -> None:
-        if self._asking is not None:
-            self._asking.remove()
-            self._asking = None
+        if self._type_query is not None:
+            self._type_query.remove()
+            self._type_query = None
         if twist is not None and twist.type is None and bridge is not None:
-            self._asking = TypeAsking(bridge, twist.topic, self._take_type)
+            self._type_query = TypeQuery(bridge, twist.topic, self._take_type)
 
     def bridge(self, key: str) -> Bridge | None:
         """Return the bridge of a part of the configuration, or None."""

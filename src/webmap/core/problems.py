@@ -23,7 +23,7 @@ AGAIN = 60.0
 """Seconds in which the log gets the same text about one subject once. A problem that
 returns within this time after it ended is the same problem."""
 
-WORDINGS = 10
+MOST_TEXTS = 10
 """The number of different texts about one subject that the log gets in that time."""
 
 _NUMBER = re.compile(
@@ -77,7 +77,7 @@ class Recurring:
             del self._logged[shape]
         if self._shape is None or self._shape in self._logged:
             return False
-        if len(self._logged) >= WORDINGS:
+        if len(self._logged) >= MOST_TEXTS:
             return False
         self._logged[self._shape] = now
         return True

@@ -65,7 +65,7 @@ class Runtime:
         self._thread: threading.Thread | None = None
         self._watchers: dict[int, Watcher] = {}
         self._on_stop: list[Callable[[], None]] = []
-        self._looked_at = asyncio.Event()
+        self._has_watchers = asyncio.Event()
         self._ending = asyncio.Event()
 
     @property
@@ -83,7 +83,7 @@ class Runtime:
         # A busy model's thread keeps the interpreter for this long at a time, while the
         # web thread must pass on the ticks to operators.
         sys.setswitchinterval(min(SWITCH, sys.getswitchinterval()))
-        self._looked_at, self._ending = asyncio.Event(), asyncio.Event()
+        self._has_watchers, self._ending = asyncio.Event(), asyncio.Event()
         ready = threading.Event()
         failure: list[BaseException] = []
         self._thread = threading.Thread(
@@ -123,19 +123,19 @@ class Runtime:
     def watch(self, watcher: Watcher) -> Removal:
         """Tick ``watcher`` until the removal; called in the model's thread."""
         self._watchers[id(watcher)] = watcher
-        self._looked_at.set()
+        self._has_watchers.set()
 
         def undo() -> None:
             self._watchers.pop(id(watcher), None)
             if not self._watchers:
-                self._looked_at.clear()
+                self._has_watchers.clear()
 
         return Removal(undo)
 
     def _run(self, ready: threading.Event, failure: list[BaseException]) -> None:
         try:
             with asyncio.Runner(loop_factory=_new_loop) as runner:
-                runner.run(self._live(ready))
+                runner.run(self._run_model(ready))
         except BaseException as error:
             failure.append(error)
             log.exception("the model's thread ended")
@@ -143,7 +143,7 @@ class Runtime:
             self._loop = None
             ready.set()
 
-    async def _live(self, ready: threading.Event) -> None:
+    async def _run_model(self, ready: threading.Event) -> None:
         from webmap.gate.display.client import GateClient
 
         loop = self._loop = asyncio.get_running_loop()
@@ -175,7 +175,7 @@ class Runtime:
         loop = asyncio.get_running_loop()
         due = loop.time()
         while True:
-            await self._looked_at.wait()
+            await self._has_watchers.wait()
             now = loop.time()
             due = max(due + TICK, now)
             for watcher in list(self._watchers.values()):

@@ -75,7 +75,7 @@ class LayerFrames:
                 return None
             self._frames = frames_of(self._bridge, self._namespace)
             with self._layer.scope.active():
-                keep(self._frames.join(self._news))
+                keep(self._frames.join(self._on_frames))
         return self._frames.buffer.name(frame_id, self._namespace)
 
     def _look(self, source: str, stamp: float) -> tuple[Transform, bool]:
@@ -111,7 +111,7 @@ class LayerFrames:
         """Place the layer at the current alignment of its map."""
         raise NotImplementedError
 
-    def _news(self) -> None:
+    def _on_frames(self) -> None:
         """Process changed frames."""
         raise NotImplementedError
 
@@ -143,7 +143,7 @@ class Anchored(LayerFrames):
             self._frame = source
             self._place(source, stamp)
 
-    def _news(self) -> None:
+    def _on_frames(self) -> None:
         if self._frame is not None:
             self._place(self._frame, 0.0)
 

@@ -101,7 +101,7 @@ class Placed:
         else:
             robot.svg.append(self.svg)
         self._put()
-        self._pose_removal = robot.pose_source.join(self._news)
+        self._pose_removal = robot.pose_source.join(self._on_poses)
         keep(Removal(self._end))
 
     def stand_in(self, frame_id: str, stamp: float, draw: Draw | None = None) -> None:
@@ -163,7 +163,7 @@ class Placed:
         self._upright[element] = (x, y)
         self._put()
 
-    def _news(self) -> None:
+    def _on_poses(self) -> None:
         if self._settled:
             if not self._on_robot or self._upright:
                 self._put()

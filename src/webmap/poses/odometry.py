@@ -7,7 +7,7 @@ from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
 from webmap.base.scope import Removable, Scope, no_scope
 from webmap.poses.placing import PoseReading
-from webmap.poses.type_asking import TypeAsking
+from webmap.poses.type_query import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.decoding import convert
 from webmap.ros.views import (
@@ -69,9 +69,9 @@ class OdometryFeed:
             f"poses of {topic}", self._failed, lambda _: self._complain(None)
         )
         self._subscription: Removable | None = None
-        self._asking: Removable | None = None
+        self._type_query: Removable | None = None
         if type is None:
-            self._asking = TypeAsking(
+            self._type_query = TypeQuery(
                 bridge, topic, self._on_type, self._listen_untyped
             )
         else:
@@ -79,10 +79,10 @@ class OdometryFeed:
 
     def remove(self) -> None:
         """Unsubscribe; a second call does nothing."""
-        for thing in (self._subscription, self._asking):
+        for thing in (self._subscription, self._type_query):
             if thing is not None:
                 thing.remove()
-        self._subscription = self._asking = None
+        self._subscription = self._type_query = None
 
     def _listen_untyped(self) -> None:
         """Determine the type from the first message: the bridge may not know the type.
@@ -110,12 +110,12 @@ class OdometryFeed:
 
     def _use(self, view: type[OdometryView]) -> None:
         """Subscribe with the type that is now known."""
-        untyped, asking = self._subscription, self._asking
+        untyped, type_query = self._subscription, self._type_query
         self._subscribe(view)
-        for thing in (untyped, asking):
+        for thing in (untyped, type_query):
             if thing is not None:
                 thing.remove()
-        self._asking = None
+        self._type_query = None
 
     def _on_first(self, message: Any) -> None:
         try:

@@ -98,7 +98,7 @@ class Placing:
         """The problem in a sentence."""
         self._known: dict[str, Transform] = {}
         self._newest = -math.inf
-        self._news: dict[str, tuple[float, float]] = {}
+        self._last_changes: dict[str, tuple[float, float]] = {}
 
     def name(self, frame: str) -> str:
         """Return the full name of a frame that the robot names."""
@@ -161,10 +161,10 @@ class Placing:
         self, frame: str, newest: float | None, now: float
     ) -> None:
         """Set a problem if a frame gets no new transforms; static frames need none."""
-        before, changed_at = self._news.get(frame, (None, now))
+        before, changed_at = self._last_changes.get(frame, (None, now))
         if newest is None or newest != before:
             changed_at = now
-            self._news[frame] = (newest or 0.0, now)
+            self._last_changes[frame] = (newest or 0.0, now)
         self.kind = ""
         if now > changed_at + LATE:
             self.kind = "late"

@@ -87,7 +87,7 @@ class MarkerFrames(LayerFrames):
             text = not_known(frame, why) + f" (and {more} more)" * bool(more)
         self._show_trouble(text)
 
-    def _news(self) -> None:
+    def _on_frames(self) -> None:
         if not self._moving:
             return
         places: dict[tuple[str, float], tuple[Transform, bool]] = {}
