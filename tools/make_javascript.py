@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from webmap.console.card_parts import GOALS
-from webmap.core.robot_state import WORDS
+from webmap.core.robot_state import STATE_TEXTS
 from webmap.features.goals.goal_tool import SPACING
 from webmap.features.routes.route_tool import LONGEST_NAME, MOST_POINTS
 from webmap.ros.messages_log import LEVELS
@@ -89,7 +89,8 @@ def constants_js() -> str:
 
 def state_words_js() -> str:
     """Return the text of ``state_words.js``."""
-    rows = "".join(f"  {name}: {json.dumps(text)},\n" for name, text in WORDS.items())
+    texts = STATE_TEXTS.items()
+    rows = "".join(f"  {name}: {json.dumps(text)},\n" for name, text in texts)
     return (
         "// Made by tools/make_javascript.py from webmap/core/robot_state.py: do not "
         "edit.\n"

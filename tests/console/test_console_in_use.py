@@ -13,7 +13,7 @@ from webmap.discovery.doctor import Observed
 from webmap.discovery.doctor.meant import lay_over
 from webmap.features.doctor.doctor_panel import DoctorReports, checkup_of
 from webmap.features.doctor.in_use import in_use
-from webmap.scene.events import Event
+from webmap.scene.element import Event
 from webmap.scene.wire.session import SceneSession
 
 

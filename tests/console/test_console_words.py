@@ -16,7 +16,7 @@ from webmap.console.words import (
     number,
     sentence,
 )
-from webmap.core.robot_state import WORDS
+from webmap.core.robot_state import STATE_TEXTS
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_a_name_at_the_beginning_of_a_sentence_keeps_its_small_letter():
 
 
 def test_every_state_of_a_robot_has_a_look():
-    assert set(LOOKS) == {name for name in WORDS if not name.endswith("_by_you")}
+    assert set(LOOKS) == {name for name in STATE_TEXTS if not name.endswith("_by_you")}
 
 
 def test_states_that_can_be_beside_each_other_in_a_list_never_share_a_shape():

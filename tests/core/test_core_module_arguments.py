@@ -98,7 +98,7 @@ def test_a_value_of_another_kind_is_refused(annotation, value, expected):
     with pytest.raises(WrongArguments) as error:
         check_arguments(made(annotation), [], {"it": value})
     (wrong,) = error.value.wrong
-    assert (wrong.way, wrong.words) == (("options", "it"), expected)
+    assert (wrong.path, wrong.text) == (("options", "it"), expected)
 
 
 def test_the_way_leads_into_lists_and_tables():
@@ -106,7 +106,7 @@ def test_the_way_leads_into_lists_and_tables():
     with pytest.raises(WrongArguments) as error:
         check_arguments(made(kind), [[{}, {"a": [1, "2"]}]], {}, first=1)
     (wrong,) = error.value.wrong
-    assert (wrong.way, wrong.got) == (("args", 1, 1, "a", 1), ("2",))
+    assert (wrong.path, wrong.got) == (("args", 1, 1, "a", 1), ("2",))
     assert "it[1]['a'][1]: expected a whole number, got '2'" in str(error.value)
 
 
@@ -130,7 +130,7 @@ def test_more_arguments_than_there_are_and_fewer_are_named():
     twice = '"one" has multiple values: one by its place, one by its name'
     with pytest.raises(WrongArguments, match=twice) as error:
         check_arguments(factory, [1], {"one": 2})
-    assert error.value.wrong[0].way == ("options", "one")
+    assert error.value.wrong[0].path == ("options", "one")
 
 
 def test_the_owner_is_no_argument_even_of_what_takes_any_name():

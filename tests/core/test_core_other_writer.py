@@ -7,7 +7,7 @@ import pytest
 
 from webmap import Bridge, Robot
 from webmap.core import motion
-from webmap.core.motion import MotionRoad
+from webmap.core.motion import RobotMotion
 
 REST = {"doing": "other", "holder": None, "goal": None, "measured": None}
 SAID = SimpleNamespace(other_writer="another program publishes to /cmd_vel", **REST)
@@ -32,7 +32,7 @@ class Gate:
 @pytest.fixture
 def gate(monkeypatch):
     gate = Gate()
-    monkeypatch.setattr(MotionRoad, "gate", gate)
+    monkeypatch.setattr(RobotMotion, "gate", gate)
     return gate
 
 

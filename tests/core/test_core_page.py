@@ -11,7 +11,7 @@ from webmap.config.buttons import read_button
 from webmap.features.buttons import robot_button
 from webmap.features.buttons.buttons import ButtonView
 from webmap.features.buttons.robot_button import RobotButton
-from webmap.scene.events import Event
+from webmap.scene.element import Event
 
 
 def click(page, mount, element):

@@ -14,7 +14,7 @@ def owners(*namespaces: str) -> PartOwners:
 
 
 @pytest.mark.parametrize(
-    ("name", "whose"),
+    ("name", "owner"),
     [
         ("a/base: Motors", "own"),
         ("/a/base: Motors", "own"),
@@ -23,33 +23,33 @@ def owners(*namespaces: str) -> PartOwners:
         ("/a", "own"),
         ("b/base: Motors", "another"),
         ("a/b/base: Motors", "another"),
-        ("a1/base: Motors", "nobody"),
-        ("base: Motors", "nobody"),
-        ("/Group/a/base: Motors", "nobody"),
-        ("base: port a/b", "nobody"),
-        ("a base: Motors", "nobody"),
-        ("", "nobody"),
+        ("a1/base: Motors", "unknown"),
+        ("base: Motors", "unknown"),
+        ("/Group/a/base: Motors", "unknown"),
+        ("base: port a/b", "unknown"),
+        ("a base: Motors", "unknown"),
+        ("", "unknown"),
     ],
 )
-def test_a_part_is_the_innermost_robots_whose_namespace_it_begins_with(name, whose):
-    assert owners("a", "b", "a/b").whose(name, "a") == whose
+def test_a_part_is_the_innermost_robots_whose_namespace_it_begins_with(name, owner):
+    assert owners("a", "b", "a/b").owner(name, "a") == owner
 
 
 def test_what_no_namespace_is_in_front_of_is_not_the_robots_that_has_none():
     found = owners("", "a")
-    assert found.whose("base: Motors", "") == "nobody"
-    assert found.whose("a/base: Motors", "") == "another"
+    assert found.owner("base: Motors", "") == "unknown"
+    assert found.owner("a/base: Motors", "") == "another"
 
 
 def test_robots_of_the_same_namespace_are_one():
     """Each page may make a robot of its own for the same one."""
-    assert owners("a", "a").whose("base: Motors", "a") == "own"
+    assert owners("a", "a").owner("base: Motors", "a") == "own"
 
 
 def test_who_leaves_counts_no_more_also_with_its_scope():
     found, scope = owners("a"), Scope("robot")
     with scope.active():
         found.join("b")
-    assert found.whose("base: Motors", "a") == "nobody"
+    assert found.owner("base: Motors", "a") == "unknown"
     scope.close()
-    assert found.whose("base: Motors", "a") == "own"
+    assert found.owner("base: Motors", "a") == "own"

@@ -7,7 +7,7 @@ import pytest
 
 from webmap import Bridge, Namespace, Robot, svg
 from webmap.base.errors import ConfigError
-from webmap.core.motion import roads
+from webmap.core.motion import robot_motions
 
 
 def toml(value) -> str:
@@ -76,12 +76,12 @@ def test_what_is_no_table_is_no_robot(data):
 
 
 def test_a_robot_whose_plain_data_is_refused_is_not_there():
-    before = set(roads)
+    before = set(robot_motions)
     twist = {"bridge": "ws://robot:9090", "topic": "/cmd_vel"}
     for wrong in ({"modules": [{"name": "Horn"}]}, {"twist": {**twist, "v_max": -1}}):
         with pytest.raises((ConfigError, LookupError)):
             Robot.from_dict({"name": "Bob", "twist": twist, **wrong})
-    assert roads == before
+    assert robot_motions == before
 
 
 def test_a_module_that_no_file_can_hold_is_said():

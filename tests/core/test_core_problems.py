@@ -5,7 +5,7 @@ import logging
 import pytest
 
 from webmap import Map, Robot
-from webmap.core.problems import Problems, wording
+from webmap.core.problems import Problems, without_numbers
 
 log = logging.getLogger("webmap.test")
 
@@ -64,7 +64,7 @@ def test_a_text_whose_numbers_change_is_said_once_and_its_newest_stands(
         problems.set("plan", nan_at(number))
     assert lines.all == ["Bob: " + nan_at(0)]
     assert [call[:2] for call in told(channel)] == [("error", "Bob: " + nan_at(0))]
-    assert problems.standing == {"plan": nan_at(99)}
+    assert problems.current == {"plan": nan_at(99)}
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_a_text_whose_numbers_change_is_said_once_and_its_newest_stands(
     ],
 )
 def test_words_are_the_same_whatever_their_numbers(one, other):
-    assert wording(one) == wording(other)
+    assert without_numbers(one) == without_numbers(other)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_words_are_the_same_whatever_their_numbers(one, other):
     ],
 )
 def test_other_words_are_other_words(one, other):
-    assert wording(one) != wording(other)
+    assert without_numbers(one) != without_numbers(other)
 
 
 def test_other_words_take_the_place_of_those_before(problems, channel, lines):
@@ -112,7 +112,7 @@ def test_what_is_mended_is_taken_back_once(problems, channel):
     problems.clear("plan")
     problems.clear("never said")
     assert told(channel)[1:] == [("mended", number)]
-    assert problems.standing == {}
+    assert problems.current == {}
 
 
 def test_what_comes_and_goes_is_logged_once_a_minute(problems, channel, lines, clock):
@@ -159,7 +159,7 @@ def test_what_fails_again_is_the_same_trouble_unless_it_was_good_for_a_minute(
 def test_what_was_mended_long_ago_is_forgotten(problems, clock):
     for number in range(1000):
         problems.set(object(), "it broke")
-        about = next(iter(problems.standing))
+        about = next(iter(problems.current))
         problems.clear(about)
         clock.now += 1.0 + number % 2
     assert len(problems._recurring) <= 61
@@ -209,7 +209,7 @@ def test_a_page_that_is_closed_is_told_nothing(problems, channel, page):
 
 def test_of_an_endless_sentence_the_beginning_is_shown(problems, lines):
     problems.set("it", "x" * 100_000)
-    (standing,) = problems.standing.values()
-    assert standing == "x" * 1000 + "..."
+    (current,) = problems.current.values()
+    assert current == "x" * 1000 + "..."
     problems.set("it", "x" * 100_000)
     problems.report("y" * 100_000)

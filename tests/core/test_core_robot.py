@@ -13,7 +13,7 @@ from webmap.base.errors import ConfigError, MotionError
 from webmap.base.scope import Removal, Scope
 from webmap.core.runtime import goal_message, twist_message
 from webmap.gate.protocol import SentGoal, SentTwist
-from webmap.poses import type_asking
+from webmap.poses import type_query
 from webmap.ros import messages
 
 
@@ -181,7 +181,7 @@ def test_a_topic_that_is_refused_is_no_odometry_for_the_gate():
 def test_poses_that_come_only_while_a_robot_moves_are_known_by_rosapi_before(
     monkeypatch,
 ):
-    monkeypatch.setattr(type_asking, "SOON", 0.01)
+    monkeypatch.setattr(type_query, "SOON", 0.01)
 
     async def scenario():
         link = Link()

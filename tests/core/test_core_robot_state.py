@@ -8,7 +8,7 @@ import pytest
 
 from webmap.base.geometry import Twist
 from webmap.console.words import LOOKS
-from webmap.core.robot_state import WORDS, Facts, state_of
+from webmap.core.robot_state import STATE_TEXTS, Facts, state_of
 from webmap.gate.protocol import Activity
 
 MOVES = (0.4, 0.0, 0.0)
@@ -37,7 +37,7 @@ def test_every_state_of_the_gate_has_words_and_a_look():
         found = state_of(robot(doing, holder=ANN))
         assert found.name == doing
         assert "{" not in found.text + found.mine
-    assert set(LOOKS) == {name for name in WORDS if not name.endswith("_by_you")}
+    assert set(LOOKS) == {name for name in STATE_TEXTS if not name.endswith("_by_you")}
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def gate(monkeypatch):
     gate = Gate()
     monkeypatch.setattr("webmap.gate.display.client.GateClient", lambda: gate)
     monkeypatch.setattr(runtime_module, "lifecycle", Lifecycle())
-    monkeypatch.setattr(runtime_module, "roads", set())
+    monkeypatch.setattr(runtime_module, "robot_motions", set())
     return gate
 
 
@@ -50,7 +50,7 @@ def test_a_robot_that_the_gate_refuses_does_not_keep_the_others_from_starting(
     robots = [Robot(name) for name in ("Ann", "Eve", "Bob")]
     for robot in robots:
         robot.set_twist_topic(bridge, "/cmd_vel")
-        runtime_module.roads.add(robot.motion)
+        runtime_module.robot_motions.add(robot.motion)
     runtime = Runtime()
     runtime.start()
     runtime.stop()

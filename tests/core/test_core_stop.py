@@ -12,7 +12,7 @@ import pytest
 from webmap import Bridge, Robot
 from webmap.base.errors import BridgeClosed, ConfigError, MotionError, MotionRefused
 from webmap.base.lifecycle import lifecycle
-from webmap.core.motion import MotionRoad
+from webmap.core.motion import RobotMotion
 from webmap.gate import pipe
 from webmap.gate.protocol import StopReport
 from webmap.gate.specs import checked
@@ -66,7 +66,7 @@ def robot():
 @pytest.fixture
 def gate(monkeypatch):
     gate = Gate()
-    monkeypatch.setattr(MotionRoad, "gate", gate)
+    monkeypatch.setattr(RobotMotion, "gate", gate)
     monkeypatch.setattr(type(lifecycle), "running", True)
     return gate
 
@@ -95,7 +95,7 @@ def test_a_program_resets_no_stop_that_it_was_not_told_of(robot, gate):
     robot.stop()
     for report in (None, SimpleNamespace(stop=None)):
         robot.report = report
-        with pytest.raises(MotionError, match=r"until report\.stop is there"):
+        with pytest.raises(MotionError, match=r"until report\.stop is set"):
             robot.reset_stop()
     assert gate.asked == [("stop", robot.motion.id)]
 

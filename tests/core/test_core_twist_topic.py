@@ -91,8 +91,8 @@ def test_an_axis_without_a_limit_is_refused_and_not_dropped(robot, gate, axis, u
     with pytest.raises(MotionError) as error:
         robot.twist(0.1, **{axis: 0.25})
     assert str(error.value) == (
-        f"robot 'Bob' was not told to move: got {axis} = 0.25 {unit}, but no limit of "
-        f"the robot is known for {axis}: state {axis}_max with its twist topic"
+        f"robot 'Bob': the velocity was not sent: got {axis} = 0.25 {unit}, but no "
+        f"limit of the robot is known for {axis}: state {axis}_max with its twist topic"
     )
     assert gate.twists == []
 

@@ -80,7 +80,7 @@ def test_what_nav2_publishes_is_drawn_once_each():
         "/global_costmap/costmap": "global costmap",
         "/local_costmap/published_footprint": "footprint",
         "/particle_cloud": "particles",
-        "/amcl_pose": "doubt",
+        "/amcl_pose": "covariance",
         "/local_plan": "local plan",
         "/camera/depth/points": "cloud",
         "/lookahead_point": "lookahead",
@@ -179,7 +179,7 @@ def test_what_has_an_odd_name_is_drawn_by_its_type():
         "dock": "pose",
         "clicked_point": "point",
         "frontiers": "cells",
-        "ekf_pose": "doubt",
+        "ekf_pose": "covariance",
     }
     (other,) = find_layers(topics, ["/a"])["/a"].left_out
     assert other.topic == "/a/move_base_simple/goal"

@@ -47,10 +47,10 @@ def refused(ready, text):
 
 def test_bridges_and_robots_lie_where_the_file_says(ready):
     bob, ann = ready(FILE).robots
-    assert bob.whereabouts.alignment == Pose(12.5, -3.0, math.pi / 2)
-    assert bob.whereabouts.own_alignment is None
-    assert ann.whereabouts.alignment == Pose(1.0, 2.0, -math.pi / 4)
-    assert alignments.of(bob.whereabouts.bridge) == Pose(12.5, -3.0, math.pi / 2)
+    assert bob.pose_source.alignment == Pose(12.5, -3.0, math.pi / 2)
+    assert bob.pose_source.own_alignment is None
+    assert ann.pose_source.alignment == Pose(1.0, 2.0, -math.pi / 4)
+    assert alignments.of(bob.pose_source.bridge) == Pose(12.5, -3.0, math.pi / 2)
 
 
 @pytest.mark.parametrize("value", ['"north"', "[1, 2]", "[1, 2, nan]", "[1, 2, true]"])
@@ -86,7 +86,7 @@ def test_what_people_saved_holds_until_the_file_says_otherwise(
         monkeypatch.setattr("webmap.fleet.made.store", fresh)
         robots = ready(text).robots
         restore(robots)
-        assert alignments.of(robots[0].whereabouts.bridge).x == wanted
+        assert alignments.of(robots[0].pose_source.bridge).x == wanted
 
 
 def test_a_robots_alignment_is_plain_data_and_back():

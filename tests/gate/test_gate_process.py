@@ -70,7 +70,7 @@ def test_a_gate_that_can_hear_no_longer_is_told_to_end():
                 raise LookupError(event)
 
     class Shell:
-        tell = None
+        deliver = None
 
     out, into = os.pipe()
     os.write(into, pipe.pack(Heartbeat()))

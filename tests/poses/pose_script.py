@@ -29,7 +29,7 @@ from webmap.base.scope import Removal, current_scope, keep, no_scope
 from webmap.core.page import Page, PageEntry
 from webmap.ros.bridge import BridgeStats
 from webmap.ros.rosbridge.protocol import Protocol
-from webmap.scene.fragment import Added, Changed
+from webmap.scene.node import Added, Changed
 
 BEGIN = 5000.0
 """Seconds of the virtual clock when a script begins."""

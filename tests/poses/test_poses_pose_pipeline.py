@@ -105,9 +105,9 @@ def test_a_robot_is_told_of_problems_when_they_change_and_only_then(monkeypatch)
     monkeypatch.setattr(robot, "set_problem", lambda about, _: calls.append(about))
     monkeypatch.setattr(robot, "clear_problem", lambda about: calls.append(about))
     for n in range(5):
-        robot.whereabouts.feed._listener(reading(0.0, 5.0 + n / 10))
+        robot.pose_source.feed._listener(reading(0.0, 5.0 + n / 10))
     assert calls == []
     for n in range(5, 10):
-        robot.whereabouts.feed._listener(reading(90.0, 5.0 + n / 10))
+        robot.pose_source.feed._listener(reading(90.0, 5.0 + n / 10))
     assert calls == ["jumps"]
     robot.destroy()

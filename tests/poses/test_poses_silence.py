@@ -19,7 +19,7 @@ from webmap.ros.bridge import BridgeStats
 def heard():
     """A robot that was heard at 100 s."""
     heard = Silence()
-    heard.hear(100.0)
+    heard.record(100.0)
     return heard
 
 
@@ -29,10 +29,10 @@ def test_a_silence_is_said_once_when_it_has_lasted(heard):
 
 
 def test_the_pose_after_a_silence_that_was_said_tells_how_long_it_was(heard):
-    assert heard.hear(102.0) is None
+    assert heard.record(102.0) is None
     heard.look(106.0, linked=True)
-    assert heard.hear(114.0) == 12.0
-    assert heard.hear(115.0) is None
+    assert heard.record(114.0) == 12.0
+    assert heard.record(115.0) is None
 
 
 def test_while_the_link_is_away_nothing_is_said_and_then_poses_have_time_to_come(heard):
@@ -44,7 +44,7 @@ def test_while_the_link_is_away_nothing_is_said_and_then_poses_have_time_to_come
 def test_a_robot_that_flickers_is_said_once_a_minute_at_most():
     flickering, said, again = Silence(), [], []
     for start in range(0, 600, 5):
-        if flickering.hear(float(start)) is not None:
+        if flickering.record(float(start)) is not None:
             again.append(start)
         if flickering.look(start + LIMIT + 1.0, linked=True) is not None:
             said.append(start)
@@ -54,7 +54,7 @@ def test_a_robot_that_flickers_is_said_once_a_minute_at_most():
 
 def test_a_silence_that_lasts_is_said_also_soon_after_another(heard):
     heard.look(103.0, linked=True)
-    heard.hear(104.0)
+    heard.record(104.0)
     assert heard.look(110.0, linked=True) is None
     assert heard.due == 103.0 + AGAIN
     assert heard.look(103.0 + AGAIN, linked=True) == AGAIN - 1.0
@@ -149,7 +149,7 @@ def test_a_robot_whose_odometry_ceases_has_a_line_in_the_log_and_one_when_it_is_
     said = [re.sub(r"\d+ s", "N s", message) for message in log.messages]
     assert [line.levelname for line in log.records] == ["WARNING", "INFO"]
     assert said == [
-        "Bob: no pose for N s; they come from /odom on hall, and that link is open",
+        "Bob: no pose for N s from /odom on hall, although the connection is open",
         "Bob: poses again, after N s",
     ]
 
@@ -218,4 +218,4 @@ def test_a_robot_that_is_found_by_its_frames_alone_is_missed_too(robots, link, l
         await lines_of(log, 1)
 
     asyncio.run(scenario())
-    assert "they come from /bob/tf on hall" in log.messages[0]
+    assert "from /bob/tf on hall" in log.messages[0]

@@ -3,7 +3,7 @@ import pytest
 from webmap.base.errors import SceneError
 from webmap.scene import html, svg
 from webmap.scene.bound import Document
-from webmap.scene.fragment import Changed, Fragment
+from webmap.scene.node import Changed, Fragment
 
 
 def test_the_same_id_gives_the_same_element():

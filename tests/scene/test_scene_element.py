@@ -8,9 +8,8 @@ from webmap.base.errors import SceneError
 from webmap.base.geometry import Affine
 from webmap.base.scope import Scope, current_scope
 from webmap.scene import html, svg
-from webmap.scene.events import Event
-from webmap.scene.fragment import Fragment
-from webmap.scene.node import Text
+from webmap.scene.element import Event
+from webmap.scene.node import Fragment, Text
 
 
 def test_keywords_are_attributes():

@@ -2,8 +2,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.scene import html, svg
-from webmap.scene.fragment import Added, Changed, Fragment, Removed
-from webmap.scene.node import Text
+from webmap.scene.node import Added, Changed, Fragment, Removed, Text
 
 
 def test_nothing_changed_since_now():
@@ -85,7 +84,7 @@ def test_the_log_is_bounded_and_says_when_it_forgot():
     for _ in range(Fragment.REMOVALS_KEPT + 1):
         child = svg.g()
         root.append(child)
-        fragment.mark_told()
+        fragment.mark_sent()
         child.remove()
     assert len(fragment._removed) == Fragment.REMOVALS_KEPT
     assert fragment.changes_since(start) is None
@@ -96,7 +95,7 @@ def test_a_moved_element_goes_and_comes():
     child = svg.g()
     left, right = svg.g(child), svg.g()
     fragment = Fragment(svg.g(left, right))
-    fragment.mark_told()
+    fragment.mark_sent()
     right.append(child)
     assert fragment.changes_since(0) == [Removed(child.id), Added(child, None)]
 
@@ -128,7 +127,7 @@ class Mirror:
     def __init__(self, fragment):
         self.fragment = fragment
         self.revision = fragment.revision
-        fragment.mark_told()
+        fragment.mark_sent()
         self.children = {}
         self.data = {}
         self.create(fragment.root)

@@ -16,7 +16,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from webmap.scene import svg
 from webmap.scene.bound import Document
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 from webmap.scene.wire.messages import Hello, read_message
 from webmap.scene.wire.session import SceneSession
 from webmap.server.security import CONTENT_SECURITY_POLICY

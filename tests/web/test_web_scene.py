@@ -8,7 +8,7 @@ from scene_host import wait
 
 from webmap.base.geometry import Affine
 from webmap.scene import html, svg
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 from webmap.scene.wire.messages import ElementEvent, Trouble
 
 pytestmark = pytest.mark.browser

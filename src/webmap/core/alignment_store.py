@@ -56,11 +56,11 @@ class AlignmentStore:
 
     def restore(self, robot: "Robot") -> None:
         """Apply the saved alignments of a robot and of its bridge."""
-        bridge = robot.whereabouts.bridge
+        bridge = robot.pose_source.bridge
         if bridge is None:
             return
         self.restore_bridge(bridge)
-        own = robot.whereabouts.own_alignment
+        own = robot.pose_source.own_alignment
         saved = self._saved(name_of(bridge, robot.name), own)
         if saved is not None:
             robot.set_alignment(*numbers(saved))

@@ -51,8 +51,8 @@ def robot_of(
     """Create a robot; see :meth:`Robot.from_config`."""
     mistakes = Mistakes()
     if config.picture is not None and model is None:
-        words = "only the console shows a picture; give a model instead"
-        mistakes.add(("picture",), words)
+        text = "only the console shows a picture; give a model instead"
+        mistakes.add(("picture",), text)
     if model is None and config.model is not None:
         try:
             model = element_from_dict(config.model)
@@ -157,9 +157,9 @@ def _place(robot: "Robot", tf: TfConfig, bridge: Bridge) -> None:
     for module in list(robot.modules):
         made = robot.arguments_of(module)
         if made is not None and made[2].get("map_frame", frame) != frame:
-            name, args, said = made
+            name, args, options = made
             robot.remove_module(module)
-            robot.add_module(name, *args, **{**said, "map_frame": frame})
+            robot.add_module(name, *args, **{**options, "map_frame": frame})
 
 
 def _names(robot: "Robot", tf: TfConfig) -> dict[str, str]:
@@ -191,47 +191,47 @@ def _set_layers(
 
 
 def _add(robot: "Robot", layer: Layer, link: Link, mistakes: Mistakes) -> None:
-    way, module = layer
-    inner = way if way[0] == "modules" else None
+    path, module = layer
+    inner = path if path[0] == "modules" else None
     try:
         name, args, options = module_call(module, link)
         made = robot.add_module(name, *args, **options)
-        if way[0] == "scan":
+        if path[0] == "scan":
             robot.svg.insert(1, made.svg)  # after the title, under the body
     except ModuleNotFound as error:
-        mistakes.add((*way, "name"), str(error))
+        mistakes.add((*path, "name"), str(error))
     except WrongArguments as error:
         for wrong in error.wrong:
-            place = wrong.way if inner else ()
-            mistakes.add((*way, *place), wrong_argument(module, wrong))
+            place = wrong.path if inner else ()
+            mistakes.add((*path, *place), wrong_argument(module, wrong))
     except WebMapError as error:
         # The error of a module begins with the name of the argument.
         key = str(error).partition(" ")[0].rstrip(":")
         place = ("options", key) if inner and key in module.options else ()
-        said = f"{module.name}: {error}" if inner else str(error)
-        mistakes.add((*way, *place), said)
+        text = f"{module.name}: {error}" if inner else str(error)
+        mistakes.add((*path, *place), text)
     except Exception as error:  # a module from elsewhere may raise anything
-        said = f"{type(error).__name__}: {error}"
-        mistakes.add(way, f"{module.name} refused its arguments: {said}")
+        text = f"{type(error).__name__}: {error}"
+        mistakes.add(path, f"{module.name} refused its arguments: {text}")
 
 
 def wrong_argument(module: ModuleConfig, wrong: WrongArgument) -> str:
     """Return the error message for a wrong argument, with the expected value."""
     if not wrong.got:
-        return f"{module.name}: {wrong.words}"
-    expected = wrong.words
+        return f"{module.name}: {wrong.text}"
+    expected = wrong.text
     if expected == "a Bridge":
         expected = 'a bridge, such as { bridge = "hall" }'
     of = f", for {wrong.name} of {module.name}"
     return f"got {checks.show(wrong.got[0])}, expected {expected}{of}"
 
 
-def _note(mistakes: Mistakes, way: Way, error: WebMapError, name: str) -> None:
+def _note(mistakes: Mistakes, path: Way, error: WebMapError, name: str) -> None:
     """Add the mistakes of a part, each with its path."""
     if isinstance(error, checks.WrongConfig):
         mistakes.take((), error.mistakes)
     else:
-        mistakes.add(way, str(error).removeprefix(f"robot {name!r}: "))
+        mistakes.add(path, str(error).removeprefix(f"robot {name!r}: "))
 
 
 def module_call(module: ModuleConfig, link: Link) -> Made:
@@ -250,7 +250,7 @@ def _argument(value: Any, link: Link) -> Any:
 
 def config_of(robot: "Robot") -> RobotConfig:
     """Return the configuration of a robot; see :meth:`Robot.to_config`."""
-    feed, tf, own = robot.feed, robot.tf, robot.whereabouts.own_alignment
+    feed, tf, own = robot.feed, robot.tf, robot.pose_source.own_alignment
     odometry = frames = None
     if feed is not None:
         odometry = OdometryConfig(

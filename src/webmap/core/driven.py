@@ -1,23 +1,65 @@
 """The motion methods of a robot; all of them go through the gate."""
 
 import asyncio
+import functools
+import inspect
 import time
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
 
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Quaternion, Twist
 from webmap.base.scope import no_scope
 from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE
 from webmap.config.robot import LINKED, MOTION
-from webmap.core.call_arguments import sets_part
 from webmap.core.extendable import Extendable
 from webmap.core.given_pose import Orientation, Position
-from webmap.core.motion import MotionRoad
+from webmap.core.module_arguments import WrongArguments, check_arguments
+from webmap.core.motion import RobotMotion
 from webmap.core.registry import Namespace
 from webmap.gate.protocol import RobotReport
 from webmap.gate.rules.goals import OVER
 from webmap.ros.bridge import Bridge
+
+P = ParamSpec("P")
+D = TypeVar("D", bound="Driven")
+Method = Callable[Concatenate[D, P], None]
+
+
+def sets_part(key: str) -> Callable[[Method[D, P]], Method[D, P]]:
+    """Make a method set one part of the configuration (decorator).
+
+    The method has a signature and a docstring but no code. Its arguments are passed to
+    ``configure`` under the names of its parameters. Unknown arguments and a bridge that
+    is not a ``Bridge`` are refused here; ``configure`` checks the rest.
+
+    Args:
+        key: The name of the part.
+
+    """
+
+    def decorate(method: Method[D, P]) -> Method[D, P]:
+        signature = inspect.signature(method)
+
+        @functools.wraps(method)
+        def setter(owner: D, /, *args: P.args, **kwargs: P.kwargs) -> None:
+            try:
+                check_arguments(method, args, kwargs)
+            except WrongArguments as error:
+                wrong = [each for each in error.wrong if each.name in ("", "bridge")]
+                if wrong:
+                    called = f"robot {owner.name!r}: {method.__name__}"
+                    raise WrongArguments(called, wrong) from None
+            given = signature.bind(owner, *args, **kwargs)
+            given.apply_defaults()
+            _, *values = given.arguments.items()
+            part = dict(values)
+            bridge = part.pop("bridge", None)
+            owner.configure(key, part, bridge)
+
+        return setter
+
+    return decorate
 
 
 class Driven(Extendable):
@@ -35,7 +77,7 @@ class Driven(Extendable):
     def __init__(self, name: str, namespace: Namespace) -> None:
         super().__init__(namespace)
         self.name = str(name)
-        self.motion = MotionRoad(self.name, self.report_error)
+        self.motion = RobotMotion(self.name, self.report_error)
         self.report: RobotReport | None = None
         self.goal_ended_at: float | None = None
         """When the newest goal ended, in seconds of ``time.monotonic()``; None if there
@@ -275,7 +317,7 @@ class Driven(Extendable):
 
         """
         deadline = time.monotonic() + timeout
-        while self._may_be_had_soon():
+        while self._may_be_free_soon():
             if time.monotonic() > deadline:
                 break  # the gate gives the reason
             await asyncio.sleep(0.02)
@@ -287,7 +329,7 @@ class Driven(Extendable):
             await asyncio.sleep(0.02)
         return epoch
 
-    def _may_be_had_soon(self) -> bool:
+    def _may_be_free_soon(self) -> bool:
         """Return whether the robot cannot be taken yet but probably can be soon."""
         gate, report = self.motion.gate, self.report
         if gate is None or self.motion.spec() is None:
@@ -299,7 +341,7 @@ class Driven(Extendable):
     def _not_drivable(self, epoch: int) -> str | None:
         report = self.report
         if report is None or report.epoch != epoch:
-            return "the gate has not said that it can"
+            return "the gate has not confirmed that this program has control"
         if self.motion.config.twist is None:  # takes goals only
             return None if report.armable else report.reason
         return report.reason
@@ -378,8 +420,8 @@ class Driven(Extendable):
     def stop(self) -> None:
         """Stop the robot, no matter who has control, and cancel its goals.
 
-        The STOP stays active for everybody, also after a restart, until
-        :meth:`reset_stop` or Reset on a page.
+        The STOP stays active for all operators and programs, also after a restart,
+        until :meth:`reset_stop` or Reset on a page.
         """
         self.motion.stop()
 
@@ -409,7 +451,7 @@ class Driven(Extendable):
             self.goal_ended_at = None
         elif self.goal_ended_at is None:
             self.goal_ended_at = time.monotonic()
-        self.motion.heed(report)
+        self.motion.on_report(report)
         self.notify_modules("on_report", report)
 
     def expect_jump(self) -> None:

@@ -1,11 +1,6 @@
-"""Poses given by a program or a page."""
+"""The forms in which a program gives a pose."""
 
-import sys
-from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
+from typing import Protocol
 
 
 class Position(Protocol):
@@ -38,31 +33,3 @@ class Orientation(Protocol):
     @property
     def w(self) -> float:
         """The real component."""
-
-
-def robot_and_pose(
-    map: "Map", given: Any
-) -> "tuple[Robot, float, float, float] | None":
-    """Return the robot, x, y and yaw that a page sent.
-
-    Args:
-        map: The map of the page.
-        given: A table with ``robot``, its id, ``x`` and ``y`` in metres and ``yaw`` in
-            radians. It comes from a page, so it may be anything.
-
-    Returns:
-        None if the map has no such robot, or a number is missing.
-
-    """
-    if not isinstance(given, dict):
-        return None
-    robot = map.find_robot(given.get("robot"))
-    x, y, yaw = (given.get(name) for name in ("x", "y", "yaw"))
-    if robot is None or not (_finite(x) and _finite(y) and _finite(yaw)):
-        return None
-    return robot, x, y, yaw
-
-
-def _finite(value: object) -> TypeGuard[float]:
-    # An integer may be too large for a float.
-    return isinstance(value, int | float) and abs(value) <= sys.float_info.max

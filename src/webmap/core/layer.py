@@ -2,16 +2,14 @@
 
 import logging
 from collections.abc import Hashable
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from webmap.base.scope import Removal, Scope, keep, no_scope
 from webmap.core.problems import Problems
+from webmap.core.world_view import WorldView
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.scene.fragment import Fragment
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
+from webmap.scene.node import Fragment
 
 log = logging.getLogger("webmap.layer")
 
@@ -32,10 +30,10 @@ class Layer:
         self.fragment = Fragment(self.svg)
         self.users = 0
         self.scope = Scope(type(self).__name__, self._failed, self.clear_problem)
-        self._told = Problems(log)
-        self.maps = self._told.maps
+        self._shown_problems = Problems(log)
+        self.maps = self._shown_problems.maps
         """The maps that show the layer's failures; see :meth:`show_on`."""
-        self.problems: dict[object, str] = self._told.standing
+        self.problems: dict[object, str] = self._shown_problems.current
         """Current failures, as sentences, by subject."""
         self._key: Hashable = None
 
@@ -71,7 +69,7 @@ class Layer:
     def start(self) -> None:
         """Subscribe to the layer's data; called once, in the layer's scope."""
 
-    def show_on(self, map: "Map", *, order: float) -> Removal:
+    def show_on(self, map: WorldView, *, order: float) -> Removal:
         """Show the layer on a map, and its failures on the map's page.
 
         Args:
@@ -83,12 +81,26 @@ class Layer:
             does the same.
 
         """
-        shown = map.add_layer(self, order=order)
-        self._told.join(map)
+        mounted = self.mount_on(map, order=order)
+        self._shown_problems.join(map)
 
         def undo() -> None:
-            self._told.leave(map)
-            shown.remove()
+            self._shown_problems.leave(map)
+            mounted.remove()
+
+        return keep(Removal(undo))
+
+    def mount_on(self, map: WorldView, *, order: float) -> Removal:
+        """Show the layer on a map without its failures; see ``Map.add_layer``."""
+        try:
+            map.mount(self.fragment, order=order)
+        except BaseException:
+            self.release()
+            raise
+
+        def undo() -> None:
+            map.unmount(self.fragment)
+            self.release()
 
         return keep(Removal(undo))
 
@@ -100,11 +112,11 @@ class Layer:
             text: A sentence for people.
 
         """
-        self._told.set(about, text)
+        self._shown_problems.set(about, text)
 
     def clear_problem(self, about: object) -> None:
         """Remove the failure shown for ``about``."""
-        self._told.clear(about)
+        self._shown_problems.clear(about)
 
     def release(self) -> None:
         """Remove one user; without users the layer ends."""
@@ -115,6 +127,6 @@ class Layer:
 
     def _failed(self, text: str, about: object) -> None:
         if about is None:
-            self._told.report(text)
+            self._shown_problems.report(text)
         else:
             self.set_problem(about, text)

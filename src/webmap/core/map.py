@@ -1,14 +1,16 @@
 """Maps: the drawing areas of pages, seen from above."""
 
-from webmap.base.scope import Removal, keep
+import sys
+from typing import Any, TypeGuard
+
+from webmap.base.scope import Removal
 from webmap.core.layer import Layer
 from webmap.core.registry import Namespace, map_modules
 from webmap.core.robot import Robot
 from webmap.core.world_view import WorldView
 from webmap.scene import svg
-from webmap.scene.element import Element
-from webmap.scene.events import Event
-from webmap.scene.fragment import Fragment
+from webmap.scene.element import Element, Event
+from webmap.scene.node import Fragment
 
 LAYER_ORDER = 10.0
 ROBOT_ORDER = 100.0
@@ -99,17 +101,7 @@ class Map(WorldView):
             WireError: If the map has ended; the layer is released.
 
         """
-        try:
-            self.mount(layer.fragment, order=order)
-        except BaseException:
-            layer.release()
-            raise
-
-        def undo() -> None:
-            self.unmount(layer.fragment)
-            layer.release()
-
-        return keep(Removal(undo))
+        return layer.mount_on(self, order=order)
 
     def set_selected(self, robot: Robot | None) -> None:
         """Select a robot of this map, on this page; None clears the selection.
@@ -192,3 +184,29 @@ class Map(WorldView):
         width, height = self.canvas_width, self.canvas_height
         if not (0 <= x <= width and 0 <= y <= height):
             self.translate(width / 2 - x, height / 2 - y)
+
+
+def robot_and_pose(map: Map, given: Any) -> tuple[Robot, float, float, float] | None:
+    """Return the robot, x, y and yaw that a page sent.
+
+    Args:
+        map: The map of the page.
+        given: A table with ``robot``, its id, ``x`` and ``y`` in metres and ``yaw`` in
+            radians. It comes from a page, so it may be anything.
+
+    Returns:
+        None if the map has no such robot, or a number is missing.
+
+    """
+    if not isinstance(given, dict):
+        return None
+    robot = map.find_robot(given.get("robot"))
+    x, y, yaw = (given.get(name) for name in ("x", "y", "yaw"))
+    if robot is None or not (_finite(x) and _finite(y) and _finite(yaw)):
+        return None
+    return robot, x, y, yaw
+
+
+def _finite(value: object) -> TypeGuard[float]:
+    # An integer may be too large for a float.
+    return isinstance(value, int | float) and abs(value) <= sys.float_info.max

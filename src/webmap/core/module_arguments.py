@@ -29,10 +29,10 @@ from webmap.base.errors import ConfigError
 from webmap.config.checks import did_you_mean
 from webmap.ros.names import normalise_topic
 
-Way: TypeAlias = tuple[str | int, ...]
+KeyPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices that lead to a value."""
 
-Misfit: TypeAlias = tuple[Way, Any, str]
+Misfit: TypeAlias = tuple[KeyPath, Any, str]
 """The path of a value of the wrong type, the value, and the expected type."""
 
 _PLAIN = (str, bytes, int, float, list, tuple, dict, type(None))
@@ -134,10 +134,10 @@ def _of_several(kinds: tuple[Any, ...], value: Any) -> Misfit | None:
     found = [misfit(kind, value) for kind in kinds]
     if None in found:
         return None
-    told = [kind for kind in kinds if kind not in (None, type(None))]
-    if len(told) == 1:
-        return misfit(told[0], value)
-    return (), value, " or ".join(_named(kind) for kind in told)
+    known = [kind for kind in kinds if kind not in (None, type(None))]
+    if len(known) == 1:
+        return misfit(known[0], value)
+    return (), value, " or ".join(_named(kind) for kind in known)
 
 
 def _of_many(
@@ -185,8 +185,8 @@ def _named(annotation: Any) -> str:
     if origin is Annotated:
         return _named(inner[0])
     if origin in (Union, types.UnionType):
-        told = [kind for kind in inner if kind is not type(None)]
-        return " or ".join(_named(kind) for kind in told)
+        known = [kind for kind in inner if kind is not type(None)]
+        return " or ".join(_named(kind) for kind in known)
     if origin is tuple and Ellipsis not in inner:
         return f"{len(inner)} in a list: {', '.join(_named(kind) for kind in inner)}"
     kind = origin or annotation
@@ -213,18 +213,18 @@ _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONL
 class WrongArgument:
     """An argument that a module does not accept."""
 
-    way: Way
+    path: KeyPath
     """``("args", 1)`` or ``("options", "throttle")``, followed by the path into a list
     or a table; empty if it is about all arguments."""
 
-    words: str
+    text: str
     """What was expected, or the error."""
 
     name: str = ""
     """The name of the module's parameter."""
 
     got: tuple[Any, ...] = ()
-    """The value, if ``words`` is what was expected."""
+    """The value, if ``text`` is what was expected."""
 
 
 class WrongArguments(ConfigError, TypeError):
@@ -238,8 +238,8 @@ class WrongArguments(ConfigError, TypeError):
 
     def __init__(self, module: str, wrong: Sequence[WrongArgument]) -> None:
         self.wrong = tuple(wrong)
-        said = [_in_words(each) for each in self.wrong]
-        super().__init__(f"{module}: {'; '.join(said)}")
+        texts = [_as_text(each) for each in self.wrong]
+        super().__init__(f"{module}: {'; '.join(texts)}")
 
 
 def check_arguments(
@@ -300,18 +300,18 @@ def _wrong(
     for name, value in options.items():
         parameter = by_name.get(name, None if name in owner else others)
         if name in placed and name in by_name:
-            words = f'"{name}" has multiple values: one by its place, one by its name'
-            yield WrongArgument(("options", name), words)
+            text = f'"{name}" has multiple values: one by its place, one by its name'
+            yield WrongArgument(("options", name), text)
         elif parameter is None:
             hint = did_you_mean(name, by_name)
-            words = f'there is no argument "{name}"{hint}; it takes {_names(signature)}'
-            yield WrongArgument(("options", name), words)
+            text = f'there is no argument "{name}"{hint}; it takes {_names(signature)}'
+            yield WrongArgument(("options", name), text)
         else:
             yield from _one(factory, parameter, value, ("options", name))
 
 
 def _one(
-    factory: Callable[..., Any], parameter: inspect.Parameter, value: Any, way: Way
+    factory: Callable[..., Any], parameter: inspect.Parameter, value: Any, path: KeyPath
 ) -> Iterator[WrongArgument]:
     if value is parameter.default:
         return
@@ -321,8 +321,8 @@ def _one(
     if found is not None:
         deeper, got, expected = found
         many = parameter.kind is inspect.Parameter.VAR_KEYWORD
-        name = str(way[1]) if many else parameter.name
-        yield WrongArgument((*way, *deeper), expected, name, (got,))
+        name = str(path[1]) if many else parameter.name
+        yield WrongArgument((*path, *deeper), expected, name, (got,))
     elif parameter.name == "topic" and isinstance(value, str):
         # The parameter means the same in every module. A bad name would otherwise be
         # found only on subscription, which may be when the first page opens.
@@ -330,9 +330,9 @@ def _one(
             normalise_topic(value)
         except ConfigError:
             expected = 'the name of a topic, such as "/odom"'
-            yield WrongArgument(way, expected, "topic", (value,))
+            yield WrongArgument(path, expected, "topic", (value,))
     elif parameter.name == "throttle" and isinstance(value, int) and value < 0:
-        yield WrongArgument(way, "milliseconds, 0 or more", "throttle", (value,))
+        yield WrongArgument(path, "milliseconds, 0 or more", "throttle", (value,))
 
 
 def _after_owner(signature: inspect.Signature) -> list[inspect.Parameter]:
@@ -349,10 +349,10 @@ def _names(signature: inspect.Signature) -> str:
     return f"({', '.join(names)})"
 
 
-def _in_words(wrong: WrongArgument) -> str:
+def _as_text(wrong: WrongArgument) -> str:
     if not wrong.got:
-        return wrong.words
-    inside = "".join(f"[{part!r}]" for part in wrong.way[2:])
+        return wrong.text
+    inside = "".join(f"[{part!r}]" for part in wrong.path[2:])
     text = repr(wrong.got[0])
     shown = text if len(text) <= 60 else f"{text[:57]}..."
-    return f"{wrong.name}{inside}: expected {wrong.words}, got {shown}"
+    return f"{wrong.name}{inside}: expected {wrong.text}, got {shown}"

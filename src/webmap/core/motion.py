@@ -29,7 +29,7 @@ from webmap.gate.limits import PLANE, Axes
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.assist import polygon_around
 from webmap.gate.specs import checked, checked_assist
-from webmap.poses.type_asking import TypeAsking
+from webmap.poses.type_query import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.moving import STOP
 from webmap.ros.names import is_type
@@ -76,7 +76,7 @@ def _id_of(name: str) -> str:
     return id if _used[id] == 1 else f"{id}-{_used[id]}"
 
 
-class MotionRoad:
+class RobotMotion:
     """The gate's description of one robot, updated as topics change.
 
     It also passes the robot's commands to the gate. Nothing here writes to a robot; the
@@ -97,9 +97,9 @@ class MotionRoad:
         self._bridges: Links = {}
         self._odometry: tuple[Bridge, str, str | None] | None = None
         self._own_map = Pose()
-        self._asking: TypeAsking | None = None
+        self._type_query: TypeQuery | None = None
         self._ask_writers_at = 0.0
-        roads.add(self)
+        robot_motions.add(self)
 
     @property
     def axes(self) -> Axes:
@@ -141,11 +141,11 @@ class MotionRoad:
         self.declare()
 
     def _ask_type(self, twist: TwistConfig | None, bridge: Bridge | None) -> None:
-        if self._asking is not None:
-            self._asking.remove()
-            self._asking = None
+        if self._type_query is not None:
+            self._type_query.remove()
+            self._type_query = None
         if twist is not None and twist.type is None and bridge is not None:
-            self._asking = TypeAsking(bridge, twist.topic, self._take_type)
+            self._type_query = TypeQuery(bridge, twist.topic, self._take_type)
 
     def bridge(self, key: str) -> Bridge | None:
         """Return the bridge of a part of the configuration, or None."""
@@ -239,9 +239,9 @@ class MotionRoad:
             goals["pose_topic"] = pose.topic
             goals["pose_covariance"] = pose.covariance
             goals["pose_type"] = _goal_type(move, "PoseWithCovarianceStamped")
-        told = move or pose
-        if told is not None:
-            goals |= {"goal_url": told.bridge, "goal_frame": told.frame}
+        goal_part = move or pose
+        if goal_part is not None:
+            goals |= {"goal_url": goal_part.bridge, "goal_frame": goal_part.frame}
         odometry = self._odometry
         return RobotSpec(
             id=self.id,
@@ -277,7 +277,7 @@ class MotionRoad:
         # All at once: for its goals, a robot without velocity would be another one.
         self.config, self._odometry = MotionConfig(), None
         self.set("twist", None)
-        roads.discard(self)
+        robot_motions.discard(self)
 
     def take(self) -> "Future[int]":
         """Request control for this program."""
@@ -296,7 +296,7 @@ class MotionRoad:
         """
         gate = self._gate()
         if why := self.axes.refusal(twist):
-            raise MotionError(f"robot {self._name!r} was not told to move: {why}")
+            raise MotionError(f"robot {self._name!r}: the velocity was not sent: {why}")
         gate.twist(self.id, twist)
 
     def move(self, x: float, y: float, yaw: float) -> None:
@@ -321,12 +321,12 @@ class MotionRoad:
         stop = None if report is None else report.stop
         if stop is None:
             raise MotionError(
-                f"robot {self._name!r}: its report tells of no STOP that could be "
-                "reset; after stop() wait until report.stop is there"
+                f"robot {self._name!r}: its report has no STOP to reset; after stop(), "
+                "wait until report.stop is set"
             )
         gate.reset(self.id, stop.id)
 
-    def heed(self, report: RobotReport) -> None:
+    def on_report(self, report: RobotReport) -> None:
         """Query the names of other publishers while another program is driving."""
         twist, now = self.config.twist, time.monotonic()
         if report.other_writer is None or twist is None:
@@ -411,5 +411,5 @@ def _assist(config: ScanAssistConfig) -> AssistSpec:
     )
 
 
-roads: set[MotionRoad] = set()
-"""Those of all robots; declared again when the gate starts."""
+robot_motions: set[RobotMotion] = set()
+"""The motion of all robots; declared again when the gate starts."""

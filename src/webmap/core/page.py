@@ -17,9 +17,8 @@ from webmap.core.pictures import Publisher
 from webmap.core.view import initial_view
 from webmap.gate.protocol import Role
 from webmap.scene.bound import BoundElement, Document
-from webmap.scene.element import Element
-from webmap.scene.events import Event, Handler, Listener
-from webmap.scene.fragment import Fragment
+from webmap.scene.element import Element, Event, Handler, Listener
+from webmap.scene.node import Fragment
 from webmap.scene.wire.session import SceneSession
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.page")
 
 
-class HandSpeeds:
+class PageSpeeds:
     """The greatest speeds of a page's modules, and the module with active input."""
 
     def __init__(self) -> None:
@@ -36,7 +35,7 @@ class HandSpeeds:
         self._driving: int | None = None
 
     @property
-    def in_force(self) -> tuple[float, float]:
+    def current(self) -> tuple[float, float]:
         """The greatest speeds that the page asks for now, in m/s and rad/s.
 
         They are those of the module with active input; without active input, the lowest
@@ -175,7 +174,7 @@ class Page:
         self._mount = channel.mount(self.fragment, under=0)
         _pages[self.fragment.id] = self
         self.on_speeds: Callable[[float, float], None] | None = None
-        self._speeds = HandSpeeds()
+        self._speeds = PageSpeeds()
         self._listening: dict[Key, tuple[Listener, ...]] = {}
 
     def element(self, id: str) -> Element:
@@ -281,24 +280,24 @@ class Page:
         They are those of the module with active input; without active input, the lowest
         of all modules; zero without a module that drives.
         """
-        return self._speeds.in_force
+        return self._speeds.current
 
     def set_speeds(self, module: object, speed: float, rotation_speed: float) -> None:
         """Set the greatest speeds of a module of this page that drives."""
         self._speeds.set(module, speed, rotation_speed)
-        self._tell_speeds()
+        self._report_speeds()
 
     def set_driving(self, module: object, on: bool) -> None:
         """Set whether a module that drives has active input."""
         self._speeds.drive(module, on)
-        self._tell_speeds()
+        self._report_speeds()
 
     def clear_speeds(self, module: object) -> None:
         """Remove a module that no longer drives."""
         self._speeds.clear(module)
-        self._tell_speeds()
+        self._report_speeds()
 
-    def _tell_speeds(self) -> None:
+    def _report_speeds(self) -> None:
         if self.on_speeds is not None:
             self.on_speeds(*self.speeds)
 
@@ -334,12 +333,12 @@ class Page:
 
     def _set_listening(self, key: Key, listeners: tuple[Listener, ...]) -> None:
         """Set the listeners of an event, and update the browser if needed."""
-        asked = _flags(listeners)
-        if asked != _flags(self._listening.get(key, ())):
-            if asked is None:
+        flags = _flags(listeners)
+        if flags != _flags(self._listening.get(key, ())):
+            if flags is None:
                 self.channel.unlisten(*key)
             else:
-                prevent, stop = asked
+                prevent, stop = flags
                 self.channel.listen(*key, prevent=prevent, stop=stop)
         if listeners:
             self._listening[key] = listeners

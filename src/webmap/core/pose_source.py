@@ -7,10 +7,11 @@ clock and the alignment.
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from webmap.base.geometry import Affine, Pose
 from webmap.base.scope import Removal, no_scope
+from webmap.core.driven import Driven
 from webmap.poses.alignment import HERE, alignments
 from webmap.poses.frames import Frames, frames_of
 from webmap.poses.odometry import ODOMETRY, OdometryFeed
@@ -19,19 +20,22 @@ from webmap.poses.placing import Placing, PoseReading
 from webmap.poses.silence import SilenceWatch
 from webmap.ros.bridge import Bridge
 
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
-
 
 class PoseSource:
     """Receives a robot's poses and puts them on the common map.
 
     Args:
-        robot: The robot, which shows its poses and their problems.
+        robot: The robot, which shows the problems of its poses.
+        show_pose: Draws the robot; called with a pose on the common map, and the time
+            when the pose was sent, or None if only the alignment changed.
 
     """
 
-    def __init__(self, robot: "Robot") -> None:
+    def __init__(
+        self,
+        robot: Driven,
+        show_pose: Callable[[PoseReading, float | None], object],
+    ) -> None:
         self.pipeline = PosePipeline()
         self.feed: OdometryFeed | None = None
         """The odometry topic, if there is one."""
@@ -45,15 +49,16 @@ class PoseSource:
         """The position and rotation of the robot's own map on the common one."""
         self.common_from_own = Affine()
         """The transform from the robot's own map to the common one."""
-        self.heard_at: float | None = None
+        self.received_at: float | None = None
         """When the newest pose arrived, in seconds of :func:`time.monotonic`."""
         self.expected_at: float | None = None
         """When the newest pose arrived from a source that also sends at rest."""
         self._robot = robot
+        self._show_pose = show_pose
         self._silence = SilenceWatch(lambda: robot.name)
         self._problems: Mapping[str, Problem] = {}
-        self._hears_frames = Removal(lambda: None)
-        self._hears_alignment = Removal(lambda: None)
+        self._frames_removal = Removal(lambda: None)
+        self._alignment_removal = Removal(lambda: None)
         self._listeners: dict[int, Callable[[], object]] = {}
 
     # Sources of poses.
@@ -106,12 +111,12 @@ class PoseSource:
         placing = Placing(frames, map_frame, base_frame, quiet=quiet)
         self.pipeline.placing = placing
         self._robot.motion.base_frame = placing.base_frame
-        self._hears_frames = frames.join(self._on_frames)
+        self._frames_removal = frames.join(self._on_frames)
         self._restart()
 
     def unplace(self) -> None:
         """Stop placing poses by TF; does nothing if TF is not set."""
-        self._hears_frames.remove()
+        self._frames_removal.remove()
         self.frames = self.pipeline.placing = None
         self._restart()
 
@@ -141,10 +146,10 @@ class PoseSource:
         """The newest pose, in the robot's own map."""
         return self.pipeline.newest
 
-    def come(self, *, within: float) -> bool:
-        """Return whether a pose of any age arrived in the last ``within`` seconds."""
-        heard = self.heard_at
-        return heard is not None and time.monotonic() - heard <= within
+    def received_within(self, seconds: float) -> bool:
+        """Return whether a pose of any age arrived in the last ``seconds``."""
+        received = self.received_at
+        return received is not None and time.monotonic() - received <= seconds
 
     def align(self, pose: Pose | None) -> None:
         """Set the robot's own alignment; None uses that of its bridge."""
@@ -159,7 +164,7 @@ class PoseSource:
         self._listeners[key] = listener
         return Removal(lambda: self._listeners.pop(key, None))
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         for listener in tuple(self._listeners.values()):
             listener()
 
@@ -187,10 +192,10 @@ class PoseSource:
         feed = self.feed
         if feed is None:
             return
-        self.heard_at = now = time.monotonic()
+        self.received_at = now = time.monotonic()
         if feed.type == ODOMETRY:  # other poses may arrive only while the robot moves
             self.expected_at = now
-            self._silence.hear(now)
+            self._silence.record(now)
         self._show(self.pipeline.step(reading, self.frames, now), now - feed.bridge.lag)
 
     def _on_frames(self) -> None:
@@ -201,14 +206,14 @@ class PoseSource:
         step = self.pipeline.step(None, frames, now)
         if step.pose is not None:
             # The pose may have waited for the next call of listeners.
-            self.heard_at = came = frames.heard_at
+            self.received_at = came = frames.received_at
             if step.pose.stamp:  # otherwise it is fixed to the map, and arrives once
                 self.expected_at = came
-                self._silence.hear(now)
+                self._silence.record(now)
             self._show(step, came - frames.bridge.lag)
         else:
             self._show_problems(step)
-            self._tell()
+            self._notify()
 
     def _on_alignment(self) -> None:
         """Move the robot, and what is drawn by its pose, to a new alignment."""
@@ -217,16 +222,16 @@ class PoseSource:
         self.common_from_own = Affine.of_pose(self.alignment)
         pipeline.alignment = self.alignment
         if pipeline.newest is not None:
-            self._robot.show_pose(pipeline.on_map(pipeline.newest))
+            self._show_pose(pipeline.on_map(pipeline.newest), None)
         self._robot.motion.set_alignment(self.alignment)
-        self._tell()
+        self._notify()
 
     # Display.
 
     def _show(self, step: Step, stamp: float) -> None:
         assert step.pose is not None  # callers have one
-        self._robot.show_pose(step.pose, stamp)
-        self._tell()
+        self._show_pose(step.pose, stamp)
+        self._notify()
         if step.problems is self.pipeline.problems:  # else a listener ended this source
             self._show_problems(step)
 
@@ -246,7 +251,7 @@ class PoseSource:
                 self._robot.set_problem(about, new.text)
 
     def _restart(self) -> None:
-        """Discard the poses so far; the next ones come from another source."""
+        """Discard the poses so far; the next ones are from another source."""
         feed, frames = self.feed, self.frames
         bridge, topic, period = None, "", None
         if feed is not None:
@@ -258,8 +263,10 @@ class PoseSource:
         self._silence.restart(bridge, topic, period or 0.0)
         self.expected_at = None
         if bridge is not self.bridge:
-            self._hears_alignment.remove()
+            self._alignment_removal.remove()
             self.bridge = bridge
             if bridge is not None:
-                self._hears_alignment = alignments.on_change(bridge, self._on_alignment)
+                self._alignment_removal = alignments.on_change(
+                    bridge, self._on_alignment
+                )
             self._on_alignment()

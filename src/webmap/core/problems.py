@@ -7,14 +7,12 @@ import secrets
 import time
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from webmap.base.errors import WebMapError
 from webmap.base.scope import Removal, keep
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.page import Page
+from webmap.core.page import Page
+from webmap.core.world_view import WorldView
 
 log = logging.getLogger("webmap.modules")
 
@@ -25,7 +23,7 @@ AGAIN = 60.0
 """Seconds in which the log gets the same text about one subject once. A problem that
 returns within this time after it ended is the same problem."""
 
-WORDINGS = 10
+MOST_TEXTS = 10
 """The number of different texts about one subject that the log gets in that time."""
 
 _NUMBER = re.compile(
@@ -43,7 +41,7 @@ def cut(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
 
 
-def wording(text: str) -> str:
+def without_numbers(text: str) -> str:
     """Return a sentence with each number or row of numbers replaced by ``#``."""
     return _ROW.sub("#", _NUMBER.sub("#", text))
 
@@ -54,34 +52,34 @@ class Recurring:
     def __init__(self) -> None:
         self.number = next(_numbers)
         """The number by which pages identify it."""
-        self._wording: str | None = None
+        self._shape: str | None = None
         self._mended = 0.0
         self._logged: dict[str, float] = {}
 
     def fails(self, text: str) -> bool:
         """Set the current sentence; return whether more than its numbers changed."""
-        words = wording(text)
-        news = words != self._wording
-        self._wording = words
-        return news
+        shape = without_numbers(text)
+        changed = shape != self._shape
+        self._shape = shape
+        return changed
 
     def mend(self, now: float) -> None:
         """Set that the problem ended, at ``now`` of any monotonic clock."""
-        self._wording, self._mended = None, now
+        self._shape, self._mended = None, now
 
     def is_over(self, now: float) -> bool:
         """Return whether it ended so long ago that the next one is a new problem."""
-        return self._wording is None and now - self._mended >= AGAIN
+        return self._shape is None and now - self._mended >= AGAIN
 
-    def is_worth_a_line(self, now: float) -> bool:
-        """Return whether the current text is to be logged, and record that it is."""
-        for words in [w for w, at in self._logged.items() if now - at >= AGAIN]:
-            del self._logged[words]
-        if self._wording is None or self._wording in self._logged:
+    def should_be_logged(self, now: float) -> bool:
+        """Return whether to log the current text, and record it as logged."""
+        for shape in [s for s, at in self._logged.items() if now - at >= AGAIN]:
+            del self._logged[shape]
+        if self._shape is None or self._shape in self._logged:
             return False
-        if len(self._logged) >= WORDINGS:
+        if len(self._logged) >= MOST_TEXTS:
             return False
-        self._logged[self._wording] = now
+        self._logged[self._shape] = now
         return True
 
 
@@ -90,7 +88,7 @@ class Problems:
 
     Args:
         log: The log for each sentence.
-        worded: Builds the shown sentence, for example with a name in front.
+        format_text: Returns the shown sentence, for example with a name in front.
         clock: A monotonic clock, in seconds.
 
     """
@@ -98,20 +96,20 @@ class Problems:
     def __init__(
         self,
         log: logging.Logger,
-        worded: Callable[[str], str] = str,
+        format_text: Callable[[str], str] = str,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.maps: list[Map] = []
-        self.standing: dict[object, str] = {}
+        self.maps: list[WorldView] = []
+        self.current: dict[object, str] = {}
         """The current problems, by subject."""
         self._log = log
-        self._worded = worded
+        self._format_text = format_text
         self._clock = clock
         self._recurring: dict[object, Recurring] = {}
 
     def report(self, text: str) -> None:
         """Log a failure and show it on every current map."""
-        sentence = self._worded(cut(text))
+        sentence = self._format_text(cut(text))
         self._log.warning("%s", sentence)
         for map in self.maps:
             map.show_error(sentence)
@@ -123,47 +121,49 @@ class Problems:
         the same text once a minute at most, even if the problem ended in between.
         """
         text = cut(text)
-        before = self.standing.get(about)
+        before = self.current.get(about)
         if before == text:
             return
         now = self._clock()
         if before is None:
             self._forget(now)
-        self.standing[about] = text
+        self.current[about] = text
         recurring = self._recurring.setdefault(about, Recurring())
         if not recurring.fails(text):
             return
-        if recurring.is_worth_a_line(now):
-            self._log.warning("%s", self._worded(text))
+        if recurring.should_be_logged(now):
+            self._log.warning("%s", self._format_text(text))
         for page in self._pages():
-            page.channel.problem(recurring.number, self._worded(text))
+            page.channel.problem(recurring.number, self._format_text(text))
 
     def clear(self, about: object) -> None:
         """Remove the problem of ``about``; does nothing if there is none."""
-        if self.standing.pop(about, None) is None:
+        if self.current.pop(about, None) is None:
             return
         recurring = self._recurring[about]
         recurring.mend(self._clock())
         for page in self._pages():
             page.channel.mended(recurring.number)
 
-    def join(self, map: "Map") -> None:
+    def join(self, map: WorldView) -> None:
         """Show a map the current and future problems."""
         self.maps.append(map)
         if map.page.closed:
             return
-        for about, text in self.standing.items():
-            map.page.channel.problem(self._recurring[about].number, self._worded(text))
+        for about, text in self.current.items():
+            map.page.channel.problem(
+                self._recurring[about].number, self._format_text(text)
+            )
 
-    def leave(self, map: "Map") -> None:
+    def leave(self, map: WorldView) -> None:
         """Stop showing problems on a map, and remove those that it shows."""
         self.maps.remove(map)
         if map.page.closed or map.page in self._pages():
             return
-        for about in self.standing:
+        for about in self.current:
             map.page.channel.mended(self._recurring[about].number)
 
-    def _pages(self) -> "list[Page]":
+    def _pages(self) -> list[Page]:
         """Return the open pages of the maps, each of them once."""
         pages = dict.fromkeys(map.page for map in self.maps)
         return [page for page in pages if not page.closed]
@@ -205,9 +205,9 @@ class Refusing:
         self._failure = ""
         keep(Removal(lambda: owner.clear_problem(self)))
 
-    def complain(self, words: str) -> None:
+    def complain(self, text: str) -> None:
         """Set an error of the message that is drawn at present."""
-        self._complaint = words
+        self._complaint = text
 
     def take(self, draw: Callable[[M], object], message: M) -> None:
         """Draw a message; a message for which ``draw`` raises is skipped.

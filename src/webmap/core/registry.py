@@ -97,7 +97,7 @@ class Namespace:
         return name in self._registered or name in self._other_packages()
 
     def __iter__(self) -> Iterator[Factory]:
-        """Yield each module's factory; one that cannot be loaded is logged once."""
+        """Yield each module's factory; log once each that cannot be loaded."""
         for name in self.names():
             if name in self._broken:
                 continue
@@ -140,14 +140,14 @@ def _built_in_files() -> dict[object, str]:
     Some files have no class of that name: a folder has other files too.
     """
     files: dict[object, str] = {}
-    rooms = find_spec(BUILT_IN)
-    assert rooms is not None
-    for room in pkgutil.iter_modules(rooms.submodule_search_locations):
-        spec = find_spec(f"{BUILT_IN}.{room.name}")
+    folders = find_spec(BUILT_IN)
+    assert folders is not None
+    for folder in pkgutil.iter_modules(folders.submodule_search_locations):
+        spec = find_spec(f"{BUILT_IN}.{folder.name}")
         assert spec is not None
         for file in pkgutil.iter_modules(spec.submodule_search_locations or ()):
             name = "".join(word.capitalize() for word in file.name.split("_"))
-            files[name] = f"{BUILT_IN}.{room.name}.{file.name}"
+            files[name] = f"{BUILT_IN}.{folder.name}.{file.name}"
     return files
 
 

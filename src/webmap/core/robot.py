@@ -14,8 +14,7 @@ from webmap.base.geometry import Quaternion, Twist, Vector3
 from webmap.base.scope import Removal, keep
 from webmap.config.reading import read_part
 from webmap.config.robot import OdometryConfig, RobotConfig, TfConfig
-from webmap.core.call_arguments import sets_part
-from webmap.core.driven import Driven
+from webmap.core.driven import Driven, sets_part
 from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
 from webmap.core.registry import Namespace, robot_modules
@@ -28,7 +27,7 @@ from webmap.poses.placing import PoseReading
 from webmap.ros.bridge import Bridge
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -75,10 +74,11 @@ class Robot(Driven):
         super().__init__(name, namespace)
         self.base_link = self.motion.base_frame = base_link
         self.model = model
-        self._told = Problems(log, lambda text: f"{self.name}: {text}")
-        self.maps = self._told.maps
-        self.problems: dict[object, str] = self._told.standing
+        self._shown_problems = Problems(log, lambda text: f"{self.name}: {text}")
+        self.problems: dict[object, str] = self._shown_problems.current
         """Current problems, as sentences, by subject."""
+        self.maps: list[Map] = []
+        """The maps that show the robot."""
         self.selected = False
         self.position = Vector3()
         self.orientation = Quaternion()
@@ -89,7 +89,7 @@ class Robot(Driven):
         self.pose_stamp: float | None = None
         """When the newest pose was sent, in seconds of ``time.monotonic()``; None
         before the first one."""
-        self.whereabouts = PoseSource(self)
+        self.pose_source = PoseSource(self, self.show_pose)
         """The source of its poses, on its own map and on the common one."""
         self.svg = svg.g(svg.title(text=self.name), self.model, class_="robot unplaced")
         self.svg.set("data-name", self.name)
@@ -127,7 +127,7 @@ class Robot(Driven):
     @property
     def feed(self) -> OdometryFeed | None:
         """The feed of the odometry topic; None if none is set."""
-        return self.whereabouts.feed
+        return self.pose_source.feed
 
     @property
     def yaw(self) -> float:
@@ -151,12 +151,12 @@ class Robot(Driven):
 
         None if there was none: AMCL, for example, sends a pose only after motion.
         """
-        heard = self.whereabouts.expected_at
-        return None if heard is None else time.monotonic() - heard
+        received = self.pose_source.expected_at
+        return None if received is None else time.monotonic() - received
 
     def hears_poses(self, within: float) -> bool:
         """Return whether a pose of any age arrived in the last ``within`` seconds."""
-        return self.whereabouts.come(within=within)
+        return self.pose_source.received_within(within)
 
     def destroy(self) -> None:
         """Stop all communication, remove the modules, leave every map."""
@@ -168,7 +168,7 @@ class Robot(Driven):
         for map in tuple(self.maps):
             map.remove_robot(self)
         self.remove_modules()
-        self.whereabouts.end()
+        self.pose_source.end()
         self.motion.close()
         robots.pop(self.id, None)
 
@@ -203,7 +203,7 @@ class Robot(Driven):
 
     def unsubscribe_odometry_topic(self) -> None:
         """Stop receiving poses; does nothing if there is no topic."""
-        self.whereabouts.unfollow()
+        self.pose_source.unfollow()
 
     @sets_part("tf")
     def set_tf(
@@ -248,16 +248,16 @@ class Robot(Driven):
             raise ConfigError(f"{what}: {key}: a bridge is missing")
         match key:
             case "odometry" if values is None:
-                self.whereabouts.unfollow()
+                self.pose_source.unfollow()
             case "tf" if values is None:
-                self.whereabouts.unplace()
+                self.pose_source.unplace()
             case "odometry" if values is not None and bridge is not None:
                 pose = read_part(OdometryConfig, key, values, what)
-                self.whereabouts.follow(bridge, pose.topic, pose.throttle, pose.type)
+                self.pose_source.follow(bridge, pose.topic, pose.throttle, pose.type)
             case "tf" if values is not None and bridge is not None:
                 tf = read_part(TfConfig, key, values, what)
                 base = tf.base_frame or self.base_link
-                self.whereabouts.place(
+                self.pose_source.place(
                     bridge, tf.map_frame, base, tf.namespace, tf.quiet
                 )
             case _:
@@ -265,12 +265,12 @@ class Robot(Driven):
 
     def unset_tf(self) -> None:
         """Stop drawing the robot by TF; does nothing if TF is not set."""
-        self.whereabouts.unplace()
+        self.pose_source.unplace()
 
     @property
     def tf(self) -> Mapping[str, Any] | None:
         """The arguments of :meth:`set_tf`; None if it is not set."""
-        return self.whereabouts.tf
+        return self.pose_source.tf
 
     def set_alignment(self, x: float, y: float, angle: float) -> None:
         """Align the robot's own map, its poses, data and goals, on the common map.
@@ -284,11 +284,11 @@ class Robot(Driven):
             ConfigError: If a number is not valid.
 
         """
-        self.whereabouts.align(alignment(x, y, angle))
+        self.pose_source.align(alignment(x, y, angle))
 
     def unset_alignment(self) -> None:
         """Use the alignment of the robot's bridge."""
-        self.whereabouts.align(None)
+        self.pose_source.align(None)
 
     # Plain data.
 
@@ -356,7 +356,7 @@ class Robot(Driven):
 
     def report_error(self, text: str) -> None:
         """Log a failure and show it on every page that has the robot."""
-        self._told.report(text)
+        self._shown_problems.report(text)
 
     def set_problem(self, about: object, text: str) -> None:
         """Show a problem until :meth:`clear_problem`, also to pages opened later.
@@ -366,19 +366,21 @@ class Robot(Driven):
             text: A sentence for people.
 
         """
-        self._told.set(about, text)
+        self._shown_problems.set(about, text)
 
     def clear_problem(self, about: object) -> None:
         """Remove the problem of ``about``; does nothing if there is none."""
-        self._told.clear(about)
+        self._shown_problems.clear(about)
 
     def on_map(self, map: "Map", shown: bool) -> None:
         """Set whether a map shows this robot, and fire ``on_map``."""
         if shown:
             self.model_images.show(map.page)
-            self._told.join(map)
+            self.maps.append(map)
+            self._shown_problems.join(map)
         else:
-            self._told.leave(map)
+            self.maps.remove(map)
+            self._shown_problems.leave(map)
             if not self.maps:
                 self.model_images.end()
         self.update_selected()
@@ -401,7 +403,7 @@ class Robot(Driven):
 
         A jump of its poses within the next seconds is then no problem.
         """
-        self.whereabouts.pipeline.jumps.expect(time.monotonic())
+        self.pose_source.pipeline.jumps.expect(time.monotonic())
 
     def _watch_state(self) -> None:
         """Update the shown state periodically: a lost robot sends no message."""

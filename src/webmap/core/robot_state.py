@@ -11,7 +11,7 @@ from webmap.gate.rules.obedience import MOVES, TURNS
 from webmap.poses.silence import PERIODS
 from webmap.ros.bridge import Bridge
 
-WORDS = {
+STATE_TEXTS = {
     "no_bridge": "No connection to the bridge",
     "connecting": "Connecting",
     "gone": "No pose since {since}",
@@ -54,7 +54,7 @@ class RobotState(NamedTuple):
     """What a robot is doing."""
 
     name: str
-    """The state: a key of ``WORDS``."""
+    """The state: a key of ``STATE_TEXTS``."""
 
     text: str
     """The text of the state."""
@@ -135,8 +135,8 @@ def _seen(facts: Facts, *, may_move: bool = False) -> str | None:
 def _state(name: str, facts: Facts) -> RobotState:
     holder = facts.report.holder if facts.report is not None else None
     who = holder.name or holder.connection if holder is not None else "Another operator"
-    text = WORDS[name].format(who=who, since=since_when(facts.silent_for))
-    return RobotState(name, text, WORDS.get(f"{name}_by_you", text))
+    text = STATE_TEXTS[name].format(who=who, since=since_when(facts.silent_for))
+    return RobotState(name, text, STATE_TEXTS.get(f"{name}_by_you", text))
 
 
 def _is_gone(facts: Facts) -> bool:

@@ -17,7 +17,7 @@ from webmap.base.geometry import Quaternion, Twist
 from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import Removal
 from webmap.base.tasks import spawn
-from webmap.core.motion import MotionRoad, roads
+from webmap.core.motion import RobotMotion, robot_motions
 from webmap.core.refused import refusals
 from webmap.core.robot import robots
 from webmap.gate.protocol import (
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap")
 
 SWITCH = 0.0001
-"""Seconds after which a running thread gives way to a waiting one.
+"""Seconds after which a running thread yields to a waiting one.
 
 While the model's thread is busy, the web thread waits this long several times for each
 message to a page. With 1 ms, the ticks to operators came up to 0.3 s late.
@@ -53,7 +53,7 @@ class Watcher(Protocol):
         """Take the changes, at the loop's monotonic time ``now``."""
 
     def notice(self, text: str) -> None:
-        """Show a sentence that everybody should read."""
+        """Show a sentence that every viewer should read."""
 
 
 class Runtime:
@@ -65,7 +65,7 @@ class Runtime:
         self._thread: threading.Thread | None = None
         self._watchers: dict[int, Watcher] = {}
         self._on_stop: list[Callable[[], None]] = []
-        self._looked_at = asyncio.Event()
+        self._has_watchers = asyncio.Event()
         self._ending = asyncio.Event()
 
     @property
@@ -83,7 +83,7 @@ class Runtime:
         # A busy model's thread keeps the interpreter for this long at a time, while the
         # web thread must pass on the ticks to operators.
         sys.setswitchinterval(min(SWITCH, sys.getswitchinterval()))
-        self._looked_at, self._ending = asyncio.Event(), asyncio.Event()
+        self._has_watchers, self._ending = asyncio.Event(), asyncio.Event()
         ready = threading.Event()
         failure: list[BaseException] = []
         self._thread = threading.Thread(
@@ -123,19 +123,19 @@ class Runtime:
     def watch(self, watcher: Watcher) -> Removal:
         """Tick ``watcher`` until the removal; called in the model's thread."""
         self._watchers[id(watcher)] = watcher
-        self._looked_at.set()
+        self._has_watchers.set()
 
         def undo() -> None:
             self._watchers.pop(id(watcher), None)
             if not self._watchers:
-                self._looked_at.clear()
+                self._has_watchers.clear()
 
         return Removal(undo)
 
     def _run(self, ready: threading.Event, failure: list[BaseException]) -> None:
         try:
             with asyncio.Runner(loop_factory=_new_loop) as runner:
-                runner.run(self._live(ready))
+                runner.run(self._run_model(ready))
         except BaseException as error:
             failure.append(error)
             log.exception("the model's thread ended")
@@ -143,22 +143,22 @@ class Runtime:
             self._loop = None
             ready.set()
 
-    async def _live(self, ready: threading.Event) -> None:
+    async def _run_model(self, ready: threading.Event) -> None:
         from webmap.gate.display.client import GateClient
 
         loop = self._loop = asyncio.get_running_loop()
         gate = self.gate = GateClient()
 
-        def hop(report: Report) -> None:
-            loop.call_soon_threadsafe(self._heard, report)
+        def pass_on(report: Report) -> None:
+            loop.call_soon_threadsafe(self._on_report, report)
 
-        gate.on_report(hop)
+        gate.on_report(pass_on)
         gate.start()
         try:
             lifecycle.begin(loop)
-            MotionRoad.gate = gate
-            for road in list(roads):
-                road.declare_or_complain()
+            RobotMotion.gate = gate
+            for motion in list(robot_motions):
+                motion.declare_or_complain()
             ready.set()
             ticking = spawn(self._tick_on())
             await self._ending.wait()
@@ -166,7 +166,7 @@ class Runtime:
         finally:
             for fn in self._on_stop:
                 fn()
-            MotionRoad.gate = None
+            RobotMotion.gate = None
             await asyncio.to_thread(gate.stop)
             self.gate = None
             await lifecycle.end()
@@ -175,7 +175,7 @@ class Runtime:
         loop = asyncio.get_running_loop()
         due = loop.time()
         while True:
-            await self._looked_at.wait()
+            await self._has_watchers.wait()
             now = loop.time()
             due = max(due + TICK, now)
             for watcher in list(self._watchers.values()):
@@ -185,7 +185,7 @@ class Runtime:
                     log.exception("a frame for %r failed", watcher)
             await asyncio.sleep(max(0.0, due - loop.time()))
 
-    def _heard(self, report: Report) -> None:
+    def _on_report(self, report: Report) -> None:
         if isinstance(report, RefusedCount):
             now = datetime.now(UTC)
             refusals.note(report.by, report.count, report.last, now)

@@ -15,9 +15,8 @@ from webmap.core.pictures import pixels_across
 from webmap.core.registry import Namespace
 from webmap.core.view import Rect, apply_operation, initial_view
 from webmap.scene import svg
-from webmap.scene.element import Element
-from webmap.scene.events import Handler
-from webmap.scene.fragment import Fragment
+from webmap.scene.element import Element, Handler
+from webmap.scene.node import Fragment
 
 log = logging.getLogger("webmap.map")
 
@@ -100,8 +99,8 @@ class WorldView(Extendable):
         if self.page.closed:  # the map would never be destroyed
             raise ConfigError(
                 f"page {self.page.entry.path!r} of {self.page.viewer.name} was closed, "
-                "so no map can be made on it: what goes on beside a page function may "
-                "take longer than the viewer stays"
+                "so no map can be created on it: create maps in the page function, not "
+                "in a task that may end after the viewer has left"
             )
         self.container = container
         width, height = self.page.size_of(container)

@@ -111,8 +111,8 @@ def _check_label(label: Any, way: Way, mistakes: Mistakes) -> None:
         read_labels([label], "")
     except ConfigError as error:
         # The label was read as item 0 of a list; its index in the file may differ.
-        _, *inner = getattr(error, "way", (0,))
-        mistakes.add((*way, *inner), getattr(error, "words", str(error)))
+        _, *inner = getattr(error, "path", (0,))
+        mistakes.add((*way, *inner), getattr(error, "text", str(error)))
 
 
 def tile_options(

@@ -182,7 +182,7 @@ def check_modules(
             check_arguments(map_modules[name], args, options)
         except WrongArguments as error:
             for wrong in error.wrong:
-                mistakes.add((*way, *wrong.way), wrong_argument(module, wrong))
+                mistakes.add((*way, *wrong.path), wrong_argument(module, wrong))
         except WebMapError as error:
             mistakes.add((*way, "name"), str(error))
         else:

@@ -97,9 +97,9 @@ def hull(points: Iterable[Point]) -> list[Point]:
     if len(found) < 3:
         return found
 
-    def side(way: Iterable[Point]) -> list[Point]:
+    def side(ordered: Iterable[Point]) -> list[Point]:
         kept: list[Point] = []
-        for point in way:
+        for point in ordered:
             while len(kept) > 1 and _turns_left(kept[-2], kept[-1], point) <= 1e-12:
                 kept.pop()
             kept.append(point)

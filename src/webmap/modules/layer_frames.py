@@ -57,13 +57,13 @@ class LayerFrames:
                 layer.svg.set("data-bridge", alignments.mark(bridge))
             else:
                 layer.svg.set("data-layer-of", robot.id)
-                keep(robot.whereabouts.join(self._look_at_alignment))
+                keep(robot.pose_source.join(self._look_at_alignment))
         self._look_at_alignment()
 
     @property
     def alignment(self) -> Pose:
         """The position and rotation of the data's map on the common one."""
-        own = None if self._robot is None else self._robot.whereabouts.own_alignment
+        own = None if self._robot is None else self._robot.pose_source.own_alignment
         return alignments.of(self._bridge) if own is None else own
 
     def _source(self, frame_id: str) -> str | None:
@@ -75,7 +75,7 @@ class LayerFrames:
                 return None
             self._frames = frames_of(self._bridge, self._namespace)
             with self._layer.scope.active():
-                keep(self._frames.join(self._news))
+                keep(self._frames.join(self._on_frames))
         return self._frames.buffer.name(frame_id, self._namespace)
 
     def _look(self, source: str, stamp: float) -> tuple[Transform, bool]:
@@ -91,11 +91,11 @@ class LayerFrames:
         target = buffer.name(self._map_frame, self._namespace)
         return newest_or_at(buffer, target, source, stamp)
 
-    def _say(self, words: str) -> None:
+    def _show_trouble(self, text: str) -> None:
         """Show a problem of the frames once it has lasted, or clear it."""
-        if lasting(self._lasting, "lost" if words else "", self._frames):
-            self._layer.set_problem(self, words)
-        elif not words:
+        if lasting(self._lasting, "lost" if text else "", self._frames):
+            self._layer.set_problem(self, text)
+        elif not text:
             self._layer.clear_problem(self)
 
     def _look_at_alignment(self) -> None:
@@ -111,7 +111,7 @@ class LayerFrames:
         """Place the layer at the current alignment of its map."""
         raise NotImplementedError
 
-    def _news(self) -> None:
+    def _on_frames(self) -> None:
         """Process changed frames."""
         raise NotImplementedError
 
@@ -143,7 +143,7 @@ class Anchored(LayerFrames):
             self._frame = source
             self._place(source, stamp)
 
-    def _news(self) -> None:
+    def _on_frames(self) -> None:
         if self._frame is not None:
             self._place(self._frame, 0.0)
 
@@ -151,11 +151,11 @@ class Anchored(LayerFrames):
         try:
             found, _ = self._look(source, stamp)
         except TransformError as error:
-            self._say(not_known(source, error))
+            self._show_trouble(not_known(source, error))
             return
         self._offset = found.from_above
         self._align(self.alignment)
-        self._say("")
+        self._show_trouble("")
 
     def _align(self, aligned: Pose) -> None:
         put(self._layer.svg, Affine.of_pose(aligned) @ self._offset)

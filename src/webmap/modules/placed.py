@@ -15,7 +15,8 @@ from webmap.poses.lasting import Lasting
 from webmap.ros.tf import Transform
 from webmap.ros.tf.transform import alike
 from webmap.scene import svg
-from webmap.scene.element import Child, Element
+from webmap.scene.element import Element
+from webmap.scene.node import Child
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -81,7 +82,7 @@ class Placed:
         self._class = class_
         mount = Pose(x, y, math.radians(angle))
         self._sightings = Sightings(
-            robot.whereabouts, frame, mount if mount != Pose() else None
+            robot.pose_source, frame, mount if mount != Pose() else None
         )
         self._seen: tuple[str, float] | None = None
         self._draw: Draw | None = None
@@ -100,7 +101,7 @@ class Placed:
         else:
             robot.svg.append(self.svg)
         self._put()
-        self._hears = robot.whereabouts.join(self._news)
+        self._pose_removal = robot.pose_source.join(self._on_poses)
         keep(Removal(self._end))
 
     def stand_in(self, frame_id: str, stamp: float, draw: Draw | None = None) -> None:
@@ -162,7 +163,7 @@ class Placed:
         self._upright[element] = (x, y)
         self._put()
 
-    def _news(self) -> None:
+    def _on_poses(self) -> None:
         if self._settled:
             if not self._on_robot or self._upright:
                 self._put()
@@ -173,8 +174,8 @@ class Placed:
             self._settled = True
             self._trouble = "failed"  # so that the next successful drawing clears it
             log.exception("%s: drawing failed", self._class)
-            words = f"drawing failed: {type(error).__name__}: {error}"
-            self.robot.set_problem(self, f"{self._class}: {words}")
+            text = f"drawing failed: {type(error).__name__}: {error}"
+            self.robot.set_problem(self, f"{self._class}: {text}")
 
     def _settle(self) -> None:
         """Determine the current pose of the group as well as possible."""
@@ -191,7 +192,7 @@ class Placed:
         # Only now, since drawing may fail: the earlier drawing then stays in place.
         self._offset, self._on_robot = offset, found.on_robot
         self._settled = found.settled
-        self._say(found)
+        self._show_trouble(found)
         self._put()
 
     def _tilt(self, draw: Draw, tilt: Transform) -> None:
@@ -206,26 +207,26 @@ class Placed:
             at = self.robot.position
             own = Affine.of_pose(Pose(at.x, at.y, self.robot.yaw))
             if self._seen is not None:
-                place = self.robot.whereabouts.common_from_own @ place
+                place = self.robot.pose_source.common_from_own @ place
             place = own.inverse @ place
         put(self.svg, place)
         for element, (x, y) in self._upright.items():
             turn = Affine.rotation(-self.robot.yaw - math.atan2(place.b, place.a))
             element.set_matrix(turn @ Affine(0.01, 0, 0, -0.01, x, y))
 
-    def _say(self, found: Sighting) -> None:
+    def _show_trouble(self, found: Sighting) -> None:
         """Show a problem of the pose once; clear it when it ends."""
-        trouble = lasting(self._lasting, found.trouble, self.robot.whereabouts.frames)
+        trouble = lasting(self._lasting, found.trouble, self.robot.pose_source.frames)
         if trouble == self._trouble:
             return
         self._trouble = trouble
         if trouble:
-            self.robot.set_problem(self, f"{self._class}: {found.words}")
+            self.robot.set_problem(self, f"{self._class}: {found.text}")
         else:
             self.robot.clear_problem(self)
 
     def _end(self) -> None:
-        self._hears.remove()
+        self._pose_removal.remove()
         self.svg.remove()
         self.robot.clear_problem(self)
 

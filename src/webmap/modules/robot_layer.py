@@ -49,7 +49,7 @@ class RobotLayer(TopicLayer):
     """Seconds after which it is drawn as stale."""
 
     name: str = ""
-    """A further CSS class, to tell several layers apart."""
+    """A further CSS class, to distinguish several layers."""
 
     frame = "map"
     x = y = angle = 0.0

@@ -36,7 +36,7 @@ class Sighting:
     trouble: str = ""
     """The kind of trouble, or empty; the sentences of one kind may differ."""
 
-    words: str = ""
+    text: str = ""
     """The trouble in a sentence."""
 
 
@@ -133,7 +133,7 @@ class Sightings:
             reach = min(stamp, newest + AHEAD)
             base = pipeline.at(reach, AHEAD)
             return Sighting(base @ mount, base.translation.z, settled=False)
-        if not self._poses.come(within=FLOWING):
+        if not self._poses.received_within(FLOWING):
             return on_robot
         if pipeline.placing is None and abs(stamp - newest) <= OTHER_CLOCK:
             return on_robot  # without frames nothing better is expected
@@ -142,7 +142,7 @@ class Sightings:
             on_robot=True,
             settled=stamp <= newest,
             trouble="then",
-            words=f"the pose of the robot at the stamp of the data is unknown, so "
+            text=f"the pose of the robot at the stamp of the data is unknown, so "
             f"the data is drawn at the current pose: {reason}; are the clocks of the "
             f"sensor and of the odometry the same?",
         )
@@ -158,7 +158,7 @@ def _lost(
         otherwise,
         settled=False,
         trouble=f"{type(error).__name__} {source}",
-        words=f"the pose of {source!r} is unknown: {error}",
+        text=f"the pose of {source!r} is unknown: {error}",
     )
 
 

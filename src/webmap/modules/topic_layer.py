@@ -232,9 +232,9 @@ class TopicLayer(LayerOptions):
         """
         raise NotImplementedError
 
-    def complain(self, words: str) -> None:
+    def complain(self, text: str) -> None:
         """Show an error in a message that is drawn nevertheless."""
-        self._refusing.complain(words)
+        self._refusing.complain(text)
 
     def _subscribe(self, owner: Owner) -> None:
         """Draw the messages of the topic; ``owner`` shows their errors."""

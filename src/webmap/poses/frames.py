@@ -33,19 +33,19 @@ PERIOD = 0.05
 """The least time between two calls of the listeners in seconds: transforms that arrive
 meanwhile share one call, however many nodes share the topic."""
 
-STANDS = 10.0
+KEPT_FOR = 10.0
 """Seconds for which a fault is shown after it last occurred."""
 
 MOST = 50
 """The greatest number of frames whose faults are kept."""
 
-_heard: dict[tuple[Bridge, str], "Frames"] = {}
+_shared_frames: dict[tuple[Bridge, str], "Frames"] = {}
 
 
 @dataclass(slots=True)
 class _Fault:
     frames: tuple[str, str]
-    words: str
+    text: str
     seen: float
 
 
@@ -66,13 +66,13 @@ class FrameFaults:
         """Whether there is a fault."""
         return bool(self._faults)
 
-    def note(self, parent: str, child: str, words: str, now: float) -> bool:
+    def note(self, parent: str, child: str, text: str, now: float) -> bool:
         """Add a fault of a transform.
 
         Args:
             parent: The frame of the transform's numbers.
             child: The frame that is placed.
-            words: The fault, in a sentence.
+            text: The fault in a sentence.
             now: The time of any monotonic clock, in seconds.
 
         Returns:
@@ -85,7 +85,7 @@ class FrameFaults:
             return False
         if len(self._faults) >= MOST:
             return False
-        self._faults[child] = _Fault((parent, child), words, now)
+        self._faults[child] = _Fault((parent, child), text, now)
         return True
 
     def of(self, base: str, now: float) -> str | None:
@@ -99,17 +99,17 @@ class FrameFaults:
         """
         if not self._faults:
             return None
-        for child in [c for c, f in self._faults.items() if now > f.seen + STANDS]:
+        for child in [c for c, f in self._faults.items() if now > f.seen + KEPT_FOR]:
             del self._faults[child]
         space = base.rpartition("/")[0]
         chain = set(self._buffer.chain(base))
-        words = [
-            fault.words
+        texts = [
+            fault.text
             for fault in self._faults.values()
             if chain.intersection(fault.frames)
             or (space and any(name.startswith(f"{space}/") for name in fault.frames))
         ]
-        return words[0] if words else None
+        return texts[0] if texts else None
 
 
 class Frames:
@@ -127,11 +127,11 @@ class Frames:
         self.buffer = Buffer()
         self.faults = FrameFaults(self.buffer)
         """The recent faults of transforms."""
-        self.heard_at = time.monotonic()
+        self.received_at = time.monotonic()
         """When the first transform of the current call of the listeners arrived, in
         seconds of :func:`time.monotonic`."""
-        self._untold_since: float | None = None
-        self._told_at = -math.inf
+        self._pending_since: float | None = None
+        self._notified_at = -math.inf
         self._listeners: dict[int, Callable[[], object]] = {}
         self._raised: set[tuple[int, type[Exception]]] = set()
         self._since = time.monotonic()
@@ -139,11 +139,11 @@ class Frames:
         self._timer: asyncio.TimerHandle | None = None
         self._soon: asyncio.TimerHandle | None = None
         with no_scope():
-            self._hears_open = bridge.on_open(self._opened)
+            self._open_removal = bridge.on_open(self._opened)
             self._subscriptions = [
                 bridge.subscribe(
                     f"{namespace}/{topic}",
-                    partial(self._hear, topic == "tf_static"),
+                    partial(self._on_message, topic == "tf_static"),
                     TYPE,
                     decode=TFMessage,
                     queue_length=QUEUE,
@@ -196,32 +196,32 @@ class Frames:
 
     def _wake(self) -> None:
         self._timer = None
-        self._tell()
+        self._notify()
 
-    def _tell_in_time(self) -> None:
+    def _notify_soon(self) -> None:
         """Call all listeners; later if they were only just called."""
         loop = self._loop
         # Before the connection opens there is no loop, and no need to limit calls.
-        if loop is None or loop.time() >= self._told_at + PERIOD:
-            self._tell()
+        if loop is None or loop.time() >= self._notified_at + PERIOD:
+            self._notify()
         elif self._soon is None:
-            self._soon = loop.call_at(self._told_at + PERIOD, self._tell)
+            self._soon = loop.call_at(self._notified_at + PERIOD, self._notify)
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         if self._soon is not None:
             self._soon.cancel()
             self._soon = None
-        since, self._untold_since = self._untold_since, None
-        self.heard_at = time.monotonic() if since is None else since
+        since, self._pending_since = self._pending_since, None
+        self.received_at = time.monotonic() if since is None else since
         for key, listener in list(self._listeners.items()):
             try:
                 listener()
             except Exception as error:  # The other listeners must run too.
-                self._say_raised(key, error)
+                self._log_raised(key, error)
         if self._loop is not None:  # A slow call leaves time for the rest.
-            self._told_at = self._loop.time()
+            self._notified_at = self._loop.time()
 
-    def _say_raised(self, key: int, error: Exception) -> None:
+    def _log_raised(self, key: int, error: Exception) -> None:
         """Log an exception of a listener once: it may occur at every call."""
         raised = (key, type(error))
         if raised not in self._raised:
@@ -231,15 +231,15 @@ class Frames:
             )
 
     def _end(self) -> None:
-        _heard.pop((self.bridge, self.namespace), None)
-        self._hears_open.remove()
+        _shared_frames.pop((self.bridge, self.namespace), None)
+        self._open_removal.remove()
         for subscription in self._subscriptions:
             subscription.remove()
         for timer in (self._timer, self._soon):
             if timer is not None:
                 timer.cancel()
 
-    def _hear(self, static: bool, message: TFMessage) -> None:
+    def _on_message(self, static: bool, message: TFMessage) -> None:
         now = time.monotonic()
         for each in message.transforms:
             parent = self.buffer.name(each.frame_id, self.namespace)
@@ -264,18 +264,18 @@ class Frames:
             if note and self.faults.note(parent, child, note, now):
                 log.warning("%s: %s", self.bridge.name, note)
         if not static or self.faults.any:
-            if self._untold_since is None:
-                self._untold_since = now
-            self._tell_in_time()
+            if self._pending_since is None:
+                self._pending_since = now
+            self._notify_soon()
 
 
 def frames_of(bridge: Bridge, namespace: str = "") -> Frames:
     """Return the frames of a ROS system; all callers share them."""
     space = "/" + namespace.strip("/") if namespace.strip("/") else ""
     key = (bridge, space)
-    if key not in _heard:
-        _heard[key] = Frames(bridge, space)
-    return _heard[key]
+    if key not in _shared_frames:
+        _shared_frames[key] = Frames(bridge, space)
+    return _shared_frames[key]
 
 
 def lasting(waits: Lasting, trouble: str, frames: Frames | None = None) -> str:

@@ -7,7 +7,7 @@ from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
 from webmap.base.scope import Removable, Scope, no_scope
 from webmap.poses.placing import PoseReading
-from webmap.poses.type_asking import TypeAsking
+from webmap.poses.type_query import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.decoding import convert
 from webmap.ros.views import (
@@ -62,25 +62,27 @@ class OdometryFeed:
         self.type: str | None = None
         self._listener = listener
         self._typed = typed
-        self._tell_complaint = complain
+        self._on_complaint = complain
         self._complaint: str | None = None
         self._report = report
         self._scope = Scope(
             f"poses of {topic}", self._failed, lambda _: self._complain(None)
         )
         self._subscription: Removable | None = None
-        self._asking: Removable | None = None
+        self._type_query: Removable | None = None
         if type is None:
-            self._asking = TypeAsking(bridge, topic, self._told, self._listen_untyped)
+            self._type_query = TypeQuery(
+                bridge, topic, self._on_type, self._listen_untyped
+            )
         else:
             self._subscribe(odometry_view(type))
 
     def remove(self) -> None:
         """Unsubscribe; a second call does nothing."""
-        for thing in (self._subscription, self._asking):
+        for thing in (self._subscription, self._type_query):
             if thing is not None:
                 thing.remove()
-        self._subscription = self._asking = None
+        self._subscription = self._type_query = None
 
     def _listen_untyped(self) -> None:
         """Determine the type from the first message: the bridge may not know the type.
@@ -94,7 +96,7 @@ class OdometryFeed:
                     self.topic, self._on_first, throttle=self.throttle
                 )
 
-    def _told(self, type: str) -> None:
+    def _on_type(self, type: str) -> None:
         """Use the type that the bridge returned."""
         if self.type is not None:
             return
@@ -108,33 +110,40 @@ class OdometryFeed:
 
     def _use(self, view: type[OdometryView]) -> None:
         """Subscribe with the type that is now known."""
-        untyped, asking = self._subscription, self._asking
+        untyped, type_query = self._subscription, self._type_query
         self._subscribe(view)
-        for thing in (untyped, asking):
+        for thing in (untyped, type_query):
             if thing is not None:
                 thing.remove()
-        self._asking = None
+        self._type_query = None
 
     def _on_first(self, message: Any) -> None:
         try:
             view = odometry_view_by_shape(message)
             first = convert(message, view)
         except ProtocolError as error:
-            self._complain(f"topic {self.topic!r}: {error}; say type=... if one does")
+            self._complain(
+                f"topic {self.topic!r}: {error}; if the topic has one of these types, "
+                "set type=..."
+            )
             self._typed("")
             return
         self._use(view)
-        self._hear(first)
+        self._on_message(first)
 
     def _subscribe(self, view: type[OdometryView]) -> None:
         self.type = _NAMES[view]
         self._typed(self.type)
         with self._scope.active():
             self._subscription = self.bridge.subscribe(
-                self.topic, self._hear, self.type, throttle=self.throttle, decode=view
+                self.topic,
+                self._on_message,
+                self.type,
+                throttle=self.throttle,
+                decode=view,
             )
 
-    def _hear(self, message: OdometryView) -> None:
+    def _on_message(self, message: OdometryView) -> None:
         try:
             reading = PoseReading.of(message)
         except ProtocolError as error:
@@ -161,4 +170,4 @@ class OdometryFeed:
     def _complain(self, text: str | None) -> None:
         if text != self._complaint:
             self._complaint = text
-            self._tell_complaint(text)
+            self._on_complaint(text)

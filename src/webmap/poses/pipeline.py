@@ -218,12 +218,12 @@ class Jumps:
         """The last jump in a sentence, while it is shown."""
         self._last: PoseReading | None = None
         self._came = -math.inf
-        self._jumped = self._asked_for = -math.inf
+        self._jumped = self._expected_since = -math.inf
         self._count = 0
 
     def expect(self, now: float) -> None:
         """Accept the next jumps: an operator or a program set the pose."""
-        self._asked_for = now
+        self._expected_since = now
 
     def look(self, reading: PoseReading, now: float, *, timed: bool = True) -> None:
         """Process the next pose, in the frame of all poses.
@@ -256,7 +256,7 @@ class Jumps:
         went = math.hypot(one.x - other.x, one.y - other.y)
         if not 0 < took < LONGEST or went <= SMALLEST + FASTEST * took:
             return
-        if now - self._asked_for <= EXPECTED:
+        if now - self._expected_since <= EXPECTED:
             return
         self._jumped = now
         self._count += 1

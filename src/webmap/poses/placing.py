@@ -98,7 +98,7 @@ class Placing:
         """The problem in a sentence."""
         self._known: dict[str, Transform] = {}
         self._newest = -math.inf
-        self._news: dict[str, tuple[float, float]] = {}
+        self._last_changes: dict[str, tuple[float, float]] = {}
 
     def name(self, frame: str) -> str:
         """Return the full name of a frame that the robot names."""
@@ -123,15 +123,15 @@ class Placing:
         try:
             found = self.buffer.find(self.map_frame, frame, reading.stamp)
         except TransformError as error:
-            self._wrong(
+            self._set_problem(
                 error, f"the robot is drawn in {frame!r}, not on the map: {error}"
             )
             if frame not in self._known:
                 return reading._replace(frame_id=frame)
         else:
             self._known[frame] = found.transform
-            self._look_whether_it_stopped(frame, found.newest, now)
-            self._look_at_clocks(frame, found.newest, reading.stamp)
+            self._check_for_new_transforms(frame, found.newest, now)
+            self._check_clocks(frame, found.newest, reading.stamp)
         return reading.moved(self._known[frame], self.map_frame)
 
     def of_base(self, now: float) -> PoseReading | None:
@@ -144,29 +144,29 @@ class Placing:
         base = self.base_frame
         try:
             newest = self.buffer.newest(self.map_frame, base)
-            self._look_whether_it_stopped(base, newest, now)
+            self._check_for_new_transforms(base, newest, now)
             newest = newest or 0.0
             if newest == self._newest:
                 return None
             placed = self.buffer.lookup(self.map_frame, base)
         except TransformError as error:
-            self._wrong(error, f"the pose of the robot is unknown: {error}")
+            self._set_problem(error, f"the pose of the robot is unknown: {error}")
             return None
         self._newest = newest
         return PoseReading(
             placed.translation, placed.rotation, None, self.map_frame, newest
         )
 
-    def _look_whether_it_stopped(
+    def _check_for_new_transforms(
         self, frame: str, newest: float | None, now: float
     ) -> None:
         """Set a problem if a frame gets no new transforms; static frames need none."""
-        before, heard = self._news.get(frame, (None, now))
+        before, changed_at = self._last_changes.get(frame, (None, now))
         if newest is None or newest != before:
-            heard = now
-            self._news[frame] = (newest or 0.0, now)
+            changed_at = now
+            self._last_changes[frame] = (newest or 0.0, now)
         self.kind = ""
-        if now > heard + LATE:
+        if now > changed_at + LATE:
             self.kind = "late"
             self.problem = (
                 f"no new transform {self.map_frame!r} -> {frame!r} for more than "
@@ -174,7 +174,7 @@ class Placing:
                 f"publishes it"
             )
 
-    def _look_at_clocks(self, frame: str, newest: float | None, stamp: float) -> None:
+    def _check_clocks(self, frame: str, newest: float | None, stamp: float) -> None:
         """Set a problem if a pose and the frames cannot have the same clock."""
         if self.kind or not stamp or newest is None:
             return
@@ -188,5 +188,5 @@ class Placing:
                 f"transform: are the clocks of both the same?"
             )
 
-    def _wrong(self, error: TransformError, words: str) -> None:
-        self.kind, self.problem = type(error).__name__, words
+    def _set_problem(self, error: TransformError, text: str) -> None:
+        self.kind, self.problem = type(error).__name__, text

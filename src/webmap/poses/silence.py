@@ -34,21 +34,21 @@ class Silence:
     def __init__(self) -> None:
         self.limit = LIMIT
         """Seconds without a pose after which the log gets a line."""
-        self._heard = 0.0
+        self._last_pose_at = 0.0
         self._counted_from = 0.0
-        self._said_at = -math.inf
-        self._is_said = False
+        self._logged_at = -math.inf
+        self._is_logged = False
 
     @property
     def due(self) -> float:
         """When the line is due if no pose arrives until then."""
-        return max(self._counted_from + self.limit, self._said_at + AGAIN)
+        return max(self._counted_from + self.limit, self._logged_at + AGAIN)
 
-    def hear(self, now: float) -> float | None:
+    def record(self, now: float) -> float | None:
         """Record a pose; return the time without poses, if it was logged."""
-        took = now - self._heard if self._is_said else None
-        self._heard = self._counted_from = now
-        self._is_said = False
+        took = now - self._last_pose_at if self._is_logged else None
+        self._last_pose_at = self._counted_from = now
+        self._is_logged = False
         return took
 
     def look(self, now: float, *, linked: bool) -> float | None:
@@ -64,12 +64,12 @@ class Silence:
             self._counted_from = now
         if now < self.due:
             return None
-        self._said_at, self._is_said = now, True
-        return now - self._heard
+        self._logged_at, self._is_logged = now, True
+        return now - self._last_pose_at
 
     def forget(self) -> None:
         """Forget the silence: the next poses come from another source."""
-        self._is_said = False
+        self._is_logged = False
 
 
 class SilenceWatch:
@@ -108,14 +108,14 @@ class SilenceWatch:
         self._silence.forget()
         self._silence.limit = max(LIMIT, PERIODS * period)
 
-    def hear(self, now: float) -> None:
+    def record(self, now: float) -> None:
         """Record a pose of a topic that also sends while the robot is at rest.
 
         Args:
             now: The time, in seconds of :func:`time.monotonic`.
 
         """
-        took = self._silence.hear(now)
+        took = self._silence.record(now)
         if took is not None:
             log.info("%s: poses again, after %.0f s", self._name(), took)
         try:
@@ -146,7 +146,7 @@ class SilenceWatch:
             self._look_at(loop, max(now + 0.01, self._silence.due))
             return
         log.warning(
-            "%s: no pose for %.0f s; they come from %s on %s, and that link is open",
+            "%s: no pose for %.0f s from %s on %s, although the connection is open",
             self._name(),
             silent,
             self._topic,

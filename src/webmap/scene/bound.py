@@ -4,7 +4,8 @@ from typing import Any, Self
 
 from webmap.base.errors import SceneError
 from webmap.scene.allowed import format_value
-from webmap.scene.element import Child, Element
+from webmap.scene.element import Element
+from webmap.scene.node import Child
 
 
 class BoundElement(Element):

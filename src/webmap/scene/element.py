@@ -1,11 +1,13 @@
-"""The elements of the scene: SVG and HTML, in Python."""
+"""The elements of the scene, SVG and HTML, and the events of a page."""
 
+import inspect
 import math
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
+from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from webmap.base.errors import SceneError
-from webmap.base.scope import Removal, current_scope, keep
+from webmap.base.scope import Removal, Scope, current_scope, keep, no_scope
 from webmap.scene.allowed import (
     attribute_name,
     check_event,
@@ -14,9 +16,97 @@ from webmap.scene.allowed import (
     check_value,
     format_value,
 )
-from webmap.scene.events import Event, Handler, Listener, Report, Spawn
 from webmap.scene.live import Live, MapPlace
-from webmap.scene.node import Node, Text
+from webmap.scene.node import Child
+
+Handler = Callable[["Event"], Any]
+"""Called with an event; may be a coroutine function."""
+
+Report = Callable[[Exception], object]
+"""Called with an exception that a handler raised."""
+
+Spawn = Callable[[Awaitable[Any]], object]
+"""Runs the coroutine that a handler returned, in the context of the call."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """One event on the page of one viewer, at one element."""
+
+    kind: str
+    """The browser's name of the event: ``"click"``, ``"keydown"``, ..."""
+
+    element: "Element | None" = None
+    """The element with the listener, which may differ from the one under the
+    pointer."""
+
+    x: float = 0.0
+    """Pixels from the left of the map, or of the window if not on a map."""
+
+    y: float = 0.0
+    """Pixels from the top of the map, or of the window if not on a map."""
+
+    world_x: float | None = None
+    """Metres in the world of the map, or None if not on a map."""
+
+    world_y: float | None = None
+    """Metres in the world of the map, or None if not on a map."""
+
+    key: str = ""
+    """The browser's name of the key of a key event: ``"a"``, ``"ArrowUp"``."""
+
+    button: int = 0
+    """The button of a pointer event: 0 is the main one."""
+
+    delta: float = 0.0
+    """How far a wheel turned, in pixels; away from the viewer is negative."""
+
+    shift: bool = False
+    ctrl: bool = False
+    alt: bool = False
+    meta: bool = False
+
+    value: str | None = None
+    """The value of an input after the event."""
+
+    checked: bool | None = None
+    """Whether a checkbox is checked after the event."""
+
+    viewer: Any = None
+    """The viewer of the page."""
+
+    map: Any = None
+    """The map of the event, or None."""
+
+
+class Listener:
+    """One handler of one kind of event, and the scope in which it was added."""
+
+    __slots__ = ("handler", "prevent", "removal", "scope", "stop")
+
+    def __init__(
+        self, handler: Handler, scope: Scope | None, *, prevent: bool, stop: bool
+    ) -> None:
+        self.handler = handler
+        self.scope = scope
+        self.prevent = prevent
+        self.stop = stop
+        self.removal: Removal | None = None
+
+    def call(self, event: Event, report: Report, spawn: Spawn | None) -> None:
+        """Call the handler in its scope; an exception is reported, not raised."""
+        with self.scope.active() if self.scope is not None else no_scope():
+            try:
+                result = self.handler(event)
+                if spawn is not None and inspect.isawaitable(result):
+                    spawn(result)
+            except Exception as error:
+                report(error)
+
+    def forget(self) -> None:
+        """Remove this listener from its scope, so that the scope does not grow."""
+        if self.scope is not None and self.removal is not None:
+            self.scope.discard(self.removal)
 
 
 class Classes:
@@ -85,11 +175,8 @@ def split_classes(*names: str) -> dict[str, None]:
     return classes
 
 
-Child = Node | str
-"""A child of an element; a string becomes a text."""
-
-# A person may have changed these on a page since, so they are always sent.
-_CHANGED_BY_HANDS = frozenset({"value", "checked", "open", "selected"})
+# A viewer may have changed these on a page since, so they are always sent.
+_CHANGED_BY_VIEWERS = frozenset({"value", "checked", "open", "selected"})
 
 
 class Element(Live):
@@ -101,13 +188,14 @@ class Element(Live):
 
     __slots__ = (
         "_attributes",
-        "_children",
         "_classes",
         "_listeners",
         "_styles",
         "namespace",
         "tag",
     )
+
+    parent: "Element | None"
 
     def __init__(
         self,
@@ -130,7 +218,6 @@ class Element(Live):
         self.tag = tag
         self.namespace = namespace
         self._attributes: dict[str, str] = {}
-        self._children: list[Node] = []
         self._classes: dict[str, None] = {}
         self._listeners: dict[str, list[Listener]] = {}
         self._styles: dict[str, str] = {}
@@ -186,7 +273,7 @@ class Element(Live):
         elif name == "transform":
             self._transform = text
             self._touch("transform")
-        elif text != self._attributes.get(name) or name in _CHANGED_BY_HANDS:
+        elif text != self._attributes.get(name) or name in _CHANGED_BY_VIEWERS:
             self._store(self._attributes, name, text)
 
     def set_style(self, name: str, value: str | float | None) -> Self:
@@ -239,105 +326,7 @@ class Element(Live):
         """The classes that Python gave to the element."""
         return Classes(self)
 
-    # Tree ---------------------------------------------------------------------
-
-    @property
-    def children(self) -> tuple[Node, ...]:
-        """The child elements and texts, in order."""
-        return tuple(self._children)
-
-    def walk(self) -> Iterator[Node]:
-        """Yield this element and all its descendants, parents first."""
-        yield self
-        for child in self._children:
-            yield from child.walk()
-
-    @property
-    def text(self) -> str:
-        """All text in the element; setting it replaces the content."""
-        return "".join(node.data for node in self.walk() if isinstance(node, Text))
-
-    @text.setter
-    def text(self, text: str) -> None:
-        children = self._children
-        if len(children) == 1 and isinstance(children[0], Text):
-            children[0].data = text
-        else:
-            self.clear()
-            self.append(text)
-
-    def append(self, *children: Child) -> Self:
-        """Append children; a child of another parent is moved.
-
-        Raises:
-            SceneError: If a child is not allowed here.
-
-        """
-        for child in children:
-            self.insert(len(self._children), child)
-        return self
-
-    def prepend(self, *children: Child) -> Self:
-        """Insert children at the beginning, in their order."""
-        for index, child in enumerate(children):
-            self.insert(index, child)
-        return self
-
-    def insert(self, index: int, child: Child) -> Self:
-        """Insert ``child`` before the child that is at ``index`` now.
-
-        Raises:
-            SceneError: If ``child`` is the root of a fragment, which is mounted and not
-                appended, or contains this element.
-
-        """
-        node = self._check_child(child)
-        if node.parent is not None:
-            if node.parent is self and self._children.index(node) < index:
-                index -= 1
-            node.parent._take_out(node)
-        self._children.insert(index, node)
-        node.parent = self
-        if self.fragment is not None:
-            self.fragment.put_in(node)
-        return self
-
-    def _check_child(self, child: Child) -> Node:
-        node = Text(child) if isinstance(child, str) else child
-        if not isinstance(node, Node):
-            raise SceneError(f"a child must be an element or text, got {child!r}")
-        if node.parent is None and node.fragment is not None:
-            raise SceneError(
-                f"{node!r} is the root of a fragment: mount the fragment instead"
-            )
-        above: Element | None = self
-        while above is not None:
-            if above is node:
-                raise SceneError(f"{node!r} cannot be put into itself")
-            above = above.parent
-        return node
-
-    def clear(self) -> Self:
-        """Remove everything in the element."""
-        for child in reversed(self._children[:]):
-            child.remove()
-        return self
-
-    def _take_out(self, node: Node) -> None:
-        self._children.remove(node)
-        if self.fragment is not None:
-            self.fragment.take_out(node)
-        node.parent = None
-
-    def _release(self) -> None:
-        for listeners in self._listeners.values():
-            for listener in listeners:
-                listener.forget()
-        self._listeners = {}
-        for child in self._children:
-            child._release()
-
-    # Events -------------------------------------------------------------------
+    # Events ---------------------------------------------------------------
 
     def on(
         self,
@@ -372,6 +361,13 @@ class Element(Live):
         self._touch("events")
         listener.removal = Removal(lambda: self._off(event, listener))
         return keep(listener.removal)
+
+    def _release(self) -> None:
+        for listeners in self._listeners.values():
+            for listener in listeners:
+                listener.forget()
+        self._listeners = {}
+        super()._release()
 
     def _off(self, event: str, listener: Listener) -> None:
         listener.forget()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from webmap.base.errors import SceneError
 from webmap.base.geometry import Affine
-from webmap.scene.node import Node
+from webmap.scene.node import Parent
 
 isfinite = math.isfinite
 
@@ -47,7 +47,7 @@ class MapPlace(NamedTuple):
     """Pixels, or 0 for the height of its container."""
 
 
-class Live(Node):
+class Live(Parent):
     """A node whose pose, dots and age can be set cheaply at every tick."""
 
     __slots__ = ("_age", "_dots", "_map", "_transform")

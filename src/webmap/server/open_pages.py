@@ -22,7 +22,7 @@ from webmap.core.refused import refusals
 from webmap.core.runtime import Runtime
 from webmap.core.view import Rect
 from webmap.gate.display.client import DriveConnection
-from webmap.scene.events import Event
+from webmap.scene.element import Event
 from webmap.scene.wire.messages import (
     ElementEvent,
     Hello,

@@ -89,12 +89,12 @@ def test_what_is_saved_holds_and_is_kept(tool, robot, channel, store, link):
     save(tool, robot)
     line = "alignment = [1.0, 2.0, 90.0] # metres, metres, degrees"
     assert answer(channel, "saved") == {"line": line, "lost": ""}
-    assert robot.whereabouts.own_alignment == Pose(1.0, 2.0, math.pi / 2)
+    assert robot.pose_source.own_alignment == Pose(1.0, 2.0, math.pi / 2)
     again = AlignmentStore(store._folder)
     bob = Robot("Bob")
     bob.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
     again.restore(bob)
-    assert bob.whereabouts.own_alignment == Pose(1.0, 2.0, math.pi / 2)
+    assert bob.pose_source.own_alignment == Pose(1.0, 2.0, math.pi / 2)
     kept = json.loads(store.path(NAME).read_text())
     assert (kept["by"], kept["of"], kept["instead_of"]) == ("Ann", NAME, None)
     bob.destroy()
@@ -110,8 +110,8 @@ def test_what_is_stated_anew_counts_more_than_what_was_saved(
         bob.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
         bob.set_alignment(stated, 0.0, 0.0)
         AlignmentStore(store._folder).restore(bob)
-    assert same.whereabouts.own_alignment == Pose(1.0, 2.0, math.pi / 2)
-    assert other.whereabouts.own_alignment == Pose(6.0, 0.0, 0.0)
+    assert same.pose_source.own_alignment == Pose(1.0, 2.0, math.pi / 2)
+    assert other.pose_source.own_alignment == Pose(6.0, 0.0, 0.0)
     assert "another one was stated since" in caplog.text
     assert not store.path(NAME).exists()
     for bob in (same, other):
@@ -122,7 +122,7 @@ def test_all_behind_a_bridge_go_along_and_the_robots_own_ends(tool, robot, store
     save(tool, robot)
     save(tool, robot, 7.0, 0.0, 0.0, whole=True)
     assert alignments.of(link) == Pose(7.0, 0.0, 0.0)
-    assert robot.whereabouts.own_alignment is None
+    assert robot.pose_source.own_alignment is None
     assert not store.path(NAME).exists()
     fresh = Link()
     AlignmentStore(store._folder).restore_bridge(fresh)
@@ -136,7 +136,7 @@ def test_a_robot_that_is_driven_stays_where_it_is(tool, robot, channel, state):
     assert "Bob is being driven" in answer(channel, "refused")
     save(tool, robot)
     assert "Bob is being driven" in answer(channel, "refused")
-    assert robot.whereabouts.own_alignment is None
+    assert robot.pose_source.own_alignment is None
 
 
 def test_one_that_is_driven_keeps_its_whole_bridge_in_place(tool, robot, channel, link):
@@ -147,7 +147,7 @@ def test_one_that_is_driven_keeps_its_whole_bridge_in_place(tool, robot, channel
     save(tool, robot, whole=True)
     assert "Ann is being driven" in answer(channel, "refused")
     save(tool, robot)
-    assert robot.whereabouts.own_alignment is not None
+    assert robot.pose_source.own_alignment is not None
     ann.destroy()
 
 
@@ -155,7 +155,7 @@ def test_one_that_is_driven_keeps_its_whole_bridge_in_place(tool, robot, channel
 def test_numbers_that_make_no_sense_are_refused(tool, robot, channel, wrong):
     save(tool, robot, wrong)
     assert "metres and an angle in degrees" in answer(channel, "refused")
-    assert robot.whereabouts.own_alignment is None
+    assert robot.pose_source.own_alignment is None
 
 
 def test_a_viewer_aligns_nothing(tmp_path, robot, channel, store):
@@ -168,7 +168,7 @@ def test_a_viewer_aligns_nothing(tmp_path, robot, channel, store):
     assert answer(channel, "refused") == "Only operators can align maps."
     save(tool, robot)
     assert answer(channel, "refused") == "Only operators can align maps."
-    assert robot.whereabouts.own_alignment is None
+    assert robot.pose_source.own_alignment is None
     page.close()
 
 
@@ -190,7 +190,7 @@ def test_what_cannot_be_kept_holds_and_that_is_said(tool, robot, channel, store)
     assert said["lost"].startswith(
         "The alignment is lost when WebMap ends: cannot save it"
     )
-    assert robot.whereabouts.own_alignment is not None
+    assert robot.pose_source.own_alignment is not None
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_a_file_that_cannot_be_read_aligns_nothing_and_is_said(
     store.path(NAME).parent.mkdir(exist_ok=True)
     store.path(NAME).write_text(text)
     store.restore(robot)
-    assert robot.whereabouts.own_alignment is None
+    assert robot.pose_source.own_alignment is None
     assert "cannot be read" in caplog.text
 
 

@@ -15,7 +15,7 @@ from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
 from webmap.config.buttons import ButtonMistake, read_button
 from webmap.core.page import Page, PageEntry
-from webmap.scene.events import Event
+from webmap.scene.element import Event
 from webmap_process import simulator
 
 DOCK = {"label": "Dock", "service": "/dock", "type": "std_srvs/Trigger"}

@@ -116,20 +116,20 @@ class TestInitialPose:
         tool, said = map.add_module("InitialPoseTool"), []
         bridge = Bridge("ws://127.0.0.1:9")
         monkeypatch.setattr(tool.half, "send", said.append)
-        tool.on_message({"doubt": robot.id})
+        tool.on_message({"covariance": robot.id})
         robot.set_initial_pose_topic(bridge, "/initialpose", covariance=(1, 4, 0.25))
         robot.set_alignment(3, 0, 90)
-        tool.on_message({"doubt": robot.id})
-        tool.on_message({"doubt": "r999"})
-        tool.on_message({"doubt": None})
-        assert said.pop(1)["doubt"] == {
+        tool.on_message({"covariance": robot.id})
+        tool.on_message({"covariance": "r999"})
+        tool.on_message({"covariance": None})
+        assert said.pop(1)["covariance"] == {
             "robot": robot.id,
             "x": 1,
             "y": 4,
             "yaw": 0.25,
             "turn": pytest.approx(math.pi / 2),
         }
-        assert said == [{"doubt": None}] * 3
+        assert said == [{"covariance": None}] * 3
 
     def test_a_key_is_one_character(self, map):
         with pytest.raises(ValueError, match="one character"):

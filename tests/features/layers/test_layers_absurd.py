@@ -216,12 +216,15 @@ def test_a_tilted_marker_higher_than_a_planet_is_refused(map, link, channel):
 def test_a_fix_whose_doubt_is_larger_than_a_planet_is_drawn_without_it(link, robot):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
     link.say("/fix", fix(50.0, 14.0, spread=[4.0, 0, 0, 0, 4.0, 0, 0, 0, 9.0]))
-    assert float(module.doubt.get("r")) == 2.0
+    assert float(module.covariance.get("r")) == 2.0
     link.say("/fix", fix(50.001, 14.0, spread=[FAR, 0, 0, 0, 4.0, 0, 0, 0, 9.0]))
-    assert float(module.doubt.get("r")) == 0.0
+    assert float(module.covariance.get("r")) == 0.0
     assert module.position == pytest.approx((0, 111.229), abs=0.01)
     (problem,) = robot.problems.values()
-    assert "a doubt of 1e+07 m at the most, got 1e+150 m, which is not" in problem
+    assert (
+        "the standard deviation of a fix must be at most 1e+07 m, got 1e+150 m; its"
+        in problem
+    )
     link.say("/fix", fix(50.001, 14.0))
     assert not robot.problems
 

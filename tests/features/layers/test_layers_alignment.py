@@ -87,7 +87,7 @@ def test_all_robots_of_a_bridge_go_along_but_those_with_their_own(link, bob):
 def test_a_robot_on_another_bridge_stays(bob):
     go_on = Link()
     align_bridge(go_on, 3.0, 0.0, 0.0)
-    assert bob.whereabouts.alignment == Pose()
+    assert bob.pose_source.alignment == Pose()
     bob.set_odometry_topic(go_on, "/odom", 0, type="geometry_msgs/PoseStamped")
     go(go_on, 1.0, 0.0)
     assert where(bob) == (4.0, 0.0, 0.0)
@@ -160,7 +160,7 @@ def test_layers_let_a_robot_go_that_is_gone(map, link, bob):
     map.add_robot(bob)
     bob.add_module("OnMaps", "Markers", link, "/bob/markers")
     map.remove_robot(bob)
-    assert bob.whereabouts._listeners == {}
+    assert bob.pose_source._listeners == {}
 
 
 def test_the_gate_is_told_where_a_robots_own_map_lies(link, bob):

@@ -156,7 +156,7 @@ def test_of_a_robot_without_frames_a_clock_that_is_a_minute_off_is_said(
 
 def test_who_stands_and_says_nothing_more_is_no_trouble(link, scanner, robot):
     odometry(link, 100.0)
-    robot.whereabouts.heard_at -= 90.0
+    robot.pose_source.received_at -= 90.0
     link.say("/scan", scan(WALL, 190.0))
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.0))
     assert robot.problems == {}
@@ -250,5 +250,5 @@ def test_a_module_that_ends_hears_of_its_robot_no_more(link, scanner, robot):
     odometry(link, 100.0)
     link.say("/scan", scan(WALL, 100.2))
     robot.remove_module(scanner)
-    assert robot.whereabouts._listeners == {}
+    assert robot.pose_source._listeners == {}
     odometry(link, 100.3)

@@ -384,7 +384,7 @@ def test_a_fix_of_satellites_is_where_the_robot_is(tab, running):
     near(
         tab, 'inWorld(".navsatfix > .cross", [[0, 0]])', [(pose.x, pose.y)], 0.02, "fix"
     )
-    doubt = tab.locator(".navsatfix > .doubt")
+    doubt = tab.locator(".navsatfix > .covariance")
     assert float(doubt.get_attribute("r")) == pytest.approx(0.3)
 
 

@@ -48,7 +48,7 @@ def test_a_gps_fix_is_drawn_as_a_fix(link, robot, type):
     more = {"header": header("", ros2=ros2), "satellites_used": 7, "status": 18}
     link.say("/gps", {**said, "status": more, "track": 90.0, "speed": 1.0, "dip": 0.0})
     assert at(module) == pytest.approx((0, 111.229), abs=0.01)
-    assert module.doubt.get("r") == "2"
+    assert module.covariance.get("r") == "2"
     link.say("/gps", {**said, "status": {**more, "status": -1}})
     assert "lost" in module.svg.classes
 
@@ -131,9 +131,9 @@ def test_a_robot_without_a_map_has_its_fix_by_odometry_until_there_is_one(
 def test_the_circle_is_as_wide_as_the_doubt(link, robot):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
     link.say("/fix", fix(50, 14, spread=[4.0, 0, 0, 0, 2.25, 0, 0, 0, 9.0]))
-    assert module.doubt.get("r") == "2"
+    assert module.covariance.get("r") == "2"
     link.say("/fix", fix(50, 14, spread=[math.nan] * 9))
-    assert module.doubt.get("r") == "0"
+    assert module.covariance.get("r") == "0"
 
 
 def test_over_the_date_line_it_is_not_far(link, robot):

@@ -10,7 +10,7 @@ from test_layers_poses import sonar
 from test_layers_ways import in_world, near, path
 
 from webmap.base.geometry import Affine
-from webmap.poses.frames import _heard
+from webmap.poses.frames import _shared_frames
 
 
 def transform(parent, child, x, y, yaw, secs=3) -> dict:
@@ -131,7 +131,7 @@ def local(**info) -> dict:
 
 
 def test_a_costmap_in_the_odometrys_frame_moves_as_that_does(map, link, channel):
-    before = dict(_heard)
+    before = dict(_shared_frames)
     module = map.add_module("OccupancyGrid", link, "/local", map_frame="map")
     link.say("/local", {**local(), "header": header("map")})
     assert "/tf" not in link.listeners, "nobody needs frames yet"
@@ -148,7 +148,7 @@ def test_a_costmap_in_the_odometrys_frame_moves_as_that_does(map, link, channel)
     assert module.layer.problems == {}
     map.remove_module(module)
     assert link.listeners == {}
-    assert _heard == before
+    assert _shared_frames == before
 
 
 def test_a_costmap_of_one_of_many_robots_is_placed_by_that_ones_frames(map, link):

@@ -12,7 +12,7 @@ from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Affine
 from webmap.features.layers.markers import layer as markers
 from webmap.poses.alignment import align_bridge
-from webmap.poses.frames import _heard
+from webmap.poses.frames import _shared_frames
 
 
 @pytest.fixture(autouse=True)
@@ -113,7 +113,7 @@ def test_texts_are_upright_in_whatever_frame(link, layer):
 
 
 def test_frames_are_heard_only_when_a_marker_needs_them(map, link):
-    before = dict(_heard)
+    before = dict(_shared_frames)
     module = map.add_module("Markers", link, "/markers")
     say(link, cube(1, "map"), cube(2, ""))
     assert set(link.listeners) == {"/markers"}
@@ -121,7 +121,7 @@ def test_frames_are_heard_only_when_a_marker_needs_them(map, link):
     assert set(link.listeners) == {"/markers", "/tf", "/tf_static"}
     map.remove_module(module)
     assert link.listeners == {}
-    assert _heard == before
+    assert _shared_frames == before
 
 
 def test_who_wants_no_frames_gets_markers_as_they_come(map, link):

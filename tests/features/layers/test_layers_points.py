@@ -211,7 +211,7 @@ def test_of_many_cells_some_are_drawn_and_that_is_said(link, robot):
     assert drawn[-1] == pytest.approx(23.75, abs=2e-3)
     assert max(np.diff(drawn)) < 5, "evenly chosen"
     (problem,) = robot.problems.values()
-    assert "more than 10 cells, of which so many are drawn" in problem
+    assert "more than 10 cells: only that many are drawn" in problem
     link.say("/cells", cells([(i, 0) for i in range(10)]))
     assert len(boxes(module)) == 10
     assert robot.problems == {}

@@ -58,17 +58,17 @@ def test_lines_of_both_dialects_come_while_the_panel_is_open(map, page, said):
         panel.on_message({"open": True})
         old.say("error", "stuck")
         new.say("info", "on my way", "nav", ros2=True)
-        panel.tell()
+        panel.send_new_lines()
         first, second = said
         assert (first["bridge"], first["total"], first["state"]) == (0, 1, "open")
         assert first["said"][0][1:5] == ["error", "/planner", "stuck", 1]
         assert second["said"][0][1:5] == ["info", "nav", "on my way", 1]
         said.clear()
-        panel.tell()
+        panel.send_new_lines()
         assert said == [], "what was told is not told again"
         old.say("error", "stuck")
         old.state = "closed"
-        panel.tell()
+        panel.send_new_lines()
         assert said[0]["said"][0][4] == 2, "what is said again is counted"
         assert said[0]["state"] == "closed"
         panel.on_message({"open": False})

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from wire_picture import histories, picture_of, play
 
 from webmap.base.geometry import Affine
-from webmap.scene import fragment, html, node, svg
+from webmap.scene import html, node, svg
 from webmap.scene.bound import Document
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 from webmap.scene.wire.session import SceneSession
 
 HERE = Path(__file__).parent
@@ -140,8 +140,8 @@ GOLDEN_SESSIONS = (everything_about_elements, a_page_with_a_map, one_tick_of_two
 
 @pytest.mark.parametrize("make", GOLDEN_SESSIONS)
 def test_the_golden_frames_are_what_is_sent(make, decoder, monkeypatch):
-    monkeypatch.setattr(node, "_ids", itertools.count(1))
-    monkeypatch.setattr(fragment, "_ids", itertools.count(1))
+    monkeypatch.setattr(node, "_node_ids", itertools.count(1))
+    monkeypatch.setattr(node, "_fragment_ids", itertools.count(1))
     monkeypatch.setattr(secrets, "randbits", lambda bits: 12345)
     session = make()
     frame = session.frame(1.5)

@@ -8,7 +8,7 @@ from webmap.base.geometry import Affine
 from webmap.scene import html, svg
 from webmap.scene.allowed import ATTRIBUTES
 from webmap.scene.bound import Document
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 from webmap.scene.wire.encode import (
     _SLOTS,
     encode_changes,

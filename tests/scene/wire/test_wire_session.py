@@ -5,7 +5,7 @@ import pytest
 from webmap.base.errors import WireError
 from webmap.scene import html, svg
 from webmap.scene.bound import Document
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 from webmap.scene.wire.messages import ElementEvent, ModuleMessage, ViewReport
 from webmap.scene.wire.opcodes import RESET, VERSION
 from webmap.scene.wire.page_state import PendingRecords
@@ -148,7 +148,7 @@ def test_a_viewer_too_far_behind_is_told_everything():
     for _ in range(Fragment.REMOVALS_KEPT + 1):
         child = svg.g()
         root.append(child)
-        fragment.mark_told()
+        fragment.mark_sent()
         child.remove()
     assert header(session.frame(0.0))[1] == RESET
 

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from webmap.base.geometry import Affine
 from webmap.scene import html, svg
 from webmap.scene.bound import BoundElement
-from webmap.scene.fragment import Fragment
-from webmap.scene.node import Text
+from webmap.scene.node import Fragment, Text
 from webmap.scene.wire.page_state import flags
 
 

@@ -70,7 +70,7 @@ class AlignTool:
         if robot is None or why is not None:
             self.half.send({"refused": why})
             return
-        bridge = robot.whereabouts.bridge
+        bridge = robot.pose_source.bridge
         assert bridge is not None  # else it is barred
         together = [r.id for r in self._together(robot)]
         self.half.send(
@@ -81,8 +81,8 @@ class AlignTool:
                     "bridge": getattr(bridge, "name", bridge.url),
                     "mark": alignments.mark(bridge),
                     "together": together,
-                    "whole": robot.whereabouts.own_alignment is None,
-                    "own": numbers(robot.whereabouts.alignment),
+                    "whole": robot.pose_source.own_alignment is None,
+                    "own": numbers(robot.pose_source.alignment),
                     "common": numbers(alignments.of(bridge)),
                 }
             }
@@ -95,7 +95,7 @@ class AlignTool:
         why = self._barred(robot, whole=whole)
         if robot is None or why is not None:
             raise ConfigError(why or "it is not on this map any more")
-        bridge = robot.whereabouts.bridge
+        bridge = robot.pose_source.bridge
         assert bridge is not None  # else it is barred
         before: Pose | None
         if whole:
@@ -105,7 +105,7 @@ class AlignTool:
             align_bridge(bridge, *numbers(pose))
         else:
             name = name_of(bridge, robot.name)
-            before = robot.whereabouts.own_alignment
+            before = robot.pose_source.own_alignment
             robot.set_alignment(*numbers(pose))
         spawn(self._keep(name, before, pose))
 
@@ -127,7 +127,7 @@ class AlignTool:
             return "Only operators can align maps."
         if robot is None:
             return "Select a robot first."
-        if robot.whereabouts.bridge is None:
+        if robot.pose_source.bridge is None:
             return f"Cannot align {robot.name}: its pose is unknown."
         concerned = self._together(robot) if whole else [robot]
         for each in concerned:
@@ -137,13 +137,13 @@ class AlignTool:
 
     def _together(self, robot: "Robot") -> "list[Robot]":
         """Return the robots that are aligned with a robot's bridge, itself included."""
-        bridge = robot.whereabouts.bridge
+        bridge = robot.pose_source.bridge
         return [
             each
             for each in self.map.robots
             if each is robot
             or (
-                each.whereabouts.bridge is bridge
-                and each.whereabouts.own_alignment is None
+                each.pose_source.bridge is bridge
+                and each.pose_source.own_alignment is None
             )
         ]

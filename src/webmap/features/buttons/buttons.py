@@ -18,8 +18,7 @@ from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field, UnknownType
 from webmap.ros.message_forms import entry_of, filled_in, hint, initial, leaves
 from webmap.scene import html
-from webmap.scene.element import Element
-from webmap.scene.events import Event
+from webmap.scene.element import Element, Event
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 MAY_PRESS = ("operator", "admin")
 """Roles that may press buttons."""
 
-ASKED_FOR = 0.3
+MIN_QUESTION_TIME = 0.3
 """Seconds before the answer to a question counts, against double clicks."""
 
 HEADER = "std_msgs/Header"
@@ -48,7 +47,7 @@ class ButtonView:
         self._viewer = page_of(parent).viewer
         self._form: FormView | None = None
         self._values: Any = None
-        self._asked = 0.0
+        self._asked_at = 0.0
         spec = button.spec
         self._press = html.button(text=spec.label, type="button", class_="button go")
         self._press.on("click", self._pressed)
@@ -84,7 +83,7 @@ class ButtonView:
                 limit=button.spec.timeout,
                 age_text=True,
             )
-        self._result.text = _said(button, why)
+        self._result.text = _result_text(button, why)
 
     def _barred(self) -> str | None:
         if self._viewer.role not in MAY_PRESS:
@@ -104,7 +103,7 @@ class ButtonView:
         if confirm is None:
             await self._run(values)
             return
-        self._values, self._asked = values, time.monotonic()
+        self._values, self._asked_at = values, time.monotonic()
         yes = html.button(text="Yes", type="button", class_="button danger yes")
         no = html.button(text="No", type="button", class_="button no")
         yes.on("click", self._confirmed)
@@ -113,7 +112,7 @@ class ButtonView:
         self._question.set(hidden=False)
 
     async def _confirmed(self, event: Event) -> None:
-        if time.monotonic() - self._asked < ASKED_FOR:
+        if time.monotonic() - self._asked_at < MIN_QUESTION_TIME:
             return
         self._close(self._question)
         await self._run(self._values)
@@ -147,8 +146,8 @@ class ButtonView:
             self._buttons("Ask the robot", self._ask_robot),
         ]
 
-    def _buttons(self, words: str, act: Any) -> Element:
-        go = html.button(text=words, type="button", class_="button yes")
+    def _buttons(self, label: str, act: Any) -> Element:
+        go = html.button(text=label, type="button", class_="button yes")
         no = html.button(text="Cancel", type="button", class_="button no")
         go.on("click", act)
         no.on("click", lambda event: self._close(self._sheet))
@@ -181,7 +180,7 @@ class ButtonView:
             self._form = None
 
 
-def _said(button: RobotButton, why: str | None) -> str:
+def _result_text(button: RobotButton, why: str | None) -> str:
     """Return the text under a button that cannot be pressed because of ``why``."""
     if button.state == "running":
         return f"Running for {button.by}"
@@ -292,8 +291,8 @@ def _choice(field: Field, entry: str) -> Element:
     if entry not in values:
         values = {entry: "", **values}
     for value, name in values.items():
-        words = name.removeprefix(prefix).replace("_", " ").lower()
-        option = html.option(text=f"{value} {words}".strip(), value=value)
+        label = name.removeprefix(prefix).replace("_", " ").lower()
+        option = html.option(text=f"{value} {label}".strip(), value=value)
         choice.append(option.set(selected=value == entry))
     return choice
 

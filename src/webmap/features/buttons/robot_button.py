@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from webmap.base.errors import MotionRefused, ServiceError, WebMapError
 from webmap.base.scope import Removable, Removal, keep
 from webmap.config.buttons import ButtonSpec, motion_of, value_kind
-from webmap.core.motion import roads
+from webmap.core.motion import robot_motions
 from webmap.ros.bridge import Bridge
 from webmap.ros.definitions import Field
 from webmap.ros.message_forms import checked, fields_of
@@ -25,7 +25,7 @@ State = Literal["idle", "running", "done", "failed"]
 PROGRAM = "this program"
 """Who presses, if a program does."""
 
-MAX_WORDS = 300
+MAX_TEXT = 300
 """The greatest number of characters of a result's text."""
 
 
@@ -183,8 +183,8 @@ def declared_motion(spec: ButtonSpec, url: str) -> str | None:
     """
     if spec.kind == "parameter":
         return None
-    for road in list(roads):
-        carried = road.writes(url).get(spec.name)
+    for motion in list(robot_motions):
+        carried = motion.writes(url).get(spec.name)
         if carried is not None:
             return (
                 f"{spec.name} carries {carried}, and a button may not write that: "
@@ -296,11 +296,11 @@ def answered(answer: Any) -> str:
     """
     if not isinstance(answer, Mapping):
         return "Done"
-    said = str(answer.get("message") or answer.get("status_message") or "")
+    message = str(answer.get("message") or answer.get("status_message") or "")
     if answer.get("success") is False:
-        raise NotDone(shortened(said or "the robot reports no success"))
-    if said:
-        return shortened(f"Done: {said}")
+        raise NotDone(shortened(message or "the robot reports no success"))
+    if message:
+        return shortened(f"Done: {message}")
     rest = {name: value for name, value in answer.items() if name != "success"}
     words = ", ".join(f"{name} {shown(value)}" for name, value in rest.items() if value)
     return shortened(f"Done: {words}") if words else "Done"
@@ -316,6 +316,6 @@ def shown(value: Any) -> str:
 
 
 def shortened(text: str) -> str:
-    """Return a text without unprintable characters, cut to ``MAX_WORDS``."""
+    """Return a text without unprintable characters, cut to ``MAX_TEXT``."""
     plain = "".join(c if c.isprintable() else " " for c in text)
-    return plain if len(plain) <= MAX_WORDS else f"{plain[: MAX_WORDS - 3]}..."
+    return plain if len(plain) <= MAX_TEXT else f"{plain[: MAX_TEXT - 3]}..."

@@ -92,7 +92,7 @@ class CameraPanel:
         self.map = map
         self._robot: Robot | None = None
         self._cameras: dict[int, Any] = {}
-        self._told: dict[str, Any] | None = None
+        self._sent: dict[str, Any] | None = None
         self._watched: Any = None
         self._watching: Any = None
         self.half = map.add_browser_half(
@@ -109,7 +109,7 @@ class CameraPanel:
     def on_ready(self) -> None:
         """Send the cameras to a page that has connected or reconnected."""
         self._watch(None)
-        self._told = None
+        self._sent = None
         self.poll()
 
     def on_select(self) -> None:
@@ -120,7 +120,7 @@ class CameraPanel:
         """Send the page the cameras that were added or removed."""
         robot = self.map.selected
         cameras = cameras_of(robot)
-        told = {
+        message = {
             "op": "cameras",
             "robot": "" if robot is None else robot.id,
             "name": "" if robot is None else robot.name,
@@ -128,12 +128,12 @@ class CameraPanel:
                 {"id": camera_number(camera), "name": camera.name} for camera in cameras
             ],
         }
-        if told == self._told:
+        if message == self._sent:
             return
-        self._told = told
+        self._sent = message
         self._cameras = {camera_number(camera): camera for camera in cameras}
         self._watch(None)
-        self.half.send(told)
+        self.half.send(message)
 
     def on_message(self, message: dict[str, Any]) -> None:
         """Send the pictures of the camera that the page has chosen, or none."""

@@ -77,5 +77,5 @@ class HttpCamera(CameraFeed):
         self.robot.clear_problem(self)
         self.show(data, media_type)
 
-    def _complain(self, words: str) -> None:
-        self.robot.set_problem(self, f"{self.name} at {self.address}: {words}")
+    def _complain(self, text: str) -> None:
+        self.robot.set_problem(self, f"{self.name} at {self.address}: {text}")

@@ -18,7 +18,7 @@ from webmap.features.doctor.in_use import in_use
 if TYPE_CHECKING:
     from webmap import Bridge, Element, Map
 
-WORDS = {"wrong": "Wrong", "warning": "Warning", "note": "Note", "good": "Good"}
+LEVEL_NAMES = {"wrong": "Wrong", "warning": "Warning", "note": "Note", "good": "Good"}
 
 SHAPES = {
     "wrong": ("M8 2.5h8L21.5 8v8L16 21.5H8L2.5 16V8z", "M8 8l8 8M16 8l-8 8"),
@@ -161,7 +161,7 @@ def groups(findings: Sequence["Finding"]) -> "Iterator[Element]":
 def line(finding: "Finding") -> "Element":
     """Return one finding: a shape, a word, the fact, and the advice."""
     return entry(
-        finding.level, f"{WORDS[finding.level]}: ", finding.words, finding.advice
+        finding.level, f"{LEVEL_NAMES[finding.level]}: ", finding.words, finding.advice
     )
 
 
@@ -187,10 +187,10 @@ def entry(level: str, word: str, words: str, advice: str = "") -> "Element":
         viewBox="0 0 24 24",
         class_="icon",
     )
-    said = html.div(html.p(html.strong(text=word), words))
+    message = html.div(html.p(html.strong(text=word), words))
     if advice:
-        said.append(html.p(text=advice, class_="advice"))
-    item = html.li(shape.set("aria-hidden", "true"), said, class_="finding")
+        message.append(html.p(text=advice, class_="advice"))
+    item = html.li(shape.set("aria-hidden", "true"), message, class_="finding")
     return item.set("data-level", level)
 
 
@@ -250,13 +250,13 @@ class Checkup:
         numbers = {level: 0 for level in PLURAL}
         for finding in self.findings:
             numbers[finding.level] += 1
-        said = [
+        texts = [
             f"{number} {level if number == 1 else PLURAL[level]}"
             for level, number in numbers.items()
             if number
         ]
         free = not numbers["wrong"] and not numbers["warning"]
-        return ("No problems: " if free else "") + ", ".join(said)
+        return ("No problems: " if free else "") + ", ".join(texts)
 
     @property
     def text(self) -> str:
@@ -282,19 +282,22 @@ class Checkup:
             self._begin(self._try(self._seen))
 
     def _begin(self, work: Coroutine[None, None, Observed]) -> None:
-        self._say("Starting.")
+        self._show_progress("Starting.")
         self._task = asyncio.get_running_loop().create_task(self._run(work))
 
     async def _look(self, robots: Sequence[MeantRobot]) -> Observed:
         try:
             return await self._observe(
-                self.url, seconds=SECONDS, meant=lambda _: robots, progress=self._say
+                self.url,
+                seconds=SECONDS,
+                meant=lambda _: robots,
+                progress=self._show_progress,
             )
         finally:
             self.ended = time.monotonic()
 
     async def _try(self, seen: Observed) -> Observed:
-        self._say(TRYING)
+        self._show_progress(TRYING)
         return await self._tried(seen)
 
     async def _run(self, work: Coroutine[None, None, Observed]) -> None:
@@ -307,9 +310,9 @@ class Checkup:
             advice = f"Run webmap doctor {self.url} in a terminal and read the log."
             self._seen = None
             self.findings = [Finding("wrong", "bridge", words, advice)]
-        self._say("")
+        self._show_progress("")
 
-    def _say(self, doing: str) -> None:
+    def _show_progress(self, doing: str) -> None:
         self.doing = doing
         self.version += 1
 
@@ -328,7 +331,7 @@ def checkup_of(bridge: "Bridge") -> Checkup:
 MAY_TRY = ("operator", "admin")
 """Roles that may try a call."""
 
-TRY_WORDS = (
+TRY_EXPLANATION = (
     "Does one slow service call delay later calls on the same connection? To test "
     "this, WebMap advertises a service of its own with a unique name, calls it over a "
     "separate connection, waits one second before the answer, and meanwhile asks "
@@ -359,7 +362,7 @@ class TryCall:
         no = html.button("Cancel", type="button", class_="button")
         no.on("click", lambda event: self._ask(False))
         self.question: Element = html.div(
-            *(html.p(text=text) for text in TRY_WORDS),
+            *(html.p(text=text) for text in TRY_EXPLANATION),
             html.div(self._yes, no, class_="doctor-answers"),
             class_="doctor-question",
             role="group",

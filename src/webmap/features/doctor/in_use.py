@@ -90,8 +90,8 @@ def _drawn(robot: "Robot", bridge: "Bridge", maps: Iterable[Made]) -> Topics:
             given.apply_defaults()
             if given.arguments.get("bridge") is bridge:
                 topic, type = (given.arguments.get(key) for key in ("topic", "type"))
-                said = (str(topic), str(type or ""))
-                topics[DRAWN[name]] = (*topics[DRAWN[name]], said)
+                found = (str(topic), str(type or ""))
+                topics[DRAWN[name]] = (*topics[DRAWN[name]], found)
         elif name == "OnMaps" and args:
             grids.append((args[0], args[1:], {"robot": robot, **options}))
     for name, args, options in grids:
@@ -109,9 +109,9 @@ def _grid(
     options: dict[str, Any],
 ) -> tuple[Role, str]:
     """Return a grid's role and topic; no topic if the robot is not on the grid."""
-    said = {**dict(zip(("bridge", "topic"), args, strict=False)), **options}
-    role: Role = "costmap" if said.get("palette") == "costmap" else "map"
-    mine = said.get("bridge") is bridge and said.get("robot") in (None, robot)
+    arguments = {**dict(zip(("bridge", "topic"), args, strict=False)), **options}
+    role: Role = "costmap" if arguments.get("palette") == "costmap" else "map"
+    mine = arguments.get("bridge") is bridge and arguments.get("robot") in (None, robot)
     if name != "OccupancyGrid" or not mine:
         return role, ""
-    return role, str(said.get("topic", "/map"))
+    return role, str(arguments.get("topic", "/map"))

@@ -7,7 +7,7 @@ from webmap.core.registry import map_modules
 if TYPE_CHECKING:
     from webmap.core.map import Map
 
-MAX_WORDS = 200
+MAX_TEXT = 200
 
 
 @map_modules.register
@@ -37,7 +37,7 @@ class ExportTool:
         """Report what the page could not save."""
         failed, missing = message.get("failed"), message.get("missing")
         if isinstance(failed, str):
-            self.map.report_error(f"the view was not saved: {failed[:MAX_WORDS]}")
+            self.map.report_error(f"the view was not saved: {failed[:MAX_TEXT]}")
         elif isinstance(missing, int):
             self.map.report_error(
                 f"the view was saved without {missing} of its images: the display "

@@ -3,7 +3,7 @@
 import logging
 from typing import TYPE_CHECKING, Any
 
-from webmap.core.given_pose import robot_and_pose
+from webmap.core.map import robot_and_pose
 from webmap.core.registry import map_modules
 
 if TYPE_CHECKING:

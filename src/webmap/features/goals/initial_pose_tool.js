@@ -21,9 +21,9 @@ const OUTLINE = "M-14-11H8l9 11-9 11h-22zM17 0h26M43 0l-9-6M43 0l-9 6";
  *
  * The tool begins with its button, with `i`, or with a message `{active: true}`; Escape
  * ends it. Sends `{told: {robot, x, y, yaw}}` when the gate has accepted the pose.
- * Sends `{doubt: robot}` to request the variances of the pose; the answer is `{doubt:
- * {robot, x, y, yaw, turn}}` with variances in m² and rad², or null, and the rotation
- * of the robot's own map on this map, in radians.
+ * Sends `{covariance: robot}` to request the variances of the pose. The answer is
+ * `{covariance: {robot, x, y, yaw, turn}}` with variances in m² and rad², or null, and
+ * the rotation of the robot's own map on this map, in radians.
  *
  * Options: `button` (true), whether there is a button; `key` ("i").
  *
@@ -69,12 +69,12 @@ class InitialPoseTool {
       this._go,
       this._word,
     );
-    this._doubt = new Doubt();
+    this._covariance = new Covariance();
     this._outline = svg("path", { d: OUTLINE, class: "webmap-locate-arrow" });
     this._drawing = svg(
       "svg",
       { class: "webmap-aim-drawing", "aria-hidden": "true" },
-      this._doubt.element,
+      this._covariance.element,
       this._outline,
     );
     this._offs = [
@@ -95,9 +95,9 @@ class InitialPoseTool {
 
   /** @param {any} message */
   receive(message) {
-    if (message && "doubt" in message) {
-      const { doubt } = message;
-      this._doubt.know(doubt?.robot === this._map.selected ? doubt : null);
+    if (message && "covariance" in message) {
+      const { covariance } = message;
+      this._covariance.set(covariance?.robot === this._map.selected ? covariance : null);
       this._explain();
       this._draw();
     }
@@ -115,7 +115,7 @@ class InitialPoseTool {
 
   /** @param {boolean} active */
   _changed(active) {
-    if (active) this._send({ doubt: this._map.selected });
+    if (active) this._send({ covariance: this._map.selected });
     if (!active) say(this._word, "");
     this._explain();
     this._show();
@@ -123,7 +123,7 @@ class InitialPoseTool {
 
   _explain() {
     if (!this._aim.active) return;
-    const sure = this._doubt.words;
+    const sure = this._covariance.words;
     const words = "Press where the robot is and drag for the heading";
     say(this._word, sure === "" ? `${words}.` : `${words} (${sure}).`);
   }
@@ -159,7 +159,7 @@ class InitialPoseTool {
   }
 
   _selected() {
-    this._doubt.know(null);
+    this._covariance.set(null);
     this._aim.leave();
     say(this._word, "");
     this._show();
@@ -172,7 +172,7 @@ class InitialPoseTool {
   }
 
   _draw() {
-    this._doubt.draw(this._map.view, this._pose);
+    this._covariance.draw(this._map.view, this._pose);
     this._outline.toggleAttribute("hidden", this._pose === null);
     if (this._pose === null) return;
     const { x, y, degrees } = onScreen(this._map.view, this._pose);
@@ -196,7 +196,7 @@ const DEVIATIONS = 2;
 const WEDGE = 64;
 
 /** The ellipse and the wedge of an aimed pose. */
-export class Doubt {
+export class Covariance {
   constructor() {
     this._ellipse = svg("ellipse", { class: "webmap-locate-ellipse" });
     this._wedge = svg("path", { class: "webmap-locate-wedge" });
@@ -207,7 +207,7 @@ export class Doubt {
   }
 
   /** @param {Variances | null} variances */
-  know(variances) {
+  set(variances) {
     this._variances = variances;
   }
 

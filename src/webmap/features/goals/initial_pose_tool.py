@@ -3,7 +3,7 @@
 import logging
 from typing import TYPE_CHECKING, Any
 
-from webmap.core.given_pose import robot_and_pose
+from webmap.core.map import robot_and_pose
 from webmap.core.registry import map_modules
 
 if TYPE_CHECKING:
@@ -50,21 +50,27 @@ class InitialPoseTool:
 
     def on_message(self, message: dict[str, Any]) -> None:
         """Handle the page's message of a sent pose, or send the page variances."""
-        if "doubt" in message:
-            self._tell_doubt(message["doubt"])
+        if "covariance" in message:
+            self._send_covariance(message["covariance"])
         elif isinstance(message.get("told"), dict):
-            told = robot_and_pose(self.map, message["told"])
-            if told is not None:
-                self.map.notify_modules("on_pose_told", *told)
+            pose = robot_and_pose(self.map, message["told"])
+            if pose is not None:
+                self.map.notify_modules("on_pose_told", *pose)
         else:
             log.warning("%r: an unknown message of the page was ignored", self.map)
 
-    def _tell_doubt(self, id: Any) -> None:
+    def _send_covariance(self, id: Any) -> None:
         robot = self.map.find_robot(id)
         spec = robot.motion.spec() if robot is not None else None
         if robot is None or spec is None or spec.pose_topic is None:
-            self.half.send({"doubt": None})
+            self.half.send({"covariance": None})
             return
         x, y, yaw = spec.pose_covariance
-        doubt = {"robot": robot.id, "x": x, "y": y, "yaw": yaw, "turn": spec.own_map[2]}
-        self.half.send({"doubt": doubt})
+        covariance = {
+            "robot": robot.id,
+            "x": x,
+            "y": y,
+            "yaw": yaw,
+            "turn": spec.own_map[2],
+        }
+        self.half.send({"covariance": covariance})

@@ -97,12 +97,12 @@ def read_labels(data: Any, of: str) -> tuple[Label, ...]:
 class _Misplaced(ConfigError):
     """An error in a label, with its position in the file."""
 
-    def __init__(self, way: tuple[str | int, ...], of: str, words: str) -> None:
-        super().__init__(f"{of}: {words}" if of else words)
-        self.way, self.of, self.words = way, of, words
+    def __init__(self, path: tuple[str | int, ...], of: str, text: str) -> None:
+        super().__init__(f"{of}: {text}" if of else text)
+        self.path, self.of, self.text = path, of, text
 
     def inside(self, number: int) -> "_Misplaced":
-        return _Misplaced((number, *self.way), self.of, self.words)
+        return _Misplaced((number, *self.path), self.of, self.text)
 
 
 def label_file(file: str | Path) -> tuple[Label, ...]:
@@ -114,13 +114,13 @@ def label_file(file: str | Path) -> tuple[Label, ...]:
     """
     from webmap.base.lined_yaml import LinedYaml
 
-    said = LinedYaml(Path(file))
+    document = LinedYaml(Path(file))
     try:
-        return read_labels(said.data, "labels")
+        return read_labels(document.data, "labels")
     except _Misplaced as error:
-        table = isinstance(said.data, Mapping) and set(said.data) == {"labels"}
-        way = ("labels", *error.way) if table else error.way
-        raise said.wrong(way, str(error)) from None
+        table = isinstance(document.data, Mapping) and set(document.data) == {"labels"}
+        path = ("labels", *error.path) if table else error.path
+        raise document.wrong(path, str(error)) from None
 
 
 def new_label(data: Mapping[str, Any]) -> Label:
@@ -200,9 +200,9 @@ class LabelStore:
 
 
 def _label(data: Any, of: str) -> Label:
-    def wrong(key: object, words: str) -> ConfigError:
+    def wrong(key: object, text: str) -> ConfigError:
         shown = key if key in _KEYS else _show(key)
-        return _Misplaced((str(key),), f"{of}{'.' if of else ''}{shown}", words)
+        return _Misplaced((str(key),), f"{of}{'.' if of else ''}{shown}", text)
 
     if not isinstance(data, Mapping):
         raise _Misplaced((), of, "expected a table with name, x and y")

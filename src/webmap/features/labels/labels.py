@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from webmap.base.errors import ConfigError
 from webmap.base.scope import Removal, keep
 from webmap.base.tasks import spawn
-from webmap.core.given_pose import robot_and_pose
 from webmap.core.layer import Layer
+from webmap.core.map import robot_and_pose
 from webmap.core.registry import map_modules
 from webmap.features.labels.label_store import (
     ICONS,
@@ -233,14 +233,14 @@ class AddedLabels:
                 self._unsaved = False
                 try:
                     await asyncio.to_thread(self.store.save, list(self.labels.values()))
-                    self._say("")
+                    self._show_trouble("")
                 except OSError as error:
                     file, why = self.store.file, error.strerror
-                    self._say(f"labels are not kept: {file}: {why}")
+                    self._show_trouble(f"labels are not kept: {file}: {why}")
         finally:
             self._saving = None
 
-    def _say(self, problem: str) -> None:
+    def _show_trouble(self, problem: str) -> None:
         self._problem = problem
         for layer in self._shown_by:
             if problem:

@@ -22,7 +22,7 @@ from webmap.scene.element import Element
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
-Whose: TypeAlias = Literal["own", "another", "nobody"]
+Owner: TypeAlias = Literal["own", "another", "unknown"]
 """Owner of a part, for one robot: the robot, another robot, or unknown."""
 
 
@@ -48,7 +48,7 @@ class PartOwners:
         self._followers[namespace] += 1
         return keep(Removal(lambda: self._leave(namespace)))
 
-    def whose(self, name: str, namespace: str) -> Whose:
+    def owner(self, name: str, namespace: str) -> Owner:
         """Return the owner of a part.
 
         A single robot owns all parts. With several robots, a part belongs to the
@@ -65,7 +65,7 @@ class PartOwners:
         while inside and inside not in self._followers:
             inside = inside.rpartition("/")[0]
         if not inside:
-            return "nobody"
+            return "unknown"
         return "own" if inside == namespace else "another"
 
     def _leave(self, namespace: str) -> None:
@@ -102,10 +102,10 @@ MAX_VALUES = 100
 LONGEST_NAME, LONGEST = 256, 1000
 """Greatest numbers of characters that are kept of a name, and of a message or value."""
 
-UNHEARD = "unheard"
+NOT_RECEIVED = "unheard"
 """The class of a badge until diagnostics of the robot are received."""
 
-UNSAID = "no diagnostics of this robot received"
+NOT_RECEIVED_TITLE = "no diagnostics of this robot received"
 GREY = "#8a8f98"
 
 # An error is worse than a stale part, although its number is smaller.
@@ -140,10 +140,10 @@ class DiagnosticStatusMsg(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         Raises:
             ProtocolError: If the level has any other value.
         """
-        said = self.level_value
-        level = said if isinstance(said, int) else _byte(said)
+        value = self.level_value
+        level = value if isinstance(value, int) else _byte(value)
         if not 0 <= level < len(LEVELS):
-            raise ProtocolError(f"{self.name!r}: a level is 0 to 3, got {said!r}")
+            raise ProtocolError(f"{self.name!r}: a level is 0 to 3, got {value!r}")
         return level
 
 
@@ -165,7 +165,7 @@ class Health:
     message: str
     hardware_id: str
     values: dict[str, str]
-    heard: float
+    received_at: float
     """Time of receipt, in monotonic seconds."""
 
     shared: bool = False
@@ -181,7 +181,7 @@ class Health:
             "health",
             {
                 r"/diagnostics\Z": "the usual name",
-                r"/diagnostics_agg\Z": "what an aggregator says",
+                r"/diagnostics_agg\Z": "the topic of an aggregator",
             },
             most=1,
             shared=True,
@@ -248,10 +248,10 @@ class Diagnostics:
         self._parts: dict[str, Health] = {}
         self._lists: list[Element] = []
         self._shown: list[tuple[str, str, str]] = []
-        self._title = svg.title(text=UNSAID)
+        self._title = svg.title(text=NOT_RECEIVED_TITLE)
         self.svg = svg.circle(
             self._title,
-            class_=f"diagnostics {UNHEARD}",
+            class_=f"diagnostics {NOT_RECEIVED}",
             cx=0.3,
             cy=0.3,
             r=0.08,
@@ -289,10 +289,10 @@ class Diagnostics:
         parts = []
         for part in self._parts.values():
             # Robots may have been added or removed since the report was received.
-            whose = self._whose(part.name)
-            if whose == "another":
+            owner = self._owner(part.name)
+            if owner == "another":
                 continue
-            shared = whose == "nobody"
+            shared = owner == "unknown"
             right = part if part.shared == shared else replace(part, shared=shared)
             parts.append(self._aged(right, now))
         return sorted(parts, key=lambda part: (-_WEIGHT[part.level], part.name))
@@ -325,7 +325,7 @@ class Diagnostics:
         """
         wrong: ProtocolError | None = None
         for status in message.status:
-            if self._whose(status.name) == "another":
+            if self._owner(status.name) == "another":
                 continue
             try:
                 self._take(status)
@@ -339,7 +339,7 @@ class Diagnostics:
         name = status.name[:LONGEST_NAME]
         if name not in self._parts and len(self._parts) >= MAX_PARTS:
             raise ProtocolError(f"{MAX_PARTS} parts are the limit")
-        said = Health(
+        health = Health(
             name,
             LEVELS[status.level],
             status.message[:LONGEST],
@@ -349,45 +349,47 @@ class Diagnostics:
                 for pair in status.values[:MAX_VALUES]
             },
             time.monotonic(),
-            self._whose(status.name) == "nobody",
+            self._owner(status.name) == "unknown",
         )
-        if not self._hides_worse(said):
-            self._parts[name] = said
+        if not self._hides_worse(health):
+            self._parts[name] = health
 
-    def _hides_worse(self, said: Health) -> bool:
+    def _hides_worse(self, health: Health) -> bool:
         """Return whether another part of this name recently reported a worse level.
 
         In ROS 2 the same nodes of two robots use the same names.
         """
-        before = self._parts.get(said.name)
-        if before is None or said.heard - before.heard > self.hold:
+        before = self._parts.get(health.name)
+        if before is None or health.received_at - before.received_at > self.hold:
             return False
-        another = said.shared or said.hardware_id != before.hardware_id
-        return another and _WEIGHT[said.level] < _WEIGHT[before.level]
+        another = health.shared or health.hardware_id != before.hardware_id
+        return another and _WEIGHT[health.level] < _WEIGHT[before.level]
 
-    def _whose(self, name: str) -> Whose:
+    def _owner(self, name: str) -> Owner:
         if self.prefix:
             return "own" if name.lstrip("/").startswith(self.prefix) else "another"
-        return self._owners.whose(name, self.namespace)
+        return self._owners.owner(name, self.namespace)
 
     def _aged(self, part: Health, now: float) -> Health:
-        if now - part.heard <= self.hold or part.level == LEVELS[STALE]:
+        if now - part.received_at <= self.hold or part.level == LEVELS[STALE]:
             return part
-        said = f"no data for {now - part.heard:.0f} s"
-        return replace(part, level=LEVELS[STALE], message=said)
+        message = f"no data for {now - part.received_at:.0f} s"
+        return replace(part, level=LEVELS[STALE], message=message)
 
     def _show(self) -> None:
         parts = self.parts
-        level = _level(parts) or UNHEARD
+        level = _level(parts) or NOT_RECEIVED
         colours = {"warn": "#e8a317", "error": "#d02f2f", "stale": GREY}
         self.svg.set(
             class_=f"diagnostics {level}",
             fill=colours.get(level, "none"),
-            stroke=GREY if level == UNHEARD else "none",
+            stroke=GREY if level == NOT_RECEIVED else "none",
         )
         self.svg.set_age(self._bridge.lag, limit=self.hold)
-        heard = level != UNHEARD
-        self._title.text = f"{parts[0].name}: {parts[0].message}" if heard else UNSAID
+        received = level != NOT_RECEIVED
+        self._title.text = (
+            f"{parts[0].name}: {parts[0].message}" if received else NOT_RECEIVED_TITLE
+        )
         shown = [(part.name, part.level, part.message) for part in parts]
         if shown != self._shown:
             self._shown = shown

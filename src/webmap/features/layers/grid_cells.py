@@ -78,7 +78,7 @@ class GridCellsMsg(Stamped, frozen=True, kw_only=True):
             {
                 r"local_costmap/(?!unknown_space\Z)": "of a local costmap",
                 r"\A(?!.*unknown_space\Z)": (
-                    "its type alone, unless it is all that nobody knows"
+                    "its type alone, except the unknown space"
                 ),
             },
         )
@@ -146,8 +146,8 @@ class GridCells(RobotLayer):
         if len(given) > len(chosen):
             # Without the number of cells, which would differ in every message.
             self.complain(
-                f"there are more than {self.max_cells} cells, of which so many are "
-                "drawn, evenly chosen; max_cells says how many"
+                f"there are more than {self.max_cells} cells: only that many are "
+                "drawn, evenly chosen; max_cells sets the limit"
             )
         return message, rows, width, height
 

@@ -107,9 +107,9 @@ class LaserScanner(RobotLayer):
             ProtocolError: If the angles are not valid, or there are too many rays.
         """
         check_rays(message)
-        doubt = scan_doubt(message)
-        if doubt is not None:
-            self.complain(doubt)
+        fault = scan_fault(message)
+        if fault is not None:
+            self.complain(fault)
         points, rays = scan_points(message, self.max_dots)
         took = len(message.ranges) * getattr(message, "time_increment", 0.0)
         if 0.0 < took <= LONGEST_SWEEP and len(points):
@@ -124,7 +124,7 @@ class LaserScanner(RobotLayer):
         self.dots.set_dots(dots.tobytes(), unit)
 
 
-def scan_doubt(scan: LaserScanMsg) -> str | None:
+def scan_fault(scan: LaserScanMsg) -> str | None:
     """Return a problem of a scan that people should know; None if there is none.
 
     A scan with only infinite readings is no problem: the area around is empty.
@@ -159,7 +159,7 @@ def check_rays(scan: LaserScanMsg) -> None:
     if count > 1 and scan.angle_increment == 0:
         raise ProtocolError(
             f"angle_increment must not be 0 for a scan of {count} rays, which would "
-            "all go one way"
+            "all have one direction"
         )
     last = scan.angle_min + scan.angle_increment * max(0, count - 1)
     if not max(abs(scan.angle_min), abs(last)) <= MOST_TURN:

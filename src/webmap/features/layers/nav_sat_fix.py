@@ -82,7 +82,7 @@ class NavSatFix(RobotLayer):
     the same datum uses the same projection. Without a fix the last fix stays and ages,
     with the class ``lost``.
 
-    Style it by CSS: ``.navsatfix > .cross``, ``.navsatfix > .doubt`` and
+    Style it by CSS: ``.navsatfix > .cross``, ``.navsatfix > .covariance`` and
     ``.navsatfix.lost``.
     """
 
@@ -123,8 +123,8 @@ class NavSatFix(RobotLayer):
         """The last fix on the map, in metres."""
         self._origin = (0.0, 0.0)
         self._waiting = self.datum is None
-        self.doubt = self.add(
-            svg.circle(class_="doubt", fill="#3b82c4", fill_opacity=0.2, r=0)
+        self.covariance = self.add(
+            svg.circle(class_="covariance", fill="#3b82c4", fill_opacity=0.2, r=0)
         )
         self.cross = self.add(
             svg.path(
@@ -159,16 +159,16 @@ class NavSatFix(RobotLayer):
         x, y = self._plane.from_globe(*place)
         x, y = x + self._origin[0], y + self._origin[1]
         self.position = (x, y)
-        for element in (self.doubt, self.cross):
+        for element in (self.covariance, self.cross):
             element.set_pose(x, y, 0.0)
-        doubt = fix.deviation or 0.0
-        self.doubt.set(r=doubt if doubt <= FARTHEST else 0.0)
+        deviation = fix.deviation or 0.0
+        self.covariance.set(r=deviation if deviation <= FARTHEST else 0.0)
         self.cross.unset("visibility")
         self.svg.set_age(self.bridge.lag, limit=self.age_limit)
-        if doubt > FARTHEST:
+        if deviation > FARTHEST:
             self.complain(
-                f"a fix has a doubt of {FARTHEST:g} m at the most, got {doubt:g} m, "
-                "which is not drawn"
+                f"the standard deviation of a fix must be at most {FARTHEST:g} m, got "
+                f"{deviation:g} m; its circle is not drawn"
             )
 
     def _anchor(self, place: tuple[float, float]) -> None:
@@ -187,10 +187,10 @@ class NavSatFix(RobotLayer):
 
     def _is_on_map(self) -> bool | None:
         """Return whether the robot's pose is on the map; None if it may become so."""
-        tf, pose = self.robot.tf, self.robot.whereabouts.newest
+        tf, pose = self.robot.tf, self.robot.pose_source.newest
         if tf is None or pose is None or pose.frame_id in ("", tf["map_frame"]):
             return True
         # Many robots have frames but no map; this is no error if ``quiet`` is set.
-        frames = self.robot.whereabouts.frames
+        frames = self.robot.pose_source.frames
         missing = frames is not None and time.monotonic() >= frames.complete_from
         return False if tf["quiet"] and missing else None

@@ -28,7 +28,7 @@ from webmap.scene import svg
             "path",
             {
                 r"/plan\Z": "the usual name",
-                r"plan|path|trajectory": "named a way to go",
+                r"plan|path|trajectory": "named like a path",
                 "": "its type alone",
             },
             most=6,

@@ -18,7 +18,7 @@ from webmap.scene import svg
         TopicKind(
             "goal",
             {
-                r"/current_goal\Z": "where move_base says that it goes",
+                r"/current_goal\Z": "the current goal of move_base",
                 r"/goal_pose\Z": "where RViz sends Nav2",
                 r"/move_base_simple/goal\Z": "where RViz sends move_base",
             },
@@ -62,7 +62,7 @@ class PoseStamped(RobotLayer):
         self.arrow.set(d=arrow(self.length))
         self.svg.set(visibility="hidden")
         self._ends = self.name == "goal" and self.frame == "map"
-        self._goes_to: Pose | None = None
+        self._goal_pose: Pose | None = None
         """The goal that is drawn until the robot reaches it."""
         self._count = 0
 
@@ -77,7 +77,7 @@ class PoseStamped(RobotLayer):
     def draw(self, found: tuple[Pose, str], at: Transform) -> None:
         """Move the arrow to the pose."""
         self.pose, frame_id = pose, _ = found
-        self._goes_to = pose if self._ends and self._in_map(frame_id) else None
+        self._goal_pose = pose if self._ends and self._in_map(frame_id) else None
         self.arrow.set_pose(pose.x, pose.y, pose.yaw)
         self._count += 1
         # Identifies a goal that the goal tool has shown already.
@@ -86,18 +86,18 @@ class PoseStamped(RobotLayer):
 
     def on_odometry_update(self) -> None:
         """Hide a goal when the robot reaches it."""
-        if self._goes_to is not None and self._is_there(self._goes_to):
-            self._goes_to = None
+        if self._goal_pose is not None and self._is_there(self._goal_pose):
+            self._goal_pose = None
             self.svg.set(visibility="hidden")
 
     def _is_there(self, pose: Pose) -> bool:
-        x, y = self.robot.whereabouts.common_from_own.apply(pose.x, pose.y)
+        x, y = self.robot.pose_source.common_from_own.apply(pose.x, pose.y)
         at = self.robot.position
         return math.dist((x, y), (at.x, at.y)) < self.reached
 
     def _in_map(self, frame_id: str) -> bool:
         """Return whether a frame is that of the robot's poses, so that both compare."""
-        tf, frames = self.robot.tf, self.robot.whereabouts.frames
+        tf, frames = self.robot.tf, self.robot.pose_source.frames
         if tf is None or frames is None:
             return frame_id.strip("/") in ("", "map")
         name = frames.buffer.name(frame_id, tf["namespace"])

@@ -18,7 +18,7 @@ from webmap.scene import svg
 AMCL, ODOMETRY = "geometry_msgs/PoseWithCovarianceStamped", "nav_msgs/Odometry"
 
 
-class DoubtfulPoseMsg(msgspec.Struct, frozen=True):
+class PoseWithCovarianceMsg(msgspec.Struct, frozen=True):
     """``geometry_msgs/PoseWithCovariance`` with its covariance."""
 
     pose: PoseMsg
@@ -39,13 +39,13 @@ class Ellipse(msgspec.Struct, frozen=True):
     """Angle from x to the longer axis, in radians."""
 
 
-class DoubtfulPoseStampedMsg(Stamped, frozen=True, kw_only=True):
+class PoseWithCovarianceStampedMsg(Stamped, frozen=True, kw_only=True):
     """``geometry_msgs/PoseWithCovarianceStamped`` and ``nav_msgs/Odometry``.
 
     Both have the fields that this view needs.
     """
 
-    pose: DoubtfulPoseMsg
+    pose: PoseWithCovarianceMsg
 
     @property
     def place(self) -> Pose:
@@ -106,14 +106,14 @@ class DoubtfulPoseStampedMsg(Stamped, frozen=True, kw_only=True):
 @layer(
     AMCL,
     ODOMETRY,
-    view=DoubtfulPoseStampedMsg,
+    view=PoseWithCovarianceStampedMsg,
     kinds=[
         TopicKind(
-            "doubt",
+            "covariance",
             {
                 r"/(?:amcl_pose|localization_pose|pose)\Z": "a localiser's pose",
                 r"\A(?!.*initial_?pose\Z)": (
-                    "its type alone, unless it is where an initial pose is told"
+                    "its type alone, except a topic for initial poses"
                 ),
             },
             most=2,
@@ -159,7 +159,9 @@ class PoseWithCovariance(RobotLayer):
             svg.path(class_="heading", fill="#e0a800", fill_opacity=0.35, stroke="none")
         )
 
-    def read(self, message: DoubtfulPoseStampedMsg) -> tuple[Pose, Ellipse, float]:
+    def read(
+        self, message: PoseWithCovarianceStampedMsg
+    ) -> tuple[Pose, Ellipse, float]:
         """Return the pose, the ellipse, and half the angle of the sector in radians.
 
         Raises:

@@ -35,7 +35,7 @@ class Line:
     stamp: float
     """Time of the message, in seconds of the robot's clock."""
 
-    heard: float
+    received_at: float
     """Time of receipt, in monotonic seconds."""
 
 

@@ -28,7 +28,7 @@ LONGEST = 500
 
 
 @dataclass(slots=True)
-class Said:
+class LogLine:
     """A log message of a node, once or several times in a row."""
 
     number: int
@@ -40,7 +40,7 @@ class Said:
 
     text: str
     count: int
-    heard: float
+    received_at: float
     """Time of the last receipt, in monotonic seconds."""
 
     version: int
@@ -55,7 +55,7 @@ class BridgeLog:
     """
 
     def __init__(self, bridge: Bridge) -> None:
-        self.lines: deque[Said] = deque(maxlen=MOST)
+        self.lines: deque[LogLine] = deque(maxlen=MOST)
         """The lines, the newest last."""
         self.total = 0
         """Number of all messages received."""
@@ -90,12 +90,12 @@ class BridgeLog:
             text,
         ):
             last.count += 1
-            last.heard, last.version = now, self.version
+            last.received_at, last.version = now, self.version
             return
         number = next(self._numbers)
-        self.lines.append(Said(number, level, name, text, 1, now, self.version))
+        self.lines.append(LogLine(number, level, name, text, 1, now, self.version))
 
-    def since(self, version: int) -> list[Said]:
+    def since(self, version: int) -> list[LogLine]:
         """Return the lines that changed after a version, the newest last."""
         return [line for line in self.lines if line.version > version]
 
@@ -158,7 +158,7 @@ class RosoutPanel:
         self._bridges = list(bridges)
         self._lines = lines
         self._logs: list[BridgeLog] = [log_of(bridge) for bridge in self._bridges]
-        self._told: list[tuple[int, str]] = []
+        self._sent: list[tuple[int, str]] = []
         self._watching: list[Removal] = []
         self._task: asyncio.Task[None] | None = None
         self.half = map.add_browser_half(
@@ -181,29 +181,36 @@ class RosoutPanel:
         elif message.get("open") is False:
             self._close()
 
-    def tell(self) -> None:
+    def send_new_lines(self) -> None:
         """Send the page the new lines."""
         for number, log in enumerate(self._logs):
             state = self._bridges[number].state
-            version, told = self._told[number]
-            if (log.version, state) == (version, told):
+            version, sent_state = self._sent[number]
+            if (log.version, state) == (version, sent_state):
                 continue
-            self._told[number] = (log.version, state)
-            said = [
-                [line.number, line.level, line.name, line.text, line.count, line.heard]
+            self._sent[number] = (log.version, state)
+            lines = [
+                [
+                    line.number,
+                    line.level,
+                    line.name,
+                    line.text,
+                    line.count,
+                    line.received_at,
+                ]
                 for line in log.since(version)[-self._lines :]
             ]
             self.half.send(
-                {"bridge": number, "said": said, "total": log.total, "state": state}
+                {"bridge": number, "said": lines, "total": log.total, "state": state}
             )
 
     def _open(self) -> None:
         # A page that was loaded again knows none of the earlier lines.
-        self._told = [(0, "") for _ in self._logs]
+        self._sent = [(0, "") for _ in self._logs]
         if not self._watching:
             self._watching = [log.watch() for log in self._logs]
         if self._task is None:
-            self._task = asyncio.get_running_loop().create_task(self._tell_on())
+            self._task = asyncio.get_running_loop().create_task(self._send_regularly())
 
     def _close(self) -> None:
         if self._task is not None:
@@ -213,7 +220,7 @@ class RosoutPanel:
             watching.remove()
         self._watching = []
 
-    async def _tell_on(self) -> None:
+    async def _send_regularly(self) -> None:
         while True:
-            self.tell()
+            self.send_new_lines()
             await asyncio.sleep(PERIOD)

@@ -15,7 +15,7 @@ from webmap.features.tiles.tile_grid import OVERLAP, Tile, TileGrid
 from webmap.features.tiles.tile_source import open_tiles
 from webmap.scene import svg
 from webmap.scene.element import Element
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -91,7 +91,7 @@ class TileLayer:
         self.svg: Element = svg.g(class_="tiles", pointer_events="none")
         self.svg.set(opacity=None if math.isclose(opacity, 1) else opacity)
         self._fragment = Fragment(self.svg)
-        self._said = False
+        self._is_reported = False
         self._closed = False
         self._dirty = False
         self._looking: asyncio.Task[None] | None = None
@@ -177,6 +177,6 @@ class TileLayer:
             pictures.withdraw(shown.url)
 
     def _complain(self, text: str) -> None:
-        if not self._said:
-            self._said = True
+        if not self._is_reported:
+            self._is_reported = True
             self.map.report_error(f"a tile is not shown: {text}")

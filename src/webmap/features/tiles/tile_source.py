@@ -239,5 +239,5 @@ def media_type(data: bytes, name: str) -> str:
 
 def plain(text: str) -> str:
     """Return the text of an attribution without its markup, in one line."""
-    words = html.unescape(re.sub(r"<[^<>]*>", "", text[:2000]))
-    return " ".join("".join(c if c.isprintable() else " " for c in words).split())[:300]
+    text = html.unescape(re.sub(r"<[^<>]*>", "", text[:2000]))
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())[:300]

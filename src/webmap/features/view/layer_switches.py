@@ -38,12 +38,14 @@ Layers declare their own selectors; names that are not here come last.
 
 def all_layers() -> dict[str, str]:
     """Return the CSS selector of each name, of all layers."""
-    selectors = {name: [said] if said else [] for name, said in LAYERS.items()}
+    selectors = {
+        name: [selector] if selector else [] for name, selector in LAYERS.items()
+    }
     for declared in declarations():
         for name, selector in declared.switches.items():
             if name:
                 selectors.setdefault(name, []).append(selector)
-    return {name: ", ".join(said) for name, said in selectors.items()}
+    return {name: ", ".join(parts) for name, parts in selectors.items()}
 
 
 @map_modules.register

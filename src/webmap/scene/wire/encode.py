@@ -10,8 +10,7 @@ from webmap.base.geometry import Affine
 from webmap.scene.allowed import ATTRIBUTES, EVENTS
 from webmap.scene.bound import BoundElement, Document
 from webmap.scene.element import Element
-from webmap.scene.fragment import Added, Changed, Fragment, Removed
-from webmap.scene.node import Node, Text
+from webmap.scene.node import Added, Changed, Fragment, Node, Removed, Text
 from webmap.scene.wire.opcodes import AFTER, FIRST, LAST, PREVENT, STOP, TAGS, Op
 
 _TAG = {tag: index for index, tag in reversed(list(enumerate(TAGS)))}
@@ -87,7 +86,7 @@ def encode_snapshot(fragment: Fragment) -> bytes:
     """Return the records that build the whole current fragment."""
     memo = _memo(fragment)
     if memo.snapshot is None:
-        fragment.mark_told()
+        fragment.mark_sent()
         out = bytearray()
         _put_node(out, fragment.root, 0, LAST)
         memo.snapshot = bytes(out)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import ClassVar
 
 from webmap.scene.element import Element
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 from webmap.scene.wire.encode import EVENT_NUMBER, encode_snapshot, string, varint
 from webmap.scene.wire.messages import ViewReport
 from webmap.scene.wire.opcodes import PREVENT, STOP, VIEW_OPERATIONS, Op
@@ -59,7 +59,7 @@ class Mount:
             out.append(flags)
         return bytes(out)
 
-    def hears(self, element: int, event: str) -> bool:
+    def has_listener(self, element: int, event: str) -> bool:
         """Return whether an event of an element has a listener here now."""
         if (element, event) in self.listening:
             return True
@@ -157,7 +157,7 @@ class PendingRecords:
         """The numbers of mounts that the page does not have yet."""
         self.records = bytearray()
         self.messages: list[bytes] = []
-        self.standing: dict[int, bytes] = {}
+        self.current_problems: dict[int, bytes] = {}
         """The record of each current problem; of too many, the newest."""
         self.problems: dict[int, bytes] = {}
         """The record of each problem that changed."""
@@ -190,11 +190,11 @@ class PendingRecords:
     def problem(self, number: int, text: str) -> None:
         """Add a problem, or end it if the text is empty; the newest text counts."""
         record = bytes((Op.PROBLEM, *varint(number))) + string(text)
-        self.standing.pop(number, None)
+        self.current_problems.pop(number, None)
         if text:
-            self.standing[number] = record
-        if len(self.standing) > self.PROBLEMS_KEPT:
-            del self.standing[next(iter(self.standing))]
+            self.current_problems[number] = record
+        if len(self.current_problems) > self.PROBLEMS_KEPT:
+            del self.current_problems[next(iter(self.current_problems))]
         self.problems[number] = record
         if len(self.problems) > self.MESSAGES_KEPT:
             # All of it can be made again from the stored state, which is shorter.

@@ -11,7 +11,7 @@ import msgspec
 from webmap.base.errors import WireError
 from webmap.scene.allowed import check_event
 from webmap.scene.element import Element, split_classes
-from webmap.scene.fragment import Fragment
+from webmap.scene.node import Fragment
 from webmap.scene.wire.encode import encode_changes, string, varint
 from webmap.scene.wire.messages import (
     ElementEvent,
@@ -287,7 +287,7 @@ class SceneSession:
                 return []
             case ElementEvent(mount=mount, element=element, event=event):
                 place = self._mounts.get(mount)
-                return [message] if place and place.hears(element, event) else []
+                return [message] if place and place.has_listener(element, event) else []
             case ViewReport(map_element=map_element):
                 return [message] if self._take_report(map_element, message) else []
             case ModuleReady(instance=instance) | ModuleMessage(instance=instance):
@@ -353,5 +353,5 @@ class SceneSession:
             parts += (map_view.state(self._key), map_view.unreported)
         parts += [record for _, record in self._attached.values()]
         parts += self._pending.notices_again()
-        parts += self._pending.standing.values()
+        parts += self._pending.current_problems.values()
         return b"".join((*parts, *self._pending.messages))

@@ -76,30 +76,30 @@ class MarkerFrames(LayerFrames):
         """Forget a deleted marker."""
         self._moving.pop(key, None)
 
-    def say(self) -> None:
+    def report_unknown(self) -> None:
         """Report the unknown frames, or withdraw the report."""
         needed = {moving.frame for moving in self._moving.values()}
-        self._lost = {f: words for f, words in self._lost.items() if f in needed}
-        words = ""
+        self._lost = {f: text for f, text in self._lost.items() if f in needed}
+        text = ""
         if self._lost:
             frame, why = next(iter(self._lost.items()))
             more = len(self._lost) - 1
-            words = not_known(frame, why) + f" (and {more} more)" * bool(more)
-        self._say(words)
+            text = not_known(frame, why) + f" (and {more} more)" * bool(more)
+        self._show_trouble(text)
 
-    def _news(self) -> None:
+    def _on_frames(self) -> None:
         if not self._moving:
             return
         places: dict[tuple[str, float], tuple[Transform, bool]] = {}
         for key, each in tuple(self._moving.items()):
-            asked = (each.frame, each.stamp)
-            if asked not in places:
-                places[asked] = self._find(*asked)
-            found, settled = places[asked]
+            wanted = (each.frame, each.stamp)
+            if wanted not in places:
+                places[wanted] = self._find(*wanted)
+            found, settled = places[wanted]
             each.put(found)
             if settled and not each.locked:
                 self.forget(key)
-        self.say()
+        self.report_unknown()
 
     def _find(self, source: str, stamp: float) -> tuple[Transform, bool]:
         """Return the pose of a frame, and whether it is final."""
@@ -195,7 +195,7 @@ class Markers(MapLayer):
         self._looks: dict[Key, tuple[object, ...]] = {}
         self._ends: dict[Key, float] = {}
         self._timer: asyncio.TimerHandle | None = None
-        self._said_unturned = False
+        self._unturned_logged = False
         self._left_out: set[Key] = set()
         """Markers beyond :data:`MAX_MARKERS`."""
         self._count_timer: asyncio.TimerHandle | None = None
@@ -219,7 +219,7 @@ class Markers(MapLayer):
                 self._take(marker)
             except WebMapError as error:
                 wrong.append(_wrong(marker, error))
-        self.frames.say()
+        self.frames.report_unknown()
         self._set_timer()
         self.be_new()
         if wrong:
@@ -266,7 +266,7 @@ class Markers(MapLayer):
         except WebMapError:
             self.frames.forget(key)
             raise
-        self._say_unturned(marker)
+        self._log_unturned(marker)
         self._ends.pop(key, None)
         if lifetime > 0:
             self._ends[key] = time.monotonic() + lifetime
@@ -283,9 +283,9 @@ class Markers(MapLayer):
             self._left_out.add(key)
         if self._count_timer is None:
             loop = asyncio.get_running_loop()
-            self._count_timer = loop.call_later(SETTLED, self._say_left_out)
+            self._count_timer = loop.call_later(SETTLED, self._report_left_out)
 
-    def _say_left_out(self) -> None:
+    def _report_left_out(self) -> None:
         self._count_timer = None
         count = len(self._left_out)
         if count:
@@ -311,13 +311,13 @@ class Markers(MapLayer):
             if _MOVED not in self.problems:
                 self.set_problem(_MOVED, f"{self.topic}: {_wrong(marker, error)}")
 
-    def _say_unturned(self, marker: MarkerMsg) -> None:
+    def _log_unturned(self, marker: MarkerMsg) -> None:
         """Log once that orientations are missing; they are drawn as in RViz.
 
         This is not a lasting problem, because it changes nothing on the map.
         """
-        if not self._said_unturned and lies_unturned(marker):
-            self._said_unturned = True
+        if not self._unturned_logged and lies_unturned(marker):
+            self._unturned_logged = True
             log.warning(
                 "%s: %s: marker %d of %r has a quaternion of zeros and is drawn "
                 "unturned, as all such markers are",

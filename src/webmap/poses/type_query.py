@@ -19,7 +19,7 @@ SHARE = 10
 queried rarely."""
 
 
-class TypeAsking:
+class TypeQuery:
     """Queries the type of a topic whenever the connection opens, until it is known.
 
     The node that has the topic may start after the connection opened, and so may the

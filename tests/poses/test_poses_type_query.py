@@ -7,8 +7,8 @@ import pytest
 
 from webmap import Bridge, Robot
 from webmap.base.scope import Removal
-from webmap.core.motion import MotionRoad
-from webmap.poses.type_asking import FEW, LATER, SHARE, SOON
+from webmap.core.motion import RobotMotion
+from webmap.poses.type_query import FEW, LATER, SHARE, SOON
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.graph import Graph
@@ -92,9 +92,9 @@ async def settle():
 def told(monkeypatch):
     """Run what is done with a robot whose velocity topic nobody knows yet."""
     gate = Gate()
-    monkeypatch.setattr(MotionRoad, "gate", gate)
+    monkeypatch.setattr(RobotMotion, "gate", gate)
     clock = SimpleNamespace(monotonic=lambda: 0.0)  # an answer takes no time
-    monkeypatch.setattr("webmap.poses.type_asking.time", clock)
+    monkeypatch.setattr("webmap.poses.type_query.time", clock)
 
     def run(scenario):
         async def all_of_it():
@@ -149,7 +149,7 @@ def test_a_rosapi_that_takes_long_to_answer_is_asked_more_rarely(told, monkeypat
     async def scenario(robot, link, time):
         clock = SimpleNamespace(monotonic=iter([0.0, 5.0]).__next__)
         with monkeypatch.context() as patch:
-            patch.setattr("webmap.poses.type_asking.time", clock)
+            patch.setattr("webmap.poses.type_query.time", clock)
             await time.passes()
         assert time.pauses[-1] == 5.0 * SHARE
 
@@ -229,7 +229,7 @@ def test_an_answer_of_a_topic_that_was_set_anew_meanwhile_counts_no_more(told):
 
 
 def test_a_rosapi_that_comes_up_after_rosbridge_is_asked_too(monkeypatch):
-    monkeypatch.setattr("webmap.poses.type_asking.SOON", 0.05)
+    monkeypatch.setattr("webmap.poses.type_query.SOON", 0.05)
 
     async def scenario():
         quirks = parse_quirks("real", "ros2")
