@@ -260,7 +260,9 @@ def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
     names = {type(module).__name__ for module in robot.modules}
     assert {"LaserScanner", "Battery", "Path"} <= names
     assert list(console.grids) == [(bridge, "/map")]
-    assert "bob has more now: velocity /cmd_vel, scan /scan" in capsys.readouterr().err
+    assert (
+        "bob has new topics: velocity /cmd_vel, scan /scan" in capsys.readouterr().err
+    )
     robot.destroy()
 
 
@@ -290,10 +292,10 @@ def test_each_camera_that_comes_later_is_used_as_long_as_there_is_room(bridge, c
     assert names() == ["Camera", "Camera 2", "Camera 3", "Camera 4"]
     said = capsys.readouterr().err.splitlines()[1:]
     assert said == [
-        "bob has more now: camera /cam0/image_raw/compressed",
-        "bob has more now: camera /cam1/image_raw/compressed, "
+        "bob has new topics: camera /cam0/image_raw/compressed",
+        "bob has new topics: camera /cam1/image_raw/compressed, "
         "camera /cam2/image_raw/compressed",
-        "bob has more now: camera /cam3/image_raw/compressed",
+        "bob has new topics: camera /cam3/image_raw/compressed",
     ]
     late.robots[0].destroy()
 
@@ -452,15 +454,14 @@ def test_cameras_that_are_left_out_are_said_once(bridge, capsys):
     robot, _, layers = drawing_of(bridge, RICH | cameras(6))
     (line,) = said()
     assert line == (
-        "a: not drawn, since there are enough of their kind: "
+        "a: not drawn, beyond the limit for their kind: "
         "/a/cam4/image_raw/compressed, /a/cam5/image_raw/compressed"
     )
     asyncio.run(layers.take(RICH | cameras(6)))
     assert said() == []
     asyncio.run(layers.take(RICH | cameras(7)))
     assert said() == [
-        "a: not drawn, since there are enough of their kind: "
-        "/a/cam6/image_raw/compressed"
+        "a: not drawn, beyond the limit for their kind: /a/cam6/image_raw/compressed"
     ], "one that came later"
     robot.destroy()
 
@@ -479,5 +480,5 @@ def test_what_is_left_out_is_said_once(bridge, capsys):
     assert len(topics_of(robot, "Path")) == 6
     said = [line for line in capsys.readouterr().err.splitlines() if "enough" in line]
     assert len(said) == 1
-    assert "a: not drawn, since there are enough of their kind: /a/path_5" in said[0]
+    assert "a: not drawn, beyond the limit for their kind: /a/path_5" in said[0]
     robot.destroy()

@@ -125,7 +125,7 @@ def test_a_call_is_tried_when_somebody_asks_and_the_report_says_what_that_told()
         assert checkup.ended == ended, "nothing was listened to again"
 
     asyncio.run(run())
-    assert told == ["Trying what a call that hangs holds up."]
+    assert told == ["Testing what a slow service call delays."]
     assert "hangs blocks its whole socket (tried)" in checkup.text
 
 

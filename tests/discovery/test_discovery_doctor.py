@@ -181,14 +181,17 @@ def test_a_map_that_nobody_publishes_is_told():
     seen = replace(GOOD, findings=discover(topics, "bob"))
     assert not any("no map under it" in each.words for each in judge(seen))
     seen = replace(seen, publishers={**GOOD.publishers, "/map": ()})
-    assert said(seen, "Nobody publishes /map") == "warning"
+    assert said(seen, "No node publishes /map") == "warning"
 
 
 def test_a_battery_may_be_slow():
     topics = TOPICS | {"/battery_state": "sensor_msgs/BatteryState"}
     seen = replace(GOOD, findings=discover(topics, "bob"))
     seen = replace(seen, heard={**LISTENED, "/battery_state": Heard(seconds=3.0)})
-    assert said(seen, "Nothing came on /battery_state in 3 s; it may") == "note"
+    assert (
+        said(seen, "No message was received on /battery_state in 3 s; the topic may")
+        == "note"
+    )
     slow = {**LISTENED, "/battery_state": Heard(1, 3.0, 3.0)}
     assert said(replace(seen, heard=slow), "/battery_state: 0.3 messages") == "good"
     broken = {**LISTENED, "/battery_state": Heard(1, 3.0, trouble="not JSON")}
@@ -204,7 +207,10 @@ def test_a_battery_has_an_age():
         said(replace(seen, heard=fresh), "1.0 messages a second, 1.0 s old") == "good"
     )
     old = {**LISTENED, "/battery_state": replace(came, stamp=10.0)}
-    assert said(replace(seen, heard=old), "what is shown is no more so") == "warning"
+    assert (
+        said(replace(seen, heard=old), "the shown value may be out of date")
+        == "warning"
+    )
 
 
 SHOWN = TOPICS | {
@@ -230,7 +236,7 @@ def shown(topic, came):
     ("topic", "changes", "level", "words"),
     [
         (CAMERA, {}, "good", f"{CAMERA}: 5.0 messages a second, 60 ms old."),
-        (CAMERA, {"count": 0}, "warning", "who drives by this camera is stopped"),
+        (CAMERA, {"count": 0}, "warning", "driving with this camera stops"),
         (CAMERA, {"every": 2.0}, "warning", "whenever its picture is older than 1 s"),
         (CAMERA, {"every": 0.0, "longest_gap": 2.5}, "warning", "older than 1 s"),
         (CAMERA, {"stamp": 97.0}, "warning", "come too late to drive by"),
@@ -249,7 +255,7 @@ def shown(topic, came):
             "/rear/scan",
             {"count": 0, "seconds": 3.0},
             "warning",
-            "Nothing came on /r",
+            "No message was received on /r",
         ),
     ],
 )
@@ -328,10 +334,10 @@ def test_whether_a_call_that_hangs_blocks_is_said(dialect, threads, level):
 @pytest.mark.parametrize(
     ("writers", "level", "words"),
     [
-        ((), "good", "Nobody else writes"),
+        ((), "good", "No other node publishes"),
         (("/joy", "/nav"), "warning", "other writers too: /joy, /nav"),
         (("/rosbridge_websocket",), "note", "may be WebMap itself"),
-        (None, "note", "cannot be told"),
+        (None, "note", "does not list the publishers"),
     ],
 )
 def test_other_writers_of_velocity_are_named(writers, level, words):
@@ -341,7 +347,8 @@ def test_other_writers_of_velocity_are_named(writers, level, words):
 
 def test_a_velocity_that_nobody_listens_to_is_wrong():
     assert (
-        said(replace(GOOD, subscribers={"/cmd_vel": ()}), "Nobody listens") == "wrong"
+        said(replace(GOOD, subscribers={"/cmd_vel": ()}), "No node subscribes")
+        == "wrong"
     )
 
 
@@ -353,7 +360,7 @@ def test_the_type_of_velocity_is_said():
 
 def test_a_robot_without_velocity_or_place_is_warned_of():
     blind = replace(GOOD, findings=discover({"/cmd_vel": "geometry_msgs/Twist"}))
-    assert said(blind, "Nothing says where it is") == "wrong"
+    assert said(blind, "No topic gives its pose") == "wrong"
     fixed = replace(GOOD, findings=discover({"/odom": "nav_msgs/Odometry"}))
     assert said(fixed, "seen and not driven") == "warning"
 
@@ -362,7 +369,7 @@ def test_a_robot_without_velocity_or_place_is_warned_of():
     ("changes", "level", "words"),
     [
         ({}, "good", "20.0 messages a second in the frame odom, 40 ms old"),
-        ({"count": 0}, "wrong", "Nothing came on /odom in 3 s"),
+        ({"count": 0}, "wrong", "No message was received on /odom in 3 s"),
         ({"trouble": "not JSON"}, "wrong", "/odom cannot be read: not JSON"),
         ({"longest_gap": 1.4}, "wrong", "none for 1.4 s"),
         ({"count": 9}, "warning", "3.0 messages a second"),
@@ -377,7 +384,7 @@ def test_odometry_has_a_rate_and_an_age(changes, level, words):
 
 def test_a_silent_scan_is_a_warning_and_no_more():
     seen = replace(GOOD, heard={**LISTENED, "/scan": Heard(seconds=3.0)})
-    assert said(seen, "Nothing came on /scan") == "warning"
+    assert said(seen, "No message was received on /scan") == "warning"
     assert is_ready(judge(seen))
 
 
@@ -406,7 +413,7 @@ def test_the_way_begins_in_the_map_that_the_robot_is_drawn_in():
     lost = Way("bob/odom", "there is no frame 'world'", start="world")
     seen = replace(GOOD, ways={"bob": lost})
     (found,) = [each for each in judge(seen) if "no frame 'world'" in each.words]
-    assert "start what tells of the frame world" in found.advice
+    assert "start the node that publishes the frame world" in found.advice
 
 
 PLACED = Pose(1.0, 0.0, 0.0)
@@ -430,19 +437,19 @@ def checked(told, extra=None):
             "/tf",
             ("map", "bob/odom", "bob/base_link"),
             "bob",
-            "It is drawn where its frames have bob/base_link in map (/tf: ",
+            "Its pose comes from its frames, bob/base_link in map (/tf: ",
         ),
         (
             "/bob/tf",
             ("map", "odom", "base_link"),
             "bob",
-            "It is drawn where its frames have base_link in map (/bob/tf: ",
+            "Its pose comes from its frames, base_link in map (/bob/tf: ",
         ),
         (
             "/bob/tf",
             ("odom", "base_link"),
             "bob",
-            "It is drawn where its frames have base_link in odom (/bob/tf: ",
+            "Its pose comes from its frames, base_link in odom (/bob/tf: ",
         ),
     ],
 )
@@ -457,7 +464,9 @@ def test_a_robot_that_frames_alone_tell_of_is_found_and_drawn(
 
 def test_a_robot_whose_frames_are_silent_is_nowhere():
     seen = checked({"/bob/tf": []}, {"/bob/scan": TOPICS["/scan"]})
-    words = "Nothing says where it is: /bob/tf tells of no base_link in a map or odom"
+    words = (
+        "Its pose is unknown: /bob/tf has no transform from map or odom to base_link"
+    )
     assert said(seen, words) == "wrong"
 
 

@@ -127,7 +127,9 @@ def test_the_type_that_is_sent_is_held_against_the_one_that_the_base_takes(
 
 def test_a_type_that_only_a_person_says_is_no_good_news():
     bob = MeantRobot("Bob", {**DRIVEN, "velocity": (("/a/other", STAMPED),)})
-    assert said(seen_of(bob), "/a/other is said to take TwistStamped").level == "note"
+    assert (
+        said(seen_of(bob), "/a/other has the stated type TwistStamped").level == "note"
+    )
 
 
 def test_a_robot_that_was_given_no_velocity_is_no_mistake():
@@ -139,7 +141,7 @@ def test_a_robot_that_was_given_no_velocity_is_no_mistake():
 def test_robots_that_nobody_meant_are_named_and_not_measured():
     seen = seen_of(MeantRobot("Bob", DRIVEN))
     assert said(seen, "found too, and not looked at: b.").level == "note"
-    assert said(seen, "robots looked at: Bob.").level == "good"
+    assert said(seen, "robots checked: Bob.").level == "good"
     assert {each.about for each in judge(seen)} == {"bridge", "Bob"}
 
 
@@ -196,7 +198,7 @@ def test_without_rosapi_the_robots_that_were_given_are_measured():
     seen = looked_at(site(rosapi=False), MeantRobot("Bob", BOB))
     assert [robot.name for robot in seen.findings.robots] == ["Bob"]
     assert seen.heard["/robot_0/odom"].count > 0
-    sent = said(seen, "/robot_0/cmd_vel is said to take TwistStamped, and")
+    sent = said(seen, "/robot_0/cmd_vel has the stated type TwistStamped, and")
     assert sent.level == "note"
     assert said(seen, "blocks its socket is not known").level == "note"
 
@@ -205,7 +207,7 @@ def test_a_topic_that_is_not_there_is_wrong():
     seen = looked_at(
         site(), MeantRobot("Bob", {**BOB, "odometry": (("/odometer", ""),)})
     )
-    assert said(seen, "Nothing came on /odometer").level == "wrong"
+    assert said(seen, "No message was received on /odometer").level == "wrong"
 
 
 def test_where_nobody_said_anything_all_that_is_found_is_measured():

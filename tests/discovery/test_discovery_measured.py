@@ -70,7 +70,7 @@ def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
     camera = "/robot_0/camera/image_raw/compressed"
     assert said(findings, f"{camera}: ") == "good"
     assert said(findings, "/map: 1 message, ") == "good"
-    words = r"Nothing came on /robot_0/plan in \d+ s; it may"
+    words = r"No message was received on /robot_0/plan in \d+ s; messages may"
     (plan,) = [each for each in findings if re.match(words, each.words)]
     assert plan.level == "note"
     assert seen.heard[camera].count <= ENOUGH
@@ -96,7 +96,9 @@ def test_a_map_that_nobody_sends_in_json_either_is_silent_and_the_limit_is_named
 
     _, findings, seen = looked_at(site("ros2", change=mute))
     assert not seen.link.too_large
-    (found,) = [each for each in findings if "Nothing came on /map" in each.words]
+    (found,) = [
+        each for each in findings if "No message was received on /map" in each.words
+    ]
     assert "max_message_size" in found.advice
 
 
@@ -105,7 +107,7 @@ def test_a_camera_that_is_silent_is_told_with_what_it_costs():
         return None if name.endswith("/compressed") else message
 
     _, findings, _ = looked_at(site("ros1", change=change))
-    words = "could publish it, and who drives by this camera is stopped"
+    words = "can publish it, so driving with this camera stops"
     assert said(findings, words) == "warning"
 
 
@@ -173,10 +175,10 @@ def test_a_topic_that_nobody_feeds_is_told_with_the_node_that_could(dialect):
         return None if name in ("/robot_0/odom", "/robot_0/base_scan") else message
 
     _, findings, _ = looked_at(site(dialect, change=mute))
-    assert said(findings, "Nothing came on /robot_0/odom") == "wrong"
-    assert said(findings, "Nothing came on /robot_0/base_scan") == "warning"
+    assert said(findings, "No message was received on /robot_0/odom") == "wrong"
+    assert said(findings, "No message was received on /robot_0/base_scan") == "warning"
     for topic in ("odom", "base_scan"):
-        words = rf"Nothing came on /robot_0/{topic} in \d+ s, "
+        words = rf"No message was received on /robot_0/{topic} in \d+ s, "
         words += "though /robots could publish"
         assert any(re.match(words, each.words) for each in findings)
 
@@ -203,7 +205,7 @@ def without(*children):
     [
         ("odom", "note", "drawn in the frame robot_0/odom, where odometry has it"),
         ("base_link", "note", "do not lead from robot_0/odom to robot_0/base_link"),
-        ("base_laser", "warning", "Nothing says where the scanner is on the robot"),
+        ("base_laser", "warning", "The pose of the scanner on the robot is unknown"),
     ],
 )
 def test_each_frame_that_is_missing_is_told(dialect, lost, level, words):
@@ -215,9 +217,9 @@ def test_each_frame_that_is_missing_is_told(dialect, lost, level, words):
 def test_frames_that_are_complete_are_good(dialect):
     _, findings, _ = looked_at(site(dialect))
     assert said(findings, "Frames lead from map to robot_0/odom (/tf:") == "good"
-    assert said(findings, "Frames lead on from robot_0/odom to robot_0/base_link") == (
-        "good"
-    )
+    assert said(
+        findings, "Frames lead further from robot_0/odom to robot_0/base_link"
+    ) == ("good")
 
 
 def apart(name, message):
@@ -316,7 +318,7 @@ def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
     assert said(findings, "rosapi does not say") == "note"
     assert said(findings, "The topics are those that were given") == "good"
     assert said(findings, "/robot_0/odom:") == "good"
-    assert said(findings, "cannot be told: the bridge did not say") == "note"
+    assert said(findings, "The bridge does not list the publishers of") == "note"
 
 
 def test_without_rosapi_and_without_a_list_the_list_is_asked_for():

@@ -145,7 +145,7 @@ def test_steps_on_the_way_to_the_base_are_not_driven_and_are_named():
 def test_a_twist_with_another_name_is_no_velocity():
     robot = only({"/odom": ODOM, "/cmd_vel_smoothed": TWIST})
     assert robot.first("velocity") is None
-    assert any("No topic is surely its velocity" in note for note in robot.notes)
+    assert any("Its velocity topic is unknown" in note for note in robot.notes)
 
 
 def test_a_camera_with_odometry_of_its_own_is_part_of_the_robot():

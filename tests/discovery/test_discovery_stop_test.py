@@ -108,7 +108,7 @@ def test_a_robot_whose_stop_stands_is_not_moved(folder):
         said = run(robot.url, "robot", "--yes")
         assert robot.log.moving_since(0.0) == []
     assert said.returncode == 2
-    assert "Nothing was found out: STOP" in said.stdout
+    assert "The stop test gave no result: STOP" in said.stdout
 
 
 def test_a_robot_that_is_not_there_is_told_from_those_that_are(ros1, folder):
@@ -121,7 +121,7 @@ def test_a_robot_that_is_not_there_is_told_from_those_that_are(ros1, folder):
 def test_a_bridge_that_is_away_is_said():
     said = run("ws://127.0.0.1:1", "robot_0", "--yes", "--wait", "0")
     assert said.returncode == 2
-    assert "Nothing was found out" in said.stderr
+    assert "The stop test gave no result" in said.stderr
     assert "Traceback" not in said.stderr
 
 
@@ -209,7 +209,7 @@ def test_the_hand_gives_up_when_it_cannot_go_on(words, why):
     hand.hear(words, 0.3)
     assert hand.stage == "over"
     assert hand.code == UNKNOWN
-    assert hand.news[-1] == f"Nothing was found out: {why}."
+    assert hand.news[-1] == f"The stop test gave no result: {why}."
 
 
 def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
@@ -218,7 +218,7 @@ def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
     assert hand.step(9.0) == []
     assert hand.stage == "coming"
     hand.step(10.1)
-    assert hand.news == ["Nothing was found out: another WebMap has it."]
+    assert hand.news == ["The stop test gave no result: another WebMap has it."]
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def test_a_tree_from_map_to_base_link_is_a_robot():
     assert robot.tf_alone
     assert robot.topic("scan") == "/scan"
     assert robot.tf == TfConfig(base_frame="base_link", map_frame="map")
-    assert "it is drawn where its frames have base_link in map" in robot.notes[0]
+    assert "its pose comes from its frames, base_link in map" in robot.notes[0]
 
 
 def test_prefixes_of_frames_are_robots_of_their_own():
@@ -188,9 +188,9 @@ def test_discover_shows_a_robot_of_frames_and_the_file_keeps_it(tmp_path):
         )
     assert "bob (in /bob)" in shown
     assert "frames      bob/base_link in map" in shown
-    assert "it is drawn where its frames have bob/base_link in map" in shown
+    assert "its pose comes from its frames, bob/base_link in map" in shown
     assert 'tf.base_frame = "bob/base_link"' in kept
-    assert "tf.quiet = false # drawn where its frames have it" in kept
+    assert "tf.quiet = false # its pose comes from its frames" in kept
     file = tmp_path / "fleet.toml"
     file.write_text(kept)
     checked = subprocess.run(
@@ -199,7 +199,7 @@ def test_discover_shows_a_robot_of_frames_and_the_file_keeps_it(tmp_path):
         text=True,
         check=False,
     )
-    assert "1 robot behind 1 bridge, and nothing wrong" in checked.stdout, checked
+    assert "1 robot behind 1 bridge, no mistakes" in checked.stdout, checked
 
 
 def test_what_was_found_is_drawn_where_its_frames_have_it():

@@ -82,7 +82,7 @@ def test_the_report_says_what_is_drawn_by_which_rule_and_what_is_used():
     assert "/rear/scan LaserScanner the usual name" in lines
     assert "/trajectory Path named a way to go" in lines
     assert "/cloud_1 PointCloud named points or a cloud" in lines
-    left = "not drawn, since there are enough of their kind: /cloud_2"
+    left = "not drawn, beyond the limit for their kind: /cloud_2"
     assert left in lines
 
 

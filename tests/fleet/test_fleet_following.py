@@ -83,7 +83,7 @@ def test_a_robot_of_frames_alone_is_drawn_in_the_map_once_that_is_there(
     watched.look(TF, "map odom base_link")
     assert watched.robot.tf["map_frame"] == "map"
     said = capsys.readouterr().err.splitlines()
-    assert said == ["host is drawn where map has base_link from now on"]
+    assert said == ["host now is drawn by base_link in map"]
 
 
 def test_goals_go_in_the_frame_of_a_map_that_comes_later(watched, capsys):
@@ -94,8 +94,8 @@ def test_goals_go_in_the_frame_of_a_map_that_comes_later(watched, capsys):
     assert watched.robot.tf["map_frame"] == "bob/map"
     assert watched.robot.motion.spec().goal_frame == "bob/map"
     assert capsys.readouterr().err.splitlines() == [
-        "bob is drawn where bob/map has bob/base_link and told goals and its place in "
-        "bob/map from now on"
+        "bob now is drawn by bob/base_link in bob/map and takes goals and its initial "
+        "pose in the frame bob/map"
     ]
 
 
@@ -166,7 +166,7 @@ def test_a_robot_without_a_place_is_placed_by_a_pose_that_comes(watched, capsys)
     watched.look(DRIVEN | POSE)
     assert watched.robot.feed.topic == "/bob/robot_pose"
     said = capsys.readouterr().err.splitlines()[1:]
-    assert said == ["bob has more now: pose /bob/robot_pose"]
+    assert said == ["bob has new topics: pose /bob/robot_pose"]
 
 
 def test_a_pose_that_comes_does_not_take_the_place_of_odometry(watched, capsys):
@@ -235,5 +235,8 @@ def test_a_told_robot_is_drawn_in_a_map_that_comes_later(bridge, monkeypatch, ca
         assert robot.tf["map_frame"] == "bob/map"
         assert robot.motion.spec().goal_frame == "bob/map"
     assert len(heard) == 3, "also once it is drawn by frames"
-    assert capsys.readouterr().err.count("Al is drawn where bob/map has") == 1
+    assert (
+        capsys.readouterr().err.count("Al now is drawn by bob/base_link in bob/map")
+        == 1
+    )
     robot.destroy()

@@ -188,6 +188,6 @@ def test_view_shows_what_it_would_draw_of_a_robot_that_is_told(ros1):
 def test_view_says_of_a_told_robot_why_no_more_is_known():
     shown = view("ws://127.0.0.1:1", "--show", "--wait", "0", "--robot", "Bob:/odom")
     said = shown.stdout.splitlines()
-    assert said == ["Bob (told with --robot)", "  odometry    /odom"]
+    assert said == ["Bob (from --robot)", "  odometry    /odom"]
     assert "cannot reach the rosbridge" in shown.stderr
     assert "No more is known" in shown.stderr

@@ -107,4 +107,4 @@ def test_the_file_that_discover_prints_shows_what_view_shows(tmp_path, spaces):
 def test_what_is_left_out_stands_in_the_file_as_a_remark(tmp_path):
     many = topics("") | {f"/path_{n}": "nav_msgs/Path" for n in range(9)}
     text = fleet_toml([("hall", URL, discover(many, "bob"))])
-    assert "# not drawn, since there are enough of its kind: /path_8\n" in text
+    assert "# not drawn, beyond the limit for its kind: /path_8\n" in text

@@ -1,4 +1,4 @@
-"""YAML files that people write by hand, with the line number of each value."""
+"""YAML files that people edit, with the line number of each value."""
 
 from pathlib import Path
 from typing import Any
@@ -57,12 +57,12 @@ class LinedYaml:
             mark = error.problem_mark or error.context_mark
             line = f":{mark.line + 1}" if mark else ""
             words = " ".join(str(error.problem or error.context).split())[:200]
-            raise ConfigError(f"{file}{line}: this is no YAML: {words}") from None
+            raise ConfigError(f"{file}{line}: this is not YAML: {words}") from None
         except RecursionError:
             raise ConfigError(f"{file}: values are nested too deep") from None
         except (yaml.YAMLError, ValueError) as error:
             words = " ".join(str(error).split())[:200]
-            raise ConfigError(f"{file}: this is no YAML: {words}") from None
+            raise ConfigError(f"{file}: this is not YAML: {words}") from None
 
     def wrong(self, way: tuple[str | int, ...], words: str) -> ConfigError:
         """Return an error with file and line.
@@ -90,7 +90,7 @@ class LinedYaml:
                     continue
                 if (*way, key.value) in self._lines:
                     raise yaml.MarkedYAMLError(
-                        problem=f'the key "{key.value}" is there twice',
+                        problem=f'the key "{key.value}" is defined twice',
                         problem_mark=key.start_mark,
                     )
                 self._note((*way, key.value), each)
@@ -109,7 +109,7 @@ class _Bounded(yaml.composer.Composer):
         self._values += 1
         problem = None
         if isinstance(event, yaml.AliasEvent):
-            problem = "aliases (*name) have no place in it"
+            problem = "aliases (*name) are not allowed"
         elif self._depth > DEEPEST:
             problem = f"values are nested more than {DEEPEST} deep"
         elif self._values > MOST_VALUES:

@@ -257,8 +257,8 @@ def _kind(begins: bytes) -> str:
     """Return the kind of a file that is not an image, by its first bytes."""
     if not begins:
         return "an empty file"
-    further = " and makes no sense further on" if begins.startswith(MAGIC) else ""
-    return f"one that begins with {begins!r}{further}"
+    further = " but cannot be decoded" if begins.startswith(MAGIC) else ""
+    return f"a file that begins with {begins!r}{further}"
 
 
 def _cells(light: "NDArray[np.float32]", settings: _Settings) -> "NDArray[np.int8]":

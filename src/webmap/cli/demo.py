@@ -23,8 +23,8 @@ USAGE = 2
 
 @click.command()
 @simulator_options(
-    robots="How many robots; 2 if not said.",
-    dialect="Which ROS the simulator plays: move_base's actions, or Nav2's.",
+    robots="Number of robots; 2 by default.",
+    dialect="ROS version: ros1 has the actions of move_base, ros2 those of Nav2.",
 )
 @click.option(
     "--bridge-port",

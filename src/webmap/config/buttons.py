@@ -219,8 +219,8 @@ def motion_of(kind: Kind, name: str, type: str | None) -> str | None:
         return None
     what = f"{name} of type {type}" if by_type else name
     return (
-        f"{what} carries {moved}, and a button may not write that: it goes through "
-        "the gate, by driving, by a goal or by STOP"
+        f"{what} carries {moved}, and a button must not send that: all motion goes "
+        "through the gate, by driving, by a goal or by STOP"
     )
 
 
@@ -330,13 +330,12 @@ def _check_values(spec: ButtonSpec) -> None:
     except RecursionError:
         raise ButtonMistake(key, "it is nested too deeply") from None
     except (TypeError, ValueError) as error:
-        raise ButtonMistake(key, f"no JSON can hold it: {error}") from None
+        raise ButtonMistake(key, f"it cannot be written as JSON: {error}") from None
 
 
 def _check_value(spec: ButtonSpec) -> None:
     if spec.value is None:
-        words = "a value is needed"
-        raise ButtonMistake("value", f"{words}, what a form begins with as well")
+        raise ButtonMistake("value", "a value is needed, also as the start of a form")
     try:
         value_kind(spec.value)
     except ConfigError as error:

@@ -112,7 +112,7 @@ class WrongConfig(ConfigError):
             for way, words in mistakes.found
         ]
         if mistakes.more:
-            lines.append(f"{what}: and {mistakes.more} mistakes more")
+            lines.append(f"{what}: and {mistakes.more} more mistakes")
         super().__init__("\n".join(lines))
 
 
@@ -138,7 +138,7 @@ def show(value: object) -> str:
 
 
 def did_you_mean(got: object, known: Iterable[str]) -> str:
-    """Return a hint at the nearest known word; empty if none is similar."""
+    """Return a hint at the most similar known name; empty if none is similar."""
     found = difflib.get_close_matches(str(got), list(known), n=1)
     return f'; did you mean "{found[0]}"?' if found else ""
 
@@ -296,13 +296,13 @@ def yes_or_no(value: Any) -> bool:
     return value
 
 
-def one_of(*words: str) -> Check:
-    """Return a check for a word: one of these."""
+def one_of(*texts: str) -> Check:
+    """Return a check for one of these texts."""
 
     def check(value: Any) -> str:
-        if not isinstance(value, str) or value not in words:
-            listed = " or ".join(f'"{word}"' for word in words)
-            raise ConfigError(f"{listed}{did_you_mean(value, words)}")
+        if not isinstance(value, str) or value not in texts:
+            listed = " or ".join(f'"{each}"' for each in texts)
+            raise ConfigError(f"{listed}{did_you_mean(value, texts)}")
         return value
 
     return check
@@ -343,7 +343,7 @@ def _otherwise(check: Check, value: Any) -> str:
             return f"; write {word} without quotes"
         if isinstance(value, int | float | date) and not isinstance(value, bool):
             check(str(value))
-            return f'; a text stands in quotes: "{value}"'
+            return f'; write it in quotes: "{value}"'
     except (ConfigError, ValueError):
         pass
     return ""

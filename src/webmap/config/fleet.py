@@ -93,8 +93,8 @@ def _bridges(value: Any, way: Way, mistakes: Mistakes) -> dict[str, BridgeConfig
     found = {}
     for name, each in value.items():
         if name in checks.HEAD and isinstance(each, str) and "://" not in each:
-            words = f"the file's own {name} stands before the first [table]"
-            mistakes.add((*way, name), f"got {show(each)} for a bridge; {words}")
+            advice = f"write the {name} of the file above the first [table]"
+            mistakes.add((*way, name), f"got {show(each)} for a bridge; {advice}")
             continue
         bridge = read(BridgeConfig, each, (*way, name), mistakes)
         if bridge is not None:
@@ -105,7 +105,7 @@ def _bridges(value: Any, way: Way, mistakes: Mistakes) -> dict[str, BridgeConfig
 def _robots(value: Any, way: Way, mistakes: Mistakes) -> list[RobotConfig]:
     if not isinstance(value, list) or not value:
         got = "nothing" if value is None else show(value)
-        more = " in two brackets" if isinstance(value, Mapping) else ""
+        more = " in double brackets" if isinstance(value, Mapping) else ""
         words = f"got {got}, expected a table [[robots]]{more} for each"
         mistakes.add(way, words)
         return []

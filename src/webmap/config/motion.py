@@ -139,7 +139,7 @@ class TwistConfig(TopicConfig, kw_only=True, frozen=True):
         """Add mistakes that concern several fields."""
         for index, hook in enumerate(self.stop_hooks):
             if self.topic in (hook.topic, hook.service):
-                words = f"its velocity goes to {self.topic}, so that is no stop hook"
+                words = f"{self.topic} is the velocity topic, expected another name"
                 mistakes.add((*way, "stop_hooks", index), words)
 
 
@@ -236,6 +236,6 @@ class MotionConfig(Config, kw_only=True, frozen=True):
         if move is not None and pose is not None and move.bridge != pose.bridge:
             mistakes.add(
                 (*way, "initial_pose"),
-                f"goals go to {move.bridge} and the initial pose to {pose.bridge}: "
-                "both go to one bridge",
+                f"goals are sent to {move.bridge} and the initial pose to "
+                f"{pose.bridge}, expected one bridge for both",
             )

@@ -160,7 +160,7 @@ def unknown(key: object, known: Iterable[str], way: Way, mistakes: Mistakes) -> 
     listed = ", ".join(known)
     hint = did_you_mean(key, known)
     if key in checks.HEAD and len(way) > 1:
-        hint = f"; it is the file's own, and stands before the first [table]{hint}"
+        hint = f"; it belongs to the file: write it above the first [table]{hint}"
     mistakes.add(way, f'there is no key "{key}" here{hint}; there are {listed}')
 
 
@@ -227,7 +227,7 @@ def _list_reader(hint: Any, *, single: bool) -> Reader:
             each = inner_read(value, way, mistakes)
             return [] if each is None else [each]
         name = ".".join(part for part in way if isinstance(part, str))
-        brackets = " in two brackets" if isinstance(value, Mapping) else ""
+        brackets = " in double brackets" if isinstance(value, Mapping) else ""
         expected = f"a table [[{name}]]{brackets} for each"
         if example:
             expected = f"an array such as [{example.partition(' or ')[0]}]"

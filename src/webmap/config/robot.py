@@ -75,7 +75,7 @@ class PictureConfig(Config, kw_only=True, frozen=True):
     height: Annotated[float, checks.above_zero("metres")]
     x: Annotated[
         float,
-        checks.finite("a number of metres: how far its middle is before the base"),
+        checks.finite("a number of metres: how far its middle is in front of the base"),
     ] = 0.0
     y: Annotated[
         float,
@@ -183,7 +183,7 @@ def _css_class(value: Any) -> str:
     plain = checks.text(value)
     if plain.split() != [plain] or plain in OWN_CLASSES:
         own = ", ".join(OWN_CLASSES)
-        raise ConfigError(f"a class of CSS: one word, and none of {own}")
+        raise ConfigError(f"a CSS class without spaces, and none of {own}")
     return plain
 
 

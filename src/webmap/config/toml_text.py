@@ -46,13 +46,12 @@ SEVERAL = ("robots", "map", "image", "modules", "labels", "buttons")
 """Tables that may occur more than once."""
 
 WORDS = {
-    "Invalid value": "no value that TOML knows: a text stands in quotes, true and "
-    "false without",
+    "Invalid value": "expected a value: a text with quotes, true and false without",
     "Illegal character '\\n'": "expected the quote that ends a text on the same line",
     "Invalid statement": 'expected a table such as [bridges], or key = "value"',
     "Expected '=' after a key in a key/value pair": "expected a key, an equals sign "
     "and a value",
-    "Cannot overwrite a value": "this key stands there already",
+    "Cannot overwrite a value": "this key is already defined",
     "Expected newline or end of document after a statement": "expected the end of the "
     "line after a value",
 }
@@ -119,7 +118,7 @@ class FleetText:
         if mistakes.found:
             lines = [self.complaint(way, words) for way, words in mistakes.found]
             if mistakes.more:
-                lines.append(f"{self.name}: and {mistakes.more} mistakes more")
+                lines.append(f"{self.name}: and {mistakes.more} more mistakes")
             raise ConfigError("\n".join(lines))
 
 
@@ -315,9 +314,9 @@ def not_toml(name: str, text: str, error: ValueError) -> str:
     table = _TABLE.fullmatch(words)
     if table is not None:
         keys = ".".join(key.strip().strip("'\"") for key in table["keys"].split(","))
-        words = f"a table [{keys}] stands there already"
+        words = f"the table [{keys}] is already defined"
         if keys.rpartition(".")[2] in SEVERAL:
-            words += f"; several are [[{keys}]] in two brackets each"
+            words += f"; for several, write [[{keys}]] in double brackets"
     here = one_line(lines[min(line, len(lines)) - 1].strip(), _LONGEST)
     got = f"got {here}, " if here else ""
     return f"{name}:{line}: this is not TOML: {got}{WORDS.get(words, words)}"

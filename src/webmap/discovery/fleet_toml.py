@@ -11,12 +11,13 @@ from webmap.discovery.layers import TRAIL, drawing, topic_of, with_layers
 
 HEAD = """\
 # A fleet file: webmap check FILE reads it, webmap run FILE shows it.
-# The words after each topic say why it was chosen; a wrong one is yours to change.
+# The comment after each topic is the reason for the choice; correct a wrong topic.
 """
 
 UNSURE = (
-    "Say within how many seconds the base stops by itself when velocity ceases, if you",
-    "know it: without it the robot is driven at 0.3 m/s and 0.6 rad/s at the most.",
+    "Set the command timeout, if you know it: the time in seconds after which the base",
+    "stops by itself when commands end. Without it the robot is driven at 0.3 m/s and",
+    "0.6 rad/s at the most.",
     "twist.stops_within = 0.25",
 )
 
@@ -111,17 +112,14 @@ def _robot(
     if config.motion.twist is not None:
         remarks.below[(*way, "twist")] = UNSURE
     behind[(*way, "tf", "quiet")] = (
-        "drawn where its frames have it"
+        "its pose comes from its frames"
         if robot.tf_alone
         else f"drawn in the frame {robot.map_frame}, if frames lead there"
     )
     config = _with_layers(config, robot, findings, way, remarks)
     left_out = findings.layers.get(robot.namespace, Layers()).left_out
     remarks.below[way] = (
-        *(
-            f"not drawn, since there are enough of its kind: {o.topic}"
-            for o in left_out
-        ),
+        *(f"not drawn, beyond the limit for its kind: {o.topic}" for o in left_out),
         *robot.notes,
     )
     data = config.to_dict()

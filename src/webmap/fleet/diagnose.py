@@ -36,15 +36,15 @@ def bridges_of(
     said = bool(robots or settings)
     if files and (said or len(given) > 1):
         raise click.UsageError(
-            f"{files[0]} says which bridges and robots there are; leave out --robot, "
+            f"{files[0]} configures the bridges and the robots; leave out --robot, "
             "--set and other addresses"
         )
     if files:
         return _of_file(Path(files[0]))
     if said and len(given) > 1:
         raise click.UsageError(
-            f"--robot and --set are about what is behind one bridge, and {len(given)} "
-            "were given; ask for each by itself"
+            f"--robot and --set apply to the robots of one bridge, got {len(given)} "
+            "bridges; run the command once for each bridge"
         )
     meant = _said(given[0], robots, settings) if said else _always(())
     return [(normalise_url(text), meant) for text in given]

@@ -13,8 +13,8 @@ from webmap.discovery.naming import free_name, unique_names
 from webmap.discovery.robots import host_name
 from webmap.ros.asking import ask_topics
 
-TELL = (
-    "Say what there is: --robot NAME:ODOM:CMD_VEL:SCAN, "
+LIST_ROBOTS = (
+    "List each robot with --robot NAME:ODOM:CMD_VEL:SCAN, "
     "as in --robot Bob:/odom:/cmd_vel:/scan; "
     "or give webmap discover a list of the topics with --topics"
 )
@@ -41,10 +41,10 @@ class Found:
         if isinstance(self.trouble, BridgeClosed):
             return f"{self.trouble}."
         if self.trouble is not None:
-            reason = f"it has no rosapi that says its topics: {self.trouble}"
+            reason = f"it has no rosapi that lists its topics: {self.trouble}"
         else:
             reason = " ".join(self.findings.notes).rstrip(".")
-        return f"{self.url}: {reason}. {TELL}"
+        return f"{self.url}: {reason}. {LIST_ROBOTS}"
 
 
 async def find(

@@ -52,7 +52,7 @@ class FoundFleet:
         lines: list[str] = []
         taken: set[tuple[Bridge, str]] = set()
         for bridge, told in self.told:
-            lines += ["", f"{told.name} (told with --robot)", *_told_table(told)]
+            lines += ["", f"{told.name} (from --robot)", *_told_table(told)]
             found = self.behind.get(bridge)
             if found is None or as_told:
                 continue
@@ -179,8 +179,7 @@ def told_fleet(
     for one in found:
         if one.trouble is not None:
             echo(
-                f"{one.url}: {one.trouble}. No more is known of what can be drawn "
-                f"than was told with --robot.",
+                f"{one.url}: {one.trouble}. Only the topics of --robot can be drawn.",
                 err=True,
             )
     return FoundFleet([*told], behind=dict(zip(bridges, found, strict=True)))

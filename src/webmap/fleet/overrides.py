@@ -26,12 +26,12 @@ from webmap.ros.names import is_topic, is_type
 
 FORM = "ROBOT.ROLE=TOPIC, as in robot_1.scan=/robot_1/front/scan"
 
-RULE = "said with --set"
+RULE = "from --set"
 
 USED: tuple[str, ...] = tuple(
     role for role in ROLES if role not in ("pose", "costmap", "cloud")
 )
-"""Roles of which a robot on the page uses the best topic only."""
+"""Roles that --set can change."""
 
 WORDS = ("name", "base", "velocity_type")
 """Keys of settings that are no topics: the robot's name, the frame of its base, and
@@ -92,15 +92,15 @@ def parse_setting(text: str) -> Setting:
         hint = f"; did you mean {near[0]!r}?" if near else "."
         raise ConfigError(
             f"--set {text!r}: there is no role {key!r}{hint} The roles are "
-            f"{', '.join(USED)}; and there are {', '.join(WORDS)}"
+            f"{', '.join(USED)}; the other keys are {', '.join(WORDS)}"
         )
     if key in WORDS:
         if not value.strip():
             raise ConfigError(f"--set {text!r}: a {key} has at least one character")
         if key == "velocity_type" and not is_type(value.strip(), *VELOCITY):
             raise ConfigError(
-                f"--set {text!r}: {value.strip()!r} is no type that drives a base; "
-                f"there are {' and '.join(VELOCITY)}"
+                f"--set {text!r}: got the type {value.strip()!r}, expected "
+                f"{' or '.join(VELOCITY)}"
             )
         check_name(value.strip(), f"--set {text!r}")
         return Setting(text, robot, key, (value.strip(),))
@@ -112,8 +112,8 @@ def parse_setting(text: str) -> Setting:
     for topic in topics:
         if not (topic.startswith("/") and is_topic(topic)):
             raise ConfigError(
-                f"--set {text!r}: {topic!r} is no name of a topic; it begins with a "
-                "slash, as in /robot_1/scan"
+                f"--set {text!r}: {topic!r} is not the name of a topic; a name begins "
+                "with a slash, as in /robot_1/scan"
             )
     return Setting(text, robot, key, topics)
 

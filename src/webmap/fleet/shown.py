@@ -98,13 +98,13 @@ class ShownRobot:
             if part is not None and part.frame != frame:
                 part = msgspec.structs.replace(part, frame=frame)
                 config = config.with_part(key, part)
-                told = [f"told goals and its place in {frame}"]
+                told = [f"takes goals and its initial pose in the frame {frame}"]
         self.use(config)
         now = self.robot.tf
         if before and now and {**before, "quiet": now["quiet"]} != now:
-            news = [f"drawn where {now['map_frame']} has {now['base_frame']}"]
+            news = [f"is drawn by {now['base_frame']} in {now['map_frame']}"]
         said = " and ".join([*news, *told])
-        return f"{self.robot.name} is {said} from now on" if said else ""
+        return f"{self.robot.name} now {said}" if said else ""
 
 
 class ShownRobots:
@@ -257,7 +257,7 @@ class ShownRobots:
             new = new.with_part(key, part)
         wrong = shown.use(new)
         words = ", ".join(said for key, said in used if key not in wrong)
-        sentences = [f"{shown.robot.name} has more now: {words}"] if words else []
+        sentences = [f"{shown.robot.name} has new topics: {words}"] if words else []
         if news.moved and "tf" not in fixed:
             sentences.append(shown.move(wanted.tf, found.map_frame))
         return [sentence for sentence in sentences if sentence]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 FORM = "NAME:ODOM:CMD_VEL:SCAN, as in Bob:/odom:/cmd_vel:/scan"
 
-APART = "names differ by more than case and Unicode form"
+APART = "names must differ by more than case and Unicode form"
 
 TOLD: tuple[Role, ...] = ("odometry", "velocity", "scan")
 """The roles in a value of ``--robot``."""
@@ -67,8 +67,8 @@ def parse_robot(text: str, bridges: Sequence["Bridge"]) -> Candidate:
     )
     if not (number.isascii() and number.isdigit() and 0 < int(number) <= len(bridges)):
         raise ConfigError(
-            f"robot {text!r}: {number!r} is no bridge's number; there are "
-            f"{len(bridges)}, counted from 1"
+            f"robot {text!r}: got the bridge number {number!r}, expected 1 to "
+            f"{len(bridges)}"
         )
     name, *topics = (part.strip() for part in rest.split(":"))
     if not name or len(topics) > len(TOLD) or not any(topics):
@@ -126,11 +126,11 @@ def told_robots(texts: Iterable[str], bridges: Sequence["Bridge"]) -> list[Candi
 def _differ(robot: Candidate, other: Candidate, text: str) -> None:
     name, drives = other.found.name, robot.found.topic("velocity")
     if same_name(robot.found.name) == same_name(name):
-        raise ConfigError(f"robot {text!r}: there is a robot {name!r} already; {APART}")
+        raise ConfigError(f"robot {text!r}: another robot is called {name!r}; {APART}")
     same = drives and _plain(drives) == _plain(other.found.topic("velocity") or "-")
     if same and robot.bridge.url == other.bridge.url:
         raise ConfigError(
-            f"robot {text!r}: {drives} drives {name!r} already; each robot has its own"
+            f"robot {text!r}: {drives} already drives {name!r}; expected another topic"
         )
 
 

@@ -86,7 +86,7 @@ class Looking(ABC):
                     log.debug("%s: %s", self.bridge.url, error)
                     pause = min(2 * pause, LONGEST)
                 except Exception:
-                    log.exception("%s: a look at the topics failed", self.bridge.url)
+                    log.exception("%s: the search for topics failed", self.bridge.url)
                     pause = min(2 * pause, LONGEST)
             await asyncio.sleep(pause)
 
@@ -129,7 +129,7 @@ class LookingForRobots(Looking):
                 self._came(news, self.bridge)
             except Exception:  # the other news is reported only once
                 log.exception(
-                    "%s: what is new of %s is not shown",
+                    "%s: the new topics of %s are not shown",
                     self.bridge.url,
                     news.robot.name,
                 )
@@ -233,7 +233,7 @@ class LookingForLayers(Looking):
         new = robot.news_of_topics([*(layer.topic for layer in others), *cameras])
         if new:
             notify(
-                f"{robot.robot.name}: not drawn, since there are enough of their kind: "
+                f"{robot.robot.name}: not drawn, beyond the limit for their kind: "
                 f"{', '.join(new)}"
             )
 

@@ -124,7 +124,7 @@ class PageHost:
             case ModuleMessage(instance=instance, data=data):
                 self._module_message(instance, data)
             case Trouble(text=text):
-                log.warning("%r: the page says: %s", self, text)
+                log.warning("%r: the page reports: %s", self, text)
 
     def lost(self, socket: PageSocket) -> None:
         """Set that the socket was lost; the page is kept for a while."""

@@ -1,4 +1,4 @@
-"""Findings of the diagnosis about messages that came, or did not come, on a topic."""
+"""Findings of the diagnosis about the rate and the age of messages on a topic."""
 
 from webmap.discovery.doctor.observed import Heard, Observed
 from webmap.discovery.found import Guess
@@ -31,14 +31,14 @@ def heard_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> F
     heard = seen.heard[guess.topic]
     bad: Level = "wrong" if needed else "warning"
     if not heard.count:
-        blind = ", and without a pose a robot is not driven" if needed else ""
+        blind = ", and a robot without a pose is not driven" if needed else ""
         return silence(name, guess.topic, seen, bad, blind)
     if heard.trouble:
         return Finding(
             bad,
             name,
             f"{guess.topic} cannot be read: {heard.trouble}.",
-            "Look whether its type is the one that the bridge says.",
+            "Check that its type is the type that the bridge lists.",
         )
     said = f"{guess.topic}: {heard.rate:.1f} messages a second"
     if heard.frame:
@@ -48,30 +48,30 @@ def heard_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> F
         return Finding(
             "wrong",
             name,
-            f"{said}, and none for {heard.longest_gap:.1f} s: driving stops when a "
+            f"{said}, but none for {heard.longest_gap:.1f} s: driving stops when a "
             f"pose is older than {OLD:g} s.",
-            "Let it be published at 10 Hz or more.",
+            "Publish it at 10 Hz or more.",
         )
     if age is not None and age > AGED:
         return Finding(
             "warning",
             name,
-            f"{said}, {age:.1f} s old when they come.",
-            "Look for a slow link, a queue, or a stamp that is not set anew.",
+            f"{said}, {age:.1f} s old when they arrive.",
+            "Look for a slow connection, a queue, or a stamp that is not updated.",
         )
     if age is not None and age < -AHEAD:
         return Finding(
             "warning",
             name,
             f"{said}, stamped {-age:.1f} s ahead of the robot's own clock.",
-            "Let all of the robot's computers take the time from one server.",
+            "Synchronise the clocks of all the robot's computers with one server.",
         )
     if heard.rate < SLOW:
         return Finding(
             "warning",
             name,
-            f"{said}: few, so what is shown jumps.",
-            "Let it be published at 10 Hz or more.",
+            f"{said}: too few, so it moves in jumps on the map.",
+            "Publish it at 10 Hz or more.",
         )
     old = "" if age is None else f", {max(age, 0.0) * 1000:.0f} ms old"
     return Finding("good", name, f"{said}{old}.")
@@ -84,14 +84,15 @@ def rare_finding(name: str, guess: Guess, seen: Observed) -> Finding:
         return Finding(
             "note",
             name,
-            f"Nothing came on {guess.topic} in {heard.seconds:.0f} s; it may be slow.",
+            f"No message was received on {guess.topic} in {heard.seconds:.0f} s; the "
+            f"topic may be slow.",
         )
     if heard.trouble:
         return Finding(
             "warning",
             name,
             f"{guess.topic} cannot be read: {heard.trouble}.",
-            "Look whether its type is the one that the bridge says.",
+            "Check that its type is the type that the bridge lists.",
         )
     age = age_of(heard, seen)
     old = "" if age is None else f", {max(age, 0.0):.1f} s old"
@@ -100,14 +101,14 @@ def rare_finding(name: str, guess: Guess, seen: Observed) -> Finding:
         return Finding(
             "warning",
             name,
-            f"{said}: what is shown is no more so.",
-            "Look for a queue, or a stamp that is not set anew.",
+            f"{said}: the shown value may be out of date.",
+            "Look for a queue, or a stamp that is not updated.",
         )
     return Finding("good", name, f"{said}.")
 
 
 def silence(name: str, topic: str, seen: Observed, bad: Level, blind: str) -> Finding:
-    """Return a finding that nothing came on a topic, with its possible publishers.
+    """Return a finding about a topic without messages, with its publishers.
 
     Args:
         name: The robot's name.
@@ -117,17 +118,17 @@ def silence(name: str, topic: str, seen: Observed, bad: Level, blind: str) -> Fi
         blind: The consequence, as the end of a sentence.
 
     """
-    said = f"Nothing came on {topic} in {seen.heard[topic].seconds:.0f} s"
+    said = f"No message was received on {topic} in {seen.heard[topic].seconds:.0f} s"
     writers = seen.publishers.get(topic)
     if writers:
         return Finding(
             bad,
             name,
-            f"{said}, though {', '.join(writers)} could publish it{blind}.",
-            "Look whether that node is waiting for something"
+            f"{said}, although {', '.join(writers)} can publish it{blind}.",
+            "Check whether that node waits for something"
             + (
-                ", and whether its quality of service is one that the bridge takes "
-                f"(ros2 topic info -v {topic})."
+                ", and whether its quality of service is compatible with that of the "
+                f"bridge (ros2 topic info -v {topic})."
                 if seen.findings.dialect != "ros1"
                 else f" (rostopic echo {topic})."
             ),
@@ -136,21 +137,21 @@ def silence(name: str, topic: str, seen: Observed, bad: Level, blind: str) -> Fi
         return Finding(
             bad,
             name,
-            f"{said}: nobody publishes it{blind}.",
-            "Start what publishes it; the topic is there only because somebody listens "
-            "to it.",
+            f"{said}: no node publishes it{blind}.",
+            "Start the node that publishes it; the topic exists only because a node "
+            "subscribes to it.",
         )
     return Finding(
         bad,
         name,
         f"{said}{blind}.",
-        "Start what publishes it; the topic may be there only because somebody listens "
-        "to it.",
+        "Start the node that publishes it; the topic may exist only because a node "
+        "subscribes to it.",
     )
 
 
 def age_of(heard: Heard, seen: Observed) -> float | None:
-    """Return the age of the newest message when it came, in seconds.
+    """Return the age of the newest message when it arrived, in seconds.
 
     None if it has no stamp, or the robot's clock is unknown.
     """

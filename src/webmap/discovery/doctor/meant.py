@@ -10,7 +10,7 @@ from webmap.discovery.rules import VELOCITY
 from webmap.ros.names import is_type, normalise_topic
 from webmap.ros.tf import Buffer
 
-RULE = "as it was said"
+RULE = "as configured"
 
 TYPES: Mapping[Role, str] = {
     "odometry": "nav_msgs/Odometry",
@@ -24,7 +24,7 @@ TYPES: Mapping[Role, str] = {
     "plan": "nav_msgs/Path",
     "tf": "tf2_msgs/TFMessage",
 }
-"""Default types of topics, if neither a person nor the bridge states the type."""
+"""Default types of topics, if neither the configuration nor the bridge has the type."""
 
 WHERE: tuple[Role, ...] = ("odometry", "pose")
 

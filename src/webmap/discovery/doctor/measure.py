@@ -37,7 +37,7 @@ MOST_SCANS = 6
 """Most scans of a robot that are listened to."""
 
 LATCHED = ("nav_msgs/OccupancyGrid", "sensor_msgs/PointCloud2")
-"""Types of maps, which are published once: one that does not come may be too large."""
+"""Types of maps, which are published once: if none arrives, it may be too large."""
 
 AS_TEXT = 10.0
 """Seconds to wait for a map as text, if it did not come in binary."""
@@ -50,7 +50,7 @@ NEEDLESS = ("/rosout", "/parameter_events")
 
 T = TypeVar("T")
 
-TRYING = "Trying what a call that hangs holds up."
+TRYING = "Testing what a slow service call delays."
 
 
 async def observe(
@@ -85,7 +85,7 @@ async def observe(
 
     """
     unlisted, told, asked = "", topics is not None, dict(topics or {})
-    progress("Asking which topics there are.")
+    progress("Requesting the list of topics.")
     try:
         found = await ask_topics(url, wait=wait, waiting=waiting)
         asked = asked if told else found
@@ -111,7 +111,7 @@ async def observe(
             )
             seen = _as_meant(seen, meant(seen.findings))
             if not unlisted:
-                progress("Asking for the time, and who writes and who listens.")
+                progress("Requesting the time, the publishers and the subscribers.")
                 seen = await _ask(seen, bridge)
                 if ask_parameters:
                     link = await checks.asked_about_threads(
@@ -259,7 +259,8 @@ async def _sample(
     if silent:
         names = ", ".join(silent)
         progress(
-            f"Nothing came of {names} in binary: listening for {AS_TEXT:g} s to text."
+            f"No binary message was received on {names}: listening to text for "
+            f"{AS_TEXT:g} s."
         )
         late = await sample(
             bridge,

@@ -68,7 +68,7 @@ class Hand:
             case "tick":
                 self._tick = words["tick"]
             case "hello" if self._report is not None:
-                self._end("the gate was started anew meanwhile")
+                self._end("the gate restarted in the meantime")
             case "refused" if words["what"] == "lease" and self.stage != "coming":
                 self._end(words["why"])
             case "refused":
@@ -108,7 +108,7 @@ class Hand:
         if self.stage == "coming" and report["armable"]:
             self._go_on("ready", now)
         elif report["latched"] and self.stage != "over":
-            self._end(report["reason"] or "STOP stands")
+            self._end(report["reason"] or "STOP is active")
         elif self.stage in ("coming", "taking") and not report["mine"]:
             self._why = report["reason"] or self._why
         test = report["test"]
@@ -116,7 +116,7 @@ class Hand:
             return
         if self.stage == "taking":
             self._go_on("testing", now)
-            self._why = "the gate did not keep the result"
+            self._why = "the gate did not store the result"
         if before is None or test != before["test"]:
             self.news.append(test["text"])
         concluded = test["state"] == "done" or test["text"] == MOVES_ON
@@ -132,7 +132,7 @@ class Hand:
             self.code = GOES_ON
             self.news.append(
                 f"Result of {day}: it does NOT stop by itself, so it is driven at 0.3 "
-                "m/s at most. Set a timeout of its own on the robot."
+                "m/s at most. Set a command timeout in the robot's base."
             )
         else:
             self.code = STOPS
@@ -150,7 +150,7 @@ class Hand:
     def _end(self, why: str) -> None:
         if self.stage != "over":
             self.stage = "over"
-            self.news.append(f"Nothing was found out: {why}.")
+            self.news.append(f"The stop test gave no result: {why}.")
 
 
 def _is_result(report: Words, text: str) -> bool:
@@ -185,10 +185,10 @@ def find_out(urls: Sequence[str], name: str, *, wait: float, yes: bool) -> int:
         found = discover(asyncio.run(_topics(url, wait)), host_name(url))
         spec = _spec(url, name, found.robots)
     except (BridgeError, ConfigError) as error:
-        echo(f"Nothing was found out: {error}", err=True)
+        echo(f"The stop test gave no result: {error}", err=True)
         return UNKNOWN
     except KeyboardInterrupt:
-        echo("Ended before anything was found out; nothing was moved.")
+        echo("Interrupted before the stop test had a result; nothing was moved.")
         return UNKNOWN
     client = GateClient()
     client.declare(spec)
@@ -196,7 +196,7 @@ def find_out(urls: Sequence[str], name: str, *, wait: float, yes: bool) -> int:
         client.start()
         return _lead(client, spec, yes)
     except (KeyboardInterrupt, click.Abort):
-        echo("Ended before anything was found out; the robot is stopped.")
+        echo("Interrupted before the stop test had a result; the robot is stopped.")
         return UNKNOWN
     finally:
         client.stop()
@@ -210,7 +210,7 @@ async def _topics(url: str, wait: float) -> dict[str, str]:
 
 
 def _spec(url: str, name: str, robots: tuple[FoundRobot, ...]) -> RobotSpec:
-    """Return the robot as the gate takes it, without its command timeout."""
+    """Return the robot's specification for the gate, without a command timeout."""
     robot = next((one for one in robots if one.name == name), None)
     if robot is None:
         there = ", ".join(one.name for one in robots) or "no robot at all"
