@@ -1,4 +1,4 @@
-"""``webmap view``: robots are found, told, and come later."""
+"""``webmap view``: robots are found, given, and come later."""
 
 import asyncio
 import re
@@ -19,9 +19,9 @@ from webmap.discovery import FoundRobot, Guess, discover
 from webmap.discovery.found import ROLES
 from webmap.discovery.newcomers import Newcomers, News
 from webmap.fleet.found import find_fleet
-from webmap.fleet.overrides import Overruling, parse_setting
+from webmap.fleet.given import Candidate
+from webmap.fleet.overrides import Overrides, parse_setting
 from webmap.fleet.shown import ShownRobots
-from webmap.fleet.stated import Candidate
 from webmap.fleet.watch import LookingForLayers
 from webmap_process import simulator
 
@@ -92,8 +92,8 @@ def test_robots_that_are_told_are_all_there_is(ros1):
 
 
 def test_a_robot_that_is_told_takes_the_place_of_the_one_found(ros1):
-    told = "Bob:/robot_0/odom:/robot_0/cmd_vel:"
-    with viewing(ros1, "--discover", "--robot", told) as view:
+    given = "Bob:/robot_0/odom:/robot_0/cmd_vel:"
+    with viewing(ros1, "--discover", "--robot", given) as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
         view.wait_for("Found robot_1")
     assert "Found robot_0" not in view.said
@@ -111,11 +111,11 @@ def test_the_page_opens_without_a_bridge_and_its_robots_come_later(later_port):
 def test_a_told_robot_takes_the_place_of_one_that_comes_when_its_bridge_does(
     later_port,
 ):
-    told = ("--discover", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
-    with viewing(f"ws://127.0.0.1:{later_port}", "--wait", "0.5", *told) as view:
+    given = ("--discover", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
+    with viewing(f"ws://127.0.0.1:{later_port}", "--wait", "0.5", *given) as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
         with simulator("--port", str(later_port), "--robots", "2"):
-            # Both settle at one look, and are told in the order of their names.
+            # Both settle at one look, and are reported in the order of their names.
             view.wait_for(r"A robot appeared behind ws://.*: robot_1: odometry", 40)
     assert "robot_0: odometry" not in view.said
 
@@ -202,8 +202,8 @@ def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge):
 
 
 def test_a_newcomer_gets_a_name_that_nobody_has(bridge, capsys):
-    told = [candidate(Bridge("ws://al:9090"), "BOB")]
-    late = ShownRobots(Console(), Overruling(stops_within=0.25), told=told)
+    given = [candidate(Bridge("ws://al:9090"), "BOB")]
+    late = ShownRobots(Console(), Overrides(stops_within=0.25), given=given)
     came = late.came
     (robot,) = discover(TOPICS, "bob").robots
     came(News(robot), bridge)
@@ -239,7 +239,7 @@ def test_where_there_is_no_odometry_a_localiser_s_pose_is_shown(bridge):
 
 def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
     console = Console()
-    late = ShownRobots(console, Overruling(stops_within=0.25))
+    late = ShownRobots(console, Overrides(stops_within=0.25))
     came = late.came
     (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
     came(News(bare), bridge)
@@ -267,7 +267,7 @@ def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
 
 
 def test_each_camera_that_comes_later_is_used_as_long_as_there_is_room(bridge, capsys):
-    late = ShownRobots(Console(), Overruling(stops_within=0.25))
+    late = ShownRobots(Console(), Overrides(stops_within=0.25))
     came = late.came
     newcomers = Newcomers()
 
@@ -308,7 +308,7 @@ def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, capsys):
 
 
 @pytest.mark.parametrize(
-    ("told", "is_it"),
+    ("given", "is_it"),
     [
         ({"name": "bob"}, True),
         ({"name": "Al", "odometry": "/odom"}, True),
@@ -317,21 +317,21 @@ def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, capsys):
     ],
 )
 def test_a_told_robot_is_the_found_one_by_name_odometry_or_velocity(
-    bridge, told, is_it
+    bridge, given, is_it
 ):
     (robot,) = discover(TOPICS, "bob").robots
     found = Candidate(bridge, robot)
-    assert candidate(bridge, **told).is_also(found) is is_it
-    assert not candidate(Bridge("ws://al:9090"), **told).is_also(found)
+    assert candidate(bridge, **given).is_also(found) is is_it
+    assert not candidate(Bridge("ws://al:9090"), **given).is_also(found)
 
 
 STAMPED = "geometry_msgs/msg/TwistStamped"
 
 
-def fleet_of(bridge, *told, topics, settings=()):
+def fleet_of(bridge, *given, topics, settings=()):
     """What is shown of a list of topics, where there is no rosapi to ask."""
-    said = Overruling([parse_setting(text) for text in settings])
-    return find_fleet([bridge], told, wait=0.0, topics=topics, overruling=said)
+    said = Overrides([parse_setting(text) for text in settings])
+    return find_fleet([bridge], given, wait=0.0, topics=topics, overrides=said)
 
 
 def test_a_robot_of_a_list_is_driven_with_the_type_that_the_list_tells(bridge):
@@ -348,10 +348,10 @@ def test_a_robot_of_a_list_is_driven_with_the_type_that_the_list_tells(bridge):
 def test_a_robot_that_is_told_has_the_type_of_a_list_if_that_drives(
     bridge, listed, type
 ):
-    told = candidate(bridge, "Al", velocity="al/go")
-    fleet = fleet_of(bridge, told, topics=TOPICS | {"/al/go": listed})
-    assert fleet.told[0].found.type_of("velocity") == type
-    assert ("/go  " + type in fleet.table(grid=True, as_told=True)) == bool(type)
+    given = candidate(bridge, "Al", velocity="al/go")
+    fleet = fleet_of(bridge, given, topics=TOPICS | {"/al/go": listed})
+    assert fleet.given[0].found.type_of("velocity") == type
+    assert ("/go  " + type in fleet.table(grid=True, only_given=True)) == bool(type)
 
 
 def test_a_velocity_topic_that_is_said_has_the_type_of_the_list(bridge):
@@ -364,7 +364,7 @@ def test_a_velocity_topic_that_is_said_has_the_type_of_the_list(bridge):
 
 
 def test_velocity_that_comes_later_is_sent_in_its_type(bridge):
-    late = ShownRobots(Console(), Overruling(stops_within=0.25))
+    late = ShownRobots(Console(), Overrides(stops_within=0.25))
     came = late.came
     (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
     came(News(bare), bridge)
@@ -377,7 +377,7 @@ def test_what_comes_later_leaves_alone_what_drives_the_robot(bridge):
     settings = [parse_setting("bob.velocity=/cmd_vel_nav")]
     topics = TOPICS | {"/cmd_vel_nav": STAMPED}
     fleet = fleet_of(bridge, topics=topics, settings=["bob.velocity=/cmd_vel_nav"])
-    late = ShownRobots(Console(), Overruling(settings))
+    late = ShownRobots(Console(), Overrides(settings))
     late.add(fleet.robots[0])
     (robot,) = late.robots
     twist = robot.motion.config.twist
@@ -405,7 +405,7 @@ RICH = {
 def drawing_of(bridge, topics, *settings):
     """Draw what is found of one robot; return it, the console and what is drawn."""
     console = Console()
-    said = Overruling([parse_setting(text) for text in settings])
+    said = Overrides([parse_setting(text) for text in settings])
     late = ShownRobots(console, said)
     (found_,) = said.findings(bridge.url, discover(topics, "bob")).robots
     late.add(Candidate(bridge, found_))

@@ -10,7 +10,7 @@ from webmap import Bridge
 from webmap.base.geometry import Pose
 from webmap.console import Console
 from webmap.discovery import discover
-from webmap.discovery.hearing import LateFrames, late_frames
+from webmap.discovery.frame_listening import LateFrames, late_frames
 from webmap.discovery.tf_robots import Trees
 from webmap.fleet.shown import ShownRobots
 from webmap.fleet.watch import LookingForLayers, LookingForRobots

@@ -73,8 +73,8 @@ def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
     words = r"No message was received on /robot_0/plan in \d+ s; messages may"
     (plan,) = [each for each in findings if re.match(words, each.words)]
     assert plan.level == "note"
-    assert seen.heard[camera].count <= ENOUGH
-    assert seen.heard[camera].every > 0
+    assert seen.measured[camera].count <= ENOUGH
+    assert seen.measured[camera].every > 0
 
 
 def test_a_map_above_the_limit_of_the_bridge_is_told_with_the_parameter():
@@ -134,7 +134,10 @@ def test_a_node_that_writes_velocity_too_is_named(dialect):
         )
 
     _, findings, _ = looked_at(site(dialect), joystick)
-    assert said(findings, "other writers too: /joy_teleop") == "warning"
+    assert (
+        said(findings, "Other nodes publish to /robot_0/cmd_vel too: /joy_teleop")
+        == "warning"
+    )
 
 
 @pytest.mark.serial  # rates and ages are measured
@@ -166,7 +169,7 @@ def test_stamps_that_stand_still_are_old(dialect):
         return message
 
     _, findings, _ = looked_at(site(dialect, change=stuck))
-    assert said(findings, "s old when they come") == "warning"
+    assert said(findings, "s old when they arrive") == "warning"
 
 
 @DIALECTS
@@ -288,7 +291,7 @@ def test_a_call_is_tried_again_without_looking_at_the_rest_again():
     called, seen, again = asyncio.run(run())
     assert not seen.link.tried
     assert (again.link.tried, again.link.calls_in_threads) == (True, True)
-    assert again.heard == seen.heard
+    assert again.measured == seen.measured
     ours = [name for name in called if name.startswith("/webmap_doctor_")]
     assert len(ours) == len(called) - 1, called
     assert "/rosapi/get_time" in called, "nothing that hangs or ends a rosapi"
@@ -316,7 +319,7 @@ def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
     )
     assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
     assert said(findings, "rosapi does not say") == "note"
-    assert said(findings, "The topics are those that were given") == "good"
+    assert said(findings, "The topics come from the given list") == "good"
     assert said(findings, "/robot_0/odom:") == "good"
     assert said(findings, "The bridge does not list the publishers of") == "note"
 

@@ -295,7 +295,7 @@ def test_two_robots_of_one_last_name_have_their_whole_namespaces_for_names():
 
 
 def test_who_publishes_is_said_to_be_unknown():
-    assert "does not say who publishes" in discover({"/odom": ODOM}).notes[0]
+    assert "does not show which nodes publish" in discover({"/odom": ODOM}).notes[0]
 
 
 @pytest.mark.parametrize("topics", [{}, {"/rosout": "rosgraph_msgs/Log"}])

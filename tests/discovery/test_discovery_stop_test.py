@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from webmap.discovery.doctor.stop_test import GOES_ON, STOPS, UNKNOWN, Hand
+from webmap.discovery.doctor.stop_test import GOES_ON, STOPS, UNKNOWN, StopTestClient
 from webmap.gate.disk import Records
 from webmap.gate.events import Key, Press, StopRecord
 from webmap.gate.rules.stop_test import MOVES_ON
@@ -145,7 +145,7 @@ def test_two_addresses_are_one_too_many():
     assert "--stop-test takes one URL, got 2" in said.stderr
 
 
-# The hand, without a gate.
+# The test, without a gate.
 
 FREE = {
     "op": "robot",
@@ -164,29 +164,29 @@ MINE = {**FREE, "mine": True, "armed": True, "epoch": 3}
 
 
 def hand_that_tests():
-    """Return a hand whose robot creeps."""
-    hand = Hand(0.0)
-    hand.hear({"op": "tick", "tick": 7}, 0.0)
-    hand.hear(FREE, 0.0)
-    hand.begin(0.0)
-    hand.hear(MINE, 0.1)
-    hand.hear({**MINE, "test": {"state": "creeping", "text": "creeping"}}, 0.2)
-    return hand
+    """Return a test whose robot creeps."""
+    test = StopTestClient(0.0)
+    test.receive({"op": "tick", "tick": 7}, 0.0)
+    test.receive(FREE, 0.0)
+    test.begin(0.0)
+    test.receive(MINE, 0.1)
+    test.receive({**MINE, "test": {"state": "creeping", "text": "creeping"}}, 0.2)
+    return test
 
 
 def test_the_hand_takes_the_robot_only_when_the_person_agreed():
-    hand = Hand(0.0)
-    hand.hear(FREE, 0.0)
-    assert hand.stage == "ready"
-    assert hand.step(60.0) == []
-    hand.begin(60.0)
-    assert hand.step(60.0) == [{"op": "take", "robot": "r1"}]
-    assert hand.step(60.05) == [], "it is not asked for at each step"
+    test = StopTestClient(0.0)
+    test.receive(FREE, 0.0)
+    assert test.stage == "ready"
+    assert test.step(60.0) == []
+    test.begin(60.0)
+    assert test.step(60.0) == [{"op": "take", "robot": "r1"}]
+    assert test.step(60.05) == [], "it is not asked for at each step"
 
 
 def test_the_hand_says_that_every_input_is_released_and_nothing_else():
-    hand = hand_that_tests()
-    (state,) = hand.step(0.25)
+    test = hand_that_tests()
+    (state,) = test.step(0.25)
     assert json.dumps(state) == (
         '{"op": "drive", "robot": "r1", "epoch": 3, "seq": 1, "tick": 7, '
         '"x": 0.0, "y": 0.0, "turn": 0.0}'
@@ -205,20 +205,20 @@ def test_the_hand_says_that_every_input_is_released_and_nothing_else():
     ],
 )
 def test_the_hand_gives_up_when_it_cannot_go_on(words, why):
-    hand = hand_that_tests()
-    hand.hear(words, 0.3)
-    assert hand.stage == "over"
-    assert hand.code == UNKNOWN
-    assert hand.news[-1] == f"The stop test gave no result: {why}."
+    test = hand_that_tests()
+    test.receive(words, 0.3)
+    assert test.stage == "over"
+    assert test.code == UNKNOWN
+    assert test.news[-1] == f"The stop test gave no result: {why}."
 
 
 def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
-    hand = Hand(0.0)
-    hand.hear({**FREE, "armable": False, "reason": "another WebMap has it"}, 1.0)
-    assert hand.step(9.0) == []
-    assert hand.stage == "coming"
-    hand.step(10.1)
-    assert hand.news == ["The stop test gave no result: another WebMap has it."]
+    test = StopTestClient(0.0)
+    test.receive({**FREE, "armable": False, "reason": "another WebMap has it"}, 1.0)
+    assert test.step(9.0) == []
+    assert test.stage == "coming"
+    test.step(10.1)
+    assert test.news == ["The stop test gave no result: another WebMap has it."]
 
 
 @pytest.mark.parametrize(
@@ -236,11 +236,11 @@ def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
 def test_the_result_of_the_test_before_is_not_taken_for_this_ones(
     test, before, after, code
 ):
-    hand = hand_that_tests()
+    test = hand_that_tests()
     kept = {**MINE, "test": test, "stop_source": "tested", "stop_date": TODAY}
-    hand.hear({**kept, "stop_time": before}, 0.3)
-    assert hand.stage == "testing"
-    hand.hear({**kept, "stop_time": after}, 0.4)
-    assert hand.stage == "over"
-    assert hand.code == code
-    assert TODAY in hand.news[-1]
+    test.receive({**kept, "stop_time": before}, 0.3)
+    assert test.stage == "testing"
+    test.receive({**kept, "stop_time": after}, 0.4)
+    assert test.stage == "over"
+    assert test.code == code
+    assert TODAY in test.news[-1]

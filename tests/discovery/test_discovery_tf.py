@@ -13,7 +13,7 @@ from webmap import Bridge, Robot
 from webmap.base.geometry import Pose
 from webmap.config.robot import TfConfig
 from webmap.discovery import discover
-from webmap.discovery.hearing import frame_topics, hear_frames
+from webmap.discovery.frame_listening import frame_topics, receive_frames
 from webmap.discovery.tf_robots import MOST_FRAMES, Trees, bases
 from webmap.poses.frames import frames_of
 
@@ -165,7 +165,7 @@ def test_only_topics_with_frames_are_listened_to():
 
 
 def test_a_bridge_that_is_gone_tells_of_no_frames():
-    heard = asyncio.run(hear_frames("ws://127.0.0.1:1", {"/tf": TF}))
+    heard = asyncio.run(receive_frames("ws://127.0.0.1:1", {"/tf": TF}))
     assert heard.bases() == ()
 
 
@@ -206,7 +206,7 @@ def test_what_was_found_is_drawn_where_its_frames_have_it():
     with telling({"/tf": MAP_TO_BASE}) as url:
 
         async def scenario() -> None:
-            heard = await hear_frames(url, {"/tf": TF})
+            heard = await receive_frames(url, {"/tf": TF})
             (found,) = discover({"/tf": TF}, "host", heard).robots
             bridge = Bridge(url)
             robot = Robot.from_config(found.config(url), {url: bridge})
@@ -240,7 +240,7 @@ def test_ten_namespaces_on_one_bridge_are_ten_robots_by_their_own_frames(dialect
             try:
                 await until(lambda: bridge.state == "open")
                 topics = await bridge.topics()
-                findings = discover(topics, "host", await hear_frames(url, topics))
+                findings = discover(topics, "host", await receive_frames(url, topics))
                 assert [each.name for each in findings.robots] == [
                     f"r{n}" for n in range(10)
                 ]

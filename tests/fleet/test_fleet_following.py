@@ -8,12 +8,12 @@ import pytest
 from webmap import Bridge
 from webmap.console import Console, make_robot
 from webmap.discovery import FoundRobot, Guess, discover
-from webmap.discovery.hearing import late_frames
+from webmap.discovery.frame_listening import late_frames
 from webmap.discovery.newcomers import Newcomers
 from webmap.discovery.tf_robots import Trees
-from webmap.fleet.overrides import Overruling, parse_setting
+from webmap.fleet.given import Candidate
+from webmap.fleet.overrides import Overrides, parse_setting
 from webmap.fleet.shown import ShownRobot, ShownRobots
-from webmap.fleet.stated import Candidate
 from webmap.fleet.watch import LookingForLayers
 
 TF = {"/tf": "tf2_msgs/TFMessage"}
@@ -42,10 +42,10 @@ def trees(chain):
 class Watched:
     """A console that looks again and again, at topics and frames as a test has them."""
 
-    def __init__(self, bridge, *settings, told=()):
+    def __init__(self, bridge, *settings, given=()):
         self.bridge = bridge
-        said = Overruling([parse_setting(text) for text in settings])
-        self.late = ShownRobots(Console(), said, told=told)
+        said = Overrides([parse_setting(text) for text in settings])
+        self.late = ShownRobots(Console(), said, given=given)
         self.newcomers = Newcomers()
 
     def look(self, topics, chain=""):
@@ -202,8 +202,8 @@ def test_a_robot_that_a_person_wants_nowhere_is_not_placed_by_a_pose(bridge):
 def test_a_told_robot_takes_the_place_of_one_that_comes_later(
     bridge, said, shown, capsys
 ):
-    told = candidate(bridge, **said)
-    watched = Watched(bridge, told=[told])
+    given = candidate(bridge, **said)
+    watched = Watched(bridge, given=[given])
     watched.look(DRIVEN | ODOM)
     watched.look(DRIVEN | ODOM | POSE | TF, LATER)
     assert [robot.name for robot in watched.late.robots] == shown
@@ -216,8 +216,8 @@ def test_a_told_robot_is_drawn_in_a_map_that_comes_later(bridge, monkeypatch, ca
     about = candidate(bridge, odometry="/bob/odom", goal="/bob/goal_pose")
     config = about.found.config(bridge.url)
     robot = make_robot(config, [bridge])
-    told = [ShownRobot(*about, robot, config)]
-    drawing = LookingForLayers(bridge, ShownRobots(Console()), told=told)
+    given = [ShownRobot(*about, robot, config)]
+    drawing = LookingForLayers(bridge, ShownRobots(Console()), given=given)
     frames = late_frames(bridge)
     heard = []
 

@@ -95,7 +95,7 @@ def test_a_newcomer_that_cannot_be_shown_keeps_no_other_from_it(caplog):
 
     asyncio.run(scenario())
     assert shown == ["/bob"]
-    assert f"{URL}: what is new of ann is not shown" in caplog.text
+    assert f"{URL}: the new topics of ann are not shown" in caplog.text
     assert "no such thing" in caplog.text
 
 

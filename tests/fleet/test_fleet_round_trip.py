@@ -9,9 +9,9 @@ from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.features.layers.on_maps import OnMaps
+from webmap.fleet.given import Candidate
 from webmap.fleet.made import prepare
 from webmap.fleet.shown import ShownRobots
-from webmap.fleet.stated import Candidate
 from webmap.fleet.watch import LookingForLayers
 
 URL = "ws://hall:9090"

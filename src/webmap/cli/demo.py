@@ -53,9 +53,9 @@ def demo(
     from webmap import console
 
     number = robots or 2
-    told = ("--robots", number, "--port", bridge_port, "--seed", seed)
+    options = ("--robots", number, "--port", bridge_port, "--seed", seed)
     with (
-        simulator(*told, "--dialect", dialect) as url,
+        simulator(*options, "--dialect", dialect) as url,
         as_file(files("webmap.sim") / "data") as data,
     ):
         bridge = webmap.Bridge(url, name="simulator")

@@ -30,7 +30,7 @@ def discover(
     ros2 topic list -t | webmap discover ws://robot:9090 --topics -
     """
     from webmap.discovery.fleet_toml import fleet_toml
-    from webmap.discovery.words import report
+    from webmap.discovery.tables import report
     from webmap.fleet.find import find
     from webmap.ros.names import normalise_url
 

@@ -98,7 +98,7 @@ def doctor(
     bridges = bridges_of(url, robots, settings)
     one_bridge([address for address, _ in bridges], topics)
     ready = True
-    for number, (address, meant) in enumerate(bridges):
+    for number, (address, configured) in enumerate(bridges):
 
         def waiting(why: str, address: str = address) -> None:
             echo(f"Waiting for the rosbridge at {address}: {why}", err=True)
@@ -111,7 +111,7 @@ def doctor(
                 ask_parameters=ask_parameters,
                 try_call=try_call,
                 topics=topics,
-                meant=meant,
+                configured=configured,
                 waiting=waiting,
             )
         )

@@ -79,13 +79,13 @@ def play(
 
     need_rosbags()
     name = recording_name(files)
-    told = ["--rate", rate, "--start", start, "--port", bridge_port]
-    told += ["--loop"] if loop else []
-    with replay(*told, "--", *files) as (url, begin_anew):
+    options = ["--rate", rate, "--start", start, "--port", bridge_port]
+    options += ["--loop"] if loop else []
+    with replay(*options, "--", *files) as (url, begin_anew):
         bridge = webmap.Bridge(url, name=f"recording {name}")
         bridge.replays = True
         watched = Watched(Path(name).stem)
-        fleet = find_fleet([bridge], [], wait=5.0, overruling=watched)
+        fleet = find_fleet([bridge], [], wait=5.0, overrides=watched)
         title = f"Recording {name}"
         opened = console.open_console([bridge], [], title=title, place=title)
         fleet.show(opened)

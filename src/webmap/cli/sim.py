@@ -74,7 +74,7 @@ from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
 @click.option(
     "--tilted",
     is_flag=True,
-    help="Mount the lasers upside down, and add a depth camera in its optical frame.",
+    help="Mount lasers upside down; send the depth cloud in its optical frame.",
 )
 @click.option(
     "--polite",

@@ -19,6 +19,7 @@ from webmap.cli.options import Finite, one_bridge, topics_option, web_options
 )
 @click.option(
     "--as-told",
+    "only_given",
     is_flag=True,
     help="Draw only the given topics of robots of --robot. Without it, the costmaps, "
     "clouds, paths and other topics in their namespaces are drawn too, as for robots "
@@ -69,7 +70,7 @@ from webmap.cli.options import Finite, one_bridge, topics_option, web_options
 def view(
     url: tuple[str, ...],
     robots: tuple[str, ...],
-    as_told: bool,
+    only_given: bool,
     settings: tuple[str, ...],
     show: bool,
     stops_within: float | None,
@@ -97,36 +98,36 @@ def view(
 
     import webmap
     from webmap import console
-    from webmap.fleet.found import FoundFleet, find_fleet, told_fleet
-    from webmap.fleet.overrides import Overruling, parse_setting
-    from webmap.fleet.stated import told_robots
+    from webmap.fleet.found import FoundFleet, find_fleet, given_fleet
+    from webmap.fleet.given import given_robots
+    from webmap.fleet.overrides import Overrides, parse_setting
 
     one_bridge(url, topics)
-    overruling = Overruling([parse_setting(text) for text in settings], stops_within)
+    overrides = Overrides([parse_setting(text) for text in settings], stops_within)
     bridges = [webmap.Bridge(text) for text in url]
-    told = told_robots(robots, bridges)
+    given = given_robots(robots, bridges)
     plan = Path(floor) if floor else None
-    if discover or topics is not None or not told:
+    if discover or topics is not None or not given:
         fleet = find_fleet(
             bridges,
-            told,
+            given,
             wait=wait,
             topics=topics,
-            overruling=overruling,
+            overrides=overrides,
         )
     else:
-        overruling.check([robot.found.name for robot in told], all_known=True)
-        told = overruling.tell(told)
-        if show and not as_told:
-            fleet = told_fleet(bridges, told, wait=wait)
+        overrides.check([robot.found.name for robot in given], all_known=True)
+        given = overrides.apply_to_given(given)
+        if show and not only_given:
+            fleet = given_fleet(bridges, given, wait=wait)
         else:
-            fleet = FoundFleet(told, overruling=overruling)
+            fleet = FoundFleet(given, overrides=overrides)
     if show:
-        echo(fleet.table(grid=plan is None, as_told=as_told), lines=True)
+        echo(fleet.table(grid=plan is None, only_given=only_given), lines=True)
         return
-    configs = [overruling.config(bridge.url, robot) for bridge, robot in fleet.told]
+    configs = [overrides.config(bridge.url, robot) for bridge, robot in fleet.given]
     opened = console.open_console(bridges, configs, floor=plan)
-    fleet.show(opened, grid=plan is None, as_told=as_told, topics=topics)
+    fleet.show(opened, grid=plan is None, only_given=only_given, topics=topics)
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

@@ -148,7 +148,7 @@ def _robot(
 ) -> FoundRobot:
     guesses: dict[Role, tuple[Guess, ...]] = {}
     for each in matches:
-        guess = Guess(each.topic, each.type, _words(each, space))
+        guess = Guess(each.topic, each.type, _reason(each, space))
         guesses[each.role] = (*guesses.get(each.role, ()), guess)
     robot = FoundRobot(name, space, guesses)
     if base is not None:
@@ -158,11 +158,11 @@ def _robot(
     return replace(robot, notes=_robot_notes(robot, twists))
 
 
-def _words(each: Match, space: str) -> str:
+def _reason(each: Match, space: str) -> str:
     if each.namespace == space:
-        return each.words
+        return each.reason
     where = "in a part of the robot" if inside(each.topic, space) else "shared by all"
-    return f"{each.words}, {where}"
+    return f"{each.reason}, {where}"
 
 
 def _robot_notes(robot: FoundRobot, twists: Sequence[str]) -> tuple[str, ...]:

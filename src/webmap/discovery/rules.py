@@ -54,8 +54,8 @@ class Rule:
     tail: str
     """Pattern for the end of the name, without the slash before it."""
 
-    words: str
-    """Why such a topic fits, for people."""
+    reason: str
+    """The reason why such a topic fits, for people."""
 
     unless: str = r"(?!)"
     """Pattern that must not occur anywhere in the name."""
@@ -169,7 +169,7 @@ class Match(NamedTuple):
     namespace: str
     topic: str
     type: str
-    words: str
+    reason: str
 
 
 def match(topic: str, type: str) -> Match | None:
@@ -185,7 +185,7 @@ def match(topic: str, type: str) -> Match | None:
         if found is not None:
             between = found["parts"].count("/")
             rank = (place, between, topic)
-            return Match(rule.role, rank, found["ns"], topic, type, rule.words)
+            return Match(rule.role, rank, found["ns"], topic, type, rule.reason)
     return None
 
 

@@ -10,7 +10,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.base.local_plane import LocalPlane
-from webmap.config.checks import Mistakes, Way
+from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.fleet import ImageConfig, TilesConfig
 from webmap.config.robot import PictureConfig
 from webmap.core.pictures import pictures
@@ -63,21 +63,21 @@ def check_images(
 
 
 def publish_picture(
-    picture: PictureConfig, folder: Path, way: Way, mistakes: Mistakes
+    picture: PictureConfig, folder: Path, path: KeyPath, mistakes: Mistakes
 ) -> str:
     """Return the URL from which pages load the picture of a robot.
 
     Args:
         picture: The picture.
         folder: Folder to which its file is relative.
-        way: The keys that lead to it.
+        path: The keys that lead to it.
         mistakes: Receives the mistakes; there is no URL then.
 
     """
     try:
         data, media_type = picture_file(folder / picture.file)
     except (ConfigError, OSError) as error:
-        mistakes.add((*way, "file"), str(error))
+        mistakes.add((*path, "file"), str(error))
         return ""
     return pictures.publish(data, media_type)
 
@@ -103,11 +103,11 @@ def label_options(places: Any, folder: Path, mistakes: Mistakes) -> dict[str, An
     return {"file": str(file.absolute())}
 
 
-def _check_label(label: Any, way: Way, mistakes: Mistakes) -> None:
+def _check_label(label: Any, path: KeyPath, mistakes: Mistakes) -> None:
     there = label if isinstance(label, dict) else NEEDED
     missing = [key for key in NEEDED if key not in there]
     for key in missing:
-        mistakes.add(way, f'the key "{key}" is missing')
+        mistakes.add(path, f'the key "{key}" is missing')
     if missing:
         return
     try:
@@ -115,7 +115,7 @@ def _check_label(label: Any, way: Way, mistakes: Mistakes) -> None:
     except ConfigError as error:
         # The label was read as item 0 of a list; its index in the file may differ.
         _, *inner = getattr(error, "way", (0,))
-        mistakes.add((*way, *inner), getattr(error, "words", str(error)))
+        mistakes.add((*path, *inner), getattr(error, "words", str(error)))
 
 
 def tile_options(

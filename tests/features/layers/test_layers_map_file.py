@@ -253,7 +253,7 @@ NO_IMAGE = {
         b"GIF89a" + bytes(20)
     ),
     "must be PGM, PNG, BMP or JPEG, got a file that begins with b'<svg/>'": b"<svg/>",
-    "begins with b'P5\\n0 0\\n2' and makes no sense further on": b"P5\n0 0\n255\n",
+    "begins with b'P5\\n0 0\\n2' but cannot be decoded": b"P5\n0 0\n255\n",
 }
 
 

@@ -21,8 +21,8 @@ from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.layers import find_layers
 from webmap.features.view.layer_switches import all_layers
+from webmap.fleet.given import Candidate
 from webmap.fleet.shown import ShownRobots
-from webmap.fleet.stated import Candidate
 from webmap.fleet.watch import LookingForLayers
 
 FILE = Path(__file__).parents[1] / "own_layers.py"

@@ -33,14 +33,16 @@ def bridge_findings(seen: Observed) -> Iterator[Finding]:
     dialect = seen.findings.dialect
     yield advice.openness(seen.link, seen.url, seen.shown, dialect)
     if seen.unlisted:
-        yield advice.topics_not_listed(seen.unlisted, "" if seen.told else GIVE_TOPICS)
-    if seen.told or not seen.unlisted:
+        yield advice.topics_not_listed(
+            seen.unlisted, "" if seen.topics_given else GIVE_TOPICS
+        )
+    if seen.topics_given or not seen.unlisted:
         yield from _robots(seen)
     if seen.clock is not None:
         yield from _clock(seen.clock)
     elif not seen.unlisted:
-        words = "The bridge does not report its time, so clocks are not compared."
-        yield Finding("note", BRIDGE, words)
+        text = "The bridge does not report its time, so clocks are not compared."
+        yield Finding("note", BRIDGE, text)
     yield advice.blocking(seen.link, seen.url, dialect)
     yield advice.compression(seen.link, _packed_scans(seen))
 
@@ -48,16 +50,16 @@ def bridge_findings(seen: Observed) -> Iterator[Finding]:
 def _packed_scans(seen: Observed) -> list[str]:
     robots = seen.findings.robots
     scans = {scan.topic for one in robots for scan in one.guesses.get("scan", ())}
-    binary = [topic for topic, heard in seen.heard.items() if heard.binary]
+    binary = [topic for topic, measured in seen.measured.items() if measured.binary]
     return [topic for topic in binary if topic in scans]
 
 
 def _robots(seen: Observed) -> Iterator[Finding]:
     robots = seen.findings.robots
     source = "The bridge lists its topics"
-    if seen.told:
+    if seen.topics_given:
         source = "The topics come from the given list"
-    which = "robots checked" if seen.meant else "robots found"
+    which = "robots checked" if seen.configured else "robots found"
     if not robots:
         notes = " ".join(seen.findings.notes)
         yield Finding("wrong", BRIDGE, f"No robot was found. {notes}", GIVE_TOPICS)

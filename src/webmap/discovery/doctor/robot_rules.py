@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from webmap.discovery.doctor.heard_rules import heard_finding, rare_finding
-from webmap.discovery.doctor.meant import MeantRobot
-from webmap.discovery.doctor.observed import Observed, Way
+from webmap.discovery.doctor.configured import ConfiguredRobot
+from webmap.discovery.doctor.observed import FramePath, Observed
+from webmap.discovery.doctor.rate_rules import rare_finding, rate_finding
 from webmap.discovery.doctor.shown_rules import shown_findings
 from webmap.discovery.found import FoundRobot, Guess
 from webmap.ros.finding import Finding
@@ -17,23 +17,23 @@ MOST_ODDITIES = 3
 
 def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     """Yield the findings about one robot."""
-    one = seen.meant.get(robot.name, MeantRobot(robot.name))
+    one = seen.configured.get(robot.name, ConfiguredRobot(robot.name))
     if "velocity" not in one.elsewhere:
         yield from _velocity(robot, seen)
     if "odometry" not in one.elsewhere:
         yield from _place(robot, seen)
     battery = robot.first("battery")
     for scan in robot.guesses.get("scan", ()):
-        if scan.topic in seen.heard:
-            yield heard_finding(robot.name, scan, seen, needed=False)
-    if battery is not None and battery.topic in seen.heard:
+        if scan.topic in seen.measured:
+            yield rate_finding(robot.name, scan, seen, needed=False)
+    if battery is not None and battery.topic in seen.measured:
         yield rare_finding(robot.name, battery, seen)
     yield from _map(robot, seen)
     yield from shown_findings(robot, seen)
     yield from _frames(robot, seen)
     if robot.first("velocity") is not None:
         # The stop test identifies robots by the names that discovery finds.
-        name = one.found_as if robot.name in seen.meant else robot.name
+        name = one.found_as if robot.name in seen.configured else robot.name
         command = f"webmap doctor {seen.url} --stop-test {name}, or " if name else ""
         yield Finding(
             "note",
@@ -57,8 +57,8 @@ def _place(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
             "No topic gives its pose.",
             "Start its odometry, or name the topic with --robot.",
         )
-    elif where.topic in seen.heard:
-        yield heard_finding(robot.name, where, seen, needed=True)
+    elif where.topic in seen.measured:
+        yield rate_finding(robot.name, where, seen, needed=True)
 
 
 def _map(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
@@ -74,18 +74,18 @@ def _map(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
 
 def _drawn_by_frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     """Yield whether frames locate a robot that has no other source of its pose."""
-    topic, way = robot.topic("tf"), seen.ways.get(robot.name)
-    if way is not None and not way.missing:
+    topic, path = robot.topic("tf"), seen.frame_paths.get(robot.name)
+    if path is not None and not path.missing:
         yield Finding(
             "good",
             robot.name,
-            f"Its pose comes from its frames, {way.frame} in {way.start}"
+            f"Its pose comes from its frames, {path.frame} in {path.start}"
             f"{_often(topic, seen)}; there is no odometry.",
         )
-    elif way is not None or (topic in seen.heard and not robot.base_frame):
+    elif path is not None or (topic in seen.measured and not robot.base_frame):
         why = f"{topic} has no transform from map or odom to base_link"
-        if way is not None:
-            why = way.missing
+        if path is not None:
+            why = path.missing
         yield Finding(
             "wrong",
             robot.name,
@@ -95,32 +95,32 @@ def _drawn_by_frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
 
 
 def _often(topic: str, seen: Observed) -> str:
-    rate = seen.heard[topic].rate if topic in seen.heard else 0.0
+    rate = seen.measured[topic].rate if topic in seen.measured else 0.0
     return f" ({topic}: {rate:.1f} messages a second)" if rate else ""
 
 
 def _frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
-    way = seen.ways.get(robot.name)
-    if way is None:
+    path = seen.frame_paths.get(robot.name)
+    if path is None:
         return
     if robot.tf_alone:
         pass  # reported already: the robot has no other source of its pose
-    elif way.missing:
+    elif path.missing:
         yield Finding(
             "note",
             robot.name,
-            f"It is drawn in the frame {way.frame}, at the pose from odometry: "
-            f"{way.missing}.",
+            f"It is drawn in the frame {path.frame}, at the pose from odometry: "
+            f"{path.missing}.",
             "To see it on the map, start the node that publishes the frame "
-            f"{way.start}: amcl, slam_toolbox, or a static transform.",
+            f"{path.start}: amcl, slam_toolbox, or a static transform.",
         )
     else:
         often = _often(f"{robot.tf_namespace}/tf", seen)
         yield Finding(
-            "good", robot.name, f"Frames lead from {way.start} to {way.frame}{often}."
+            "good", robot.name, f"Frames lead from {path.start} to {path.frame}{often}."
         )
-    yield from _inner_frames(robot.name, way)
-    for oddity in way.oddities[:MOST_ODDITIES]:
+    yield from _inner_frames(robot.name, path)
+    for oddity in path.oddities[:MOST_ODDITIES]:
         yield Finding(
             "warning",
             robot.name,
@@ -129,36 +129,36 @@ def _frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         )
 
 
-def _inner_frames(name: str, way: Way) -> Iterator[Finding]:
-    if way.base_missing:
+def _inner_frames(name: str, path: FramePath) -> Iterator[Finding]:
+    if path.base_missing:
         yield Finding(
             "note",
             name,
-            f"There is no transform from {way.frame} to {way.base}, although odometry "
-            f"names both: {way.base_missing}.",
+            f"There is no transform from {path.frame} to {path.base}, although "
+            f"odometry names both: {path.base_missing}.",
             "Let one node publish that transform too: the base's driver, or the filter "
             "that publishes the odometry (publish_tf).",
         )
-    if way.scan_missing:
+    if path.scan_missing:
         yield Finding(
             "warning",
             name,
-            f"The pose of the scanner on the robot is unknown: {way.scan_missing}. "
+            f"The pose of the scanner on the robot is unknown: {path.scan_missing}. "
             "Its points are drawn as if it were in the robot's middle, facing ahead.",
             "Start robot_state_publisher with the robot's URDF, or a "
-            f"static_transform_publisher from {way.base} to {way.scan}.",
+            f"static_transform_publisher from {path.base} to {path.scan}.",
         )
-    elif way.scan and way.base and not way.base_missing:
-        base = f"{way.base} and to " if way.base != way.frame else ""
+    elif path.scan and path.base and not path.base_missing:
+        base = f"{path.base} and to " if path.base != path.frame else ""
         yield Finding(
-            "good", name, f"Frames lead further from {way.frame} to {base}{way.scan}."
+            "good", name, f"Frames lead further from {path.frame} to {base}{path.scan}."
         )
 
 
 def _velocity(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     velocity = robot.first("velocity")
-    meant = seen.meant.get(robot.name)
-    if velocity is None and meant is not None and "velocity" in meant.topics:
+    configured = seen.configured.get(robot.name)
+    if velocity is None and configured is not None and "velocity" in configured.topics:
         yield Finding(
             "note",
             robot.name,
@@ -190,7 +190,7 @@ def _type(robot: FoundRobot, velocity: Guess, seen: Observed) -> Finding:
     """Return whether the topic has the type that WebMap sends."""
     short = velocity.type.rpartition("/")[2]
     takes = seen.types.get(velocity.topic, "").strip()
-    stated = seen.told or (robot.name in seen.meant and not takes)
+    stated = seen.topics_given or (robot.name in seen.configured and not takes)
     has = "has the stated type" if stated else "has the type"
     if takes and not same_type(takes, velocity.type):
         return Finding(

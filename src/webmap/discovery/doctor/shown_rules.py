@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from webmap.discovery.doctor.heard_rules import age_of, silence
-from webmap.discovery.doctor.observed import Heard, Observed
+from webmap.discovery.doctor.observed import Measurement, Observed
+from webmap.discovery.doctor.rate_rules import age_of, silence
 from webmap.discovery.found import FoundRobot, Role
 from webmap.ros.finding import Finding, Level
 from webmap.ros.rosbridge import advice
@@ -34,36 +34,38 @@ def shown_topics(robot: FoundRobot) -> Iterator[tuple[str, str, str]]:
 def shown_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     """Yield the rate and the age of each of these topics."""
     for kind, topic, _ in shown_topics(robot):
-        heard = seen.heard.get(topic)
-        if heard is None:
+        measured = seen.measured.get(topic)
+        if measured is None:
             continue
-        if not heard.count:
+        if not measured.count:
             yield from _silent(kind, robot.name, topic, seen)
         elif topic in seen.link.too_large:
             size = seen.link.too_large[topic]
             yield advice.too_large(robot.name, topic, size)
-        elif heard.trouble:
+        elif measured.trouble:
             yield Finding(
                 "warning",
                 robot.name,
-                f"{topic} cannot be read: {heard.trouble}.",
+                f"{topic} cannot be read: {measured.trouble}.",
                 "Check that its type is the type that the bridge lists.",
             )
         else:
-            yield _came(kind, robot.name, topic, heard, age_of(heard, seen))
+            yield _came(kind, robot.name, topic, measured, age_of(measured, seen))
 
 
-def _came(kind: str, name: str, topic: str, heard: Heard, age: float | None) -> Finding:
-    said = f"{topic}: {heard.count} message{'s' * (heard.count != 1)}"
-    if heard.every:
-        said = f"{topic}: {1 / heard.every:.1f} messages a second"
+def _came(
+    kind: str, name: str, topic: str, measured: Measurement, age: float | None
+) -> Finding:
+    text = f"{topic}: {measured.count} message{'s' * (measured.count != 1)}"
+    if measured.every:
+        text = f"{topic}: {1 / measured.every:.1f} messages a second"
     if age is not None:
-        said += f", {_duration_text(max(age, 0.0))} old"
-    if kind == "camera" and (heard.every or heard.longest_gap) > PICTURE_AGE:
+        text += f", {_duration_text(max(age, 0.0))} old"
+    if kind == "camera" and (measured.every or measured.longest_gap) > PICTURE_AGE:
         return Finding(
             "warning",
             name,
-            f"{said}: driving with this camera stops whenever its picture is older "
+            f"{text}: driving with this camera stops whenever its picture is older "
             f"than {PICTURE_AGE:g} s.",
             "Publish 5 pictures a second or more, or choose smaller or compressed "
             "pictures.",
@@ -72,7 +74,7 @@ def _came(kind: str, name: str, topic: str, heard: Heard, age: float | None) -> 
         return Finding(
             "warning",
             name,
-            f"{said}: its pictures arrive too late for driving.",
+            f"{text}: its pictures arrive too late for driving.",
             "Look for a slow connection or a queue, or choose smaller or compressed "
             "pictures.",
         )
@@ -80,22 +82,22 @@ def _came(kind: str, name: str, topic: str, heard: Heard, age: float | None) -> 
         return Finding(
             "warning",
             name,
-            f"{said}, so its points are drawn at an earlier pose of the robot.",
+            f"{text}, so its points are drawn at an earlier pose of the robot.",
             "Look for a slow connection, or let the driver send fewer points.",
         )
-    return Finding("good", name, f"{said}.")
+    return Finding("good", name, f"{text}.")
 
 
 def _silent(kind: str, name: str, topic: str, seen: Observed) -> Iterator[Finding]:
     if kind == "map" and seen.publishers.get(topic) == ():
         return  # reported already: the topic has no publisher
     if kind in ("plan", "status"):
-        seconds = seen.heard[topic].seconds
-        words = (
+        seconds = seen.measured[topic].seconds
+        text = (
             f"No message was received on {topic} in {seconds:.0f} s; messages may "
             f"begin with a goal."
         )
-        yield Finding("note", name, words)
+        yield Finding("note", name, text)
         return
     why = {
         "camera": ", so driving with this camera stops",
@@ -109,8 +111,8 @@ def _silent(kind: str, name: str, topic: str, seen: Observed) -> Iterator[Findin
     if kind == "map" and writers:
         found = replace(found, advice=_map_advice(writers[0], topic, seen))
     if kind in ("map", "costmap", "cloud") and writers:
-        words = f"{found.advice} {advice.MAYBE_TOO_LARGE}"
-        found = replace(found, advice=words)
+        text = f"{found.advice} {advice.MAYBE_TOO_LARGE}"
+        found = replace(found, advice=text)
     yield found
 
 

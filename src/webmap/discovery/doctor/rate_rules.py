@@ -1,6 +1,6 @@
 """Findings of the diagnosis about the rate and the age of messages on a topic."""
 
-from webmap.discovery.doctor.observed import Heard, Observed
+from webmap.discovery.doctor.observed import Measurement, Observed
 from webmap.discovery.found import Guess
 from webmap.ros.finding import Finding, Level
 
@@ -18,7 +18,7 @@ RARE = 60.0
 AHEAD = 0.1
 
 
-def heard_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> Finding:
+def rate_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> Finding:
     """Return the rate and the age of a pose or a scan as a finding.
 
     Args:
@@ -28,27 +28,27 @@ def heard_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> F
         needed: Whether a robot cannot be driven without the topic.
 
     """
-    heard = seen.heard[guess.topic]
+    measured = seen.measured[guess.topic]
     bad: Level = "wrong" if needed else "warning"
-    if not heard.count:
+    if not measured.count:
         blind = ", and a robot without a pose is not driven" if needed else ""
         return silence(name, guess.topic, seen, bad, blind)
-    if heard.trouble:
+    if measured.trouble:
         return Finding(
             bad,
             name,
-            f"{guess.topic} cannot be read: {heard.trouble}.",
+            f"{guess.topic} cannot be read: {measured.trouble}.",
             "Check that its type is the type that the bridge lists.",
         )
-    said = f"{guess.topic}: {heard.rate:.1f} messages a second"
-    if heard.frame:
-        said += f" in the frame {heard.frame}"
-    age = age_of(heard, seen)
-    if needed and heard.longest_gap > OLD:
+    text = f"{guess.topic}: {measured.rate:.1f} messages a second"
+    if measured.frame:
+        text += f" in the frame {measured.frame}"
+    age = age_of(measured, seen)
+    if needed and measured.longest_gap > OLD:
         return Finding(
             "wrong",
             name,
-            f"{said}, but none for {heard.longest_gap:.1f} s: driving stops when a "
+            f"{text}, but none for {measured.longest_gap:.1f} s: driving stops when a "
             f"pose is older than {OLD:g} s.",
             "Publish it at 10 Hz or more.",
         )
@@ -56,55 +56,55 @@ def heard_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> F
         return Finding(
             "warning",
             name,
-            f"{said}, {age:.1f} s old when they arrive.",
+            f"{text}, {age:.1f} s old when they arrive.",
             "Look for a slow connection, a queue, or a stamp that is not updated.",
         )
     if age is not None and age < -AHEAD:
         return Finding(
             "warning",
             name,
-            f"{said}, stamped {-age:.1f} s ahead of the robot's own clock.",
+            f"{text}, stamped {-age:.1f} s ahead of the robot's own clock.",
             "Synchronise the clocks of all the robot's computers with one server.",
         )
-    if heard.rate < SLOW:
+    if measured.rate < SLOW:
         return Finding(
             "warning",
             name,
-            f"{said}: too few, so it moves in jumps on the map.",
+            f"{text}: too few, so it moves in jumps on the map.",
             "Publish it at 10 Hz or more.",
         )
     old = "" if age is None else f", {max(age, 0.0) * 1000:.0f} ms old"
-    return Finding("good", name, f"{said}{old}.")
+    return Finding("good", name, f"{text}{old}.")
 
 
 def rare_finding(name: str, guess: Guess, seen: Observed) -> Finding:
     """Return a finding about a topic that may be slow, such as a battery's."""
-    heard = seen.heard[guess.topic]
-    if not heard.count:
+    measured = seen.measured[guess.topic]
+    if not measured.count:
         return Finding(
             "note",
             name,
-            f"No message was received on {guess.topic} in {heard.seconds:.0f} s; the "
-            f"topic may be slow.",
+            f"No message was received on {guess.topic} in {measured.seconds:.0f} s; "
+            "the topic may be slow.",
         )
-    if heard.trouble:
+    if measured.trouble:
         return Finding(
             "warning",
             name,
-            f"{guess.topic} cannot be read: {heard.trouble}.",
+            f"{guess.topic} cannot be read: {measured.trouble}.",
             "Check that its type is the type that the bridge lists.",
         )
-    age = age_of(heard, seen)
+    age = age_of(measured, seen)
     old = "" if age is None else f", {max(age, 0.0):.1f} s old"
-    said = f"{guess.topic}: {heard.rate:.1f} messages a second{old}"
+    text = f"{guess.topic}: {measured.rate:.1f} messages a second{old}"
     if age is not None and age > RARE:
         return Finding(
             "warning",
             name,
-            f"{said}: the shown value may be out of date.",
+            f"{text}: the shown value may be out of date.",
             "Look for a queue, or a stamp that is not updated.",
         )
-    return Finding("good", name, f"{said}.")
+    return Finding("good", name, f"{text}.")
 
 
 def silence(name: str, topic: str, seen: Observed, bad: Level, blind: str) -> Finding:
@@ -118,13 +118,13 @@ def silence(name: str, topic: str, seen: Observed, bad: Level, blind: str) -> Fi
         blind: The consequence, as the end of a sentence.
 
     """
-    said = f"No message was received on {topic} in {seen.heard[topic].seconds:.0f} s"
+    text = f"No message was received on {topic} in {seen.measured[topic].seconds:.0f} s"
     writers = seen.publishers.get(topic)
     if writers:
         return Finding(
             bad,
             name,
-            f"{said}, although {', '.join(writers)} can publish it{blind}.",
+            f"{text}, although {', '.join(writers)} can publish it{blind}.",
             "Check whether that node waits for something"
             + (
                 ", and whether its quality of service is compatible with that of the "
@@ -137,24 +137,24 @@ def silence(name: str, topic: str, seen: Observed, bad: Level, blind: str) -> Fi
         return Finding(
             bad,
             name,
-            f"{said}: no node publishes it{blind}.",
+            f"{text}: no node publishes it{blind}.",
             "Start the node that publishes it; the topic exists only because a node "
             "subscribes to it.",
         )
     return Finding(
         bad,
         name,
-        f"{said}{blind}.",
+        f"{text}{blind}.",
         "Start the node that publishes it; the topic may exist only because a node "
         "subscribes to it.",
     )
 
 
-def age_of(heard: Heard, seen: Observed) -> float | None:
+def age_of(measured: Measurement, seen: Observed) -> float | None:
     """Return the age of the newest message when it arrived, in seconds.
 
     None if it has no stamp, or the robot's clock is unknown.
     """
-    if heard.stamp is None or seen.clock is None:
+    if measured.stamp is None or seen.clock is None:
         return None
-    return heard.arrived + seen.clock.ahead - heard.stamp
+    return measured.arrived + seen.clock.ahead - measured.stamp

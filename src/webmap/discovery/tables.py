@@ -121,9 +121,9 @@ def _use(robot: FoundRobot, role: Role, place: int) -> str:
     return ", not used" if place else ", used"
 
 
-def in_one_line(robot: FoundRobot) -> str:
+def summary_line(robot: FoundRobot) -> str:
     """Return a robot with the topics in use, for a log."""
-    said = [f"{role} {robot.topic(role)}" for role in USED if robot.topic(role)]
+    used = [f"{role} {robot.topic(role)}" for role in USED if robot.topic(role)]
     if robot.tf_alone and robot.base_frame:
-        said.insert(0, f"frame {robot.base_frame}")
-    return f"{robot.name}: {', '.join(said)}"
+        used.insert(0, f"frame {robot.base_frame}")
+    return f"{robot.name}: {', '.join(used)}"
