@@ -59,7 +59,7 @@ def test_nothing_is_wrong_with_a_good_robot_and_nothing_is_disturbed(dialect):
         *there.called
     }, "ends or hangs rosapi"
     assert all(name.startswith("/rosapi/") for name in there.called)
-    assert progress[0].startswith("Asking")
+    assert progress[0].startswith("Requesting")
     assert progress[-2] == f"Listening for {LONG:g} s."
     assert progress[-1] == "Listening for a few pictures, maps and plans."
 
@@ -116,7 +116,7 @@ def test_a_camera_that_is_silent_is_told_with_what_it_costs():
 )
 def test_the_type_of_velocity_is_the_one_that_the_base_takes(dialect, twist):
     _, findings, _ = looked_at(site(dialect, twist=twist))
-    assert said(findings, f"/robot_0/cmd_vel takes {twist}, and") == "good"
+    assert said(findings, f"/robot_0/cmd_vel has the type {twist}, and") == "good"
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="Linux tells it there")
@@ -182,7 +182,7 @@ def test_a_topic_that_nobody_feeds_is_told_with_the_node_that_could(dialect):
     assert said(findings, "No message was received on /robot_0/base_scan") == "warning"
     for topic in ("odom", "base_scan"):
         words = rf"No message was received on /robot_0/{topic} in \d+ s, "
-        words += "though /robots could publish"
+        words += "although /robots can publish"
         assert any(re.match(words, each.words) for each in findings)
 
 
@@ -206,8 +206,8 @@ def without(*children):
 @pytest.mark.parametrize(
     ("lost", "level", "words"),
     [
-        ("odom", "note", "drawn in the frame robot_0/odom, where odometry has it"),
-        ("base_link", "note", "do not lead from robot_0/odom to robot_0/base_link"),
+        ("odom", "note", "drawn in the frame robot_0/odom, at the pose from odometry"),
+        ("base_link", "note", "no transform from robot_0/odom to robot_0/base_link"),
         ("base_laser", "warning", "The pose of the scanner on the robot is unknown"),
     ],
 )
@@ -247,7 +247,7 @@ def apart(name, message):
 def test_the_frames_of_a_robot_with_a_map_of_its_own_are_good(dialect):
     _, findings, _ = looked_at(site(dialect, change=apart))
     assert said(findings, "Frames lead from world to robot_0/odom (/tf:") == "good"
-    assert not any("where odometry has it" in each.words for each in findings)
+    assert not any("at the pose from odometry" in each.words for each in findings)
 
 
 @pytest.mark.parametrize(

@@ -145,7 +145,7 @@ def test_two_addresses_are_one_too_many():
     assert "--stop-test takes one URL, got 2" in said.stderr
 
 
-# The test, without a gate.
+# The client, without a gate.
 
 FREE = {
     "op": "robot",
@@ -163,30 +163,30 @@ FREE = {
 MINE = {**FREE, "mine": True, "armed": True, "epoch": 3}
 
 
-def hand_that_tests():
-    """Return a test whose robot creeps."""
-    test = StopTestClient(0.0)
-    test.receive({"op": "tick", "tick": 7}, 0.0)
-    test.receive(FREE, 0.0)
-    test.begin(0.0)
-    test.receive(MINE, 0.1)
-    test.receive({**MINE, "test": {"state": "creeping", "text": "creeping"}}, 0.2)
-    return test
+def client_that_tests():
+    """Return a client whose robot creeps."""
+    client = StopTestClient(0.0)
+    client.receive({"op": "tick", "tick": 7}, 0.0)
+    client.receive(FREE, 0.0)
+    client.begin(0.0)
+    client.receive(MINE, 0.1)
+    client.receive({**MINE, "test": {"state": "creeping", "text": "creeping"}}, 0.2)
+    return client
 
 
 def test_the_hand_takes_the_robot_only_when_the_person_agreed():
-    test = StopTestClient(0.0)
-    test.receive(FREE, 0.0)
-    assert test.stage == "ready"
-    assert test.step(60.0) == []
-    test.begin(60.0)
-    assert test.step(60.0) == [{"op": "take", "robot": "r1"}]
-    assert test.step(60.05) == [], "it is not asked for at each step"
+    client = StopTestClient(0.0)
+    client.receive(FREE, 0.0)
+    assert client.stage == "ready"
+    assert client.step(60.0) == []
+    client.begin(60.0)
+    assert client.step(60.0) == [{"op": "take", "robot": "r1"}]
+    assert client.step(60.05) == [], "it is not asked for at each step"
 
 
 def test_the_hand_says_that_every_input_is_released_and_nothing_else():
-    test = hand_that_tests()
-    (state,) = test.step(0.25)
+    client = client_that_tests()
+    (state,) = client.step(0.25)
     assert json.dumps(state) == (
         '{"op": "drive", "robot": "r1", "epoch": 3, "seq": 1, "tick": 7, '
         '"x": 0.0, "y": 0.0, "turn": 0.0}'
@@ -196,7 +196,7 @@ def test_the_hand_says_that_every_input_is_released_and_nothing_else():
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        ({"op": "hello", "connection": "c2"}, "the gate was started anew meanwhile"),
+        ({"op": "hello", "connection": "c2"}, "the gate restarted in the meantime"),
         ({"op": "refused", "what": "lease", "why": "STOP by Ann"}, "STOP by Ann"),
         (
             {**MINE, "test": {"state": "failed", "text": "a key was pressed"}},
@@ -205,20 +205,20 @@ def test_the_hand_says_that_every_input_is_released_and_nothing_else():
     ],
 )
 def test_the_hand_gives_up_when_it_cannot_go_on(words, why):
-    test = hand_that_tests()
-    test.receive(words, 0.3)
-    assert test.stage == "over"
-    assert test.code == UNKNOWN
-    assert test.news[-1] == f"The stop test gave no result: {why}."
+    client = client_that_tests()
+    client.receive(words, 0.3)
+    assert client.stage == "over"
+    assert client.code == UNKNOWN
+    assert client.news[-1] == f"The stop test gave no result: {why}."
 
 
 def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
-    test = StopTestClient(0.0)
-    test.receive({**FREE, "armable": False, "reason": "another WebMap has it"}, 1.0)
-    assert test.step(9.0) == []
-    assert test.stage == "coming"
-    test.step(10.1)
-    assert test.news == ["The stop test gave no result: another WebMap has it."]
+    client = StopTestClient(0.0)
+    client.receive({**FREE, "armable": False, "reason": "another WebMap has it"}, 1.0)
+    assert client.step(9.0) == []
+    assert client.stage == "coming"
+    client.step(10.1)
+    assert client.news == ["The stop test gave no result: another WebMap has it."]
 
 
 @pytest.mark.parametrize(
@@ -236,11 +236,11 @@ def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
 def test_the_result_of_the_test_before_is_not_taken_for_this_ones(
     test, before, after, code
 ):
-    test = hand_that_tests()
+    client = client_that_tests()
     kept = {**MINE, "test": test, "stop_source": "tested", "stop_date": TODAY}
-    test.receive({**kept, "stop_time": before}, 0.3)
-    assert test.stage == "testing"
-    test.receive({**kept, "stop_time": after}, 0.4)
-    assert test.stage == "over"
-    assert test.code == code
-    assert TODAY in test.news[-1]
+    client.receive({**kept, "stop_time": before}, 0.3)
+    assert client.stage == "testing"
+    client.receive({**kept, "stop_time": after}, 0.4)
+    assert client.stage == "over"
+    assert client.code == code
+    assert TODAY in client.news[-1]

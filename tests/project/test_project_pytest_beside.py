@@ -42,7 +42,9 @@ def run(tmp_path):
 def test_what_passes_the_second_time_is_named(run):
     status, said = run(ONCE)
     assert status == 0
-    assert "Passed the second time, to be mended:\n  test_it.py::test_once" in said
+    assert (
+        "Passed the second time; correct these tests:\n  test_it.py::test_once" in said
+    )
 
 
 def test_what_fails_alone_too_has_failed(run):

@@ -291,4 +291,4 @@ def test_a_package_brings_layers_along_that_view_shows(tmp_path):
     why = ["its", "type", "and", "its", "name"]
     assert ["/a/temp_2", "Temperature", *why] in shown
     assert ["/zones", "Zones", "its", "type", "alone"] in shown
-    assert "enough of their kind: /b/temp_3" in done.stdout
+    assert "beyond the limit for their kind: /b/temp_3" in done.stdout
