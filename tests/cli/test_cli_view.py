@@ -129,8 +129,8 @@ def test_without_rosapi_the_page_opens_and_says_what_to_give():
                        '"args":{"type":"nav_msgs/Odometry"}}')  # fmt: skip
         with viewing(url) as view:
             assert re.fullmatch(READY, view.process.stdout.readline())
-            view.wait_for(r"it has no rosapi that says its topics: .*")
-            view.wait_for(r"Say what there is: --robot NAME:ODOM:CMD_VEL:SCAN")
+            view.wait_for(r"it has no rosapi that lists its topics: .*")
+            view.wait_for(r"List each robot with --robot NAME:ODOM:CMD_VEL:SCAN")
 
 
 @pytest.mark.parametrize("sig", [signal.SIGINT, signal.SIGTERM])
@@ -478,7 +478,7 @@ def test_what_is_left_out_is_said_once(bridge, capsys):
     robot, _, layers = drawing_of(bridge, many)
     asyncio.run(layers.take(many))
     assert len(topics_of(robot, "Path")) == 6
-    said = [line for line in capsys.readouterr().err.splitlines() if "enough" in line]
+    said = [line for line in capsys.readouterr().err.splitlines() if "limit" in line]
     assert len(said) == 1
     assert "a: not drawn, beyond the limit for their kind: /a/path_5" in said[0]
     robot.destroy()

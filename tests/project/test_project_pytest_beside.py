@@ -51,7 +51,7 @@ def test_what_fails_alone_too_has_failed(run):
     status, said = run(ONCE + "\ndef test_never():\n    assert not 1\n")
     assert status == 1
     assert "2 failed at first" in said
-    assert "to be mended" not in said
+    assert "correct these tests" not in said
 
 
 def test_a_proof_of_safety_gets_no_second_look(run):
@@ -70,4 +70,4 @@ def test_many_failures_get_no_second_look(run):
 def test_what_cannot_be_collected_has_failed(run):
     status, said = run("import nothing_of_that_name\n")
     assert status != 0
-    assert "to be mended" not in said
+    assert "correct these tests" not in said
