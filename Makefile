@@ -1,4 +1,4 @@
-# `make demo` shows WebMap, `make test` proves it, `make help` lists the rest.
+# `make demo` shows WebMap, `make test` tests it, `make help` lists all targets.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
@@ -6,7 +6,7 @@ SHELL := /bin/bash
 .NOTPARALLEL:
 .DEFAULT_GOAL := help
 
-# Every path is relative to this file, so that the checkout may lie anywhere.
+# Every path is relative to this file, so that the checkout may be anywhere.
 BIN := .venv/bin
 PY := $(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -14,7 +14,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # all modules that it imports, which takes longer than the import.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Stamps lie in the folders that they vouch for and go with them.
+# Each stamp is in the folder that it marks as complete, and is deleted with it.
 MADE := .venv/.made
 INSTALLED := .venv/.installed
 DEV := .venv/.installed-dev
@@ -26,7 +26,7 @@ JOBS ?= 2
 WAITING_JOBS ?= 4
 ARGS ?=
 
-## help: list what there is
+## help: list the targets
 .PHONY: help
 help:
 	@sed -n 's/^## /  make /p' Makefile
@@ -76,15 +76,15 @@ test-fast: $(DEV)
 test-web: $(NODE)
 	node --test $$(find tests -name '*.test.js' | sort)
 
-## test-gate: every branch of the gate, its sockets and process too, is taken by a test
+## test-gate: the tests of the gate, which must cover every branch of it
 .PHONY: test-gate
-# What needs the display too, or numpy, or takes long, is not where branches are counted.
+# Tests that need the display or numpy, or take long, do not count for the branches.
 GATE_BESIDE := $(addprefix tests/gate/test_gate_,client.py assist_road.py machine.py recorded.py)
 test-gate: $(DEV)
 	$(BIN)/pytest -q -n $(JOBS) tests/gate $(addprefix --ignore ,$(GATE_BESIDE)) \
 	  --cov=webmap.gate --cov-config=tests/gate/coverage.toml --cov-fail-under=100
 
-## test-python: pytest but for test-gate; what measures time runs at the end
+## test-python: pytest without test-gate; tests that measure time run at the end
 .PHONY: test-python test-parallel test-serial
 OF_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py))
 test-python: test-parallel test-serial
@@ -92,9 +92,9 @@ WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | s
 test-parallel: $(DEV) $(NODE)
 	$(PY) tools/pytest_beside.py $(WAITING_JOBS) -m "not browser and not serial" $(addprefix --ignore ,$(OF_GATE))
 	$(PY) tools/pytest_beside.py $(JOBS) -m "browser and not serial" $(WITH_BROWSER)
-# Tests that measure time wait most of the time: two files of them run side by side, on
-# any machine, the longest first. The trials of motion grant what the machine was late by
-# and get no second look; the others get one. The trials under load run alone.
+# Tests that measure time wait most of the time, so two files of them run in parallel on
+# any machine, the longest first. Safety tests allow for the delays of the machine and do
+# not run again; the other tests run a second time if they fail. Tests under load run alone.
 ALONE := $(wildcard tests/safety/test_*_load.py tests/safety/test_*_soak.py)
 LONG = $(ONE_LANE) $(OTHER_LANE)
 OF_MOTION = $(LONG) $(filter-out $(LONG) $(ALONE),$(wildcard tests/safety/test_*.py))
@@ -104,7 +104,7 @@ test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial $(ALONE)
 	$(PY) tools/pytest_beside.py 2 -m serial $(OF_TIME)
 
-## test-safety: the motion promises proved at length, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
+## test-safety: long tests of the motion guarantees, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
 .PHONY: test-safety
 TRIALS ?= 50
 RESUME ?=
@@ -134,12 +134,12 @@ test-safety: $(DEV) $(NODE)
 docs: $(DEV)
 	$(BIN)/sphinx-build -n -W --keep-going -q -b html docs docs/_build/html
 
-## bench: measure against roslibpy and the old ways of drawing; see benchmarks/README.md
+## bench: compare with roslibpy and older methods of drawing; see benchmarks/README.md
 .PHONY: bench
 bench: $(DEV) $(NODE)
 	$(PY) -m benchmarks $(ARGS)
 
-## format: let ruff put the Python in order
+## format: format the Python files with ruff
 .PHONY: format
 format: $(DEV)
 	$(BIN)/ruff check --fix
@@ -156,18 +156,18 @@ $(MADE): tools/make_venv.sh
 	touch $@
 
 $(INSTALLED): pyproject.toml $(MADE)
-	@echo "webmap: installing WebMap and what it needs into .venv"
+	@echo "webmap: installing WebMap and its dependencies into .venv"
 	$(PY) -m pip install --quiet --editable .
 	touch $@
 
-# Dependency groups came to pip with 25.1.
+# pip has dependency groups since version 25.1.
 $(DEV): pyproject.toml $(INSTALLED)
-	@echo "webmap: installing what the checks and tests need into .venv"
+	@echo "webmap: installing the dependencies of the checks and tests into .venv"
 	$(PY) -m pip install --quiet --upgrade "pip>=25.1"
 	$(PY) -m pip install --quiet --group dev --group docs
 	touch $@
 
-# Looked for every time: it costs nothing, and a missing browser is then said at once.
+# Checked every time: it is quick, and a missing browser is reported at once.
 .PHONY: system
 system:
 	@tools/need_browser_and_node.sh

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Install Debian packages where that is allowed; elsewhere say which are missing.
+# Install Debian packages if the user is root; otherwise print the missing packages.
 #
 # usage: tools/install_debian.sh PACKAGE...
 set -euo pipefail
 
 if ! command -v apt-get >/dev/null; then
-  printf 'webmap: this needs %s: install what your system calls them, then run it again.\n' "$*" >&2
+  printf 'webmap: this needs %s: install the packages of your system with these programs, then run it again.\n' "$*" >&2
   exit 1
 fi
 if [ "$(id -u)" -ne 0 ]; then

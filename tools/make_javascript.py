@@ -52,10 +52,10 @@ def opcodes_js() -> str:
 def constants_js() -> str:
     """Return the text of ``constants.js``."""
     constants = {
-        "FOLDER": (FOLDER, "Where the server has WebMap's own files and sockets."),
+        "FOLDER": (FOLDER, "The path of WebMap's own files and sockets on the server."),
         "PROTOCOL": (PROTOCOL, "The subprotocol of both sockets."),
         "CODE": (CODE, "The field of a query that signs in once."),
-        "KEY": (KEY, "The element and the header that carry the secret of a page."),
+        "KEY": (KEY, "The element and the header with the secret of a page."),
         "PAGE_ID": (PAGE_ID, "The pattern of the name that a page chooses for itself."),
         "LONGEST_TEXTS": (
             LONGEST_TEXTS,
@@ -63,15 +63,15 @@ def constants_js() -> str:
         ),
         "FOR_GOOD": (
             [BROKEN_RULE, REPLACED],
-            "Close codes after which another try would end the same way.",
+            "Close codes after which the page does not connect again.",
         ),
-        "MOST_POINTS": (MOST_POINTS, "Points of a route, at the most."),
-        "LONGEST_NAME": (LONGEST_NAME, "Letters of a route's name, at the most."),
+        "MOST_POINTS": (MOST_POINTS, "Most points of a route."),
+        "LONGEST_NAME": (LONGEST_NAME, "Most characters of a route's name."),
         "SPACING": (list(SPACING), "Metres between robots that are sent together."),
-        "LEVELS": (list(LEVELS), "The levels of a log, from the least."),
+        "LEVELS": (list(LEVELS), "The levels of a log, the lowest first."),
         "GOALS": (
             {state: [words, shape] for state, (words, shape, _) in GOALS.items()},
-            "The words and the shape of each state of a goal.",
+            "The text and the shape of each state of a goal.",
         ),
     }
     parts = ["// Made by tools/make_javascript.py: do not edit."]
@@ -95,7 +95,7 @@ def state_words_js() -> str:
         "// Made by tools/make_javascript.py from webmap/core/robot_state.py: do not "
         "edit.\n"
         "\n"
-        "/** What a robot is doing, in words; `{who}` is who holds or drives it. */\n"
+        "/** The text for each state of a robot; `{who}` is its operator. */\n"
         f"export const WORDS = Object.freeze({{\n{rows}}});\n"
     )
 

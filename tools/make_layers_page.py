@@ -98,9 +98,9 @@ def _described(declared: Declaration) -> str:
         lines.append(f"These options may also be positional, in this order: {listed}.")
     lines += ["", "| option | default | meaning |", "|---|---|---|"]
     for each in list(signature.parameters.values())[3:]:
-        said = " ".join(option_doc(layer, each.name).split())
+        text = " ".join(option_doc(layer, each.name).split())
         default = f"`{_shown(each.default)}`"
-        lines.append(f"| `{each.name}` | {default} | {_markdown(said)} |")
+        lines.append(f"| `{each.name}` | {default} | {_markdown(text)} |")
     return "\n".join(lines) + "\n"
 
 

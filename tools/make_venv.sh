@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Make a virtual environment with Python 3.11 or newer, or say what is missing.
+# Make a virtual environment with Python 3.11 or newer, or print what is missing.
 #
 # usage: tools/make_venv.sh FOLDER        (PYTHON=... names the interpreter to use)
 set -euo pipefail
 folder=$1
 here=$(dirname "${BASH_SOURCE[0]}")
 
-# An environment that works is kept; one that was left half made is made again.
+# A working environment is kept; an incomplete one is created again.
 if "$folder/bin/python" -m pip --version >/dev/null 2>&1; then
   exit 0
 fi
@@ -30,7 +30,7 @@ if ! python=$(find_python); then
     exit 1
   }
 fi
-# Debian keeps what venv needs in a package of its own.
+# Debian has the files that venv needs in a separate package.
 if ! "$python" -c 'import ensurepip, venv' 2>/dev/null; then
   "$here/install_debian.sh" python3-venv
 fi

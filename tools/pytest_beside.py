@@ -2,7 +2,7 @@
 
 A browser that shares two cores with another one may be delayed by seconds, longer than
 a test allows, and a shared machine may stop for a moment. So if only a few tests fail,
-they run again. A test that fails again has failed; one that passes is listed: its
+they run again. A test that fails again has failed; a test that passes is listed: its
 waiting time is too short and must be corrected. A safety test does not run again.
 
 Usage: pytest_beside.py JOBS [PYTEST ARGUMENT...]
@@ -70,7 +70,12 @@ def main(jobs: str, *arguments: str) -> int:
     print("\nNow a second time, alone:", flush=True)
     status = subprocess.call([sys.executable, "-m", "pytest", "-q", "-rA", *tests])
     if status == 0:
-        print("Passed the second time, to be mended:", *tests, sep="\n  ", flush=True)
+        print(
+            "Passed the second time; correct these tests:",
+            *tests,
+            sep="\n  ",
+            flush=True,
+        )
     return status
 
 

@@ -4,7 +4,7 @@ Usage: tools/screenshots.py [NAME ...]
 
 ``console-...`` shows the demo while a robot is driven, ``layers-...`` all layers of
 ``webmap view``, ``manual-...`` the steps of the operator's manual. Needs Chromium.
-Without names, all pictures are taken.
+Without names, it takes all pictures.
 """
 
 import io
@@ -28,7 +28,8 @@ ARGS = ["--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars"]
 
 
 CALM = """() => {
-  for (const said of document.querySelectorAll(".webmap-notice button")) said.click();
+  for (const button of document.querySelectorAll(".webmap-notice button"))
+    button.click();
   return !document.querySelector(".robot.stale, .laserscan.stale, .webmap-notice");
 }"""
 
@@ -80,7 +81,7 @@ def running(*arguments: str) -> Iterator[str]:
         try:
             found = re.search(r"ready at (\S+)", process.stdout.readline())
             if found is None:
-                raise SystemExit(f"{command} did not start; what it said is above")
+                raise SystemExit(f"{command} did not start; its error message is above")
             yield found[1]
         finally:
             process.send_signal(signal.SIGINT)

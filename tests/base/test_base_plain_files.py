@@ -95,13 +95,13 @@ def test_yaml_knows_on_which_line_something_stands(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("a: 1\nb: &x [1]\nc: *x\n", ":3: this is no YAML: aliases (*name) have no"),
-        ("a: 1\na: 2\n", ':2: this is no YAML: the key "a" is there twice'),
-        ("a: 1\nb: [\n", ":3: this is no YAML: "),
-        ("a: !!python/object:os.system {}\n", ":1: this is no YAML: could not"),
-        ("a: 2001-99-99\n", ": this is no YAML: month must be in 1..12"),
-        ("\x00", ": this is no YAML: "),
-        ("[" * 5000, ":1: this is no YAML: values are nested more than 50 deep"),
+        ("a: 1\nb: &x [1]\nc: *x\n", ":3: this is not YAML: aliases (*name) are not"),
+        ("a: 1\na: 2\n", ':2: this is not YAML: the key "a" is defined twice'),
+        ("a: 1\nb: [\n", ":3: this is not YAML: "),
+        ("a: !!python/object:os.system {}\n", ":1: this is not YAML: could not"),
+        ("a: 2001-99-99\n", ": this is not YAML: month must be in 1..12"),
+        ("\x00", ": this is not YAML: "),
+        ("[" * 5000, ":1: this is not YAML: values are nested more than 50 deep"),
     ],
 )
 def test_what_is_no_such_yaml_is_refused_with_its_line(tmp_path, text, said):

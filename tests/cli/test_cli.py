@@ -79,7 +79,7 @@ def test_version_is_the_packages():
         (("sim", "--map", "nowhere.yaml"), "nowhere.yaml"),
         (("sim", "--flat", "--robots", "2"), "one robot only"),
         (("sim", "--quirks", "polite,odd"), "no quirk is called 'odd'; there are"),
-        (("sim", "--quirks", "real", "--polite"), "give one"),
+        (("sim", "--quirks", "real", "--polite"), "give only one"),
         (("demo", "--host", "0.0.0.0"), "--insecure-lan"),
     ],
 )

@@ -24,7 +24,7 @@ def test_the_file_that_discovery_writes_is_right_and_runs(ros1, ros2, tmp_path):
     file.write_text(webmap("discover", "--toml", ros1, ros2).stdout)
     said = webmap("check", file)
     assert said.returncode == 0, said.stderr
-    assert said.stdout == f"{file}: 3 robots behind 2 bridges, and nothing wrong\n"
+    assert said.stdout == f"{file}: 3 robots behind 2 bridges, no mistakes\n"
     with subprocess.Popen(
         [sys.executable, "-m", "webmap", "run", file, "--port", "0", "--no-browser"],
         stdout=subprocess.PIPE,

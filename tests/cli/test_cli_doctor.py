@@ -27,13 +27,13 @@ def test_robots_of_ros_1_are_ready(ros1):
     assert re.search(r"/robot_1/odom: [12]\d\.\d messages a second", said.stdout)
     assert "Frames lead from map to robot_1/odom" in said.stdout
     assert "each call in a thread of its own" in said.stdout
-    assert "/robot_0/cmd_vel takes Twist," in said.stdout
+    assert "/robot_0/cmd_vel has the type Twist," in said.stdout
 
 
 def test_ros_2_is_asked_nothing_that_ends_its_rosapi(ros2):
     said = webmap("doctor", ros2, "--seconds", "1", "--ask-parameters")
     assert said.returncode == 0, said.stdout
-    assert "takes TwistStamped" in said.stdout
+    assert "has the type TwistStamped" in said.stdout
     assert "may block its whole socket" in said.stdout
     assert "Scans come packed as CBOR (/base_scan)" in said.stdout
     assert webmap("discover", ros2).returncode == 0, "rosapi is still there"
@@ -63,7 +63,7 @@ def test_a_list_of_topics_takes_the_place_of_rosapi(ros1, tmp_path):
     topics = tmp_path / "topics.txt"
     topics.write_text("/robot_1/odom [nav_msgs/Odometry]\n")
     said = webmap("doctor", ros1, "--seconds", "1", "--topics", str(topics))
-    assert "those that were given; robots found: robot_1." in said.stdout
+    assert "The topics come from the given list; robots found: robot_1." in said.stdout
     assert "robot_0" not in said.stdout
 
 
@@ -72,11 +72,14 @@ def test_robots_are_looked_at_as_they_were_told(ros1):
     sent = ("--set", "Bob.velocity_type=geometry_msgs/TwistStamped")
     said = webmap("doctor", ros1, "--seconds", "2", *told, *sent)
     assert said.returncode == 1, said.stdout
-    assert "\nBob\n  WRONG    /robot_0/cmd_vel takes Twist, and WebMap" in said.stdout
-    assert "set to send TwistStamped" in said.stdout
+    assert (
+        "\nBob\n  WRONG    /robot_0/cmd_vel has the type Twist, but WebMap"
+        in said.stdout
+    )
+    assert "configured to send TwistStamped" in said.stdout
     assert "/robot_0/odom: " in said.stdout
     assert "base_scan" not in said.stdout, "it was given no scan"
-    assert "not looked at: robot_1." in said.stdout
+    assert "they were not checked: robot_1." in said.stdout
 
 
 def test_robots_are_looked_at_as_a_fleet_file_has_them(ros1, tmp_path):
@@ -90,7 +93,10 @@ def test_robots_are_looked_at_as_a_fleet_file_has_them(ros1, tmp_path):
     said = webmap("doctor", str(file), "--seconds", "2")
     assert said.returncode == 1, said.stdout
     assert said.stdout.startswith(ros1)
-    assert "\nBob\n  WRONG    /robot_1/cmd_vel takes Twist, and WebMap" in said.stdout
+    assert (
+        "\nBob\n  WRONG    /robot_1/cmd_vel has the type Twist, but WebMap"
+        in said.stdout
+    )
     assert "/robot_1/base_scan: " in said.stdout
     assert "camera" not in said.stdout, "the file has none"
 

@@ -45,7 +45,7 @@ def test_a_list_is_of_one_bridge(tmp_path):
     for command in ("discover", "doctor"):
         said = run_inside(command, "ws://a:1", "ws://b:1", "--topics", str(topics))
         assert said.returncode == 2
-        assert "one bridge, and 2 were given" in said.stderr
+        assert "one bridge, got 2 bridges" in said.stderr
 
 
 def test_help_shows_each_example_on_a_line_of_its_own():
@@ -56,7 +56,7 @@ def test_help_shows_each_example_on_a_line_of_its_own():
 def test_a_list_without_an_end_is_refused():
     said = webmap("discover", "ws://127.0.0.1:1", "--topics", "/dev/zero")
     assert said.returncode == 2
-    assert "has more than 4194304 characters, so it is no list of topics" in said.stderr
+    assert "has more than 4194304 characters, expected a list of topics" in said.stderr
 
 
 def test_a_list_that_is_not_utf_8_is_refused_with_a_sentence(tmp_path):
@@ -116,7 +116,7 @@ def test_what_ros_prints_and_what_people_write_is_read(text, types):
         ("/odom Odometry", "line 1: got '/odom Odometry'"),
         ("/odom nav_msgs/srv/a/b", "line 1"),
         ("/a-b nav_msgs/Odometry", "line 1"),
-        ("/a x/A\n/a x/B", "line 2: /a is x/B here and x/A further up"),
+        ("/a x/A\n/a x/B", "line 2: /a has the type x/B here and x/A above"),
         ("\n# nothing\n", "list.txt is empty"),
         ("\x00\xff" * 100, "line 1"),
     ],

@@ -144,7 +144,7 @@ def test_a_topic_that_has_no_type_is_not_waited_for(tmp_path):
     listed.write_text("/odom nav_msgs/Odometry\n")
     named = ("--topic", "/odom", "--topic", "/x")
     done = run("ws://127.0.0.1:1", "--topics", listed, *named, "--duration", "1")
-    assert_refused(done, "nothing says the type of /x: name it with --type")
+    assert_refused(done, "the type of /x is unknown: give it with --type")
 
 
 def assert_refused(done, words):

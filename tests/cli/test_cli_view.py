@@ -1,4 +1,4 @@
-"""``webmap view``: robots are found, told, and come later."""
+"""``webmap view``: robots are found, given, and come later."""
 
 import asyncio
 import re
@@ -19,9 +19,9 @@ from webmap.discovery import FoundRobot, Guess, discover
 from webmap.discovery.found import ROLES
 from webmap.discovery.newcomers import Newcomers, News
 from webmap.fleet.found import find_fleet
-from webmap.fleet.overrides import Overruling, parse_setting
+from webmap.fleet.given import Candidate
+from webmap.fleet.overrides import Overrides, parse_setting
 from webmap.fleet.shown import ShownRobots
-from webmap.fleet.stated import Candidate
 from webmap.fleet.watch import LookingForLayers
 from webmap_process import simulator
 
@@ -92,8 +92,8 @@ def test_robots_that_are_told_are_all_there_is(ros1):
 
 
 def test_a_robot_that_is_told_takes_the_place_of_the_one_found(ros1):
-    told = "Bob:/robot_0/odom:/robot_0/cmd_vel:"
-    with viewing(ros1, "--discover", "--robot", told) as view:
+    given = "Bob:/robot_0/odom:/robot_0/cmd_vel:"
+    with viewing(ros1, "--discover", "--robot", given) as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
         view.wait_for("Found robot_1")
     assert "Found robot_0" not in view.said
@@ -111,11 +111,11 @@ def test_the_page_opens_without_a_bridge_and_its_robots_come_later(later_port):
 def test_a_told_robot_takes_the_place_of_one_that_comes_when_its_bridge_does(
     later_port,
 ):
-    told = ("--discover", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
-    with viewing(f"ws://127.0.0.1:{later_port}", "--wait", "0.5", *told) as view:
+    given = ("--discover", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
+    with viewing(f"ws://127.0.0.1:{later_port}", "--wait", "0.5", *given) as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
         with simulator("--port", str(later_port), "--robots", "2"):
-            # Both settle at one look, and are told in the order of their names.
+            # Both settle at one look, and are reported in the order of their names.
             view.wait_for(r"A robot appeared behind ws://.*: robot_1: odometry", 40)
     assert "robot_0: odometry" not in view.said
 
@@ -129,8 +129,8 @@ def test_without_rosapi_the_page_opens_and_says_what_to_give():
                        '"args":{"type":"nav_msgs/Odometry"}}')  # fmt: skip
         with viewing(url) as view:
             assert re.fullmatch(READY, view.process.stdout.readline())
-            view.wait_for(r"it has no rosapi that says its topics: .*")
-            view.wait_for(r"Say what there is: --robot NAME:ODOM:CMD_VEL:SCAN")
+            view.wait_for(r"it has no rosapi that lists its topics: .*")
+            view.wait_for(r"List each robot with --robot NAME:ODOM:CMD_VEL:SCAN")
 
 
 @pytest.mark.parametrize("sig", [signal.SIGINT, signal.SIGTERM])
@@ -202,8 +202,8 @@ def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge):
 
 
 def test_a_newcomer_gets_a_name_that_nobody_has(bridge, capsys):
-    told = [candidate(Bridge("ws://al:9090"), "BOB")]
-    late = ShownRobots(Console(), Overruling(stops_within=0.25), told=told)
+    given = [candidate(Bridge("ws://al:9090"), "BOB")]
+    late = ShownRobots(Console(), Overrides(stops_within=0.25), given=given)
     came = late.came
     (robot,) = discover(TOPICS, "bob").robots
     came(News(robot), bridge)
@@ -239,7 +239,7 @@ def test_where_there_is_no_odometry_a_localiser_s_pose_is_shown(bridge):
 
 def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
     console = Console()
-    late = ShownRobots(console, Overruling(stops_within=0.25))
+    late = ShownRobots(console, Overrides(stops_within=0.25))
     came = late.came
     (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
     came(News(bare), bridge)
@@ -260,12 +260,14 @@ def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
     names = {type(module).__name__ for module in robot.modules}
     assert {"LaserScanner", "Battery", "Path"} <= names
     assert list(console.grids) == [(bridge, "/map")]
-    assert "bob has more now: velocity /cmd_vel, scan /scan" in capsys.readouterr().err
+    assert (
+        "bob has new topics: velocity /cmd_vel, scan /scan" in capsys.readouterr().err
+    )
     robot.destroy()
 
 
 def test_each_camera_that_comes_later_is_used_as_long_as_there_is_room(bridge, capsys):
-    late = ShownRobots(Console(), Overruling(stops_within=0.25))
+    late = ShownRobots(Console(), Overrides(stops_within=0.25))
     came = late.came
     newcomers = Newcomers()
 
@@ -290,10 +292,10 @@ def test_each_camera_that_comes_later_is_used_as_long_as_there_is_room(bridge, c
     assert names() == ["Camera", "Camera 2", "Camera 3", "Camera 4"]
     said = capsys.readouterr().err.splitlines()[1:]
     assert said == [
-        "bob has more now: camera /cam0/image_raw/compressed",
-        "bob has more now: camera /cam1/image_raw/compressed, "
+        "bob has new topics: camera /cam0/image_raw/compressed",
+        "bob has new topics: camera /cam1/image_raw/compressed, "
         "camera /cam2/image_raw/compressed",
-        "bob has more now: camera /cam3/image_raw/compressed",
+        "bob has new topics: camera /cam3/image_raw/compressed",
     ]
     late.robots[0].destroy()
 
@@ -306,7 +308,7 @@ def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, capsys):
 
 
 @pytest.mark.parametrize(
-    ("told", "is_it"),
+    ("given", "is_it"),
     [
         ({"name": "bob"}, True),
         ({"name": "Al", "odometry": "/odom"}, True),
@@ -315,21 +317,21 @@ def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, capsys):
     ],
 )
 def test_a_told_robot_is_the_found_one_by_name_odometry_or_velocity(
-    bridge, told, is_it
+    bridge, given, is_it
 ):
     (robot,) = discover(TOPICS, "bob").robots
     found = Candidate(bridge, robot)
-    assert candidate(bridge, **told).is_also(found) is is_it
-    assert not candidate(Bridge("ws://al:9090"), **told).is_also(found)
+    assert candidate(bridge, **given).is_also(found) is is_it
+    assert not candidate(Bridge("ws://al:9090"), **given).is_also(found)
 
 
 STAMPED = "geometry_msgs/msg/TwistStamped"
 
 
-def fleet_of(bridge, *told, topics, settings=()):
+def fleet_of(bridge, *given, topics, settings=()):
     """What is shown of a list of topics, where there is no rosapi to ask."""
-    said = Overruling([parse_setting(text) for text in settings])
-    return find_fleet([bridge], told, wait=0.0, topics=topics, overruling=said)
+    said = Overrides([parse_setting(text) for text in settings])
+    return find_fleet([bridge], given, wait=0.0, topics=topics, overrides=said)
 
 
 def test_a_robot_of_a_list_is_driven_with_the_type_that_the_list_tells(bridge):
@@ -346,10 +348,10 @@ def test_a_robot_of_a_list_is_driven_with_the_type_that_the_list_tells(bridge):
 def test_a_robot_that_is_told_has_the_type_of_a_list_if_that_drives(
     bridge, listed, type
 ):
-    told = candidate(bridge, "Al", velocity="al/go")
-    fleet = fleet_of(bridge, told, topics=TOPICS | {"/al/go": listed})
-    assert fleet.told[0].found.type_of("velocity") == type
-    assert ("/go  " + type in fleet.table(grid=True, as_told=True)) == bool(type)
+    given = candidate(bridge, "Al", velocity="al/go")
+    fleet = fleet_of(bridge, given, topics=TOPICS | {"/al/go": listed})
+    assert fleet.given[0].found.type_of("velocity") == type
+    assert ("/go  " + type in fleet.table(grid=True, only_given=True)) == bool(type)
 
 
 def test_a_velocity_topic_that_is_said_has_the_type_of_the_list(bridge):
@@ -362,7 +364,7 @@ def test_a_velocity_topic_that_is_said_has_the_type_of_the_list(bridge):
 
 
 def test_velocity_that_comes_later_is_sent_in_its_type(bridge):
-    late = ShownRobots(Console(), Overruling(stops_within=0.25))
+    late = ShownRobots(Console(), Overrides(stops_within=0.25))
     came = late.came
     (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
     came(News(bare), bridge)
@@ -375,7 +377,7 @@ def test_what_comes_later_leaves_alone_what_drives_the_robot(bridge):
     settings = [parse_setting("bob.velocity=/cmd_vel_nav")]
     topics = TOPICS | {"/cmd_vel_nav": STAMPED}
     fleet = fleet_of(bridge, topics=topics, settings=["bob.velocity=/cmd_vel_nav"])
-    late = ShownRobots(Console(), Overruling(settings))
+    late = ShownRobots(Console(), Overrides(settings))
     late.add(fleet.robots[0])
     (robot,) = late.robots
     twist = robot.motion.config.twist
@@ -403,7 +405,7 @@ RICH = {
 def drawing_of(bridge, topics, *settings):
     """Draw what is found of one robot; return it, the console and what is drawn."""
     console = Console()
-    said = Overruling([parse_setting(text) for text in settings])
+    said = Overrides([parse_setting(text) for text in settings])
     late = ShownRobots(console, said)
     (found_,) = said.findings(bridge.url, discover(topics, "bob")).robots
     late.add(Candidate(bridge, found_))
@@ -452,15 +454,14 @@ def test_cameras_that_are_left_out_are_said_once(bridge, capsys):
     robot, _, layers = drawing_of(bridge, RICH | cameras(6))
     (line,) = said()
     assert line == (
-        "a: not drawn, since there are enough of their kind: "
+        "a: not drawn, beyond the limit for their kind: "
         "/a/cam4/image_raw/compressed, /a/cam5/image_raw/compressed"
     )
     asyncio.run(layers.take(RICH | cameras(6)))
     assert said() == []
     asyncio.run(layers.take(RICH | cameras(7)))
     assert said() == [
-        "a: not drawn, since there are enough of their kind: "
-        "/a/cam6/image_raw/compressed"
+        "a: not drawn, beyond the limit for their kind: /a/cam6/image_raw/compressed"
     ], "one that came later"
     robot.destroy()
 
@@ -477,7 +478,7 @@ def test_what_is_left_out_is_said_once(bridge, capsys):
     robot, _, layers = drawing_of(bridge, many)
     asyncio.run(layers.take(many))
     assert len(topics_of(robot, "Path")) == 6
-    said = [line for line in capsys.readouterr().err.splitlines() if "enough" in line]
+    said = [line for line in capsys.readouterr().err.splitlines() if "limit" in line]
     assert len(said) == 1
-    assert "a: not drawn, since there are enough of their kind: /a/path_5" in said[0]
+    assert "a: not drawn, beyond the limit for their kind: /a/path_5" in said[0]
     robot.destroy()

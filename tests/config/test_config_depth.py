@@ -81,7 +81,7 @@ def test_of_very_many_mistakes_the_first_are_named_and_the_others_counted(tmp_pa
     lines = str(refused.value).splitlines()
     assert len(lines) == MOST_MISTAKES + 1
     assert "robots[0].k0: there is no key" in lines[0]
-    counted = re.fullmatch(r".*: and (\d+) mistakes more", lines[-1])
+    counted = re.fullmatch(r".*: and (\d+) more mistakes", lines[-1])
     assert 4900 <= int(counted[1]) <= 4903
 
 

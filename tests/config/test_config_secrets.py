@@ -35,7 +35,7 @@ def warned(tmp_path, caplog):
 )
 def test_a_password_that_others_can_read_is_warned_of(warned, text, mode):
     (said,) = warned(text, mode)
-    assert "my fleet.toml holds a password, and other users of this comp" in said
+    assert "my fleet.toml contains a password, and other users of this comp" in said
     assert f"(its mode is {mode:04o}): run chmod 600 '/" in said
     assert said.endswith("/my fleet.toml'")
     assert "word@" not in said

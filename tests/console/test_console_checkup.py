@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from webmap import Bridge
-from webmap.discovery.doctor import Finding, MeantRobot, Observed
+from webmap.discovery.doctor import ConfiguredRobot, Finding, Observed
 from webmap.features.doctor.doctor_panel import Checkup, checkup_of, groups
 from webmap.ros.rosbridge.checks import LinkFacts
 
@@ -20,7 +20,7 @@ async def until(condition):
 def test_however_many_ask_there_is_one_look_at_a_time():
     asked, go_on = [], asyncio.Event()
 
-    async def observe(url, *, seconds, meant, progress):
+    async def observe(url, *, seconds, configured, progress):
         asked.append(url)
         progress("Listening for 3 s.")
         await go_on.wait()
@@ -49,7 +49,7 @@ def test_however_many_ask_there_is_one_look_at_a_time():
 
 
 def test_a_check_that_fails_itself_is_said_and_can_be_made_again(caplog):
-    async def observe(url, *, seconds, meant, progress):
+    async def observe(url, *, seconds, configured, progress):
         raise RuntimeError("broken")
 
     async def run():
@@ -87,13 +87,13 @@ def test_viewers_of_one_bridge_share_its_check():
 def test_the_robots_that_the_page_has_are_looked_at():
     asked = []
 
-    async def observe(url, *, seconds, meant, progress):
-        asked.append(meant(None))
+    async def observe(url, *, seconds, configured, progress):
+        asked.append(configured(None))
         return Observed(url)
 
     async def run():
         checkup = Checkup("ws://bob:9090", observe=observe)
-        bob = MeantRobot("Bob")
+        bob = ConfiguredRobot("Bob")
         checkup.start([bob])
         await until(lambda: not checkup.is_running)
         assert asked == [[bob]]
@@ -125,7 +125,7 @@ def test_a_call_is_tried_when_somebody_asks_and_the_report_says_what_that_told()
         assert checkup.ended == ended, "nothing was listened to again"
 
     asyncio.run(run())
-    assert told == ["Trying what a call that hangs holds up."]
+    assert told == ["Testing what a slow service call delays."]
     assert "hangs blocks its whole socket (tried)" in checkup.text
 
 

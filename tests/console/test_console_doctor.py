@@ -31,7 +31,7 @@ def test_a_bridge_is_checked_when_asked_and_each_finding_says_how_bad_it_is(
     checked = re.compile(r"^Checked \d.* ago\. .*\d+ notes, \d+ good$")
     expect(report.locator(".status")).to_have_text(checked, timeout=20_000)
     velocity = report.locator(".finding").filter(
-        has_text="/robot_0/cmd_vel takes Twist"
+        has_text="/robot_0/cmd_vel has the type Twist"
     )
     expect(velocity).to_have_attribute("data-level", "good")
     expect(velocity.locator("strong")).to_have_text("Good:")
@@ -51,7 +51,10 @@ def test_a_bridge_is_checked_when_asked_and_each_finding_says_how_bad_it_is(
     expect(report.get_by_text("Copied", exact=True)).to_be_visible()
     text = page.evaluate("navigator.clipboard.readText()")
     assert text.startswith("ws://127.0.0.1:")
-    assert "  good     /robot_0/cmd_vel takes Twist, and WebMap sends that." in text
+    assert (
+        "  good     /robot_0/cmd_vel has the type Twist, and WebMap sends this type."
+        in text
+    )
 
     page.keyboard.press("Escape")
     expect(report).to_be_hidden()

@@ -10,7 +10,7 @@ from webmap.console import make_robot
 from webmap.core.page import Page, PageEntry, Viewer
 from webmap.discovery import discover
 from webmap.discovery.doctor import Observed
-from webmap.discovery.doctor.meant import lay_over
+from webmap.discovery.doctor.configured import merge_configured
 from webmap.features.doctor.doctor_panel import DoctorReports, checkup_of
 from webmap.features.doctor.in_use import in_use
 from webmap.scene.element import Event
@@ -108,12 +108,12 @@ def test_a_robot_of_another_bridge_is_none_of_this_one(bridge, other):
 def test_a_robot_that_is_drawn_by_its_frames_is_followed_by_those(bridge):
     bob = Robot("Bob")
     bob.set_tf(bridge, namespace="/bob", map_frame="site")
-    meant = only(in_use([bob], bridge))
-    assert meant.topics["tf"] == (("/bob/tf", ""),)
+    configured = only(in_use([bob], bridge))
+    assert configured.topics["tf"] == (("/bob/tf", ""),)
     topics = {"/bob/tf": "tf2_msgs/TFMessage"}
-    (robot,) = lay_over(discover(topics), [meant], topics)[0].robots
+    (robot,) = merge_configured(discover(topics), [configured], topics)[0].robots
     assert robot.tf_alone
-    assert (robot.base_frame, meant.map_frame) == ("bob/base_link", "bob/site")
+    assert (robot.base_frame, configured.map_frame) == ("bob/base_link", "bob/site")
 
 
 def test_a_robot_that_nothing_places_is_not_placed_by_frames_it_does_not_use(bridge):
@@ -165,8 +165,8 @@ def checkup(bridge):
     checkup = checkup_of(bridge)
     checkup.asked = []
 
-    async def observe(url, *, seconds, meant, progress):
-        checkup.asked.append(meant(None))
+    async def observe(url, *, seconds, configured, progress):
+        checkup.asked.append(configured(None))
         return Observed(url)
 
     async def tried(seen):

@@ -12,11 +12,11 @@ from frames_only import telling
 
 from webmap.base.geometry import Pose
 from webmap.discovery import discover
-from webmap.discovery.doctor import Heard, Observed, is_ready, judge
+from webmap.discovery.doctor import Measurement, Observed, is_ready, judge
 from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.listening import MOST_BYTES, Listening, Sampling
 from webmap.discovery.doctor.measure import observe
-from webmap.discovery.doctor.observed import Clock, Way
+from webmap.discovery.doctor.observed import Clock, FramePath
 from webmap.discovery.doctor.shown_rules import shown_topics
 from webmap.discovery.doctor.verdict import report
 from webmap.ros.rosbridge.checks import LinkFacts, is_loopback, listening_addresses
@@ -28,8 +28,8 @@ TOPICS = {
     "/scan": "sensor_msgs/LaserScan",
 }
 LISTENED = {
-    "/odom": Heard(60, 3.0, 0.06, 50_000, "odom", 99.97, 100.0),
-    "/scan": Heard(30, 3.0, 0.11, 90_000, "laser", 99.95, 100.0, binary=True),
+    "/odom": Measurement(60, 3.0, 0.06, 50_000, "odom", 99.97, 100.0),
+    "/scan": Measurement(30, 3.0, 0.11, 90_000, "laser", 99.95, 100.0, binary=True),
 }
 GOOD = Observed(
     "ws://localhost:9090",
@@ -38,7 +38,7 @@ GOOD = Observed(
     clock=Clock(0.01, 0.004),
     publishers={"/cmd_vel": ()},
     subscribers={"/cmd_vel": ("/base",)},
-    heard=LISTENED,
+    measured=LISTENED,
 )
 
 
@@ -52,7 +52,7 @@ def said(seen, words):
 
 def heard(**changes):
     odometry = replace(LISTENED["/odom"], **changes)
-    return replace(GOOD, heard={**LISTENED, "/odom": odometry})
+    return replace(GOOD, measured={**LISTENED, "/odom": odometry})
 
 
 def test_a_good_robot_is_ready_and_what_cannot_be_seen_is_a_note():
@@ -173,7 +173,7 @@ def test_a_bridge_that_hides_nothing_is_told_so_where_others_reach_it():
 def test_only_the_first_of_many_robots_are_listened_to_and_that_is_said():
     topics = {f"/r{n}/odom": "nav_msgs/Odometry" for n in range(12)}
     many = replace(GOOD, findings=discover(topics))
-    assert said(many, "12 robots are many: only the first 10") == "note"
+    assert said(many, "Only the first 10 of 12 robots") == "note"
 
 
 def test_a_map_that_nobody_publishes_is_told():
@@ -181,30 +181,39 @@ def test_a_map_that_nobody_publishes_is_told():
     seen = replace(GOOD, findings=discover(topics, "bob"))
     assert not any("no map under it" in each.words for each in judge(seen))
     seen = replace(seen, publishers={**GOOD.publishers, "/map": ()})
-    assert said(seen, "Nobody publishes /map") == "warning"
+    assert said(seen, "No node publishes /map") == "warning"
 
 
 def test_a_battery_may_be_slow():
     topics = TOPICS | {"/battery_state": "sensor_msgs/BatteryState"}
     seen = replace(GOOD, findings=discover(topics, "bob"))
-    seen = replace(seen, heard={**LISTENED, "/battery_state": Heard(seconds=3.0)})
-    assert said(seen, "Nothing came on /battery_state in 3 s; it may") == "note"
-    slow = {**LISTENED, "/battery_state": Heard(1, 3.0, 3.0)}
-    assert said(replace(seen, heard=slow), "/battery_state: 0.3 messages") == "good"
-    broken = {**LISTENED, "/battery_state": Heard(1, 3.0, trouble="not JSON")}
-    assert said(replace(seen, heard=broken), "cannot be read: not JSON") == "warning"
+    seen = replace(
+        seen, measured={**LISTENED, "/battery_state": Measurement(seconds=3.0)}
+    )
+    assert (
+        said(seen, "No message was received on /battery_state in 3 s; the topic may")
+        == "note"
+    )
+    slow = {**LISTENED, "/battery_state": Measurement(1, 3.0, 3.0)}
+    assert said(replace(seen, measured=slow), "/battery_state: 0.3 messages") == "good"
+    broken = {**LISTENED, "/battery_state": Measurement(1, 3.0, trouble="not JSON")}
+    assert said(replace(seen, measured=broken), "cannot be read: not JSON") == "warning"
 
 
 def test_a_battery_has_an_age():
     topics = TOPICS | {"/battery_state": "sensor_msgs/BatteryState"}
     seen = replace(GOOD, findings=discover(topics, "bob"))
-    came = Heard(3, 3.0, 1.0, stamp=99.0, arrived=100.0)
+    came = Measurement(3, 3.0, 1.0, stamp=99.0, arrived=100.0)
     fresh = {**LISTENED, "/battery_state": came}
     assert (
-        said(replace(seen, heard=fresh), "1.0 messages a second, 1.0 s old") == "good"
+        said(replace(seen, measured=fresh), "1.0 messages a second, 1.0 s old")
+        == "good"
     )
     old = {**LISTENED, "/battery_state": replace(came, stamp=10.0)}
-    assert said(replace(seen, heard=old), "what is shown is no more so") == "warning"
+    assert (
+        said(replace(seen, measured=old), "the shown value may be out of date")
+        == "warning"
+    )
 
 
 SHOWN = TOPICS | {
@@ -218,38 +227,43 @@ SHOWN = TOPICS | {
 }
 STATUS = "/move_base/status"
 CAMERA = "/camera/image_raw/compressed"
-CAME = Heard(4, 0.6, 0.2, stamp=99.95, arrived=100.0, every=0.2)
+CAME = Measurement(4, 0.6, 0.2, stamp=99.95, arrived=100.0, every=0.2)
 
 
 def shown(topic, came):
     seen = replace(GOOD, findings=discover(SHOWN, "bob"))
-    return replace(seen, heard={**LISTENED, topic: came})
+    return replace(seen, measured={**LISTENED, topic: came})
 
 
 @pytest.mark.parametrize(
     ("topic", "changes", "level", "words"),
     [
         (CAMERA, {}, "good", f"{CAMERA}: 5.0 messages a second, 60 ms old."),
-        (CAMERA, {"count": 0}, "warning", "who drives by this camera is stopped"),
+        (CAMERA, {"count": 0}, "warning", "driving with this camera stops"),
         (CAMERA, {"every": 2.0}, "warning", "whenever its picture is older than 1 s"),
         (CAMERA, {"every": 0.0, "longest_gap": 2.5}, "warning", "older than 1 s"),
-        (CAMERA, {"stamp": 97.0}, "warning", "come too late to drive by"),
+        (CAMERA, {"stamp": 97.0}, "warning", "arrive too late for driving"),
         (CAMERA, {"trouble": "not JSON"}, "warning", "cannot be read: not JSON"),
         ("/points", {}, "good", "/points: 5.0 messages a second"),
-        ("/points", {"stamp": 97.0}, "warning", "its points lie where the robot was"),
+        (
+            "/points",
+            {"stamp": 97.0},
+            "warning",
+            "its points are drawn at an earlier pose",
+        ),
         ("/points", {"count": 0}, "warning", "so no points are drawn"),
         ("/local_costmap/costmap", {"count": 0}, "warning", "so no costs are drawn"),
         ("/map", {"count": 1, "every": 0.0, "stamp": -7300.0}, "good", ", 2 h old"),
         ("/map", {"count": 1, "every": 0.0, "stamp": -900.0}, "good", ", 17 min old"),
-        ("/map", {"count": 0}, "warning", "so there is no map under it"),
-        ("/plan", {"count": 0}, "note", "it may come with a goal"),
-        (STATUS, {"count": 0}, "note", "it may come with a goal"),
+        ("/map", {"count": 0}, "warning", "so no map is drawn under the robot"),
+        ("/plan", {"count": 0}, "note", "messages may begin with a goal"),
+        (STATUS, {"count": 0}, "note", "messages may begin with a goal"),
         (STATUS, {}, "good", f"{STATUS}: 5.0 messages a second"),
         (
             "/rear/scan",
             {"count": 0, "seconds": 3.0},
             "warning",
-            "Nothing came on /r",
+            "No message was received on /r",
         ),
     ],
 )
@@ -291,7 +305,7 @@ def test_no_robot_is_wrong():
         (0.2, "good", "Both clocks agree"),
         (3.0, "warning", "3.0 s ahead of"),
         (-3600.0, "warning", "3600.0 s behind"),
-        (-1.7e9, "note", "a simulator's"),
+        (-1.7e9, "note", "the clock of a simulator"),
     ],
 )
 def test_clocks_are_compared(ahead, level, words):
@@ -302,7 +316,7 @@ def test_clocks_are_compared(ahead, level, words):
     ("trip", "level"), [(0.02, "good"), (0.2, "warning"), (0.5, "wrong")]
 )
 def test_a_long_way_is_no_way_to_drive(trip, level):
-    assert said(replace(GOOD, clock=Clock(0.0, trip)), "there and back") == level
+    assert said(replace(GOOD, clock=Clock(0.0, trip)), "A service call takes") == level
 
 
 def test_an_offset_within_half_the_way_is_no_offset():
@@ -328,10 +342,14 @@ def test_whether_a_call_that_hangs_blocks_is_said(dialect, threads, level):
 @pytest.mark.parametrize(
     ("writers", "level", "words"),
     [
-        ((), "good", "Nobody else writes"),
-        (("/joy", "/nav"), "warning", "other writers too: /joy, /nav"),
+        ((), "good", "No other node publishes"),
+        (
+            ("/joy", "/nav"),
+            "warning",
+            "Other nodes publish to /cmd_vel too: /joy, /nav",
+        ),
         (("/rosbridge_websocket",), "note", "may be WebMap itself"),
-        (None, "note", "cannot be told"),
+        (None, "note", "does not list the publishers"),
     ],
 )
 def test_other_writers_of_velocity_are_named(writers, level, words):
@@ -341,32 +359,33 @@ def test_other_writers_of_velocity_are_named(writers, level, words):
 
 def test_a_velocity_that_nobody_listens_to_is_wrong():
     assert (
-        said(replace(GOOD, subscribers={"/cmd_vel": ()}), "Nobody listens") == "wrong"
+        said(replace(GOOD, subscribers={"/cmd_vel": ()}), "No node subscribes")
+        == "wrong"
     )
 
 
 def test_the_type_of_velocity_is_said():
     stamped = TOPICS | {"/cmd_vel": "geometry_msgs/msg/TwistStamped"}
     seen = replace(GOOD, findings=discover(stamped, "bob"))
-    assert said(seen, "takes TwistStamped") == "good"
+    assert said(seen, "has the type TwistStamped") == "good"
 
 
 def test_a_robot_without_velocity_or_place_is_warned_of():
     blind = replace(GOOD, findings=discover({"/cmd_vel": "geometry_msgs/Twist"}))
-    assert said(blind, "Nothing says where it is") == "wrong"
+    assert said(blind, "No topic gives its pose") == "wrong"
     fixed = replace(GOOD, findings=discover({"/odom": "nav_msgs/Odometry"}))
-    assert said(fixed, "seen and not driven") == "warning"
+    assert said(fixed, "seen but not driven") == "warning"
 
 
 @pytest.mark.parametrize(
     ("changes", "level", "words"),
     [
         ({}, "good", "20.0 messages a second in the frame odom, 40 ms old"),
-        ({"count": 0}, "wrong", "Nothing came on /odom in 3 s"),
+        ({"count": 0}, "wrong", "No message was received on /odom in 3 s"),
         ({"trouble": "not JSON"}, "wrong", "/odom cannot be read: not JSON"),
         ({"longest_gap": 1.4}, "wrong", "none for 1.4 s"),
         ({"count": 9}, "warning", "3.0 messages a second"),
-        ({"stamp": 99.0}, "warning", "1.0 s old when they come"),
+        ({"stamp": 99.0}, "warning", "1.0 s old when they arrive"),
         ({"stamp": 101.0}, "warning", "1.0 s ahead of the robot's own clock"),
         ({"stamp": None}, "good", "in the frame odom."),
     ],
@@ -376,8 +395,8 @@ def test_odometry_has_a_rate_and_an_age(changes, level, words):
 
 
 def test_a_silent_scan_is_a_warning_and_no_more():
-    seen = replace(GOOD, heard={**LISTENED, "/scan": Heard(seconds=3.0)})
-    assert said(seen, "Nothing came on /scan") == "warning"
+    seen = replace(GOOD, measured={**LISTENED, "/scan": Measurement(seconds=3.0)})
+    assert said(seen, "No message was received on /scan") == "warning"
     assert is_ready(judge(seen))
 
 
@@ -394,19 +413,21 @@ def test_the_report_counts_and_lets_no_control_character_through():
 
 
 def test_a_way_from_the_map_is_good_and_a_missing_one_a_note():
-    seen = replace(GOOD, ways={"bob": Way("odom")})
+    seen = replace(GOOD, frame_paths={"bob": FramePath("odom")})
     assert said(seen, "Frames lead from map to odom") == "good"
-    seen = replace(GOOD, ways={"bob": Way("odom", "there is no frame 'map'")})
-    assert said(seen, "where odometry has it: there is no frame 'map'") == "note"
+    seen = replace(
+        GOOD, frame_paths={"bob": FramePath("odom", "there is no frame 'map'")}
+    )
+    assert said(seen, "at the pose from odometry: there is no frame 'map'") == "note"
 
 
 def test_the_way_begins_in_the_map_that_the_robot_is_drawn_in():
-    seen = replace(GOOD, ways={"bob": Way("bob/odom", start="world")})
+    seen = replace(GOOD, frame_paths={"bob": FramePath("bob/odom", start="world")})
     assert said(seen, "Frames lead from world to bob/odom") == "good"
-    lost = Way("bob/odom", "there is no frame 'world'", start="world")
-    seen = replace(GOOD, ways={"bob": lost})
+    lost = FramePath("bob/odom", "there is no frame 'world'", start="world")
+    seen = replace(GOOD, frame_paths={"bob": lost})
     (found,) = [each for each in judge(seen) if "no frame 'world'" in each.words]
-    assert "start what tells of the frame world" in found.advice
+    assert "start the node that publishes the frame world" in found.advice
 
 
 PLACED = Pose(1.0, 0.0, 0.0)
@@ -430,19 +451,19 @@ def checked(told, extra=None):
             "/tf",
             ("map", "bob/odom", "bob/base_link"),
             "bob",
-            "It is drawn where its frames have bob/base_link in map (/tf: ",
+            "Its pose comes from its frames, bob/base_link in map (/tf: ",
         ),
         (
             "/bob/tf",
             ("map", "odom", "base_link"),
             "bob",
-            "It is drawn where its frames have base_link in map (/bob/tf: ",
+            "Its pose comes from its frames, base_link in map (/bob/tf: ",
         ),
         (
             "/bob/tf",
             ("odom", "base_link"),
             "bob",
-            "It is drawn where its frames have base_link in odom (/bob/tf: ",
+            "Its pose comes from its frames, base_link in odom (/bob/tf: ",
         ),
     ],
 )
@@ -457,7 +478,9 @@ def test_a_robot_that_frames_alone_tell_of_is_found_and_drawn(
 
 def test_a_robot_whose_frames_are_silent_is_nowhere():
     seen = checked({"/bob/tf": []}, {"/bob/scan": TOPICS["/scan"]})
-    words = "Nothing says where it is: /bob/tf tells of no base_link in a map or odom"
+    words = (
+        "Its pose is unknown: /bob/tf has no transform from map or odom to base_link"
+    )
     assert said(seen, words) == "wrong"
 
 
@@ -470,11 +493,13 @@ def test_robots_with_a_map_each_are_followed_from_what_holds_the_maps():
     ]
     seen = checked({"/tf": told})
     for name in names:
-        assert said(seen, f"have {name}/base_link in world") == "good"
+        assert said(seen, f"from its frames, {name}/base_link in world") == "good"
 
 
 def test_odd_frames_are_a_warning():
-    seen = replace(GOOD, ways={"bob": Way("odom", "", ("'a' -> 'a' would close",))})
+    seen = replace(
+        GOOD, frame_paths={"bob": FramePath("odom", "", ("'a' -> 'a' would close",))}
+    )
     assert said(seen, "would close") == "warning"
 
 
@@ -501,7 +526,7 @@ def test_frames_are_followed_from_the_map():
     assert whole.missing("", "odom") == ""
     assert whole.missing("", "map") == ""
     assert "there is no frame 'lidar'" in whole.missing("", "lidar")
-    assert whole.missing("/bob", "odom") == "nothing came on /bob/tf"
+    assert whole.missing("/bob", "odom") == "no message was received on /bob/tf"
     own = frames(("map", "odom", 1.0), topic="/bob/tf")
     assert own.missing("/bob", "odom") == ""
 

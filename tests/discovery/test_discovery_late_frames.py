@@ -10,7 +10,7 @@ from webmap import Bridge
 from webmap.base.geometry import Pose
 from webmap.console import Console
 from webmap.discovery import discover
-from webmap.discovery.hearing import LateFrames, late_frames
+from webmap.discovery.frame_listening import LateFrames, late_frames
 from webmap.discovery.tf_robots import Trees
 from webmap.fleet.shown import ShownRobots
 from webmap.fleet.watch import LookingForLayers, LookingForRobots
@@ -120,7 +120,7 @@ def test_a_robot_that_is_localised_while_running_is_drawn_on_the_map(
                     await service.stop()
 
         asyncio.run(scenario())
-    assert capsys.readouterr().err.count("is drawn where map has base_link") == 1
+    assert capsys.readouterr().err.count("now is drawn by base_link in map") == 1
 
 
 def test_a_bridge_without_frames_is_not_listened_to():

@@ -59,7 +59,7 @@ def test_nothing_is_wrong_with_a_good_robot_and_nothing_is_disturbed(dialect):
         *there.called
     }, "ends or hangs rosapi"
     assert all(name.startswith("/rosapi/") for name in there.called)
-    assert progress[0].startswith("Asking")
+    assert progress[0].startswith("Requesting")
     assert progress[-2] == f"Listening for {LONG:g} s."
     assert progress[-1] == "Listening for a few pictures, maps and plans."
 
@@ -70,11 +70,11 @@ def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
     camera = "/robot_0/camera/image_raw/compressed"
     assert said(findings, f"{camera}: ") == "good"
     assert said(findings, "/map: 1 message, ") == "good"
-    words = r"Nothing came on /robot_0/plan in \d+ s; it may"
+    words = r"No message was received on /robot_0/plan in \d+ s; messages may"
     (plan,) = [each for each in findings if re.match(words, each.words)]
     assert plan.level == "note"
-    assert seen.heard[camera].count <= ENOUGH
-    assert seen.heard[camera].every > 0
+    assert seen.measured[camera].count <= ENOUGH
+    assert seen.measured[camera].every > 0
 
 
 def test_a_map_above_the_limit_of_the_bridge_is_told_with_the_parameter():
@@ -96,7 +96,9 @@ def test_a_map_that_nobody_sends_in_json_either_is_silent_and_the_limit_is_named
 
     _, findings, seen = looked_at(site("ros2", change=mute))
     assert not seen.link.too_large
-    (found,) = [each for each in findings if "Nothing came on /map" in each.words]
+    (found,) = [
+        each for each in findings if "No message was received on /map" in each.words
+    ]
     assert "max_message_size" in found.advice
 
 
@@ -105,7 +107,7 @@ def test_a_camera_that_is_silent_is_told_with_what_it_costs():
         return None if name.endswith("/compressed") else message
 
     _, findings, _ = looked_at(site("ros1", change=change))
-    words = "could publish it, and who drives by this camera is stopped"
+    words = "can publish it, so driving with this camera stops"
     assert said(findings, words) == "warning"
 
 
@@ -114,7 +116,7 @@ def test_a_camera_that_is_silent_is_told_with_what_it_costs():
 )
 def test_the_type_of_velocity_is_the_one_that_the_base_takes(dialect, twist):
     _, findings, _ = looked_at(site(dialect, twist=twist))
-    assert said(findings, f"/robot_0/cmd_vel takes {twist}, and") == "good"
+    assert said(findings, f"/robot_0/cmd_vel has the type {twist}, and") == "good"
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="Linux tells it there")
@@ -132,7 +134,10 @@ def test_a_node_that_writes_velocity_too_is_named(dialect):
         )
 
     _, findings, _ = looked_at(site(dialect), joystick)
-    assert said(findings, "other writers too: /joy_teleop") == "warning"
+    assert (
+        said(findings, "Other nodes publish to /robot_0/cmd_vel too: /joy_teleop")
+        == "warning"
+    )
 
 
 @pytest.mark.serial  # rates and ages are measured
@@ -164,7 +169,7 @@ def test_stamps_that_stand_still_are_old(dialect):
         return message
 
     _, findings, _ = looked_at(site(dialect, change=stuck))
-    assert said(findings, "s old when they come") == "warning"
+    assert said(findings, "s old when they arrive") == "warning"
 
 
 @DIALECTS
@@ -173,11 +178,11 @@ def test_a_topic_that_nobody_feeds_is_told_with_the_node_that_could(dialect):
         return None if name in ("/robot_0/odom", "/robot_0/base_scan") else message
 
     _, findings, _ = looked_at(site(dialect, change=mute))
-    assert said(findings, "Nothing came on /robot_0/odom") == "wrong"
-    assert said(findings, "Nothing came on /robot_0/base_scan") == "warning"
+    assert said(findings, "No message was received on /robot_0/odom") == "wrong"
+    assert said(findings, "No message was received on /robot_0/base_scan") == "warning"
     for topic in ("odom", "base_scan"):
-        words = rf"Nothing came on /robot_0/{topic} in \d+ s, "
-        words += "though /robots could publish"
+        words = rf"No message was received on /robot_0/{topic} in \d+ s, "
+        words += "although /robots can publish"
         assert any(re.match(words, each.words) for each in findings)
 
 
@@ -201,9 +206,9 @@ def without(*children):
 @pytest.mark.parametrize(
     ("lost", "level", "words"),
     [
-        ("odom", "note", "drawn in the frame robot_0/odom, where odometry has it"),
-        ("base_link", "note", "do not lead from robot_0/odom to robot_0/base_link"),
-        ("base_laser", "warning", "Nothing says where the scanner is on the robot"),
+        ("odom", "note", "drawn in the frame robot_0/odom, at the pose from odometry"),
+        ("base_link", "note", "no transform from robot_0/odom to robot_0/base_link"),
+        ("base_laser", "warning", "The pose of the scanner on the robot is unknown"),
     ],
 )
 def test_each_frame_that_is_missing_is_told(dialect, lost, level, words):
@@ -215,9 +220,9 @@ def test_each_frame_that_is_missing_is_told(dialect, lost, level, words):
 def test_frames_that_are_complete_are_good(dialect):
     _, findings, _ = looked_at(site(dialect))
     assert said(findings, "Frames lead from map to robot_0/odom (/tf:") == "good"
-    assert said(findings, "Frames lead on from robot_0/odom to robot_0/base_link") == (
-        "good"
-    )
+    assert said(
+        findings, "Frames lead further from robot_0/odom to robot_0/base_link"
+    ) == ("good")
 
 
 def apart(name, message):
@@ -242,7 +247,7 @@ def apart(name, message):
 def test_the_frames_of_a_robot_with_a_map_of_its_own_are_good(dialect):
     _, findings, _ = looked_at(site(dialect, change=apart))
     assert said(findings, "Frames lead from world to robot_0/odom (/tf:") == "good"
-    assert not any("where odometry has it" in each.words for each in findings)
+    assert not any("at the pose from odometry" in each.words for each in findings)
 
 
 @pytest.mark.parametrize(
@@ -286,7 +291,7 @@ def test_a_call_is_tried_again_without_looking_at_the_rest_again():
     called, seen, again = asyncio.run(run())
     assert not seen.link.tried
     assert (again.link.tried, again.link.calls_in_threads) == (True, True)
-    assert again.heard == seen.heard
+    assert again.measured == seen.measured
     ours = [name for name in called if name.startswith("/webmap_doctor_")]
     assert len(ours) == len(called) - 1, called
     assert "/rosapi/get_time" in called, "nothing that hangs or ends a rosapi"
@@ -314,9 +319,9 @@ def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
     )
     assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
     assert said(findings, "rosapi does not say") == "note"
-    assert said(findings, "The topics are those that were given") == "good"
+    assert said(findings, "The topics come from the given list") == "good"
     assert said(findings, "/robot_0/odom:") == "good"
-    assert said(findings, "cannot be told: the bridge did not say") == "note"
+    assert said(findings, "The bridge does not list the publishers of") == "note"
 
 
 def test_without_rosapi_and_without_a_list_the_list_is_asked_for():

@@ -145,7 +145,7 @@ def test_steps_on_the_way_to_the_base_are_not_driven_and_are_named():
 def test_a_twist_with_another_name_is_no_velocity():
     robot = only({"/odom": ODOM, "/cmd_vel_smoothed": TWIST})
     assert robot.first("velocity") is None
-    assert any("No topic is surely its velocity" in note for note in robot.notes)
+    assert any("Its velocity topic is unknown" in note for note in robot.notes)
 
 
 def test_a_camera_with_odometry_of_its_own_is_part_of_the_robot():
@@ -295,7 +295,7 @@ def test_two_robots_of_one_last_name_have_their_whole_namespaces_for_names():
 
 
 def test_who_publishes_is_said_to_be_unknown():
-    assert "does not say who publishes" in discover({"/odom": ODOM}).notes[0]
+    assert "does not show which nodes publish" in discover({"/odom": ODOM}).notes[0]
 
 
 @pytest.mark.parametrize("topics", [{}, {"/rosout": "rosgraph_msgs/Log"}])

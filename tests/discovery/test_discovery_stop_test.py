@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from webmap.discovery.doctor.stop_test import GOES_ON, STOPS, UNKNOWN, Hand
+from webmap.discovery.doctor.stop_test import GOES_ON, STOPS, UNKNOWN, StopTestClient
 from webmap.gate.disk import Records
 from webmap.gate.events import Key, Press, StopRecord
 from webmap.gate.rules.stop_test import MOVES_ON
@@ -108,7 +108,7 @@ def test_a_robot_whose_stop_stands_is_not_moved(folder):
         said = run(robot.url, "robot", "--yes")
         assert robot.log.moving_since(0.0) == []
     assert said.returncode == 2
-    assert "Nothing was found out: STOP" in said.stdout
+    assert "The stop test gave no result: STOP" in said.stdout
 
 
 def test_a_robot_that_is_not_there_is_told_from_those_that_are(ros1, folder):
@@ -121,7 +121,7 @@ def test_a_robot_that_is_not_there_is_told_from_those_that_are(ros1, folder):
 def test_a_bridge_that_is_away_is_said():
     said = run("ws://127.0.0.1:1", "robot_0", "--yes", "--wait", "0")
     assert said.returncode == 2
-    assert "Nothing was found out" in said.stderr
+    assert "The stop test gave no result" in said.stderr
     assert "Traceback" not in said.stderr
 
 
@@ -145,7 +145,7 @@ def test_two_addresses_are_one_too_many():
     assert "--stop-test takes one URL, got 2" in said.stderr
 
 
-# The hand, without a gate.
+# The client, without a gate.
 
 FREE = {
     "op": "robot",
@@ -163,30 +163,30 @@ FREE = {
 MINE = {**FREE, "mine": True, "armed": True, "epoch": 3}
 
 
-def hand_that_tests():
-    """Return a hand whose robot creeps."""
-    hand = Hand(0.0)
-    hand.hear({"op": "tick", "tick": 7}, 0.0)
-    hand.hear(FREE, 0.0)
-    hand.begin(0.0)
-    hand.hear(MINE, 0.1)
-    hand.hear({**MINE, "test": {"state": "creeping", "text": "creeping"}}, 0.2)
-    return hand
+def client_that_tests():
+    """Return a client whose robot creeps."""
+    client = StopTestClient(0.0)
+    client.receive({"op": "tick", "tick": 7}, 0.0)
+    client.receive(FREE, 0.0)
+    client.begin(0.0)
+    client.receive(MINE, 0.1)
+    client.receive({**MINE, "test": {"state": "creeping", "text": "creeping"}}, 0.2)
+    return client
 
 
 def test_the_hand_takes_the_robot_only_when_the_person_agreed():
-    hand = Hand(0.0)
-    hand.hear(FREE, 0.0)
-    assert hand.stage == "ready"
-    assert hand.step(60.0) == []
-    hand.begin(60.0)
-    assert hand.step(60.0) == [{"op": "take", "robot": "r1"}]
-    assert hand.step(60.05) == [], "it is not asked for at each step"
+    client = StopTestClient(0.0)
+    client.receive(FREE, 0.0)
+    assert client.stage == "ready"
+    assert client.step(60.0) == []
+    client.begin(60.0)
+    assert client.step(60.0) == [{"op": "take", "robot": "r1"}]
+    assert client.step(60.05) == [], "it is not asked for at each step"
 
 
 def test_the_hand_says_that_every_input_is_released_and_nothing_else():
-    hand = hand_that_tests()
-    (state,) = hand.step(0.25)
+    client = client_that_tests()
+    (state,) = client.step(0.25)
     assert json.dumps(state) == (
         '{"op": "drive", "robot": "r1", "epoch": 3, "seq": 1, "tick": 7, '
         '"x": 0.0, "y": 0.0, "turn": 0.0}'
@@ -196,7 +196,7 @@ def test_the_hand_says_that_every_input_is_released_and_nothing_else():
 @pytest.mark.parametrize(
     ("words", "why"),
     [
-        ({"op": "hello", "connection": "c2"}, "the gate was started anew meanwhile"),
+        ({"op": "hello", "connection": "c2"}, "the gate restarted in the meantime"),
         ({"op": "refused", "what": "lease", "why": "STOP by Ann"}, "STOP by Ann"),
         (
             {**MINE, "test": {"state": "failed", "text": "a key was pressed"}},
@@ -205,20 +205,20 @@ def test_the_hand_says_that_every_input_is_released_and_nothing_else():
     ],
 )
 def test_the_hand_gives_up_when_it_cannot_go_on(words, why):
-    hand = hand_that_tests()
-    hand.hear(words, 0.3)
-    assert hand.stage == "over"
-    assert hand.code == UNKNOWN
-    assert hand.news[-1] == f"Nothing was found out: {why}."
+    client = client_that_tests()
+    client.receive(words, 0.3)
+    assert client.stage == "over"
+    assert client.code == UNKNOWN
+    assert client.news[-1] == f"The stop test gave no result: {why}."
 
 
 def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
-    hand = Hand(0.0)
-    hand.hear({**FREE, "armable": False, "reason": "another WebMap has it"}, 1.0)
-    assert hand.step(9.0) == []
-    assert hand.stage == "coming"
-    hand.step(10.1)
-    assert hand.news == ["Nothing was found out: another WebMap has it."]
+    client = StopTestClient(0.0)
+    client.receive({**FREE, "armable": False, "reason": "another WebMap has it"}, 1.0)
+    assert client.step(9.0) == []
+    assert client.stage == "coming"
+    client.step(10.1)
+    assert client.news == ["The stop test gave no result: another WebMap has it."]
 
 
 @pytest.mark.parametrize(
@@ -236,11 +236,11 @@ def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
 def test_the_result_of_the_test_before_is_not_taken_for_this_ones(
     test, before, after, code
 ):
-    hand = hand_that_tests()
+    client = client_that_tests()
     kept = {**MINE, "test": test, "stop_source": "tested", "stop_date": TODAY}
-    hand.hear({**kept, "stop_time": before}, 0.3)
-    assert hand.stage == "testing"
-    hand.hear({**kept, "stop_time": after}, 0.4)
-    assert hand.stage == "over"
-    assert hand.code == code
-    assert TODAY in hand.news[-1]
+    client.receive({**kept, "stop_time": before}, 0.3)
+    assert client.stage == "testing"
+    client.receive({**kept, "stop_time": after}, 0.4)
+    assert client.stage == "over"
+    assert client.code == code
+    assert TODAY in client.news[-1]

@@ -13,7 +13,7 @@ from webmap import Bridge, Robot
 from webmap.base.geometry import Pose
 from webmap.config.robot import TfConfig
 from webmap.discovery import discover
-from webmap.discovery.hearing import frame_topics, hear_frames
+from webmap.discovery.frame_listening import frame_topics, receive_frames
 from webmap.discovery.tf_robots import MOST_FRAMES, Trees, bases
 from webmap.poses.frames import frames_of
 
@@ -52,7 +52,7 @@ def test_a_tree_from_map_to_base_link_is_a_robot():
     assert robot.tf_alone
     assert robot.topic("scan") == "/scan"
     assert robot.tf == TfConfig(base_frame="base_link", map_frame="map")
-    assert "it is drawn where its frames have base_link in map" in robot.notes[0]
+    assert "its pose comes from its frames, base_link in map" in robot.notes[0]
 
 
 def test_prefixes_of_frames_are_robots_of_their_own():
@@ -165,7 +165,7 @@ def test_only_topics_with_frames_are_listened_to():
 
 
 def test_a_bridge_that_is_gone_tells_of_no_frames():
-    heard = asyncio.run(hear_frames("ws://127.0.0.1:1", {"/tf": TF}))
+    heard = asyncio.run(receive_frames("ws://127.0.0.1:1", {"/tf": TF}))
     assert heard.bases() == ()
 
 
@@ -188,9 +188,9 @@ def test_discover_shows_a_robot_of_frames_and_the_file_keeps_it(tmp_path):
         )
     assert "bob (in /bob)" in shown
     assert "frames      bob/base_link in map" in shown
-    assert "it is drawn where its frames have bob/base_link in map" in shown
+    assert "its pose comes from its frames, bob/base_link in map" in shown
     assert 'tf.base_frame = "bob/base_link"' in kept
-    assert "tf.quiet = false # drawn where its frames have it" in kept
+    assert "tf.quiet = false # its pose comes from its frames" in kept
     file = tmp_path / "fleet.toml"
     file.write_text(kept)
     checked = subprocess.run(
@@ -199,14 +199,14 @@ def test_discover_shows_a_robot_of_frames_and_the_file_keeps_it(tmp_path):
         text=True,
         check=False,
     )
-    assert "1 robot behind 1 bridge, and nothing wrong" in checked.stdout, checked
+    assert "1 robot behind 1 bridge, no mistakes" in checked.stdout, checked
 
 
 def test_what_was_found_is_drawn_where_its_frames_have_it():
     with telling({"/tf": MAP_TO_BASE}) as url:
 
         async def scenario() -> None:
-            heard = await hear_frames(url, {"/tf": TF})
+            heard = await receive_frames(url, {"/tf": TF})
             (found,) = discover({"/tf": TF}, "host", heard).robots
             bridge = Bridge(url)
             robot = Robot.from_config(found.config(url), {url: bridge})
@@ -240,7 +240,7 @@ def test_ten_namespaces_on_one_bridge_are_ten_robots_by_their_own_frames(dialect
             try:
                 await until(lambda: bridge.state == "open")
                 topics = await bridge.topics()
-                findings = discover(topics, "host", await hear_frames(url, topics))
+                findings = discover(topics, "host", await receive_frames(url, topics))
                 assert [each.name for each in findings.robots] == [
                     f"r{n}" for n in range(10)
                 ]

@@ -8,12 +8,12 @@ import pytest
 from webmap import Bridge
 from webmap.console import Console, make_robot
 from webmap.discovery import FoundRobot, Guess, discover
-from webmap.discovery.hearing import late_frames
+from webmap.discovery.frame_listening import late_frames
 from webmap.discovery.newcomers import Newcomers
 from webmap.discovery.tf_robots import Trees
-from webmap.fleet.overrides import Overruling, parse_setting
+from webmap.fleet.given import Candidate
+from webmap.fleet.overrides import Overrides, parse_setting
 from webmap.fleet.shown import ShownRobot, ShownRobots
-from webmap.fleet.stated import Candidate
 from webmap.fleet.watch import LookingForLayers
 
 TF = {"/tf": "tf2_msgs/TFMessage"}
@@ -42,10 +42,10 @@ def trees(chain):
 class Watched:
     """A console that looks again and again, at topics and frames as a test has them."""
 
-    def __init__(self, bridge, *settings, told=()):
+    def __init__(self, bridge, *settings, given=()):
         self.bridge = bridge
-        said = Overruling([parse_setting(text) for text in settings])
-        self.late = ShownRobots(Console(), said, told=told)
+        said = Overrides([parse_setting(text) for text in settings])
+        self.late = ShownRobots(Console(), said, given=given)
         self.newcomers = Newcomers()
 
     def look(self, topics, chain=""):
@@ -83,7 +83,7 @@ def test_a_robot_of_frames_alone_is_drawn_in_the_map_once_that_is_there(
     watched.look(TF, "map odom base_link")
     assert watched.robot.tf["map_frame"] == "map"
     said = capsys.readouterr().err.splitlines()
-    assert said == ["host is drawn where map has base_link from now on"]
+    assert said == ["host now is drawn by base_link in map"]
 
 
 def test_goals_go_in_the_frame_of_a_map_that_comes_later(watched, capsys):
@@ -94,8 +94,8 @@ def test_goals_go_in_the_frame_of_a_map_that_comes_later(watched, capsys):
     assert watched.robot.tf["map_frame"] == "bob/map"
     assert watched.robot.motion.spec().goal_frame == "bob/map"
     assert capsys.readouterr().err.splitlines() == [
-        "bob is drawn where bob/map has bob/base_link and told goals and its place in "
-        "bob/map from now on"
+        "bob now is drawn by bob/base_link in bob/map and takes goals and its initial "
+        "pose in the frame bob/map"
     ]
 
 
@@ -166,7 +166,7 @@ def test_a_robot_without_a_place_is_placed_by_a_pose_that_comes(watched, capsys)
     watched.look(DRIVEN | POSE)
     assert watched.robot.feed.topic == "/bob/robot_pose"
     said = capsys.readouterr().err.splitlines()[1:]
-    assert said == ["bob has more now: pose /bob/robot_pose"]
+    assert said == ["bob has new topics: pose /bob/robot_pose"]
 
 
 def test_a_pose_that_comes_does_not_take_the_place_of_odometry(watched, capsys):
@@ -202,8 +202,8 @@ def test_a_robot_that_a_person_wants_nowhere_is_not_placed_by_a_pose(bridge):
 def test_a_told_robot_takes_the_place_of_one_that_comes_later(
     bridge, said, shown, capsys
 ):
-    told = candidate(bridge, **said)
-    watched = Watched(bridge, told=[told])
+    given = candidate(bridge, **said)
+    watched = Watched(bridge, given=[given])
     watched.look(DRIVEN | ODOM)
     watched.look(DRIVEN | ODOM | POSE | TF, LATER)
     assert [robot.name for robot in watched.late.robots] == shown
@@ -216,8 +216,8 @@ def test_a_told_robot_is_drawn_in_a_map_that_comes_later(bridge, monkeypatch, ca
     about = candidate(bridge, odometry="/bob/odom", goal="/bob/goal_pose")
     config = about.found.config(bridge.url)
     robot = make_robot(config, [bridge])
-    told = [ShownRobot(*about, robot, config)]
-    drawing = LookingForLayers(bridge, ShownRobots(Console()), told=told)
+    given = [ShownRobot(*about, robot, config)]
+    drawing = LookingForLayers(bridge, ShownRobots(Console()), given=given)
     frames = late_frames(bridge)
     heard = []
 
@@ -235,5 +235,8 @@ def test_a_told_robot_is_drawn_in_a_map_that_comes_later(bridge, monkeypatch, ca
         assert robot.tf["map_frame"] == "bob/map"
         assert robot.motion.spec().goal_frame == "bob/map"
     assert len(heard) == 3, "also once it is drawn by frames"
-    assert capsys.readouterr().err.count("Al is drawn where bob/map has") == 1
+    assert (
+        capsys.readouterr().err.count("Al now is drawn by bob/base_link in bob/map")
+        == 1
+    )
     robot.destroy()

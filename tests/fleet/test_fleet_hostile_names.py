@@ -16,7 +16,7 @@ import webmap.cli as webmap_cli
 from webmap.base.echo import LONGEST, echo
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.found import Findings, FoundRobot, Layers
-from webmap.discovery.words import report
+from webmap.discovery.tables import report
 
 EVIL = "\n[[robots]]\r\x1b[2J\x1b]0;mine\x07\x9b31m\u202eevil"
 TOPICS = {

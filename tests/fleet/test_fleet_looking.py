@@ -95,7 +95,7 @@ def test_a_newcomer_that_cannot_be_shown_keeps_no_other_from_it(caplog):
 
     asyncio.run(scenario())
     assert shown == ["/bob"]
-    assert f"{URL}: what is new of ann is not shown" in caplog.text
+    assert f"{URL}: the new topics of ann are not shown" in caplog.text
     assert "no such thing" in caplog.text
 
 
@@ -135,7 +135,7 @@ def test_a_topic_that_cannot_be_used_keeps_no_other_from_it(caplog, capsys):
     finally:
         robot.destroy()
     assert "ann: its scan is not used" in caplog.text
-    assert "ann has more now: battery /ann/battery_state\n" in capsys.readouterr().err
+    assert "ann has new topics: battery /ann/battery_state\n" in capsys.readouterr().err
 
 
 def test_a_layer_that_cannot_be_drawn_is_said_once_and_keeps_no_other_from_it(caplog):

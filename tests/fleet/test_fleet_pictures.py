@@ -70,10 +70,10 @@ def test_a_robot_has_its_picture_in_its_place(write):
         ("angle", "angel", 'no key "angel" here; did you mean "angle"?'),
         ("bob.png", "no.png", "FILE:9: robots[0].picture.file: there is no file"),
         ("bob.png", ".", "FILE:9: robots[0].picture.file: "),
-        ("bob.png", "fleet.toml", "is no picture: its name must end in .bmp .gif"),
-        ("bob.png", "text.png", "is no picture that can be read: expected what its"),
+        ("bob.png", "fleet.toml", "is not a picture: its name must end in .bmp .gif"),
+        ("bob.png", "text.png", "cannot be read: expected a complete picture"),
         ("bob.png", "cut.png", "FILE:9: robots[0].picture.file: "),
-        ("bob.png", "bob.svg", "is no SVG: it has no element <svg>"),
+        ("bob.png", "bob.svg", "is not an SVG: it has no element <svg>"),
         ("bob.png", "large.png", "has 9000 x 9000 pixels; expected 67108864 at the"),
     ],
 )

@@ -9,9 +9,9 @@ from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.features.layers.on_maps import OnMaps
+from webmap.fleet.given import Candidate
 from webmap.fleet.made import prepare
 from webmap.fleet.shown import ShownRobots
-from webmap.fleet.stated import Candidate
 from webmap.fleet.watch import LookingForLayers
 
 URL = "ws://hall:9090"
@@ -107,4 +107,4 @@ def test_the_file_that_discover_prints_shows_what_view_shows(tmp_path, spaces):
 def test_what_is_left_out_stands_in_the_file_as_a_remark(tmp_path):
     many = topics("") | {f"/path_{n}": "nav_msgs/Path" for n in range(9)}
     text = fleet_toml([("hall", URL, discover(many, "bob"))])
-    assert "# not drawn, since there are enough of its kind: /path_8\n" in text
+    assert "# not drawn, beyond the limit for its kind: /path_8\n" in text

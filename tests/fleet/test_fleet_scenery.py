@@ -144,7 +144,7 @@ class FakeMap:
         ("x = -2", "x = nan", "FILE:21: image[0].x: got the number nan"),
         ("x = -2", "z = 1\nx = -2", 'image[0].z: there is no key "z" here'),
         ('"hall.png"', '"no.png"', "FILE:20: image[0].file: there is no file"),
-        ('"hall.png"', '"fleet.toml"', "is no picture: its name must end in"),
+        ('"hall.png"', '"fleet.toml"', "is not a picture: its name must end in"),
         (
             'name = "Markers"',
             'name = "Marker"',

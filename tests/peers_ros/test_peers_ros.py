@@ -234,5 +234,5 @@ def test_the_readiness_check_says_how_it_stands_with_the_real_robot(ros):
     rate = re.search(rf"{ROBOT}/odom: (\d+\.\d) messages a second", said)
     assert rate, said
     assert float(rate[1]) == pytest.approx(20, abs=8)
-    assert f"{ROBOT}/cmd_vel is said to take Twist" in said
+    assert f"{ROBOT}/cmd_vel has the stated type Twist" in said
     assert re.search(rf"Scans come packed as CBOR \({ROBOT}/scan\)", said)

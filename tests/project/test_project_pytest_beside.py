@@ -42,14 +42,16 @@ def run(tmp_path):
 def test_what_passes_the_second_time_is_named(run):
     status, said = run(ONCE)
     assert status == 0
-    assert "Passed the second time, to be mended:\n  test_it.py::test_once" in said
+    assert (
+        "Passed the second time; correct these tests:\n  test_it.py::test_once" in said
+    )
 
 
 def test_what_fails_alone_too_has_failed(run):
     status, said = run(ONCE + "\ndef test_never():\n    assert not 1\n")
     assert status == 1
     assert "2 failed at first" in said
-    assert "to be mended" not in said
+    assert "correct these tests" not in said
 
 
 def test_a_proof_of_safety_gets_no_second_look(run):
@@ -68,4 +70,4 @@ def test_many_failures_get_no_second_look(run):
 def test_what_cannot_be_collected_has_failed(run):
     status, said = run("import nothing_of_that_name\n")
     assert status != 0
-    assert "to be mended" not in said
+    assert "correct these tests" not in said

@@ -1,4 +1,4 @@
-"""YAML files that people write by hand, with the line number of each value."""
+"""YAML files that people edit, with the line number of each value."""
 
 from pathlib import Path
 from typing import Any
@@ -56,45 +56,45 @@ class LinedYaml:
         except yaml.MarkedYAMLError as error:
             mark = error.problem_mark or error.context_mark
             line = f":{mark.line + 1}" if mark else ""
-            words = " ".join(str(error.problem or error.context).split())[:200]
-            raise ConfigError(f"{file}{line}: this is no YAML: {words}") from None
+            message = " ".join(str(error.problem or error.context).split())[:200]
+            raise ConfigError(f"{file}{line}: this is not YAML: {message}") from None
         except RecursionError:
             raise ConfigError(f"{file}: values are nested too deep") from None
         except (yaml.YAMLError, ValueError) as error:
-            words = " ".join(str(error).split())[:200]
-            raise ConfigError(f"{file}: this is no YAML: {words}") from None
+            message = " ".join(str(error).split())[:200]
+            raise ConfigError(f"{file}: this is not YAML: {message}") from None
 
-    def wrong(self, way: tuple[str | int, ...], words: str) -> ConfigError:
+    def wrong(self, path: tuple[str | int, ...], message: str) -> ConfigError:
         """Return an error with file and line.
 
         Args:
-            way: Keys and indices of the wrong value; for a missing value, the line is
+            path: Keys and indices of the wrong value; for a missing value, the line is
                 that of the part that lacks it.
-            words: The wrong value and the expected one.
+            message: The wrong value and the expected one.
 
         """
-        while way and way not in self._lines:
-            way = way[:-1]
-        line = self._lines.get(way, 1)
+        while path and path not in self._lines:
+            path = path[:-1]
+        line = self._lines.get(path, 1)
         # Text of a file must not control the terminal that shows it.
-        return ConfigError(f"{self.file}:{line}: {one_line(words)}")
+        return ConfigError(f"{self.file}:{line}: {one_line(message)}")
 
-    def _note(self, way: tuple[str | int, ...], node: yaml.Node) -> None:
-        self._lines[way] = node.start_mark.line + 1
+    def _note(self, path: tuple[str | int, ...], node: yaml.Node) -> None:
+        self._lines[path] = node.start_mark.line + 1
         if isinstance(node, yaml.SequenceNode):
             for index, each in enumerate(node.value):
-                self._note((*way, index), each)
+                self._note((*path, index), each)
         elif isinstance(node, yaml.MappingNode):
             for key, each in node.value:
                 if not isinstance(key, yaml.ScalarNode):
                     continue
-                if (*way, key.value) in self._lines:
+                if (*path, key.value) in self._lines:
                     raise yaml.MarkedYAMLError(
-                        problem=f'the key "{key.value}" is there twice',
+                        problem=f'the key "{key.value}" is defined twice',
                         problem_mark=key.start_mark,
                     )
-                self._note((*way, key.value), each)
-                self._lines[(*way, key.value)] = key.start_mark.line + 1
+                self._note((*path, key.value), each)
+                self._lines[(*path, key.value)] = key.start_mark.line + 1
 
 
 class _Bounded(yaml.composer.Composer):
@@ -109,7 +109,7 @@ class _Bounded(yaml.composer.Composer):
         self._values += 1
         problem = None
         if isinstance(event, yaml.AliasEvent):
-            problem = "aliases (*name) have no place in it"
+            problem = "aliases (*name) are not allowed"
         elif self._depth > DEEPEST:
             problem = f"values are nested more than {DEEPEST} deep"
         elif self._values > MOST_VALUES:

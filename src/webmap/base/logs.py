@@ -98,11 +98,11 @@ class Budgets:
                 budget.left_out += 1
                 return None
             budget.lines -= 1
-            words = f" ({budget.left_out} more were left out)" * (budget.left_out > 0)
+            suffix = f" ({budget.left_out} more were left out)" * (budget.left_out > 0)
             budget.left_out = 0
             if budget.lines < 1:
-                words += f" (more like this is left out, but for one in {PAUSE:g} s)"
-            return words
+                suffix += f" (more like this is left out, but for one in {PAUSE:g} s)"
+            return suffix
 
     def clear(self) -> None:
         """Forget all counts."""

@@ -99,56 +99,64 @@ def _settings(file: Path) -> _Settings:
         raise ConfigError(
             f"{file}: {size} bytes are no map's YAML, which has {MAX_YAML} at the most"
         )
-    said = LinedYaml(file, texts=True)
-    table = said.data
+    yaml_file = LinedYaml(file, texts=True)
+    table = yaml_file.data
     if not isinstance(table, dict):
         got = "a list" if isinstance(table, list) else repr(table)[:60]
-        raise said.wrong(
+        raise yaml_file.wrong(
             (),
             "needs image, resolution and origin, each as a line KEY: VALUE, got "
             + ("nothing" if table is None else got),
         )
-    resolution = _number(said, table.get("resolution"), ("resolution",))
+    resolution = _number(yaml_file, table.get("resolution"), ("resolution",))
     if resolution <= 0:
-        raise said.wrong(
+        raise yaml_file.wrong(
             ("resolution",), f"resolution must be above 0, got {resolution}"
         )
     if resolution < FINEST:
-        raise said.wrong(
+        raise yaml_file.wrong(
             ("resolution",),
             f"resolution must be {FINEST:g} m a cell at the least, got {resolution:g}",
         )
     origin = table.get("origin")
     if not isinstance(origin, list) or len(origin) != 3:
-        raise said.wrong(("origin",), f"origin must be [x, y, yaw], got {origin!r}")
+        raise yaml_file.wrong(
+            ("origin",), f"origin must be [x, y, yaw], got {origin!r}"
+        )
     x, y, yaw = (
-        _number(said, part, ("origin", place)) for place, part in enumerate(origin)
+        _number(yaml_file, part, ("origin", place)) for place, part in enumerate(origin)
     )
     if max(abs(x), abs(y)) > FARTHEST:
-        raise said.wrong(
+        raise yaml_file.wrong(
             ("origin",),
             f"origin must be within {FARTHEST:g} m, got ({x:g}, {y:g})",
         )
     negate = TRUTH.get(str(table.get("negate", "0")).lower())
     if negate is None:
-        raise said.wrong(("negate",), f"negate must be 0 or 1, got {table['negate']!r}")
-    occupied = _number(said, table.get("occupied_thresh"), ("occupied_thresh",), "0.65")
-    free = _number(said, table.get("free_thresh"), ("free_thresh",), "0.196")
+        raise yaml_file.wrong(
+            ("negate",), f"negate must be 0 or 1, got {table['negate']!r}"
+        )
+    occupied = _number(
+        yaml_file, table.get("occupied_thresh"), ("occupied_thresh",), "0.65"
+    )
+    free = _number(yaml_file, table.get("free_thresh"), ("free_thresh",), "0.196")
     if not 0 <= free < occupied <= 1:
-        raise said.wrong(
+        raise yaml_file.wrong(
             ("free_thresh",),
             f"needs 0 <= free_thresh < occupied_thresh <= 1, got {free} and {occupied}",
         )
     mode = table.get("mode", "trinary")
     if mode not in MODES:
-        raise said.wrong(("mode",), f"mode must be {', '.join(MODES)}, got {mode!r}")
-    image = _image_path(said, table.get("image"))
+        raise yaml_file.wrong(
+            ("mode",), f"mode must be {', '.join(MODES)}, got {mode!r}"
+        )
+    image = _image_path(yaml_file, table.get("image"))
     pose = Pose(x, y, yaw)
     return _Settings(image, resolution, pose, negate, occupied, free, mode)
 
 
 def _number(
-    said: LinedYaml, value: object, way: tuple[str | int, ...], default: str = ""
+    yaml_file: LinedYaml, value: object, path: tuple[str | int, ...], default: str = ""
 ) -> float:
     text = default if value is None and default else value
     try:
@@ -156,28 +164,28 @@ def _number(
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise said.wrong(way, f"{way[0]} must be a finite number, got {text!r}")
+        raise yaml_file.wrong(path, f"{path[0]} must be a finite number, got {text!r}")
     return number
 
 
-def _image_path(said: LinedYaml, name: object) -> Path:
-    way = ("image",)
+def _image_path(yaml_file: LinedYaml, name: object) -> Path:
+    path = ("image",)
     if not isinstance(name, str) or not name or "\0" in name:
-        raise said.wrong(way, f"image must be the name of a file, got {name!r}")
+        raise yaml_file.wrong(path, f"image must be the name of a file, got {name!r}")
     try:
-        folder = resolved(said.file).parent
+        folder = resolved(yaml_file.file).parent
         image = resolved(folder / name)
     except ConfigError as error:
-        raise said.wrong(way, str(error)) from None
+        raise yaml_file.wrong(path, str(error)) from None
     if Path(name).is_absolute() or not image.is_relative_to(folder):
-        raise said.wrong(
-            way,
+        raise yaml_file.wrong(
+            path,
             f"the image {name!r} is not in the folder of the YAML file; put it there "
             "and write its bare name",
         )
     # Opening a pipe would block, and a device may have no end.
     if not image.is_file():
-        raise said.wrong(way, f"there is no image file {name!r}")
+        raise yaml_file.wrong(path, f"there is no image file {name!r}")
     return image
 
 
@@ -257,8 +265,8 @@ def _kind(begins: bytes) -> str:
     """Return the kind of a file that is not an image, by its first bytes."""
     if not begins:
         return "an empty file"
-    further = " and makes no sense further on" if begins.startswith(MAGIC) else ""
-    return f"one that begins with {begins!r}{further}"
+    further = " but cannot be decoded" if begins.startswith(MAGIC) else ""
+    return f"a file that begins with {begins!r}{further}"
 
 
 def _cells(light: "NDArray[np.float32]", settings: _Settings) -> "NDArray[np.int8]":

@@ -58,26 +58,17 @@ class LazyGroup(click.Group):
 def cli() -> None:
     """See and drive robots that run ROS, on a map in the browser.
 
-    \b
-    webmap demo                    two simulated robots, to try everything
-    webmap view ws://robot:9090    the robots behind a rosbridge
-    webmap discover ws://...       which robots are there, and why it thinks so
-    webmap doctor ws://...         what would be in the way of driving
-    webmap record ws://...         a bag of what they say
-    webmap play FILE               a bag on the map
-    webmap run FILE.py             your own page, in Python
-    webmap run FILE.toml           the robots of a fleet file
-    webmap check FILE.toml         what is wrong in a fleet file
-    webmap sim                     the simulator and its rosbridge alone
+    Start with webmap demo, which needs no robot. For a robot with a rosbridge, use
+    webmap view ws://robot:9090.
 
-    The commands that serve (demo, view, play, run, sim) print one line when they are
-    ready, log to standard error, and end on Ctrl+C.
+    The commands demo, view, play, run and sim print one line when they are ready, log
+    to standard error, and end on Ctrl+C.
     """
 
 
-def _told() -> str | None:
+def _named_command() -> str | None:
     """Return the name of the command on the command line."""
-    return next((word for word in sys.argv[1:] if word in COMMANDS), None)
+    return next((text for text in sys.argv[1:] if text in COMMANDS), None)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
@@ -95,11 +86,11 @@ def main() -> None:
     except click.exceptions.Exit as done:
         sys.exit(done.exit_code)
     except click.Abort:
-        sys.exit(INTERRUPTED if _told() in ANSWERING else 0)
+        sys.exit(INTERRUPTED if _named_command() in ANSWERING else 0)
     except click.UsageError as error:
         path = error.ctx.command_path if error.ctx else "webmap"
-        said = error.format_message().rstrip(".").replace("\n", " ")
-        echo(f"Error: {said} (see '{path} --help').", err=True)
+        message = error.format_message().rstrip(".").replace("\n", " ")
+        echo(f"Error: {message} (see '{path} --help').", err=True)
         sys.exit(2)
     except ConfigError as error:  # a fleet file has one line for each mistake
         echo(f"Error: {error}", err=True, lines=True)

@@ -8,7 +8,7 @@ from webmap.base.echo import echo
 from webmap.cli.options import verbose_option
 
 
-@click.command(short_help="Say what is wrong in a fleet file.")
+@click.command(short_help="Validate a fleet file and list its mistakes.")
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @verbose_option
 def check(file: Path) -> None:
@@ -23,5 +23,5 @@ def check(file: Path) -> None:
     robots, bridges = len(ready.robots), len(ready.bridges)
     echo(
         f"{file}: {robots} robot{'s' * (robots != 1)} behind "
-        f"{bridges} bridge{'s' * (bridges != 1)}, and nothing wrong"
+        f"{bridges} bridge{'s' * (bridges != 1)}, no mistakes"
     )

@@ -23,8 +23,8 @@ USAGE = 2
 
 @click.command()
 @simulator_options(
-    robots="How many robots; 2 if not said.",
-    dialect="Which ROS the simulator plays: move_base's actions, or Nav2's.",
+    robots="Number of robots; 2 by default.",
+    dialect="ROS version: ros1 has the actions of move_base, ros2 those of Nav2.",
 )
 @click.option(
     "--bridge-port",
@@ -53,9 +53,9 @@ def demo(
     from webmap import console
 
     number = robots or 2
-    told = ("--robots", number, "--port", bridge_port, "--seed", seed)
+    options = ("--robots", number, "--port", bridge_port, "--seed", seed)
     with (
-        simulator(*told, "--dialect", dialect) as url,
+        simulator(*options, "--dialect", dialect) as url,
         as_file(files("webmap.sim") / "data") as data,
     ):
         bridge = webmap.Bridge(url, name="simulator")

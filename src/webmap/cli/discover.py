@@ -9,9 +9,11 @@ from webmap.base.echo import echo
 from webmap.cli.options import one_bridge, topics_option, verbose_option, wait_option
 
 
-@click.command(short_help="Print the robots behind a bridge, their topics, and why.")
+@click.command(
+    short_help="List the robots behind a bridge, their topics, and the reasons."
+)
 @click.argument("url", nargs=-1, required=True)
-@click.option("--toml", is_flag=True, help="Print a fleet file, to be kept.")
+@click.option("--toml", is_flag=True, help="Print a fleet file.")
 @wait_option
 @topics_option
 @verbose_option
@@ -28,7 +30,7 @@ def discover(
     ros2 topic list -t | webmap discover ws://robot:9090 --topics -
     """
     from webmap.discovery.fleet_toml import fleet_toml
-    from webmap.discovery.words import report
+    from webmap.discovery.tables import report
     from webmap.fleet.find import find
     from webmap.ros.names import normalise_url
 

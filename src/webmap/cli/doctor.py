@@ -15,22 +15,22 @@ from webmap.cli.options import (
 )
 
 
-@click.command(short_help="Say what is in the way of driving the robots of a bridge.")
+@click.command(short_help="Diagnose what prevents driving the robots of a bridge.")
 @click.argument("url", nargs=-1, required=True, metavar="URL...|FILE.toml")
 @click.option(
     "--robot",
     "robots",
     multiple=True,
     metavar="NAME:ODOM:CMD_VEL:SCAN",
-    help="Look at this robot by these topics, as webmap view shows it, and at no robot "
-    "that is only found. Several times for several robots.",
+    help="Check this robot with these topics, as for webmap view, and no robots that "
+    "are only found. May be repeated.",
 )
 @click.option(
     "--set",
     "settings",
     multiple=True,
     metavar="ROBOT.ROLE=TOPIC",
-    help="Another topic than the one that is guessed, or none, as for webmap view.",
+    help="Replace a guessed topic, or remove it, as for webmap view. May be repeated.",
 )
 @click.option(
     "--seconds",
@@ -43,23 +43,23 @@ from webmap.cli.options import (
 @click.option(
     "--ask-parameters",
     is_flag=True,
-    help="Ask rosapi for a parameter of rosbridge too, which tells whether a service "
-    "that hangs blocks its socket.",
+    help="Read a parameter of rosbridge through rosapi too, which shows whether a slow "
+    "service call blocks its socket.",
 )
 @click.option(
     "--try-call",
     is_flag=True,
-    help="Offer a service that hangs for a second and call it, which finds out whether "
-    "one that hangs blocks its socket.",
+    help="Offer a service that takes a second and call it, to find out whether a slow "
+    "service call blocks the socket.",
 )
 @topics_option
 @click.option(
     "--stop-test",
     metavar="ROBOT",
-    help="Instead, have this robot creep and see whether it stops by itself: it MOVES. "
-    "The exit code is 0 if it stops, 1 if not, 2 if nothing was found out.",
+    help="Instead, test whether this robot stops by itself: it MOVES slowly. The exit "
+    "code is 0 if it stops, 1 if not, 2 without a result.",
 )
-@click.option("--yes", is_flag=True, help="With --stop-test: move without asking.")
+@click.option("--yes", is_flag=True, help="With --stop-test: move without a question.")
 @verbose_option
 def doctor(
     url: tuple[str, ...],
@@ -83,7 +83,7 @@ def doctor(
     """
     if stop_test is not None and (robots or settings):
         raise click.UsageError(
-            "--stop-test takes a robot as webmap discover finds it; leave out --robot "
+            "--stop-test needs a robot's name from webmap discover; leave out --robot "
             "and --set"
         )
     if stop_test is not None:
@@ -98,7 +98,7 @@ def doctor(
     bridges = bridges_of(url, robots, settings)
     one_bridge([address for address, _ in bridges], topics)
     ready = True
-    for number, (address, meant) in enumerate(bridges):
+    for number, (address, configured) in enumerate(bridges):
 
         def waiting(why: str, address: str = address) -> None:
             echo(f"Waiting for the rosbridge at {address}: {why}", err=True)
@@ -111,7 +111,7 @@ def doctor(
                 ask_parameters=ask_parameters,
                 try_call=try_call,
                 topics=topics,
-                meant=meant,
+                configured=configured,
                 waiting=waiting,
             )
         )

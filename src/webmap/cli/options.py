@@ -108,7 +108,7 @@ def simulator_options(*, robots: str, dialect: str) -> Callable[[F], F]:
                 type=int,
                 default=1,
                 show_default=True,
-                help="Where they start.",
+                help="Random seed of the start poses.",
             ),
             click.option("--robots", "-n", type=click.IntRange(1, 500), help=robots),
         ):
@@ -130,8 +130,8 @@ _LINE = re.compile(
 _HEADINGS = re.compile(r"(?:Published|Subscribed) topics:")
 
 EXPECTED = (
-    "expected a topic and its type, as in /odom nav_msgs/Odometry, or what "
-    "'ros2 topic list -t' or 'rostopic list -v' prints"
+    "expected a topic and its type, as in /odom nav_msgs/Odometry, or the output of "
+    "'ros2 topic list -t' or 'rostopic list -v'"
 )
 
 
@@ -166,7 +166,7 @@ def parse_topics(text: str, source: str = "the list") -> dict[str, str]:
             raise ConfigError(f"{where}: {error}") from None
         if topics.setdefault(topic, type) != type:
             raise ConfigError(
-                f"{where}: {topic} is {type} here and {topics[topic]} further up"
+                f"{where}: {topic} has the type {type} here and {topics[topic]} above"
             )
     if not topics:
         raise ConfigError(f"{source} is empty; {EXPECTED}")
@@ -185,7 +185,7 @@ def _read(
         raise click.BadParameter(f"{name} is not UTF-8", ctx, param) from None
     if len(text) > LARGEST:
         raise click.BadParameter(
-            f"{name} has more than {LARGEST} characters, so it is no list of topics",
+            f"{name} has more than {LARGEST} characters, expected a list of topics",
             ctx,
             param,
         )
@@ -197,9 +197,9 @@ topics_option = click.option(
     type=click.File(encoding="utf-8"),
     callback=_read,
     metavar="FILE",
-    help="Take the topics and their types from FILE ('-' for standard input) where "
-    "the bridge has no rosapi: /odom nav_msgs/Odometry, or what 'ros2 topic list -t' "
-    "or 'rostopic list -v' prints.",
+    help="Read the topics and their types from FILE ('-' for standard input) if the "
+    "bridge has no rosapi: /odom nav_msgs/Odometry, or the output of 'ros2 topic list "
+    "-t' or 'rostopic list -v'.",
 )
 
 
@@ -212,6 +212,6 @@ def one_bridge(urls: Sequence[str], topics: dict[str, str] | None) -> None:
     """
     if topics is not None and len(urls) > 1:
         raise click.UsageError(
-            f"--topics lists what is behind one bridge, and {len(urls)} were given; "
-            f"ask for each by itself"
+            f"--topics lists the topics of one bridge, got {len(urls)} bridges; run "
+            f"the command once for each bridge"
         )

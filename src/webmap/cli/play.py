@@ -23,23 +23,23 @@ POSITION = re.compile(r".*: (\d+\.\d) of ")
 """Matches the position in the recording, in seconds, in the replay's status."""
 
 
-@click.command(short_help="Show a recording: a bag of ROS 1 or ROS 2.")
+@click.command(short_help="Play a recording on the map: a bag of ROS 1 or ROS 2.")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--rate",
     type=Finite(0.001, 1000.0),
     default=1.0,
     show_default=True,
-    help="How many seconds of the recording are played in one.",
+    help="Playback rate: 2 plays twice as fast as recorded.",
 )
 @click.option(
     "--start",
     type=Finite(0.0),
     default=0.0,
     show_default=True,
-    help="Where in the recording the playing begins, in seconds.",
+    help="Start of the playback in the recording, in seconds.",
 )
-@click.option("--loop", is_flag=True, help="Begin anew when the recording has ended.")
+@click.option("--loop", is_flag=True, help="Start again when the recording ends.")
 @click.option(
     "--bridge-port",
     type=PORT,
@@ -59,7 +59,7 @@ def play(
     no_browser: bool,
     insecure_lan: bool,
 ) -> None:
-    """Show a recording on the map, at its own speed.
+    """Play a recording on the map.
 
     A FILE is a bag of ROS 1 (.bag), the folder of a bag of ROS 2, or one of its files
     (.mcap, .db3); several bags of ROS 1 are played as one. Nothing in a recording can
@@ -79,13 +79,13 @@ def play(
 
     need_rosbags()
     name = recording_name(files)
-    told = ["--rate", rate, "--start", start, "--port", bridge_port]
-    told += ["--loop"] if loop else []
-    with replay(*told, "--", *files) as (url, begin_anew):
+    options = ["--rate", rate, "--start", start, "--port", bridge_port]
+    options += ["--loop"] if loop else []
+    with replay(*options, "--", *files) as (url, begin_anew):
         bridge = webmap.Bridge(url, name=f"recording {name}")
         bridge.replays = True
         watched = Watched(Path(name).stem)
-        fleet = find_fleet([bridge], [], wait=5.0, overruling=watched)
+        fleet = find_fleet([bridge], [], wait=5.0, overrides=watched)
         title = f"Recording {name}"
         opened = console.open_console([bridge], [], title=title, place=title)
         fleet.show(opened)
@@ -115,7 +115,7 @@ def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
         if line.startswith(WRONG):
             raise ConfigError(line.removeprefix(WRONG).strip())
         if not line.startswith(READY):
-            raise ConfigError("the replay did not start; what it said is above")
+            raise ConfigError("the replay did not start; its error message is above")
 
         def begin_anew() -> None:
             try:  # unbuffered: a buffer would keep the line and fail again at exit

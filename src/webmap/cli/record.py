@@ -9,33 +9,33 @@ from webmap.base.errors import ConfigError
 from webmap.cli.options import Finite, topics_option, verbose_option, wait_option
 
 
-@click.command(short_help="Record what is behind a bridge into a bag.")
+@click.command(short_help="Record the topics of a bridge into a bag.")
 @click.argument("url")
 @click.option(
     "--topic",
     "only",
     multiple=True,
     metavar="TOPIC",
-    help="Record this topic and no others but those named likewise.",
+    help="Record only this topic. May be repeated.",
 )
 @click.option(
     "--type",
     "types",
     multiple=True,
     metavar="NAME",
-    help="The type of a --topic where the bridge has no rosapi, once for each of them "
-    "and in the same order: nav_msgs/Odometry, or of ROS 2 nav_msgs/msg/Odometry.",
+    help="The type of a --topic if the bridge has no rosapi, once for each --topic in "
+    "the same order: nav_msgs/Odometry, or nav_msgs/msg/Odometry for ROS 2.",
 )
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
-    help="The bag: a file for ROS 1, a folder for ROS 2. It must not exist. Unless "
-    "said it is called webmap- and the time.",
+    help="The bag: a file for ROS 1, a folder for ROS 2. It must not exist. By "
+    "default, its name is webmap- and the time.",
 )
 @click.option(
     "--duration",
     type=Finite(0.0, min_open=True),
-    help="End after so many seconds; without it Ctrl+C ends it.",
+    help="Seconds to record; without it, Ctrl+C ends the recording.",
 )
 @wait_option
 @topics_option
@@ -72,7 +72,7 @@ def record(
         told = {normalise_topic(topic): type_name for topic, type_name in told.items()}
         if bare := [name for name in names if name not in told]:
             raise ConfigError(
-                f"nothing says the type of {', '.join(bare)}: name it with --type, or "
+                f"the type of {', '.join(bare)} is unknown: give it with --type, or "
                 f"add it to the list of --topics"
             )
     failed = asyncio.run(

@@ -14,8 +14,8 @@ from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
 
 @click.command()
 @simulator_options(
-    robots="How many robots; 2 if not said, and 1 with --flat.",
-    dialect="Names of types and stamps.",
+    robots="Number of robots; 2 by default, and 1 with --flat.",
+    dialect="ROS version of types and stamps.",
 )
 @click.option(
     "--port",
@@ -29,13 +29,13 @@ from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
     "--host",
     default="127.0.0.1",
     show_default=True,
-    help="Address of the rosbridge; anyone who reaches it can drive what is simulated.",
+    help="Address of the rosbridge; anyone who reaches it can drive the robots.",
 )
 @click.option(
     "--map",
     "map_file",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="The floor, in map_server's form (YAML); a building floor if not given.",
+    help="A floor plan in map_server's format (YAML); a building by default.",
 )
 @click.option(
     "--twist",
@@ -56,42 +56,42 @@ from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
     type=Finite(0.0),
     default=0.0,
     show_default=True,
-    help="How much odometry drifts, as a share of the way.",
+    help="Drift of odometry, as a fraction of the driven distance.",
 )
-@click.option("--nan", is_flag=True, help="Some rays of a scan are NaN.")
-@click.option("--wander", is_flag=True, help="Robots that nobody commands drive about.")
+@click.option("--nan", is_flag=True, help="Set some rays of each scan to NaN.")
+@click.option("--wander", is_flag=True, help="Let robots without commands drive about.")
 @click.option(
     "--flat",
     is_flag=True,
-    help="Topics of the only robot without a prefix: /odom, /cmd_vel, /base_scan.",
+    help="One robot, with topics without a prefix: /odom, /cmd_vel, /base_scan.",
 )
 @click.option(
     "--extras/--no-extras",
     default=True,
     show_default=True,
-    help="Costmaps, clouds, sonars, markers, health and the like, for who subscribes.",
+    help="Offer costmaps, clouds, sonars, markers, diagnostics and more topics.",
 )
 @click.option(
     "--tilted",
     is_flag=True,
-    help="Lasers that hang upside down, and a depth camera in its optical frame.",
+    help="Mount lasers upside down; send the depth cloud in its optical frame.",
 )
 @click.option(
     "--polite",
     is_flag=True,
-    help="A rosbridge that says what is wrong; short for --quirks polite.",
+    help="Let the rosbridge report mistakes of clients; short for --quirks polite.",
 )
 @click.option(
     "--quirks",
     metavar="TEXT",
-    help="How the rosbridge departs from its protocol's text: 'real' as servers were "
-    "seen to, or 'polite', and then ',NAME' or ',-NAME' for one more or less: "
-    "'polite,bare_nan'. The reference lists the names.",
+    help="How the rosbridge departs from its protocol: 'real' as observed servers, or "
+    "'polite'; then ',NAME' adds and ',-NAME' removes a quirk: 'polite,bare_nan'. The "
+    "reference lists the names.",
 )
 @click.option(
     "--take-nan",
     is_flag=True,
-    help="Bases that run on a velocity with NaN or infinity; others ignore it.",
+    help="Let bases obey a velocity with NaN or infinity; by default they ignore it.",
 )
 @click.option(
     "--http-camera",
@@ -131,7 +131,9 @@ def sim(
     from webmap.sim import run_simulator
 
     if polite and quirks:
-        raise click.UsageError("--polite and --quirks say the same thing: give one")
+        raise click.UsageError(
+            "--polite is short for --quirks polite; give only one of them"
+        )
     if with_parent:
         end_with_parent(lambda: os.kill(os.getpid(), signal.SIGTERM))
     asyncio.run(

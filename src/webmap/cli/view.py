@@ -13,49 +13,49 @@ from webmap.cli.options import Finite, one_bridge, topics_option, web_options
     "robots",
     multiple=True,
     metavar="NAME:ODOM:CMD_VEL:SCAN",
-    help="A robot and its topics; what it does not have stays empty. Several times "
-    "for several robots. With several URLs, URL's number and @ before the name say "
-    "behind which the robot is: 2@bob:/odom:/cmd_vel:",
+    help="A robot and its topics; leave a topic empty if it has none. May be repeated. "
+    "With several URLs, write the number of the robot's URL and @ before its name: "
+    "2@bob:/odom:/cmd_vel:",
 )
 @click.option(
     "--as-told",
+    "only_given",
     is_flag=True,
-    help="Draw of the robots of --robot no more than what is said there. Otherwise "
-    "costmaps, clouds, paths and what else is in their namespaces are drawn too, as "
-    "of robots that are found.",
+    help="Draw only the given topics of robots of --robot. Without it, the costmaps, "
+    "clouds, paths and other topics in their namespaces are drawn too, as for robots "
+    "that are found.",
 )
 @click.option(
     "--set",
     "settings",
     multiple=True,
     metavar="ROBOT.ROLE=TOPIC",
-    help="Another topic than the one that is guessed, or none: robot_1.scan=/scan2, "
-    "robot_1.battery= . The roles are those that webmap discover prints, and name, "
-    "base and velocity_type. "
-    "Several times for several.",
+    help="Replace a guessed topic, or remove it with an empty value: "
+    "robot_1.scan=/scan2, robot_1.battery= . The roles are those that webmap discover "
+    "prints, and name, base and velocity_type. May be repeated.",
 )
 @click.option(
     "--show",
     is_flag=True,
-    help="Print the robots, the topics that would be used and what would be drawn, "
-    "and why, and end.",
+    help="Print the robots, their topics in use and their drawn topics, with reasons, "
+    "and end.",
 )
 @click.option(
     "--stops-within",
     type=Finite(0.0, min_open=True),
-    help="Seconds within which every base stops by itself when cmd_vel ceases. "
-    "Without it robots are driven at 0.3 m/s and 0.6 rad/s at the most.",
+    help="Command timeout: seconds after which every base stops by itself when "
+    "commands end. Without it, robots are driven at 0.3 m/s and 0.6 rad/s at the most.",
 )
 @click.option(
     "--floor",
     type=click.Path(exists=True, dir_okay=False),
-    help="A floor plan in map_server's form (YAML), to see the robots on.",
+    help="A floor plan in map_server's format (YAML), drawn under the robots.",
 )
 @click.option(
     "--discover",
     is_flag=True,
-    help="Look for robots too where --robot is given; without --robot it is always "
-    "done. A robot that is told takes the place of the one found.",
+    help="Find robots although --robot is given; without --robot they are always "
+    "found. A robot of --robot replaces the same robot found.",
 )
 @click.option(
     "--wait",
@@ -63,14 +63,14 @@ from webmap.cli.options import Finite, one_bridge, topics_option, web_options
     default=10.0,
     show_default=True,
     help="Seconds to wait for a rosbridge that cannot be reached, before the page "
-    "opens without its robots. They are added when they come.",
+    "opens without its robots. They are added when the rosbridge answers.",
 )
 @topics_option
 @web_options
 def view(
     url: tuple[str, ...],
     robots: tuple[str, ...],
-    as_told: bool,
+    only_given: bool,
     settings: tuple[str, ...],
     show: bool,
     stops_within: float | None,
@@ -98,36 +98,36 @@ def view(
 
     import webmap
     from webmap import console
-    from webmap.fleet.found import FoundFleet, find_fleet, told_fleet
-    from webmap.fleet.overrides import Overruling, parse_setting
-    from webmap.fleet.stated import told_robots
+    from webmap.fleet.found import FoundFleet, find_fleet, given_fleet
+    from webmap.fleet.given import given_robots
+    from webmap.fleet.overrides import Overrides, parse_setting
 
     one_bridge(url, topics)
-    overruling = Overruling([parse_setting(text) for text in settings], stops_within)
+    overrides = Overrides([parse_setting(text) for text in settings], stops_within)
     bridges = [webmap.Bridge(text) for text in url]
-    told = told_robots(robots, bridges)
+    given = given_robots(robots, bridges)
     plan = Path(floor) if floor else None
-    if discover or topics is not None or not told:
+    if discover or topics is not None or not given:
         fleet = find_fleet(
             bridges,
-            told,
+            given,
             wait=wait,
             topics=topics,
-            overruling=overruling,
+            overrides=overrides,
         )
     else:
-        overruling.check([robot.found.name for robot in told], all_known=True)
-        told = overruling.tell(told)
-        if show and not as_told:
-            fleet = told_fleet(bridges, told, wait=wait)
+        overrides.check([robot.found.name for robot in given], all_known=True)
+        given = overrides.apply_to_given(given)
+        if show and not only_given:
+            fleet = given_fleet(bridges, given, wait=wait)
         else:
-            fleet = FoundFleet(told, overruling=overruling)
+            fleet = FoundFleet(given, overrides=overrides)
     if show:
-        echo(fleet.table(grid=plan is None, as_told=as_told), lines=True)
+        echo(fleet.table(grid=plan is None, only_given=only_given), lines=True)
         return
-    configs = [overruling.config(bridge.url, robot) for bridge, robot in fleet.told]
+    configs = [overrides.config(bridge.url, robot) for bridge, robot in fleet.given]
     opened = console.open_console(bridges, configs, floor=plan)
-    fleet.show(opened, grid=plan is None, as_told=as_told, topics=topics)
+    fleet.show(opened, grid=plan is None, only_given=only_given, topics=topics)
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
     )

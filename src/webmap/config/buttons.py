@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from webmap.base.errors import ConfigError
-from webmap.config.checks import Mistakes, Way, did_you_mean
+from webmap.config.checks import KeyPath, Mistakes, did_you_mean
 from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import UnknownType
 from webmap.ros.message_forms import checked, fields_of
@@ -70,14 +70,14 @@ class ButtonMistake(ConfigError):
 
     Attributes:
         key: The key; empty if it is about the button as a whole.
-        words: The mistake.
+        message: The mistake.
 
     """
 
-    def __init__(self, key: str, words: str) -> None:
-        super().__init__(f"{key}: {words}" if key else words)
+    def __init__(self, key: str, message: str) -> None:
+        super().__init__(f"{key}: {message}" if key else message)
         self.key = key
-        self.words = words
+        self.message = message
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,12 +133,12 @@ def read_buttons(data: Iterable[Mapping[str, Any]]) -> list[ButtonSpec]:
     return specs
 
 
-def check_buttons(buttons: Iterable[Any], way: Way, mistakes: Mistakes) -> None:
+def check_buttons(buttons: Iterable[Any], path: KeyPath, mistakes: Mistakes) -> None:
     """Add all mistakes in buttons.
 
     Args:
         buttons: A table for each.
-        way: The path of the list.
+        path: The path of the list.
         mistakes: The list for every mistake.
 
     """
@@ -148,11 +148,11 @@ def check_buttons(buttons: Iterable[Any], way: Way, mistakes: Mistakes) -> None:
             label = read_button(each).label
         except ButtonMistake as error:
             key = tuple(part for part in error.key.split(".") if part)
-            mistakes.add((*way, index, *key), error.words)
+            mistakes.add((*path, index, *key), error.message)
             continue
         if first.setdefault(label, index) != index:
-            words = f'got "{label}", expected a label that no other button has'
-            mistakes.add((*way, index, "label"), words)
+            message = f'got "{label}", expected a label that no other button has'
+            mistakes.add((*path, index, "label"), message)
 
 
 def read_button(data: Mapping[str, Any]) -> ButtonSpec:
@@ -219,8 +219,8 @@ def motion_of(kind: Kind, name: str, type: str | None) -> str | None:
         return None
     what = f"{name} of type {type}" if by_type else name
     return (
-        f"{what} carries {moved}, and a button may not write that: it goes through "
-        "the gate, by driving, by a goal or by STOP"
+        f"{what} carries {moved}, and a button must not send that: all motion goes "
+        "through the gate, by driving, by a goal or by STOP"
     )
 
 
@@ -330,13 +330,12 @@ def _check_values(spec: ButtonSpec) -> None:
     except RecursionError:
         raise ButtonMistake(key, "it is nested too deeply") from None
     except (TypeError, ValueError) as error:
-        raise ButtonMistake(key, f"no JSON can hold it: {error}") from None
+        raise ButtonMistake(key, f"it cannot be written as JSON: {error}") from None
 
 
 def _check_value(spec: ButtonSpec) -> None:
     if spec.value is None:
-        words = "a value is needed"
-        raise ButtonMistake("value", f"{words}, what a form begins with as well")
+        raise ButtonMistake("value", "a value is needed, also as the start of a form")
     try:
         value_kind(spec.value)
     except ConfigError as error:

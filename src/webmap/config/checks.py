@@ -13,7 +13,7 @@ from webmap.base.errors import ConfigError
 from webmap.base.outside_text import one_line
 from webmap.ros.names import normalise_topic, split_type
 
-Way: TypeAlias = tuple[str | int, ...]
+KeyPath: TypeAlias = tuple[str | int, ...]
 """Keys and indices that lead to a value."""
 
 Check: TypeAlias = Callable[[Any], Any]
@@ -49,28 +49,28 @@ _KINDS: tuple[tuple[type, str], ...] = (
 class Mistakes:
     """The mistakes found, each with its path."""
 
-    found: list[tuple[Way, str]] = field(default_factory=list)
+    found: list[tuple[KeyPath, str]] = field(default_factory=list)
     more: int = 0
     """The number of further mistakes; only counted, since many texts take long to write
     and read."""
-    wrong: set[Way] = field(default_factory=set)
+    wrong: set[KeyPath] = field(default_factory=set)
     """The path of each mistake, reported or counted, up to three keys:
     ``("robots", 3, "twist")``."""
 
-    def add(self, way: Way, words: str) -> None:
+    def add(self, path: KeyPath, message: str) -> None:
         """Add one mistake."""
-        self.wrong.add(way[:3])
+        self.wrong.add(path[:3])
         if self.full:
             self.more += 1
         else:
-            self.found.append((way, words))
+            self.found.append((path, message))
 
-    def take(self, way: Way, others: "Mistakes") -> None:
-        """Add the mistakes of a part whose path is ``way``."""
-        for inner, words in others.found:
-            self.add((*way, *inner), words)
+    def take(self, path: KeyPath, others: "Mistakes") -> None:
+        """Add the mistakes of a part whose path is ``path``."""
+        for inner, message in others.found:
+            self.add((*path, *inner), message)
         self.more += others.more
-        self.wrong |= {(*way, *inner)[:3] for inner in others.wrong}
+        self.wrong |= {(*path, *inner)[:3] for inner in others.wrong}
 
     @property
     def count(self) -> int:
@@ -108,21 +108,21 @@ class WrongConfig(ConfigError):
     def __init__(self, what: str, mistakes: Mistakes) -> None:
         self.mistakes = mistakes
         lines = [
-            one_line(": ".join(filter(None, (what, way_in_words(way), words))))
-            for way, words in mistakes.found
+            one_line(": ".join(filter(None, (what, key_path_text(path), message))))
+            for path, message in mistakes.found
         ]
         if mistakes.more:
-            lines.append(f"{what}: and {mistakes.more} mistakes more")
+            lines.append(f"{what}: and {mistakes.more} more mistakes")
         super().__init__("\n".join(lines))
 
 
-def way_in_words(way: Way) -> str:
+def key_path_text(path: KeyPath) -> str:
     """Return the path of a value as in TOML: ``robots[0].twist.v_max``."""
-    words = ""
-    for part in way:
-        dot = "." if words else ""
-        words += f"[{part}]" if isinstance(part, int) else f"{dot}{part}"
-    return words
+    message = ""
+    for part in path:
+        dot = "." if message else ""
+        message += f"[{part}]" if isinstance(part, int) else f"{dot}{part}"
+    return message
 
 
 def show(value: object) -> str:
@@ -133,12 +133,14 @@ def show(value: object) -> str:
         text = "of very many digits"
     else:
         text = f'"{value}"' if isinstance(value, str) else str(value)
-    kind = next((words for cls, words in _KINDS if isinstance(value, cls)), "the value")
+    kind = next(
+        (message for cls, message in _KINDS if isinstance(value, cls)), "the value"
+    )
     return f"{kind} {one_line(text, _SHOWN)}"
 
 
 def did_you_mean(got: object, known: Iterable[str]) -> str:
-    """Return a hint at the nearest known word; empty if none is similar."""
+    """Return a hint at the most similar known name; empty if none is similar."""
     found = difflib.get_close_matches(str(got), list(known), n=1)
     return f'; did you mean "{found[0]}"?' if found else ""
 
@@ -296,13 +298,13 @@ def yes_or_no(value: Any) -> bool:
     return value
 
 
-def one_of(*words: str) -> Check:
-    """Return a check for a word: one of these."""
+def one_of(*texts: str) -> Check:
+    """Return a check for one of these texts."""
 
     def check(value: Any) -> str:
-        if not isinstance(value, str) or value not in words:
-            listed = " or ".join(f'"{word}"' for word in words)
-            raise ConfigError(f"{listed}{did_you_mean(value, words)}")
+        if not isinstance(value, str) or value not in texts:
+            listed = " or ".join(f'"{each}"' for each in texts)
+            raise ConfigError(f"{listed}{did_you_mean(value, texts)}")
         return value
 
     return check
@@ -322,13 +324,13 @@ def table(value: Any) -> dict[str, Any]:
     return dict(value)
 
 
-def checked(check: Check, value: Any, way: Way, mistakes: Mistakes) -> Any:
+def checked(check: Check, value: Any, path: KeyPath, mistakes: Mistakes) -> Any:
     """Return the checked value; None, and a mistake, if it is wrong."""
     try:
         return check(value)
     except ConfigError as error:
         hint = "" if mistakes.full else _otherwise(check, value)
-        mistakes.add(way, f"got {show(value)}, expected {error}{hint}")
+        mistakes.add(path, f"got {show(value)}, expected {error}{hint}")
         return None
 
 
@@ -339,11 +341,11 @@ def _otherwise(check: Check, value: Any) -> str:
             plain = value.strip().lower()
             named = {"true": True, "yes": True, "false": False, "no": False}
             check(named[plain] if plain in named else _number_of(plain))
-            word = str(named[plain]).lower() if plain in named else value.strip()
-            return f"; write {word} without quotes"
+            bare = str(named[plain]).lower() if plain in named else value.strip()
+            return f"; write {bare} without quotes"
         if isinstance(value, int | float | date) and not isinstance(value, bool):
             check(str(value))
-            return f'; a text stands in quotes: "{value}"'
+            return f'; write it in quotes: "{value}"'
     except (ConfigError, ValueError):
         pass
     return ""

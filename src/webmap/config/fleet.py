@@ -12,7 +12,7 @@ import msgspec
 from webmap.base.errors import ConfigError
 from webmap.base.outside_text import escaped
 from webmap.config import checks
-from webmap.config.checks import Mistakes, Way, same_name, show, way_in_words
+from webmap.config.checks import KeyPath, Mistakes, key_path_text, same_name, show
 from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
 from webmap.config.robot import (
     Alignment,
@@ -84,41 +84,41 @@ def _labels(value: Any) -> Any:
     raise ConfigError("a file's name, or a table [[labels]] for each")
 
 
-def _bridges(value: Any, way: Way, mistakes: Mistakes) -> dict[str, BridgeConfig]:
+def _bridges(value: Any, path: KeyPath, mistakes: Mistakes) -> dict[str, BridgeConfig]:
     if not isinstance(value, Mapping) or not value:
         got = "nothing" if value is None else show(value)
         example = 'a table [bridges] with lines such as hall = "ws://robot:9090"'
-        mistakes.add(way, f"got {got}, expected {example}")
+        mistakes.add(path, f"got {got}, expected {example}")
         return {}
     found = {}
     for name, each in value.items():
         if name in checks.HEAD and isinstance(each, str) and "://" not in each:
-            words = f"the file's own {name} stands before the first [table]"
-            mistakes.add((*way, name), f"got {show(each)} for a bridge; {words}")
+            advice = f"write the {name} of the file above the first [table]"
+            mistakes.add((*path, name), f"got {show(each)} for a bridge; {advice}")
             continue
-        bridge = read(BridgeConfig, each, (*way, name), mistakes)
+        bridge = read(BridgeConfig, each, (*path, name), mistakes)
         if bridge is not None:
             found[name] = bridge
     return found
 
 
-def _robots(value: Any, way: Way, mistakes: Mistakes) -> list[RobotConfig]:
+def _robots(value: Any, path: KeyPath, mistakes: Mistakes) -> list[RobotConfig]:
     if not isinstance(value, list) or not value:
         got = "nothing" if value is None else show(value)
-        more = " in two brackets" if isinstance(value, Mapping) else ""
-        words = f"got {got}, expected a table [[robots]]{more} for each"
-        mistakes.add(way, words)
+        more = " in double brackets" if isinstance(value, Mapping) else ""
+        message = f"got {got}, expected a table [[robots]]{more} for each"
+        mistakes.add(path, message)
         return []
     robots = []
     for index, each in enumerate(value):
-        inner = (*way, index)
+        inner = (*path, index)
         robot = read_robot(each, inner, mistakes) or RobotConfig(name="")
         if isinstance(each, Mapping) and isinstance(each.get("name"), str):
             checks.checked(checks.name, robot.name, (*inner, "name"), mistakes)
         robots.append(robot)
         if isinstance(each, Mapping) and "scan_assist" in each and "twist" not in each:
-            words = 'scan assist slows a driven robot: the key "twist" is missing'
-            mistakes.add((*inner, "scan_assist"), words)
+            message = 'scan assist slows a driven robot: the key "twist" is missing'
+            mistakes.add((*inner, "scan_assist"), message)
     return robots
 
 
@@ -169,35 +169,35 @@ def _linked(fleet: FleetConfig, mistakes: Mistakes) -> FleetConfig:
     replace = msgspec.structs.replace
     maps = [replace(each, bridge=each.bridge or only) for each in fleet.map]
     robots = [replace(each, bridge=each.bridge or only) for each in fleet.robots]
-    named: list[tuple[Way, str]] = []
+    named: list[tuple[KeyPath, str]] = []
     places: set[tuple[str, str]] = set()
-    wrong = {way[:2] for way in mistakes.wrong}
+    wrong = {path[:2] for path in mistakes.wrong}
     for index, each in enumerate(maps):
-        way: Way = ("map",) if len(maps) == 1 else ("map", index)
-        named.append(((*way, "bridge") if each.bridge else way, each.bridge))
+        path: KeyPath = ("map",) if len(maps) == 1 else ("map", index)
+        named.append(((*path, "bridge") if each.bridge else path, each.bridge))
         place = (each.bridge, each.topic)
         if each.topic and place in places:
-            words = f"the map {each.topic} of {each.bridge} is in the file already"
-            mistakes.add(("map", index), words)
+            message = f"the map {each.topic} of {each.bridge} is in the file already"
+            mistakes.add(("map", index), message)
         places.add(place)
     for index, module in enumerate(fleet.modules):
         named += [(("modules", index, *w), name) for w, name in bridges_of(module)]
     for index, robot in enumerate(robots):
-        way = ("robots", index)
+        path = ("robots", index)
         if robot.bridge:
-            named += [((*way, *inner), name) for inner, name in robot.bridges()]
+            named += [((*path, *inner), name) for inner, name in robot.bridges()]
         elif robot.name:
-            words = 'the key "bridge" is missing: there are several bridges'
-            mistakes.add(way, words)
-        if way not in wrong:
-            robot.resolved().motion.check(way, mistakes)
-    for way, name in named:
+            message = 'the key "bridge" is missing: there are several bridges'
+            mistakes.add(path, message)
+        if path not in wrong:
+            robot.resolved().motion.check(path, mistakes)
+    for path, name in named:
         if not name:
-            mistakes.add(way, 'the key "bridge" is missing')
+            mistakes.add(path, 'the key "bridge" is missing')
         elif name not in fleet.bridges:
             listed = f"the name of a bridge ({', '.join(fleet.bridges)})"
             hint = checks.did_you_mean(name, fleet.bridges)
-            mistakes.add(way, f"got {show(name)}, expected {listed}{hint}")
+            mistakes.add(path, f"got {show(name)}, expected {listed}{hint}")
     return msgspec.structs.replace(fleet, map=maps, robots=robots)
 
 
@@ -214,7 +214,7 @@ def _no_base_twice(fleet: FleetConfig, mistakes: Mistakes) -> None:
             mistakes.add(
                 ("robots", index, "twist", "topic"),
                 f'got the text "{twist.topic}", which drives '
-                f'"{fleet.robots[other].name}" ({way_in_words(("robots", other))}) '
+                f'"{fleet.robots[other].name}" ({key_path_text(("robots", other))}) '
                 "already, expected a topic of its own",
             )
 
@@ -229,7 +229,7 @@ def _no_name_twice(robots: Sequence[RobotConfig], mistakes: Mistakes) -> None:
             mistakes.add(
                 ("robots", index, "name"),
                 f'got the text "{robot.name}", expected a name that differs from '
-                f'"{robots[other].name}" ({way_in_words(("robots", other))}) by more '
+                f'"{robots[other].name}" ({key_path_text(("robots", other))}) by more '
                 "than case and Unicode form",
             )
 
@@ -239,14 +239,14 @@ def _no_name_twice(robots: Sequence[RobotConfig], mistakes: Mistakes) -> None:
 SHORT = ("odometry", "twist", "move", "initial_pose", "cameras")
 """Keys whose value may be a topic alone."""
 
-Remarks = Mapping[Way, str]
+Remarks = Mapping[KeyPath, str]
 
 
 def dump(
     data: Mapping[str, Any],
     *,
     remarks: Remarks | None = None,
-    below: Mapping[Way, Sequence[str]] | None = None,
+    below: Mapping[KeyPath, Sequence[str]] | None = None,
     head: str = "",
 ) -> str:
     """Return the text of a fleet file.
@@ -286,41 +286,43 @@ def _is_table(value: object) -> bool:
 class _Writer:
     """Writes TOML tables with comments."""
 
-    def __init__(self, remarks: Remarks, below: Mapping[Way, Sequence[str]]) -> None:
+    def __init__(
+        self, remarks: Remarks, below: Mapping[KeyPath, Sequence[str]]
+    ) -> None:
         self._remarks = remarks
         self._below = below
 
-    def pairs(self, way: Way, table: Mapping[str, Any]) -> list[str]:
+    def pairs(self, path: KeyPath, table: Mapping[str, Any]) -> list[str]:
         """Return the lines of a table, one per key, without its header."""
         lines = []
         for key, value in table.items():
-            lines += self._pair((*way, key), _key(key), value)
-            lines += self.under((*way, key))
+            lines += self._pair((*path, key), _key(key), value)
+            lines += self.under((*path, key))
         return lines
 
-    def under(self, way: Way) -> list[str]:
+    def under(self, path: KeyPath) -> list[str]:
         """Return the comments below a value."""
-        return [f"# {each}" for each in self._below.get(way, ())]
+        return [f"# {each}" for each in self._below.get(path, ())]
 
-    def _pair(self, way: Way, name: str, value: Any) -> list[str]:
-        inner = [each[: len(way)] == way != each for each in self._remarks]
+    def _pair(self, path: KeyPath, name: str, value: Any) -> list[str]:
+        inner = [each[: len(path)] == path != each for each in self._remarks]
         if isinstance(value, Mapping) and any(inner):
             lines = []
             for key, each in value.items():
-                lines += self._pair((*way, key), f"{name}.{_key(key)}", each)
+                lines += self._pair((*path, key), f"{name}.{_key(key)}", each)
             return lines
-        if isinstance(value, list) and way[-1] in ("modules", "cameras", "buttons"):
+        if isinstance(value, list) and path[-1] in ("modules", "cameras", "buttons"):
             rows = [
-                f"  {self._value(each, way)},{self._remark((*way, index))}"
+                f"  {self._value(each, path)},{self._remark((*path, index))}"
                 for index, each in enumerate(value)
             ]
             return [f"{name} = [", *rows, "]"]
-        return [f"{name} = {self._value(value, way)}{self._remark(way)}"]
+        return [f"{name} = {self._value(value, path)}{self._remark(path)}"]
 
-    def _remark(self, way: Way) -> str:
-        return f" # {self._remarks[way]}" if way in self._remarks else ""
+    def _remark(self, path: KeyPath) -> str:
+        return f" # {self._remarks[path]}" if path in self._remarks else ""
 
-    def _value(self, value: Any, way: Way = ()) -> str:
+    def _value(self, value: Any, path: KeyPath = ()) -> str:
         match value:
             case str():
                 return _text(value)
@@ -328,7 +330,7 @@ class _Writer:
                 return str(value).lower()
             case list() | tuple():
                 return f"[{', '.join(map(self._value, value))}]"
-            case Mapping() if way and way[-1] in SHORT and set(value) == {"topic"}:
+            case Mapping() if path and path[-1] in SHORT and set(value) == {"topic"}:
                 return _text(value["topic"])
             case Mapping():
                 pairs = [f"{_key(k)} = {self._value(v)}" for k, v in value.items()]

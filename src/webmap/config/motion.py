@@ -12,7 +12,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.config import checks
-from webmap.config.checks import Mistakes, Way
+from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.reading import Config
 from webmap.ros.names import normalise_topic
 
@@ -96,15 +96,15 @@ class StopHook(Config, kw_only=True, frozen=True):
             type = "std_msgs/Bool" if self.topic else "std_srvs/Trigger"
             msgspec.structs.force_setattr(self, "type", type)
 
-    def check(self, way: Way, mistakes: Mistakes) -> None:
+    def check(self, path: KeyPath, mistakes: Mistakes) -> None:
         """Add mistakes that concern several fields."""
         if bool(self.topic) == bool(self.service):
-            words = 'expected the key "topic" or the key "service", one of them'
-            mistakes.add(way, words)
+            message = 'expected the key "topic" or the key "service", one of them'
+            mistakes.add(path, message)
             return
         allowed = "std_msgs/Bool" if self.topic else "std_srvs/Trigger"
         checks.checked(
-            checks.message_type(allowed), self.type, (*way, "type"), mistakes
+            checks.message_type(allowed), self.type, (*path, "type"), mistakes
         )
 
 
@@ -135,12 +135,12 @@ class TwistConfig(TopicConfig, kw_only=True, frozen=True):
     stop_hooks: list[StopHook] = []
     bridge: str = ""
 
-    def check(self, way: Way, mistakes: Mistakes) -> None:
+    def check(self, path: KeyPath, mistakes: Mistakes) -> None:
         """Add mistakes that concern several fields."""
         for index, hook in enumerate(self.stop_hooks):
             if self.topic in (hook.topic, hook.service):
-                words = f"its velocity goes to {self.topic}, so that is no stop hook"
-                mistakes.add((*way, "stop_hooks", index), words)
+                message = f"{self.topic} is the velocity topic, expected another name"
+                mistakes.add((*path, "stop_hooks", index), message)
 
 
 class MoveConfig(TopicConfig, kw_only=True, frozen=True):
@@ -165,12 +165,12 @@ class MoveConfig(TopicConfig, kw_only=True, frozen=True):
     """Whether a goal continues or is cancelled when its operator is lost."""
     bridge: str = ""
 
-    def check(self, way: Way, mistakes: Mistakes) -> None:
+    def check(self, path: KeyPath, mistakes: Mistakes) -> None:
         """Add mistakes that concern several fields."""
         if not self.topic and not self.action:
             missing = 'the key "topic" is missing'
-            words = "goals go to a topic or to an action, and neither is given"
-            mistakes.add(way, f"{missing}: {words}")
+            message = "goals go to a topic or to an action, and neither is given"
+            mistakes.add(path, f"{missing}: {message}")
 
 
 class InitialPoseConfig(TopicConfig, kw_only=True, frozen=True):
@@ -200,7 +200,7 @@ class ScanAssistConfig(Config, kw_only=True, frozen=True):
     """The scanner's direction, counter-clockwise from the robot's x."""
     upside_down: bool = False
     """Whether the scanner is mounted upside down, so that its rays turn the other
-    way."""
+    path."""
     frame: Annotated[str, checks.frame] = ""
     """The frame that the scans must have; any if empty."""
     stop_distance: Annotated[float, checks.from_zero("metres")] = 0.15
@@ -230,12 +230,12 @@ class MotionConfig(Config, kw_only=True, frozen=True):
     initial_pose: InitialPoseConfig | None = None
     scan_assist: ScanAssistConfig | None = None
 
-    def check(self, way: Way, mistakes: Mistakes) -> None:
+    def check(self, path: KeyPath, mistakes: Mistakes) -> None:
         """Add mistakes that concern several parts."""
         move, pose = self.move, self.initial_pose
         if move is not None and pose is not None and move.bridge != pose.bridge:
             mistakes.add(
-                (*way, "initial_pose"),
-                f"goals go to {move.bridge} and the initial pose to {pose.bridge}: "
-                "both go to one bridge",
+                (*path, "initial_pose"),
+                f"goals are sent to {move.bridge} and the initial pose to "
+                f"{pose.bridge}, expected one bridge for both",
             )

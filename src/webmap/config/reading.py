@@ -27,12 +27,12 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.config import checks
-from webmap.config.checks import Mistakes, Way, checked, did_you_mean, show
+from webmap.config.checks import KeyPath, Mistakes, checked, did_you_mean, show
 
 ONE_OR_MORE = "one or more"
 """Annotation of a list: a single value is read as a list of one."""
 
-Reader: TypeAlias = Callable[[Any, Way, Mistakes], Any]
+Reader: TypeAlias = Callable[[Any, KeyPath, Mistakes], Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,20 +62,20 @@ class Config(msgspec.Struct, frozen=True, omit_defaults=True):
         such = f" such as {cls.example}" if cls.example else " of keys and values"
         raise ConfigError(f"a table{such}")
 
-    def check(self, way: Way, mistakes: Mistakes) -> None:
+    def check(self, path: KeyPath, mistakes: Mistakes) -> None:
         """Add mistakes that concern several fields; each alone is valid."""
 
 
 S = TypeVar("S", bound=Config)
 
 
-def read(cls: type[S], value: Any, way: Way, mistakes: Mistakes) -> S | None:
+def read(cls: type[S], value: Any, path: KeyPath, mistakes: Mistakes) -> S | None:
     """Return the Struct for a table of plain values; every mistake is added.
 
     Args:
         cls: The Struct.
         value: A table of keys and values, or its short form.
-        way: The path of the table.
+        path: The path of the table.
         mistakes: The list for every mistake. If there is one, the result is unusable:
             required fields that are wrong or missing are None.
 
@@ -84,19 +84,21 @@ def read(cls: type[S], value: Any, way: Way, mistakes: Mistakes) -> S | None:
 
     """
     if isinstance(value, Mapping):
-        return _read_table(cls, value, way, mistakes)
+        return _read_table(cls, value, path, mistakes)
     try:
         table = cls.expand(value)
     except ConfigError as error:
-        mistakes.add(way, f"got {show(value)}, expected {error}")
+        mistakes.add(path, f"got {show(value)}, expected {error}")
         return None
-    return None if table is None else _read_table(cls, table, way, mistakes, short=True)
+    return (
+        None if table is None else _read_table(cls, table, path, mistakes, short=True)
+    )
 
 
 def _read_table(
     cls: type[S],
     table: Mapping[str, Any],
-    way: Way,
+    path: KeyPath,
     mistakes: Mistakes,
     *,
     short: bool = False,
@@ -105,22 +107,22 @@ def _read_table(
     values: dict[str, Any] = {key: None for key in known if known[key].required}
     for key, got in table.items():
         if key not in known:
-            unknown(key, known, (*way, str(key)), mistakes)
+            unknown(key, known, (*path, str(key)), mistakes)
             continue
         # A short form has no key of its own in the file.
-        value = known[key].read(got, way if short else (*way, key), mistakes)
+        value = known[key].read(got, path if short else (*path, key), mistakes)
         if value is not None:
             values[key] = value
     for key, each in known.items():
         if each.required and key not in table:
-            mistakes.add(way, f'the key "{key}" is missing')
+            mistakes.add(path, f'the key "{key}" is missing')
     if cls.inline:
         part = _inline(cls)
         keys = values.keys() & set(part.__struct_fields__)
         values[cls.inline] = part(**{key: values.pop(key) for key in keys})
     made = cls(**values)
     if mistakes.count == before:
-        made.check(way, mistakes)
+        made.check(path, mistakes)
     return made
 
 
@@ -152,16 +154,18 @@ def read_part(
     return part
 
 
-def unknown(key: object, known: Iterable[str], way: Way, mistakes: Mistakes) -> None:
+def unknown(
+    key: object, known: Iterable[str], path: KeyPath, mistakes: Mistakes
+) -> None:
     """Add the mistake of an unknown key."""
     if mistakes.full:
-        mistakes.add(way, str(key))  # only counted: a hint takes long
+        mistakes.add(path, str(key))  # only counted: a hint takes long
         return
     listed = ", ".join(known)
     hint = did_you_mean(key, known)
-    if key in checks.HEAD and len(way) > 1:
-        hint = f"; it is the file's own, and stands before the first [table]{hint}"
-    mistakes.add(way, f'there is no key "{key}" here{hint}; there are {listed}')
+    if key in checks.HEAD and len(path) > 1:
+        hint = f"; it belongs to the file: write it above the first [table]{hint}"
+    mistakes.add(path, f'there is no key "{key}" here{hint}; there are {listed}')
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,8 +206,8 @@ def _reader_of(hint: Any) -> Reader:
         inner_read = _reader_of(
             next(each for each in inner if each is not types.NoneType)
         )
-        return lambda value, way, mistakes: (
-            None if value is None else inner_read(value, way, mistakes)
+        return lambda value, path, mistakes: (
+            None if value is None else inner_read(value, path, mistakes)
         )
     if origin is list:
         return _list_reader(inner[0], single=False)
@@ -212,28 +216,28 @@ def _reader_of(hint: Any) -> Reader:
     if isinstance(hint, type) and issubclass(hint, Config):
         return functools.partial(read, hint)
     if hint is Any:
-        return lambda value, way, mistakes: value
+        return lambda value, path, mistakes: value
     return functools.partial(checked, {bool: checks.yes_or_no, str: checks.text}[hint])
 
 
 def _list_reader(hint: Any, *, single: bool) -> Reader:
     inner_read, example = _reader_of(hint), getattr(hint, "example", "")
 
-    def read_all(value: Any, way: Way, mistakes: Mistakes) -> list[Any]:
+    def read_all(value: Any, path: KeyPath, mistakes: Mistakes) -> list[Any]:
         if isinstance(value, list | tuple):
-            taken = (inner_read(v, (*way, i), mistakes) for i, v in enumerate(value))
+            taken = (inner_read(v, (*path, i), mistakes) for i, v in enumerate(value))
             return [each for each in taken if each is not None]
         if single:
-            each = inner_read(value, way, mistakes)
+            each = inner_read(value, path, mistakes)
             return [] if each is None else [each]
-        name = ".".join(part for part in way if isinstance(part, str))
-        brackets = " in two brackets" if isinstance(value, Mapping) else ""
+        name = ".".join(part for part in path if isinstance(part, str))
+        brackets = " in double brackets" if isinstance(value, Mapping) else ""
         expected = f"a table [[{name}]]{brackets} for each"
         if example:
             expected = f"an array such as [{example.partition(' or ')[0]}]"
         elif get_origin(hint) is Annotated and get_args(hint)[0] is str:
             expected = 'an array of texts, such as ["one", "two"]'
-        mistakes.add(way, f"got {show(value)}, expected {expected}")
+        mistakes.add(path, f"got {show(value)}, expected {expected}")
         return []
 
     return read_all

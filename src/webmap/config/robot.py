@@ -12,7 +12,7 @@ import msgspec
 from webmap.base.errors import ConfigError
 from webmap.config import checks
 from webmap.config.buttons import check_buttons
-from webmap.config.checks import Mistakes, Way
+from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.motion import MotionConfig, TopicConfig
 from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
 from webmap.ros.image_address import EXAMPLE, parse_address
@@ -75,7 +75,7 @@ class PictureConfig(Config, kw_only=True, frozen=True):
     height: Annotated[float, checks.above_zero("metres")]
     x: Annotated[
         float,
-        checks.finite("a number of metres: how far its middle is before the base"),
+        checks.finite("a number of metres: how far its middle is in front of the base"),
     ] = 0.0
     y: Annotated[
         float,
@@ -119,10 +119,10 @@ class CameraConfig(Config, kw_only=True, frozen=True):
             pass
         raise ConfigError(either)
 
-    def check(self, way: Way, mistakes: Mistakes) -> None:
+    def check(self, path: KeyPath, mistakes: Mistakes) -> None:
         """Add mistakes that concern several fields."""
         if bool(self.topic) == bool(self.url):
-            mistakes.add(way, 'a camera has either a "topic" or a "url"')
+            mistakes.add(path, 'a camera has either a "topic" or a "url"')
 
 
 class ModuleConfig(Config, kw_only=True, frozen=True):
@@ -140,7 +140,7 @@ class ModuleConfig(Config, kw_only=True, frozen=True):
 class Layer(NamedTuple):
     """A module of a robot, and the configuration key that adds it."""
 
-    way: Way
+    path: KeyPath
     module: ModuleConfig
 
 
@@ -166,12 +166,12 @@ def _any_table(value: Any) -> dict[str, Any]:
     return dict(value)
 
 
-def _buttons(value: Any, way: Way, mistakes: Mistakes) -> list[dict[str, Any]]:
+def _buttons(value: Any, path: KeyPath, mistakes: Mistakes) -> list[dict[str, Any]]:
     if not isinstance(value, list | tuple):
-        words = "expected a table [[robots.buttons]] for each"
-        mistakes.add(way, f"got {checks.show(value)}, {words}")
+        message = "expected a table [[robots.buttons]] for each"
+        mistakes.add(path, f"got {checks.show(value)}, {message}")
         return []
-    check_buttons(value, way, mistakes)
+    check_buttons(value, path, mistakes)
     return [dict(each) for each in value if isinstance(each, Mapping)]
 
 
@@ -183,7 +183,7 @@ def _css_class(value: Any) -> str:
     plain = checks.text(value)
     if plain.split() != [plain] or plain in OWN_CLASSES:
         own = ", ".join(OWN_CLASSES)
-        raise ConfigError(f"a class of CSS: one word, and none of {own}")
+        raise ConfigError(f"a CSS class without spaces, and none of {own}")
     return plain
 
 
@@ -253,11 +253,11 @@ class RobotConfig(Config, kw_only=True, frozen=True):
             data |= value if key == "motion" else {key: value}
         return data
 
-    def check(self, way: Way, mistakes: Mistakes) -> None:
+    def check(self, path: KeyPath, mistakes: Mistakes) -> None:
         """Add mistakes that concern several fields."""
         if self.picture is not None and self.model is not None:
-            words = 'a robot has a "picture" or a "model"; remove one of them'
-            mistakes.add((*way, "picture"), words)
+            message = 'a robot has a "picture" or a "model"; remove one of them'
+            mistakes.add((*path, "picture"), message)
 
     def part(self, key: str) -> Any:
         """Return a part by its key, including those of ``motion``; None if absent."""
@@ -280,7 +280,7 @@ class RobotConfig(Config, kw_only=True, frozen=True):
                 config = config.with_part(key, linked)
         return config
 
-    def bridges(self) -> Iterator[tuple[Way, str]]:
+    def bridges(self) -> Iterator[tuple[KeyPath, str]]:
         """Yield every named bridge with its path."""
         if self.bridge:
             yield ("bridge",), self.bridge
@@ -289,8 +289,8 @@ class RobotConfig(Config, kw_only=True, frozen=True):
             if part is not None and part.bridge:
                 yield (key, "bridge"), part.bridge
         for index, module in enumerate(self.modules):
-            for way, bridge in bridges_of(module):
-                yield ("modules", index, *way), bridge
+            for path, bridge in bridges_of(module):
+                yield ("modules", index, *path), bridge
 
     def layers(self) -> list[Layer]:
         """Return every module that draws or shows something of the robot, in order."""
@@ -312,35 +312,39 @@ class RobotConfig(Config, kw_only=True, frozen=True):
             layers.append(Layer(("buttons",), buttons))
         for index, camera in enumerate(named_cameras(self.cameras)):
             throttle = camera.throttle
-            said = {} if throttle is None else {"throttle": throttle}
+            options = {} if throttle is None else {"throttle": throttle}
             kind = "HttpCamera" if camera.url else "Camera"
             where = [camera.url] if camera.url else [link, camera.topic]
-            module = ModuleConfig(name=kind, args=[*where, camera.name], options=said)
+            module = ModuleConfig(
+                name=kind, args=[*where, camera.name], options=options
+            )
             layers.append(Layer(("cameras", index), module))
         listed = enumerate(self.modules)
         return layers + [Layer(("modules", index), module) for index, module in listed]
 
 
-def read_robot(value: Any, way: Way, mistakes: Mistakes) -> RobotConfig | None:
+def read_robot(value: Any, path: KeyPath, mistakes: Mistakes) -> RobotConfig | None:
     """Return the robot in plain data; every mistake is added.
 
     Args:
         value: The plain data.
-        way: Its path.
+        path: Its path.
         mistakes: The list for every mistake. If there is one, the result is unusable.
 
     """
     if not isinstance(value, Mapping):
-        mistakes.add(way, f"got {checks.show(value)}, expected a table [[robots]]")
+        mistakes.add(path, f"got {checks.show(value)}, expected a table [[robots]]")
         return None
-    config = read(RobotConfig, value, way, mistakes)
+    config = read(RobotConfig, value, path, mistakes)
     if config is None:
         return None
     taken: set[str] = set()
     for index, camera in enumerate(named_cameras(config.cameras)):
         if checks.same_name(camera.name) in taken:
-            words = f'a second camera is called "{camera.name}"; give each its own name'
-            mistakes.add((*way, "cameras", index), words)
+            message = (
+                f'a second camera is called "{camera.name}"; give each its own name'
+            )
+            mistakes.add((*path, "cameras", index), message)
         taken.add(checks.same_name(camera.name))
     return config
 
@@ -361,7 +365,7 @@ def scan_name(number: int) -> str:
     return f"scan-{number}" if number > 1 else ""
 
 
-def bridges_of(module: ModuleConfig) -> Iterator[tuple[Way, str]]:
+def bridges_of(module: ModuleConfig) -> Iterator[tuple[KeyPath, str]]:
     """Yield every bridge among the arguments of a module, with its path."""
     for index, each in enumerate(module.args):
         if is_link(each):

@@ -27,8 +27,8 @@ def readable_secret(file: Path, data: Any) -> str | None:
     if os.name != "posix" or not mode & 0o077 or not _holds_secret(data):
         return None
     return (
-        f"{file} holds a password, and other users of this computer may read it (its "
-        f"mode is {mode:04o}): run chmod 600 {shlex.quote(str(file))}"
+        f"{file} contains a password, and other users of this computer may read it "
+        f"(its mode is {mode:04o}): run chmod 600 {shlex.quote(str(file))}"
     )
 
 

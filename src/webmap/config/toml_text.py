@@ -13,7 +13,7 @@ from pathlib import Path
 from webmap.base.errors import ConfigError
 from webmap.base.outside_text import one_line
 from webmap.base.plain_files import read_file
-from webmap.config.checks import Mistakes, Way, way_in_words
+from webmap.config.checks import KeyPath, Mistakes, key_path_text
 
 LARGEST = 1 << 19
 """The greatest size of a file, in bytes."""
@@ -36,7 +36,7 @@ _TOKEN = re.compile(
 )
 
 _WHERE = re.compile(
-    r"(?P<words>.*) \(at (?:line (?P<line>\d+), column \d+|end of .*)\)"
+    r"(?P<message>.*) \(at (?:line (?P<line>\d+), column \d+|end of .*)\)"
 )
 _TABLE = re.compile(r"Cannot declare \((?P<keys>.*?),?\) twice")
 _NUMBER = re.compile(r"\d[\d_]{999,}")
@@ -45,14 +45,13 @@ _LONGEST = 60
 SEVERAL = ("robots", "map", "image", "modules", "labels", "buttons")
 """Tables that may occur more than once."""
 
-WORDS = {
-    "Invalid value": "no value that TOML knows: a text stands in quotes, true and "
-    "false without",
+MESSAGES = {
+    "Invalid value": "expected a value: a text with quotes, true and false without",
     "Illegal character '\\n'": "expected the quote that ends a text on the same line",
     "Invalid statement": 'expected a table such as [bridges], or key = "value"',
     "Expected '=' after a key in a key/value pair": "expected a key, an equals sign "
     "and a value",
-    "Cannot overwrite a value": "this key stands there already",
+    "Cannot overwrite a value": "this key is already defined",
     "Expected newline or end of document after a statement": "expected the end of the "
     "line after a value",
 }
@@ -103,11 +102,11 @@ class FleetText:
             ) from None
         self._lines = Lines(text)
 
-    def complaint(self, way: Way, words: str) -> str:
+    def complaint(self, path: KeyPath, message: str) -> str:
         """Return a mistake with file, line and key."""
-        said = f"{way_in_words(way) or 'the file'}: {words}"
+        mistake = f"{key_path_text(path) or 'the file'}: {message}"
         # The content of a file must not control the terminal that shows it.
-        return f"{self.name}:{self._lines.of(way)}: {one_line(said)}"
+        return f"{self.name}:{self._lines.of(path)}: {one_line(mistake)}"
 
     def refuse(self, mistakes: Mistakes) -> None:
         """Raise all mistakes at once, if there are any.
@@ -117,9 +116,9 @@ class FleetText:
 
         """
         if mistakes.found:
-            lines = [self.complaint(way, words) for way, words in mistakes.found]
+            lines = [self.complaint(path, message) for path, message in mistakes.found]
             if mistakes.more:
-                lines.append(f"{self.name}: and {mistakes.more} mistakes more")
+                lines.append(f"{self.name}: and {mistakes.more} more mistakes")
             raise ConfigError("\n".join(lines))
 
 
@@ -157,19 +156,19 @@ class Lines:
     def __init__(self, text: str) -> None:
         self._text = text.replace("\r\n", "\n")
         self._at = 0
-        self._found: dict[Way, int] = {}
-        self._tables: dict[Way, int] = {}
+        self._found: dict[KeyPath, int] = {}
+        self._tables: dict[KeyPath, int] = {}
         self._seen_to = (0, 1)
         self._document()
 
-    def of(self, path: Way) -> int:
+    def of(self, path: KeyPath) -> int:
         """Return the line of a path, or of its nearest parent; 1 for the file."""
         while path and path not in self._found:
             path = path[:-1]
         return self._found.get(path, 1)
 
     def _document(self) -> None:
-        table: Way = ()
+        table: KeyPath = ()
         while self._skip(_GAP) < len(self._text):
             if self._next("[["):
                 table = self._header(array=True)
@@ -178,10 +177,10 @@ class Lines:
             else:
                 self._pair(table)
 
-    def _header(self, *, array: bool) -> Way:
+    def _header(self, *, array: bool) -> KeyPath:
         keys = self._key()
         self._at += 2 if array else 1
-        path: Way = ()
+        path: KeyPath = ()
         for place, key in enumerate(keys):
             path = (*path, key)
             if array and place == len(keys) - 1:
@@ -192,7 +191,7 @@ class Lines:
         self._found[path] = self._line()
         return path
 
-    def _pair(self, table: Way) -> None:
+    def _pair(self, table: KeyPath) -> None:
         path = table
         start = self._line()
         for key in self._key():
@@ -201,7 +200,7 @@ class Lines:
         self._at += 1  # the equals sign
         self._value(path)
 
-    def _value(self, path: Way) -> None:
+    def _value(self, path: KeyPath) -> None:
         self._skip(_GAP)
         if self._next("["):
             self._array(path)
@@ -211,7 +210,7 @@ class Lines:
             string = _TEXT.match(self._text, self._at)
             self._at = string.end() if string else self._skip(_PLAIN)
 
-    def _array(self, path: Way) -> None:
+    def _array(self, path: KeyPath) -> None:
         index = 0
         while self._skip(_GAP) < len(self._text) and not self._next("]"):
             self._note((*path, index))
@@ -220,7 +219,7 @@ class Lines:
             self._next(",")
             index += 1
 
-    def _inline(self, path: Way) -> None:
+    def _inline(self, path: KeyPath) -> None:
         while self._skip(_GAP) < len(self._text) and not self._next("}"):
             self._pair(path)
             self._skip(_GAP)
@@ -256,7 +255,7 @@ class Lines:
             return True
         return False
 
-    def _note(self, path: Way) -> None:
+    def _note(self, path: KeyPath) -> None:
         self._found.setdefault(path, self._line())
 
     def _line(self) -> int:
@@ -309,15 +308,15 @@ def not_toml(name: str, text: str, error: ValueError) -> str:
             return f"{name}: this is not TOML: {error}"
         line = text.count("\n", 0, number.start()) + 1
         return f"{name}:{line}: this is not TOML: a whole number of far too many digits"
-    words = found["words"]
+    message = found["message"]
     # The reader gives no line for the end of the file.
     line = int(found["line"] or len(lines))
-    table = _TABLE.fullmatch(words)
+    table = _TABLE.fullmatch(message)
     if table is not None:
         keys = ".".join(key.strip().strip("'\"") for key in table["keys"].split(","))
-        words = f"a table [{keys}] stands there already"
+        message = f"the table [{keys}] is already defined"
         if keys.rpartition(".")[2] in SEVERAL:
-            words += f"; several are [[{keys}]] in two brackets each"
+            message += f"; for several, write [[{keys}]] in double brackets"
     here = one_line(lines[min(line, len(lines)) - 1].strip(), _LONGEST)
     got = f"got {here}, " if here else ""
-    return f"{name}:{line}: this is not TOML: {got}{WORDS.get(words, words)}"
+    return f"{name}:{line}: this is not TOML: {got}{MESSAGES.get(message, message)}"

@@ -7,7 +7,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError, ModuleNotFound, WebMapError
 from webmap.config import checks
-from webmap.config.checks import Mistakes, Way
+from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.robot import (
     LINKED,
     MOTION,
@@ -226,7 +226,7 @@ def wrong_argument(module: ModuleConfig, wrong: WrongArgument) -> str:
     return f"got {checks.show(wrong.got[0])}, expected {expected}{of}"
 
 
-def _note(mistakes: Mistakes, path: Way, error: WebMapError, name: str) -> None:
+def _note(mistakes: Mistakes, path: KeyPath, error: WebMapError, name: str) -> None:
     """Add the mistakes of a part, each with its path."""
     if isinstance(error, checks.WrongConfig):
         mistakes.take((), error.mistakes)

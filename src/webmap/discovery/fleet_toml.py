@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from webmap.config.checks import Way
+from webmap.config.checks import KeyPath
 from webmap.config.fleet import BridgeConfig, FleetConfig, MapConfig, dump
 from webmap.config.robot import ModuleConfig, RobotConfig
 from webmap.discovery.found import Findings, FoundRobot, Layers
@@ -11,12 +11,13 @@ from webmap.discovery.layers import TRAIL, drawing, topic_of, with_layers
 
 HEAD = """\
 # A fleet file: webmap check FILE reads it, webmap run FILE shows it.
-# The words after each topic say why it was chosen; a wrong one is yours to change.
+# The comment after each topic is the reason for the choice; correct a wrong topic.
 """
 
 UNSURE = (
-    "Say within how many seconds the base stops by itself when velocity ceases, if you",
-    "know it: without it the robot is driven at 0.3 m/s and 0.6 rad/s at the most.",
+    "Set the command timeout, if you know it: the time in seconds after which the base",
+    "stops by itself when commands end. Without it the robot is driven at 0.3 m/s and",
+    "0.6 rad/s at the most.",
     "twist.stops_within = 0.25",
 )
 
@@ -35,8 +36,8 @@ class Remarks:
     """The remarks about a fleet file's values."""
 
     def __init__(self) -> None:
-        self.behind: dict[Way, str] = {}
-        self.below: dict[Way, Sequence[str]] = {}
+        self.behind: dict[KeyPath, str] = {}
+        self.below: dict[KeyPath, Sequence[str]] = {}
 
 
 def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
@@ -54,8 +55,8 @@ def fleet_toml(found: Sequence[tuple[str, str, Findings]]) -> str:
     for bridge, _, findings in found:
         _add_shared(bridge, findings, maps, modules, remarks)
         for robot in findings.robots:
-            way = ("robots", len(robots))
-            robots.append(_robot(robot, bridge, findings, way, remarks))
+            path = ("robots", len(robots))
+            robots.append(_robot(robot, bridge, findings, path, remarks))
     bridges = {name: BridgeConfig(url=url) for name, url, _ in found}
     data = FleetConfig(bridges=bridges, map=maps, modules=modules).to_dict()
     data["bridges"] = {name: url for name, url, _ in found}
@@ -92,7 +93,7 @@ def _add_shared(
 
 
 def _robot(
-    robot: FoundRobot, bridge: str, findings: Findings, way: Way, remarks: Remarks
+    robot: FoundRobot, bridge: str, findings: Findings, path: KeyPath, remarks: Remarks
 ) -> dict[str, Any]:
     """Return a robot as plain data, and note the rule of each of its topics."""
     config = robot.config(bridge)
@@ -101,27 +102,24 @@ def _robot(
         key = REMARKED.get(role, ("odometry",))
         guess = robot.first(role)  # type: ignore[arg-type]
         if guess is not None:
-            behind[(*way, *key)] = guess.rule
+            behind[(*path, *key)] = guess.rule
     for index, guess in enumerate(robot.guesses.get("camera", ())):
-        behind[(*way, "cameras", index)] = guess.rule
+        behind[(*path, "cameras", index)] = guess.rule
     pose = robot.first("initialpose")
     if pose is not None and config.motion.initial_pose is not None:
         framed = ("topic",) if config.motion.initial_pose.frame != "map" else ()
-        behind[(*way, "initial_pose", *framed)] = pose.rule
+        behind[(*path, "initial_pose", *framed)] = pose.rule
     if config.motion.twist is not None:
-        remarks.below[(*way, "twist")] = UNSURE
-    behind[(*way, "tf", "quiet")] = (
-        "drawn where its frames have it"
+        remarks.below[(*path, "twist")] = UNSURE
+    behind[(*path, "tf", "quiet")] = (
+        "its pose comes from its frames"
         if robot.tf_alone
         else f"drawn in the frame {robot.map_frame}, if frames lead there"
     )
-    config = _with_layers(config, robot, findings, way, remarks)
+    config = _with_layers(config, robot, findings, path, remarks)
     left_out = findings.layers.get(robot.namespace, Layers()).left_out
-    remarks.below[way] = (
-        *(
-            f"not drawn, since there are enough of its kind: {o.topic}"
-            for o in left_out
-        ),
+    remarks.below[path] = (
+        *(f"not drawn, beyond the limit for its kind: {o.topic}" for o in left_out),
         *robot.notes,
     )
     data = config.to_dict()
@@ -140,7 +138,7 @@ def _with_layers(
     config: RobotConfig,
     robot: FoundRobot,
     findings: Findings,
-    way: Way,
+    path: KeyPath,
     remarks: Remarks,
 ) -> RobotConfig:
     """Return a robot with all layers that ``webmap view`` draws of it."""
@@ -151,9 +149,9 @@ def _with_layers(
     best = [guess for guess in (robot.first("scan"), robot.first("plan")) if guess]
     rules |= {guess.topic: guess.rule for guess in best}
     if config.scan:
-        remarks.behind[(*way, "scan")] = "; ".join(rules[scan] for scan in config.scan)
+        remarks.behind[(*path, "scan")] = "; ".join(rules[scan] for scan in config.scan)
     for index, module in enumerate(config.modules):
         rule = rules.get(topic_of(module))
         if rule:
-            remarks.behind[(*way, "modules", index)] = rule
+            remarks.behind[(*path, "modules", index)] = rule
     return config

@@ -11,7 +11,7 @@ from collections.abc import Container, Iterable
 from webmap.discovery.rules import Match
 
 MOVING = ("odometry", "pose", "velocity")
-"""Roles of which each makes a namespace a robot."""
+"""Roles that make a namespace a robot."""
 
 
 def robot_namespaces(matches: Iterable[Match]) -> tuple[str, ...]:

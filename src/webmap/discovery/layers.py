@@ -116,10 +116,10 @@ def _match(
         for number, kind in enumerate(declared.kinds):
             if plain not in kind.types:
                 continue
-            for rule, (pattern, words) in enumerate(kind.names.items()):
+            for rule, (pattern, reason) in enumerate(kind.names.items()):
                 if re.search(pattern, topic):
                     place = (declared.rank, number, kind.types.index(plain), rule)
-                    return place, FoundLayer(kind.name, topic, type.strip(), words)
+                    return place, FoundLayer(kind.name, topic, type.strip(), reason)
     return None
 
 

@@ -25,7 +25,7 @@ class Newcomers:
 
     The topics of a robot that starts appear one by one. Therefore news is reported
     only when two consecutive looks find the same topics of the robot. A topic that
-    disappears, or a better one that appears, is no news: a topic in use stays in use.
+    disappears, or a better topic that appears, is no news: a topic in use stays in use.
     All cameras are used, so each new one is news. Frames are news if
     :func:`leads_further` is true, and else stay as they are.
 

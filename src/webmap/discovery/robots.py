@@ -21,8 +21,8 @@ DRAWN_ONLY: tuple[Role, ...] = ("scan", "plan", "map", "costmap", "cloud")
 """Roles of topics that are only drawn, so that a layer may take them."""
 
 DIRECTION = (
-    "A list of topics does not say who publishes and who subscribes: a topic may be "
-    "there because another program listens to it, and carry nothing."
+    "A list of topics does not show which nodes publish and which subscribe: a topic "
+    "may exist only because another program subscribes to it, and carry no messages."
 )
 
 
@@ -148,7 +148,7 @@ def _robot(
 ) -> FoundRobot:
     guesses: dict[Role, tuple[Guess, ...]] = {}
     for each in matches:
-        guess = Guess(each.topic, each.type, _words(each, space))
+        guess = Guess(each.topic, each.type, _reason(each, space))
         guesses[each.role] = (*guesses.get(each.role, ()), guess)
     robot = FoundRobot(name, space, guesses)
     if base is not None:
@@ -158,11 +158,11 @@ def _robot(
     return replace(robot, notes=_robot_notes(robot, twists))
 
 
-def _words(each: Match, space: str) -> str:
+def _reason(each: Match, space: str) -> str:
     if each.namespace == space:
-        return each.words
+        return each.reason
     where = "in a part of the robot" if inside(each.topic, space) else "shared by all"
-    return f"{each.words}, {where}"
+    return f"{each.reason}, {where}"
 
 
 def _robot_notes(robot: FoundRobot, twists: Sequence[str]) -> tuple[str, ...]:
@@ -175,35 +175,37 @@ def _robot_notes(robot: FoundRobot, twists: Sequence[str]) -> tuple[str, ...]:
             else "in its own frame"
         )
         notes.append(
-            f"{pose.topic} has the pose on the map, but mostly only while the robot "
+            f"{pose.topic} has the pose on the map, but usually only while the robot "
             f"moves; {odometry.topic} is used, {where}."
         )
     elif pose:
         notes.append(f"There is no odometry; {pose.topic} is used in its place.")
     elif not odometry and robot.base_frame:
         notes.append(
-            f"There is no odometry; it is drawn where its frames have "
+            f"There is no odometry; its pose comes from its frames, "
             f"{robot.base_frame} in {robot.root_frame}."
         )
     elif robot.tf_alone and robot.tf_namespace:
         notes.append(
-            f"There is no odometry; it is drawn where {robot.topic('tf')} has its base."
+            f"There is no odometry; its pose comes from the frames on "
+            f"{robot.topic('tf')}."
         )
     elif not odometry:
-        notes.append("Nothing says where it is, so it cannot be drawn or driven.")
+        notes.append("No topic gives its pose, so it cannot be drawn or driven.")
     for guess in robot.guesses.get("odometry", ())[1:]:
         notes.append(f"{guess.topic} is odometry too ({guess.rule}).")
     chosen = robot.first("velocity")
     others = [name for name in twists if name != robot.topic("velocity")]
     if chosen is None and others:
         notes.append(
-            f"No topic is surely its velocity; {', '.join(others)} "
-            f"{'carries' if len(others) == 1 else 'carry'} twists too."
+            f"Its velocity topic is unknown; "
+            f"{'a topic' if len(others) == 1 else 'topics'} with velocities: "
+            f"{', '.join(others)}."
         )
     elif chosen is None:
-        notes.append("Nothing takes velocity, so it can be seen and not driven.")
+        notes.append("No topic takes its velocity, so it can be seen but not driven.")
     elif others:
-        notes.append(f"Not used for driving, though of that type: {', '.join(others)}.")
+        notes.append(f"Not used for driving, but of that type: {', '.join(others)}.")
     return tuple(notes)
 
 
@@ -234,7 +236,7 @@ def _notes(topics: Mapping[str, str], robots: Sequence[FoundRobot]) -> tuple[str
     if not topics:
         return ("There are no topics.",)
     return (
-        f"There are {len(topics)} topics, and none says where a robot is "
+        f"There are {len(topics)} topics, but none gives the pose of a robot "
         f"(nav_msgs/Odometry, a pose named amcl_pose, or frames from map or odom to "
         f"base_link) or takes its velocity "
         f"(a Twist or TwistStamped named cmd_vel).",

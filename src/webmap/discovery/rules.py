@@ -54,8 +54,8 @@ class Rule:
     tail: str
     """Pattern for the end of the name, without the slash before it."""
 
-    words: str
-    """Why such a topic fits, for people."""
+    reason: str
+    """The reason why such a topic fits, for people."""
 
     unless: str = r"(?!)"
     """Pattern that must not occur anywhere in the name."""
@@ -70,11 +70,11 @@ RULES: tuple[Rule, ...] = (
         "odometry",
         ODOMETRY,
         r"(?:[^/]*ground_truth[^/]*)(?:/[^/]+)?",
-        "a simulator's truth, taken when there is nothing else",
+        "a simulator's ground truth, used if there is no other",
     ),
-    Rule("odometry", ODOMETRY, r"odom/sample", "a tracking camera's"),
+    Rule("odometry", ODOMETRY, r"odom/sample", "the odometry of a tracking camera"),
     Rule("odometry", ODOMETRY, r"[^/]+", "its type alone"),
-    Rule("pose", POSES[:1], r"amcl_pose", "where AMCL thinks that it is on the map"),
+    Rule("pose", POSES[:1], r"amcl_pose", "AMCL's pose on the map"),
     Rule("pose", POSES, r"(?:robot_pose|localization_pose)", "a localiser's pose"),
     Rule("pose", POSES, r"pose", "the usual name of a localiser's pose"),
     Rule("pose", BARE_POSES, r"robot_pose", "a robot's pose, without its frame"),
@@ -83,13 +83,18 @@ RULES: tuple[Rule, ...] = (
         "velocity",
         VELOCITY,
         r"webmap/cmd_vel",
-        "an input that was made for WebMap",
+        "an input made for WebMap",
     ),
     Rule("velocity", VELOCITY, r"cmd_vel", "the usual name"),
     Rule("velocity", VELOCITY, r"cmd_vel_unstamped", "a controller's plain input"),
     Rule("velocity", VELOCITY, r"commands/velocity", "the base's own input"),
-    Rule("velocity", VELOCITY, r"cmd_vel_mux/input/teleop", "a mux's input for hands"),
-    Rule("velocity", VELOCITY, r"input/teleop", "a mux's input for hands"),
+    Rule(
+        "velocity",
+        VELOCITY,
+        r"cmd_vel_mux/input/teleop",
+        "a mux's input for teleoperation",
+    ),
+    Rule("velocity", VELOCITY, r"input/teleop", "a mux's input for teleoperation"),
     Rule("scan", ("sensor_msgs/LaserScan",), r"scan", "the usual name"),
     Rule("scan", ("sensor_msgs/LaserScan",), r"base_scan", "the usual name of Stage"),
     Rule("scan", ("sensor_msgs/LaserScan",), r"[^/]+", "its type alone"),
@@ -107,43 +112,43 @@ RULES: tuple[Rule, ...] = (
         "goal",
         ("geometry_msgs/PoseStamped",),
         r"goal_pose",
-        "where Nav2 and RViz take goals",
+        "the goal topic of Nav2 and RViz",
     ),
     Rule(
         "goal",
         ("geometry_msgs/PoseStamped",),
         r"move_base_simple/goal",
-        "where move_base and RViz take goals",
+        "the goal topic of move_base and RViz",
     ),
     Rule(
         "action",
         ("nav2_msgs/NavigateToPose_FeedbackMessage",),
         r"navigate_to_pose/_action/feedback",
-        "Nav2's action, which says how a goal goes",
+        "Nav2's action, which reports the progress of a goal",
     ),
     Rule(
         "action",
         ("move_base_msgs/MoveBaseActionGoal",),
         r"move_base/goal",
-        "move_base's action, which says how a goal goes",
+        "move_base's action, which reports the progress of a goal",
     ),
     Rule(
         "initialpose",
         POSES[:1],
         r"initialpose",
-        "where AMCL and RViz take an initial pose",
+        "the initial pose topic of AMCL and RViz",
     ),
     Rule(
         "cancel",
         ("actionlib_msgs/GoalID",),
         r"move_base/cancel",
-        "where move_base calls goals off",
+        "the topic that cancels goals of move_base",
     ),
     Rule("costmap", GRID, r"[^/]*costmap[^/]*(?:/[^/]+)?", "named a costmap"),
     Rule("map", GRID, r"map", "the usual name"),
     Rule("map", GRID, r"[^/]+", "its type alone"),
     Rule("camera", CAMERA[:1], r"[^/]+/compressed", "compressed pictures", DEPTH),
-    Rule("camera", CAMERA[1:], r"[^/]*image[^/]*", "pictures, not packed", DEPTH),
+    Rule("camera", CAMERA[1:], r"[^/]*image[^/]*", "pictures, not compressed", DEPTH),
     Rule("camera", CAMERA[:1], r"[^/]+", "its type alone", DEPTH),
     Rule("camera", CAMERA[1:], r"[^/]+", "its type alone", DEPTH),
     Rule("cloud", ("sensor_msgs/PointCloud2",), r"[^/]+", "its type alone"),
@@ -164,7 +169,7 @@ class Match(NamedTuple):
     namespace: str
     topic: str
     type: str
-    words: str
+    reason: str
 
 
 def match(topic: str, type: str) -> Match | None:
@@ -180,7 +185,7 @@ def match(topic: str, type: str) -> Match | None:
         if found is not None:
             between = found["parts"].count("/")
             rank = (place, between, topic)
-            return Match(rule.role, rank, found["ns"], topic, type, rule.words)
+            return Match(rule.role, rank, found["ns"], topic, type, rule.reason)
     return None
 
 

@@ -7,17 +7,17 @@ from typing import TypeAlias
 import click
 
 from webmap.discovery import Findings
-from webmap.discovery.doctor import MeantRobot
+from webmap.discovery.doctor import ConfiguredRobot
 from webmap.discovery.found import ROLES, FoundRobot, Role
 from webmap.ros.names import normalise_url
 
-Meant: TypeAlias = Callable[[Findings], Sequence[MeantRobot]]
+Configured: TypeAlias = Callable[[Findings], Sequence[ConfiguredRobot]]
 """Returns the robots as they were configured, from the findings of a bridge."""
 
 
 def bridges_of(
     given: Sequence[str], robots: Sequence[str], settings: Sequence[str]
-) -> list[tuple[str, Meant]]:
+) -> list[tuple[str, Configured]]:
     """Return each bridge to check, with the settings for the robots behind it.
 
     Args:
@@ -33,32 +33,34 @@ def bridges_of(
 
     """
     files = [text for text in given if _is_file(text)]
-    said = bool(robots or settings)
-    if files and (said or len(given) > 1):
+    has_settings = bool(robots or settings)
+    if files and (has_settings or len(given) > 1):
         raise click.UsageError(
-            f"{files[0]} says which bridges and robots there are; leave out --robot, "
+            f"{files[0]} configures the bridges and the robots; leave out --robot, "
             "--set and other addresses"
         )
     if files:
         return _of_file(Path(files[0]))
-    if said and len(given) > 1:
+    if has_settings and len(given) > 1:
         raise click.UsageError(
-            f"--robot and --set are about what is behind one bridge, and {len(given)} "
-            "were given; ask for each by itself"
+            f"--robot and --set apply to the robots of one bridge, got {len(given)} "
+            "bridges; run the command once for each bridge"
         )
-    meant = _said(given[0], robots, settings) if said else _always(())
-    return [(normalise_url(text), meant) for text in given]
+    configured = (
+        _with_options(given[0], robots, settings) if has_settings else _always(())
+    )
+    return [(normalise_url(text), configured) for text in given]
 
 
 def _is_file(text: str) -> bool:
     return text.lower().endswith(".toml") and "://" not in text
 
 
-def _always(robots: Sequence[MeantRobot]) -> Meant:
+def _always(robots: Sequence[ConfiguredRobot]) -> Configured:
     return lambda _found: robots
 
 
-def _of_file(file: Path) -> list[tuple[str, Meant]]:
+def _of_file(file: Path) -> list[tuple[str, Configured]]:
     from webmap.features.doctor.in_use import Made, in_use
     from webmap.fleet.made import prepare
 
@@ -73,41 +75,45 @@ def _of_file(file: Path) -> list[tuple[str, Meant]]:
     ]
 
 
-def _said(url: str, robots: Sequence[str], settings: Sequence[str]) -> Meant:
+def _with_options(
+    url: str, robots: Sequence[str], settings: Sequence[str]
+) -> Configured:
     import webmap
-    from webmap.fleet.overrides import Overruling, parse_setting
-    from webmap.fleet.stated import told_robots
+    from webmap.fleet.given import given_robots
+    from webmap.fleet.overrides import Overrides, parse_setting
 
-    overruling = Overruling([parse_setting(text) for text in settings])
-    told = told_robots(robots, [webmap.Bridge(url)])
-    if told:
-        overruling.check([robot.found.name for robot in told], all_known=True)
-        return _always([_of_told(robot) for _, robot in overruling.tell(told)])
+    overrides = Overrides([parse_setting(text) for text in settings])
+    given = given_robots(robots, [webmap.Bridge(url)])
+    if given:
+        overrides.check([robot.found.name for robot in given], all_known=True)
+        return _always(
+            [_from_given(robot) for _, robot in overrides.apply_to_given(given)]
+        )
 
-    def overruled(found: Findings) -> Sequence[MeantRobot]:
-        overruling.check([robot.name for robot in found.robots], all_known=True)
-        better = overruling.findings(normalise_url(url), found).robots
+    def overridden(found: Findings) -> Sequence[ConfiguredRobot]:
+        overrides.check([robot.name for robot in found.robots], all_known=True)
+        better = overrides.findings(normalise_url(url), found).robots
         pairs = zip(found.robots, better, strict=True)
         return [_of_found(robot, there) for there, robot in pairs]
 
-    return overruled
+    return overridden
 
 
-def _of_told(robot: FoundRobot) -> MeantRobot:
+def _from_given(robot: FoundRobot) -> ConfiguredRobot:
     """Return a robot of ``--robot``; its other roles are as discovery found them."""
-    from webmap.fleet.overrides import TOLD
+    from webmap.fleet.overrides import SETTABLE_ROLES
 
-    roles: list[Role] = ["pose", *TOLD]
+    roles: list[Role] = ["pose", *SETTABLE_ROLES]
     if not robot.topic("odometry"):
         roles.append("tf")  # drawn by frames only if odometry names the frame
-    return MeantRobot(robot.name, _topics(robot, roles))
+    return ConfiguredRobot(robot.name, _topics(robot, roles))
 
 
-def _of_found(robot: FoundRobot, there: FoundRobot) -> MeantRobot:
+def _of_found(robot: FoundRobot, there: FoundRobot) -> ConfiguredRobot:
     """Return the roles of a found robot that the settings change."""
     roles = [r for r in ROLES if robot.guesses.get(r) != there.guesses.get(r)]
     topics = _topics(robot, roles)
-    return MeantRobot(robot.name, topics, robot.base_frame, found_as=there.name)
+    return ConfiguredRobot(robot.name, topics, robot.base_frame, found_as=there.name)
 
 
 def _topics(

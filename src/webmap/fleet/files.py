@@ -10,7 +10,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.base.local_plane import LocalPlane
-from webmap.config.checks import Mistakes, Way
+from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.fleet import ImageConfig, TilesConfig
 from webmap.config.robot import PictureConfig
 from webmap.core.pictures import pictures
@@ -32,8 +32,11 @@ def check_floor(floor: Path, mistakes: Mistakes) -> None:
     from webmap.console.floor import load_floor
 
     if floor.suffix.lower() in PICTURES:
-        words = f"got the picture {str(floor)!r}, expected the YAML file beside it"
-        mistakes.add(("floor",), f"{words}, which says where it lies")
+        mistakes.add(
+            ("floor",),
+            f"got the picture {str(floor)!r}, expected the YAML file that names it and "
+            "its position",
+        )
         return
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -60,21 +63,21 @@ def check_images(
 
 
 def publish_picture(
-    picture: PictureConfig, folder: Path, way: Way, mistakes: Mistakes
+    picture: PictureConfig, folder: Path, path: KeyPath, mistakes: Mistakes
 ) -> str:
     """Return the URL from which pages load the picture of a robot.
 
     Args:
         picture: The picture.
         folder: Folder to which its file is relative.
-        way: The keys that lead to it.
+        path: The keys that lead to it.
         mistakes: Receives the mistakes; there is no URL then.
 
     """
     try:
         data, media_type = picture_file(folder / picture.file)
     except (ConfigError, OSError) as error:
-        mistakes.add((*way, "file"), str(error))
+        mistakes.add((*path, "file"), str(error))
         return ""
     return pictures.publish(data, media_type)
 
@@ -100,11 +103,11 @@ def label_options(places: Any, folder: Path, mistakes: Mistakes) -> dict[str, An
     return {"file": str(file.absolute())}
 
 
-def _check_label(label: Any, way: Way, mistakes: Mistakes) -> None:
+def _check_label(label: Any, path: KeyPath, mistakes: Mistakes) -> None:
     there = label if isinstance(label, dict) else NEEDED
     missing = [key for key in NEEDED if key not in there]
     for key in missing:
-        mistakes.add(way, f'the key "{key}" is missing')
+        mistakes.add(path, f'the key "{key}" is missing')
     if missing:
         return
     try:
@@ -112,7 +115,7 @@ def _check_label(label: Any, way: Way, mistakes: Mistakes) -> None:
     except ConfigError as error:
         # The label was read as item 0 of a list; its index in the file may differ.
         _, *inner = getattr(error, "path", (0,))
-        mistakes.add((*way, *inner), getattr(error, "text", str(error)))
+        mistakes.add((*path, *inner), getattr(error, "text", str(error)))
 
 
 def tile_options(
@@ -147,7 +150,7 @@ def picture_file(file: Path) -> tuple[bytes, str]:
     known = [end for end, type in MEDIA_TYPES.items() if type.startswith("image/")]
     if file.is_file() and file.suffix.lower() not in known:
         raise ConfigError(
-            f"{str(file)!r} is no picture: its name must end in {' '.join(known)}"
+            f"{str(file)!r} is not a picture: its name must end in {' '.join(known)}"
         )
     published = Published()  # raises errors of the file itself
     found = published.image(published.publish_image(file).removeprefix(IMAGES))
@@ -160,7 +163,7 @@ def picture_file(file: Path) -> tuple[bytes, str]:
 
 def _check_svg(file: Path, data: bytes) -> None:
     if b"<svg" not in data[: 1 << 16]:
-        raise ConfigError(f"{str(file)!r} is no SVG: it has no element <svg>")
+        raise ConfigError(f"{str(file)!r} is not an SVG: it has no element <svg>")
 
 
 def _check_pixels(file: Path, data: bytes) -> None:
@@ -172,8 +175,8 @@ def _check_pixels(file: Path, data: bytes) -> None:
             image.verify()
     except Exception as error:  # each picture format has its own errors
         raise ConfigError(
-            f"{str(file)!r} is no picture that can be read: expected what its suffix "
-            f"{file.suffix} says, whole; got {_in_words(error)}"
+            f"{str(file)!r} cannot be read: expected a complete picture in the format "
+            f"of its suffix {file.suffix}, got {_reason(error)}"
         ) from None
     if width * height > MOST_PIXELS:
         raise ConfigError(
@@ -182,9 +185,9 @@ def _check_pixels(file: Path, data: bytes) -> None:
         )
 
 
-def _in_words(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     from PIL import UnidentifiedImageError
 
     if isinstance(error, UnidentifiedImageError):
-        return "something else"
+        return "another format"
     return str(error) or type(error).__name__

@@ -8,13 +8,13 @@ from urllib.parse import urlsplit
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.discovery import Findings, discover
-from webmap.discovery.hearing import hear_frames
+from webmap.discovery.frame_listening import receive_frames
 from webmap.discovery.naming import free_name, unique_names
 from webmap.discovery.robots import host_name
 from webmap.ros.asking import ask_topics
 
-TELL = (
-    "Say what there is: --robot NAME:ODOM:CMD_VEL:SCAN, "
+LIST_ROBOTS = (
+    "List each robot with --robot NAME:ODOM:CMD_VEL:SCAN, "
     "as in --robot Bob:/odom:/cmd_vel:/scan; "
     "or give webmap discover a list of the topics with --topics"
 )
@@ -41,10 +41,10 @@ class Found:
         if isinstance(self.trouble, BridgeClosed):
             return f"{self.trouble}."
         if self.trouble is not None:
-            reason = f"it has no rosapi that says its topics: {self.trouble}"
+            reason = f"it has no rosapi that lists its topics: {self.trouble}"
         else:
             reason = " ".join(self.findings.notes).rstrip(".")
-        return f"{self.url}: {reason}. {TELL}"
+        return f"{self.url}: {reason}. {LIST_ROBOTS}"
 
 
 async def find(
@@ -69,8 +69,8 @@ async def find(
         [(name, one) for name, (one, _, _) in zip(names, asked, strict=True)]
     )
     return [
-        Found(url, label, findings, trouble, said)
-        for url, label, findings, (_, said, trouble) in zip(
+        Found(url, label, findings, trouble, listed)
+        for url, label, findings, (_, listed, trouble) in zip(
             urls, names, named, asked, strict=True
         )
     ]
@@ -102,4 +102,4 @@ async def _ask(
 
 
 async def _behind(url: str, topics: Mapping[str, str]) -> Findings:
-    return discover(topics, host_name(url), await hear_frames(url, topics))
+    return discover(topics, host_name(url), await receive_frames(url, topics))

@@ -1,4 +1,4 @@
-"""The robots behind bridges, found or given by hand, for the console."""
+"""The robots behind bridges, found or given with ``--robot``, for the console."""
 
 import asyncio
 from collections.abc import Mapping, Sequence
@@ -12,11 +12,11 @@ from webmap.config.checks import same_name
 from webmap.discovery import FoundRobot
 from webmap.discovery.naming import free_name
 from webmap.discovery.rules import VELOCITY
-from webmap.discovery.words import OVERRULE, drawn_table, in_one_line, robot_table
+from webmap.discovery.tables import OVERRULE, drawn_table, robot_table, summary_line
 from webmap.fleet.find import Found, find
-from webmap.fleet.overrides import TOLD, Overruling
+from webmap.fleet.given import Candidate, offer, set_twice
+from webmap.fleet.overrides import SETTABLE_ROLES, Overrides
 from webmap.fleet.shown import ShownRobot, ShownRobots
-from webmap.fleet.stated import Candidate, offer, set_twice
 from webmap.fleet.watch import LookingForLayers, LookingForRobots, on_page
 from webmap.ros.names import is_topic, is_type, normalise_topic
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 class FoundFleet:
     """The robots that were found, and the data for later searches."""
 
-    told: list[Candidate]
-    """Robots that were given by hand; the console has them already."""
+    given: list[Candidate]
+    """Robots given with ``--robot``; the console has them already."""
 
     robots: list[Candidate] = field(default_factory=list)
     """Robots that were found."""
@@ -38,25 +38,25 @@ class FoundFleet:
     behind: "dict[Bridge, Found]" = field(default_factory=dict)
     """The findings of each bridge, before any settings."""
 
-    overruling: Overruling = field(default_factory=Overruling)
+    overrides: Overrides = field(default_factory=Overrides)
     """The settings of robots."""
 
-    def table(self, *, grid: bool, as_told: bool) -> str:
+    def table(self, *, grid: bool, only_given: bool) -> str:
         """Return the topics that the page uses and draws, with reasons, for people.
 
         Args:
             grid: Whether the robots' own maps are shown under them.
-            as_told: Whether only the given topics of robots given by hand are drawn.
+            only_given: Whether only the topics given with ``--robot`` are drawn.
 
         """
         lines: list[str] = []
         taken: set[tuple[Bridge, str]] = set()
-        for bridge, told in self.told:
-            lines += ["", f"{told.name} (told with --robot)", *_told_table(told)]
+        for bridge, given in self.given:
+            lines += ["", f"{given.name} (from --robot)", *_given_table(given)]
             found = self.behind.get(bridge)
-            if found is None or as_told:
+            if found is None or only_given:
                 continue
-            there = offer(told, found.topics, found.findings)
+            there = offer(given, found.topics, found.findings)
             if (bridge, there.namespace) not in taken:  # it is drawn once
                 taken.add((bridge, there.namespace))
                 lines += drawn_table(there.namespace, on_page(there.layers, grid))
@@ -65,7 +65,7 @@ class FoundFleet:
             findings = self.behind[bridge].findings
             space = robot.namespace
             guessed = next(r for r in findings.robots if r.namespace == space)
-            layers = self.overruling.layers(bridge.url, findings, guessed)
+            layers = self.overrides.layers(bridge.url, findings, guessed)
             lines += drawn_table(space, on_page(layers, grid))
         if self.robots:
             lines += ["", OVERRULE]
@@ -76,33 +76,33 @@ class FoundFleet:
         console: "Console",
         *,
         grid: bool = True,
-        as_told: bool = False,
+        only_given: bool = False,
         topics: Mapping[str, str] | None = None,
     ) -> None:
         """Show the robots found now and later, and all their topics that can be drawn.
 
         Args:
-            console: The console, opened with the robots that were given by hand.
+            console: The console, opened with the robots given with ``--robot``.
             grid: Whether the robots' own maps are shown under them.
-            as_told: Whether only the given topics of robots given by hand are drawn.
+            only_given: Whether only the topics given with ``--robot`` are drawn.
             topics: Types by topic, if a bridge does not list them.
 
         """
-        shown = ShownRobots(console, self.overruling, told=self.told, grid=grid)
+        shown = ShownRobots(console, self.overrides, given=self.given, grid=grid)
         for robot in self.robots:
             shown.add(robot)
         for bridge, one in self.behind.items():
             robots = one.findings.robots
             _services.append(LookingForRobots(bridge, robots, shown.came))
-        config = self.overruling.config
-        told = [
+        config = self.overrides.config
+        given = [
             ShownRobot(bridge, found, made, config(bridge.url, found))
-            for (bridge, found), made in zip(self.told, console.told, strict=True)
-            if not as_told
+            for (bridge, found), made in zip(self.given, console.told, strict=True)
+            if not only_given
         ]
-        bridges = dict.fromkeys([*self.behind, *(robot.bridge for robot in told)])
+        bridges = dict.fromkeys([*self.behind, *(robot.bridge for robot in given)])
         for bridge in bridges:
-            looking = LookingForLayers(bridge, shown, told=told, topics=topics)
+            looking = LookingForLayers(bridge, shown, given=given, topics=topics)
             _services.append(looking)
 
 
@@ -112,66 +112,66 @@ _services: list[object] = []
 
 def find_fleet(
     bridges: Sequence["Bridge"],
-    told: Sequence[Candidate],
+    given: Sequence[Candidate],
     *,
     wait: float,
     topics: Mapping[str, str] | None = None,
-    overruling: Overruling | None = None,
+    overrides: Overrides | None = None,
 ) -> FoundFleet:
     """Return the robots behind bridges, and print the findings on standard error.
 
     Args:
         bridges: The bridges.
-        told: Robots that were given by hand; each replaces one that is found.
+        given: Robots given with ``--robot``; each replaces the found robot.
         wait: How long to wait for an unreachable bridge, in seconds.
         topics: Types by topic, if the bridge does not list them.
-        overruling: The settings of robots.
+        overrides: The settings of robots.
 
     Raises:
         ConfigError: If a setting names a robot that does not exist, or gives a robot
             the name of another one.
 
     """
-    overruling = overruling or Overruling()
+    overrides = overrides or Overrides()
     found = asyncio.run(
         find([bridge.url for bridge in bridges], wait=wait, topics=topics)
     )
     names = [robot.name for one in found for robot in one.findings.robots]
     missing = any(isinstance(one.trouble, BridgeClosed) for one in found)
-    names += [robot.found.name for robot in told]
-    for sentence in overruling.check(names, all_known=not missing):
+    names += [robot.found.name for robot in given]
+    for sentence in overrides.check(names, all_known=not missing):
         echo(sentence, err=True)
-    fleet = FoundFleet([], overruling=overruling)
+    fleet = FoundFleet([], overrides=overrides)
     behind = {bridge: one.topics for bridge, one in zip(bridges, found, strict=True)}
-    for bridge, robot in overruling.tell(told):
-        fleet.told.append(Candidate(bridge, _typed(robot, behind[bridge])))
-    taken = {same_name(other.found.name) for other in fleet.told}
+    for bridge, robot in overrides.apply_to_given(given):
+        fleet.given.append(Candidate(bridge, _typed(robot, behind[bridge])))
+    taken = {same_name(other.found.name) for other in fleet.given}
     for bridge, one in zip(bridges, found, strict=True):
         if one.why:
             echo(one.why, err=True)
-        for robot in overruling.findings(bridge.url, one.findings).robots:
+        for robot in overrides.findings(bridge.url, one.findings).robots:
             robot = _typed(robot, one.topics)
-            if any(o.is_also(Candidate(bridge, robot)) for o in fleet.told):
+            if any(o.is_also(Candidate(bridge, robot)) for o in fleet.given):
                 continue
-            if same_name(robot.name) in taken and overruling.names(robot.name):
+            if same_name(robot.name) in taken and overrides.names(robot.name):
                 raise set_twice(robot.name)
             robot = replace(robot, name=free_name(robot.name, taken))
-            echo(f"Found {in_one_line(robot)}", err=True)
+            echo(f"Found {summary_line(robot)}", err=True)
             fleet.robots.append(Candidate(bridge, robot))
         fleet.behind[bridge] = one
     return fleet
 
 
-def told_fleet(
-    bridges: Sequence["Bridge"], told: Sequence[Candidate], *, wait: float
+def given_fleet(
+    bridges: Sequence["Bridge"], given: Sequence[Candidate], *, wait: float
 ) -> FoundFleet:
-    """Return robots that were given by hand, with the findings of their bridges.
+    """Return robots given with ``--robot``, with the findings of their bridges.
 
     Prints on standard error if a bridge does not list its topics.
 
     Args:
         bridges: The bridges.
-        told: The robots.
+        given: The robots.
         wait: How long to wait for an unreachable bridge, in seconds.
 
     """
@@ -179,11 +179,10 @@ def told_fleet(
     for one in found:
         if one.trouble is not None:
             echo(
-                f"{one.url}: {one.trouble}. No more is known of what can be drawn "
-                f"than was told with --robot.",
+                f"{one.url}: {one.trouble}. Only the topics of --robot can be drawn.",
                 err=True,
             )
-    return FoundFleet([*told], behind=dict(zip(bridges, found, strict=True)))
+    return FoundFleet([*given], behind=dict(zip(bridges, found, strict=True)))
 
 
 def _typed(robot: FoundRobot, topics: Mapping[str, str]) -> FoundRobot:
@@ -199,10 +198,14 @@ def _typed(robot: FoundRobot, topics: Mapping[str, str]) -> FoundRobot:
     return replace(robot, guesses={**robot.guesses, "velocity": typed})
 
 
-def _told_table(robot: FoundRobot) -> list[str]:
+def _given_table(robot: FoundRobot) -> list[str]:
     """Return the given topics of a robot, one on each line."""
-    said = [(role, guess) for role in TOLD for guess in robot.guesses.get(role, ())]
+    listed = [
+        (role, guess)
+        for role in SETTABLE_ROLES
+        for guess in robot.guesses.get(role, ())
+    ]
     return [
         f"  {role:<11} {guess.topic}{f'  {guess.type}' if guess.type else ''}"
-        for role, guess in said
+        for role, guess in listed
     ]

@@ -10,7 +10,7 @@ import webmap
 from webmap import console
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.map_file import read_map
-from webmap.config.checks import Mistakes, Way, WrongConfig
+from webmap.config.checks import KeyPath, Mistakes, WrongConfig
 from webmap.config.fleet import FleetConfig, read_fleet
 from webmap.config.robot import MOTION, ModuleConfig, RobotConfig
 from webmap.config.secrets import readable_secret
@@ -71,7 +71,7 @@ def prepare(file: Path) -> ReadyFleet:
     """
     text, mistakes = read_text(file), Mistakes()
     fleet = read_fleet(text.data, mistakes)
-    wrong = {way[:1] for way in mistakes.wrong}
+    wrong = {path[:1] for path in mistakes.wrong}
     if ("bridges",) in wrong:
         text.refuse(mistakes)
     warning = readable_secret(file, text.data)
@@ -126,32 +126,32 @@ def make_robots(
             out, so that mistakes in other parts are found too.
 
     """
-    wrong: dict[object, list[Way]] = {}
+    wrong: dict[object, list[KeyPath]] = {}
     for each in mistakes.wrong:
         if each[:1] == ("robots",) and len(each) > 1:
             wrong.setdefault(each[1], []).append(each)
     robots = []
     for index, made in enumerate(fleet.robots):
-        way: Way = ("robots", index)
+        path: KeyPath = ("robots", index)
         config = _without(made, wrong.get(index, []))
         if config is None:
             continue
         picture = ""
         if config.picture is not None:
-            where = (*way, "picture")
+            where = (*path, "picture")
             picture = publish_picture(config.picture, folder, where, mistakes)
         try:
             robots.append(console.make_robot(config, bridges, picture))
         except WrongConfig as error:
-            mistakes.take(way, error.mistakes)
+            mistakes.take(path, error.mistakes)
     return robots
 
 
-def _without(config: RobotConfig, wrong: list[Way]) -> RobotConfig | None:
+def _without(config: RobotConfig, wrong: list[KeyPath]) -> RobotConfig | None:
     """Return a robot without its wrong parts; None if no robot remains."""
     plain = RobotConfig(name=config.name)
-    for way in wrong:
-        key = str(way[2]) if len(way) > 2 else "name"
+    for path in wrong:
+        key = str(path[2]) if len(path) > 2 else "name"
         if key in ("name", "bridge"):
             return None
         if hasattr(plain, key) or key in MOTION:  # else there is no such key
@@ -176,34 +176,34 @@ def check_modules(
     """
     found = []
     for index, module in enumerate(modules):
-        way: Way = ("modules", index)
+        path: KeyPath = ("modules", index)
         name, args, options = module_call(module, bridges.__getitem__)
         try:
             check_arguments(map_modules[name], args, options)
         except WrongArguments as error:
             for wrong in error.wrong:
-                mistakes.add((*way, *wrong.path), wrong_argument(module, wrong))
+                mistakes.add((*path, *wrong.path), wrong_argument(module, wrong))
         except WebMapError as error:
-            mistakes.add((*way, "name"), str(error))
+            mistakes.add((*path, "name"), str(error))
         else:
             if name == "MapFile":
-                args, options = _map_file(module, folder, way, mistakes)
+                args, options = _map_file(module, folder, path, mistakes)
             found.append(MapModule(name, args, options))
     return found
 
 
 def _map_file(
-    module: ModuleConfig, folder: Path, way: Way, mistakes: Mistakes
+    module: ModuleConfig, folder: Path, path: KeyPath, mistakes: Mistakes
 ) -> tuple[tuple[Any, ...], dict[str, Any]]:
     """Return the arguments of a map file, which is read to check that it is a map."""
     options = dict(module.options)
     name, *others = [options.pop("file")] if "file" in options else module.args
-    inner: Way = ("options", "file") if "file" in module.options else ("args", 0)
+    inner: KeyPath = ("options", "file") if "file" in module.options else ("args", 0)
     file = (folder / name).absolute()
     try:
         read_map(file)
     except (ConfigError, OSError) as error:
-        mistakes.add((*way, *inner), str(error))
+        mistakes.add((*path, *inner), str(error))
     return (str(file), *others), options
 
 
@@ -225,8 +225,8 @@ def show_scenery(shown: console.Console, ready: ReadyFleet) -> None:
     for image in ready.images:
         shown.add_image(*image)
     for grid in ready.fleet.map:
-        said = {"palette": grid.palette, "order": grid.order}
-        chosen = {key: value for key, value in said.items() if value is not None}
+        options = {"palette": grid.palette, "order": grid.order}
+        chosen = {key: value for key, value in options.items() if value is not None}
         shown.add_grid(ready.bridges[grid.bridge], grid.topic, **chosen)
     for module in ready.others:
         shown.add_module(module.name, *module.args, **module.options)

@@ -21,23 +21,23 @@ from webmap.discovery.found import (
 from webmap.discovery.layers import is_own, role_of
 from webmap.discovery.robots import host_name
 from webmap.discovery.rules import VELOCITY
-from webmap.fleet.stated import Candidate, check_name, set_twice
+from webmap.fleet.given import Candidate, check_name, set_twice
 from webmap.ros.names import is_topic, is_type
 
 FORM = "ROBOT.ROLE=TOPIC, as in robot_1.scan=/robot_1/front/scan"
 
-RULE = "said with --set"
+RULE = "from --set"
 
 USED: tuple[str, ...] = tuple(
     role for role in ROLES if role not in ("pose", "costmap", "cloud")
 )
-"""Roles of which a robot on the page uses the best topic only."""
+"""Roles that --set can change."""
 
-WORDS = ("name", "base", "velocity_type")
+OTHER_KEYS = ("name", "base", "velocity_type")
 """Keys of settings that are no topics: the robot's name, the frame of its base, and
 the type of its velocity topic."""
 
-TOLD: tuple[Role, ...] = (
+SETTABLE_ROLES: tuple[Role, ...] = (
     "odometry",
     "velocity",
     "scan",
@@ -66,7 +66,7 @@ class Setting:
 
     robot: str
     key: str
-    """A role, or one of ``WORDS``."""
+    """A role, or one of ``OTHER_KEYS``."""
 
     values: tuple[str, ...]
     """Topics, or one value; empty if the robot has none of that role."""
@@ -87,20 +87,20 @@ def parse_setting(text: str) -> Setting:
     robot, dot, key = (part.strip() for part in left.rpartition("."))
     if not (sign and dot and robot):
         raise ConfigError(f"--set {text!r} is not of the form {FORM}")
-    if key not in (*USED, *WORDS):
-        near = difflib.get_close_matches(key, (*USED, *WORDS), n=1)
+    if key not in (*USED, *OTHER_KEYS):
+        near = difflib.get_close_matches(key, (*USED, *OTHER_KEYS), n=1)
         hint = f"; did you mean {near[0]!r}?" if near else "."
         raise ConfigError(
             f"--set {text!r}: there is no role {key!r}{hint} The roles are "
-            f"{', '.join(USED)}; and there are {', '.join(WORDS)}"
+            f"{', '.join(USED)}; the other keys are {', '.join(OTHER_KEYS)}"
         )
-    if key in WORDS:
+    if key in OTHER_KEYS:
         if not value.strip():
             raise ConfigError(f"--set {text!r}: a {key} has at least one character")
         if key == "velocity_type" and not is_type(value.strip(), *VELOCITY):
             raise ConfigError(
-                f"--set {text!r}: {value.strip()!r} is no type that drives a base; "
-                f"there are {' and '.join(VELOCITY)}"
+                f"--set {text!r}: got the type {value.strip()!r}, expected "
+                f"{' or '.join(VELOCITY)}"
             )
         check_name(value.strip(), f"--set {text!r}")
         return Setting(text, robot, key, (value.strip(),))
@@ -112,13 +112,13 @@ def parse_setting(text: str) -> Setting:
     for topic in topics:
         if not (topic.startswith("/") and is_topic(topic)):
             raise ConfigError(
-                f"--set {text!r}: {topic!r} is no name of a topic; it begins with a "
-                "slash, as in /robot_1/scan"
+                f"--set {text!r}: {topic!r} is not the name of a topic; a name begins "
+                "with a slash, as in /robot_1/scan"
             )
     return Setting(text, robot, key, topics)
 
 
-class Overruling:
+class Overrides:
     """The settings of a command line, and the robots that they apply to.
 
     Args:
@@ -150,28 +150,28 @@ class Overruling:
             config = config.with_part("twist", known)
         return config.with_part("cameras", cameras)
 
-    def tell(self, robots: Sequence[Candidate]) -> list[Candidate]:
+    def apply_to_given(self, robots: Sequence[Candidate]) -> list[Candidate]:
         """Return robots of ``--robot`` with their further settings applied.
 
         Raises:
             ConfigError: If a setting is not possible for such a robot.
 
         """
-        told: list[Candidate] = []
+        given: list[Candidate] = []
         for robot in robots:
             settings = self._of(robot.found.name)
             for setting in settings:
-                if setting.key not in (*TOLD, "name", "velocity_type"):
+                if setting.key not in (*SETTABLE_ROLES, "name", "velocity_type"):
                     raise ConfigError(
                         f"--set {setting.text!r}: a robot of --robot has no "
                         f"{setting.key}; leave --robot out, so that it is found, or "
                         "write a fleet file"
                     )
-            named = _overruled(robot.found, settings, None)
-            if any(same_name(named.name) == same_name(o.found.name) for o in told):
+            named = _with_settings(robot.found, settings, None)
+            if any(same_name(named.name) == same_name(o.found.name) for o in given):
                 raise set_twice(named.name)
-            told.append(Candidate(robot.bridge, named))
-        return told
+            given.append(Candidate(robot.bridge, named))
+        return given
 
     def apply(
         self, url: str, robot: FoundRobot, dialect: str | None = None
@@ -189,7 +189,7 @@ class Overruling:
         settings = self._of(known)
         if settings:
             self._robots[place] = known
-        return _overruled(robot, settings, dialect)
+        return _with_settings(robot, settings, dialect)
 
     def fixed(self, url: str, robot: FoundRobot) -> frozenset[str]:
         """Return the roles of a robot that later topics may not take."""
@@ -206,14 +206,14 @@ class Overruling:
 
         """
         fixed = self.fixed(url, robot)
-        overruled = {
+        overridden = {
             (role, guess.topic)
             for role, guesses in robot.guesses.items()
             if role in fixed
             for guess in guesses
         }
         drawn, others = findings.layers[robot.namespace]
-        kept = [each for each in drawn if (role_of(each), each.topic) not in overruled]
+        kept = [each for each in drawn if (role_of(each), each.topic) not in overridden]
         return Layers(tuple(kept), others)
 
     def names(self, name: str) -> bool:
@@ -263,7 +263,7 @@ class Overruling:
         return [setting for setting in self._settings if setting.robot == name]
 
 
-class Watched(Overruling):
+class Watched(Overrides):
     """No settings: every robot stays as discovery found it.
 
     Args:
@@ -311,7 +311,7 @@ def shared_map(found: FoundRobot) -> str:
     return guess.topic if shared or guess.rule == RULE else ""
 
 
-def _overruled(
+def _with_settings(
     robot: FoundRobot, settings: Sequence[Setting], dialect: str | None
 ) -> FoundRobot:
     """Return a robot with its settings applied."""
@@ -324,10 +324,10 @@ def _overruled(
             robot = replace(robot, base_frame=setting.values[0])
         elif setting.key != "velocity_type":
             role = next(role for role in ROLES if role == setting.key)
-            said = _guesses(role, setting.values, guesses.get(role, ()), dialect)
+            new = _guesses(role, setting.values, guesses.get(role, ()), dialect)
             guesses.pop(role, None)
-            if said:
-                guesses[role] = said
+            if new:
+                guesses[role] = new
             if role == "odometry":
                 # The setting excludes every other source of the pose.
                 guesses.pop("pose", None)

@@ -21,9 +21,9 @@ from webmap.discovery.found import FoundLayer, Role
 from webmap.discovery.layers import TRAIL, drawing, topic_of, with_layers
 from webmap.discovery.naming import free_name
 from webmap.discovery.newcomers import News
-from webmap.discovery.words import in_one_line
-from webmap.fleet.overrides import Overruling, shared_map
-from webmap.fleet.stated import Candidate
+from webmap.discovery.tables import summary_line
+from webmap.fleet.given import Candidate
+from webmap.fleet.overrides import Overrides, shared_map
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
@@ -48,7 +48,7 @@ PARTS: Mapping[Role, str] = {
 
 @dataclass(slots=True, eq=False)
 class ShownRobot:
-    """A robot that is shown, found or given by hand."""
+    """A robot that is shown, found or given with ``--robot``."""
 
     bridge: "Bridge"
     found: FoundRobot
@@ -68,9 +68,9 @@ class ShownRobot:
     def use(self, config: RobotConfig) -> set[Any]:
         """Change the robot, and log and return the keys that cannot be used."""
         mistakes = self.change(config).found
-        for way, words in mistakes:
-            log.error("%s: its %s is not used: %s", self.robot.name, way[0], words)
-        return {way[0] for way, _ in mistakes}
+        for path, message in mistakes:
+            log.error("%s: its %s is not used: %s", self.robot.name, path[0], message)
+        return {path[0] for path, _ in mistakes}
 
     def news_of_topics(self, topics: Iterable[str]) -> list[str]:
         """Return the topics that are new since the last call."""
@@ -90,7 +90,7 @@ class ShownRobot:
 
         """
         config, before = self.config, self.robot.tf
-        news = told = []
+        drawn = frames = []
         if tf is not None:
             config = config.with_part("tf", tf)
         for key in ("initial_pose", "move"):
@@ -98,13 +98,13 @@ class ShownRobot:
             if part is not None and part.frame != frame:
                 part = msgspec.structs.replace(part, frame=frame)
                 config = config.with_part(key, part)
-                told = [f"told goals and its place in {frame}"]
+                frames = [f"takes goals and its initial pose in the frame {frame}"]
         self.use(config)
         now = self.robot.tf
         if before and now and {**before, "quiet": now["quiet"]} != now:
-            news = [f"drawn where {now['map_frame']} has {now['base_frame']}"]
-        said = " and ".join([*news, *told])
-        return f"{self.robot.name} is {said} from now on" if said else ""
+            drawn = [f"is drawn by {now['base_frame']} in {now['map_frame']}"]
+        changes = " and ".join([*drawn, *frames])
+        return f"{self.robot.name} now {changes}" if changes else ""
 
 
 class ShownRobots:
@@ -112,8 +112,8 @@ class ShownRobots:
 
     Args:
         console: The console that shows them.
-        overruling: Settings that replace guesses.
-        told: Robots that were given by hand; each replaces one that is found.
+        overrides: Settings that replace guesses.
+        given: Robots given with ``--robot``; each replaces the found robot.
         grid: Whether the robots' own maps are shown under them.
 
     """
@@ -121,16 +121,16 @@ class ShownRobots:
     def __init__(
         self,
         console: Console,
-        overruling: Overruling | None = None,
+        overrides: Overrides | None = None,
         *,
-        told: Sequence[Candidate] = (),
+        given: Sequence[Candidate] = (),
         grid: bool = True,
     ) -> None:
-        self.overruling = overruling or Overruling()
+        self.overrides = overrides or Overrides()
         self.grid = grid
         self._console = console
-        self._told = told
-        self._names = {same_name(robot.found.name) for robot in told}
+        self._given = given
+        self._names = {same_name(robot.found.name) for robot in given}
         self._places: dict[tuple[Bridge, str], ShownRobot] = {}
 
     @property
@@ -147,7 +147,7 @@ class ShownRobots:
         bridge, found = robot
         self._show_map(robot)
         self._names.add(same_name(found.name))
-        config = self.overruling.config(bridge.url, found)
+        config = self.overrides.config(bridge.url, found)
         with no_scope():
             made = make_robot(config, [bridge])
             store.restore(made)
@@ -159,29 +159,29 @@ class ShownRobots:
         """Show news, and report it on standard error.
 
         If the name of a new robot is taken, the name of its bridge is added. A robot
-        that was given by hand is no news.
+        given with ``--robot`` is no news.
 
         Args:
             news: The news.
             bridge: The bridge that the robot is behind.
 
         """
-        robot = Candidate(bridge, self.overruling.apply(bridge.url, news.robot))
+        robot = Candidate(bridge, self.overrides.apply(bridge.url, news.robot))
         self._show_map(robot)
         if news.roles or news.moved:
             shown = self.get(bridge, robot.found.namespace)
-            if shown is not None:  # else it was given by hand, with all its topics
+            if shown is not None:  # else it is a robot of ``--robot``
                 for sentence in self._update(shown, robot.found, news):
                     notify(sentence)
             return
-        if any(other.is_also(robot) for other in self._told):
+        if any(other.is_also(robot) for other in self._given):
             return
         wanted = robot.found.name
         if same_name(wanted) in self._names:
             wanted = f"{wanted} ({urlsplit(bridge.url).netloc})"
         named = replace(robot.found, name=free_name(wanted, self._names))
         self.add(Candidate(bridge, named))
-        notify(f"A robot appeared behind {bridge.url}: {in_one_line(named)}")
+        notify(f"A robot appeared behind {bridge.url}: {summary_line(named)}")
 
     def draw(
         self, shown: ShownRobot, layers: Iterable[FoundLayer], namespace: str
@@ -207,9 +207,12 @@ class ShownRobots:
         config = with_layers(shown.config, fresh, namespace)
         if TRAIL not in config.modules:
             config = config.with_part("modules", [*config.modules, TRAIL])
-        topics = {layer.way: topic_of(layer.module) for layer in config.layers()}
+        topics = {layer.path: topic_of(layer.module) for layer in config.layers()}
         mistakes = shown.change(config).found
-        for topic, why in [*wrong, *((topics[way[:2]], why) for way, why in mistakes)]:
+        for topic, why in [
+            *wrong,
+            *((topics[path[:2]], why) for path, why in mistakes),
+        ]:
             log.warning("%s: %s is not drawn: %s", shown.robot.name, topic, why)
 
     def _show_shared(self, bridge: "Bridge", layer: FoundLayer, namespace: str) -> None:
@@ -235,8 +238,8 @@ class ShownRobots:
         stays as it is: a change of a topic that moves the robot would end its lease.
         """
         bridge = shown.bridge
-        fixed = self.overruling.fixed(bridge.url, news.robot)
-        wanted = self.overruling.config(bridge.url, found)
+        fixed = self.overrides.fixed(bridge.url, news.robot)
+        wanted = self.overrides.config(bridge.url, found)
         drawn = {topic_of(layer.module) for layer in shown.config.layers()}
         new, used = shown.config, []
         for role in news.roles:
@@ -245,7 +248,7 @@ class ShownRobots:
             key = PARTS[role]
             old, part, topics = new.part(key), wanted.part(key), [found.topic(role)]
             if isinstance(part, list):
-                own = [layer for layer in wanted.layers() if layer.way[0] == key]
+                own = [layer for layer in wanted.layers() if layer.path[0] == key]
                 more = {
                     topic_of(layer.module): each
                     for layer, each in zip(own, part, strict=True)
@@ -256,8 +259,8 @@ class ShownRobots:
                 used += [(key, f"{role} {topic}") for topic in topics]
             new = new.with_part(key, part)
         wrong = shown.use(new)
-        words = ", ".join(said for key, said in used if key not in wrong)
-        sentences = [f"{shown.robot.name} has more now: {words}"] if words else []
+        listed = ", ".join(topic for key, topic in used if key not in wrong)
+        sentences = [f"{shown.robot.name} has new topics: {listed}"] if listed else []
         if news.moved and "tf" not in fixed:
             sentences.append(shown.move(wanted.tf, found.map_frame))
         return [sentence for sentence in sentences if sentence]

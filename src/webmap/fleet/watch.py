@@ -13,12 +13,12 @@ from webmap.base.errors import BridgeError
 from webmap.base.lifecycle import lifecycle
 from webmap.discovery import Findings, FoundRobot, discover
 from webmap.discovery.found import Layers
-from webmap.discovery.hearing import late_frames
+from webmap.discovery.frame_listening import late_frames
 from webmap.discovery.layers import role_of
 from webmap.discovery.newcomers import Newcomers, News, leads_further
 from webmap.discovery.robots import host_name
+from webmap.fleet.given import Offer, offer
 from webmap.fleet.overrides import MOST_CAMERAS
-from webmap.fleet.stated import Offer, offer
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -50,7 +50,7 @@ class Looking(ABC):
         self, bridge: "Bridge", topics: Mapping[str, str] | None = None
     ) -> None:
         self.bridge = bridge
-        self._told_topics = topics
+        self._given_topics = topics
         self._task: asyncio.Task[None] | None = None
         lifecycle.add(self)
 
@@ -86,13 +86,13 @@ class Looking(ABC):
                     log.debug("%s: %s", self.bridge.url, error)
                     pause = min(2 * pause, LONGEST)
                 except Exception:
-                    log.exception("%s: a look at the topics failed", self.bridge.url)
+                    log.exception("%s: the search for topics failed", self.bridge.url)
                     pause = min(2 * pause, LONGEST)
             await asyncio.sleep(pause)
 
     async def _topics(self) -> dict[str, str]:
-        if self._told_topics is not None:
-            return dict(self._told_topics)
+        if self._given_topics is not None:
+            return dict(self._given_topics)
         return await self.bridge.topics()
 
 
@@ -129,7 +129,7 @@ class LookingForRobots(Looking):
                 self._came(news, self.bridge)
             except Exception:  # the other news is reported only once
                 log.exception(
-                    "%s: what is new of %s is not shown",
+                    "%s: the new topics of %s are not shown",
                     self.bridge.url,
                     news.robot.name,
                 )
@@ -141,7 +141,7 @@ class LookingForLayers(Looking):
     Args:
         bridge: The bridge.
         shown: The robots that are found and shown; more may be added.
-        told: Robots given by hand, of which more is drawn than the given topics.
+        given: Robots of ``--robot`` whose other topics are drawn too.
         topics: Types by topic, if the bridge does not list them.
 
     """
@@ -151,12 +151,12 @@ class LookingForLayers(Looking):
         bridge: "Bridge",
         shown: "ShownRobots",
         *,
-        told: "Sequence[ShownRobot]" = (),
+        given: "Sequence[ShownRobot]" = (),
         topics: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(bridge, topics)
         self._shown = shown
-        self._told = [robot for robot in told if robot.bridge is bridge]
+        self._given = [robot for robot in given if robot.bridge is bridge]
         self._placed: dict[ShownRobot, FoundRobot] = {}
         self._has_drawn = False
 
@@ -168,24 +168,24 @@ class LookingForLayers(Looking):
     async def take(self, topics: dict[str, str]) -> None:
         """Draw the new topics behind the bridge."""
         frames = late_frames(self.bridge)
-        if self._told:  # robots drawn by frames receive them anyway
+        if self._given:  # robots drawn by frames receive them anyway
             await frames.listen(topics)
-        url, said = self.bridge.url, self._shown.overruling
+        url, overrides = self.bridge.url, self._shown.overrides
         behind = discover(topics, host_name(url), frames.trees)
-        self._take_told(topics, behind)
+        self._take_given(topics, behind)
         for guessed in behind.robots:
             space = guessed.namespace
             robot = self._shown.get(self.bridge, space)
             if robot is None:
                 continue
-            one = said.apply(url, guessed, behind.dialect)
-            layers = said.layers(url, behind, guessed)
+            one = overrides.apply(url, guessed, behind.dialect)
+            layers = overrides.layers(url, behind, guessed)
             self._draw(robot, layers, space, _cameras_left_out(robot, one))
 
-    def _take_told(self, topics: dict[str, str], behind: Findings) -> None:
-        """Draw the new topics of the robots that were given by hand."""
+    def _take_given(self, topics: dict[str, str], behind: Findings) -> None:
+        """Draw the new topics of the robots given with ``--robot``."""
         taken: set[str] = set()
-        for robot in self._told:
+        for robot in self._given:
             offered = offer(robot.found, topics, behind)
             if offered.namespace in taken:  # the topics of a namespace are drawn once
                 self._draw(robot, Layers(), offered.namespace)
@@ -233,7 +233,7 @@ class LookingForLayers(Looking):
         new = robot.news_of_topics([*(layer.topic for layer in others), *cameras])
         if new:
             notify(
-                f"{robot.robot.name}: not drawn, since there are enough of their kind: "
+                f"{robot.robot.name}: not drawn, beyond the limit for their kind: "
                 f"{', '.join(new)}"
             )
 

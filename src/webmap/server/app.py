@@ -193,7 +193,7 @@ class PageAnswers:
         if entry is not None:
             root = base_of(request.scope.get("root_path", "")).removesuffix(FOLDER)
             return RedirectResponse(root + entry.path, 308)
-        return await answer_file(request, lambda: self._beside_page("/" + path))
+        return await answer_file(request, lambda: self._folder_file("/" + path))
 
     async def _page(self, request: Request, entry: PageEntry) -> Response:
         base = base_of(request.scope.get("root_path", ""))
@@ -210,7 +210,7 @@ class PageAnswers:
         self._warn(entry.html, page.blocked)
         return HTMLResponse(page.text, headers=headers)
 
-    def _beside_page(self, path: str) -> File:
+    def _folder_file(self, path: str) -> File:
         # Longest first: the files of the nearest page come first.
         for entry in sorted(self._site.pages.values(), key=_depth, reverse=True):
             name = name_in_folder(entry, path)

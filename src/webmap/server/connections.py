@@ -38,7 +38,7 @@ T = TypeVar("T")
 
 
 class Waiting(Generic[T]):
-    """Waiting connections up to a limit, of which the newest stay.
+    """Waiting connections up to a limit; the newest ones stay.
 
     A new connection is never refused: whether it has signed in is known only when its
     request arrives. Instead, the oldest connection of the address with the most is

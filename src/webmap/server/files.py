@@ -203,7 +203,7 @@ class Published:
         return read_file(path)
 
     def image(self, tag: str) -> File:
-        """Return a published image, or one that a layer of this process drew.
+        """Return a published image, or an image that a layer of this process drew.
 
         Raises:
             NoSuchFile: If it was not published, or was withdrawn.

@@ -109,9 +109,9 @@ class PageHost:
             self._pages.count_refused(self.viewer, f"page: {error}")
             return
         for event in events:
-            self._hear(event)
+            self._receive(event)
 
-    def _hear(self, event: PageEvent) -> None:
+    def _receive(self, event: PageEvent) -> None:
         match event:
             case Hello(containers=sizes):
                 self._hello(sizes)
@@ -124,7 +124,7 @@ class PageHost:
             case ModuleMessage(instance=instance, data=data):
                 self._module_message(instance, data)
             case Trouble(text=text):
-                log.warning("%r: the page says: %s", self, text)
+                log.warning("%r: the page reports: %s", self, text)
 
     def lost(self, socket: PageSocket) -> None:
         """Set that the socket was lost; the page is kept for a while."""
@@ -170,18 +170,18 @@ class PageHost:
         for map in self._page.maps if self._page else ():
             map.on_module_message(instance, message)
 
-    def _element_event(self, said: ElementEvent) -> None:
-        page, element = self._page, self._session.element(said.mount, said.element)
+    def _element_event(self, report: ElementEvent) -> None:
+        page, element = self._page, self._session.element(report.mount, report.element)
         if page is None or element is None:
             return
         event = Event(
-            kind=said.event,
+            kind=report.event,
             element=element,
             viewer=self.viewer,
-            map=next((map for map in page.maps if map.shows(said.mount)), None),
-            **{name: getattr(said, name) for name in SAME},
+            map=next((map for map in page.maps if map.shows(report.mount)), None),
+            **{name: getattr(report, name) for name in SAME},
         )
-        page.dispatch(said.mount, element, event)
+        page.dispatch(report.mount, element, event)
 
     def close(self) -> None:
         """Close the page permanently."""
@@ -195,7 +195,7 @@ class PageHost:
             self._socket.end(FAILED, "the page was closed")
             self._socket = None
 
-    def tell_speeds(self) -> None:
+    def send_speeds(self) -> None:
         """Send the gate the greatest speeds that this page may ask for."""
         if self.drive is not None and self._page is not None:
             self.drive.set_speeds(*self._page.speeds)
@@ -204,7 +204,7 @@ class PageHost:
         page = self._page = Page(
             self._entry, self._session, self.viewer, self._pages.publisher, sizes
         )
-        page.on_speeds = lambda v, w: self.tell_speeds()
+        page.on_speeds = lambda v, w: self.send_speeds()
         try:
             with page.scope.active():
                 result = self._entry.function(page)
@@ -214,7 +214,7 @@ class PageHost:
                     page.complete()
         except Exception as error:
             self._failed(error)
-        self.tell_speeds()
+        self.send_speeds()
 
     def _failed(self, error: Exception) -> None:
         if self._page is None:  # the viewer is gone, which may be the cause
@@ -284,7 +284,7 @@ class OpenPages:
         pages: The page entry of each path.
         publisher: Gives the pages' files URLs.
         max_pages: The greatest number of pages. Of those that are kept for a viewer who
-            may return, the one that was lost first is closed for a new page.
+            may return, the page that was lost first is closed for a new page.
 
     """
 
@@ -362,17 +362,17 @@ class OpenPages:
 
     def _drive_opened(self, key: tuple[str, str], connection: DriveConnection) -> None:
         self._drives[key] = connection
-        self._tell_drive(key, connection)
+        self._set_drive(key, connection)
 
     def _drive_closed(self, key: tuple[str, str], connection: DriveConnection) -> None:
         if self._drives.get(key) is connection:
             del self._drives[key]
-            self._tell_drive(key, None)
+            self._set_drive(key, None)
 
-    def _tell_drive(
+    def _set_drive(
         self, key: tuple[str, str], connection: DriveConnection | None
     ) -> None:
         for host_key, host in self._hosts.items():
             if host_key[1:] == key:
                 host.drive = connection
-                host.tell_speeds()
+                host.send_speeds()

@@ -151,7 +151,7 @@ class PageSocket:
     async def refuse(self, code: int, reason: str) -> None:
         """Close the socket with a reason before any message was passed."""
         self._end(code, reason)
-        await self._say_goodbye()
+        await self._send_close()
 
     async def refuse_full(self) -> None:
         """Close the socket because too many pages are open."""
@@ -194,7 +194,7 @@ class PageSocket:
                     )
         if on_rest is not None and not self._gone:
             await self._read_rest(on_rest)
-        await self._say_goodbye()
+        await self._send_close()
 
     def _put(self, item: bytes | str) -> None:
         if self._queue.put(item):
@@ -268,7 +268,7 @@ class PageSocket:
         else:
             await self._socket.send_bytes(item)
 
-    async def _say_goodbye(self) -> None:
+    async def _send_close(self) -> None:
         if self._gone or self._ended is None:
             return
         code, reason = self._ended

@@ -42,8 +42,8 @@ def check_exposure(host: str, *, insecure_lan: bool) -> None:
     if not is_loopback(host) and not insecure_lan:
         raise ConfigError(
             f"host {host!r} can be reached from other machines, and without TLS "
-            "everybody on the way can read the token and drive the robots: keep "
-            "127.0.0.1 and put a proxy with TLS or an SSH tunnel in front, or say "
+            "anyone on the network can read the token and drive the robots: keep "
+            "127.0.0.1 and put a proxy with TLS or an SSH tunnel in front, or set "
             "insecure_lan=True (--insecure-lan) if you trust this network"
         )
 

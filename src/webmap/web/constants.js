@@ -1,6 +1,6 @@
 // Made by tools/make_javascript.py: do not edit.
 
-/** Where the server has WebMap's own files and sockets. */
+/** The path of WebMap's own files and sockets on the server. */
 export const FOLDER = "/_webmap/";
 
 /** The subprotocol of both sockets. */
@@ -9,7 +9,7 @@ export const PROTOCOL = "webmap";
 /** The field of a query that signs in once. */
 export const CODE = "webmap_code";
 
-/** The element and the header that carry the secret of a page. */
+/** The element and the header with the secret of a page. */
 export const KEY = "webmap-key";
 
 /** The pattern of the name that a page chooses for itself. */
@@ -23,22 +23,22 @@ export const LONGEST_TEXTS = Object.freeze({
   "trouble": 2000,
 });
 
-/** Close codes after which another try would end the same way. */
+/** Close codes after which the page does not connect again. */
 export const FOR_GOOD = Object.freeze([1008, 4001]);
 
-/** Points of a route, at the most. */
+/** Most points of a route. */
 export const MOST_POINTS = 500;
 
-/** Letters of a route's name, at the most. */
+/** Most characters of a route's name. */
 export const LONGEST_NAME = 60;
 
 /** Metres between robots that are sent together. */
 export const SPACING = Object.freeze([0.3, 20.0]);
 
-/** The levels of a log, from the least. */
+/** The levels of a log, the lowest first. */
 export const LEVELS = Object.freeze(["debug", "info", "warn", "error", "fatal"]);
 
-/** The words and the shape of each state of a goal. */
+/** The text and the shape of each state of a goal. */
 export const GOALS = Object.freeze({
   "sent": ["Goal sent", "sent"],
   "accepted": ["Goal accepted", "sent"],

@@ -78,11 +78,11 @@ def test_a_file_is_yaml_or_json(tmp_path, name, text):
     ("data", "words"),
     [
         (b"", "expected a list of labels, got None"),
-        (b"- name: [", r"a\.yaml:1: this is no YAML"),
-        (b"\xff\xfe\x00", "this is no YAML"),
-        (b"!!python/object/apply:os.system ['true']", "no YAML"),
+        (b"- name: [", r"a\.yaml:1: this is not YAML"),
+        (b"\xff\xfe\x00", "this is not YAML"),
+        (b"!!python/object/apply:os.system ['true']", "not YAML"),
         (b"[" * 50_000, "nested more than 50 deep"),
-        (b"a: &a [1]\nb: *a", r"a\.yaml:2: this is no YAML: aliases"),
+        (b"a: &a [1]\nb: *a", r"a\.yaml:2: this is not YAML: aliases"),
         (b"- {name: A, x: 1, y: 2}\n- {}\n", r"a\.yaml:2: labels\[1\]\.name: expected"),
         (b"labels:\n- name: A\n  x: 1\n  y: '2'\n", r":4: labels\[0\]\.y: expected a"),
         (

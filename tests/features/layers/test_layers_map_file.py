@@ -249,11 +249,11 @@ NO_IMAGE = {
     "cannot be read: maxval must be greater than 0": b"P5\n3 2\n0\n" + bytes(6),
     "cannot be read: image file is truncated": b"P5\n3 2\n255\n" + bytes(3),
     "must be PGM, PNG, BMP or JPEG, got an empty file": b"",
-    "must be PGM, PNG, BMP or JPEG, got one that begins with b'GIF89a": (
+    "must be PGM, PNG, BMP or JPEG, got a file that begins with b'GIF89a": (
         b"GIF89a" + bytes(20)
     ),
-    "must be PGM, PNG, BMP or JPEG, got one that begins with b'<svg/>'": b"<svg/>",
-    "begins with b'P5\\n0 0\\n2' and makes no sense further on": b"P5\n0 0\n255\n",
+    "must be PGM, PNG, BMP or JPEG, got a file that begins with b'<svg/>'": b"<svg/>",
+    "begins with b'P5\\n0 0\\n2' but cannot be decoded": b"P5\n0 0\n255\n",
 }
 
 

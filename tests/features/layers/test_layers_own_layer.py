@@ -21,8 +21,8 @@ from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.layers import find_layers
 from webmap.features.view.layer_switches import all_layers
+from webmap.fleet.given import Candidate
 from webmap.fleet.shown import ShownRobots
-from webmap.fleet.stated import Candidate
 from webmap.fleet.watch import LookingForLayers
 
 FILE = Path(__file__).parents[1] / "own_layers.py"
@@ -291,4 +291,4 @@ def test_a_package_brings_layers_along_that_view_shows(tmp_path):
     why = ["its", "type", "and", "its", "name"]
     assert ["/a/temp_2", "Temperature", *why] in shown
     assert ["/zones", "Zones", "its", "type", "alone"] in shown
-    assert "enough of their kind: /b/temp_3" in done.stdout
+    assert "beyond the limit for their kind: /b/temp_3" in done.stdout

@@ -19,8 +19,8 @@ SIMULATED = 365 * 24 * 3600.0
 """Seconds of difference from which the robot's clock is a simulator's."""
 
 
-TELL = (
-    "Give a list of the topics (webmap doctor URL --topics FILE), or name each robot "
+GIVE_TOPICS = (
+    "Give a list of the topics (webmap doctor URL --topics FILE), or pass each robot "
     "to webmap view with --robot NAME:ODOM:CMD_VEL:SCAN."
 )
 
@@ -33,14 +33,16 @@ def bridge_findings(seen: Observed) -> Iterator[Finding]:
     dialect = seen.findings.dialect
     yield advice.openness(seen.link, seen.url, seen.shown, dialect)
     if seen.unlisted:
-        yield advice.topics_not_listed(seen.unlisted, "" if seen.told else TELL)
-    if seen.told or not seen.unlisted:
+        yield advice.topics_not_listed(
+            seen.unlisted, "" if seen.topics_given else GIVE_TOPICS
+        )
+    if seen.topics_given or not seen.unlisted:
         yield from _robots(seen)
     if seen.clock is not None:
         yield from _clock(seen.clock)
     elif not seen.unlisted:
-        words = "The bridge does not tell the time, so clocks are not compared."
-        yield Finding("note", BRIDGE, words)
+        text = "The bridge does not report its time, so clocks are not compared."
+        yield Finding("note", BRIDGE, text)
     yield advice.blocking(seen.link, seen.url, dialect)
     yield advice.compression(seen.link, _packed_scans(seen))
 
@@ -48,19 +50,19 @@ def bridge_findings(seen: Observed) -> Iterator[Finding]:
 def _packed_scans(seen: Observed) -> list[str]:
     robots = seen.findings.robots
     scans = {scan.topic for one in robots for scan in one.guesses.get("scan", ())}
-    binary = [topic for topic, heard in seen.heard.items() if heard.binary]
+    binary = [topic for topic, measured in seen.measured.items() if measured.binary]
     return [topic for topic in binary if topic in scans]
 
 
 def _robots(seen: Observed) -> Iterator[Finding]:
     robots = seen.findings.robots
     source = "The bridge lists its topics"
-    if seen.told:
-        source = "The topics are those that were given"
-    which = "robots looked at" if seen.meant else "robots found"
+    if seen.topics_given:
+        source = "The topics come from the given list"
+    which = "robots checked" if seen.configured else "robots found"
     if not robots:
-        said = " ".join(seen.findings.notes)
-        yield Finding("wrong", BRIDGE, f"No robot was found. {said}", TELL)
+        notes = " ".join(seen.findings.notes)
+        yield Finding("wrong", BRIDGE, f"No robot was found. {notes}", GIVE_TOPICS)
         return
     names = ", ".join(robot.name for robot in robots)
     yield Finding("good", BRIDGE, f"{source}; {which}: {names}.")
@@ -68,40 +70,38 @@ def _robots(seen: Observed) -> Iterator[Finding]:
         yield Finding(
             "note",
             BRIDGE,
-            f"Robots that nobody named here were found too, and not looked at: "
-            f"{', '.join(seen.others)}.",
+            f"Discovery also found robots that are not configured; they were not "
+            f"checked: {', '.join(seen.others)}.",
         )
     if len(robots) > MOST_ROBOTS:
         yield Finding(
             "note",
             BRIDGE,
-            f"{len(robots)} robots are many: only the first {MOST_ROBOTS} of them were "
-            f"listened to.",
+            f"Only the first {MOST_ROBOTS} of {len(robots)} robots were measured.",
         )
 
 
 def _clock(clock: Clock) -> Iterator[Finding]:
-    trip = f"A call takes {clock.round_trip * 1000:.0f} ms there and back"
-    near = "Bring both ends nearer, by cable or by a better radio link."
+    trip = f"A service call takes {clock.round_trip * 1000:.0f} ms"
+    near = "Use a faster connection, such as a cable or a better radio link."
     if clock.round_trip > NO_LOOP:
-        yield Finding("wrong", BRIDGE, f"{trip}: too long to drive.", near)
+        yield Finding("wrong", BRIDGE, f"{trip}: too long for driving.", near)
     elif clock.round_trip > SLOW_LOOP:
-        yield Finding("warning", BRIDGE, f"{trip}: driving is slow to answer.", near)
+        yield Finding("warning", BRIDGE, f"{trip}: the robot reacts late.", near)
     else:
         yield Finding("good", BRIDGE, f"{trip}.")
     off = abs(clock.ahead)
     side = "ahead of" if clock.ahead > 0 else "behind"
     if off > SIMULATED:
-        yield Finding(
-            "note", BRIDGE, "The robot's clock is not this world's: a simulator's."
-        )
+        yield Finding("note", BRIDGE, "The robot uses the clock of a simulator.")
     elif off - clock.round_trip / 2 > CLOCK_OFF:
         yield Finding(
             "warning",
             BRIDGE,
             f"The robot's clock is {off:.1f} s {side} this machine's.",
-            "Let both take the time from one server (chrony, systemd-timesyncd). "
-            "WebMap decides nothing by them, but stamps of both do not fit together.",
+            "Synchronise both clocks with one server (chrony, systemd-timesyncd). "
+            "WebMap's safety does not depend on them, but stamps of the two machines "
+            "do not match.",
         )
     else:
         yield Finding("good", BRIDGE, "Both clocks agree.")

@@ -60,7 +60,7 @@ class FrameListening:
         """
         buffer = self._buffers.get(namespace)
         if buffer is None:
-            return f"nothing came on {namespace}/tf"
+            return f"no message was received on {namespace}/tf"
         name, start = buffer.name(frame, namespace), buffer.name(start, namespace)
         if name == start:
             return ""

@@ -11,7 +11,7 @@ import msgspec
 from webmap.base.errors import ProtocolError
 from webmap.base.scope import no_scope
 from webmap.discovery.doctor.frames import FrameListening
-from webmap.discovery.doctor.observed import Heard
+from webmap.discovery.doctor.observed import Measurement
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import Header
 from webmap.ros.received import ReceivedMessage
@@ -49,7 +49,7 @@ class Listening:
         topics = tuple(topics)
         self._last = dict.fromkeys(topics, now)
         self._gap = dict.fromkeys(topics, 0.0)
-        self._heard = {topic: Heard() for topic in topics}
+        self._measured = {topic: Measurement() for topic in topics}
         self._newest: dict[str, tuple[ReceivedMessage, float]] = {}
 
     def received(self, message: ReceivedMessage, now: float, wall: float) -> None:
@@ -62,31 +62,31 @@ class Listening:
 
         """
         topic = message.topic
-        heard = self._heard.get(topic)
-        if heard is None:
+        measured = self._measured.get(topic)
+        if measured is None:
             return
-        if heard.count:  # the time before the first one is needed to subscribe
+        if measured.count:  # the time before the first one is needed to subscribe
             self._gap[topic] = max(self._gap[topic], now - self._last[topic])
         self._last[topic] = now
         self._newest[topic] = (message, wall)
-        self._heard[topic] = Heard(
-            heard.count + 1,
-            bytes=heard.bytes + len(message.frame),
+        self._measured[topic] = Measurement(
+            measured.count + 1,
+            bytes=measured.bytes + len(message.frame),
         )
 
-    def end(self, now: float) -> dict[str, Heard]:
+    def end(self, now: float) -> dict[str, Measurement]:
         """Return the measurements until now."""
-        return {topic: self._sum_up(topic, now) for topic in self._heard}
+        return {topic: self._sum_up(topic, now) for topic in self._measured}
 
-    def end_of(self, topic: str, now: float) -> Heard:
+    def end_of(self, topic: str, now: float) -> Measurement:
         """Return the measurements of one topic until now."""
         return self._sum_up(topic, now)
 
-    def _sum_up(self, topic: str, now: float) -> Heard:
-        heard, seconds = self._heard[topic], now - self._began
+    def _sum_up(self, topic: str, now: float) -> Measurement:
+        measured, seconds = self._measured[topic], now - self._began
         gap = max(self._gap[topic], now - self._last[topic])
         if topic not in self._newest:
-            return Heard(seconds=seconds, longest_gap=gap)
+            return Measurement(seconds=seconds, longest_gap=gap)
         message, wall = self._newest[topic]
         frame, child, stamp, trouble = "", "", None, ""
         try:
@@ -95,11 +95,11 @@ class Listening:
             stamp = stamped.header.stamp.seconds or None
         except ProtocolError as error:
             trouble = str(error)
-        return Heard(
-            count=heard.count,
+        return Measurement(
+            count=measured.count,
             seconds=seconds,
             longest_gap=gap,
-            bytes=heard.bytes,
+            bytes=measured.bytes,
             frame=frame,
             child=child,
             stamp=stamp,
@@ -127,7 +127,7 @@ class Sampling:
         self._listening = Listening(self._topics, now)
         self._bytes = dict.fromkeys(self._topics, 0)
         self._came: dict[str, list[float]] = {topic: [] for topic in self._topics}
-        self._left: dict[str, Heard] = {}
+        self._left: dict[str, Measurement] = {}
 
     @property
     def done(self) -> bool:
@@ -152,19 +152,19 @@ class Sampling:
         self._came[topic].append(now)
         if len(self._came[topic]) < self._enough and self._bytes[topic] < MOST_BYTES:
             return False
-        self._left[topic] = self._heard(topic, now)
+        self._left[topic] = self._measured(topic, now)
         return True
 
-    def end(self, now: float) -> dict[str, Heard]:
+    def end(self, now: float) -> dict[str, Measurement]:
         """Return the measurements; without silent topics if the limit ended them."""
         found = {
-            topic: self._left.get(topic) or self._heard(topic, now)
+            topic: self._left.get(topic) or self._measured(topic, now)
             for topic in self._topics
         }
         cut = sum(self._bytes.values()) >= MOST_BYTES_IN_ALL
         return {topic: each for topic, each in found.items() if each.count or not cut}
 
-    def _heard(self, topic: str, now: float) -> Heard:
+    def _measured(self, topic: str, now: float) -> Measurement:
         came = self._came[topic]
         every = (came[-1] - came[0]) / (len(came) - 1) if len(came) > 1 else 0.0
         return replace(self._listening.end_of(topic, now), every=every)
@@ -176,7 +176,7 @@ async def listen(
     seconds: float,
     tf: Sequence[str] = (),
     frames: FrameListening | None = None,
-) -> dict[str, Heard]:
+) -> dict[str, Measurement]:
     """Listen to topics for a time.
 
     Args:
@@ -225,7 +225,7 @@ async def sample(
     enough: int = ENOUGH,
     encoding: Encoding = "binary",
     throttle: int = 0,
-) -> dict[str, Heard]:
+) -> dict[str, Measurement]:
     """Listen to a few messages of each topic, which may be large.
 
     Args:

@@ -12,13 +12,19 @@ from functools import partial
 from typing import TypeVar
 
 from webmap.base.errors import BridgeClosed, BridgeError
+from webmap.discovery.doctor.configured import ConfiguredRobot, merge_configured
 from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.listening import listen, sample
-from webmap.discovery.doctor.meant import MeantRobot, lay_over
-from webmap.discovery.doctor.observed import MOST_ROBOTS, Clock, Heard, Observed, Way
+from webmap.discovery.doctor.observed import (
+    MOST_ROBOTS,
+    Clock,
+    FramePath,
+    Measurement,
+    Observed,
+)
 from webmap.discovery.doctor.shown_rules import shown_topics
 from webmap.discovery.found import Findings, FoundRobot
-from webmap.discovery.hearing import LateFrames, frame_topics
+from webmap.discovery.frame_listening import LateFrames, frame_topics
 from webmap.discovery.robots import discover, host_name
 from webmap.ros.asking import ask_topics
 from webmap.ros.bridge import Bridge, TemporaryBridge
@@ -37,7 +43,7 @@ MOST_SCANS = 6
 """Most scans of a robot that are listened to."""
 
 LATCHED = ("nav_msgs/OccupancyGrid", "sensor_msgs/PointCloud2")
-"""Types of maps, which are published once: one that does not come may be too large."""
+"""Types of maps, which are published once: if none arrives, it may be too large."""
 
 AS_TEXT = 10.0
 """Seconds to wait for a map as text, if it did not come in binary."""
@@ -50,7 +56,7 @@ NEEDLESS = ("/rosout", "/parameter_events")
 
 T = TypeVar("T")
 
-TRYING = "Trying what a call that hangs holds up."
+TRYING = "Testing what a slow service call delays."
 
 
 async def observe(
@@ -61,7 +67,7 @@ async def observe(
     ask_parameters: bool = False,
     try_call: bool = False,
     topics: Mapping[str, str] | None = None,
-    meant: Callable[[Findings], Sequence[MeantRobot]] = lambda _found: (),
+    configured: Callable[[Findings], Sequence[ConfiguredRobot]] = lambda _found: (),
     waiting: Callable[[str], object] = lambda _why: None,
     progress: Callable[[str], object] = lambda _what: None,
 ) -> Observed:
@@ -75,20 +81,20 @@ async def observe(
         try_call: Whether to offer and call a service that takes a second to answer,
             to find out what it delays.
         topics: Types by topic, which replace the list of the bridge.
-        meant: Receives the findings and returns the robots as a person configured
+        configured: Receives the findings and returns the robots as a person configured
             them; if there are any, only these are measured.
         waiting: Called once with the reason if the bridge is waited for.
         progress: Called with a sentence about the current step.
 
     Raises:
-        ConfigError: If ``meant`` reports that the settings do not fit the findings.
+        ConfigError: If ``configured`` finds that the settings do not fit.
 
     """
-    unlisted, told, asked = "", topics is not None, dict(topics or {})
-    progress("Asking which topics there are.")
+    unlisted, topics_given, asked = "", topics is not None, dict(topics or {})
+    progress("Requesting the list of topics.")
     try:
         found = await ask_topics(url, wait=wait, waiting=waiting)
-        asked = asked if told else found
+        asked = asked if topics_given else found
     except BridgeClosed as error:
         return Observed(url, trouble=error.why or str(error))
     except BridgeError as error:
@@ -103,15 +109,17 @@ async def observe(
             seen = Observed(
                 url,
                 unlisted=unlisted,
-                told=told,
-                shown=tuple(name for name in NEEDLESS if name in asked and not told),
+                topics_given=topics_given,
+                shown=tuple(
+                    name for name in NEEDLESS if name in asked and not topics_given
+                ),
                 types=asked,
                 findings=discover(asked, host_name(url), trees),
                 link=await checks.look(url),
             )
-            seen = _as_meant(seen, meant(seen.findings))
+            seen = _with_configured(seen, configured(seen.findings))
             if not unlisted:
-                progress("Asking for the time, and who writes and who listens.")
+                progress("Requesting the time, the publishers and the subscribers.")
                 seen = await _ask(seen, bridge)
                 if ask_parameters:
                     link = await checks.asked_about_threads(
@@ -137,18 +145,18 @@ async def tried(seen: Observed) -> Observed:
     return replace(seen, link=await checks.tried_a_call(seen.link, seen.url))
 
 
-def _as_meant(seen: Observed, robots: Sequence[MeantRobot]) -> Observed:
+def _with_configured(seen: Observed, robots: Sequence[ConfiguredRobot]) -> Observed:
     """Return the observations with the robots as a person configured them, if any."""
     if not robots:
         return seen
-    findings, meant = lay_over(seen.findings, robots, seen.types)
-    known = {one.found_as for one in meant.values()}
+    findings, configured = merge_configured(seen.findings, robots, seen.types)
+    known = {one.found_as for one in configured.values()}
     others = [robot.name for robot in seen.findings.robots if robot.name not in known]
     return replace(
         seen,
-        told=seen.told or seen.unlisted != "",
+        topics_given=seen.topics_given or seen.unlisted != "",
         findings=findings,
-        meant=meant,
+        configured=configured,
         others=tuple(others),
     )
 
@@ -221,14 +229,14 @@ async def _listen(seen: Observed, bridge: Bridge, seconds: float) -> Observed:
     spaces = sorted({each.tf_namespace for each in robots} - {None})  # type: ignore[type-var]
     tf = [f"{space}/{name}" for space in spaces for name in ("tf", "tf_static")]
     frames = FrameListening()
-    heard = await listen(bridge, topics, seconds, tf, frames)
-    ways = {}
+    measured = await listen(bridge, topics, seconds, tf, frames)
+    frame_paths = {}
     for robot in robots:
-        one = seen.meant.get(robot.name)
-        way = _way(robot, heard, frames, one.map_frame if one else "")
-        if way is not None:
-            ways[robot.name] = way
-    return replace(seen, heard=heard, ways=ways)
+        one = seen.configured.get(robot.name)
+        path = _frame_path(robot, measured, frames, one.map_frame if one else "")
+        if path is not None:
+            frame_paths[robot.name] = path
+    return replace(seen, measured=measured, frame_paths=frame_paths)
 
 
 async def _sample(
@@ -248,10 +256,10 @@ async def _sample(
         if checks.came_in_parts(message) and is_type(topics[message.topic], *LATCHED):
             too_large[message.topic] = len(message.frame)
 
-    heard = await sample(bridge, topics, max(seconds, SLOW_TOPICS), received)
+    measured = await sample(bridge, topics, max(seconds, SLOW_TOPICS), received)
     silent = {
         topic: topics[topic]
-        for topic, each in heard.items()
+        for topic, each in measured.items()
         if is_type(topics[topic], *LATCHED)
         and seen.publishers.get(topic)
         and not each.count
@@ -259,7 +267,8 @@ async def _sample(
     if silent:
         names = ", ".join(silent)
         progress(
-            f"Nothing came of {names} in binary: listening for {AS_TEXT:g} s to text."
+            f"No binary message was received on {names}: listening to text for "
+            f"{AS_TEXT:g} s."
         )
         late = await sample(
             bridge,
@@ -270,9 +279,9 @@ async def _sample(
             encoding="text",
             throttle=ONCE,
         )
-        heard |= {topic: each for topic, each in late.items() if each.count}
+        measured |= {topic: each for topic, each in late.items() if each.count}
     link = replace(seen.link, too_large=too_large)
-    return replace(seen, heard={**seen.heard, **heard}, link=link)
+    return replace(seen, measured={**seen.measured, **measured}, link=link)
 
 
 def _scans(robot: FoundRobot) -> list[str]:
@@ -288,23 +297,26 @@ def place_of(robot: FoundRobot) -> str:
     return robot.topic("odometry") or robot.topic("pose")
 
 
-def _way(
-    robot: FoundRobot, heard: Mapping[str, Heard], frames: FrameListening, start: str
-) -> Way | None:
+def _frame_path(
+    robot: FoundRobot,
+    measured: Mapping[str, Measurement],
+    frames: FrameListening,
+    start: str,
+) -> FramePath | None:
     """Return the frames of a robot whose odometry names its frame.
 
     Without odometry, the frame of the base is used. The robot is drawn in the frame
     ``start`` if it is configured, else in the frame that was found.
     """
-    tf, where = robot.tf, heard.get(place_of(robot), Heard())
+    tf, where = robot.tf, measured.get(place_of(robot), Measurement())
     frame, base = where.frame, where.child
     if robot.tf_alone:
         frame = base = robot.base_frame
     if tf is None or not frame:
         return None
     space, start = tf.namespace, start or tf.map_frame
-    scan = heard.get(robot.topic("scan"), Heard()).frame
-    return Way(
+    scan = measured.get(robot.topic("scan"), Measurement()).frame
+    return FramePath(
         frame,
         frames.missing(space, frame, start),
         frames.oddities(space),

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from webmap.discovery.doctor.meant import MeantRobot
+from webmap.discovery.doctor.configured import ConfiguredRobot
 from webmap.discovery.found import Findings
 from webmap.discovery.tf_robots import MAP
 from webmap.ros.rosbridge.checks import LinkFacts
@@ -13,7 +13,7 @@ MOST_ROBOTS = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class Measurement:
     """The measurements of one topic."""
 
     count: int = 0
@@ -64,7 +64,7 @@ class Clock:
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class FramePath:
     """The frames from the map to a robot's odometry, its base and its scanner."""
 
     frame: str
@@ -103,7 +103,7 @@ class Observed:
     unlisted: str = ""
     """Why the bridge does not list its topics, empty if it does."""
 
-    told: bool = False
+    topics_given: bool = False
     """Whether the list of topics was given by hand."""
 
     shown: tuple[str, ...] = ()
@@ -115,7 +115,7 @@ class Observed:
     findings: Findings = field(default_factory=Findings)
     """The robots that are measured, with the topics that are in use."""
 
-    meant: Mapping[str, MeantRobot] = field(default_factory=dict)
+    configured: Mapping[str, ConfiguredRobot] = field(default_factory=dict)
     """The configured robots by name; empty if all robots were found by discovery."""
 
     others: tuple[str, ...] = ()
@@ -128,8 +128,8 @@ class Observed:
     subscribers: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """The nodes that subscribe to a topic, if the bridge lists them."""
 
-    heard: Mapping[str, Heard] = field(default_factory=dict)
-    ways: Mapping[str, Way] = field(default_factory=dict)
+    measured: Mapping[str, Measurement] = field(default_factory=dict)
+    frame_paths: Mapping[str, FramePath] = field(default_factory=dict)
     """The frames of each robot that has some, by its name."""
 
     link: LinkFacts = field(default_factory=LinkFacts)

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from webmap.discovery.doctor.heard_rules import heard_finding, rare_finding
-from webmap.discovery.doctor.meant import MeantRobot
-from webmap.discovery.doctor.observed import Observed, Way
+from webmap.discovery.doctor.configured import ConfiguredRobot
+from webmap.discovery.doctor.observed import FramePath, Observed
+from webmap.discovery.doctor.rate_rules import rare_finding, rate_finding
 from webmap.discovery.doctor.shown_rules import shown_findings
 from webmap.discovery.found import FoundRobot, Guess
 from webmap.ros.finding import Finding
@@ -17,31 +17,31 @@ MOST_ODDITIES = 3
 
 def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     """Yield the findings about one robot."""
-    one = seen.meant.get(robot.name, MeantRobot(robot.name))
+    one = seen.configured.get(robot.name, ConfiguredRobot(robot.name))
     if "velocity" not in one.elsewhere:
         yield from _velocity(robot, seen)
     if "odometry" not in one.elsewhere:
         yield from _place(robot, seen)
     battery = robot.first("battery")
     for scan in robot.guesses.get("scan", ()):
-        if scan.topic in seen.heard:
-            yield heard_finding(robot.name, scan, seen, needed=False)
-    if battery is not None and battery.topic in seen.heard:
+        if scan.topic in seen.measured:
+            yield rate_finding(robot.name, scan, seen, needed=False)
+    if battery is not None and battery.topic in seen.measured:
         yield rare_finding(robot.name, battery, seen)
     yield from _map(robot, seen)
     yield from shown_findings(robot, seen)
     yield from _frames(robot, seen)
     if robot.first("velocity") is not None:
         # The stop test identifies robots by the names that discovery finds.
-        name = one.found_as if robot.name in seen.meant else robot.name
+        name = one.found_as if robot.name in seen.configured else robot.name
         command = f"webmap doctor {seen.url} --stop-test {name}, or " if name else ""
         yield Finding(
             "note",
             robot.name,
-            "Whether the base stops by itself when commands cease cannot be seen from "
-            "here.",
-            "Set its timeout, and try it where it may creep for three seconds: "
-            f"{command}the button on its card.",
+            "This check does not find out whether the base stops by itself when "
+            "commands end.",
+            "Set its command timeout, and run the stop test where the robot may creep "
+            f"for three seconds: {command}the button on its card.",
         )
 
 
@@ -54,11 +54,11 @@ def _place(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         yield Finding(
             "wrong",
             robot.name,
-            "Nothing says where it is.",
+            "No topic gives its pose.",
             "Start its odometry, or name the topic with --robot.",
         )
-    elif where.topic in seen.heard:
-        yield heard_finding(robot.name, where, seen, needed=True)
+    elif where.topic in seen.measured:
+        yield rate_finding(robot.name, where, seen, needed=True)
 
 
 def _map(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
@@ -67,107 +67,109 @@ def _map(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         yield Finding(
             "warning",
             robot.name,
-            f"Nobody publishes {grid.topic}, so there is no map under it.",
+            f"No node publishes {grid.topic}, so no map is drawn under the robot.",
             "Start map_server or slam_toolbox, or give a floor plan with --floor.",
         )
 
 
 def _drawn_by_frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     """Yield whether frames locate a robot that has no other source of its pose."""
-    topic, way = robot.topic("tf"), seen.ways.get(robot.name)
-    if way is not None and not way.missing:
+    topic, path = robot.topic("tf"), seen.frame_paths.get(robot.name)
+    if path is not None and not path.missing:
         yield Finding(
             "good",
             robot.name,
-            f"It is drawn where its frames have {way.frame} in {way.start}"
+            f"Its pose comes from its frames, {path.frame} in {path.start}"
             f"{_often(topic, seen)}; there is no odometry.",
         )
-    elif way is not None or (topic in seen.heard and not robot.base_frame):
-        why = way.missing if way else f"{topic} tells of no base_link in a map or odom"
+    elif path is not None or (topic in seen.measured and not robot.base_frame):
+        why = f"{topic} has no transform from map or odom to base_link"
+        if path is not None:
+            why = path.missing
         yield Finding(
             "wrong",
             robot.name,
-            f"Nothing says where it is: {why}.",
-            f"Start what tells of its frames on {topic}, or its odometry.",
+            f"Its pose is unknown: {why}.",
+            f"Start the node that publishes its frames on {topic}, or its odometry.",
         )
 
 
 def _often(topic: str, seen: Observed) -> str:
-    rate = seen.heard[topic].rate if topic in seen.heard else 0.0
+    rate = seen.measured[topic].rate if topic in seen.measured else 0.0
     return f" ({topic}: {rate:.1f} messages a second)" if rate else ""
 
 
 def _frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
-    way = seen.ways.get(robot.name)
-    if way is None:
+    path = seen.frame_paths.get(robot.name)
+    if path is None:
         return
     if robot.tf_alone:
         pass  # reported already: the robot has no other source of its pose
-    elif way.missing:
+    elif path.missing:
         yield Finding(
             "note",
             robot.name,
-            f"It is drawn in the frame {way.frame}, where odometry has it: "
-            f"{way.missing}.",
-            f"To see it on the map, start what tells of the frame {way.start}: amcl, "
-            "slam_toolbox, or a static transform.",
+            f"It is drawn in the frame {path.frame}, at the pose from odometry: "
+            f"{path.missing}.",
+            "To see it on the map, start the node that publishes the frame "
+            f"{path.start}: amcl, slam_toolbox, or a static transform.",
         )
     else:
         often = _often(f"{robot.tf_namespace}/tf", seen)
         yield Finding(
-            "good", robot.name, f"Frames lead from {way.start} to {way.frame}{often}."
+            "good", robot.name, f"Frames lead from {path.start} to {path.frame}{often}."
         )
-    yield from _inner_frames(robot.name, way)
-    for oddity in way.oddities[:MOST_ODDITIES]:
+    yield from _inner_frames(robot.name, path)
+    for oddity in path.oddities[:MOST_ODDITIES]:
         yield Finding(
             "warning",
             robot.name,
             f"A frame is odd: {oddity}.",
-            "Look which node tells of it, and whether two do.",
+            "Check which node publishes it, and whether two nodes do.",
         )
 
 
-def _inner_frames(name: str, way: Way) -> Iterator[Finding]:
-    if way.base_missing:
+def _inner_frames(name: str, path: FramePath) -> Iterator[Finding]:
+    if path.base_missing:
         yield Finding(
             "note",
             name,
-            f"The frames do not lead from {way.frame} to {way.base}, which odometry "
-            f"says all the same: {way.base_missing}.",
-            "Let one node send that transform too: the base's driver, or the filter "
-            "that makes the odometry (publish_tf).",
+            f"There is no transform from {path.frame} to {path.base}, although "
+            f"odometry names both: {path.base_missing}.",
+            "Let one node publish that transform too: the base's driver, or the filter "
+            "that publishes the odometry (publish_tf).",
         )
-    if way.scan_missing:
+    if path.scan_missing:
         yield Finding(
             "warning",
             name,
-            f"Nothing says where the scanner is on the robot: {way.scan_missing}. Its "
-            f"dots are drawn as if it were in the middle, looking ahead.",
+            f"The pose of the scanner on the robot is unknown: {path.scan_missing}. "
+            "Its points are drawn as if it were in the robot's middle, facing ahead.",
             "Start robot_state_publisher with the robot's URDF, or a "
-            f"static_transform_publisher from {way.base} to {way.scan}.",
+            f"static_transform_publisher from {path.base} to {path.scan}.",
         )
-    elif way.scan and way.base and not way.base_missing:
-        base = f"{way.base} and to " if way.base != way.frame else ""
+    elif path.scan and path.base and not path.base_missing:
+        base = f"{path.base} and to " if path.base != path.frame else ""
         yield Finding(
-            "good", name, f"Frames lead on from {way.frame} to {base}{way.scan}."
+            "good", name, f"Frames lead further from {path.frame} to {base}{path.scan}."
         )
 
 
 def _velocity(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     velocity = robot.first("velocity")
-    meant = seen.meant.get(robot.name)
-    if velocity is None and meant is not None and "velocity" in meant.topics:
+    configured = seen.configured.get(robot.name)
+    if velocity is None and configured is not None and "velocity" in configured.topics:
         yield Finding(
             "note",
             robot.name,
-            "It was given no topic for velocity, so it can be seen and not driven.",
+            "It is configured without a velocity topic: it can be seen but not driven.",
         )
         return
     if velocity is None:
         yield Finding(
             "warning",
             robot.name,
-            "No topic is surely its velocity, so it can be seen and not driven.",
+            "Its velocity topic is unknown, so it can be seen but not driven.",
             "Name it: --robot NAME:ODOM:CMD_VEL:SCAN.",
         )
         return
@@ -178,34 +180,35 @@ def _velocity(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         yield Finding(
             "wrong",
             robot.name,
-            f"Nobody listens to {velocity.topic}: the robot would not move, nor stop.",
-            "Start the base's driver, or name the topic that it listens to.",
+            f"No node subscribes to {velocity.topic}: the robot would neither move "
+            f"nor stop.",
+            "Start the base's driver, or name the topic that it subscribes to.",
         )
 
 
 def _type(robot: FoundRobot, velocity: Guess, seen: Observed) -> Finding:
-    """Return which type the base takes, and which one WebMap sends."""
+    """Return whether the topic has the type that WebMap sends."""
     short = velocity.type.rpartition("/")[2]
     takes = seen.types.get(velocity.topic, "").strip()
-    said = seen.told or (robot.name in seen.meant and not takes)
-    verb = "is said to take" if said else "takes"
+    stated = seen.topics_given or (robot.name in seen.configured and not takes)
+    has = "has the stated type" if stated else "has the type"
     if takes and not same_type(takes, velocity.type):
         return Finding(
             "wrong",
             robot.name,
-            f"{velocity.topic} {verb} {takes.rpartition('/')[2]}, and WebMap is set to "
-            f"send {short}: the robot would not move, nor stop.",
+            f"{velocity.topic} {has} {takes.rpartition('/')[2]}, but WebMap is "
+            f"configured to send {short}: the robot would neither move nor stop.",
             "Correct the type where the robot is configured (twist.type of a fleet "
-            "file, velocity_type of --set), or leave it out, so that it is asked for.",
+            "file, velocity_type of --set), or leave it out: then WebMap queries it.",
         )
     stamped = is_type(velocity.type, "geometry_msgs/TwistStamped")
     if not stamped and seen.findings.dialect == "ros2" and _has_client(velocity, seen):
         return advice.type_not_certain(robot.name, velocity.topic, short)
     return Finding(
-        "note" if said else "good",
+        "note" if stated else "good",
         robot.name,
-        f"{velocity.topic} {verb} {short}, and "
-        f"WebMap sends that{', with a stamp of zero' if stamped else ''}.",
+        f"{velocity.topic} {has} {short}, and "
+        f"WebMap sends this type{', with a zero stamp' if stamped else ''}.",
     )
 
 
@@ -224,8 +227,8 @@ def _writers(robot: FoundRobot, velocity: Guess, seen: Observed) -> Iterator[Fin
         yield Finding(
             "note",
             robot.name,
-            f"Who else writes to {velocity.topic} cannot be told: the bridge did not "
-            f"say.",
+            f"The bridge does not list the publishers of {velocity.topic}, so other "
+            f"programs that drive the robot are not detected.",
         )
         return
     others = [name for name in writers if not is_client_node(name)]
@@ -234,12 +237,14 @@ def _writers(robot: FoundRobot, velocity: Guess, seen: Observed) -> Iterator[Fin
         yield Finding(
             "warning",
             robot.name,
-            f"{velocity.topic} has other writers too: {', '.join(others)}. The base "
-            f"takes whatever comes last.",
-            "Put a mux before the base (twist_mux) with a topic of WebMap's own, "
-            "webmap/cmd_vel, below the hand-held's priority.",
+            f"Other nodes publish to {velocity.topic} too: {', '.join(others)}. The "
+            f"base obeys the newest message of any node.",
+            "Put a mux (twist_mux) before the base, with an input for WebMap, "
+            "webmap/cmd_vel, of lower priority than that of a handheld controller.",
         )
     elif bridges:
         yield advice.client_writes(robot.name, velocity.topic, bridges)
     else:
-        yield Finding("good", robot.name, f"Nobody else writes to {velocity.topic}.")
+        yield Finding(
+            "good", robot.name, f"No other node publishes to {velocity.topic}."
+        )

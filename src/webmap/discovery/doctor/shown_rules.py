@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from webmap.discovery.doctor.heard_rules import age_of, silence
-from webmap.discovery.doctor.observed import Heard, Observed
+from webmap.discovery.doctor.observed import Measurement, Observed
+from webmap.discovery.doctor.rate_rules import age_of, silence
 from webmap.discovery.found import FoundRobot, Role
 from webmap.ros.finding import Finding, Level
 from webmap.ros.rosbridge import advice
@@ -34,69 +34,75 @@ def shown_topics(robot: FoundRobot) -> Iterator[tuple[str, str, str]]:
 def shown_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
     """Yield the rate and the age of each of these topics."""
     for kind, topic, _ in shown_topics(robot):
-        heard = seen.heard.get(topic)
-        if heard is None:
+        measured = seen.measured.get(topic)
+        if measured is None:
             continue
-        if not heard.count:
+        if not measured.count:
             yield from _silent(kind, robot.name, topic, seen)
         elif topic in seen.link.too_large:
             size = seen.link.too_large[topic]
             yield advice.too_large(robot.name, topic, size)
-        elif heard.trouble:
+        elif measured.trouble:
             yield Finding(
                 "warning",
                 robot.name,
-                f"{topic} cannot be read: {heard.trouble}.",
-                "Look whether its type is the one that the bridge says.",
+                f"{topic} cannot be read: {measured.trouble}.",
+                "Check that its type is the type that the bridge lists.",
             )
         else:
-            yield _came(kind, robot.name, topic, heard, age_of(heard, seen))
+            yield _came(kind, robot.name, topic, measured, age_of(measured, seen))
 
 
-def _came(kind: str, name: str, topic: str, heard: Heard, age: float | None) -> Finding:
-    said = f"{topic}: {heard.count} message{'s' * (heard.count != 1)}"
-    if heard.every:
-        said = f"{topic}: {1 / heard.every:.1f} messages a second"
+def _came(
+    kind: str, name: str, topic: str, measured: Measurement, age: float | None
+) -> Finding:
+    text = f"{topic}: {measured.count} message{'s' * (measured.count != 1)}"
+    if measured.every:
+        text = f"{topic}: {1 / measured.every:.1f} messages a second"
     if age is not None:
-        said += f", {_in_words(max(age, 0.0))} old"
-    if kind == "camera" and (heard.every or heard.longest_gap) > PICTURE_AGE:
+        text += f", {_duration_text(max(age, 0.0))} old"
+    if kind == "camera" and (measured.every or measured.longest_gap) > PICTURE_AGE:
         return Finding(
             "warning",
             name,
-            f"{said}: who drives by this camera is stopped whenever its picture is "
-            f"older than {PICTURE_AGE:g} s.",
-            "Let it take 5 pictures a second or more, or choose a smaller or "
-            "compressed one.",
+            f"{text}: driving with this camera stops whenever its picture is older "
+            f"than {PICTURE_AGE:g} s.",
+            "Publish 5 pictures a second or more, or choose smaller or compressed "
+            "pictures.",
         )
     if kind == "camera" and age is not None and age > PICTURE_AGE:
         return Finding(
             "warning",
             name,
-            f"{said}: its pictures come too late to drive by.",
-            "Look for a slow link or a queue, or choose a smaller or compressed one.",
+            f"{text}: its pictures arrive too late for driving.",
+            "Look for a slow connection or a queue, or choose smaller or compressed "
+            "pictures.",
         )
     if kind == "cloud" and age is not None and age > CLOUD_AGE:
         return Finding(
             "warning",
             name,
-            f"{said}, so its points lie where the robot was.",
-            "Look for a slow link, or let the driver send fewer points.",
+            f"{text}, so its points are drawn at an earlier pose of the robot.",
+            "Look for a slow connection, or let the driver send fewer points.",
         )
-    return Finding("good", name, f"{said}.")
+    return Finding("good", name, f"{text}.")
 
 
 def _silent(kind: str, name: str, topic: str, seen: Observed) -> Iterator[Finding]:
     if kind == "map" and seen.publishers.get(topic) == ():
         return  # reported already: the topic has no publisher
     if kind in ("plan", "status"):
-        seconds = seen.heard[topic].seconds
-        words = f"Nothing came on {topic} in {seconds:.0f} s; it may come with a goal."
-        yield Finding("note", name, words)
+        seconds = seen.measured[topic].seconds
+        text = (
+            f"No message was received on {topic} in {seconds:.0f} s; messages may "
+            f"begin with a goal."
+        )
+        yield Finding("note", name, text)
         return
     why = {
-        "camera": ", and who drives by this camera is stopped",
+        "camera": ", so driving with this camera stops",
         "costmap": ", so no costs are drawn",
-        "map": ", so there is no map under it",
+        "map": ", so no map is drawn under the robot",
         "cloud": ", so no points are drawn",
     }
     level: Level = "warning"
@@ -105,8 +111,8 @@ def _silent(kind: str, name: str, topic: str, seen: Observed) -> Iterator[Findin
     if kind == "map" and writers:
         found = replace(found, advice=_map_advice(writers[0], topic, seen))
     if kind in ("map", "costmap", "cloud") and writers:
-        words = f"{found.advice} {advice.MAYBE_TOO_LARGE}"
-        found = replace(found, advice=words)
+        text = f"{found.advice} {advice.MAYBE_TOO_LARGE}"
+        found = replace(found, advice=text)
     yield found
 
 
@@ -114,18 +120,19 @@ def _map_advice(node: str, topic: str, seen: Observed) -> str:
     """Return the usual reasons why a map with a publisher does not come."""
     if seen.findings.dialect == "ros1":
         return (
-            f"Maps are sent once: look whether {node} has loaded its map, and whether "
-            f"it is latched, so that clients that come later get it (rostopic echo "
+            f"Maps are sent once: check whether {node} has loaded its map, and whether "
+            f"it is latched, so that later subscribers receive it (rostopic echo "
             f"{topic})."
         )
     return (
-        f"Maps are sent once: look whether {node} is active (ros2 lifecycle get {node})"
-        f" and has loaded its map, and whether its durability is transient_local, so "
-        f"that clients that come later get it (ros2 topic info -v {topic})."
+        f"Maps are sent once: check whether {node} is active (ros2 lifecycle get "
+        f"{node}) and has loaded its map, and whether its durability is "
+        "transient_local, so that later subscribers receive it (ros2 topic info -v "
+        f"{topic})."
     )
 
 
-def _in_words(seconds: float) -> str:
+def _duration_text(seconds: float) -> str:
     if seconds < 1.0:
         return f"{seconds * 1000:.0f} ms"
     if seconds < 120.0:

@@ -38,10 +38,10 @@ PATIENCE = 10.0
 ROBOT = "r1"
 STOPS, GOES_ON, UNKNOWN = 0, 1, 2
 
-Words: TypeAlias = dict[str, Any]
+Message: TypeAlias = dict[str, Any]
 
 
-class Hand:
+class StopTestClient:
     """The client of the gate and its output for the person, stage by stage. No I/O.
 
     Args:
@@ -58,30 +58,30 @@ class Hand:
         self._why = "the gate has not answered"
         self._since = now
         self._asked_at = float("-inf")
-        self._report: Words | None = None
+        self._report: Message | None = None
         self._tick: int | None = None
         self._seq = 0
 
-    def hear(self, words: Words, now: float) -> None:
+    def receive(self, message: Message, now: float) -> None:
         """Process a message of the gate."""
-        match words["op"]:
+        match message["op"]:
             case "tick":
-                self._tick = words["tick"]
+                self._tick = message["tick"]
             case "hello" if self._report is not None:
-                self._end("the gate was started anew meanwhile")
-            case "refused" if words["what"] == "lease" and self.stage != "coming":
-                self._end(words["why"])
+                self._end("the gate restarted in the meantime")
+            case "refused" if message["what"] == "lease" and self.stage != "coming":
+                self._end(message["why"])
             case "refused":
-                self._why = words["why"]
+                self._why = message["why"]
             case "robot":
-                self._hear_robot(words, now)
+                self._receive_robot(message, now)
 
     def begin(self, now: float) -> None:
         """Start the test, after the person has agreed."""
         if self.stage == "ready":
             self._go_on("taking", now)
 
-    def step(self, now: float) -> list[Words]:
+    def step(self, now: float) -> list[Message]:
         """Return the messages to send to the gate now."""
         if now - self._since > PATIENCE and self.stage not in ("ready", "over"):
             self._end(self._why)
@@ -90,25 +90,25 @@ class Hand:
             return []
         if not report["mine"]:
             return [{"op": "take", "robot": ROBOT}] if self._may_ask(now) else []
-        said: list[Words] = []
+        messages: list[Message] = []
         if self._tick is not None:
-            said.append(self._released(report["epoch"], self._tick))
+            messages.append(self._released(report["epoch"], self._tick))
         if self.stage == "taking" and report["armed"] and self._may_ask(now):
-            said.append({"op": "stop-test", "robot": ROBOT})
-        return said
+            messages.append({"op": "stop-test", "robot": ROBOT})
+        return messages
 
-    def _released(self, epoch: int, tick: int) -> Words:
+    def _released(self, epoch: int, tick: int) -> Message:
         self._seq += 1
         axes = {"x": 0.0, "y": 0.0, "turn": 0.0}
         state = {"epoch": epoch, "seq": self._seq, "tick": tick, **axes}
         return {"op": "drive", "robot": ROBOT, **state}
 
-    def _hear_robot(self, report: Words, now: float) -> None:
+    def _receive_robot(self, report: Message, now: float) -> None:
         before, self._report = self._report, report
         if self.stage == "coming" and report["armable"]:
             self._go_on("ready", now)
         elif report["latched"] and self.stage != "over":
-            self._end(report["reason"] or "STOP stands")
+            self._end(report["reason"] or "STOP is active")
         elif self.stage in ("coming", "taking") and not report["mine"]:
             self._why = report["reason"] or self._why
         test = report["test"]
@@ -116,7 +116,7 @@ class Hand:
             return
         if self.stage == "taking":
             self._go_on("testing", now)
-            self._why = "the gate did not keep the result"
+            self._why = "the gate did not store the result"
         if before is None or test != before["test"]:
             self.news.append(test["text"])
         concluded = test["state"] == "done" or test["text"] == MOVES_ON
@@ -125,14 +125,14 @@ class Hand:
         elif concluded and _is_result(report, test["text"]):
             self._conclude(report)
 
-    def _conclude(self, report: Words) -> None:
+    def _conclude(self, report: Message) -> None:
         seconds, day = report["stop_time"], report["stop_date"]
         self.stage = "over"
         if seconds is None:
             self.code = GOES_ON
             self.news.append(
                 f"Result of {day}: it does NOT stop by itself, so it is driven at 0.3 "
-                "m/s at most. Set a timeout of its own on the robot."
+                "m/s at most. Set a command timeout in the robot's base."
             )
         else:
             self.code = STOPS
@@ -150,10 +150,10 @@ class Hand:
     def _end(self, why: str) -> None:
         if self.stage != "over":
             self.stage = "over"
-            self.news.append(f"Nothing was found out: {why}.")
+            self.news.append(f"The stop test gave no result: {why}.")
 
 
-def _is_result(report: Words, text: str) -> bool:
+def _is_result(report: Message, text: str) -> bool:
     """Return whether a report belongs to this test and not to an earlier one."""
     today = datetime.now().astimezone().date().isoformat()
     if report["stop_source"] != "tested" or report["stop_date"] != today:
@@ -185,18 +185,18 @@ def find_out(urls: Sequence[str], name: str, *, wait: float, yes: bool) -> int:
         found = discover(asyncio.run(_topics(url, wait)), host_name(url))
         spec = _spec(url, name, found.robots)
     except (BridgeError, ConfigError) as error:
-        echo(f"Nothing was found out: {error}", err=True)
+        echo(f"The stop test gave no result: {error}", err=True)
         return UNKNOWN
     except KeyboardInterrupt:
-        echo("Ended before anything was found out; nothing was moved.")
+        echo("Interrupted before the stop test had a result; nothing was moved.")
         return UNKNOWN
     client = GateClient()
     client.declare(spec)
     try:
         client.start()
-        return _lead(client, spec, yes)
+        return _run(client, spec, yes)
     except (KeyboardInterrupt, click.Abort):
-        echo("Ended before anything was found out; the robot is stopped.")
+        echo("Interrupted before the stop test had a result; the robot is stopped.")
         return UNKNOWN
     finally:
         client.stop()
@@ -210,7 +210,7 @@ async def _topics(url: str, wait: float) -> dict[str, str]:
 
 
 def _spec(url: str, name: str, robots: tuple[FoundRobot, ...]) -> RobotSpec:
-    """Return the robot as the gate takes it, without its command timeout."""
+    """Return the robot's specification for the gate, without a command timeout."""
     robot = next((one for one in robots if one.name == name), None)
     if robot is None:
         there = ", ".join(one.name for one in robots) or "no robot at all"
@@ -230,26 +230,26 @@ def _spec(url: str, name: str, robots: tuple[FoundRobot, ...]) -> RobotSpec:
     )
 
 
-def _lead(client: GateClient, spec: RobotSpec, yes: bool) -> int:
+def _run(client: GateClient, spec: RobotSpec, yes: bool) -> int:
     """Run the client from stage to stage, at 20 Hz."""
-    hand = Hand(time.monotonic())
-    heard: queue.SimpleQueue[str] = queue.SimpleQueue()
-    connection = client.connect("webmap doctor", "operator", heard.put, echo)
-    while hand.stage != "over":
+    test = StopTestClient(time.monotonic())
+    received: queue.SimpleQueue[str] = queue.SimpleQueue()
+    connection = client.connect("webmap doctor", "operator", received.put, echo)
+    while test.stage != "over":
         time.sleep(PERIOD)
-        while not heard.empty():
-            hand.hear(json.loads(heard.get()), time.monotonic())
-        if hand.stage == "ready":
+        while not received.empty():
+            test.receive(json.loads(received.get()), time.monotonic())
+        if test.stage == "ready":
             if not yes and not _agrees(spec):
                 echo("Nothing was moved.")
                 return UNKNOWN
-            hand.begin(time.monotonic())
-        for words in hand.step(time.monotonic()):
-            connection.receive(json.dumps(words))
-        for text in hand.news:
+            test.begin(time.monotonic())
+        for message in test.step(time.monotonic()):
+            connection.receive(json.dumps(message))
+        for text in test.news:
             echo(f"{spec.name}: {text}")
-        hand.news.clear()
-    return hand.code
+        test.news.clear()
+    return test.code
 
 
 def _agrees(spec: RobotSpec) -> bool:

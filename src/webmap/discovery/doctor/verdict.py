@@ -40,8 +40,8 @@ def report(url: str, findings: Sequence[Finding]) -> str:
         if finding.advice:
             lines.append(f"           -> {one_line(finding.advice)}")
     counts = Counter(finding.level for finding in findings)
-    words = [_counted(counts[level], level) for level in LEVELS]
-    return "\n".join([*lines, "", ", ".join(words)])
+    texts = [_counted(counts[level], level) for level in LEVELS]
+    return "\n".join([*lines, "", ", ".join(texts)])
 
 
 def _counted(count: int, level: Level) -> str:

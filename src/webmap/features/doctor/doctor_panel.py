@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from webmap import html, svg
-from webmap.discovery.doctor import Finding, MeantRobot, Observed, judge
+from webmap.discovery.doctor import ConfiguredRobot, Finding, Observed, judge
 from webmap.discovery.doctor.measure import TRYING, observe, tried
 from webmap.discovery.doctor.verdict import report as report_text
 from webmap.features.doctor.in_use import in_use
@@ -263,7 +263,7 @@ class Checkup:
         """All findings as plain text."""
         return report_text(self.url, self.findings)
 
-    def start(self, robots: Sequence[MeantRobot] = ()) -> None:
+    def start(self, robots: Sequence[ConfiguredRobot] = ()) -> None:
         """Check the bridge, unless a check is running already.
 
         Args:
@@ -285,12 +285,12 @@ class Checkup:
         self._show_progress("Starting.")
         self._task = asyncio.get_running_loop().create_task(self._run(work))
 
-    async def _look(self, robots: Sequence[MeantRobot]) -> Observed:
+    async def _look(self, robots: Sequence[ConfiguredRobot]) -> Observed:
         try:
             return await self._observe(
                 self.url,
                 seconds=SECONDS,
-                meant=lambda _: robots,
+                configured=lambda _: robots,
                 progress=self._show_progress,
             )
         finally:

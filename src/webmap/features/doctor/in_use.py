@@ -4,7 +4,7 @@ import inspect
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from webmap.discovery.doctor import MeantRobot
+from webmap.discovery.doctor import ConfiguredRobot
 from webmap.discovery.found import ACTIONS, Role
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ Topics: TypeAlias = dict[Role, tuple[tuple[str, str], ...]]
 
 def in_use(
     robots: "Iterable[Robot]", bridge: "Bridge", maps: Iterable[Made] = ()
-) -> list[MeantRobot]:
+) -> list[ConfiguredRobot]:
     """Return the robots that use a bridge, with the topics that they use on it.
 
     Args:
@@ -44,7 +44,7 @@ def in_use(
 
 def _in_use(
     robot: "Robot", bridge: "Bridge", maps: Iterable[Made]
-) -> MeantRobot | None:
+) -> ConfiguredRobot | None:
     feed, motion = robot.feed, robot.motion
     twist, goals = motion.config.twist, motion.config.move
     frames = robot.tf
@@ -74,7 +74,7 @@ def _in_use(
     topics |= _drawn(robot, bridge, maps)
     if not any(topics[role] for role in topics if role not in GRIDS):
         return None  # the robot has at most a shared map there
-    return MeantRobot(robot.name, topics, base, start, frozenset(elsewhere))
+    return ConfiguredRobot(robot.name, topics, base, start, frozenset(elsewhere))
 
 
 def _drawn(robot: "Robot", bridge: "Bridge", maps: Iterable[Made]) -> Topics:

@@ -1,6 +1,6 @@
 // Made by tools/make_javascript.py from webmap/core/robot_state.py: do not edit.
 
-/** What a robot is doing, in words; `{who}` is who holds or drives it. */
+/** The text for each state of a robot; `{who}` is its operator. */
 export const WORDS = Object.freeze({
   no_bridge: "No connection to the bridge",
   connecting: "Connecting",

@@ -1,4 +1,4 @@
-"""Robots that are given by hand, and their other topics behind the bridges."""
+"""Robots given with ``--robot``, and their other topics behind the bridges."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 FORM = "NAME:ODOM:CMD_VEL:SCAN, as in Bob:/odom:/cmd_vel:/scan"
 
-APART = "names differ by more than case and Unicode form"
+APART = "names must differ by more than case and Unicode form"
 
-TOLD: tuple[Role, ...] = ("odometry", "velocity", "scan")
+GIVEN_ROLES: tuple[Role, ...] = ("odometry", "velocity", "scan")
 """The roles in a value of ``--robot``."""
 
 WHERE: tuple[Role, ...] = ("odometry", "pose")
@@ -29,7 +29,7 @@ _PART = re.compile(PARTS)
 
 
 class Candidate(NamedTuple):
-    """A robot, found or given by hand, and the bridge that it is behind."""
+    """A robot, found or given with ``--robot``, and the bridge that it is behind."""
 
     bridge: "Bridge"
     found: FoundRobot
@@ -67,14 +67,14 @@ def parse_robot(text: str, bridges: Sequence["Bridge"]) -> Candidate:
     )
     if not (number.isascii() and number.isdigit() and 0 < int(number) <= len(bridges)):
         raise ConfigError(
-            f"robot {text!r}: {number!r} is no bridge's number; there are "
-            f"{len(bridges)}, counted from 1"
+            f"robot {text!r}: got the bridge number {number!r}, expected 1 to "
+            f"{len(bridges)}"
         )
     name, *topics = (part.strip() for part in rest.split(":"))
-    if not name or len(topics) > len(TOLD) or not any(topics):
+    if not name or len(topics) > len(GIVEN_ROLES) or not any(topics):
         raise ConfigError(f"robot {text!r} is not of the form {FORM}")
-    said = zip(TOLD, topics, strict=False)
-    guesses = {role: (Guess(topic, "", ""),) for role, topic in said if topic}
+    pairs = zip(GIVEN_ROLES, topics, strict=False)
+    guesses = {role: (Guess(topic, "", ""),) for role, topic in pairs if topic}
     return Candidate(bridges[int(number) - 1], FoundRobot(name, "", guesses))
 
 
@@ -96,7 +96,7 @@ def set_twice(name: str) -> ConfigError:
     return ConfigError(f"--set: two robots would be called {name!r}; {APART}")
 
 
-def told_robots(texts: Iterable[str], bridges: Sequence["Bridge"]) -> list[Candidate]:
+def given_robots(texts: Iterable[str], bridges: Sequence["Bridge"]) -> list[Candidate]:
     """Return the robots of ``--robot``.
 
     Args:
@@ -108,35 +108,35 @@ def told_robots(texts: Iterable[str], bridges: Sequence["Bridge"]) -> list[Candi
             velocity topic.
 
     """
-    told: list[Candidate] = []
+    given: list[Candidate] = []
     for text in texts:
         robot = parse_robot(text, bridges)
         check_name(robot.found.name, f"robot {text!r}")
-        for topic in _said(robot.found):
+        for topic in _topics_of(robot.found):
             try:
                 normalise_topic(topic)
             except ConfigError as error:
                 raise ConfigError(f"robot {text!r}: {error}") from None
-        for other in told:
+        for other in given:
             _differ(robot, other, text)
-        told.append(robot)
-    return told
+        given.append(robot)
+    return given
 
 
 def _differ(robot: Candidate, other: Candidate, text: str) -> None:
     name, drives = other.found.name, robot.found.topic("velocity")
     if same_name(robot.found.name) == same_name(name):
-        raise ConfigError(f"robot {text!r}: there is a robot {name!r} already; {APART}")
+        raise ConfigError(f"robot {text!r}: another robot is called {name!r}; {APART}")
     same = drives and _plain(drives) == _plain(other.found.topic("velocity") or "-")
     if same and robot.bridge.url == other.bridge.url:
         raise ConfigError(
-            f"robot {text!r}: {drives} drives {name!r} already; each robot has its own"
+            f"robot {text!r}: {drives} already drives {name!r}; expected another topic"
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Offer:
-    """The drawable topics of a robot that was given by hand."""
+    """The drawable topics of a robot of ``--robot``."""
 
     found: FoundRobot | None
     """The same robot as discovery found it, if it did."""
@@ -145,19 +145,19 @@ class Offer:
     layers: Layers
 
 
-def offer(told: FoundRobot, topics: Mapping[str, str], findings: Findings) -> Offer:
-    """Return the drawable topics of a robot that was given by hand.
+def offer(given: FoundRobot, topics: Mapping[str, str], findings: Findings) -> Offer:
+    """Return the drawable topics of a robot given with ``--robot``.
 
     Scans are only those that were given, so the result has none.
 
     Args:
-        told: The robot.
+        given: The robot.
         topics: Types by topic, behind its bridge.
         findings: The findings of the bridge.
 
     """
-    found = same_robot(told, findings.robots)
-    space = namespace_of(told) if found is None else found.namespace
+    found = same_robot(given, findings.robots)
+    space = namespace_of(given) if found is None else found.namespace
     layers = findings.layers.get(space)
     if layers is None:
         layers = find_layers(topics, {*findings.layers, space})[space]
@@ -165,27 +165,27 @@ def offer(told: FoundRobot, topics: Mapping[str, str], findings: Findings) -> Of
     return Offer(found, space, Layers(*map(tuple, kept)))
 
 
-def same_robot(told: FoundRobot, robots: Iterable[FoundRobot]) -> FoundRobot | None:
-    """Return the found robot that is the one given by hand.
+def same_robot(given: FoundRobot, robots: Iterable[FoundRobot]) -> FoundRobot | None:
+    """Return the found robot that is the one given with ``--robot``.
 
     They are the same if one of the found topics is given, also one that is not the
     best of its role; else by name.
     """
     there = tuple(robots)
     for robot in there:
-        if _has(robot, WHERE, told.topic("odometry")) or _has(
-            robot, ("velocity",), told.topic("velocity")
+        if _has(robot, WHERE, given.topic("odometry")) or _has(
+            robot, ("velocity",), given.topic("velocity")
         ):
             return robot
-    return next((robot for robot in there if robot.name == told.name), None)
+    return next((robot for robot in there if robot.name == given.name), None)
 
 
-def namespace_of(told: FoundRobot) -> str:
+def namespace_of(given: FoundRobot) -> str:
     """Return the common namespace of a robot's topics.
 
     Names of robot parts at its end belong to the part.
     """
-    spaces = [_plain(topic).split("/")[1:-1] for topic in _said(told)]
+    spaces = [_plain(topic).split("/")[1:-1] for topic in _topics_of(given)]
     common: list[str] = []
     for names in zip(*spaces, strict=False):
         if len(set(names)) > 1:
@@ -196,8 +196,8 @@ def namespace_of(told: FoundRobot) -> str:
     return "".join(f"/{name}" for name in common)
 
 
-def _said(told: FoundRobot) -> list[str]:
-    return [told.topic(role) for role in TOLD if told.topic(role)]
+def _topics_of(given: FoundRobot) -> list[str]:
+    return [given.topic(role) for role in GIVEN_ROLES if given.topic(role)]
 
 
 def _where(robot: FoundRobot) -> str:

@@ -1,4 +1,4 @@
-"""What is said with ``--set`` comes before what is guessed."""
+"""Settings of ``--set`` replace guesses."""
 
 import pytest
 from cli_inside import run_inside
@@ -6,8 +6,8 @@ from cli_inside import run_inside
 from webmap import Bridge
 from webmap.base.errors import ConfigError
 from webmap.discovery import discover
-from webmap.fleet.overrides import Overruling, parse_setting
-from webmap.fleet.stated import parse_robot
+from webmap.fleet.given import parse_robot
+from webmap.fleet.overrides import Overrides, parse_setting
 
 URL = "ws://127.0.0.1:9090/"
 TOPICS = {
@@ -19,8 +19,8 @@ TOPICS = {
 }
 
 
-def overruling(*texts):
-    return Overruling([parse_setting(text) for text in texts])
+def overrides(*texts):
+    return Overrides([parse_setting(text) for text in texts])
 
 
 @pytest.fixture
@@ -38,14 +38,17 @@ def found():
         (".scan=/scan", "not of the form ROBOT.ROLE=TOPIC"),
         ("robot_1.scam=/scan", "did you mean 'scan'?"),
         ("robot_1.arm=/arm", "no role 'arm'. The roles are odometry, velocity"),
-        ("robot_1.scan=scan", "'scan' is no name of a topic; it begins with a slash"),
-        ("robot_1.scan=/a b", "'/a b' is no name of a topic"),
+        (
+            "robot_1.scan=scan",
+            "'scan' is not the name of a topic; a name begins with a slash",
+        ),
+        ("robot_1.scan=/a b", "'/a b' is not the name of a topic"),
         ("robot_1.scan=/a,/b", "one topic of that role, got 2"),
         ("robot_1.name= ", "at least one character"),
         (
             "robot_1.velocity_type=std_msgs/String",
-            "'std_msgs/String' is no type that drives a base; there are "
-            "geometry_msgs/Twist and geometry_msgs/TwistStamped",
+            "got the type 'std_msgs/String', expected "
+            "geometry_msgs/Twist or geometry_msgs/TwistStamped",
         ),
         ("robot_1.name=a\tb", "a name is one line of 100 characters at the most"),
     ],
@@ -57,7 +60,7 @@ def test_a_setting_that_makes_no_sense_says_what_was_expected(text, words):
 
 
 def test_one_topic_is_overruled_and_the_others_stay(found):
-    said = overruling("robot_1.scan=/robot_1/rear/scan", "robot_1.battery=")
+    said = overrides("robot_1.scan=/robot_1/rear/scan", "robot_1.battery=")
     robot = said.apply(URL, found)
     config = said.config(URL, robot)
     assert config.scan == ["/robot_1/rear/scan"]
@@ -69,7 +72,7 @@ def test_one_topic_is_overruled_and_the_others_stay(found):
 
 
 def test_a_robot_gets_another_name_and_is_known_again_by_its_namespace(found):
-    said = overruling("robot_1.name=Bob", "robot_1.base=base_footprint")
+    said = overrides("robot_1.name=Bob", "robot_1.base=base_footprint")
     for _ in range(2):
         robot = said.apply(URL, found)
         assert (robot.name, robot.base_frame) == ("Bob", "base_footprint")
@@ -80,7 +83,7 @@ STAMPED = "geometry_msgs/msg/TwistStamped"
 
 @pytest.mark.parametrize("last", ["velocity=/robot_1/drive", "velocity=/drive"])
 def test_the_type_of_velocity_is_overruled_whatever_else_is(found, last):
-    said = overruling(f"robot_1.velocity_type={STAMPED}", f"robot_1.{last}")
+    said = overrides(f"robot_1.velocity_type={STAMPED}", f"robot_1.{last}")
     about = said.apply(URL, found)
     velocity = about.first("velocity")
     assert (velocity.topic, velocity.type) == (last.partition("=")[2], STAMPED)
@@ -88,14 +91,14 @@ def test_the_type_of_velocity_is_overruled_whatever_else_is(found, last):
 
 def test_a_robot_that_was_told_is_driven_with_the_type_that_was_said():
     bob = parse_robot("Bob::/cmd_vel", [Bridge(URL)])
-    (told,) = overruling(f"Bob.velocity_type={STAMPED}").tell([bob])
-    assert told.found.type_of("velocity") == STAMPED
+    (given,) = overrides(f"Bob.velocity_type={STAMPED}").apply_to_given([bob])
+    assert given.found.type_of("velocity") == STAMPED
 
 
 def test_a_robot_without_odometry_is_not_placed_by_another_pose():
     topics = TOPICS | {"/robot_1/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
     (robot,) = discover(topics).robots
-    robot = overruling("robot_1.odometry=").apply(URL, robot)
+    robot = overrides("robot_1.odometry=").apply(URL, robot)
     assert robot.config(URL).odometry is None
 
 
@@ -108,12 +111,12 @@ def test_a_robot_without_odometry_is_not_placed_by_another_pose():
 )
 def test_the_dialect_says_which_action_it_is(odometry, type):
     (robot,) = discover({"/robot_1/odom": odometry}).robots
-    robot = overruling("robot_1.action=/robot_1/drive_to").apply(URL, robot)
+    robot = overrides("robot_1.action=/robot_1/drive_to").apply(URL, robot)
     assert robot.action == ("/robot_1/drive_to", type)
 
 
 def test_cameras_are_a_list(found):
-    robot = overruling("robot_1.camera=/front/image,/rear/image").apply(URL, found)
+    robot = overrides("robot_1.camera=/front/image,/rear/image").apply(URL, found)
     cameras = robot.config(URL).cameras
     assert [camera.topic for camera in cameras] == ["/front/image", "/rear/image"]
 
@@ -121,17 +124,19 @@ def test_cameras_are_a_list(found):
 def test_a_robot_that_was_told_gets_what_its_form_has_no_place_for():
     bridges = [Bridge(URL)]
     bob, al = (parse_robot(f"{name}:/odom", bridges) for name in ("Bob", "Al"))
-    (told,) = overruling("Bob.battery=/battery", "Bob.odometry=/odom2").tell([bob])
-    assert told.found.topic("battery") == "/battery"
-    assert told.found.topic("odometry") == "/odom2"
+    (given,) = overrides("Bob.battery=/battery", "Bob.odometry=/odom2").apply_to_given(
+        [bob]
+    )
+    assert given.found.topic("battery") == "/battery"
+    assert given.found.topic("odometry") == "/odom2"
     with pytest.raises(ConfigError, match="write a fleet file"):
-        overruling("Bob.plan=/plan").tell([bob])
+        overrides("Bob.plan=/plan").apply_to_given([bob])
     with pytest.raises(ConfigError, match="two robots would be called 'BOB'"):
-        overruling("Al.name=BOB").tell([bob, al])
+        overrides("Al.name=BOB").apply_to_given([bob, al])
 
 
 def test_a_robot_that_is_not_there_is_refused_unless_it_may_still_come():
-    said = overruling("robot_7.scan=/scan")
+    said = overrides("robot_7.scan=/scan")
     with pytest.raises(ConfigError, match="did you mean 'robot_1'"):
         said.check(["robot_1"], all_known=True)
     (words,) = said.check(["robot_1"], all_known=False)
@@ -152,7 +157,7 @@ def test_view_shows_what_it_would_use_and_refuses_what_is_not_there(ros1):
     bob = shown.stdout.partition("Bob (in /robot_1)")[2]
     (scan,) = (line for line in bob.splitlines() if line.startswith("  scan "))
     assert scan.split() == [
-        *("scan", "/robot_0/base_scan", "said", "with", "--set"),
+        *("scan", "/robot_0/base_scan", "from", "--set"),
     ]
     drawn = bob.partition("drawn by webmap view:")[2]
     assert "/robot_1/points" in drawn
@@ -168,12 +173,12 @@ def test_view_shows_what_it_would_use_and_refuses_what_is_not_there(ros1):
 
 
 def test_view_shows_what_it_would_draw_of_a_robot_that_is_told(ros1):
-    told = (ros1, "--show", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:/odd")
-    shown = view(*told)
+    given = (ros1, "--show", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:/odd")
+    shown = view(*given)
     assert shown.returncode == 0, shown.stderr
     bob, _, drawn = shown.stdout.partition("drawn by webmap view:")
     assert [line.split() for line in bob.splitlines()] == [
-        ["Bob", "(told", "with", "--robot)"],
+        ["Bob", "(from", "--robot)"],
         ["odometry", "/robot_0/odom"],
         ["velocity", "/robot_0/cmd_vel"],
         ["scan", "/odd"],
@@ -182,12 +187,12 @@ def test_view_shows_what_it_would_draw_of_a_robot_that_is_told(ros1):
     assert "/robot_0/points" in drawn
     assert " /map " in drawn
     assert "robot_1" not in shown.stdout
-    assert view(*told, "--as-told").stdout.strip() == bob.strip()
+    assert view(*given, "--as-told").stdout.strip() == bob.strip()
 
 
 def test_view_says_of_a_told_robot_why_no_more_is_known():
     shown = view("ws://127.0.0.1:1", "--show", "--wait", "0", "--robot", "Bob:/odom")
     said = shown.stdout.splitlines()
-    assert said == ["Bob (told with --robot)", "  odometry    /odom"]
+    assert said == ["Bob (from --robot)", "  odometry    /odom"]
     assert "cannot reach the rosbridge" in shown.stderr
-    assert "No more is known" in shown.stderr
+    assert "Only the topics of --robot can be drawn" in shown.stderr

@@ -7,10 +7,16 @@ import pytest
 from faulty_site import site
 
 from webmap.discovery import discover
-from webmap.discovery.doctor import Heard, MeantRobot, Observed, is_ready, judge
-from webmap.discovery.doctor.meant import lay_over
+from webmap.discovery.doctor import (
+    ConfiguredRobot,
+    Measurement,
+    Observed,
+    is_ready,
+    judge,
+)
+from webmap.discovery.doctor.configured import merge_configured
 from webmap.discovery.doctor.measure import observe
-from webmap.discovery.doctor.observed import Clock, Way
+from webmap.discovery.doctor.observed import Clock, FramePath
 
 SECONDS = 0.4
 STAMPED = "geometry_msgs/msg/TwistStamped"
@@ -30,24 +36,24 @@ DRIVEN = {
 }
 
 
-def laid(*meant, topics=TOPICS):
-    return lay_over(discover(topics), meant, topics)
+def laid(*configured, topics=TOPICS):
+    return merge_configured(discover(topics), configured, topics)
 
 
-def seen_of(*meant, topics=TOPICS, **more):
-    """What is seen of robots that are meant so, on a link without any trouble."""
-    findings, by_name = laid(*meant, topics=topics)
+def seen_of(*configured, topics=TOPICS, **more):
+    """What is seen of configured robots, on a link without any trouble."""
+    findings, by_name = laid(*configured, topics=topics)
     known = {one.found_as for one in by_name.values()}
     others = [one.name for one in discover(topics).robots if one.name not in known]
     seen = Observed(
         "ws://localhost:9090",
         types=topics,
         findings=findings,
-        meant=by_name,
+        configured=by_name,
         others=tuple(others),
         clock=Clock(0.0, 0.004),
         publishers={"/a/cmd_vel": ()},
-        heard={"/a/odom": Heard(60, 3.0, 0.06)},
+        measured={"/a/odom": Measurement(60, 3.0, 0.06)},
     )
     return replace(seen, **more)
 
@@ -60,7 +66,7 @@ def said(seen, words):
 
 def test_what_was_said_is_measured_and_what_was_not_is_as_it_was_found():
     findings, _ = laid(
-        MeantRobot("Bob", {"odometry": (("/a/ekf/odometry/filtered", ""),)})
+        ConfiguredRobot("Bob", {"odometry": (("/a/ekf/odometry/filtered", ""),)})
     )
     (bob,) = findings.robots
     assert bob.name == "Bob"
@@ -69,49 +75,55 @@ def test_what_was_said_is_measured_and_what_was_not_is_as_it_was_found():
 
 
 def test_a_robot_that_does_without_a_topic_is_not_measured_by_it():
-    (bob,) = laid(MeantRobot("Bob", {**DRIVEN, "scan": ()}))[0].robots
+    (bob,) = laid(ConfiguredRobot("Bob", {**DRIVEN, "scan": ()}))[0].robots
     assert "scan" not in bob.guesses
 
 
 def test_a_relative_name_of_a_topic_is_the_one_that_is_behind_the_bridge():
-    (bob,) = laid(MeantRobot("Bob", {"odometry": (("a/odom/", ""),)}))[0].robots
+    (bob,) = laid(ConfiguredRobot("Bob", {"odometry": (("a/odom/", ""),)}))[0].robots
     assert bob.first("odometry").topic == "/a/odom"
     assert bob.topic("velocity") == "/a/cmd_vel", "it is the robot that was found"
 
 
 def test_topics_tell_which_robot_is_meant_before_any_name_does():
     turned = (
-        MeantRobot("b", {"odometry": (("/a/odom", ""),)}),
-        MeantRobot("a", {"velocity": (("/b/cmd_vel", ""),)}),
+        ConfiguredRobot("b", {"odometry": (("/a/odom", ""),)}),
+        ConfiguredRobot("a", {"velocity": (("/b/cmd_vel", ""),)}),
     )
-    findings, meant = laid(*turned)
+    findings, configured = laid(*turned)
     assert [robot.topic("scan") for robot in findings.robots] == ["/a/scan", "/b/scan"]
-    assert [one.found_as for one in meant.values()] == ["a", "b"]
+    assert [one.found_as for one in configured.values()] == ["a", "b"]
 
 
 def test_two_robots_of_one_name_are_told_apart():
-    findings, meant = laid(MeantRobot("Bob", DRIVEN), MeantRobot("Bob"))
+    findings, configured = laid(ConfiguredRobot("Bob", DRIVEN), ConfiguredRobot("Bob"))
     assert [robot.name for robot in findings.robots] == ["Bob", "Bob 2"]
-    assert list(meant) == ["Bob", "Bob 2"]
+    assert list(configured) == ["Bob", "Bob 2"]
 
 
 @pytest.mark.parametrize(
     ("takes", "sends", "level", "words"),
     [
-        ("geometry_msgs/Twist", "geometry_msgs/msg/Twist", "good", "takes Twist, and"),
-        ("geometry_msgs/Twist", "", "good", "takes Twist, and"),
-        (STAMPED, "", "good", "takes TwistStamped, and"),
+        (
+            "geometry_msgs/Twist",
+            "geometry_msgs/msg/Twist",
+            "good",
+            "has the type Twist, and",
+        ),
+        ("geometry_msgs/Twist", "", "good", "has the type Twist, and"),
+        (STAMPED, "", "good", "has the type TwistStamped, and"),
         (
             "geometry_msgs/Twist",
             STAMPED,
             "wrong",
-            "takes Twist, and WebMap is set to send TwistStamped: the robot would not",
+            "has the type Twist, but WebMap is configured to send TwistStamped: the "
+            "robot would neither move nor stop",
         ),
         (
             "std_msgs/String",
             "",
             "wrong",
-            "takes String, and WebMap is set to send Twist:",
+            "has the type String, but WebMap is configured to send Twist:",
         ),
     ],
 )
@@ -119,42 +131,47 @@ def test_the_type_that_is_sent_is_held_against_the_one_that_the_base_takes(
     takes, sends, level, words
 ):
     topics = TOPICS | {"/a/cmd_vel": takes}
-    bob = MeantRobot("Bob", {**DRIVEN, "velocity": (("/a/cmd_vel", sends),)})
+    bob = ConfiguredRobot("Bob", {**DRIVEN, "velocity": (("/a/cmd_vel", sends),)})
     found = said(seen_of(bob, topics=topics), words)
     assert found.level == level
     assert ("twist.type" in found.advice) is (level == "wrong")
 
 
 def test_a_type_that_only_a_person_says_is_no_good_news():
-    bob = MeantRobot("Bob", {**DRIVEN, "velocity": (("/a/other", STAMPED),)})
-    assert said(seen_of(bob), "/a/other is said to take TwistStamped").level == "note"
+    bob = ConfiguredRobot("Bob", {**DRIVEN, "velocity": (("/a/other", STAMPED),)})
+    assert (
+        said(seen_of(bob), "/a/other has the stated type TwistStamped").level == "note"
+    )
 
 
 def test_a_robot_that_was_given_no_velocity_is_no_mistake():
-    seen = seen_of(MeantRobot("Bob", {**DRIVEN, "velocity": ()}))
-    assert said(seen, "so it can be seen and not driven").level == "note"
+    seen = seen_of(ConfiguredRobot("Bob", {**DRIVEN, "velocity": ()}))
+    assert (
+        said(seen, "without a velocity topic: it can be seen but not driven").level
+        == "note"
+    )
     assert is_ready(judge(seen))
 
 
 def test_robots_that_nobody_meant_are_named_and_not_measured():
-    seen = seen_of(MeantRobot("Bob", DRIVEN))
-    assert said(seen, "found too, and not looked at: b.").level == "note"
-    assert said(seen, "robots looked at: Bob.").level == "good"
+    seen = seen_of(ConfiguredRobot("Bob", DRIVEN))
+    assert said(seen, "they were not checked: b.").level == "note"
+    assert said(seen, "robots checked: Bob.").level == "good"
     assert {each.about for each in judge(seen)} == {"bridge", "Bob"}
 
 
 def test_the_stop_test_is_told_by_the_name_that_the_command_finds():
-    words = "stops by itself when commands cease"
-    advice = said(seen_of(MeantRobot("Bob", DRIVEN)), words).advice
+    words = "This check does not find out whether the base stops by itself"
+    advice = said(seen_of(ConfiguredRobot("Bob", DRIVEN)), words).advice
     assert "--stop-test a, or the button on its card" in advice
     strange = {"odometry": (("/x/odom", ""),), "velocity": (("/x/cmd", ""),)}
-    advice = said(seen_of(MeantRobot("Eve", strange)), words).advice
+    advice = said(seen_of(ConfiguredRobot("Eve", strange)), words).advice
     assert "--stop-test" not in advice
     assert "the button on its card" in advice
 
 
 def test_what_goes_over_another_bridge_is_not_missed_at_this_one():
-    bob = MeantRobot(
+    bob = ConfiguredRobot(
         "Bob",
         {"odometry": (), "pose": (), "velocity": (), "tf": ()},
         elsewhere=frozenset({"odometry", "velocity"}),
@@ -164,12 +181,14 @@ def test_what_goes_over_another_bridge_is_not_missed_at_this_one():
     assert about_bob == []
 
 
-def looked_at(system, *meant):
-    """Observe a system with robots that are meant so."""
+def looked_at(system, *configured):
+    """Observe a system with configured robots."""
 
     async def run():
         async with system as there:
-            seen = await observe(there.url, seconds=SECONDS, meant=lambda _: meant)
+            seen = await observe(
+                there.url, seconds=SECONDS, configured=lambda _: configured
+            )
             assert there.graph.advertised == [], "something was published"
             return seen
 
@@ -186,39 +205,46 @@ BOB = {
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_a_robot_is_measured_by_the_topics_that_it_was_given(dialect):
-    seen = looked_at(site(dialect), MeantRobot("Bob", BOB))
-    assert said(seen, "/robot_0/cmd_vel takes Twist, and WebMap is").level == "wrong"
-    assert seen.heard["/robot_0/odom"].count > 0
-    assert not [topic for topic in seen.heard if "scan" in topic or "camera" in topic]
+    seen = looked_at(site(dialect), ConfiguredRobot("Bob", BOB))
+    assert (
+        said(seen, "/robot_0/cmd_vel has the type Twist, but WebMap is").level
+        == "wrong"
+    )
+    assert seen.measured["/robot_0/odom"].count > 0
+    assert not [
+        topic for topic in seen.measured if "scan" in topic or "camera" in topic
+    ]
 
 
 def test_without_rosapi_the_robots_that_were_given_are_measured():
-    seen = looked_at(site(rosapi=False), MeantRobot("Bob", BOB))
+    seen = looked_at(site(rosapi=False), ConfiguredRobot("Bob", BOB))
     assert [robot.name for robot in seen.findings.robots] == ["Bob"]
-    assert seen.heard["/robot_0/odom"].count > 0
-    sent = said(seen, "/robot_0/cmd_vel is said to take TwistStamped, and")
+    assert seen.measured["/robot_0/odom"].count > 0
+    sent = said(seen, "/robot_0/cmd_vel has the stated type TwistStamped, and")
     assert sent.level == "note"
     assert said(seen, "blocks its socket is not known").level == "note"
 
 
 def test_a_topic_that_is_not_there_is_wrong():
     seen = looked_at(
-        site(), MeantRobot("Bob", {**BOB, "odometry": (("/odometer", ""),)})
+        site(), ConfiguredRobot("Bob", {**BOB, "odometry": (("/odometer", ""),)})
     )
-    assert said(seen, "Nothing came on /odometer").level == "wrong"
+    assert said(seen, "No message was received on /odometer").level == "wrong"
 
 
 def test_where_nobody_said_anything_all_that_is_found_is_measured():
     seen = looked_at(site())
     assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
-    assert seen.meant == {}
+    assert seen.configured == {}
     assert said(seen, "robots found: robot_0.").level == "good"
 
 
 def test_the_frames_are_followed_from_the_frame_that_was_said():
     told = {**BOB, "tf": (("/tf", ""),)}
-    seen = looked_at(site(), MeantRobot("Bob", told, map_frame="site"))
-    assert seen.ways["Bob"].start == "site"
-    assert "site" in seen.ways["Bob"].missing
-    seen = looked_at(site(), MeantRobot("Bob", told, map_frame="map"))
-    assert seen.ways["Bob"] == Way("robot_0/odom", base="robot_0/base_link")
+    seen = looked_at(site(), ConfiguredRobot("Bob", told, map_frame="site"))
+    assert seen.frame_paths["Bob"].start == "site"
+    assert "site" in seen.frame_paths["Bob"].missing
+    seen = looked_at(site(), ConfiguredRobot("Bob", told, map_frame="map"))
+    assert seen.frame_paths["Bob"] == FramePath(
+        "robot_0/odom", base="robot_0/base_link"
+    )

@@ -1,4 +1,4 @@
-"""Robots that are told by hand have what else is in their namespaces."""
+"""Robots that are given by hand have what else is in their namespaces."""
 
 import asyncio
 
@@ -16,15 +16,15 @@ from webmap.features.layers.on_maps import OnMaps
 from webmap.fleet import found as found_fleet
 from webmap.fleet.find import Found
 from webmap.fleet.found import FoundFleet
-from webmap.fleet.shown import ShownRobot, ShownRobots
-from webmap.fleet.stated import (
+from webmap.fleet.given import (
     Candidate,
+    given_robots,
     namespace_of,
     offer,
     parse_robot,
     same_robot,
-    told_robots,
 )
+from webmap.fleet.shown import ShownRobot, ShownRobots
 from webmap.fleet.watch import LookingForLayers
 
 URL = "ws://bob:9090"
@@ -59,14 +59,14 @@ def made(robot):
     return make_robot(robot.found.config(robot.bridge.url), [robot.bridge])
 
 
-def drawn(bridge, topics, *told):
-    """Draw what is behind a bridge of robots that were told; return all of it."""
-    console = Console([made(about) for about in told])
+def drawn(bridge, topics, *given):
+    """Draw what is behind a bridge of robots that were given; return all of it."""
+    console = Console([made(about) for about in given])
     known = [
         ShownRobot(*about, robot, about.found.config(about.bridge.url))
-        for about, robot in zip(told, console.told, strict=True)
+        for about, robot in zip(given, console.told, strict=True)
     ]
-    layers = LookingForLayers(bridge, ShownRobots(console), told=known)
+    layers = LookingForLayers(bridge, ShownRobots(console), given=known)
     asyncio.run(layers.take(topics))
     return console
 
@@ -82,10 +82,10 @@ def what_of(robot):
 
 
 def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
-    told = described(
+    given = described(
         bridge, odometry="/a/odom", velocity="/a/cmd_vel", scan="/a/rear/scan"
     )
-    console = drawn(bridge, TOPICS, told)
+    console = drawn(bridge, TOPICS, given)
     (robot,) = console.told
     assert what_of(robot) == [
         ("LaserScanner", "/a/rear/scan"),
@@ -96,7 +96,7 @@ def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
     ]
     assert [type(module).__name__ for module in robot.modules].count("Trail") == 1
     assert list(console.grids) == [(bridge, "/map")]
-    assert robot.feed.topic == "/a/odom", "its odometry is as it was told"
+    assert robot.feed.topic == "/a/odom", "its odometry is as it was given"
     robot.destroy()
 
 
@@ -104,11 +104,11 @@ def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
 def test_with_as_told_it_stays_with_what_was_told(monkeypatch, said, drawn_of):
     asked = []
 
-    def looking(bridge, shown, *, told, **options):
-        asked.extend(each.robot.name for each in told)
+    def looking(bridge, shown, *, given, **options):
+        asked.extend(each.robot.name for each in given)
 
-    def open_console(bridges, told, floor):
-        return Console([make_robot(config, bridges) for config in told])
+    def open_console(bridges, given, floor):
+        return Console([make_robot(config, bridges) for config in given])
 
     monkeypatch.setattr(webmap.console, "open_console", open_console)
     monkeypatch.setattr(webmap, "run", lambda **options: None)
@@ -130,9 +130,9 @@ def test_a_told_robot_is_drawn_in_the_frame_of_the_map_if_frames_lead_there(brid
 
 def test_a_told_robot_that_discovery_does_not_know_has_its_namespace_too(bridge):
     topics = TOPICS | {"/c/where": "geometry_msgs/Pose", "/c/plan": "nav_msgs/Path"}
-    told = described(bridge, odometry="/c/where")
-    assert offer(told.found, topics, discover(topics)).found is None
-    console = drawn(bridge, topics, told)
+    given = described(bridge, odometry="/c/where")
+    assert offer(given.found, topics, discover(topics)).found is None
+    console = drawn(bridge, topics, given)
     assert what_of(console.told[0]) == [("Path", "/c/plan")]
     console.told[0].destroy()
 
@@ -146,7 +146,7 @@ def test_what_is_in_a_namespace_is_drawn_with_the_first_robot_told_there(bridge)
     assert [names.count("Trail") for names in made] == [1, 1], "each goes its own way"
     behind = {bridge: Found(URL, "bob", discover(TOPICS), topics=TOPICS)}
     fleet = FoundFleet([first, second], behind=behind)
-    assert fleet.table(grid=True, as_told=False).count("/a/points") == 1
+    assert fleet.table(grid=True, only_given=False).count("/a/points") == 1
     for robot in console.told:
         robot.destroy()
 
@@ -160,7 +160,7 @@ def test_robots_behind_another_bridge_are_left_alone(bridge):
 
 
 @pytest.mark.parametrize(
-    ("told", "namespace"),
+    ("given", "namespace"),
     [
         ({"odometry": "/a/ekf/odometry/filtered"}, "/a"),  # not the best of its role
         ({"odometry": "a/odom/"}, "/a"),
@@ -171,14 +171,14 @@ def test_robots_behind_another_bridge_are_left_alone(bridge):
     ],
 )
 def test_a_told_robot_is_known_by_its_topics_and_then_by_its_name(
-    bridge, told, namespace
+    bridge, given, namespace
 ):
-    found = same_robot(described(bridge, **told).found, discover(TOPICS).robots)
+    found = same_robot(described(bridge, **given).found, discover(TOPICS).robots)
     assert (None if found is None else found.namespace) == namespace
 
 
 @pytest.mark.parametrize(
-    ("told", "namespace"),
+    ("given", "namespace"),
     [
         ({"odometry": "/c/odom", "velocity": "/c/cmd_vel", "scan": "/c/scan"}, "/c"),
         ({"odometry": "/c/base/odom", "velocity": "/c/cmd_vel"}, "/c"),
@@ -188,32 +188,35 @@ def test_a_told_robot_is_known_by_its_topics_and_then_by_its_name(
     ],
 )
 def test_the_namespace_of_a_told_robot_is_what_its_topics_share(
-    bridge, told, namespace
+    bridge, given, namespace
 ):
-    assert namespace_of(described(bridge, **told).found) == namespace
+    assert namespace_of(described(bridge, **given).found) == namespace
 
 
 @pytest.mark.parametrize(
     ("texts", "said"),
     [
-        (["Bob:/odom", "bob:/odom2"], "robot 'bob:/odom2': there is a robot 'Bob' alr"),
+        (
+            ["Bob:/odom", "bob:/odom2"],
+            "robot 'bob:/odom2': another robot is called 'Bob'",
+        ),
         (["Bob:/a b"], "robot 'Bob:/a b': '/a b' is not the name of a topic: expected"),
         (["B\nob:/a"], "a name is one line of 100 characters at the most"),
         (["b" * 101 + ":/a"], "a name is one line of 100 characters at the most"),
-        (["Bob:/a:/c", "Al:/b:c/"], "c/ drives 'Bob' already; each robot has its own"),
+        (["Bob:/a:/c", "Al:/b:c/"], "c/ already drives 'Bob'; expected another topic"),
     ],
 )
 def test_robots_that_are_told_amiss_are_refused_with_what_was_said(bridge, texts, said):
     with pytest.raises(ConfigError) as refused:
-        told_robots(texts, [bridge])
+        given_robots(texts, [bridge])
     assert said in str(refused.value)
 
 
 def test_robots_of_one_topic_behind_two_bridges_are_two(bridge):
     bridges = [bridge, Bridge("ws://al:9090")]
-    told = told_robots(["Bob:/odom:/cmd_vel", "2@Al:/odom:/cmd_vel"], bridges)
-    assert [robot.found.name for robot in told] == ["Bob", "Al"]
-    assert told_robots(["Bob:/a", "Al:/b"], [bridge])[1].found.topic("velocity") == ""
+    given = given_robots(["Bob:/odom:/cmd_vel", "2@Al:/odom:/cmd_vel"], bridges)
+    assert [robot.found.name for robot in given] == ["Bob", "Al"]
+    assert given_robots(["Bob:/a", "Al:/b"], [bridge])[1].found.topic("velocity") == ""
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-1", "x"])
@@ -230,17 +233,17 @@ def bridges():
 
 
 def test_a_robot_is_a_name_and_three_topics(bridges):
-    told = parse_robot("Bob:/odom:/cmd_vel:/scan", bridges)
-    assert told == described(
+    given = parse_robot("Bob:/odom:/cmd_vel:/scan", bridges)
+    assert given == described(
         bridges[0], odometry="/odom", velocity="/cmd_vel", scan="/scan"
     )
 
 
 def test_topics_may_be_empty_or_left_out(bridges):
-    told = parse_robot("Bob:/odom::/scan", bridges)
-    assert told == described(bridges[0], odometry="/odom", scan="/scan")
-    told = parse_robot("Bob:/odom", bridges)
-    assert told == described(bridges[0], odometry="/odom")
+    given = parse_robot("Bob:/odom::/scan", bridges)
+    assert given == described(bridges[0], odometry="/odom", scan="/scan")
+    given = parse_robot("Bob:/odom", bridges)
+    assert given == described(bridges[0], odometry="/odom")
 
 
 def test_a_number_says_behind_which_bridge_it_is(bridges):
@@ -261,5 +264,5 @@ def test_another_form_is_refused_with_the_right_one(bridges, text):
 
 @pytest.mark.parametrize("number", ["0", "3", "-1", "x", "", "²"])
 def test_a_bridge_that_is_not_there_is_refused(bridges, number):
-    with pytest.raises(ConfigError, match="there are 2"):
+    with pytest.raises(ConfigError, match="expected 1 to 2"):
         parse_robot(f"{number}@Bob:/odom", bridges)

@@ -63,10 +63,10 @@ class LateFrames:
         if not wanted:
             return self.trees
         with no_scope():
-            heard = [
+            subscriptions = [
                 self._bridge.subscribe(
                     topic,
-                    partial(self._hear, topic.rpartition("/")[0]),
+                    partial(self._receive, topic.rpartition("/")[0]),
                     TYPE,
                     decode=TFMessage,
                     queue_length=QUEUE,
@@ -76,11 +76,11 @@ class LateFrames:
         try:
             await asyncio.sleep(seconds)
         finally:
-            for subscription in heard:
+            for subscription in subscriptions:
                 subscription.remove()
         return self.trees
 
-    def _hear(self, namespace: str, message: TFMessage) -> None:
+    def _receive(self, namespace: str, message: TFMessage) -> None:
         for each in message.transforms:
             self.trees.take(namespace, each.frame_id, each.child_frame_id)
 
@@ -95,7 +95,7 @@ def late_frames(bridge: Bridge) -> LateFrames:
     return _late[bridge]
 
 
-async def hear_frames(
+async def receive_frames(
     url: str, topics: Mapping[str, str], *, seconds: float = SECONDS
 ) -> Trees:
     """Return the frames behind a bridge; none if it does not answer.

@@ -10,7 +10,7 @@ from webmap.discovery.rules import VELOCITY
 from webmap.ros.names import is_type, normalise_topic
 from webmap.ros.tf import Buffer
 
-RULE = "as it was said"
+RULE = "as configured"
 
 TYPES: Mapping[Role, str] = {
     "odometry": "nav_msgs/Odometry",
@@ -24,13 +24,13 @@ TYPES: Mapping[Role, str] = {
     "plan": "nav_msgs/Path",
     "tf": "tf2_msgs/TFMessage",
 }
-"""Default types of topics, if neither a person nor the bridge states the type."""
+"""Default types of topics, if neither the configuration nor the bridge has the type."""
 
 WHERE: tuple[Role, ...] = ("odometry", "pose")
 
 
 @dataclass(frozen=True, slots=True)
-class MeantRobot:
+class ConfiguredRobot:
     """A robot as a person configured it."""
 
     name: str
@@ -51,38 +51,38 @@ class MeantRobot:
     """Its name in discovery without settings; empty if it was not found."""
 
 
-def lay_over(
-    findings: Findings, meant: Sequence[MeantRobot], types: Mapping[str, str]
-) -> tuple[Findings, dict[str, MeantRobot]]:
+def merge_configured(
+    findings: Findings, configured: Sequence[ConfiguredRobot], types: Mapping[str, str]
+) -> tuple[Findings, dict[str, ConfiguredRobot]]:
     """Return the findings to measure, and the configured robots by name.
 
     Robots that were found but not configured are left out.
 
     Args:
         findings: The findings of discovery.
-        meant: The robots that a person configured, at least one.
+        configured: The robots that a person configured, at least one.
         types: Types by topic, from the bridge or a list.
 
     """
     taken: set[str] = set()
     robots: list[FoundRobot] = []
-    by_name: dict[str, MeantRobot] = {}
-    for one, there in zip(meant, _found(meant, findings.robots), strict=True):
+    by_name: dict[str, ConfiguredRobot] = {}
+    for one, there in zip(configured, _found(configured, findings.robots), strict=True):
         name = free_name(one.name, taken)
-        robots.append(_laid(name, one, there, types))
+        robots.append(_merged(name, one, there, types))
         by_name[name] = replace(one, found_as="" if there is None else there.name)
     return replace(findings, robots=tuple(robots)), by_name
 
 
 def _found(
-    meant: Sequence[MeantRobot], robots: Sequence[FoundRobot]
+    configured: Sequence[ConfiguredRobot], robots: Sequence[FoundRobot]
 ) -> list[FoundRobot | None]:
     """Return the found robot for each configured robot, each at most once."""
     left = list(robots)
-    found: list[FoundRobot | None] = [None for _ in meant]
+    found: list[FoundRobot | None] = [None for _ in configured]
     # A name is the weakest match: it is compared after all topics.
     for fits in (_is_called, _has_its_topics, _has_its_name):
-        for place, one in enumerate(meant):
+        for place, one in enumerate(configured):
             if found[place] is None:
                 there = next((robot for robot in left if fits(one, robot)), None)
                 if there is not None:
@@ -91,28 +91,28 @@ def _found(
     return found
 
 
-def _is_called(one: MeantRobot, robot: FoundRobot) -> bool:
+def _is_called(one: ConfiguredRobot, robot: FoundRobot) -> bool:
     return one.found_as == robot.name
 
 
-def _has_its_name(one: MeantRobot, robot: FoundRobot) -> bool:
+def _has_its_name(one: ConfiguredRobot, robot: FoundRobot) -> bool:
     return one.name == robot.name
 
 
-def _has_its_topics(one: MeantRobot, robot: FoundRobot) -> bool:
+def _has_its_topics(one: ConfiguredRobot, robot: FoundRobot) -> bool:
     velocity: tuple[Role, ...] = ("velocity",)
     for alike in (WHERE, velocity):
-        said = [each for role in alike for each in one.topics.get(role, ())]
+        text = [each for role in alike for each in one.topics.get(role, ())]
         there = {each.topic for role in alike for each in robot.guesses.get(role, ())}
-        if any(_plain(topic) in there for topic, _ in said):
+        if any(_plain(topic) in there for topic, _ in text):
             return True
     whole = Buffer().name(robot.base_frame, robot.tf_namespace or "")
     return whole != "" and one.base_frame == whole
 
 
-def _laid(
+def _merged(
     name: str,
-    one: MeantRobot,
+    one: ConfiguredRobot,
     there: FoundRobot | None,
     types: Mapping[str, str],
 ) -> FoundRobot:
@@ -130,12 +130,12 @@ def _laid(
     return replace(robot, guesses=guesses, base_frame=base)
 
 
-def _type(role: Role, behind: str, said: str) -> str:
+def _type(role: Role, behind: str, text: str) -> str:
     """Return the type that WebMap uses to send and to subscribe."""
     behind = behind.strip()
     if role == "velocity":
-        return said or (behind if is_type(behind, *VELOCITY) else TYPES[role])
-    return behind or said or TYPES.get(role, "")
+        return text or (behind if is_type(behind, *VELOCITY) else TYPES[role])
+    return behind or text or TYPES.get(role, "")
 
 
 def _plain(topic: str) -> str:

@@ -4,7 +4,7 @@ from webmap.base.outside_text import escaped
 from webmap.discovery.found import ROLES, Findings, FoundRobot, Layers, Role
 from webmap.discovery.layers import drawing
 
-DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "a ROS that cannot be told"}
+DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "unknown ROS version"}
 
 USED: tuple[Role, ...] = (
     "odometry",
@@ -27,11 +27,11 @@ ONE: tuple[Role, ...] = (
     "initialpose",
     "tf",
 )
-"""Roles of which a robot uses the best topic only; all topics of others are drawn."""
+"""Roles with one topic in use, the best; all topics of other roles are drawn."""
 
 OVERRULE = (
-    "Wrong? Say it to webmap view, one topic with --set ROBOT.ROLE=TOPIC or a robot "
-    "with --robot NAME:ODOM:CMD_VEL:SCAN, or keep a file: "
+    "Wrong? Correct one topic with webmap view --set ROBOT.ROLE=TOPIC or a robot with "
+    "--robot NAME:ODOM:CMD_VEL:SCAN, or write a fleet file: "
     "webmap discover URL --toml > fleet.toml"
 )
 
@@ -108,7 +108,7 @@ def drawn_table(namespace: str, layers: Layers) -> list[str]:
     ]
     if layers.left_out:
         listed = ", ".join(layer.topic for layer in layers.left_out)
-        lines.append(f"  not drawn, since there are enough of their kind: {listed}")
+        lines.append(f"  not drawn, beyond the limit for their kind: {listed}")
     return lines
 
 
@@ -121,9 +121,9 @@ def _use(robot: FoundRobot, role: Role, place: int) -> str:
     return ", not used" if place else ", used"
 
 
-def in_one_line(robot: FoundRobot) -> str:
+def summary_line(robot: FoundRobot) -> str:
     """Return a robot with the topics in use, for a log."""
-    said = [f"{role} {robot.topic(role)}" for role in USED if robot.topic(role)]
+    used = [f"{role} {robot.topic(role)}" for role in USED if robot.topic(role)]
     if robot.tf_alone and robot.base_frame:
-        said.insert(0, f"frame {robot.base_frame}")
-    return f"{robot.name}: {', '.join(said)}"
+        used.insert(0, f"frame {robot.base_frame}")
+    return f"{robot.name}: {', '.join(used)}"

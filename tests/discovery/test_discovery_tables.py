@@ -8,7 +8,7 @@ from webmap.config.checks import same_name
 from webmap.discovery import discover, rules
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.naming import unique_names
-from webmap.discovery.words import in_one_line, report
+from webmap.discovery.tables import report, summary_line
 from webmap.modules.declaration import declarations
 
 ODOM = "nav_msgs/Odometry"
@@ -68,7 +68,7 @@ def test_a_type_with_control_characters_does_not_reach_the_terminal():
 
 def test_one_line_has_what_is_used():
     (robot,) = discover(TOPICS, "bob").robots
-    assert in_one_line(robot) == (
+    assert summary_line(robot) == (
         "bob: odometry /odom, velocity /cmd_vel, scan /scan, "
         "goal /move_base_simple/goal, plan /plan"
     )
@@ -82,7 +82,7 @@ def test_the_report_says_what_is_drawn_by_which_rule_and_what_is_used():
     assert "/rear/scan LaserScanner the usual name" in lines
     assert "/trajectory Path named like a path" in lines
     assert "/cloud_1 PointCloud named points or a cloud" in lines
-    left = "not drawn, since there are enough of their kind: /cloud_2"
+    left = "not drawn, beyond the limit for their kind: /cloud_2"
     assert left in lines
 
 

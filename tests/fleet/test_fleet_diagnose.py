@@ -1,11 +1,11 @@
-"""Which robots ``webmap doctor`` is told to look at."""
+"""Which robots ``webmap doctor`` checks."""
 
 import click
 import pytest
 
 from webmap.base.errors import ConfigError
 from webmap.discovery import discover
-from webmap.discovery.doctor.meant import lay_over
+from webmap.discovery.doctor.configured import merge_configured
 from webmap.fleet.diagnose import bridges_of
 
 URL = "ws://127.0.0.1:9090"
@@ -38,17 +38,17 @@ scan = ["/bob/front", "/bob/rear"]
 
 
 def looked_at(robots=(), settings=()):
-    """The robots that are looked at of those behind a bridge."""
-    ((_, meant),) = bridges_of([URL], robots, settings)
+    """The robots behind a bridge that are checked."""
+    ((_, configured),) = bridges_of([URL], robots, settings)
     found = discover(TOPICS)
-    findings, _ = lay_over(found, meant(found), TOPICS)
+    findings, _ = merge_configured(found, configured(found), TOPICS)
     return {robot.name: robot for robot in findings.robots}
 
 
 def test_where_nothing_is_said_each_bridge_is_looked_at_as_it_is_found():
     found = bridges_of([URL, "ws://Bob"], (), ())
     assert [url for url, _ in found] == ["ws://127.0.0.1:9090", "ws://bob"]
-    assert [list(meant(discover(TOPICS))) for _, meant in found] == [[], []]
+    assert [list(configured(discover(TOPICS))) for _, configured in found] == [[], []]
 
 
 def test_one_topic_is_overruled_and_the_others_stay_with_the_type_that_is_said():
@@ -95,9 +95,9 @@ def test_a_fleet_file_says_which_robots_are_behind_which_bridge(tmp_path):
 @pytest.mark.parametrize(
     ("given", "robots", "settings", "words"),
     [
-        (["ws://a", "ws://b"], [], ["a.scan="], "about what is behind one bridge"),
-        (["ws://a", "ws://b"], ["Bob:/odom"], [], "and 2 were given"),
-        (["fleet.toml"], ["Bob:/odom"], [], "fleet.toml says which bridges"),
+        (["ws://a", "ws://b"], [], ["a.scan="], "apply to the robots of one bridge"),
+        (["ws://a", "ws://b"], ["Bob:/odom"], [], "got 2 bridges"),
+        (["fleet.toml"], ["Bob:/odom"], [], "fleet.toml configures the bridges"),
         (["ws://a", "fleet.toml"], [], [], "leave out --robot, --set and other"),
     ],
 )
@@ -107,8 +107,8 @@ def test_what_cannot_go_together_is_refused(given, robots, settings, words):
 
 
 def test_a_setting_about_nobody_is_refused_when_the_robots_are_known():
-    ((_, meant),) = bridges_of([URL], (), ["c.scan=/scan"])
+    ((_, configured),) = bridges_of([URL], (), ["c.scan=/scan"])
     with pytest.raises(ConfigError, match="there is no robot 'c'"):
-        meant(discover(TOPICS))
+        configured(discover(TOPICS))
     with pytest.raises(ConfigError, match="there is no robot 'a'"):
         bridges_of([URL], ["Bob:/odom"], ["a.scan=/scan"])
