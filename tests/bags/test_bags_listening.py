@@ -217,8 +217,8 @@ def test_a_link_that_never_opens_is_said_with_the_reason(monkeypatch):
 
     asyncio.run(ended())
     assert story.said == [
-        "Nothing is recorded yet: the link is not open (nothing listens there)",
-        "Nothing is recorded: the link was never open (nothing listens there)",
+        "Nothing is recorded yet: the connection is not open (nothing listens there)",
+        "Nothing is recorded: the connection was never open (nothing listens there)",
     ]
 
 

@@ -271,7 +271,7 @@ def test_a_bridge_that_offers_no_services_of_its_clients_leaves_that_open():
 
 def test_without_rosapi_a_call_is_not_tried_and_why_is_said():
     there, findings, _ = looked_at(site("ros2", rosapi=False), try_call=True)
-    assert said(findings, "is not known: it takes a rosapi that answers") == "note"
+    assert said(findings, "is not known: rosapi does not answer") == "note"
     assert not any("webmap_doctor" in name for name in there.called)
 
 

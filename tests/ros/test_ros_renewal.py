@@ -26,7 +26,7 @@ def looks(answers, until):
         now = tenth / 10
         if silence.due(now):
             asked.append(now)
-            if silence.heard(answers(now), now):
+            if silence.answered(answers(now), now):
                 renewed.append(now)
     return asked, renewed
 

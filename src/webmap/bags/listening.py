@@ -115,7 +115,7 @@ class Listening:
             await self._bridge.stop()
             await self._incoming.finish()
         if not self._was_open:
-            self._say(f"Nothing is recorded: the link was never open{why}")
+            self._say(f"Nothing is recorded: the connection was never open{why}")
         if self._failure is not None:
             raise self._failure
         return lasted
@@ -171,7 +171,7 @@ class Listening:
         await asyncio.sleep(OPEN_WITHIN)
         if not self._was_open:
             why = self._why_not_open()
-            self._say(f"Nothing is recorded yet: the link is not open{why}")
+            self._say(f"Nothing is recorded yet: the connection is not open{why}")
 
     def _why_not_open(self) -> str:
         trouble = self._bridge.trouble

@@ -136,12 +136,12 @@ def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
             f"A service that hangs blocks its whole socket{how}.",
             advice,
         )
-    if facts.untold:
+    if facts.no_result:
         return Finding(
             "note",
             BRIDGE,
             f"Whether a service that hangs blocks its socket was tried, and is not "
-            f"known: {facts.untold}.",
+            f"known: {facts.no_result}.",
         )
     if dialect is None:
         return Finding(
