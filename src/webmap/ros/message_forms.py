@@ -153,7 +153,7 @@ def _zero(field: Field) -> Any:
 def _from_entry(field: Field, entry: Any, path: str) -> Any:
     """Return the value of an entry; text that is not a number stays text."""
     if isinstance(entry, str) and len(entry) > MAX_TEXT:
-        raise Misfit(f"at most {MAX_TEXT} characters are taken", path)
+        raise Misfit(f"at most {MAX_TEXT} characters are allowed", path)
     if field.is_array and isinstance(entry, str):
         if field.fields is not None:
             return _json(entry, path)
@@ -166,7 +166,7 @@ def _json(entry: str, path: str) -> Any:
     try:
         return json.loads(entry or "[]")
     except (ValueError, RecursionError) as error:
-        raise Misfit(f"this is no JSON: {error}", path) from None
+        raise Misfit(f"this is not JSON: {error}", path) from None
 
 
 def _scalar_entry(field: Field, entry: Any) -> Any:

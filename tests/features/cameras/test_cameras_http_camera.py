@@ -204,7 +204,7 @@ def test_a_stream_that_ends_is_opened_again():
         camera = robot.add_module("HttpCamera", server.at(STREAM))
         camera.watch(lambda: None)
         await until(lambda: len(server.asked) >= 3)
-        assert "it hung up" in next(iter(robot.problems.values()))
+        assert "it closed the connection" in next(iter(robot.problems.values()))
         del server.scripts[STREAM]
         await until(lambda: camera.url is not None)
 
