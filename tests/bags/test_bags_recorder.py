@@ -76,7 +76,7 @@ def test_messages_that_do_not_fit_are_counted_and_said_once(made, recording):
     bag.close()
     assert (recorder.messages, recorder.dropped) == (1, 2)
     (sentence,) = said
-    assert "/odom: messages are left out that do not fit the type" in sentence
+    assert "/odom: messages that do not fit the type" in sentence
 
 
 @pytest.mark.parametrize("fields", [{}, {"variance": 0.5}])

@@ -245,7 +245,7 @@ class Recording:
 
         Args:
             start: The time, in nanoseconds since 1970.
-            go_on: Called repeatedly; returns whether the messages are still wanted.
+            go_on: Called repeatedly; returns whether to continue.
 
         Raises:
             ConfigError: If the file is damaged before that time.
@@ -280,8 +280,9 @@ class Recording:
             if recorded.topic not in self._failed:
                 self._failed.add(recorded.topic)
                 self._warn(
-                    f"{self.name}: messages of {recorded.topic} are left out that are "
-                    f"not of the type {recorded.connection.msgtype} ({_words(error)})"
+                    f"{self.name}: messages of {recorded.topic} that are not of the "
+                    f"type {recorded.connection.msgtype} are not played "
+                    f"({_reason(error)})"
                 )
             return None
 
@@ -319,7 +320,9 @@ class Recording:
                 self._leave_out(connection, f"it is a {known.type} too")
                 continue
             self.schema.define(texts)
-            latched = (known is not None and known.latched) or _said_latched(connection)
+            latched = (known is not None and known.latched) or _is_latched_in_file(
+                connection
+            )
             latched = latched or is_latched(name, type_name)
             self.topics[name] = RecordedTopic(name, type_name, latched)
             usable.append(connection)
@@ -341,15 +344,15 @@ def recording_name(paths: Sequence[Path]) -> str:
 
 def unreadable(name: str, error: Exception) -> ConfigError:
     """Return the error for a file that cannot be read."""
-    return ConfigError(f"{name} cannot be read as a recording: {_words(error)}")
+    return ConfigError(f"{name} cannot be read as a recording: {_reason(error)}")
 
 
-def _words(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     """Return why a file could not be read, for people."""
-    said = str(error).strip().partition("\n")[0].rstrip(".")
-    if not said or isinstance(error, AssertionError | LookupError | TypeError):
+    text = str(error).strip().partition("\n")[0].rstrip(".")
+    if not text or isinstance(error, AssertionError | LookupError | TypeError):
         return "it is damaged or cut off"
-    return said[:200]
+    return text[:200]
 
 
 def _dialect(paths: Sequence[Path]) -> DialectName:
@@ -417,7 +420,7 @@ def _add_defaults(reader: "AnyReader", dialect: DialectName) -> None:
     reader.typestore.register({n: usual[n] for n in usual if n not in known})
 
 
-def _said_latched(connection: "Connection") -> bool:
+def _is_latched_in_file(connection: "Connection") -> bool:
     from rosbags.interfaces import ConnectionExtRosbag1, QosDurability
 
     if isinstance(connection.ext, ConnectionExtRosbag1):

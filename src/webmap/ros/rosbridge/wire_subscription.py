@@ -147,15 +147,15 @@ class WireSubscription:
         self._id = ""
 
     def update(self) -> None:
-        """Subscribe again if the wanted options have changed.
+        """Subscribe again if the needed options have changed.
 
         The new subscription begins before the old one ends, so no message is missed.
         """
-        wanted = self._wire_options()
-        if self._asked == wanted:
+        options = self._wire_options()
+        if self._asked == options:
             return
         old, had = self._id, self._asked is not None
-        self._ask(wanted)
+        self._ask(options)
         if had:
             self._send(ops.unsubscribe(self.topic.name, id=old))
 
@@ -373,8 +373,8 @@ class Renewals:
         while True:
             await asyncio.sleep(PERIOD)
             now = time.monotonic()
-            wanted = [each for each in self._subscriptions() if not each.topic.count]
-            silent = {each: silent.get(each) or Silence(now) for each in wanted}
+            without = [each for each in self._subscriptions() if not each.topic.count]
+            silent = {each: silent.get(each) or Silence(now) for each in without}
             for subscription, silence in silent.items():
                 if silence.due(now):
                     await self._check(subscription, silence)
