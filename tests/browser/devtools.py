@@ -44,7 +44,7 @@ class Tab:
             if answer.get("id") == number:
                 assert "error" not in answer, f"{method}: {answer['error']}"
                 return answer["result"]
-            self._hear(answer)
+            self._on_message(answer)
 
     def evaluate(self, expression: str) -> Any:
         """Return the value of an expression in the page."""
@@ -106,7 +106,7 @@ class Tab:
         """Let go of the tab; it stays open."""
         self._open.close()
 
-    def _hear(self, event: dict[str, Any]) -> None:
+    def _on_message(self, event: dict[str, Any]) -> None:
         method, about = event.get("method"), event.get("params", {})
         if method == "Runtime.exceptionThrown":
             self.errors.append(str(about["exceptionDetails"]))

@@ -1,4 +1,4 @@
-"""What a robot's ROS says, heard by a client that this project did not write."""
+"""What a robot's ROS says, on_message by a client that this project did not write."""
 
 import threading
 import time
@@ -21,12 +21,12 @@ class Witness:
     def follow(self, topic: str, type_name: str) -> None:
         """Keep the newest message of a topic."""
 
-        def heard(message) -> None:
+        def on_message(message) -> None:
             with self._lock:
                 self._newest[topic] = message
                 self._count[topic] = self._count.get(topic, 0) + 1
 
-        roslibpy.Topic(self.ros, topic, type_name).subscribe(heard)
+        roslibpy.Topic(self.ros, topic, type_name).subscribe(on_message)
 
     def count(self, topic: str) -> int:
         """How many messages of a topic came."""

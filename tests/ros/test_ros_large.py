@@ -203,7 +203,7 @@ def test_after_links_that_ended_nothing_more_is_asked_and_people_are_told(quick)
             with scope.active():
                 bridge.subscribe("/map", print, MAP)
             for number in range(1, MOST_LOST + 1):
-                await server.heard("subscribe", number, compression="none")
+                await server.wait_for("subscribe", number, compression="none")
                 server.drop()
                 await until(lambda n=number: bridge.stats.links > n)
             await until(lambda: told)

@@ -47,7 +47,7 @@ def test_what_a_callback_goes_on_with_ends_with_its_subscription():
             heard = bridge.subscribe("/a", by_hand)
             with scope.active():
                 bridge.subscribe("/a", by_scope)
-            await server.heard("subscribe")
+            await server.wait_for("subscribe")
             await server.publish("/a", {"data": 1})
             await until(lambda: by_hand.began and by_scope.began)
             heard.remove()
@@ -83,7 +83,7 @@ def test_a_callback_that_ends_its_own_subscription_goes_on_to_its_end():
 
         async with bridged() as (server, bridge):
             heard = bridge.subscribe("/a", once)
-            await server.heard("subscribe")
+            await server.wait_for("subscribe")
             await server.publish("/a", {"data": 1})
             await until(lambda: done)
             assert done == [1]

@@ -150,7 +150,7 @@ class Bench:
 
     def tasks_up(self, site, topic):
         """Wait until the gate can send goals: it has announced a topic of theirs."""
-        self.until(lambda: site.told("advertise", topic), f"the lane of {topic}")
+        self.until(lambda: site.received("advertise", topic), f"the lane of {topic}")
 
     def shows(self, label, page, robot, check):
         """Record the report of a robot on a page, once it is so and stays so."""
@@ -160,7 +160,7 @@ class Bench:
 
         self._note(f"report to {page.name}: {label}", report, check)
 
-    def tells(self, label, robot, check):
+    def reports(self, label, robot, check):
         """Record what the gate last told the display of a robot, likewise."""
 
         def report():

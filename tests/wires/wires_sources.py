@@ -170,7 +170,7 @@ def site(source, graph, label="hall", frames=()):
         source.names.call(f"ws://127.0.0.1:{robot.port}", f"ws://{label}")
         source.names.call(f"127.0.0.1:{robot.port}", label)
         if frames:
-            robot.says["/tf"] = transforms(frames)
+            robot.repeated["/tf"] = transforms(frames)
         yield robot.url
 
 

@@ -175,7 +175,7 @@ def test_the_last_picture_of_a_burst_is_shown_though_nothing_follows_it():
         (
             "/e",
             b"HTTP/1.1 200 OK\r\nContent-Type: image/jpeg\r\n\r\n<svg onload=x>",
-            "no JPEG, PNG or WebP",
+            "not JPEG, PNG or WebP",
         ),
     ],
 )
