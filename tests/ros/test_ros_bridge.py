@@ -490,7 +490,7 @@ def test_publishing_advertises_first_and_once():
             assert server.received[0]["type"] == "std_msgs/String"
             with pytest.raises(BridgeError, match="std_msgs/String"):
                 bridge.publish("/a", {"data": True}, "std_msgs/Bool")
-            with pytest.raises(BridgeError, match="say the message type"):
+            with pytest.raises(BridgeError, match="the message type is unknown"):
                 bridge.publish("/b", {})
             with pytest.raises(ValueError, match=r"JSON|nan"):
                 bridge.publish("/a", {"data": math.nan})

@@ -143,16 +143,16 @@ def test_whoever_uses_a_bridge_that_ended_is_told_why(lifecycle, caplog):
             bridge.subscribe("/odom", print)
         page.close()
         await until(lambda: told)
-        assert "has ended with the page or the module that made it" in told[0]
+        assert "ended with the page or the module that made its bridge" in told[0]
         assert "/odom" in caplog.text
         for use in (
             lambda: bridge.subscribe("/scan", print),
             lambda: bridge.publish("/a", {"data": "x"}, "std_msgs/String"),
             lambda: bridge.on_open(print),
         ):
-            with pytest.raises(BridgeClosed, match="made outside of both"):
+            with pytest.raises(BridgeClosed, match="create it outside of both"):
                 use()
-        with pytest.raises(BridgeClosed, match="made outside of both"):
+        with pytest.raises(BridgeClosed, match="create it outside of both"):
             await bridge.call_service("/dock")
         robot.close()
         await lifecycle.end()

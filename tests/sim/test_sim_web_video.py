@@ -233,7 +233,7 @@ def test_what_a_camera_sends_that_is_no_picture_is_left_out(caplog):
         await until(lambda: served.watchers == 1)
         served.send(b"\x89PNG")
         served.send(b"\xff\xd8\xff and no more")
-        await until(lambda: "left out a picture" in caplog.text)
+        await until(lambda: "a picture is skipped" in caplog.text)
         served.send(a_picture())
         assert opened((await asks)[1]).size == (64, 20)
         assert "a picture that is not JPEG is skipped" in caplog.text

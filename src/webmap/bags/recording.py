@@ -301,7 +301,7 @@ class Recording:
     def _usable(self) -> "list[Connection]":
         """Return the connections that can be played; register topics and types."""
         if self._reader.message_count == 0:
-            raise ConfigError(f"{self.name}: there is no message in it")
+            raise ConfigError(f"{self.name}: it contains no message")
         _add_defaults(self._reader, self.dialect)
         usable = []
         for connection in self._reader.connections:
@@ -327,7 +327,7 @@ class Recording:
             self.topics[name] = RecordedTopic(name, type_name, latched)
             usable.append(connection)
         if not usable:
-            raise ConfigError(f"{self.name}: no topic of it can be played")
+            raise ConfigError(f"{self.name}: none of its topics can be played")
         return usable
 
     def _leave_out(self, connection: "Connection", why: str) -> None:
@@ -363,13 +363,13 @@ def _dialect(paths: Sequence[Path]) -> DialectName:
         _refuse_endless(path)
         if path.is_dir() and not (path / METADATA).exists():
             raise ConfigError(
-                f"{path}: there is no metadata.yaml in this folder, so it is no bag of "
-                f"ROS 2; give the .mcap or .db3 file in it by itself"
+                f"{path}: there is no metadata.yaml in this folder, so it is not a bag "
+                f"of ROS 2; give the .mcap or .db3 file in it instead"
             )
         if path.is_file() and path.suffix not in (ROS1, *ROS2):
             raise ConfigError(
-                f"{path} is no recording by its name; expected .bag, .mcap, .db3, or "
-                f"the folder of a bag of ROS 2"
+                f"{path} is not the name of a recording; expected .bag, .mcap, .db3, "
+                f"or the folder of a bag of ROS 2"
             )
         kinds.add("ros1" if path.suffix == ROS1 and path.is_file() else "ros2")
     if len(kinds) > 1:
@@ -389,8 +389,8 @@ def _refuse_endless(path: Path) -> None:
     size = about.stat().st_size if about.is_file() else 0
     if size > LARGEST_METADATA:
         raise ConfigError(
-            f"{about}: {size} bytes are no description of a bag, which has "
-            f"{LARGEST_METADATA} at the most"
+            f"{about}: {size} bytes are too many for the description of a "
+            f"bag, which has at most {LARGEST_METADATA}"
         )
 
 

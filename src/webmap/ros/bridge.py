@@ -231,7 +231,9 @@ class Bridge:
         published_as = type or before or known
         self._written.refuse_message(name, published_as, known)
         if published_as is None:
-            raise BridgeError(f"{name}: say the message type the first time")
+            raise BridgeError(
+                f"{name}: the message type is unknown; pass type= the first time"
+            )
         if before is not None and not same_type(before, published_as):
             raise BridgeError(
                 f"{name} is advertised as {before}, not as {published_as}"
@@ -376,7 +378,7 @@ class Bridge:
         await self._faults.stop()
         if self._link.over is not None and self._topics:  # it still has listeners
             log.warning(
-                "%s: nothing more of %s", self._link.over, ", ".join(self._topics)
+                "%s; no more messages from %s", self._link.over, ", ".join(self._topics)
             )
             for topic in tuple(self._topics.values()):
                 topic.over(BridgeClosed(self._link.over))
@@ -384,8 +386,8 @@ class Bridge:
     def _end(self) -> None:
         """End for ever: the page or module that created this bridge has ended."""
         self._link.over = (
-            f"the link to {self.url} has ended with the page or the module that made "
-            "it: a bridge that others use, too, is made outside of both"
+            f"the connection to {self.url} ended with the page or the module that made "
+            "its bridge: if others use it too, create it outside of both"
         )
         lifecycle.end_service(self)
 

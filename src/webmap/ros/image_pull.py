@@ -254,7 +254,7 @@ class Answer:
                 "themselves, not that of a page that shows them"
             )
         if headers.get("transfer-encoding", "identity").lower() != "identity":
-            raise ProtocolError("it answers in chunks, which were not asked for")
+            raise ProtocolError("it answers in chunks, which WebMap did not request")
         length = headers.get("content-length", "")
         if self._parts is None and length.isdecimal() and len(length) < 12:
             self._length = int(length)

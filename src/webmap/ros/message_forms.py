@@ -43,7 +43,9 @@ def _form_fields(
             continue  # in ROS 1 the publisher sets it
         budget[0] -= 1
         if budget[0] < 0:
-            raise ConfigError(f"{owner}: more than {MAX_FIELDS} fields are no form")
+            raise ConfigError(
+                f"{owner}: more than {MAX_FIELDS} fields are too many for a form"
+            )
         if field.fields is not None:
             inner = _form_fields(field.type, field.fields, budget)
             field = replace(field, fields=inner)

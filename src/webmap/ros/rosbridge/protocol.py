@@ -97,7 +97,7 @@ class _Assembly:
         try:
             data = fragment.data.encode()
         except UnicodeEncodeError as error:
-            raise ProtocolError(f"fragments that are no text: {error}") from None
+            raise ProtocolError(f"fragments that are not text: {error}") from None
         self.received += 1
         self.size += len(data)
         if fragment.num in self.pieces:

@@ -256,7 +256,7 @@ async def _next(newest: NewestPicture, request: Request) -> tuple[bytes, float]:
             # In a thread, because the world's clock runs in this one.
             return await asyncio.to_thread(request.form.apply, picture), stamp
         except NoPicture as error:
-            log.warning("%s: left out a picture: %s", request.topic, error)
+            log.warning("%s: a picture is skipped: %s", request.topic, error)
 
 
 async def _send_stream(

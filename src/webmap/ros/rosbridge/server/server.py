@@ -93,7 +93,7 @@ class RosbridgeServer:
                 self.hangs |= session.spinning
                 if session.overflowed:
                     log.warning("a client reads too slowly: its connection is closed")
-                    await connection.close(1008, "too much waits")
+                    await connection.close(1008, "too many unsent messages")
 
     async def _write(
         self, connection: ServerConnection, session: Session, wake: asyncio.Event
