@@ -1,4 +1,4 @@
-"""A Chromium of our own, spoken to by its DevTools protocol alone.
+"""A Chromium that is controlled by its DevTools protocol alone.
 
 Playwright keeps every page focused and visible, which is what most tests want, and
 what a test of a hidden page cannot have.
@@ -72,7 +72,7 @@ class Tab:
         self.call("Page.navigate", url=url)
 
     def key(self, kind: str, key: str) -> None:
-        """Press (``keyDown``) or let go (``keyUp``) a letter's key."""
+        """Press (``keyDown``) or release (``keyUp``) a letter's key."""
         self.call(
             "Input.dispatchKeyEvent",
             type=kind,
@@ -87,7 +87,7 @@ class Tab:
         self.key("keyDown", key)
 
     def up(self, key: str) -> None:
-        """Let go of a letter's key."""
+        """Release a letter's key."""
         self.key("keyUp", key)
 
     def click(self, x: float, y: float) -> None:
@@ -103,7 +103,7 @@ class Tab:
             )
 
     def close(self) -> None:
-        """Let go of the tab; it stays open."""
+        """Disconnect from the tab; it stays open."""
         self._open.close()
 
     def _on_message(self, event: dict[str, Any]) -> None:

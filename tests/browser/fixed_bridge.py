@@ -1,4 +1,4 @@
-"""A rosbridge that says the same all the time, as what it says is not to change."""
+"""A rosbridge that always publishes the same messages."""
 
 import asyncio
 import contextlib
@@ -33,7 +33,7 @@ SUBSCRIBED = {
 
 
 class FixedBridge:
-    """All that :func:`fixed_site.site` tells, again and again."""
+    """Publishes all messages of :func:`fixed_site.site`, repeatedly."""
 
     def __init__(self, dialect: str) -> None:
         quirks = parse_quirks("real", dialect)

@@ -1,4 +1,4 @@
-"""What a robot's ROS says, on_message by a client that this project did not write."""
+"""Messages of a robot's ROS, received by a client that this project did not write."""
 
 import threading
 import time
@@ -44,12 +44,12 @@ class Witness:
         raise AssertionError(f"nothing came on {topic}")
 
     def place(self, topic: str) -> tuple[float, float]:
-        """Where odometry says the robot is."""
+        """The pose of the robot in odometry."""
         position = self.newest(topic)["pose"]["pose"]["position"]
         return position["x"], position["y"]
 
     def speed(self, topic: str) -> tuple[float, float]:
-        """How fast odometry says the robot is: forward, turning."""
+        """The velocity of the robot in odometry: forward, turning."""
         twist = self.newest(topic)["twist"]["twist"]
         return twist["linear"]["x"], twist["angular"]["z"]
 

@@ -1,4 +1,4 @@
-"""A person who holds W, a robot that notes what it is told, and faults in between.
+"""A person who holds W, a robot that records its commands, and faults in between.
 
 ::
 
@@ -201,7 +201,7 @@ class Bench:
         )
 
     def space(self, kind):
-        """Press the space bar, which says STOP, or let it go."""
+        """Press or release the space bar, which sends STOP."""
         self.tab.call(
             "Input.dispatchKeyEvent",
             type=kind,

@@ -65,12 +65,12 @@ class ProvingBench(Bench):
             name: What fails, for the table.
             inflict: Makes it fail.
             within: Seconds in which the robot is promised to be stopped.
-            back: Mends it.
-            stops_by: ``zero``: a zero must come; ``itself``: nobody can send one, and
-                the robot's own timeout must stop it.
-            held_after: Whether the key is still down when it is mended.
-            watch: Seconds for which nothing may move after it is mended.
-            few_late: How many moving velocities may still come when it is mended, if
+            back: Ends the fault.
+            stops_by: ``zero``: a zero must come; ``itself``: no process can send one,
+                and the robot's own timeout must stop it.
+            held_after: Whether the key is still down when the fault ends.
+            watch: Seconds for which nothing may move after the fault ends.
+            few_late: How many moving velocities may still come when the fault ends, if
                 the robot is driven through a link that keeps what it cannot pass on.
             before: Happens while the robot moves, before the fault.
             new_link: Whether the zeros may be owed on a new link, where they go on for

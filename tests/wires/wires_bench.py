@@ -29,7 +29,7 @@ STILL = 0.3
 
 
 NOWHERE = "ws://127.0.0.1:9"
-"""A bridge that nobody answers at."""
+"""The address of a bridge that does not answer."""
 
 
 class Bench:
@@ -143,7 +143,7 @@ class Bench:
         return found
 
     def kill_the_gate(self):
-        """End the gate's process without a word."""
+        """Kill the gate's process."""
         for child in psutil.Process().children():
             if "webmap.gate" in child.cmdline():
                 child.kill()
@@ -161,7 +161,7 @@ class Bench:
         self._note(f"report to {page.name}: {label}", report, check)
 
     def reports(self, label, robot, check):
-        """Record what the gate last told the display of a robot, likewise."""
+        """Record the gate's newest report about a robot, likewise."""
 
         def report():
             return self.tap.reports.get(robot.id, {})

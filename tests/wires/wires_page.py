@@ -19,14 +19,14 @@ NEUTRAL = (0.0, 0.0, 0.0)
 
 
 class Report(dict):
-    """A report of a robot; what it does not tell, or nobody told yet, is None."""
+    """A report of a robot; fields without a value are None."""
 
     def __missing__(self, key):
         return None
 
 
 class Page:
-    """Speaks the pages' side of both sockets.
+    """Sends and receives on both sockets like a page.
 
     Args:
         bench: What it belongs to.
@@ -40,14 +40,14 @@ class Page:
         self.reports = {}
         """The newest report of each robot, by its id."""
         self.inputs = None
-        """Which parts of full speed the hand asks for of a robot that the page has.
+        """The inputs for a robot that this page controls, as parts of full speed.
 
         Nothing is sent without it. As long as the gate waits to see that it is off the
         keys, it is."""
         self.robot = ""
-        """The id of the robot that the hand drives."""
+        """The id of the robot that the inputs drive."""
         self.greeted = False
-        """Whether the gate has said hello."""
+        """Whether the gate has sent hello."""
         self.refusals = []
         """What was refused, newest last."""
         self.ended = ""
@@ -124,7 +124,7 @@ class Page:
         )
 
     def aim(self, op, robot, x=1.0, y=2.0, yaw=0.5):
-        """Send a goal, or tell where the robot is."""
+        """Send a goal, or a pose of the robot."""
         self.send_op(op, **self._licence(robot.id), x=x, y=y, yaw=yaw)
 
     def reset(self, robot):

@@ -39,7 +39,7 @@ def free(report):
 
 
 def driven(site, x, at_least=3):
-    """Return what tells whether the robot was told to go so fast, a few times."""
+    """Return a check whether the robot received a speed, a few times."""
     before = site.speeds.count(x)
     return lambda: site.speeds.count(x) >= before + at_least
 

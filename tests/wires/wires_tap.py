@@ -104,7 +104,7 @@ class Tap:
             case {"type": "take-reply", "epoch": int(epoch)}:
                 self.names.grow("epoch", epoch)
 
-    # In words.
+    # As text.
 
     def channels(self) -> dict[str, str]:
         """Return what went over each channel."""
@@ -119,7 +119,7 @@ class Tap:
             }
 
     def report(self, report: dict[str, Any]) -> str:
-        """Return a report of a robot in words, as far as it is always the same."""
+        """Return a report of a robot as text, without values that vary."""
         with self._lock:
             plain = self.names.plain(report)
         if plain["asker"] is not None:
@@ -237,15 +237,15 @@ def settled(
     still: float = 0.0,
     good: Callable[[], bool] = lambda: True,
 ) -> str:
-    """Return what is said in the end.
+    """Return the text when it no longer changes.
 
     Args:
-        words: What is said so far.
+        words: Returns the text so far.
         expected: What was recorded.
         seconds: How long it is waited for.
         calm: Seconds for which the words must stay the same if nothing is recorded.
         still: Seconds for which what was recorded must stay the same.
-        good: Tells whether it can be the end.
+        good: Returns whether the text may be complete.
 
     """
     deadline = time.monotonic() + seconds
