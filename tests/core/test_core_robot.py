@@ -225,7 +225,7 @@ def test_a_topic_of_another_type_is_a_clear_error():
         robot.set_odometry_topic(link, "/odom")
         await settle()
         assert "std_msgs/String" in robot.problems["odometry"]
-        assert "these do: nav_msgs/Odometry" in robot.problems["odometry"]
+        assert "these types have one: nav_msgs/Odometry" in robot.problems["odometry"]
         assert link.subscribed == []
 
     asyncio.run(scenario())

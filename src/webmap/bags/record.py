@@ -83,17 +83,17 @@ async def record_to(
     failure: OSError | None = None
     lasted = 0.0
     line = ProgressLine()
-    recorder = Recorder(bag, Types(dialect), line.print)
+    recorder = Recorder(bag, Types(dialect), line.show_text)
     try:
         listening = Listening(
-            Bridge(url), recorder, only=only, stated_types=stated, report=line.print
+            Bridge(url), recorder, only=only, stated_types=stated, report=line.show_text
         )
         stop = asyncio.Event()
 
         def ready() -> None:
             echo(f"Recording {url} to {bag.path}")
             if listening.missing:
-                line.print(f"Waiting for: {', '.join(listening.missing)}")
+                line.show_text(f"Waiting for: {', '.join(listening.missing)}")
 
         with signals_set(stop):
             lasted = await listening.run(
@@ -111,8 +111,8 @@ async def record_to(
         except OSError as error:
             failure = failure or error
     if failure is not None:
-        line.print(f"Error: {bag.path} cannot be written: {failure}")
-    line.print(
+        line.show_text(f"Error: {bag.path} cannot be written: {failure}")
+    line.show_text(
         f"Recorded {recorder.messages} messages of {recorder.topics} topics in "
         f"{lasted:.1f} s to {bag.path}: {megabytes(recorder)}, "
         f"{recorder.dropped} dropped"
@@ -150,7 +150,7 @@ class ProgressLine:
             self._next += EVERY
             echo(text, err=True)
 
-    def print(self, text: str) -> None:
+    def show_text(self, text: str) -> None:
         """Print another text, on a line of its own."""
         if self._shown:
             echo("", err=True)
