@@ -33,12 +33,12 @@ def listening(client: str, topic: str, count: int) -> Callable[[], Figures]:
                 assert player.stdout is not None
                 port = player.stdout.readline().strip()
                 command = [*module, "benchmarks.listener", client, port, topic]
-                heard = subprocess.run(
+                finished = subprocess.run(
                     [*command, str(count)], capture_output=True, text=True, check=True
                 )
             finally:
                 player.terminate()
-        figures: Figures = json.loads(heard.stdout)
+        figures: Figures = json.loads(finished.stdout)
         return figures
 
     return run

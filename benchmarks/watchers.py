@@ -46,7 +46,7 @@ async def open_link(url: str, name: str) -> ClientConnection:
     async with httpx.AsyncClient(follow_redirects=True) as client:
         page = (await client.get(url)).raise_for_status().text
     key = re.search(r'name="webmap-key" content="([^"]+)"', page)
-    assert key, "the page that signs in hands out a key"
+    assert key, "the sign-in page contains no key"
     place = urlsplit(url)
     return await connect(
         f"ws://{place.netloc}/_webmap/scene?page=/&id={name}",

@@ -33,7 +33,7 @@ class Made:
         self.schema = Schema(Dialect(dialect))
 
     def message(self, type_name, **fields):
-        """A whole message: zero where nothing is said."""
+        """Return a complete message, with zero for fields that are not given."""
         return self.schema.conform(type_name, fields)
 
     def time(self, moment):

@@ -1,4 +1,4 @@
-"""A camera on the web: a small HTTP server that speaks as web_video_server does."""
+"""A camera on the web: a small HTTP server that answers like web_video_server."""
 
 import asyncio
 import io

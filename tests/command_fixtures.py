@@ -10,7 +10,7 @@ from webmap_process import simulator
 
 @pytest.fixture
 def later_port() -> Iterator[int]:
-    """A port that nothing listens on yet, and that nobody else is given meanwhile."""
+    """A port on which nothing listens yet, reserved for this test."""
     with socket.socket() as kept:
         # With this a server may listen there all the same.
         kept.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -41,7 +41,7 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def state_folder() -> Iterator[None]:
-    """Keep what stands on disk, such as a STOP, from the user's own and from others."""
+    """Separate stored state, such as a STOP, from the user's and from other tests."""
     with tempfile.TemporaryDirectory(prefix="webmap-state-") as folder:
         before = os.environ.get("WEBMAP_STATE_DIR")
         os.environ["WEBMAP_STATE_DIR"] = folder
@@ -54,7 +54,7 @@ def state_folder() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def log_budgets() -> None:
-    """Let each test log as if nothing was logged before."""
+    """Reset the limits of the log before each test."""
     budgets.clear()
 
 

@@ -70,7 +70,7 @@ def load_recording(files: Iterable[Path]) -> Recording:
     if not recording.texts:
         raise ConfigError("no captured publications among the files")
     for robot, pose in _recorded_poses(recording).items():
-        _give_voice(recording, robot, pose)
+        _copy_messages(recording, robot, pose)
     return recording
 
 
@@ -115,22 +115,22 @@ def _recorded_poses(recording: Recording) -> dict[str, dict[str, Any]]:
     return poses
 
 
-def _give_voice(recording: Recording, robot: str, pose: dict[str, Any]) -> None:
-    """Let a robot of which ``/tf`` alone was taken say what the recorded one said.
+def _copy_messages(recording: Recording, robot: str, pose: dict[str, Any]) -> None:
+    """Copy the messages of the recorded robot to a robot with frames in ``/tf`` only.
 
     Its name takes the other's place in the bytes, and its own pose in odometry.
     """
-    speaker = "robot_0"
-    if len(robot) != len(speaker) or f"/{robot}/odom" in recording.texts:
+    recorded = "robot_0"
+    if len(robot) != len(recorded) or f"/{robot}/odom" in recording.texts:
         return
-    old, new = speaker.encode(), robot.encode()
+    old, new = recorded.encode(), robot.encode()
     for topic, text in tuple(recording.texts.items()):
-        if topic.startswith(f"/{speaker}/"):
-            text = _with_pose(text.replace(speaker, robot), pose)
-            recording.texts[topic.replace(speaker, robot)] = text
+        if topic.startswith(f"/{recorded}/"):
+            text = _with_pose(text.replace(recorded, robot), pose)
+            recording.texts[topic.replace(recorded, robot)] = text
     for (topic, compression), frame in tuple(recording.binaries.items()):
-        if topic.startswith(f"/{speaker}/") and not topic.endswith("/odom"):
-            key = (topic.replace(speaker, robot), compression)
+        if topic.startswith(f"/{recorded}/") and not topic.endswith("/odom"):
+            key = (topic.replace(recorded, robot), compression)
             recording.binaries[key] = frame.replace(old, new)
 
 
@@ -148,7 +148,7 @@ class Player:
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
-        self._wanted: dict[str, str] = {}
+        self._subscribed: dict[str, str] = {}
         self._fresh: set[str] = set()
 
     def receive(self, data: str | bytes) -> list[str]:
@@ -161,10 +161,10 @@ class Player:
             return []
         name, topic = operation.get("op"), operation.get("topic")
         if name == "subscribe" and isinstance(topic, str):
-            self._wanted[topic] = str(operation.get("compression") or "none")
+            self._subscribed[topic] = str(operation.get("compression") or "none")
             self._fresh.add(topic)
         elif name == "unsubscribe" and isinstance(topic, str):
-            self._wanted.pop(topic, None)
+            self._subscribed.pop(topic, None)
         elif name == "call_service":
             return [self._answer(operation)]
         return []
@@ -172,7 +172,7 @@ class Player:
     def due(self) -> list[str | bytes]:
         """Return the frames of this moment: latched ones only once a subscription."""
         frames = []
-        for topic, compression in self._wanted.items():
+        for topic, compression in self._subscribed.items():
             if topic in _LATCHED and topic not in self._fresh:
                 continue
             key = (topic, compression)
@@ -202,8 +202,8 @@ class Player:
         if service == f"{_ROSAPI}topic_type":
             return {"type": types.get(args.get("topic", ""), "")}
         if service == f"{_ROSAPI}topics_for_type":
-            wanted = args.get("type")
-            return {"topics": [name for name, kind in types.items() if kind == wanted]}
+            type = args.get("type")
+            return {"topics": [name for name, kind in types.items() if kind == type]}
         return self._recording.answers.get(service)
 
 
@@ -275,11 +275,11 @@ def main() -> int:
     options = vars(parser.parse_args())
     set_up_logging()
 
-    def say_ready(url: str) -> None:
+    def print_ready(url: str) -> None:
         print(f"rosbridge is ready at {url}", flush=True)
 
     try:
-        asyncio.run(play(**options, on_ready=say_ready))
+        asyncio.run(play(**options, on_ready=print_ready))
     except (ConfigError, OSError) as error:
         print(f"error: {one_line(error)}", file=sys.stderr)
         return 2

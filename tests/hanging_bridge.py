@@ -1,4 +1,4 @@
-"""A simulated bridge that hangs for good when a client leaves a queue of messages."""
+"""A simulated bridge that hangs for ever when a client leaves a queue of messages."""
 
 import asyncio
 import contextlib
@@ -17,7 +17,7 @@ from webmap.ros.rosbridge.server.server import RosbridgeServer
 
 
 class HangingBridge:
-    """Each topic brings a message every 10 ms, so one is always under way."""
+    """Each topic brings a message every 10 ms, so one is always in transit."""
 
     def __init__(self, dialect, types):
         quirks = parse_quirks("real,spinning_queue", dialect)
@@ -47,12 +47,12 @@ class HangingBridge:
         return len(self.server.sessions)
 
     def reset_all(self):
-        """End every socket as a network does: neither end says a word."""
+        """End every socket as a network does: without a close frame."""
         for connection in list(self.server._server.connections):
             connection.transport.abort()
 
-    async def lets_in(self):
-        """Return whether a new client gets in."""
+    async def accepts_client(self):
+        """Return whether a new client can connect."""
         try:
             async with connect(self.url, open_timeout=3, proxy=None):
                 return True

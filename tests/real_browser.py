@@ -114,28 +114,28 @@ class Complaints:
 
     def __init__(self) -> None:
         self.allowed: list[str] = []
-        self._said: list[tuple[str, str]] = []
-        """What was said, and the URL of what it is about, which no pattern sees."""
+        self._reports: list[tuple[str, str]] = []
+        """Each text with its URL; patterns apply to the text alone."""
 
     def listen(self, context: BrowserContext) -> None:
-        """Hear what the pages of a context report, those it opens later too."""
+        """Record what the pages of a context report, also later pages."""
         context.on(
             "weberror",
-            lambda error: self._said.append((f"exception: {error.error}", "")),
+            lambda error: self._reports.append((f"exception: {error.error}", "")),
         )
         context.on("console", self._console)
 
     def _console(self, message: ConsoleMessage) -> None:
         if message.type in {"error", "warning"}:
             url = message.location["url"]
-            self._said.append((f"{message.type}: {message.text}", url))
+            self._reports.append((f"{message.type}: {message.text}", url))
 
     @property
     def unexpected(self) -> list[str]:
         """What no pattern in ``allowed`` is found in."""
         return [
             f"{line} {url}".rstrip()
-            for line, url in self._said
+            for line, url in self._reports
             if not any(re.search(pattern, line) for pattern in self.allowed)
         ]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 @contextmanager
 def webmap(*arguments: str | Path, **environment: str) -> Iterator[str]:
-    """Run the command ``webmap``; give the address that it says it is ready at."""
+    """Run the command ``webmap``; yield the address that it prints when ready."""
     with subprocess.Popen(
         [sys.executable, "-m", "webmap", *arguments],
         stdout=subprocess.PIPE,

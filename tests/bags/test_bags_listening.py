@@ -90,7 +90,7 @@ class Story:
         self.bridge, self.recorder = FakeBridge(topics), FakeRecorder()
         self.said, self.stop = [], asyncio.Event()
         self.listening = Listening(
-            self.bridge, self.recorder, say=self.said.append, **options
+            self.bridge, self.recorder, report=self.said.append, **options
         )
 
     def run(self, happens, **options):
@@ -157,7 +157,7 @@ def test_topics_of_unknown_types_are_named_once():
 
     story.run(happens)
     assert story.said == [
-        "Left out, since nothing here knows their types: /a (acme_msgs/Arm), "
+        "Not recorded, since their types are unknown: /a (acme_msgs/Arm), "
         "/b (acme_msgs/Leg)"
     ]
 
@@ -171,8 +171,8 @@ def test_a_link_that_was_lost_and_is_back_is_said_with_the_gap():
 
     story.run(happens)
     lost, back = story.said
-    assert lost.startswith("The link was lost (the robot went to sleep)")
-    assert back == "The link is back after 0.0 s, which are missing in the bag"
+    assert lost.startswith("The connection was lost (the robot went to sleep)")
+    assert back == "The connection is open again; 0.0 s are missing in the bag"
 
 
 def test_it_ends_by_itself_after_its_time():
@@ -217,8 +217,8 @@ def test_a_link_that_never_opens_is_said_with_the_reason(monkeypatch):
 
     asyncio.run(ended())
     assert story.said == [
-        "Nothing is recorded yet: the link is not open (nothing listens there)",
-        "Nothing is recorded: the link was never open (nothing listens there)",
+        "Nothing is recorded yet: the connection is not open (nothing listens there)",
+        "Nothing is recorded: the connection was never open (nothing listens there)",
     ]
 
 
@@ -247,7 +247,7 @@ def test_what_cannot_be_read_is_counted():
 
     story.run(happens)
     ((topic, why, error),) = story.recorder.dropped
-    assert (topic, why) == ("/odom", "messages are left out that cannot be read")
+    assert (topic, why) == ("/odom", "messages that cannot be read are not recorded")
     assert "not JSON" in error
 
 
@@ -272,7 +272,7 @@ def test_what_is_too_much_to_wait_is_counted(monkeypatch):
     assert got[0] == ("/odom", {"x": 0})
     assert len(got) + len(dropped) == 10
     assert 7 <= len(dropped) <= 8
-    assert "more come than can be written" in dropped[0][1]
+    assert "more arrive than can be written" in dropped[0][1]
 
 
 class HandFed(Bridge):
@@ -288,7 +288,7 @@ class HandFed(Bridge):
 
 def test_no_large_message_is_lost_nor_a_small_one_behind_it():
     """For whoever shows messages the newest large one is enough; not for a bag."""
-    story = Story({"/map": "nav_msgs/OccupancyGrid"}, told={})
+    story = Story({"/map": "nav_msgs/OccupancyGrid"}, stated_types={})
     story.bridge = HandFed("ws://127.0.0.1:1")
     story.listening._bridge = story.bridge
     sent = [

@@ -76,7 +76,7 @@ def test_messages_that_do_not_fit_are_counted_and_said_once(made, recording):
     bag.close()
     assert (recorder.messages, recorder.dropped) == (1, 2)
     (sentence,) = said
-    assert "/odom: messages are left out that do not fit the type" in sentence
+    assert "/odom: messages that do not fit the type" in sentence
 
 
 @pytest.mark.parametrize("fields", [{}, {"variance": 0.5}])
@@ -107,7 +107,7 @@ def test_what_rosbags_refuses_to_make_is_one_sentence(made, tmp_path, monkeypatc
     monkeypatch.setattr(Path, "exists", lambda _: False)  # it comes in between
     (tmp_path / "office").mkdir()
     (tmp_path / "office.bag").touch()
-    with pytest.raises(ConfigError, match=r"cannot be made: .* exists already"):
+    with pytest.raises(ConfigError, match=r"cannot be created: .* exists already"):
         new_bag(tmp_path / "office", made.dialect)
 
 

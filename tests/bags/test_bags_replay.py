@@ -154,7 +154,7 @@ def test_a_loop_begins_anew_and_one_recording_ends(bag):
             assert xs(client)[:9] == [1.0, 2.0, 3.0, 4.0] * 2 + [1.0]
         async with played(bag) as player:
             client = Client(player).listen("/odom")
-            await until(lambda: "ended after 4.0 s" in player.words)
+            await until(lambda: "ended after 4.0 s" in player.status)
             assert len(xs(client)) == 4
 
     asyncio.run(story())
@@ -200,7 +200,7 @@ def test_it_begins_anew_when_it_is_told_to(bag):
     async def story():
         async with played(bag) as player:
             client = Client(player).listen("/odom")
-            await until(lambda: "ended" in player.words)
+            await until(lambda: "ended" in player.status)
             player.begin_anew()
             await until(lambda: len(xs(client)) == 8)
 
@@ -232,7 +232,7 @@ def test_it_says_what_is_played_and_where_in_it(bag):
 def test_its_words_have_the_moment_the_length_and_the_speed(bag):
     recording = Recording([bag])
     player = Player(recording, rate=2.0, start=1.0, now=lambda: NOW)
-    assert player.words == (
+    assert player.status == (
         f"Recording {recording.name}: 1.0 of 4.0 s, 2 times as fast"
     )
     recording.close()
@@ -264,7 +264,7 @@ def test_nothing_is_taken_in_whatever_a_client_sends(bag, operation):
     async def story():
         async with played(bag) as player:
             other = Client(player).listen("/cmd_vel")
-            await until(lambda: "ended" in player.words)
+            await until(lambda: "ended" in player.status)
             heard = len(other.messages("/cmd_vel"))
             client = Client(player)
             client.send(**operation)
@@ -320,8 +320,8 @@ def test_a_recording_that_is_damaged_in_the_middle_is_played_up_to_there(
     async def story():
         async with played(bag) as player:
             client = Client(player).listen("/odom")
-            await until(lambda: "ended" in player.words)
+            await until(lambda: "ended" in player.status)
             assert xs(client) == [1.0, 2.0]
 
     asyncio.run(story())
-    assert "what comes behind it is not played" in caplog.text
+    assert "the rest of the recording is not played" in caplog.text

@@ -1,4 +1,4 @@
-"""A Chromium of our own, spoken to by its DevTools protocol alone.
+"""A Chromium that is controlled by its DevTools protocol alone.
 
 Playwright keeps every page focused and visible, which is what most tests want, and
 what a test of a hidden page cannot have.
@@ -44,7 +44,7 @@ class Tab:
             if answer.get("id") == number:
                 assert "error" not in answer, f"{method}: {answer['error']}"
                 return answer["result"]
-            self._hear(answer)
+            self._on_message(answer)
 
     def evaluate(self, expression: str) -> Any:
         """Return the value of an expression in the page."""
@@ -72,7 +72,7 @@ class Tab:
         self.call("Page.navigate", url=url)
 
     def key(self, kind: str, key: str) -> None:
-        """Press (``keyDown``) or let go (``keyUp``) a letter's key."""
+        """Press (``keyDown``) or release (``keyUp``) a letter's key."""
         self.call(
             "Input.dispatchKeyEvent",
             type=kind,
@@ -87,7 +87,7 @@ class Tab:
         self.key("keyDown", key)
 
     def up(self, key: str) -> None:
-        """Let go of a letter's key."""
+        """Release a letter's key."""
         self.key("keyUp", key)
 
     def click(self, x: float, y: float) -> None:
@@ -103,10 +103,10 @@ class Tab:
             )
 
     def close(self) -> None:
-        """Let go of the tab; it stays open."""
+        """Disconnect from the tab; it stays open."""
         self._open.close()
 
-    def _hear(self, event: dict[str, Any]) -> None:
+    def _on_message(self, event: dict[str, Any]) -> None:
         method, about = event.get("method"), event.get("params", {})
         if method == "Runtime.exceptionThrown":
             self.errors.append(str(about["exceptionDetails"]))

@@ -223,23 +223,23 @@ def _difference(
     drawn: Sequence[str],
     new: Sequence[int],
 ) -> str:
-    way = _way(recorded, old[0]) if old else _way(drawn, new[0])
+    path = _element_path(recorded, old[0]) if old else _element_path(drawn, new[0])
     lines = [
         *(f"  - {recorded[i].strip()}" for i in old[:SHOWN]),
         *(f"  + {drawn[j].strip()}" for j in new[:SHOWN]),
     ]
-    return "\n".join([f"in {way}:", *lines])
+    return "\n".join([f"in {path}:", *lines])
 
 
-def _way(lines: Sequence[str], index: int) -> str:
-    """Return the elements that a line lies in, the innermost last."""
+def _element_path(lines: Sequence[str], index: int) -> str:
+    """Return the elements around a line, the innermost last."""
     depth = _depth(lines[index])
-    way: list[str] = []
+    path: list[str] = []
     for line in reversed(lines[:index]):
         if _depth(line) < depth:
             depth = _depth(line)
-            way.append(line.split()[0])
-    return " > ".join(reversed(way[:4])) or "the page"
+            path.append(line.split()[0])
+    return " > ".join(reversed(path[:4])) or "the page"
 
 
 def _depth(line: str) -> int:

@@ -1,4 +1,4 @@
-"""A rosbridge that says the same all the time, as what it says is not to change."""
+"""A rosbridge that always publishes the same messages."""
 
 import asyncio
 import contextlib
@@ -25,12 +25,15 @@ QUICK, SLOW = 0.2, 1.0
 SOON_OLD = re.compile(r"/(tf|odom|pose|pose2d|scan|ranges|sonar\w*|points)\Z")
 """Topics of which what is drawn is old after a second or two."""
 
-TAKEN = {"/anna/cmd_vel": "geometry_msgs/Twist", "/bert/cmd_vel": "geometry_msgs/Twist"}
+SUBSCRIBED = {
+    "/anna/cmd_vel": "geometry_msgs/Twist",
+    "/bert/cmd_vel": "geometry_msgs/Twist",
+}
 """Topics that the robots listen to, and do nothing for."""
 
 
 class FixedBridge:
-    """All that :func:`fixed_site.site` tells, again and again."""
+    """Publishes all messages of :func:`fixed_site.site`, repeatedly."""
 
     def __init__(self, dialect: str) -> None:
         quirks = parse_quirks("real", dialect)
@@ -46,29 +49,29 @@ class FixedBridge:
             for step in range(len(STEPS))
         ]
 
-    def _whole(self, said: dict[str, Any]) -> dict[str, Any]:
+    def _whole(self, messages: dict[str, Any]) -> dict[str, Any]:
         return {
             topic: (type, self.schema.conform(type, message))
-            for topic, (type, message) in said.items()
+            for topic, (type, message) in messages.items()
         }
 
     async def run(self, stop: threading.Event) -> None:
-        """Say everything until it is stopped."""
+        """Publish everything until it is stopped."""
         for topic, (type, message) in self._sites[0].items():
             latch = topic in LATCHED
             self.graph.advertise(self, topic, type, node="/site", latch=latch)
             if latch:
                 self.graph.publish(self, topic, self._now(message, time.time()))
-        for topic, type in TAKEN.items():
+        for topic, type in SUBSCRIBED.items():
             self.graph.subscribe(self, topic, lambda _: None, type, node="/site")
         for turn in itertools.count():
             if stop.is_set():
                 break
-            self._say(all_of_them=turn % round(SLOW / QUICK) == 0)
+            self._publish(all_of_them=turn % round(SLOW / QUICK) == 0)
             await asyncio.sleep(QUICK)
         await self.server.stop()
 
-    def _say(self, *, all_of_them: bool) -> None:
+    def _publish(self, *, all_of_them: bool) -> None:
         stamp = time.time()
         for topic, (_, message) in self._sites[self.step].items():
             due = topic not in LATCHED and (all_of_them or SOON_OLD.search(topic))

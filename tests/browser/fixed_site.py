@@ -153,7 +153,7 @@ def mounts() -> Fields:
 
 
 def particles(*, ros2: bool) -> dict[str, tuple[str, Fields]]:
-    """Return where Anna may be, as her localiser says it in either ROS."""
+    """Return the possible poses of Anna, as published in either ROS."""
     array = poses("map", 12, -1.5, -0.4)
     if not ros2:
         return {"/anna/particlecloud": ("geometry_msgs/PoseArray", array)}
@@ -163,7 +163,7 @@ def particles(*, ros2: bool) -> dict[str, tuple[str, Fields]]:
 
 
 def parts() -> list[Fields]:
-    """Return what parts of both robots say of their health."""
+    """Return the diagnostics of the parts of both robots."""
     said = (
         ("anna/base: Motors", 0),
         ("anna/base: Battery", 1),

@@ -39,7 +39,7 @@ class Process:
         self._log = b""
 
     def ready(self, pattern: str, within: float = 30.0) -> str:
-        """Wait for the line that says it is ready; return the URL in it."""
+        """Wait for the line that reports it ready; return the URL in it."""
         stdout = self.popen.stdout
         deadline = time.monotonic() + within
         said = b""

@@ -1,4 +1,4 @@
-"""What a robot's ROS says, heard by a client that this project did not write."""
+"""Messages of a robot's ROS, received by a client that this project did not write."""
 
 import threading
 import time
@@ -21,12 +21,12 @@ class Witness:
     def follow(self, topic: str, type_name: str) -> None:
         """Keep the newest message of a topic."""
 
-        def heard(message) -> None:
+        def on_message(message) -> None:
             with self._lock:
                 self._newest[topic] = message
                 self._count[topic] = self._count.get(topic, 0) + 1
 
-        roslibpy.Topic(self.ros, topic, type_name).subscribe(heard)
+        roslibpy.Topic(self.ros, topic, type_name).subscribe(on_message)
 
     def count(self, topic: str) -> int:
         """How many messages of a topic came."""
@@ -44,12 +44,12 @@ class Witness:
         raise AssertionError(f"nothing came on {topic}")
 
     def place(self, topic: str) -> tuple[float, float]:
-        """Where odometry says the robot is."""
+        """The pose of the robot in odometry."""
         position = self.newest(topic)["pose"]["pose"]["position"]
         return position["x"], position["y"]
 
     def speed(self, topic: str) -> tuple[float, float]:
-        """How fast odometry says the robot is: forward, turning."""
+        """The velocity of the robot in odometry: forward, turning."""
         twist = self.newest(topic)["twist"]["twist"]
         return twist["linear"]["x"], twist["angular"]["z"]
 

@@ -175,7 +175,7 @@ def test_a_bridge_that_is_not_there_is_said_and_the_other_robot_goes_on(tab, ros
 @pytest.mark.parametrize(
     ("topics", "sentence"),
     [
-        ("/map::", r"Odd: topic '/map': '.+Grid' does not say where a robot is"),
+        ("/map::", r"Odd: topic '/map': '.+Grid' has no pose of a robot"),
         ("/robot_1/odom::/map", r"/map: expected sensor_msgs/LaserScan, .+Grid"),
     ],
     ids=["odometry", "scan"],

@@ -62,4 +62,4 @@ def test_a_robot_whose_odometry_ceases_looks_old_everywhere_and_the_log_says_so(
     bob_looks(is_old=False)
     wait_until(lambda: "Bob: poses again" in server.log, what="another line")
     assert "Ann: no pose" not in server.log
-    assert "the link ended" not in server.log
+    assert "the connection ended" not in server.log

@@ -39,7 +39,7 @@ PLACES = f"""() => {{
 """Places of the window beside other robots, where the map is to be seen; the farthest
 from the selected robot first."""
 
-UNDER_WAY = re.compile("Navigating to goal.*to go")
+NAVIGATING = re.compile("Navigating to goal.*to go")
 
 
 def send_away(page: Page) -> None:
@@ -55,7 +55,7 @@ def send_away(page: Page) -> None:
         x, y = next(place for place in places if tuple(place) not in without_path)
         page.mouse.click(x, y)
         try:
-            expect(goal).to_contain_text(UNDER_WAY, timeout=5_000)
+            expect(goal).to_contain_text(NAVIGATING, timeout=5_000)
         except AssertionError:
             if "Goal failed" in goal.inner_text():
                 without_path.add((x, y))

@@ -59,7 +59,7 @@ def test_a_check_that_fails_itself_is_said_and_can_be_made_again(caplog):
             await until(lambda: not checkup.is_running)
             (finding,) = checkup.findings
             assert finding.level == "wrong"
-            assert "RuntimeError('broken')" in finding.words
+            assert "RuntimeError('broken')" in finding.text
 
     asyncio.run(run())
     assert "the readiness check of ws://bob:9090 failed" in caplog.text

@@ -18,7 +18,7 @@ def ways():
         ["/bob/wheels"],
         {"stop_hooks": [hook]},
         "/bob/lock",
-        "what STOP says",
+        "the STOP",
     )
     move = {"cancel_topic": "/bob/halt/", "action": "bob//walk"}
     for topic, carried in (

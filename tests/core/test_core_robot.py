@@ -225,7 +225,7 @@ def test_a_topic_of_another_type_is_a_clear_error():
         robot.set_odometry_topic(link, "/odom")
         await settle()
         assert "std_msgs/String" in robot.problems["odometry"]
-        assert "these do: nav_msgs/Odometry" in robot.problems["odometry"]
+        assert "these types have one: nav_msgs/Odometry" in robot.problems["odometry"]
         assert link.subscribed == []
 
     asyncio.run(scenario())
@@ -238,7 +238,9 @@ def test_a_message_of_another_shape_is_a_clear_error():
         robot.set_odometry_topic(link, "/odom")
         await settle()
         link.say("/odom", {"data": "hello"})
-        assert "with the fields data says nowhere" in robot.problems["odometry"]
+        assert (
+            "with the fields data has no pose of a robot" in robot.problems["odometry"]
+        )
         assert not robot.valid
 
     asyncio.run(scenario())

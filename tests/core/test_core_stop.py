@@ -133,7 +133,7 @@ def test_what_stop_says_is_the_gates_alone_to_write(robot):
         with pytest.raises(MotionRefused) as refused:
             bridge.publish("lock/", {"data": said}, "std_msgs/Bool")
     assert str(refused.value) == (
-        "/lock carries what STOP says of a robot, which the gate alone writes: use "
+        "/lock carries the STOP of a robot, which only the gate publishes: use "
         "Robot.stop() and Robot.reset_stop()"
     )
     with pytest.raises(BridgeClosed):

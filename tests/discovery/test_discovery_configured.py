@@ -60,7 +60,7 @@ def seen_of(*configured, topics=TOPICS, **more):
 
 def said(seen, words):
     """The only finding that says these words."""
-    (found,) = [each for each in judge(seen) if words in each.words]
+    (found,) = [each for each in judge(seen) if words in each.text]
     return found
 
 
@@ -177,7 +177,7 @@ def test_what_goes_over_another_bridge_is_not_missed_at_this_one():
         elsewhere=frozenset({"odometry", "velocity"}),
         found_as="a",
     )
-    about_bob = [each.words for each in judge(seen_of(bob)) if each.about == "Bob"]
+    about_bob = [each.text for each in judge(seen_of(bob)) if each.about == "Bob"]
     assert about_bob == []
 
 

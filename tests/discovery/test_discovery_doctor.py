@@ -44,7 +44,7 @@ GOOD = Observed(
 
 def said(seen, words):
     """The level of the only finding that says these words."""
-    (found,) = [each for each in judge(seen) if words in each.words]
+    (found,) = [each for each in judge(seen) if words in each.text]
     if found.level in ("wrong", "warning"):
         assert found.advice, "what to do is said"
     return found.level
@@ -93,7 +93,7 @@ def test_why_a_bridge_is_away_says_what_to_do(trouble, advice):
 )
 def test_a_bridge_that_others_reach_is_open_to_them(url, peer, level):
     findings = judge(replace(GOOD, url=url, link=LinkFacts(peer)))
-    (found,) = [f for f in findings if "open to the" in f.words or "reached" in f.words]
+    (found,) = [f for f in findings if "open to the" in f.text or "reached" in f.text]
     assert found.level == level
     assert ("topics_glob" in found.advice) is (not url.startswith("ws://localhost"))
 
@@ -103,8 +103,8 @@ def test_a_bridge_that_others_reach_is_open_to_them(url, peer, level):
     [
         (("127.0.0.1",), "good", "listens on this machine alone"),
         (("127.0.0.1", "::1"), "good", "listens on this machine alone"),
-        (("0.0.0.0",), "warning", "listens at 0.0.0.0: it asks nobody"),
-        (("127.0.0.1", "::"), "warning", "listens at ::: it asks nobody"),
+        (("0.0.0.0",), "warning", "listens at 0.0.0.0: it has no sign-in"),
+        (("127.0.0.1", "::"), "warning", "listens at ::: it has no sign-in"),
     ],
 )
 def test_a_bridge_on_this_machine_may_be_open_to_others(listens, level, words):
@@ -165,9 +165,9 @@ def test_only_some_addresses_are_of_this_machine_alone(address, here):
 def test_a_bridge_that_hides_nothing_is_told_so_where_others_reach_it():
     link = LinkFacts("192.168.1.7")
     seen = replace(GOOD, url="ws://bob:9090", link=link, shown=("/rosout",))
-    assert said(seen, "Nothing is hidden from anybody either (/rosout") == "warning"
+    assert said(seen, "No topic is hidden from its clients (/rosout") == "warning"
     at_home = replace(GOOD, shown=("/rosout",))
-    assert not any("hidden" in each.words for each in judge(at_home))
+    assert not any("hidden" in each.text for each in judge(at_home))
 
 
 def test_only_the_first_of_many_robots_are_listened_to_and_that_is_said():
@@ -179,7 +179,7 @@ def test_only_the_first_of_many_robots_are_listened_to_and_that_is_said():
 def test_a_map_that_nobody_publishes_is_told():
     topics = TOPICS | {"/map": "nav_msgs/OccupancyGrid"}
     seen = replace(GOOD, findings=discover(topics, "bob"))
-    assert not any("no map under it" in each.words for each in judge(seen))
+    assert not any("no map under it" in each.text for each in judge(seen))
     seen = replace(seen, publishers={**GOOD.publishers, "/map": ()})
     assert said(seen, "No node publishes /map") == "warning"
 
@@ -290,7 +290,7 @@ def test_the_status_of_goals_is_asked_for_by_the_action_that_the_robot_has():
 
 def test_a_bridge_without_rosapi_is_told_what_to_do():
     bare = Observed("ws://localhost:9090", unlisted="no answer")
-    assert said(bare, "rosapi does not say") == "warning"
+    assert said(bare, "rosapi does not list") == "warning"
     assert said(bare, "is not known") == "note"
 
 
@@ -335,7 +335,7 @@ def test_an_offset_within_half_the_way_is_no_offset():
 def test_whether_a_call_that_hangs_blocks_is_said(dialect, threads, level):
     findings = replace(GOOD.findings, dialect=dialect)
     seen = replace(GOOD, findings=findings, link=LinkFacts(calls_in_threads=threads))
-    (found,) = [f for f in judge(seen) if "hangs" in f.words or "of its own" in f.words]
+    (found,) = [f for f in judge(seen) if "hangs" in f.text or "of its own" in f.text]
     assert found.level == level
 
 
@@ -426,7 +426,7 @@ def test_the_way_begins_in_the_map_that_the_robot_is_drawn_in():
     assert said(seen, "Frames lead from world to bob/odom") == "good"
     lost = FramePath("bob/odom", "there is no frame 'world'", start="world")
     seen = replace(GOOD, frame_paths={"bob": lost})
-    (found,) = [each for each in judge(seen) if "no frame 'world'" in each.words]
+    (found,) = [each for each in judge(seen) if "no frame 'world'" in each.text]
     assert "start the node that publishes the frame world" in found.advice
 
 

@@ -40,7 +40,7 @@ def looked_at(system, look=None, *, seconds=SECONDS, **options):
 
 def said(findings, words):
     """The level of the only finding that says these words."""
-    (found,) = [each for each in findings if words in each.words]
+    (found,) = [each for each in findings if words in each.text]
     if found.level in ("wrong", "warning"):
         assert found.advice, "what to do is said"
     return found.level
@@ -71,7 +71,7 @@ def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
     assert said(findings, f"{camera}: ") == "good"
     assert said(findings, "/map: 1 message, ") == "good"
     words = r"No message was received on /robot_0/plan in \d+ s; messages may"
-    (plan,) = [each for each in findings if re.match(words, each.words)]
+    (plan,) = [each for each in findings if re.match(words, each.text)]
     assert plan.level == "note"
     assert seen.measured[camera].count <= ENOUGH
     assert seen.measured[camera].every > 0
@@ -80,9 +80,9 @@ def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
 def test_a_map_above_the_limit_of_the_bridge_is_told_with_the_parameter():
     _, findings, seen = looked_at(site("ros2", limit=8000))
     assert seen.link.too_large["/map"] > 8000
-    (found,) = [each for each in findings if each.words.startswith("/map comes")]
+    (found,) = [each for each in findings if each.text.startswith("/map comes")]
     assert found.level == "warning"
-    assert "larger than max_message_size of the bridge" in found.words
+    assert "larger than max_message_size of the bridge" in found.text
     assert "parameter max_message_size of rosbridge_websocket to" in found.advice
 
 
@@ -97,7 +97,7 @@ def test_a_map_that_nobody_sends_in_json_either_is_silent_and_the_limit_is_named
     _, findings, seen = looked_at(site("ros2", change=mute))
     assert not seen.link.too_large
     (found,) = [
-        each for each in findings if "No message was received on /map" in each.words
+        each for each in findings if "No message was received on /map" in each.text
     ]
     assert "max_message_size" in found.advice
 
@@ -183,7 +183,7 @@ def test_a_topic_that_nobody_feeds_is_told_with_the_node_that_could(dialect):
     for topic in ("odom", "base_scan"):
         words = rf"No message was received on /robot_0/{topic} in \d+ s, "
         words += "although /robots can publish"
-        assert any(re.match(words, each.words) for each in findings)
+        assert any(re.match(words, each.text) for each in findings)
 
 
 def without(*children):
@@ -247,7 +247,7 @@ def apart(name, message):
 def test_the_frames_of_a_robot_with_a_map_of_its_own_are_good(dialect):
     _, findings, _ = looked_at(site(dialect, change=apart))
     assert said(findings, "Frames lead from world to robot_0/odom (/tf:") == "good"
-    assert not any("at the pose from odometry" in each.words for each in findings)
+    assert not any("at the pose from odometry" in each.text for each in findings)
 
 
 @pytest.mark.parametrize(
@@ -276,7 +276,7 @@ def test_a_bridge_that_offers_no_services_of_its_clients_leaves_that_open():
 
 def test_without_rosapi_a_call_is_not_tried_and_why_is_said():
     there, findings, _ = looked_at(site("ros2", rosapi=False), try_call=True)
-    assert said(findings, "is not known: it takes a rosapi that answers") == "note"
+    assert said(findings, "is not known: rosapi does not answer") == "note"
     assert not any("webmap_doctor" in name for name in there.called)
 
 
@@ -326,7 +326,7 @@ def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
 
 def test_without_rosapi_and_without_a_list_the_list_is_asked_for():
     _, findings, _ = looked_at(site(rosapi=False))
-    (found,) = [each for each in findings if "rosapi does not say" in each.words]
+    (found,) = [each for each in findings if "rosapi does not list" in each.text]
     assert found.level == "warning"
     assert "--topics FILE" in found.advice
 

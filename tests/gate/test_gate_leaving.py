@@ -93,6 +93,6 @@ async def test_each_lane_is_left_and_the_bridge_still_answers(lane_of, leave, di
         try:
             await leave(bridge, lane, unsubscribe)
             await asyncio.sleep(0.1)  # the bridge sees it
-            assert await bridge.lets_in()
+            assert await bridge.accepts_client()
         finally:
             lane.lane.close()

@@ -58,7 +58,7 @@ class Twist(NamedTuple):
 
 
 class Program:
-    """A program of ROS, and each line that it said."""
+    """A program of ROS, and each line of its output."""
 
     def __init__(self, command, environment):
         self.lines = []

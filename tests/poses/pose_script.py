@@ -70,7 +70,7 @@ class Link:
         self.stats = BridgeStats()
         self.types: dict[str, str] = {}
         self._opening: dict[int, Callable[[], object]] = {}
-        self._heard: dict[str, list[tuple]] = {}
+        self._subscriptions: dict[str, list[tuple]] = {}
 
     def open(self) -> None:
         self.state, self.lost = "open", False
@@ -92,22 +92,22 @@ class Link:
         return self.types.get(topic)
 
     def protect(self, topic: str, carries: str) -> None:
-        """Nobody publishes here."""
+        """Do nothing: no program publishes here."""
 
     def subscribe(self, topic, callback, type=None, *, decode=None, **options):
         entry = (callback, decode, current_scope())
-        self._heard.setdefault(topic, []).append(entry)
-        return keep(Removal(lambda: self._heard[topic].remove(entry)))
+        self._subscriptions.setdefault(topic, []).append(entry)
+        return keep(Removal(lambda: self._subscriptions[topic].remove(entry)))
 
-    def say(self, topic: str, message: dict) -> None:
-        """Let a message come in as a rosbridge writes it, if the link is open."""
+    def publish(self, topic: str, message: dict) -> None:
+        """Receive a message as a rosbridge writes it, if the link is open."""
         if self.state != "open":
             return
         text = json.dumps(message).replace("NaN", "null")
         frame = f'{{"op":"publish","topic":"{topic}","msg":{text}}}'.encode()
         event = Protocol().receive(frame, time.monotonic())
-        for entry in tuple(self._heard.get(topic, ())):
-            if entry in self._heard[topic]:
+        for entry in tuple(self._subscriptions.get(topic, ())):
+            if entry in self._subscriptions[topic]:
                 self._give(event, *entry)
 
     def _give(self, event: Any, callback: Any, decode: Any, scope: Any) -> None:
@@ -124,7 +124,7 @@ class Link:
 
 
 class Seer:
-    """A module that notes when the robot's pose is told."""
+    """A module that records each new pose of the robot."""
 
     def __init__(self, robot: Robot, note: Callable[[str], None]) -> None:
         self._robot, self._note = robot, note
@@ -137,7 +137,7 @@ class Seer:
 
 
 class Channel:
-    """A page that notes what it is told."""
+    """A page that records what it receives."""
 
     def __init__(self, note: Callable[[str], None]) -> None:
         self._note = note
@@ -208,9 +208,9 @@ class Stage(logging.Handler):
         await asyncio.sleep(0)
         self.look()
 
-    def tell(self, topic: str, message: dict, link: Link | None = None) -> None:
-        """Say something on a link, and look."""
-        (link or self.link).say(topic, message)
+    def publish(self, topic: str, message: dict, link: Link | None = None) -> None:
+        """Publish a message on a link, and look."""
+        (link or self.link).publish(topic, message)
         self.look()
 
     # What is seen.
@@ -387,7 +387,7 @@ def scan(stamp: float, frame="laser") -> dict:
     }
 
 
-def way(stamp: float, frame="odom") -> dict:
+def planned_path(stamp: float, frame="odom") -> dict:
     each = [{"header": header(frame, stamp), "pose": pose(x, 0, 0)} for x in (0, 1)]
     return {"header": header(frame, stamp), "poses": each}
 
@@ -440,7 +440,7 @@ class Chance:
 
     def mount(self) -> None:
         chain = transform("base_link", "laser", 0.3, stamp=0.0)
-        self.stage.tell("/tf_static", transforms(chain))
+        self.stage.publish("/tf_static", transforms(chain))
 
     def follow(self, robot: Robot) -> None:
         topic, type, throttle = self.random.choice(
@@ -470,24 +470,26 @@ class Chance:
         late, v = self.random.choice([0.0, 0.0, 0.05, 0.2]), self.random.choice([0, 1])
         place = (self.x, self.random.uniform(-0.01, 0.01), self.yaw)
         stamp = self.stamp - late
-        tell = self.stage.tell
-        tell("/odom", odometry(*place, stamp=stamp, v=v))
-        tell("/odom2", amcl(*place, stamp=stamp, frame="odom"))
+        publish = self.stage.publish
+        publish("/odom", odometry(*place, stamp=stamp, v=v))
+        publish("/odom2", amcl(*place, stamp=stamp, frame="odom"))
         if self.random.random() < 0.3:
-            tell("/amcl_pose", amcl(*place, stamp=stamp))
+            publish("/amcl_pose", amcl(*place, stamp=stamp))
 
     def frames(self) -> None:
         moved = [transform("odom", "base_link", self.x, 0, self.yaw, stamp=self.stamp)]
         if self.clear:
             drift = 0.01 * self.x
             moved.append(transform("map", "odom", 1.0 + drift, stamp=self.stamp))
-        self.stage.tell("/tf", transforms(*moved))
+        self.stage.publish("/tf", transforms(*moved))
 
     def sensors(self) -> None:
         stamp = self.random.choice([0.0, self.stamp, self.stamp - 0.1, self.stamp + 5])
         frame = self.random.choice(["laser", "laser", "", "camera"])
-        self.stage.tell("/scan", scan(stamp, frame))
-        self.stage.tell("/plan", way(stamp, self.random.choice(["odom", "map", ""])))
+        self.stage.publish("/scan", scan(stamp, frame))
+        self.stage.publish(
+            "/plan", planned_path(stamp, self.random.choice(["odom", "map", ""]))
+        )
 
     async def unusual(self) -> None:
         does = [
@@ -520,13 +522,16 @@ class Chance:
 
     def nonsense(self) -> None:
         wrong = self.random.choice([math.nan, 1e12])
-        tell, frame = self.stage.tell, self.random.choice(["odom", "map", "elsewhere"])
-        tell("/odom", odometry(wrong, stamp=self.stamp, frame=frame))
-        self.stage.tell("/amcl_pose", {"header": {}, "pose": 3})
+        publish, frame = (
+            self.stage.publish,
+            self.random.choice(["odom", "map", "elsewhere"]),
+        )
+        publish("/odom", odometry(wrong, stamp=self.stamp, frame=frame))
+        self.stage.publish("/amcl_pose", {"header": {}, "pose": 3})
         zero = odometry(self.x, stamp=0.0, frame=frame)
         if self.random.random() < 0.5:
             zero["pose"]["pose"]["orientation"] = {"x": 0, "y": 0, "z": 0, "w": 0}
-        tell("/odom", zero)
+        publish("/odom", zero)
 
     def wrong_frames(self) -> None:
         wrong = [
@@ -537,7 +542,7 @@ class Chance:
             transform("elsewhere", "camera", 1.0, stamp=self.stamp),
             transform("", "camera", 1.0, stamp=self.stamp),
         ]
-        self.stage.tell("/tf", transforms(self.random.choice(wrong)))
+        self.stage.publish("/tf", transforms(self.random.choice(wrong)))
 
     async def lose_localisation(self) -> None:
         self.clear = not self.clear

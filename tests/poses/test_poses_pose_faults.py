@@ -54,13 +54,13 @@ def test_a_failure_to_draw_anew_leaves_the_drawing_in_place_and_is_cleared(
                 ]
                 if roll is not None:
                     moved.append(tilted("base_link", "camera", roll, now))
-                stage.tell("/tf", transforms(*moved))
-                stage.tell("/odom", odometry(1.0, stamp=now))
+                stage.publish("/tf", transforms(*moved))
+                stage.publish("/odom", odometry(1.0, stamp=now))
                 await stage.wait(0.1)
 
         def point(stamp):
             place = {"x": 1.0, "y": 0.0, "z": 0.0}
-            stage.tell("/point", {"header": header("camera", stamp), "point": place})
+            stage.publish("/point", {"header": header("camera", stamp), "point": place})
 
         def failed():
             return any("no such tilt" in words for words in robot.problems.values())
@@ -102,9 +102,9 @@ def test_a_jump_is_no_problem_of_a_robot_whose_source_a_listener_ends(monkeypatc
         stage.link.open()
         stage.robot.add_module(Ends)
         stage.robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
-        stage.tell("/odom", odometry(0.0, stamp=100.0))
+        stage.publish("/odom", odometry(0.0, stamp=100.0))
         await stage.wait(0.1)
-        stage.tell("/odom", odometry(100.0, stamp=100.1))
+        stage.publish("/odom", odometry(100.0, stamp=100.1))
         await stage.wait(60)
         assert stage.robot.feed is None
         assert stage.robot.problems == {}

@@ -12,11 +12,11 @@ from pose_script import (
     Chance,
     amcl,
     odometry,
+    planned_path,
     play,
     scan,
     transform,
     transforms,
-    way,
 )
 
 from webmap import align_bridge
@@ -36,8 +36,8 @@ async def drive(stage, seconds, x=0.0, *, localised=True, ahead=0.0, step=0.1):
         moved = [transform("odom", "base_link", x, stamp=stamp)]
         if localised:
             moved.append(transform("map", "odom", 2.0, 1.0, 0.5, stamp=stamp))
-        stage.tell("/tf", transforms(*moved))
-        stage.tell("/odom", odometry(x, stamp=stamp, v=0.5))
+        stage.publish("/tf", transforms(*moved))
+        stage.publish("/odom", odometry(x, stamp=stamp, v=0.5))
     return x
 
 
@@ -48,12 +48,12 @@ async def odometry_alone(stage):
     for step in range(30):
         await stage.wait(0.1)
         now = stage.loop.now
-        stage.tell("/odom", odometry(step / 20, yaw=step / 10, stamp=now, v=0.5))
-        stage.tell("/scan", scan(now + 0.03))
+        stage.publish("/odom", odometry(step / 20, yaw=step / 10, stamp=now, v=0.5))
+        stage.publish("/scan", scan(now + 0.03))
     stage.link.lag = 2.0
-    stage.tell("/odom", odometry(1.5, stamp=stage.loop.now))
+    stage.publish("/odom", odometry(1.5, stamp=stage.loop.now))
     await stage.wait(50.0)
-    stage.tell("/odom", odometry(1.5, stamp=stage.loop.now))
+    stage.publish("/odom", odometry(1.5, stamp=stage.loop.now))
     stage.robot.unsubscribe_odometry_topic()
     await stage.wait(5.0)
 
@@ -65,12 +65,12 @@ async def odometry_by_frames(stage):
     stage.robot.add_module("LaserScanner", stage.link, "/scan", throttle=0)
     stage.link.open()
     x = await drive(stage, 4.0, localised=False)
-    stage.tell("/plan", way(stage.loop.now))
-    stage.tell("/scan", scan(stage.loop.now, "laser"))
+    stage.publish("/plan", planned_path(stage.loop.now))
+    stage.publish("/scan", scan(stage.loop.now, "laser"))
     x = await drive(stage, 2.0, x)
     mount = transform("base_link", "laser", 0.3, stamp=0.0)
-    stage.tell("/tf_static", transforms(mount))
-    stage.tell("/scan", scan(stage.loop.now + 0.1, "laser"))
+    stage.publish("/tf_static", transforms(mount))
+    stage.publish("/scan", scan(stage.loop.now + 0.1, "laser"))
     x = await drive(stage, 4.0, x, localised=False)
     x = await drive(stage, 1.0, x)
     x = await drive(stage, 2.0, x + 30.0)
@@ -85,7 +85,7 @@ async def amcl_by_frames(stage):
     stage.link.open()
     for x in (1.0, 1.5, 1.5, 30.0):
         await stage.wait(0.6)
-        stage.tell("/amcl_pose", amcl(x, stamp=stage.loop.now))
+        stage.publish("/amcl_pose", amcl(x, stamp=stage.loop.now))
     await stage.wait(60.0)
 
 
@@ -96,7 +96,7 @@ async def frames_alone(stage):
     moved = transform("map", "other", 1.0, stamp=1.0)
     for _ in range(40):
         await stage.wait(0.2)
-        stage.tell("/tf", transforms(moved))
+        stage.publish("/tf", transforms(moved))
     await drive(stage, 2.0, 1.0, step=0.01)
     stage.link.close()
     await stage.wait(40.0)
@@ -107,9 +107,11 @@ async def frames_alone(stage):
 async def static_frames_alone(stage):
     stage.robot.set_tf(stage.link)
     stage.link.open()
-    stage.tell("/tf_static", transforms(transform("map", "base_link", 3.0, stamp=0.0)))
+    stage.publish(
+        "/tf_static", transforms(transform("map", "base_link", 3.0, stamp=0.0))
+    )
     await stage.wait(0.2)
-    stage.tell("/tf", transforms(transform("map", "other", 3.0, stamp=1.0)))
+    stage.publish("/tf", transforms(transform("map", "other", 3.0, stamp=1.0)))
     await stage.wait(40.0)
 
 
@@ -117,12 +119,12 @@ async def type_by_shape(stage):
     stage.robot.set_odometry_topic(stage.link, "/odom", 0)
     stage.link.open()
     await stage.wait(0.1)
-    stage.tell("/odom", {"data": 3})
-    stage.tell("/odom", odometry(1.0, stamp=stage.loop.now))
-    stage.tell("/odom", odometry(float("nan"), stamp=stage.loop.now))
-    stage.tell("/odom", {"data": 3})
+    stage.publish("/odom", {"data": 3})
+    stage.publish("/odom", odometry(1.0, stamp=stage.loop.now))
+    stage.publish("/odom", odometry(float("nan"), stamp=stage.loop.now))
+    stage.publish("/odom", {"data": 3})
     await stage.wait(1.0)
-    stage.tell("/odom", odometry(1.1, stamp=stage.loop.now))
+    stage.publish("/odom", odometry(1.1, stamp=stage.loop.now))
     await stage.wait(1.0)
 
 
@@ -131,10 +133,10 @@ async def two_places(stage):
     stage.link.open()
     for step in range(12):
         await stage.wait(0.1)
-        stage.tell("/odom", odometry(20.0 * (step % 2), stamp=stage.loop.now))
+        stage.publish("/odom", odometry(20.0 * (step % 2), stamp=stage.loop.now))
     for step in range(12):
         await stage.wait(1.1)
-        stage.tell("/odom", odometry(0.1 * step, stamp=stage.loop.now))
+        stage.publish("/odom", odometry(0.1 * step, stamp=stage.loop.now))
 
 
 async def aligned_and_shared(stage):
@@ -145,7 +147,7 @@ async def aligned_and_shared(stage):
         robot.add_module("Path", stage.link, "/plan", throttle=0)
     stage.link.open()
     x = await drive(stage, 1.0)
-    stage.tell("/plan", way(stage.loop.now))
+    stage.publish("/plan", planned_path(stage.loop.now))
     align_bridge(stage.link, 5.0, 6.0, 90.0)
     stage.look()
     ann.set_alignment(1.0, 2.0, 45.0)
@@ -157,7 +159,7 @@ async def aligned_and_shared(stage):
     x = await drive(stage, 1.0, x)
     ann.set_odometry_topic(stage.links[1], "/odom", 0, type=ODOMETRY)
     stage.links[1].open()
-    stage.tell("/odom", odometry(7.0, stamp=stage.loop.now), stage.links[1])
+    stage.publish("/odom", odometry(7.0, stamp=stage.loop.now), stage.links[1])
     await drive(stage, 0.5, x)
 
 

@@ -1,4 +1,4 @@
-"""A rosbridge that does only what a test tells it, and notes what it is told."""
+"""A rosbridge server that a test controls; it records what it receives."""
 
 import asyncio
 import json
@@ -21,7 +21,7 @@ async def until(condition, what=None):
 class FakeRosbridge:
     def __init__(self):
         self.links = []
-        self.said = []
+        self.received = []
         self.answer = {}
         self._server = None
         self.port = 0
@@ -48,7 +48,7 @@ class FakeRosbridge:
             async for text in link:
                 assert isinstance(text, str)
                 message = {**json.loads(text), "link": link}
-                self.said.append(message)
+                self.received.append(message)
                 if message["op"] == "call_service":
                     await self._respond(link, message)
         finally:
@@ -63,15 +63,15 @@ class FakeRosbridge:
         await link.send(json.dumps({**reply, "id": call["id"], "result": result}))
 
     def ops(self, op, **fields):
-        """What was said with this operation and these fields."""
+        """Return the received messages with this operation and these fields."""
         return [
             message
-            for message in self.said
+            for message in self.received
             if message["op"] == op
             and all(message.get(name) == value for name, value in fields.items())
         ]
 
-    async def heard(self, op, count=1, **fields):
+    async def wait_for(self, op, count=1, **fields):
         await until(lambda: len(self.ops(op, **fields)) >= count)
         return self.ops(op, **fields)
 

@@ -94,7 +94,7 @@ def test_entries_become_the_message():
         ("uint8[] n", "1, x", 'n[1]: got "x", expected a whole number'),
         ("time n", "-1", "n: got -1, expected seconds from 0"),
         ("duration n", "1e12", "n: got 1000000000000.0, expected a number of seconds"),
-        ("std_msgs/Bool[] n", "{", "n: this is no JSON"),
+        ("std_msgs/Bool[] n", "{", "n: this is not JSON"),
         ("std_msgs/Bool[] n", '[{"data": 1}]', "n[0].data: got 1, expected true"),
         ("std_msgs/Bool[] n", '[{"dat": true}]', "n[0].dat: no such field; there are"),
         ("std_msgs/Bool[] n", "[[]]", "n[0]: got [], expected a table of fields"),

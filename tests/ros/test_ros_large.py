@@ -92,7 +92,7 @@ class TestSilence:
         for tenth in range(10 * until):
             now = tenth / 10
             if silence.due(now):
-                silence.heard(answers(now), now)
+                silence.answered(answers(now), now)
                 if silence.is_unsent(now):
                     return now
         return None
@@ -203,11 +203,11 @@ def test_after_links_that_ended_nothing_more_is_asked_and_people_are_told(quick)
             with scope.active():
                 bridge.subscribe("/map", print, MAP)
             for number in range(1, MOST_LOST + 1):
-                await server.heard("subscribe", number, compression="none")
+                await server.wait_for("subscribe", number, compression="none")
                 server.drop()
                 await until(lambda n=number: bridge.stats.links > n)
             await until(lambda: told)
-            assert "the link ended before it came in JSON" in told[0]
+            assert "the connection ended before it came in JSON" in told[0]
             assert "max_message_size" in told[0]
             assert len(server.ops("subscribe", compression="none")) == MOST_LOST
 

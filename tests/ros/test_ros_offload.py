@@ -36,7 +36,7 @@ def large(data="x"):
 
 async def decoded(message, *types):
     aside, done = Offload(), asyncio.Event()
-    assert aside.wants(message)
+    assert aside.is_needed(message)
     aside.decode(message, frozenset(types), lambda _: done.set())
     await done.wait()
     await aside.stop()
@@ -135,7 +135,7 @@ def test_what_waits_is_replaced_by_what_is_newer_and_order_is_kept():
         aside, got = Offload(), []
         small = Publish("/a", b'{"op":"publish","topic":"/a","msg":{"data":"last"}}')
         for message in (large("1"), large("2"), large("3"), small):
-            assert aside.wants(message)
+            assert aside.is_needed(message)
             aside.decode(
                 message,
                 frozenset([None]),
@@ -143,7 +143,7 @@ def test_what_waits_is_replaced_by_what_is_newer_and_order_is_kept():
             )
         await until(lambda: got[-1:] == ["last"])
         assert got == ["1", "last"]
-        assert not aside.wants(small)
+        assert not aside.is_needed(small)
         await aside.stop()
 
     run(scenario)

@@ -63,7 +63,7 @@ def test_an_encoding_is_asked_for_in_the_words_of_the_bridge(encoding, compressi
     async def scenario():
         async with bridged() as (server, bridge):
             bridge.subscribe("/a", print, encoding=encoding)
-            (asked,) = await server.heard("subscribe")
+            (asked,) = await server.wait_for("subscribe")
             assert asked["compression"] == compression
 
     asyncio.run(scenario())
@@ -85,7 +85,7 @@ def test_a_temporary_bridge_is_open_within_its_block_only():
             await bridge.open()
             assert bridge.state == "open"
             bridge.subscribe("/a", print)
-            await server.heard("subscribe")
+            await server.wait_for("subscribe")
         assert bridge.state == "closed"
         await until(lambda: not server.links)
         await server.stop()

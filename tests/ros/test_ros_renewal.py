@@ -26,7 +26,7 @@ def looks(answers, until):
         now = tenth / 10
         if silence.due(now):
             asked.append(now)
-            if silence.heard(answers(now), now):
+            if silence.answered(answers(now), now):
                 renewed.append(now)
     return asked, renewed
 
@@ -70,13 +70,13 @@ def test_the_old_subscription_is_given_up_before_the_new_one_is_asked_for(quick)
         async with bridged(publishers={"publishers": []}) as (server, bridge):
             bridge.subscribe("/map", got.append, TYPE)
             bridge.subscribe("/heard", got.append, "std_msgs/String")
-            (first,) = await server.heard("subscribe", topic="/map")
+            (first,) = await server.wait_for("subscribe", topic="/map")
             await server.publish("/heard", {"data": "I am here"})
-            await server.heard("call_service", count=3, service="/rosapi/publishers")
+            await server.wait_for("call_service", count=3, service="/rosapi/publishers")
             assert len(server.ops("subscribe", topic="/map")) == 1
             server.answer["/rosapi/publishers"] = {"publishers": ["/map_server"]}
-            await server.heard("subscribe", count=2, topic="/map")
-            about = [m for m in server.said if m.get("topic") == "/map"]
+            await server.wait_for("subscribe", count=2, topic="/map")
+            about = [m for m in server.received if m.get("topic") == "/map"]
             assert [m["op"] for m in about] == ["subscribe", "unsubscribe", "subscribe"]
             assert about[1]["id"] == first["id"] != about[2]["id"]
             await server.publish("/map", {"info": {}})
@@ -98,7 +98,7 @@ def test_a_bridge_without_rosapi_is_not_troubled(quick, monkeypatch):
             bridge.on_error(errors.append)
             bridge.subscribe("/map", print, TYPE)
             # It is asked for anew now and then, since nobody can tell.
-            await server.heard("subscribe", count=3, topic="/map")
+            await server.wait_for("subscribe", count=3, topic="/map")
             asked = server.ops("call_service", service="/rosapi/publishers")
             assert len(asked) == UNANSWERED
             assert errors == []

@@ -47,7 +47,7 @@ def test_what_a_callback_goes_on_with_ends_with_its_subscription():
             heard = bridge.subscribe("/a", by_hand)
             with scope.active():
                 bridge.subscribe("/a", by_scope)
-            await server.heard("subscribe")
+            await server.wait_for("subscribe")
             await server.publish("/a", {"data": 1})
             await until(lambda: by_hand.began and by_scope.began)
             heard.remove()
@@ -83,7 +83,7 @@ def test_a_callback_that_ends_its_own_subscription_goes_on_to_its_end():
 
         async with bridged() as (server, bridge):
             heard = bridge.subscribe("/a", once)
-            await server.heard("subscribe")
+            await server.wait_for("subscribe")
             await server.publish("/a", {"data": 1})
             await until(lambda: done)
             assert done == [1]
@@ -143,16 +143,16 @@ def test_whoever_uses_a_bridge_that_ended_is_told_why(lifecycle, caplog):
             bridge.subscribe("/odom", print)
         page.close()
         await until(lambda: told)
-        assert "has ended with the page or the module that made it" in told[0]
+        assert "ended with the page or the module that made its bridge" in told[0]
         assert "/odom" in caplog.text
         for use in (
             lambda: bridge.subscribe("/scan", print),
             lambda: bridge.publish("/a", {"data": "x"}, "std_msgs/String"),
             lambda: bridge.on_open(print),
         ):
-            with pytest.raises(BridgeClosed, match="made outside of both"):
+            with pytest.raises(BridgeClosed, match="create it outside of both"):
                 use()
-        with pytest.raises(BridgeClosed, match="made outside of both"):
+        with pytest.raises(BridgeClosed, match="create it outside of both"):
             await bridge.call_service("/dock")
         robot.close()
         await lifecycle.end()

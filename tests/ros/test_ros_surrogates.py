@@ -66,7 +66,7 @@ def test_an_answer_that_cannot_be_read_is_not_called_none():
             )
             await until(lambda: server.ops("call_service"))
             await server.send('{"op": "service_response", "values": ')
-            with pytest.raises(ServiceError, match="no answer that can be read") as why:
+            with pytest.raises(ServiceError, match="no readable answer") as why:
                 await call
             assert "did not answer" not in str(why.value)
 

@@ -26,21 +26,21 @@ def test_a_link_that_held_starts_the_growth_anew():
 
 def test_a_ping_is_due_after_each_answer_and_only_then():
     liveness = Liveness(0.0)
-    assert not liveness.wants_ping(0.4)
-    assert liveness.wants_ping(0.5)
+    assert not liveness.is_ping_due(0.4)
+    assert liveness.is_ping_due(0.5)
     liveness.pinged(0.5)
-    assert not liveness.wants_ping(2.0)
+    assert not liveness.is_ping_due(2.0)
     liveness.ponged(0.6)
-    assert not liveness.wants_ping(1.0)
-    assert liveness.wants_ping(1.1)
+    assert not liveness.is_ping_due(1.0)
+    assert liveness.is_ping_due(1.1)
 
 
 def test_after_an_answer_that_took_long_the_next_ping_is_due_at_once():
     liveness = Liveness(0.0)
     liveness.pinged(0.5)
-    assert not liveness.wants_ping(2.0)
+    assert not liveness.is_ping_due(2.0)
     liveness.ponged(2.0)
-    assert liveness.wants_ping(2.0)
+    assert liveness.is_ping_due(2.0)
 
 
 class TestLag:

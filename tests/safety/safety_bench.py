@@ -1,4 +1,4 @@
-"""A person who holds W, a robot that notes what it is told, and faults in between.
+"""A person who holds W, a robot that records its commands, and faults in between.
 
 ::
 
@@ -201,7 +201,7 @@ class Bench:
         )
 
     def space(self, kind):
-        """Press the space bar, which says STOP, or let it go."""
+        """Press or release the space bar, which sends STOP."""
         self.tab.call(
             "Input.dispatchKeyEvent",
             type=kind,
@@ -250,11 +250,15 @@ class Bench:
     def steady(self):
         """Whether the robot has been moved without a break for a moment."""
         now = time.monotonic()
-        recent = [told for told in self.robot.log.told[-12:] if told.at > now - 0.4]
+        recent = [
+            velocity
+            for velocity in self.robot.log.told[-12:]
+            if velocity.at > now - 0.4
+        ]
         return (
             len(recent) >= 6
             and now - recent[-1].at < 0.1
-            and not any(told.is_zero for told in recent)
+            and not any(velocity.is_zero for velocity in recent)
         )
 
 

@@ -1,6 +1,6 @@
 """Many viewers of one page, some of whom read nothing, until standard input ends.
 
-Started as ``safety_crowd.py URL VIEWERS SILENT``; says ``ready`` when all are there.
+Started as ``safety_crowd.py URL VIEWERS SILENT``; prints ``ready`` after all connected.
 """
 
 import asyncio
@@ -29,7 +29,7 @@ def sign_in(url: str) -> str:
 
 
 async def view(url: str, key: str, number: int, silent: bool, there) -> None:
-    """Be one page: say hello, and acknowledge each frame or none."""
+    """Be one page: send hello, and acknowledge each frame or none."""
     address = urlsplit(url).netloc
     name = f"viewer{number:04d}"
     socket = await connect(

@@ -1,8 +1,8 @@
-"""A display without pages: a gate, one robot, and a hand that says what it is told to.
+"""A display without pages: a gate, one robot, and an operator that follows orders.
 
 A process of its own, so that it can be killed. It reads orders, one a line (``take``,
-``x 1.0``, ``stop``), and writes a line of JSON whenever the gate tells the hand of the
-robot something new.
+``x 1.0``, ``stop``), and writes a line of JSON for each new report of the
+robot from the gate.
 """
 
 import json
@@ -13,22 +13,22 @@ from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import RobotSpec
 
 
-class Hand:
-    """Speaks a page's side of ``/drive`` at 20 Hz."""
+class Operator:
+    """Sends the messages of a page on ``/drive``, at 20 Hz."""
 
     def __init__(self, client: GateClient) -> None:
         self.x: float | None = None
         self._tick: int | None = None
         self._epoch = 0
         self._seq = 0
-        self._connection = client.connect("Ann", "operator", self._hear, print)
+        self._connection = client.connect("Ann", "operator", self._on_message, print)
 
-    def say(self, text: str) -> None:
+    def send(self, text: str) -> None:
         """Send a text as it is."""
         self._connection.receive(text)
 
     def step(self) -> None:
-        """Send how the hand is, if it is anyhow."""
+        """Send the command, if there is one."""
         if self.x is None or self._tick is None:
             return
         self._seq += 1
@@ -42,9 +42,9 @@ class Hand:
             "y": 0.0,
             "turn": 0.0,
         }
-        self.say(json.dumps(command))
+        self.send(json.dumps(command))
 
-    def _hear(self, text: str) -> None:
+    def _on_message(self, text: str) -> None:
         message = json.loads(text)
         match message["op"]:
             case "tick":
@@ -57,7 +57,7 @@ class Hand:
 
 
 def main() -> None:
-    """Do as standard input says, until it ends."""
+    """Follow the orders on standard input, until it ends."""
     client = GateClient()
     client.start()
     spec = RobotSpec(
@@ -72,22 +72,22 @@ def main() -> None:
         odometry_type="nav_msgs/Odometry",
     )
     client.declare(spec)
-    hand, ended = Hand(client), threading.Event()
+    operator, ended = Operator(client), threading.Event()
 
     def stream() -> None:
         while not ended.wait(0.05):
-            hand.step()
+            operator.step()
 
     thread = threading.Thread(target=stream)
     thread.start()
     for line in sys.stdin:
         match line.split(maxsplit=1):
             case ["take"]:
-                hand.say('{"op":"take","robot":"r1"}')
+                operator.send('{"op":"take","robot":"r1"}')
             case ["x", value]:
-                hand.x = float(value)
+                operator.x = float(value)
             case ["stop"]:
-                hand.say('{"op":"stop","robot":"r1"}')
+                operator.send('{"op":"stop","robot":"r1"}')
     ended.set()
     thread.join()
     client.stop()

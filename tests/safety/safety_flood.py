@@ -28,7 +28,7 @@ EVERY = 2.0
 
 
 async def send_maps(stop: asyncio.Event) -> None:
-    """Publish maps, no two of which are the same, to whoever subscribes."""
+    """Publish maps, no two of which are the same, to every subscriber."""
     schema, quirks = Schema(Dialect("ros1")), parse_quirks("real", "ros1")
     graph, node = Graph(schema), object()
     server = RosbridgeServer(graph, Encoder(schema, quirks))

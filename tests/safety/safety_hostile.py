@@ -27,7 +27,7 @@ SETTLE = 2.0
 DRIVE = 3.0
 """Seconds for which the good robot is driven."""
 
-HEAR_TICKS = """{
+RECORD_TICKS = """{
     const Native = WebSocket;
     window.ticks = [];
     window.WebSocket = class extends Native {
@@ -105,7 +105,7 @@ def beside(bench, *peers, shown=False):
             bench.close_page()
             bench.end_display()
             bench.start_display()
-            bench.open_page(before=HEAR_TICKS)
+            bench.open_page(before=RECORD_TICKS)
             pass_time(SETTLE)
             bench.tab.wait(READY)  # until then the page says that it is getting ready
             yield urls
@@ -134,7 +134,9 @@ def _drive(bench, seconds):
     begun = time.monotonic()
     pass_time(seconds)
     ended = time.monotonic()
-    driven = [told for told in bench.robot.log.told if begun <= told.at <= ended]
+    driven = [
+        velocity for velocity in bench.robot.log.told if begun <= velocity.at <= ended
+    ]
     ticks = bench.tab.evaluate(
         f"ticks.filter((t) => t > performance.now() - {seconds * 1000})"
     )
@@ -152,8 +154,8 @@ def _drive(bench, seconds):
     bench.reset_stop()
     return Driven(
         refused=refused,
-        zeros=sum(told.is_zero for told in driven),
-        velocity_gap=gap([begun, *(told.at for told in driven), ended]),
+        zeros=sum(velocity.is_zero for velocity in driven),
+        velocity_gap=gap([begun, *(velocity.at for velocity in driven), ended]),
         tick_gap=gap([tick / 1000 for tick in ticks]),
         driving_jitter=driving_jitter,
         stop=zero - pressed,

@@ -114,7 +114,7 @@ def picture(width, height):
 
 
 def empty_lists(count):
-    """An answer that nobody asked for, and a message, of nothing but empty lists."""
+    """An answer without a request, and a message, of nothing but empty lists."""
     lists = "[]," * count + "[]"
     answer = f'{{"op":"service_response","service":"/x","values":[{lists}]}}'
     head = cbor2.dumps({"op": "publish", "topic": "/map", "msg": 0})[:-1]
@@ -152,7 +152,7 @@ def png_bombs(side):
 
 
 def peer(make, *arguments):
-    """Return a peer that sends to whoever subscribes to anything that is shown."""
+    """Return a peer that sends to every subscriber of a topic that is shown."""
 
     async def talk(link):
         await link.accept()

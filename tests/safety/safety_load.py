@@ -27,7 +27,7 @@ DOTS = """[...document.querySelectorAll('.laserscan .dot')]
     .filter((dots) => dots.getAttribute('d')).length"""
 
 
-def stand_apart():
+def run_separately():
     """Be another computer as far as one can: robots and viewers are not on this one.
 
     What they send and take is the load; the processor that they need for it is not.
@@ -45,7 +45,7 @@ def helper(script, *arguments):
     command = [sys.executable, str(Path(__file__).with_name(script)), *arguments]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen(
-        command, text=True, preexec_fn=stand_apart, **pipes
+        command, text=True, preexec_fn=run_separately, **pipes
     ) as process:
         try:
             yield process

@@ -65,12 +65,12 @@ class ProvingBench(Bench):
             name: What fails, for the table.
             inflict: Makes it fail.
             within: Seconds in which the robot is promised to be stopped.
-            back: Mends it.
-            stops_by: ``zero``: a zero must come; ``itself``: nobody can send one, and
-                the robot's own timeout must stop it.
-            held_after: Whether the key is still down when it is mended.
-            watch: Seconds for which nothing may move after it is mended.
-            few_late: How many moving velocities may still come when it is mended, if
+            back: Ends the fault.
+            stops_by: ``zero``: a zero must come; ``itself``: no process can send one,
+                and the robot's own timeout must stop it.
+            held_after: Whether the key is still down when the fault ends.
+            watch: Seconds for which nothing may move after the fault ends.
+            few_late: How many moving velocities may still come when the fault ends, if
                 the robot is driven through a link that keeps what it cannot pass on.
             before: Happens while the robot moves, before the fault.
             new_link: Whether the zeros may be owed on a new link, where they go on for
@@ -84,7 +84,7 @@ class ProvingBench(Bench):
         self.quiet, self.unreachable, self.causes = [], [], []
         for trial in range(TRIALS):
             self.hurried = FULL and trial % EVERY != 0
-            self._get_under_way(before)
+            self._drive_before_fault(before)
             waiting = self.waiting()
             self.fault_at = time.monotonic()
             inflict()
@@ -92,11 +92,11 @@ class ProvingBench(Bench):
             if self.crowded and not FULL:
                 figure["jitter"] = max(figure["jitter"], waiting.seconds())
             watched = self.stretch(watch, HURRIED_WATCH)
-            self._mend(figure, back, held_after, watched, few_late)
+            self._recover(figure, back, held_after, watched, few_late)
             figures.append(figure)
             progress.add(figure["late"], figure["jitter"])
         pass_time(zeros + 0.2)
-        log = [told for told in self.robot.log.told if told.at >= begin]
+        log = [velocity for velocity in self.robot.log.told if velocity.at >= begin]
         wrong = check_invariants(
             log,
             Bounds(
@@ -126,7 +126,7 @@ class ProvingBench(Bench):
             most = within + grace(figure["jitter"])
             assert figure["late"] <= most, (name, worst, figures)
 
-    def _get_under_way(self, before):
+    def _drive_before_fault(self, before):
         """Drive, so that it is the fault that stops the robot and nothing else."""
         why = None
         for _ in range(5):
@@ -146,34 +146,34 @@ class ProvingBench(Bench):
         raise AssertionError("the robot stops again and again") from why
 
     def waiting(self):
-        """Begin to see what they wait for a processor whom a key passes."""
-        on_the_way = [psutil.Process(), psutil.Process(self.display.popen.pid)]
+        """Measure from now on how long the processes between key and robot wait."""
+        processes = [psutil.Process(), psutil.Process(self.display.popen.pid)]
         if self.gate:
-            on_the_way.append(self.gate)
+            processes.append(self.gate)
         if self.browser:
             browser = psutil.Process(self.browser.process.pid)
-            on_the_way += [browser, *browser.children(recursive=True)]
-        return Waiting(each.pid for each in on_the_way)
+            processes += [browser, *browser.children(recursive=True)]
+        return Waiting(each.pid for each in processes)
 
     def _measure(self, within, stops_by):
-        """Wait until the robot is stopped, and say how long that took."""
+        """Wait until the robot is stopped, and return how long that took."""
         stopped = self._stopped_after(self.fault_at, stops_by)
-        # The dead-man's time began with a command that may have been under way.
+        # The dead-man's time began with a command that may have been in transit.
         jitter = self.sentinel.stolen(self.fault_at - 0.1, stopped)
         if stops_by == "itself":
-            # From the last word before the fault until the first one after it.
+            # From the last message before the fault until the first one after it.
             self.unreachable.append((self.fault_at - 0.5, math.inf))
         return {"late": stopped - self.fault_at, "jitter": jitter, "within": within}
 
-    def _mend(self, figure, back, held_after, watch, few_late):
-        """Mend what failed, with the key held on, and see that nothing resumes."""
+    def _recover(self, figure, back, held_after, watch, few_late):
+        """End the fault with the key held down, and check that nothing resumes."""
         still = self.fault_at + figure["within"] + figure["jitter"] + 0.001
-        mending = time.monotonic()
+        recovering = time.monotonic()
         back()
         # While a part comes back, zeros may begin anew at any time.
-        while mending < time.monotonic():
-            self.causes.append(mending)
-            mending += 0.1
+        while recovering < time.monotonic():
+            self.causes.append(recovering)
+            recovering += 0.1
         if self.tab is not None and held_after:
             self.repeat_press()
         pass_time(watch)

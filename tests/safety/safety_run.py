@@ -1,6 +1,6 @@
 """How long the run is, how far it has come, and what it need not measure again.
 
-A full run is of fifty trials or more; the environment says how many. It asserts the
+A full run is of fifty trials or more; the environment states the number. It asserts the
 promises as they stand, while a quick one grants what the machine itself was late by.
 """
 
@@ -39,7 +39,7 @@ class Progress:
         self._of_machine = 0.0
 
     def add(self, late: float, jitter: float) -> None:
-        """Say how a trial ended; seconds."""
+        """Print how a trial ended; seconds."""
         self._number += 1
         self._worst = max(self._worst, late)
         self._of_machine = max(self._of_machine, jitter)

@@ -1,4 +1,4 @@
-"""How long the threads on the way from a key to a robot waited for a processor."""
+"""How long the threads between a key and a robot waited for a processor."""
 
 import threading
 import time
@@ -12,14 +12,14 @@ NANO = 1e-9
 
 
 class Waiting:
-    """What the scheduler let processes wait from now on, though they were ready.
+    """How long processes that were ready wait for the scheduler, from now on.
 
     A thread that sleeps most of the time, as the sentinel's, gets a processor before
     those that have just used one. So where all processors are taken, it says little of
     what a browser has to wait, and Linux, which counts that for each thread, says more.
 
     Args:
-        pids: Of the processes on the way.
+        pids: The processes between key and robot.
 
     """
 
@@ -55,12 +55,12 @@ class Waiting:
 class Contention:
     """How much processor time other processes and the host took during a measurement.
 
-    Other processes use a processor while a thread on the way waits for one. The host of
-    a virtual machine may take a processor away: then no thread runs on that processor,
-    and Linux counts the time as steal time, see proc_stat(5).
+    Other processes use a processor while a thread between key and robot waits for
+    one. The host of a virtual machine may take a processor away: then no thread runs on
+    that processor, and Linux counts the time as steal time, see proc_stat(5).
 
     Args:
-        waiting: Reads how long the threads on the way have waited.
+        waiting: Reads how long the threads between key and robot have waited.
 
     """
 

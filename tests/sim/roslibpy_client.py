@@ -1,4 +1,4 @@
-"""What a Python application does with roslibpy, told as one JSON object on stdout.
+"""A Python application with roslibpy; it prints its results as one JSON object.
 
 Arguments: the bridge's URL and its dialect. A process of its own: roslibpy's reactor
 cannot be started twice.

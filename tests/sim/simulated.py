@@ -55,7 +55,7 @@ def drive(robot, twist, seconds, *, now=0.0, dt=0.025, blocked=lambda x, y: Fals
 
 
 def coast(robot, seconds, *, now, dt=0.025):
-    """Let time go by without a command; return the time after it."""
+    """Advance the time without a command; return the time after it."""
     for _ in range(round(seconds / dt)):
         now += dt
         robot.step(dt, now, lambda x, y: False)
@@ -100,7 +100,7 @@ class Bench:
         return Client(self)
 
     def run(self, seconds):
-        """Let time go by."""
+        """Advance the time."""
         for _ in range(round(seconds / STEP)):
             self.time += STEP
             self.node.step()

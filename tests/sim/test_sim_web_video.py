@@ -74,8 +74,8 @@ def test_the_addresses_are_those_of_web_video_server(target, request_):
         (f"{STREAM}&width=0", 400, "width must be a whole number from 1 to 4096"),
         (f"{STREAM}&height=99999999999", 400, "height must be a whole number"),
         (f"{STREAM}&height=²", 400, "height must be a whole number"),
-        (f"{STREAM}{'&a=b' * 40}", 400, "no address with parameters"),
-        ("http://[", 400, "no address with parameters"),
+        (f"{STREAM}{'&a=b' * 40}", 400, "not an address with parameters"),
+        ("http://[", 400, "not an address with parameters"),
         ("/stream_viewer", 404, "there is nothing at '/stream_viewer'; there are /"),
         ("/../etc/passwd", 404, "there is nothing at"),
     ],
@@ -233,10 +233,10 @@ def test_what_a_camera_sends_that_is_no_picture_is_left_out(caplog):
         await until(lambda: served.watchers == 1)
         served.send(b"\x89PNG")
         served.send(b"\xff\xd8\xff and no more")
-        await until(lambda: "left out a picture" in caplog.text)
+        await until(lambda: "a picture is skipped" in caplog.text)
         served.send(a_picture())
         assert opened((await asks)[1]).size == (64, 20)
-        assert "left out what is no JPEG" in caplog.text
+        assert "a picture that is not JPEG is skipped" in caplog.text
 
     serving(scenario)
 
@@ -285,9 +285,9 @@ def test_a_reader_that_takes_nothing_is_let_go(monkeypatch):
     ("sent", "status", "said"),
     [
         (b"GET /stream HTTP/1.1\r\n\r\n", 400, "the topic of the camera is missing"),
-        (b"PUT / HTTP/1.1\r\n\r\n", 405, "asked for with GET, got 'PUT'"),
+        (b"PUT / HTTP/1.1\r\n\r\n", 405, "use GET for pictures, got 'PUT'"),
         (b"GET /" + b"x" * 100_000, 431, "8192 bytes at the most"),
-        (b"GET / HTTP/1.1\r\n", 408, "no whole request came within 0.1 s"),
+        (b"GET / HTTP/1.1\r\n", 408, "no complete request came within 0.1 s"),
         (
             b"GET /stream?topic=/robot_7/camera/image_raw HTTP/1.0\r\n\r\n",
             404,
@@ -324,7 +324,7 @@ def test_one_client_too_many_is_told_so(monkeypatch):
         await until(lambda: served.watchers == 2)
         head, body = await served.answer("/")
         assert head.startswith("HTTP/1.0 503 ")
-        assert b"2 clients have the cameras" in body
+        assert b"2 clients are connected" in body
         writers[0].close()
         await until(lambda: served.watchers == 1)
         assert (await served.answer("/"))[0].startswith("HTTP/1.0 200 ")

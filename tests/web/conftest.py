@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 from fake_drive import FakeDrive
-from hands_bench import Bench
+from input_bench import Bench
 from playwright.sync_api import Browser, Page
 from scene_host import SceneHost
 

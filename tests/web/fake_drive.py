@@ -23,17 +23,17 @@ POLICY = (
 
 
 class FakeDrive:
-    """Grants every lease, accepts every command and notes all with the time."""
+    """Grants every lease, accepts every command and records all with the time."""
 
     def __init__(self) -> None:
-        self.said: list[tuple[float, dict]] = []
+        self.received: list[tuple[float, dict]] = []
         self.robots = {id: self._robot(id) for id in ("r1", "r2")}
         self.ticking = True
         self.acking = True
         self.latching = False
         """Whether STOP latches, as it does at a gate that is not of the first kind."""
-        self.deaf = False
-        """Whether what is said is noted and not obeyed."""
+        self.ignores_messages = False
+        """Whether messages are recorded and not processed."""
         self.port = 0
         self._epoch = 40
         self._presses = 0
@@ -59,12 +59,12 @@ class FakeDrive:
     def change(self, robot: str, **fields: object) -> None:
         """Report a robot anew to every page."""
         self.robots[robot] |= fields
-        self._loop.call_soon_threadsafe(self._tell_all, dict(self.robots[robot]))
+        self._loop.call_soon_threadsafe(self._send_all, dict(self.robots[robot]))
 
     def refuse(self, robot: str, what: str, why: str) -> None:
         """Refuse something to every page."""
         refused = {"op": "refused", "robot": robot, "what": what, "why": why}
-        self._loop.call_soon_threadsafe(self._tell_all, refused)
+        self._loop.call_soon_threadsafe(self._send_all, refused)
 
     def drop(self) -> None:
         """Cut every connection."""
@@ -72,21 +72,29 @@ class FakeDrive:
             self._loop.call_soon_threadsafe(socket.transport.abort)
 
     def greet(self) -> None:
-        """Say what a gate says that was started anew: nobody holds anything."""
+        """Send what a restarted gate sends: no operator has control."""
         self.robots = {id: self._robot(id) for id in self.robots}
         hello = {"op": "hello", "connection": "c1"}
         for message in (hello, *self.robots.values()):
-            self._loop.call_soon_threadsafe(self._tell_all, dict(message))
+            self._loop.call_soon_threadsafe(self._send_all, dict(message))
         for state in self._states:
             state["ack"] = -1
 
     def of(self, op: str, since: float = 0.0) -> list[dict]:
-        """Return what was said of one kind, after a moment."""
-        return [said for at, said in self.said if said["op"] == op and at > since]
+        """Return the messages with an operation, received after a time."""
+        return [
+            message
+            for at, message in self.received
+            if message["op"] == op and at > since
+        ]
 
     def moves(self, since: float = 0.0) -> list[dict]:
         drives = self.of("drive", since)
-        return [said for said in drives if said["x"] or said["y"] or said["turn"]]
+        return [
+            message
+            for message in drives
+            if message["x"] or message["y"] or message["turn"]
+        ]
 
     @staticmethod
     def _robot(id: str) -> dict:
@@ -133,15 +141,15 @@ class FakeDrive:
         self._states.append(state)
         ticker = asyncio.create_task(self._tick(socket, state))
         try:
-            await self._say(socket, {"op": "hello", "connection": "c1"})
+            await self._send(socket, {"op": "hello", "connection": "c1"})
             for robot in self.robots:
                 self.robots[robot] |= self._free()
-                await self._say(socket, self.robots[robot])
+                await self._send(socket, self.robots[robot])
             async for text in socket:
-                said = json.loads(text)
-                self.said.append((time.monotonic(), said))
-                if not self.deaf:
-                    await self._obey(socket, said, state)
+                message = json.loads(text)
+                self.received.append((time.monotonic(), message))
+                if not self.ignores_messages:
+                    await self._process(socket, message, state)
         except ConnectionClosed:
             pass
         finally:
@@ -153,14 +161,16 @@ class FakeDrive:
         while True:
             if self.ticking:
                 tick += 1
-                await self._say(
+                await self._send(
                     socket, {"op": "tick", "tick": tick, "ack": state["ack"]}
                 )
             await asyncio.sleep(0.05)
 
-    async def _obey(self, socket: ServerConnection, said: dict, state: dict) -> None:
-        robot = self.robots.get(said["robot"])
-        match said["op"]:
+    async def _process(
+        self, socket: ServerConnection, message: dict, state: dict
+    ) -> None:
+        robot = self.robots.get(message["robot"])
+        match message["op"]:
             case "take":
                 self._epoch += 1
                 state["neutral"] = 0
@@ -169,7 +179,7 @@ class FakeDrive:
             case "release" | "stop":
                 for one in [robot] if robot else self.robots.values():
                     one |= self._free()
-                    if self.latching and said["op"] == "stop":
+                    if self.latching and message["op"] == "stop":
                         one |= self._stopped()
             case "reset":
                 for one in [robot] if robot else self.robots.values():
@@ -184,44 +194,44 @@ class FakeDrive:
             case "deny":
                 robot |= {"asker": None}
             case "drive":
-                await self._drive(socket, robot, said, state)
+                await self._drive(socket, robot, message, state)
             case "goal":
-                state["ack"] = said["seq"]
-        for one in [said["robot"]] if robot else self.robots:
-            if said["op"] not in ("drive", "goal"):
-                await self._say(socket, self.robots[one])
+                state["ack"] = message["seq"]
+        for one in [message["robot"]] if robot else self.robots:
+            if message["op"] not in ("drive", "goal"):
+                await self._send(socket, self.robots[one])
 
     async def _drive(
-        self, socket: ServerConnection, robot: dict, said: dict, state: dict
+        self, socket: ServerConnection, robot: dict, message: dict, state: dict
     ) -> None:
         if self.acking:
-            state["ack"] = said["seq"]
-        moving = any(said[axis] for axis in ("x", "y", "turn"))
+            state["ack"] = message["seq"]
+        moving = any(message[axis] for axis in ("x", "y", "turn"))
         state["neutral"] = 0 if moving else state["neutral"] + 1
         armed = robot["armed"] or state["neutral"] >= 5
         now = "driving" if moving else "held"
         if (armed, now) != (robot["armed"], robot["state"]):
             robot |= {"armed": armed, "state": now}
-            await self._say(socket, robot)
+            await self._send(socket, robot)
 
     @staticmethod
     def _free() -> dict:
-        nobody = {"holder": None, "mine": False, "epoch": None}
-        return nobody | {"armed": False, "state": "free"}
+        without_operator = {"holder": None, "mine": False, "epoch": None}
+        return without_operator | {"armed": False, "state": "free"}
 
     def _stopped(self) -> dict:
         self._presses += 1
         stop = {"by": "me", "confirmed": None, "why": "", "id": f"s{self._presses}"}
-        words = {"armable": False, "reason": "stopped by me"}
-        return words | {"state": "stopped", "latched": True, "stop": stop}
+        blocked = {"armable": False, "reason": "stopped by me"}
+        return blocked | {"state": "stopped", "latched": True, "stop": stop}
 
-    def _tell_all(self, message: dict) -> None:
+    def _send_all(self, message: dict) -> None:
         for socket in self._open:
-            task = asyncio.ensure_future(self._say(socket, message))
+            task = asyncio.ensure_future(self._send(socket, message))
             task.add_done_callback(lambda task: task.exception())
 
     @staticmethod
-    async def _say(socket: ServerConnection, message: dict) -> None:
+    async def _send(socket: ServerConnection, message: dict) -> None:
         if message["op"] == "robot":
             message = {"doing": _doing(message), **message}
         await socket.send(json.dumps(message))

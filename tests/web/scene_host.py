@@ -58,7 +58,7 @@ export default function attach(map, options, send) {
 
 
 class Shown:
-    """What one page is shown, and what it said."""
+    """The scene of one page, and the events that the page sent."""
 
     def __init__(self) -> None:
         self.session = SceneSession()

@@ -5,7 +5,7 @@ import time
 
 import pytest
 from fake_drive import FakeDrive
-from hands_bench import DOUBTS, Bench
+from input_bench import INPUT_BLOCKERS, Bench
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -38,12 +38,12 @@ def test_letting_go_is_neutral_at_once_and_pressing_again_drives(bench: Bench) -
     assert bench.gate.moves(since)[0]["turn"] == 1
 
 
-@pytest.mark.parametrize("doubt", DOUBTS)
+@pytest.mark.parametrize("blocker", INPUT_BLOCKERS)
 def test_doubt_is_neutral_within_50_ms_and_nothing_resumes(
-    bench: Bench, doubt: str
+    bench: Bench, blocker: str
 ) -> None:
     bench.drive()
-    bench.page.evaluate(f"bench.mark(() => {{ {DOUBTS[doubt]} }})")
+    bench.page.evaluate(f"bench.mark(() => {{ {INPUT_BLOCKERS[blocker]} }})")
     bench.neutral_within(50)
     bench.page.wait_for_timeout(250)
     # The keyboard repeats a key that is held, also after the hands had their rest.
@@ -79,7 +79,7 @@ def test_a_modifier_is_a_doubt(bench: Bench, key: str) -> None:
 
 def test_a_hidden_page_gives_the_robot_back(bench: Bench) -> None:
     bench.drive()
-    bench.page.evaluate(f"() => {{ {DOUBTS['hidden']} }}")
+    bench.page.evaluate(f"() => {{ {INPUT_BLOCKERS['hidden']} }}")
     bench.until(lambda: bench.gate.of("release") == [{"op": "release", "robot": "r1"}])
 
 
@@ -149,7 +149,7 @@ def test_a_robot_that_another_holds_is_not_taken_by_a_press(bench: Bench) -> Non
     bench.until(lambda: bench.shown() == "held")
     bench.page.keyboard.down("w")
     bench.page.wait_for_timeout(300)
-    assert bench.gate.said == []
+    assert bench.gate.received == []
     assert "Ann is driving" in bench.page.inner_text(".webmap-teleop")
 
 
@@ -197,7 +197,7 @@ def test_the_holder_is_asked_and_answers(bench: Bench, answer: str) -> None:
         return
     bench.still(tolerance=0.05)
     bench.until(lambda: bench.shown() == "held")
-    said = [said for _, said in bench.gate.said]
+    said = [said for _, said in bench.gate.received]
     before = said[said.index({"op": "grant", "robot": "r1"}) - 1]
     assert (before["op"], before["x"], before["turn"]) == ("drive", 0, 0)
 
@@ -241,7 +241,7 @@ def test_space_in_a_text_field_is_a_space(bench: Bench) -> None:
     bench.select("r1")
     bench.page.locator("#text").press_sequentially("w a")
     assert bench.page.locator("#text").input_value() == "w a"
-    assert bench.gate.said == []
+    assert bench.gate.received == []
 
 
 def test_the_stop_button_is_large_named_and_stops(bench: Bench) -> None:
@@ -258,8 +258,8 @@ def test_a_stop_without_a_connection_is_the_first_thing_said(bench: Bench) -> No
     bench.select("r1")
     bench.cut()
     bench.page.keyboard.press("Escape")
-    bench.until(lambda: bench.gate.said)
-    assert bench.gate.said[0][1] == {"op": "stop", "robot": "r1"}
+    bench.until(lambda: bench.gate.received)
+    assert bench.gate.received[0][1] == {"op": "stop", "robot": "r1"}
 
 
 def test_the_lease_is_given_back_when_nothing_moves(open_bench) -> None:
@@ -385,7 +385,7 @@ def test_a_goal_is_aimed_asked_for_and_called_off(open_bench) -> None:
     bench.page.mouse.up()
     bench.until(lambda: bench.gate.of("goal"))
     goal = bench.gate.of("goal")[0]
-    assert [said["op"] for _, said in bench.gate.said] == ["take", "goal"]
+    assert [said["op"] for _, said in bench.gate.received] == ["take", "goal"]
     assert (goal["x"], goal["y"]) == pytest.approx((2, 0))
     assert goal["yaw"] == pytest.approx(1.5707963)
     assert bench.view()["e"] == 400, "aiming does not move the view"
@@ -400,7 +400,7 @@ def test_escape_leaves_the_goal_tool_before_it_stops(open_bench) -> None:
     bench.page.keyboard.press("g")
     bench.page.keyboard.press("Escape")
     bench.page.wait_for_timeout(100)
-    assert bench.gate.said == []
+    assert bench.gate.received == []
     bench.page.keyboard.press("Escape")
     bench.until(lambda: bench.gate.of("stop"))
 
@@ -606,7 +606,7 @@ def test_a_stop_that_nothing_answers_is_said_to_be_unconfirmed(open_bench) -> No
     bench.gate.change("r1", latched=False, stop=None)
     bench.select("r1")
     bench.until(lambda: bench.shown() == "free")
-    bench.gate.deaf = True
+    bench.gate.ignores_messages = True
     bench.page.keyboard.press("Space")
     bench.until(lambda: bench.shown() == "unconfirmed")
     words = bench.page.inner_text(".webmap-teleop-state")
@@ -643,4 +643,4 @@ def test_readouts_follow_the_view_and_everything_goes_away(open_bench) -> None:
     bench.page.keyboard.press("Escape")
     bench.page.keyboard.down("w")
     bench.page.wait_for_timeout(200)
-    assert bench.gate.said == []
+    assert bench.gate.received == []

@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from hands_bench import DOUBTS, Bench
+from input_bench import INPUT_BLOCKERS, Bench
 from playwright.sync_api import CDPSession, Locator
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -189,12 +189,12 @@ def test_a_capture_that_is_told_to_be_lost_is_neutral_at_once(touched: Bench) ->
     touched.still(tolerance=0.05)
 
 
-@pytest.mark.parametrize("doubt", ["blur", "hidden", "lost focus"])
+@pytest.mark.parametrize("blocker", ["blur", "hidden", "lost focus"])
 def test_a_finger_that_rests_through_a_doubt_moves_nothing(
-    touched: Bench, doubt: str
+    touched: Bench, blocker: str
 ) -> None:
     finger = drive_by_finger(touched)
-    touched.page.evaluate(f"bench.mark(() => {{ {DOUBTS[doubt]} }})")
+    touched.page.evaluate(f"bench.mark(() => {{ {INPUT_BLOCKERS[blocker]} }})")
     touched.neutral_within(50)
     touched.page.wait_for_timeout(250)
     finger.say("touchMove", down=-0.8)
@@ -340,5 +340,5 @@ def test_a_gamepad_that_says_nothing_new_is_neutral(padded: Bench) -> None:
 
 def test_a_doubt_needs_the_dead_man_button_anew(padded: Bench) -> None:
     drive_by_pad(padded)
-    padded.page.evaluate(f"{{ {DOUBTS['blur']} }}")
+    padded.page.evaluate(f"{{ {INPUT_BLOCKERS['blur']} }}")
     padded.still(tolerance=0.1)

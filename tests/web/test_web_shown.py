@@ -1,7 +1,7 @@
 """What a person sees of a robot that is driven, in a real Chromium."""
 
 import pytest
-from hands_bench import Bench
+from input_bench import Bench
 
 pytestmark = pytest.mark.browser
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from hands_bench import Bench
+from input_bench import Bench
 
 pytestmark = pytest.mark.browser
 

@@ -29,7 +29,7 @@ STILL = 0.3
 
 
 NOWHERE = "ws://127.0.0.1:9"
-"""A bridge that nobody answers at."""
+"""The address of a bridge that does not answer."""
 
 
 class Bench:
@@ -143,14 +143,14 @@ class Bench:
         return found
 
     def kill_the_gate(self):
-        """End the gate's process without a word."""
+        """Kill the gate's process."""
         for child in psutil.Process().children():
             if "webmap.gate" in child.cmdline():
                 child.kill()
 
     def tasks_up(self, site, topic):
         """Wait until the gate can send goals: it has announced a topic of theirs."""
-        self.until(lambda: site.told("advertise", topic), f"the lane of {topic}")
+        self.until(lambda: site.received("advertise", topic), f"the lane of {topic}")
 
     def shows(self, label, page, robot, check):
         """Record the report of a robot on a page, once it is so and stays so."""
@@ -160,8 +160,8 @@ class Bench:
 
         self._note(f"report to {page.name}: {label}", report, check)
 
-    def tells(self, label, robot, check):
-        """Record what the gate last told the display of a robot, likewise."""
+    def reports(self, label, robot, check):
+        """Record the gate's newest report about a robot, likewise."""
 
         def report():
             return self.tap.reports.get(robot.id, {})

@@ -7,11 +7,11 @@ CAPTURED = Path(__file__).parents[1] / "captured"
 FLEETS = Path(__file__).with_name("fleets")
 
 NOWHERE = "ws://127.0.0.1:9"
-"""A bridge that nobody answers at."""
+"""The address of a bridge that does not answer."""
 
 
 def captured(file):
-    """Return the types by topic that a real rosapi told."""
+    """Return the types by topic from a real rosapi."""
     values = json.loads((CAPTURED / file).read_text("utf-8"))["values"]
     return dict(zip(values["topics"], values["types"], strict=True))
 

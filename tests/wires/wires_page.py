@@ -1,4 +1,4 @@
-"""A page as a browser has it open: its two sockets, and a hand at the keys."""
+"""A page as a browser has it open: its two sockets, and inputs."""
 
 import contextlib
 import json
@@ -19,14 +19,14 @@ NEUTRAL = (0.0, 0.0, 0.0)
 
 
 class Report(dict):
-    """A report of a robot; what it does not tell, or nobody told yet, is None."""
+    """A report of a robot; fields without a value are None."""
 
     def __missing__(self, key):
         return None
 
 
 class Page:
-    """Speaks the pages' side of both sockets.
+    """Sends and receives on both sockets like a page.
 
     Args:
         bench: What it belongs to.
@@ -39,15 +39,15 @@ class Page:
         self.name = name
         self.reports = {}
         """The newest report of each robot, by its id."""
-        self.hand = None
-        """Which parts of full speed the hand asks for of a robot that the page has.
+        self.inputs = None
+        """The inputs for a robot that this page controls, as parts of full speed.
 
         Nothing is sent without it. As long as the gate waits to see that it is off the
         keys, it is."""
         self.robot = ""
-        """The id of the robot that the hand drives."""
+        """The id of the robot that the inputs drive."""
         self.greeted = False
-        """Whether the gate has said hello."""
+        """Whether the gate has sent hello."""
         self.refusals = []
         """What was refused, newest last."""
         self.ended = ""
@@ -83,7 +83,7 @@ class Page:
 
     # What a person does.
 
-    def say(self, op, **fields):
+    def send_op(self, op, **fields):
         """Send a command."""
         self.send(json.dumps({"op": op, **fields}))
 
@@ -103,38 +103,38 @@ class Page:
     def take(self, robot):
         """Take a robot, once it can be had."""
         self._bench.until(lambda: self.report(robot)["armable"], "a robot")
-        self.say("take", robot=robot.id)
+        self.send_op("take", robot=robot.id)
         self._bench.until(lambda: self.report(robot)["mine"], "the lease")
 
     def rest(self, robot):
-        """Have the hand seen to be off the keys."""
-        self.robot, self.hand = robot.id, NEUTRAL
+        """Send neutral inputs until the gate accepts commands."""
+        self.robot, self.inputs = robot.id, NEUTRAL
         self._bench.until(lambda: self.report(robot)["armed"], "an armed driver")
 
     def drive(self, robot, x=0.0, y=0.0, turn=0.0, *, until):
         """Drive, until something is so and from then on."""
-        self.robot, self.hand = robot.id, (x, y, turn)
+        self.robot, self.inputs = robot.id, (x, y, turn)
         self._bench.until(until, "a robot that is driven")
 
-    def let_go(self, robot):
-        """Take the hand off the keys; wait until the robot has stopped."""
-        self.hand = NEUTRAL
+    def release_inputs(self, robot):
+        """Release all inputs; wait until the robot has stopped."""
+        self.inputs = NEUTRAL
         self._bench.until(
             lambda: self.report(robot)["state"] == "held", "a robot at rest"
         )
 
     def aim(self, op, robot, x=1.0, y=2.0, yaw=0.5):
-        """Send a goal, or tell where the robot is."""
-        self.say(op, **self._licence(robot.id), x=x, y=y, yaw=yaw)
+        """Send a goal, or a pose of the robot."""
+        self.send_op(op, **self._licence(robot.id), x=x, y=y, yaw=yaw)
 
     def reset(self, robot):
         """End the STOP that is shown."""
         stop = self._bench.until(lambda: self.report(robot)["stop"], "a STOP")
-        self.say("reset", robot=robot.id, stop=stop["id"])
+        self.send_op("reset", robot=robot.id, stop=stop["id"])
 
     def close(self):
         """Close both sockets, as a tab that is closed."""
-        self.hand = None
+        self.inputs = None
         self._over.set()
         for socket in (self._drive, self._scene):
             socket.close()
@@ -180,11 +180,11 @@ class Page:
     def _stream(self):
         due = time.monotonic()
         while not self._over.is_set():
-            hand, robot = self.hand, self.robot
+            inputs, robot = self.inputs, self.robot
             report = self.reports.get(robot, Report())
-            if hand is not None and report["mine"]:
-                x, y, turn = hand if report["armed"] else NEUTRAL
+            if inputs is not None and report["mine"]:
+                x, y, turn = inputs if report["armed"] else NEUTRAL
                 with contextlib.suppress(ConnectionClosed):
-                    self.say("drive", **self._licence(robot), x=x, y=y, turn=turn)
+                    self.send_op("drive", **self._licence(robot), x=x, y=y, turn=turn)
             due = max(due + 0.05, time.monotonic())
             self._over.wait(due - time.monotonic())

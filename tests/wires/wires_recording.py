@@ -41,7 +41,7 @@ def compare(name: str, text: str) -> None:
 
 
 def difference(name: str, text: str) -> str:
-    """Return in words how a text differs from the recording of that name."""
+    """Describe how a text differs from the recording of that name."""
     lines = difflib.unified_diff(
         recorded(name).splitlines(),
         text.splitlines(),

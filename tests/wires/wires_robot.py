@@ -1,4 +1,4 @@
-"""A rosbridge with a robot that notes who told it what."""
+"""A rosbridge with a robot that records what each client sends."""
 
 import asyncio
 import contextlib
@@ -31,12 +31,12 @@ class Link:
     socket: Any
     topics: dict[str, dict[str, Any]] = field(default_factory=dict)
     """What it subscribed to."""
-    told: list[dict[str, Any]] = field(default_factory=list)
+    received: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def ids(self) -> list[str]:
-        """The ids of what was said."""
-        return [str(message.get("id", "")) for message in list(self.told)]
+        """The ids of the received messages."""
+        return [str(message.get("id", "")) for message in list(self.received)]
 
     @property
     def by_gate(self) -> bool:
@@ -46,8 +46,8 @@ class Link:
 
     @property
     def lane(self) -> str:
-        """What the gate uses it for, by what it says there."""
-        ids, ops = self.ids, {message["op"] for message in list(self.told)}
+        """What the gate uses it for, by its messages."""
+        ids, ops = self.ids, {message["op"] for message in list(self.received)}
         if not self.by_gate:
             return "display"
         if any(id.startswith("webmap-gate echo") for id in ids):
@@ -62,11 +62,11 @@ class Link:
 class Robot:
     """Serves in a thread, so that a script may block; used as a context manager.
 
-    It does what its velocity topic says at once: odometry tells the velocity that came
-    last. It echoes what is published to whoever subscribes.
+    It follows its velocity topic at once: odometry reports the last velocity. It sends
+    published messages to every subscriber.
 
     Args:
-        types: What rosapi says of topics.
+        types: The types of topics that rosapi reports.
         velocity: The topic whose velocities it follows.
 
     """
@@ -74,13 +74,13 @@ class Robot:
     def __init__(self, types: dict[str, str] | None = None, velocity: str = "/cmd_vel"):
         self.types = types or {}
         self.publishers: dict[str, list[str]] = {}
-        """Nodes by topic, as rosapi tells them."""
+        """Nodes by topic, as rosapi reports them."""
         self.velocity = velocity
         self.links: list[Link] = []
-        self.says: dict[str, dict[str, Any]] = {}
+        self.repeated: dict[str, dict[str, Any]] = {}
         """What it publishes again and again besides odometry, by topic."""
         self.follows = True
-        """Whether it moves as it is told."""
+        """Whether it follows its commands."""
         self.now = REST
         self._ready = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._run()))
@@ -100,12 +100,12 @@ class Robot:
 
     # What a script asks for.
 
-    def told(self, op, topic=None, by_gate=True):
-        """Return what was said with that operation, oldest first."""
+    def received(self, op, topic=None, by_gate=True):
+        """Return the received messages with an operation, oldest first."""
         return [
             message
             for link in self.links
-            for message in list(link.told)
+            for message in list(link.received)
             if link.by_gate == by_gate
             and message["op"] == op
             and topic in (None, message.get("topic"))
@@ -114,15 +114,15 @@ class Robot:
     @property
     def speeds(self):
         """The forward speeds that were published."""
-        published = self.told("publish", self.velocity)
+        published = self.received("publish", self.velocity)
         return [twist_in(message["msg"])["linear"]["x"] for message in published]
 
     def link_that(self, op):
-        """Return the last link that said an operation."""
+        """Return the last link that sent an operation."""
         return next(
             link
             for link in reversed(self.links)
-            if any(message["op"] == op for message in link.told)
+            if any(message["op"] == op for message in link.received)
         )
 
     def send(self, link, message):
@@ -130,7 +130,7 @@ class Robot:
         work = link.socket.send(json.dumps(message))
         asyncio.run_coroutine_threadsafe(work, self._loop).result(5)
 
-    def say(self, topic, message):
+    def publish(self, topic, message):
         """Publish a message, as a node of the robot's own."""
         work = self._publish(topic, message)
         asyncio.run_coroutine_threadsafe(work, self._loop).result(5)
@@ -157,7 +157,7 @@ class Robot:
         with contextlib.suppress(ConnectionClosed):
             async for frame in socket:
                 message = json.loads(frame)
-                link.told.append(message)
+                link.received.append(message)
                 await self._answer(link, message)
         link.topics.clear()
 
@@ -192,11 +192,11 @@ class Robot:
 
     async def _publish(self, topic, message):
         for link in list(self.links):
-            wish = link.topics.get(topic)
-            if wish is None:
+            subscription = link.topics.get(topic)
+            if subscription is None:
                 continue
             operation = {"op": "publish", "topic": topic, "msg": message}
-            in_cbor = wish.get("compression") == "cbor"
+            in_cbor = subscription.get("compression") == "cbor"
             data = cbor2.dumps(operation) if in_cbor else json.dumps(operation)
             with contextlib.suppress(ConnectionClosed):
                 await link.socket.send(data)
@@ -215,7 +215,7 @@ class Robot:
                 "twist": {"twist": self.now, "covariance": [0.0] * 36},
             }
             await self._publish("/odom", odometry)
-            for topic, message in list(self.says.items()):
+            for topic, message in list(self.repeated.items()):
                 await self._publish(topic, message)
 
 

@@ -36,7 +36,7 @@ def of_twist(bridge, name, **options):
 
 
 def of_stamped(bridge, name):
-    """A robot whose type of velocity rosapi tells, that moves sideways too."""
+    """A robot whose type of velocity rosapi reports, and which moves sideways too."""
     robot = with_odometry(bridge, name, base_link="base_footprint")
     robot.set_twist_topic(bridge, "/cmd_vel", holonomic=True, a_max=1e6, **LIMITS)
     return robot
@@ -97,7 +97,7 @@ def that_assists(bridge, name, **options):
 
 
 def of_unknown_stop(bridge, name):
-    """A robot of which nobody says that it stops by itself, nor how fast it is."""
+    """A robot without a stated command timeout and speed."""
     robot = with_odometry(bridge, name)
     robot.set_twist_topic(bridge, "/cmd_vel", type="geometry_msgs/Twist")
     return robot
@@ -158,7 +158,7 @@ def with_everything(bridge, other, name):
 
 
 def of_poses(bridge, name):
-    """A robot that can only be told where it is."""
+    """A robot that accepts only initial poses."""
     robot = Robot(name)
     robot.set_initial_pose_topic(bridge, "/initialpose", frame="hall")
     return robot

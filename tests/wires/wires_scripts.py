@@ -39,14 +39,14 @@ def free(report):
 
 
 def driven(site, x, at_least=3):
-    """Return what tells whether the robot was told to go so fast, a few times."""
+    """Return a check whether the robot received a speed, a few times."""
     before = site.speeds.count(x)
     return lambda: site.speeds.count(x) >= before + at_least
 
 
 def a_robot_from_before_the_start(b):
     b.end_with(b.early)
-    b.tells("before the start", b.early, lambda r: r["link"] == "down")
+    b.reports("before the start", b.early, lambda r: r["link"] == "down")
 
 
 def a_page_drives_by_twist(b):
@@ -60,12 +60,12 @@ def a_page_drives_by_twist(b):
     ann.drive(bob, x=1.0, until=driven(site, FULL))
     b.shows("driving", ann, bob, lambda r: r["doing"] == "driven" and r["measured"])
     ann.drive(bob, x=-0.5, turn=0.5, until=driven(site, -FULL / 2))
-    ann.let_go(bob)
+    ann.release_inputs(bob)
     b.until(lambda: site.speeds[-1] == 0, "a zero")
     b.shows("let go", ann, bob, held)
-    ann.hand = None
-    ann.say("renew", robot=bob.id, epoch=ann.report(bob)["epoch"])
-    ann.say("release", robot=bob.id)
+    ann.inputs = None
+    ann.send_op("renew", robot=bob.id, epoch=ann.report(bob)["epoch"])
+    ann.send_op("release", robot=bob.id)
     b.shows("released", ann, bob, free)
     b.model(robots.no_velocity, bob)
     b.until(lambda: bob.id not in ann.reports, "the robot's end")
@@ -76,12 +76,12 @@ def a_page_drives_by_stamped_twist(b):
     site, bridge = b.site(types={"/cmd_vel": stamped})
     bob = b.robot(robots.of_stamped, bridge, "Stan")
     ann = b.page("Ann")
-    b.until(lambda: stamped in str(site.told("advertise")), "the type of velocity")
+    b.until(lambda: stamped in str(site.received("advertise")), "the type of velocity")
     ann.take(bob)
     ann.drive(bob, x=1.0, until=driven(site, FULL))
     ann.drive(bob, y=1.0, until=driven(site, 0.0))
     b.shows("sideways", ann, bob, lambda r: r["sent"][1] and r["doing"] == "driven")
-    ann.let_go(bob)
+    ann.release_inputs(bob)
     b.shows("let go", ann, bob, held)
 
 
@@ -92,7 +92,7 @@ def a_page_drives_at_the_speed_of_an_unknown_base(b):
     b.shows("free", ann, bob, free)
     ann.take(bob)
     ann.drive(bob, turn=1.0, until=lambda: len(site.speeds) > 3)
-    ann.let_go(bob)
+    ann.release_inputs(bob)
 
 
 def stop_and_reset(b):
@@ -102,14 +102,14 @@ def stop_and_reset(b):
     b.tasks_up(site, "/lock")
     ann.take(bob)
     ann.drive(bob, x=1.0, until=driven(site, FULL))
-    vic.say("stop", robot="*")
+    vic.send_op("stop", robot="*")
     b.until(lambda: site.speeds[-1] == 0, "a zero")
-    ann.hand = None
-    b.until(lambda: site.told("call_service"), "the hook that is a service")
+    ann.inputs = None
+    b.until(lambda: site.received("call_service"), "the hook that is a service")
     b.shows("stopped by a viewer", vic, bob, stands)
     vic.reset(bob)
     b.until(lambda: vic.refusals, "the refusal of a viewer's reset")
-    ann.say("reset", robot=bob.id, stop="0000")
+    ann.send_op("reset", robot=bob.id, stop="0000")
     b.until(lambda: ann.refusals, "the refusal of an old reset")
     ann.reset(bob)
     b.shows("reset", ann, bob, free)
@@ -135,12 +135,12 @@ def goals_by_a_topic(b):
     b.tasks_up(site, "/initialpose")
     ann.take(bob)
     ann.aim("locate", bob)
-    b.until(lambda: site.told("publish", "/initialpose"), "the pose")
+    b.until(lambda: site.received("publish", "/initialpose"), "the pose")
     ann.aim("goal", bob)
-    b.until(lambda: site.told("publish", "/move_base_simple/goal"), "the goal")
+    b.until(lambda: site.received("publish", "/move_base_simple/goal"), "the goal")
     b.shows("sent", ann, bob, lambda r: r["goal"])
-    ann.say("cancel", robot=bob.id)
-    b.until(lambda: site.told("publish", "/move_base/cancel"), "the cancel")
+    ann.send_op("cancel", robot=bob.id)
+    b.until(lambda: site.received("publish", "/move_base/cancel"), "the cancel")
     b.shows("cancelled", ann, bob, goal_is("cancelled"))
 
 
@@ -155,15 +155,15 @@ def goals_by_move_base(b):
     b.tasks_up(site, "/move_base/goal")
     ann.take(bob)
     ann.aim("goal", bob)
-    (sent,) = b.until(lambda: site.told("publish", "/move_base/goal"), "the goal")
-    b.until(lambda: site.told("subscribe", "/move_base/result"), "its ear")
+    (sent,) = b.until(lambda: site.received("publish", "/move_base/goal"), "the goal")
+    b.until(lambda: site.received("subscribe", "/move_base/result"), "its ear")
     status = {"goal_id": sent["msg"]["goal_id"], "status": 1, "text": ""}
-    site.say("/move_base/status", {"status_list": [status]})
+    site.publish("/move_base/status", {"status_list": [status]})
     b.shows("under way", ann, bob, goal_is("under way"))
-    ann.say("cancel", robot=bob.id)
-    b.until(lambda: site.told("publish", "/move_base/cancel"), "the cancel")
+    ann.send_op("cancel", robot=bob.id)
+    b.until(lambda: site.received("publish", "/move_base/cancel"), "the cancel")
     ended = {"status": {**status, "status": 2}, "result": {}}
-    site.say("/move_base/result", ended)
+    site.publish("/move_base/result", ended)
     b.shows("cancelled", ann, bob, goal_is("cancelled"))
 
 
@@ -174,7 +174,7 @@ def goals_by_navigation(b):
     b.tasks_up(site, "/goal_pose")
     ann.take(bob)
     ann.aim("goal", bob)
-    (sent,) = b.until(lambda: site.told("send_action_goal"), "the goal")
+    (sent,) = b.until(lambda: site.received("send_action_goal"), "the goal")
     link = site.link_that("send_action_goal")
     feedback = {"distance_remaining": 2.5, "number_of_recoveries": 1}
     feedback["navigation_time"] = {"sec": 3, "nanosec": 0}
@@ -184,15 +184,15 @@ def goals_by_navigation(b):
     result = {"op": "action_result", "id": sent["id"], "status": 4, "values": {}}
     site.send(link, {**result, "action": "/navigate_to_pose", "result": True})
     b.shows("reached", ann, bob, goal_is("reached"))
-    ann.say("cancel", robot=bob.id)
-    b.until(lambda: site.told("call_service"), "the cancel")
-    b.until(lambda: len(site.told("advertise", "/goal_pose")) == 2, "another lane")
+    ann.send_op("cancel", robot=bob.id)
+    b.until(lambda: site.received("call_service"), "the cancel")
+    b.until(lambda: len(site.received("advertise", "/goal_pose")) == 2, "another lane")
     time.sleep(0.1)  # it is open, and the gate is told so
     ann.aim("goal", bob, x=3.0)
-    b.until(lambda: len(site.told("send_action_goal")) == 2, "another goal")
+    b.until(lambda: len(site.received("send_action_goal")) == 2, "another goal")
     ann.close()  # who sent it is lost
-    b.until(lambda: len(site.told("call_service")) == 2, "its cancel")
-    b.tells("who sent it is lost", bob, goal_is("cancelling"))
+    b.until(lambda: len(site.received("call_service")) == 2, "its cancel")
+    b.reports("who sent it is lost", bob, goal_is("cancelling"))
 
 
 def hand_over(b):
@@ -202,27 +202,27 @@ def hand_over(b):
     ann.take(bob)
     ann.rest(bob)
     for page in (ben, vic):
-        page.say("take", robot=bob.id)
+        page.send_op("take", robot=bob.id)
         b.until(lambda page=page: page.refusals, "a refusal")
-    ben.say("ask", robot=bob.id)
+    ben.send_op("ask", robot=bob.id)
     b.shows("asked", ann, bob, lambda r: r["asker"])
-    ann.say("deny", robot=bob.id)
+    ann.send_op("deny", robot=bob.id)
     b.shows("denied", ann, bob, lambda r: not r["asker"])
     b.until(lambda: len(ben.refusals) == 2, "the answer")
-    ben.say("ask", robot=bob.id)
+    ben.send_op("ask", robot=bob.id)
     b.until(lambda: ann.report(bob)["asker"], "the question")
-    ben.say("release", robot=bob.id)
+    ben.send_op("release", robot=bob.id)
     b.until(lambda: not ann.report(bob)["asker"], "the end of the question")
-    ben.say("ask", robot=bob.id)
+    ben.send_op("ask", robot=bob.id)
     b.until(lambda: ann.report(bob)["asker"], "the question")
-    ann.say("grant", robot=bob.id)
-    ann.hand = None
+    ann.send_op("grant", robot=bob.id)
+    ann.inputs = None
     b.until(lambda: ben.report(bob)["mine"], "the lease")
     ben.rest(bob)
     b.shows("granted", ben, bob, held)
     ben.drive(bob, x=1.0, until=driven(site, FULL))
-    ben.let_go(bob)
-    ben.hand = None
+    ben.release_inputs(bob)
+    ben.inputs = None
     ben.close()  # without a word
     b.shows("closed", ann, bob, free)
     b.run(bob.acquire_lease())
@@ -235,9 +235,9 @@ def hand_over(b):
 def a_program_drives(b):
     site, bridge = b.site()
     bob = b.robot(robots.that_flies, bridge, "Pam")
-    heard = b.model(bob.add_module, Ears)
+    received = b.model(bob.add_module, Receiver)
     b.run(bob.acquire_lease())
-    b.tells("held by the program", bob, lambda r: r["epoch"])
+    b.reports("held by the program", bob, lambda r: r["epoch"])
 
     def drive(until, *velocity):
         def under_way():
@@ -253,8 +253,8 @@ def a_program_drives(b):
     drive(driven(site, 0.03), 0.03, 0.0, 0.01, 0.2, 0.3, 0.4)
     drive(lambda: site.speeds[-1] == 0, 0.0)
     b.model(bob.release_lease)
-    b.tells("let go", bob, free)
-    b.note("what modules heard", once_each(heard.twists))
+    b.reports("let go", bob, free)
+    b.note("what modules heard", once_each(received.twists))
     refused = []
     for act in (lambda: bob.twist(0.1), lambda: bob.move(PLACE, TURN)):
         try:
@@ -272,28 +272,28 @@ def a_program_drives(b):
 def a_program_sends_goals(b):
     site, bridge = b.site()
     bob = b.robot(robots.by_simple_goals, bridge, "Gail")
-    heard = b.model(bob.add_module, Ears)
+    received = b.model(bob.add_module, Receiver)
     b.tasks_up(site, "/initialpose")
     b.run(bob.acquire_lease())
     b.model(bob.locate, PLACE, TURN)
-    b.until(lambda: site.told("publish", "/initialpose"), "the pose")
+    b.until(lambda: site.received("publish", "/initialpose"), "the pose")
     b.model(bob.move, PLACE, TURN)
-    b.until(lambda: site.told("publish", "/move_base_simple/goal"), "the goal")
-    b.tells("sent", bob, lambda r: r["goal"])
+    b.until(lambda: site.received("publish", "/move_base_simple/goal"), "the goal")
+    b.reports("sent", bob, lambda r: r["goal"])
     b.model(bob.cancel)
-    b.tells("cancelled", bob, goal_is("cancelled"))
-    b.until(lambda: heard.goals, "the trigger")
-    b.note("what modules heard", once_each(heard.goals))
+    b.reports("cancelled", bob, goal_is("cancelled"))
+    b.until(lambda: received.goals, "the trigger")
+    b.note("what modules heard", once_each(received.goals))
     alone = b.robot(robots.of_goals_alone, bridge, "Gus")
     b.tasks_up(site, "/goal")
     b.run(alone.acquire_lease())
     b.model(alone.move, PLACE, TURN)
-    b.until(lambda: site.told("publish", "/goal"), "the goal")
-    b.tells("without velocity", alone, lambda r: r["goal"])
+    b.until(lambda: site.received("publish", "/goal"), "the goal")
+    b.reports("without velocity", alone, lambda r: r["goal"])
 
 
-class Ears:
-    """A module that hears what the gate wrote."""
+class Receiver:
+    """A module that records what the gate sent."""
 
     def __init__(self, robot):
         self.twists, self.goals = [], []
@@ -318,17 +318,17 @@ def scan_assist(b):
     ann.take(bob)
     ann.drive(bob, x=1.0, until=driven(site, CREEP))
     b.shows("blind", ann, bob, lambda r: "no scan yet" in str(r["why"]))
-    site.says["/scan"] = scan_of(20.0)
+    site.repeated["/scan"] = scan_of(20.0)
     ann.drive(bob, x=1.0, until=driven(site, FULL))
-    site.says["/scan"] = scan_of(0.44)
+    site.repeated["/scan"] = scan_of(0.44)
     ann.drive(bob, x=1.0, until=lambda: CREEP < site.speeds[-1] < FULL)
     b.shows("near a wall", ann, bob, lambda r: "ahead" in str(r["why"]))
-    ann.let_go(bob)
+    ann.release_inputs(bob)
     b.model(robots.no_assist, bob)
     b.until(lambda: not ann.report(bob)["mine"], "the robot, declared anew")
     ann.take(bob)
     ann.drive(bob, x=1.0, until=driven(site, FULL))
-    ann.let_go(bob)
+    ann.release_inputs(bob)
 
 
 def another_program_drives(b):
@@ -341,7 +341,7 @@ def another_program_drives(b):
     velocity["angular"] = {"x": 0.0, "y": 0.0, "z": 0.2}
 
     def written():
-        site.say("/cmd_vel", velocity)
+        site.publish("/cmd_vel", velocity)
         return "/teleop" in (ann.report(bob)["other_writer"] or "")
 
     time.sleep(2.1)  # for so long after a link opened nobody else's is told
@@ -359,14 +359,14 @@ def a_stop_test(b):
         state = (ann.report(bob)["test"] or {"state": "failed"})["state"]
         if state == "failed":  # at first, and where a busy machine came in between
             ann.rest(bob)
-            ann.say("stop-test", robot=bob.id)
+            ann.send_op("stop-test", robot=bob.id)
             time.sleep(0.2)
         return state == "waiting"
 
     b.until(creeps, "motion")
     site.now = REST  # by itself
     b.shows("tested", ann, bob, lambda r: r["test"]["state"] == "done")
-    ann.hand = None
+    ann.inputs = None
 
 
 def a_declaration_that_changes(b):
@@ -406,7 +406,7 @@ def a_declaration_that_changes(b):
     known("no goals", lambda r: r["way"] is None)
     b.model(robots.no_velocity, bob)
     known("no velocity", lambda r: r["armable"] is False)
-    b.until(lambda: site.told("unadvertise", "/other/cmd_vel"), "the last word")
+    b.until(lambda: site.received("unadvertise", "/other/cmd_vel"), "the last word")
 
 
 def a_state_that_is_stored(b):
@@ -426,7 +426,7 @@ def every_option(b):
     _, bridge = b.site()
     _, other = b.site("other")
     full = b.robot(robots.with_everything, bridge, other, "Eve")
-    b.tells("every option", full, lambda r: r["link"] == "up" and r["armable"])
+    b.reports("every option", full, lambda r: r["link"] == "up" and r["armable"])
 
 
 def a_gate_that_dies(b):
@@ -437,9 +437,9 @@ def a_gate_that_dies(b):
     b.tasks_up(site, "/goal")
     ann.take(bob)
     ann.drive(bob, x=1.0, until=driven(site, FULL))
-    vic.say("stop", robot=bob.id)
+    vic.send_op("stop", robot=bob.id)
     b.until(lambda: ann.report(bob)["latched"], "a STOP that stands")
-    ann.hand = None
+    ann.inputs = None
     ann.greeted = vic.greeted = False
     b.kill_the_gate()
     b.until(lambda: ann.greeted and vic.greeted, "another gate")

@@ -148,7 +148,7 @@ class Source:
         return re.sub(r"console-[0-9a-f]{16}", "console-*", "\n".join(said))
 
     def _plain(self, value):
-        """Return a value as JSON has it; what JSON does not know in words."""
+        """Return a value as JSON has it; a value unknown to JSON as text."""
 
         def word(value):
             return (
@@ -170,12 +170,12 @@ def site(source, graph, label="hall", frames=()):
         source.names.call(f"ws://127.0.0.1:{robot.port}", f"ws://{label}")
         source.names.call(f"127.0.0.1:{robot.port}", label)
         if frames:
-            robot.says["/tf"] = transforms(frames)
+            robot.repeated["/tf"] = transforms(frames)
         yield robot.url
 
 
 def command(source, *arguments):
-    """Run a command line and note what it says; one that serves shows what there is."""
+    """Run a command line and record its output; one that serves shows its robots."""
 
     def serves(**options):
         note()
@@ -306,7 +306,7 @@ def refused(source, act):
 
 
 def each(source, kind):
-    """Note what is said of each wrong input of a kind."""
+    """Record the errors for each wrong input of a kind."""
     wrong, inputs = WRONG[kind]
     for name in inputs:
         one = Source("")

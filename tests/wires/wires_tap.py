@@ -1,4 +1,4 @@
-"""Notes all that passes between page, display, gate and robot, and puts it in words."""
+"""Records all messages between page, display, gate and robot, as text."""
 
 import json
 import re
@@ -15,10 +15,10 @@ from webmap.gate import pipe
 from webmap.gate.display.supervisor import GateProcess
 
 PERIODIC = ("drive", "program-twist", "robot", "sent-twist", "tick", "writer-nodes")
-"""What is said again and again: each distinct message is shown once."""
+"""Messages that are repeated: each distinct one is shown once."""
 
 SILENT: tuple[Any, ...] = (None, False, "", [], [0.0] * 6)
-"""Values of a report that say nothing; which fields it has is noted apart."""
+"""Values of a report that are not shown; its fields are recorded separately."""
 
 HASTY = ("drive", "stop-test")
 """What may be refused where a robot, or a busy machine, was not ready yet."""
@@ -32,7 +32,7 @@ Entry = tuple[str, dict[str, Any]]
 
 
 class Tap:
-    """Notes messages by the channel that they pass; may be told from any thread.
+    """Notes messages by the channel that they pass; may be called from any thread.
 
     The pipe is tapped in this process alone: what is noted was packed for the gate, or
     came packed from it.
@@ -42,7 +42,7 @@ class Tap:
         self.names = Names()
         self.entries: list[Entry] = []
         self.reports: dict[str, dict[str, Any]] = {}
-        """What the gate last told the display of each robot, by the robot's id."""
+        """The gate's newest report about each robot, by the robot's id."""
         self.each_declaration = False
         """Whether each declaration of a robot is shown, or of several in a row only
         the last: how a program configures a robot, step by step or at once, is its
@@ -82,7 +82,7 @@ class Tap:
             self.entries.append((channel, message))
 
     def _learn(self, message: dict[str, Any]) -> None:
-        """Give names to what the message tells."""
+        """Give names to the values of a message."""
         match message:
             case {"type": "connect", "connection": connection, "name": name}:
                 self.names.call(connection, f"<{name}>")
@@ -104,7 +104,7 @@ class Tap:
             case {"type": "take-reply", "epoch": int(epoch)}:
                 self.names.grow("epoch", epoch)
 
-    # In words.
+    # As text.
 
     def channels(self) -> dict[str, str]:
         """Return what went over each channel."""
@@ -112,12 +112,14 @@ class Tap:
             entries = list(self.entries)
             names = [TO_GATE, FROM_GATE, *sorted({name for name, _ in entries})]
             return {
-                name: "\n".join(self._words(name, [m for n, m in entries if n == name]))
+                name: "\n".join(
+                    self._lines_of(name, [m for n, m in entries if n == name])
+                )
                 for name in dict.fromkeys(names)
             }
 
     def report(self, report: dict[str, Any]) -> str:
-        """Return a report of a robot in words, as far as it is always the same."""
+        """Return a report of a robot as text, without values that vary."""
         with self._lock:
             plain = self.names.plain(report)
         if plain["asker"] is not None:
@@ -129,10 +131,10 @@ class Tap:
             plain["test"]["text"] = _SECONDS.sub(f"{ANY} s", plain["test"]["text"])
         if plain["stop_source"] == "tested":
             plain["stop_time"] = plain["stop_date"] = ANY
-        says = {key: value for key, value in plain.items() if value not in SILENT}
-        return tree({key: says[key] for key in says if key not in ("op", "type")})
+        shown = {key: value for key, value in plain.items() if value not in SILENT}
+        return tree({key: shown[key] for key in shown if key not in ("op", "type")})
 
-    def _words(self, channel: str, messages: Iterable[dict[str, Any]]) -> list[str]:
+    def _lines_of(self, channel: str, messages: Iterable[dict[str, Any]]) -> list[str]:
         said: list[tuple[str, str, str]] = []
         before: dict[str, Any] = {}
         for message in messages:
@@ -148,7 +150,7 @@ class Tap:
             said.append((kind, text, stays))
             before = message
         if channel == FROM_GATE or channel.startswith("server to page"):
-            # Of words of two kinds it may be chance which come first.
+            # The order of two kinds of messages may vary.
             said.sort(key=lambda each: each[0])
         return thinned((text, stays) for _, text, stays in said)
 
@@ -170,7 +172,7 @@ class Tap:
             case "declare":
                 return kind, self._declared(fields)
             case "browser":
-                return self._said_by_page(fields)
+                return self._sent_by_page(fields)
         return kind, lines(kind, self.names.plain(fields))
 
     def _declared(self, fields: dict[str, Any]) -> str:
@@ -178,7 +180,7 @@ class Tap:
         id = fields.pop("id")
         return lines("declare", {"id": id, **self.names.plain(fields)})
 
-    def _said_by_page(self, fields: dict[str, Any]) -> tuple[str, str]:
+    def _sent_by_page(self, fields: dict[str, Any]) -> tuple[str, str]:
         try:
             said = json.loads(fields["text"])
             op = said.pop("op")
@@ -195,25 +197,25 @@ def unpacked(body: bytes) -> dict[str, Any]:
 
 
 def lanes_of(names: Names, label: str, robot: Any) -> dict[str, str]:
-    """Return what a robot was told, by the lane that it came over.
+    """Return the messages that a robot received, by lane.
 
     A lane may have been opened again, and a goal goes over a socket of its own.
     """
-    told: dict[str, list[tuple[str, str]]] = {}
+    received: dict[str, list[tuple[str, str]]] = {}
     for link in list(robot.links):
-        said = told.setdefault(link.lane, [])
-        for message in list(link.told):
+        texts = received.setdefault(link.lane, [])
+        for message in list(link.received):
             zero = message["op"] == "publish" and is_zero(message["msg"])
             text = _operation(names, message, link.lane)
             if text is not None:
-                said.append((text, "last" if zero else "once"))
-    if "display" in told:
-        told["display"].sort()
+                texts.append((text, "last" if zero else "once"))
+    if "display" in received:
+        received["display"].sort()
     order = ("control", "witness", "tasks", "call", "display")
     return {
-        f"bridge {label}: {lane}": "\n".join(thinned(told[lane]))
+        f"bridge {label}: {lane}": "\n".join(thinned(received[lane]))
         for lane in order
-        if told.get(lane)
+        if received.get(lane)
     }
 
 
@@ -235,15 +237,15 @@ def settled(
     still: float = 0.0,
     good: Callable[[], bool] = lambda: True,
 ) -> str:
-    """Return what is said in the end.
+    """Return the text when it no longer changes.
 
     Args:
-        words: What is said so far.
+        words: Returns the text so far.
         expected: What was recorded.
         seconds: How long it is waited for.
         calm: Seconds for which the words must stay the same if nothing is recorded.
         still: Seconds for which what was recorded must stay the same.
-        good: Tells whether it can be the end.
+        good: Returns whether the text may be complete.
 
     """
     deadline = time.monotonic() + seconds

@@ -9,7 +9,7 @@ LONGEST = 88
 """Characters of a line that holds a whole value."""
 
 ANY = "*"
-"""What stands for a value that differs from run to run."""
+"""Replaces a value that differs from run to run."""
 
 CHANGING = {
     "acks",
@@ -20,7 +20,7 @@ CHANGING = {
     "seq",
     "tick",
 }
-"""Fields of numbers that tell time or count what time brings."""
+"""Fields of numbers that depend on time."""
 
 _GENERATED = re.compile(r"\bWebMap-(\d+)\b")
 
@@ -38,7 +38,7 @@ class Names:
         self._texts: dict[str, str] = {}
 
     def call(self, text: str, token: str) -> None:
-        """Have a text stand as a token wherever it occurs."""
+        """Replace a text by a token wherever it occurs."""
         self._texts[text] = token
 
     def grow(self, kind: str, number: int) -> None:

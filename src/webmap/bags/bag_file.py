@@ -60,7 +60,7 @@ def new_bag(path: Path, dialect: DialectName) -> BagFile:
     try:
         return Ros1Bag(path) if dialect == "ros1" else Ros2Bag(path)
     except (Ros1Error, Ros2Error) as error:
-        raise ConfigError(f"{path} cannot be made: {error}") from None
+        raise ConfigError(f"{path} cannot be created: {error}") from None
 
 
 class Ros1Bag:

@@ -35,9 +35,9 @@ class Listening:
     Args:
         bridge: The bridge, not started yet.
         recorder: Gets the messages.
-        only: The wanted topics; all if empty.
-        told: Types by topic, if the bridge cannot be asked for them.
-        say: Called with each sentence for people.
+        only: The topics to record; all if empty.
+        stated_types: Types by topic; None to ask the bridge for them.
+        report: Called with each sentence to show.
 
     """
 
@@ -47,14 +47,14 @@ class Listening:
         recorder: Recorder,
         *,
         only: Sequence[str] = (),
-        told: Mapping[str, str] | None = None,
-        say: Callable[[str], object],
+        stated_types: Mapping[str, str] | None = None,
+        report: Callable[[str], object],
     ) -> None:
         self._bridge = bridge
         self._recorder = recorder
         self._only = frozenset(only)
-        self._told = told
-        self._say = say
+        self._stated_types = stated_types
+        self._report = report
         self._seen: set[str] = set()
         self._lost = 0.0
         self._was_open = False
@@ -95,9 +95,9 @@ class Listening:
         self._bridge.start(self._loop)
         began = time.monotonic()
         tasks = [
-            asyncio.create_task(self._look_on()),
-            asyncio.create_task(self._say_if_not_open()),
-            asyncio.create_task(_show_on(began, show)),
+            asyncio.create_task(self._find_new_topics()),
+            asyncio.create_task(self._report_if_not_open()),
+            asyncio.create_task(_show_progress(began, show)),
         ]
         ready()
         try:
@@ -115,29 +115,29 @@ class Listening:
             await self._bridge.stop()
             await self._incoming.finish()
         if not self._was_open:
-            self._say(f"Nothing is recorded: the link was never open{why}")
+            self._report(f"Nothing is recorded: the connection was never open{why}")
         if self._failure is not None:
             raise self._failure
         return lasted
 
     def take(self, topics: Mapping[str, str]) -> None:
-        """Subscribe to topics that are wanted and new; name those left out."""
+        """Subscribe to new topics to record, and report those left out."""
         unknown = []
         for topic, type_name in sorted(topics.items()):
-            wanted = topic in self._only if self._only else topic != STATUS
-            if not wanted or topic in self._seen or not type_name:
+            chosen = topic in self._only if self._only else topic != STATUS
+            if not chosen or topic in self._seen or not type_name:
                 continue
             self._seen.add(topic)
             if not self._subscribe(topic, type_name):
                 unknown.append(f"{topic} ({type_name})")
         if unknown:
-            self._say(
-                f"Left out, since nothing here knows their types: {', '.join(unknown)}"
+            self._report(
+                f"Not recorded, since their types are unknown: {', '.join(unknown)}"
             )
 
     @property
     def missing(self) -> list[str]:
-        """The wanted topics that do not exist yet."""
+        """The topics to record that do not exist yet."""
         return sorted(self._only - self._seen)
 
     def _subscribe(self, topic: str, type_name: str) -> bool:
@@ -145,20 +145,19 @@ class Listening:
             name = normalise_topic(topic)
             if not self._recorder.add(name, type_name):
                 return False
-            heard = partial(self._heard, name)
             subscription = self._bridge.subscribe(
                 name,
-                heard,
+                partial(self._received, name),
                 type_name,
                 queue_length=QUEUE,
                 encoding="binary" if is_type(type_name, *PICTURES) else None,
             )
             subscription.undecoded = True
         except ConfigError as error:
-            self._say(f"{topic} is left out: {error}")
+            self._report(f"{topic} is not recorded: {error}")
         return True
 
-    def _heard(self, topic: str, message: ReceivedMessage) -> None:
+    def _received(self, topic: str, message: ReceivedMessage) -> None:
         if not self._stop.is_set():
             self._incoming.put(topic, message, time.time_ns())
 
@@ -167,18 +166,18 @@ class Listening:
         if self._loop is not None:
             self._loop.call_soon_threadsafe(self._stop.set)
 
-    async def _say_if_not_open(self) -> None:
+    async def _report_if_not_open(self) -> None:
         await asyncio.sleep(OPEN_WITHIN)
         if not self._was_open:
             why = self._why_not_open()
-            self._say(f"Nothing is recorded yet: the link is not open{why}")
+            self._report(f"Nothing is recorded yet: the connection is not open{why}")
 
     def _why_not_open(self) -> str:
         trouble = self._bridge.trouble
         return f" ({trouble})" if trouble else ""
 
-    async def _look_on(self) -> None:
-        while self._told is None:
+    async def _find_new_topics(self) -> None:
+        while self._stated_types is None:
             await asyncio.sleep(LOOK)
             if self._bridge.state == "open":
                 with contextlib.suppress(BridgeError):  # it is asked again
@@ -186,19 +185,22 @@ class Listening:
 
     def _closed(self, reason: str) -> None:
         self._lost = time.monotonic()
-        self._say(f"The link was lost ({reason}): nothing is recorded until it is back")
+        self._report(
+            f"The connection was lost ({reason}): nothing is recorded until it is open "
+            "again"
+        )
 
     def _opened(self) -> None:
         self._was_open = True
         if self._lost:
             gone = time.monotonic() - self._lost
             self._lost = 0.0
-            self._say(
-                f"The link is back after {gone:.1f} s, which are missing in the bag"
+            self._report(
+                f"The connection is open again; {gone:.1f} s are missing in the bag"
             )
 
 
-async def _show_on(began: float, show: Callable[[float], object]) -> None:
+async def _show_progress(began: float, show: Callable[[float], object]) -> None:
     while True:
         await asyncio.sleep(SHOW)
         show(time.monotonic() - began)

@@ -13,7 +13,7 @@ from webmap.base.errors import ConfigError
 
 log = logging.getLogger("webmap.bags")
 
-SAY_EVERY = 0.5
+STATUS_PERIOD = 0.5
 """Seconds between two status messages with the position in the recording."""
 
 SLOWEST, FASTEST = 0.001, 1000.0
@@ -80,7 +80,7 @@ class Player:
         self._woken = asyncio.Event()
 
     @property
-    def words(self) -> str:
+    def status(self) -> str:
         """The name, position and rate of the recording, for people."""
         recording = self._recording
         at = (self._pace.at(self._now()) - recording.begin) / SECOND
@@ -98,22 +98,24 @@ class Player:
 
     async def run(self) -> None:
         """Play until cancelled; playing begins with the first subscription."""
-        await self.replay.graph.heard.wait()
+        await self.replay.graph.subscribed.wait()
         async with asyncio.TaskGroup() as group:
-            group.create_task(self._say_on())
-            group.create_task(self._play_on())
+            group.create_task(self._publish_status())
+            group.create_task(self._play_rounds())
 
-    async def _play_on(self) -> None:
+    async def _play_rounds(self) -> None:
         while True:
             self._again, self._ended = False, False
             self._woken.clear()
             self._pace = Pace(self._first, self._now(), self._rate)
-            self.replay.say(self.words)  # first, as poses jump in a new round
+            self.replay.publish_status(
+                self.status
+            )  # first, as poses jump in a new round
             soonest = self._now() + round(ROUND * SECOND)
             try:
                 await self._once()
             except ConfigError as error:
-                log.error("%s; what comes behind it is not played", error)
+                log.error("%s; the rest of the recording is not played", error)
             if self._again:
                 continue
             if self._loop:
@@ -156,7 +158,9 @@ class Player:
             self._pace.put_off(-wait)
             if not self._late:
                 self._late = True
-                log.warning("this computer cannot keep the pace, and plays later")
+                log.warning(
+                    "this computer is too slow for this rate: messages are played late"
+                )
         if wait < SOON:
             await asyncio.sleep(0)  # let the subscribers run
             return not self._again
@@ -165,7 +169,7 @@ class Player:
                 await self._woken.wait()
         return not self._again
 
-    async def _say_on(self) -> None:
+    async def _publish_status(self) -> None:
         while True:
-            self.replay.say(self.words)
-            await asyncio.sleep(SAY_EVERY)
+            self.replay.publish_status(self.status)
+            await asyncio.sleep(STATUS_PERIOD)

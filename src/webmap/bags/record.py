@@ -24,7 +24,7 @@ EVERY = 10.0
 """Seconds between two progress lines if one cannot replace the other."""
 
 
-def told_types(
+def stated_types(
     names: Sequence[str], types: Sequence[str], topics: Mapping[str, str] | None
 ) -> dict[str, str] | None:
     """Return the types that a person stated, by topic; None if there are none.
@@ -42,8 +42,8 @@ def told_types(
         return None if topics is None else dict(topics)
     if len(types) != len(names):
         raise click.UsageError(
-            f"--type says the type of each --topic, in their order: got {len(types)} "
-            f"types for {len(names)} topics"
+            f"--type needs one type for each --topic, in the same order: got "
+            f"{len(types)} types for {len(names)} topics"
         )
     for name in types:
         split_type(name)
@@ -55,7 +55,7 @@ async def record_to(
     out: Path | None,
     *,
     only: Sequence[str],
-    told: Mapping[str, str] | None,
+    stated: Mapping[str, str] | None,
     wait: float,
     duration: float | None,
 ) -> bool:
@@ -64,8 +64,8 @@ async def record_to(
     Args:
         url: The bridge's address.
         out: The bag; None for a name with the time in it.
-        only: The wanted topics; all if empty.
-        told: Types by topic, if the bridge cannot be asked for them.
+        only: The topics to record; all if empty.
+        stated: Types by topic; None to ask the bridge for them.
         wait: Longest time to wait for an unreachable bridge, in seconds.
         duration: Longest duration of the recording, in seconds.
 
@@ -75,7 +75,7 @@ async def record_to(
         OSError: If the bag cannot be created.
 
     """
-    topics = await _topics(url, told, wait)
+    topics = await _topics(url, stated, wait)
     dialect = _dialect(topics)
     if out is None:
         out = Path(time.strftime("webmap-%Y-%m-%d-%H-%M-%S"))
@@ -83,15 +83,17 @@ async def record_to(
     failure: OSError | None = None
     lasted = 0.0
     line = ProgressLine()
-    recorder = Recorder(bag, Types(dialect), line.say)
+    recorder = Recorder(bag, Types(dialect), line.show_text)
     try:
-        listening = Listening(Bridge(url), recorder, only=only, told=told, say=line.say)
+        listening = Listening(
+            Bridge(url), recorder, only=only, stated_types=stated, report=line.show_text
+        )
         stop = asyncio.Event()
 
         def ready() -> None:
             echo(f"Recording {url} to {bag.path}")
             if listening.missing:
-                line.say(f"Waiting for: {', '.join(listening.missing)}")
+                line.show_text(f"Waiting for: {', '.join(listening.missing)}")
 
         with signals_set(stop):
             lasted = await listening.run(
@@ -109,8 +111,8 @@ async def record_to(
         except OSError as error:
             failure = failure or error
     if failure is not None:
-        line.say(f"Error: {bag.path} cannot be written: {failure}")
-    line.say(
+        line.show_text(f"Error: {bag.path} cannot be written: {failure}")
+    line.show_text(
         f"Recorded {recorder.messages} messages of {recorder.topics} topics in "
         f"{lasted:.1f} s to {bag.path}: {megabytes(recorder)}, "
         f"{recorder.dropped} dropped"
@@ -148,7 +150,7 @@ class ProgressLine:
             self._next += EVERY
             echo(text, err=True)
 
-    def say(self, text: str) -> None:
+    def show_text(self, text: str) -> None:
         """Print another text, on a line of its own."""
         if self._shown:
             echo("", err=True)
@@ -162,10 +164,10 @@ def megabytes(recorder: Recorder) -> str:
 
 
 async def _topics(
-    url: str, told: Mapping[str, str] | None, wait: float
+    url: str, stated: Mapping[str, str] | None, wait: float
 ) -> dict[str, str]:
-    if told is not None:
-        return dict(told)
+    if stated is not None:
+        return dict(stated)
 
     def waiting(why: str) -> None:
         echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
@@ -174,7 +176,7 @@ async def _topics(
         return await ask_topics(url, wait=wait, waiting=waiting)
     except ServiceError as error:
         raise BridgeError(
-            f"{url} has no rosapi that says its topics ({error}): name them with "
+            f"{url} has no rosapi that lists its topics ({error}): name them with "
             f"--topic and --type, or list them with --topics"
         ) from None
 
@@ -186,6 +188,6 @@ def _dialect(topics: Mapping[str, str]) -> DialectName:
     if 1 in slashes:
         return "ros1"
     raise ConfigError(
-        "there are no topics, so nobody knows which ROS it is and there is nothing to "
-        "record"
+        "there are no topics: nothing can be recorded, and it is not known whether the "
+        "bridge is of ROS 1 or ROS 2"
     )

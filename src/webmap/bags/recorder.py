@@ -42,12 +42,12 @@ class Recorder:
     Args:
         bag: The bag to write to.
         types: The types of messages.
-        say: Called with a sentence about each kind of dropped message.
+        report: Called with a sentence about each kind of dropped message.
 
     """
 
     def __init__(
-        self, bag: BagFile, types: Types, say: Callable[[str], object]
+        self, bag: BagFile, types: Types, report: Callable[[str], object]
     ) -> None:
         self.messages = 0
         """Number of written messages."""
@@ -57,10 +57,10 @@ class Recorder:
         """Number of dropped messages: misfits, unreadable ones, or too many at once."""
         self._bag = bag
         self._types = types
-        self._say = say
+        self._report = report
         self._tracks: dict[str, _Track] = {}
         self._lock = threading.Lock()
-        self._told: set[tuple[str, str]] = set()
+        self._reported: set[tuple[str, str]] = set()
 
     @property
     def topics(self) -> int:
@@ -97,7 +97,7 @@ class Recorder:
             data = self._bytes_of(track, message)
         except Misfit as error:
             track.misfit = True
-            why = f"messages are left out that do not fit the type {track.type}"
+            why = f"messages that do not fit the type {track.type} are not recorded"
             self.drop(topic, why, str(error))
             return
         if track.channel is None:
@@ -117,10 +117,10 @@ class Recorder:
         """
         with self._lock:
             self.dropped += 1
-            new = (topic, why) not in self._told
-            self._told.add((topic, why))
+            new = (topic, why) not in self._reported
+            self._reported.add((topic, why))
         if new:
-            self._say(f"{topic}: {why}{f': {error}' if error else ''}")
+            self._report(f"{topic}: {why}{f': {error}' if error else ''}")
 
     def _bytes_of(self, track: _Track, message: object) -> bytes:
         """Return a message's bytes; the first message determines the release."""
@@ -158,7 +158,7 @@ class Incoming:
         self._size = 0
         """Bytes that wait, as counted by :func:`_size_of`."""
         self._thread = threading.Thread(
-            target=self._write_on, name="recording", daemon=True
+            target=self._write_all, name="recording", daemon=True
         )
 
     def start(self) -> None:
@@ -181,7 +181,8 @@ class Incoming:
                 self._size += size
         if full:
             self._recorder.drop(
-                topic, "messages are left out, since more come than can be written"
+                topic,
+                "messages are not recorded, since more arrive than can be written",
             )
         else:
             self._waiting.put((topic, message, time))
@@ -191,7 +192,7 @@ class Incoming:
         self._waiting.put(None)
         await asyncio.to_thread(self._thread.join)
 
-    def _write_on(self) -> None:
+    def _write_all(self) -> None:
         while (one := self._waiting.get()) is not None:
             try:
                 self._write(*one)
@@ -205,13 +206,13 @@ class Incoming:
         try:
             self._recorder.take(topic, message.decode(), time)
         except ProtocolError as error:
-            why = "messages are left out that cannot be read"
+            why = "messages that cannot be read are not recorded"
             self._recorder.drop(topic, why, str(error))
         except OSError:
             raise
         except Exception as error:  # the next message must be written in any case
             log.exception("a message on %s was lost", topic)
-            why = "messages are left out that could not be written"
+            why = "messages that cannot be written are not recorded"
             self._recorder.drop(topic, why, str(error))
 
 

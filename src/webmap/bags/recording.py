@@ -245,7 +245,7 @@ class Recording:
 
         Args:
             start: The time, in nanoseconds since 1970.
-            go_on: Called repeatedly; returns whether the messages are still wanted.
+            go_on: Called repeatedly; returns whether to continue.
 
         Raises:
             ConfigError: If the file is damaged before that time.
@@ -280,8 +280,9 @@ class Recording:
             if recorded.topic not in self._failed:
                 self._failed.add(recorded.topic)
                 self._warn(
-                    f"{self.name}: messages of {recorded.topic} are left out that are "
-                    f"not of the type {recorded.connection.msgtype} ({_words(error)})"
+                    f"{self.name}: messages of {recorded.topic} that are not of the "
+                    f"type {recorded.connection.msgtype} are not played "
+                    f"({_reason(error)})"
                 )
             return None
 
@@ -300,7 +301,7 @@ class Recording:
     def _usable(self) -> "list[Connection]":
         """Return the connections that can be played; register topics and types."""
         if self._reader.message_count == 0:
-            raise ConfigError(f"{self.name}: there is no message in it")
+            raise ConfigError(f"{self.name}: it contains no message")
         _add_defaults(self._reader, self.dialect)
         usable = []
         for connection in self._reader.connections:
@@ -319,12 +320,14 @@ class Recording:
                 self._leave_out(connection, f"it is a {known.type} too")
                 continue
             self.schema.define(texts)
-            latched = (known is not None and known.latched) or _said_latched(connection)
+            latched = (known is not None and known.latched) or _is_latched_in_file(
+                connection
+            )
             latched = latched or is_latched(name, type_name)
             self.topics[name] = RecordedTopic(name, type_name, latched)
             usable.append(connection)
         if not usable:
-            raise ConfigError(f"{self.name}: no topic of it can be played")
+            raise ConfigError(f"{self.name}: none of its topics can be played")
         return usable
 
     def _leave_out(self, connection: "Connection", why: str) -> None:
@@ -341,15 +344,15 @@ def recording_name(paths: Sequence[Path]) -> str:
 
 def unreadable(name: str, error: Exception) -> ConfigError:
     """Return the error for a file that cannot be read."""
-    return ConfigError(f"{name} cannot be read as a recording: {_words(error)}")
+    return ConfigError(f"{name} cannot be read as a recording: {_reason(error)}")
 
 
-def _words(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     """Return why a file could not be read, for people."""
-    said = str(error).strip().partition("\n")[0].rstrip(".")
-    if not said or isinstance(error, AssertionError | LookupError | TypeError):
+    text = str(error).strip().partition("\n")[0].rstrip(".")
+    if not text or isinstance(error, AssertionError | LookupError | TypeError):
         return "it is damaged or cut off"
-    return said[:200]
+    return text[:200]
 
 
 def _dialect(paths: Sequence[Path]) -> DialectName:
@@ -360,13 +363,13 @@ def _dialect(paths: Sequence[Path]) -> DialectName:
         _refuse_endless(path)
         if path.is_dir() and not (path / METADATA).exists():
             raise ConfigError(
-                f"{path}: there is no metadata.yaml in this folder, so it is no bag of "
-                f"ROS 2; give the .mcap or .db3 file in it by itself"
+                f"{path}: there is no metadata.yaml in this folder, so it is not a bag "
+                f"of ROS 2; give the .mcap or .db3 file in it instead"
             )
         if path.is_file() and path.suffix not in (ROS1, *ROS2):
             raise ConfigError(
-                f"{path} is no recording by its name; expected .bag, .mcap, .db3, or "
-                f"the folder of a bag of ROS 2"
+                f"{path} is not the name of a recording; expected .bag, .mcap, .db3, "
+                f"or the folder of a bag of ROS 2"
             )
         kinds.add("ros1" if path.suffix == ROS1 and path.is_file() else "ros2")
     if len(kinds) > 1:
@@ -386,8 +389,8 @@ def _refuse_endless(path: Path) -> None:
     size = about.stat().st_size if about.is_file() else 0
     if size > LARGEST_METADATA:
         raise ConfigError(
-            f"{about}: {size} bytes are no description of a bag, which has "
-            f"{LARGEST_METADATA} at the most"
+            f"{about}: {size} bytes are too many for the description of a "
+            f"bag, which has at most {LARGEST_METADATA}"
         )
 
 
@@ -417,7 +420,7 @@ def _add_defaults(reader: "AnyReader", dialect: DialectName) -> None:
     reader.typestore.register({n: usual[n] for n in usual if n not in known})
 
 
-def _said_latched(connection: "Connection") -> bool:
+def _is_latched_in_file(connection: "Connection") -> bool:
     from rosbags.interfaces import ConnectionExtRosbag1, QosDurability
 
     if isinstance(connection.ext, ConnectionExtRosbag1):

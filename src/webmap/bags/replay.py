@@ -26,7 +26,7 @@ STATUS = "/webmap/recording"
 Only the replay publishes it: it is neither recorded nor played from a recording.
 """
 
-REFUSED = "this is a recording: nothing is taken in"
+REFUSED = "this is a recording: it accepts no messages, services or actions"
 
 
 class ReplayGraph(Graph):
@@ -37,7 +37,7 @@ class ReplayGraph(Graph):
 
     def __init__(self, schema: Schema, *, clock: Callable[[], float]) -> None:
         super().__init__(schema, clock=clock)
-        self.heard = asyncio.Event()
+        self.subscribed = asyncio.Event()
         """Set at the first subscription."""
         self._sealed = False
 
@@ -97,7 +97,7 @@ class ReplayGraph(Graph):
 
         """
         super().subscribe(owner, name, deliver, type_name, node=node)
-        self.heard.set()
+        self.subscribed.set()
 
     def _refuse(self) -> None:
         if self._sealed:
@@ -147,6 +147,6 @@ class Replay:
             message = self._static[name].with_all(message)
         self.graph.publish(self, name, message)
 
-    def say(self, text: str) -> None:
+    def publish_status(self, text: str) -> None:
         """Publish the status of the replay, for people."""
         self.graph.publish(self, STATUS, {"data": text})

@@ -62,15 +62,17 @@ def record(
     import asyncio
 
     from webmap.bags import need_rosbags
-    from webmap.bags.record import record_to, told_types
+    from webmap.bags.record import record_to, stated_types
     from webmap.ros.names import normalise_topic, normalise_url
 
     need_rosbags()
     names = [normalise_topic(topic) for topic in only]
-    told = told_types(names, types, topics)
-    if told is not None:
-        told = {normalise_topic(topic): type_name for topic, type_name in told.items()}
-        if bare := [name for name in names if name not in told]:
+    stated = stated_types(names, types, topics)
+    if stated is not None:
+        stated = {
+            normalise_topic(topic): type_name for topic, type_name in stated.items()
+        }
+        if bare := [name for name in names if name not in stated]:
             raise ConfigError(
                 f"the type of {', '.join(bare)} is unknown: give it with --type, or "
                 f"add it to the list of --topics"
@@ -80,7 +82,7 @@ def record(
             normalise_url(url),
             out,
             only=names,
-            told=told,
+            stated=stated,
             wait=wait,
             duration=duration,
         )

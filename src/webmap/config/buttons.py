@@ -326,7 +326,7 @@ def _check_values(spec: ButtonSpec) -> None:
             checked(fields, spec.values)
         json.dumps(spec.values, allow_nan=False, ensure_ascii=False).encode()
     except Misfit as error:
-        raise ButtonMistake(f"{key}.{error.path}", error.words) from None
+        raise ButtonMistake(f"{key}.{error.path}", error.reason) from None
     except RecursionError:
         raise ButtonMistake(key, "it is nested too deeply") from None
     except (TypeError, ValueError) as error:

@@ -116,8 +116,8 @@ class Int8s(Numbers):
         return np.frombuffer(memoryview(self.values).toreadonly(), np.int8)
 
 
-def dec_hook(wanted: type, value: object) -> object:
+def dec_hook(expected: type, value: object) -> object:
     """Decode the fields of types unknown to msgspec; its ``dec_hook``."""
-    if isinstance(wanted, type) and issubclass(wanted, Numbers):
-        return wanted.from_wire(value)
-    raise NotImplementedError(f"a message cannot hold a {wanted!r}")
+    if isinstance(expected, type) and issubclass(expected, Numbers):
+        return expected.from_wire(value)
+    raise NotImplementedError(f"a message cannot hold a {expected!r}")

@@ -30,7 +30,7 @@ async def ask_topics(
 
     """
     deadline = time.monotonic() + wait
-    said = False
+    reported = False
     async with TemporaryBridge(url) as bridge:
         while True:
             try:
@@ -38,7 +38,7 @@ async def ask_topics(
             except BridgeClosed as error:
                 if time.monotonic() >= deadline:
                     raise
-                if not said:
+                if not reported:
                     waiting(error.why or str(error))
-                    said = True
+                    reported = True
             await asyncio.sleep(AGAIN)

@@ -168,7 +168,7 @@ class Bridge:
             throttle: Least time between two messages, in milliseconds; 0 gives every
                 message. WebMap asks the bridge for at least 1 ms; the bridge then
                 queues the messages of a burst.
-            decode: A type with the wanted fields; None for a plain dict.
+            decode: A type with the fields to decode; None for a plain dict.
             encoding: ``binary`` for a binary encoding, which keeps infinities and costs
                 a bridge less for large messages; ``text``; or ``raw`` for a mapping
                 with the serialized bytes of ROS. None uses a binary encoding for types
@@ -188,8 +188,8 @@ class Bridge:
         """
         self._link.refuse_if_over()
         name = normalise_topic(topic)
-        wanted = SubscriptionOptions(type, throttle, queue_length, encoding)
-        options = checked(wanted, callback, decode)
+        given = SubscriptionOptions(type, throttle, queue_length, encoding)
+        options = checked(given, callback, decode)
         if type is not None:
             split_type(type)
         entry = self._topics.get(name) or self._new_topic(name)
@@ -228,13 +228,17 @@ class Bridge:
         name = normalise_topic(topic)
         entry, before = self._topics.get(name), self._link.published_type(name)
         known = self._graph.known(name) or (entry.message_type if entry else None)
-        wanted = type or before or known
-        self._written.refuse_message(name, wanted, known)
-        if wanted is None:
-            raise BridgeError(f"{name}: say the message type the first time")
-        if before is not None and not same_type(before, wanted):
-            raise BridgeError(f"{name} is advertised as {before}, not as {wanted}")
-        self._link.publish(name, wanted, message)
+        published_as = type or before or known
+        self._written.refuse_message(name, published_as, known)
+        if published_as is None:
+            raise BridgeError(
+                f"{name}: the message type is unknown; pass type= the first time"
+            )
+        if before is not None and not same_type(before, published_as):
+            raise BridgeError(
+                f"{name} is advertised as {before}, not as {published_as}"
+            )
+        self._link.publish(name, published_as, message)
 
     def unadvertise(self, topic: str) -> None:
         """Stop publishing on ``topic``; no effect if it was not advertised."""
@@ -374,7 +378,7 @@ class Bridge:
         await self._faults.stop()
         if self._link.over is not None and self._topics:  # it still has listeners
             log.warning(
-                "%s: nothing more of %s", self._link.over, ", ".join(self._topics)
+                "%s; no more messages from %s", self._link.over, ", ".join(self._topics)
             )
             for topic in tuple(self._topics.values()):
                 topic.over(BridgeClosed(self._link.over))
@@ -382,8 +386,8 @@ class Bridge:
     def _end(self) -> None:
         """End for ever: the page or module that created this bridge has ended."""
         self._link.over = (
-            f"the link to {self.url} has ended with the page or the module that made "
-            "it: a bridge that others use, too, is made outside of both"
+            f"the connection to {self.url} ended with the page or the module that made "
+            "its bridge: if others use it too, create it outside of both"
         )
         lifecycle.end_service(self)
 

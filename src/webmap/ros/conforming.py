@@ -18,23 +18,23 @@ class Misfit(ConfigError):
     Attributes:
         path: Where the field is in the message: ``pose.position.x``, ``ranges[3]``;
             empty for the message as a whole.
-        words: The error message.
+        reason: What is wrong with the value.
         value: The value.
-        expected: What the field expects, in words; empty if there is no such field.
+        expected: The expected value, as a phrase; empty if there is no such field.
 
     """
 
     def __init__(
-        self, words: str, path: str = "", *, value: Any = None, expected: str = ""
+        self, reason: str, path: str = "", *, value: Any = None, expected: str = ""
     ) -> None:
-        super().__init__(words)
-        self.words = words
+        super().__init__(reason)
+        self.reason = reason
         self.path = path
         self.value = value
         self.expected = expected
 
     def __str__(self) -> str:
-        return f"{self.path}: {self.words}" if self.path else self.words
+        return f"{self.path}: {self.reason}" if self.path else self.reason
 
     def inside(self, place: str) -> "Misfit":
         """Return the same error, with ``place`` before the path."""
@@ -174,8 +174,8 @@ def _check_names(fields: Sequence[Field], value: Mapping[str, Any]) -> None:
     names = [field.name for field in fields]
     for name in value:
         if name not in names:
-            words = f"no such field; there are {', '.join(names) or 'none'}"
-            raise Misfit(words, str(name))
+            reason = f"no such field; there are {', '.join(names) or 'none'}"
+            raise Misfit(reason, str(name))
 
 
 def check_size(field: Field, value: Sized) -> None:
@@ -189,14 +189,14 @@ def check_size(field: Field, value: Sized) -> None:
     fixed = field.size is not None and count != field.size
     if fixed or (field.most is not None and count > field.most):
         expected = expectation(field)
-        words = f"got {count} values, expected {expected}"
-        raise Misfit(words, value=value, expected=expected)
+        reason = f"got {count} values, expected {expected}"
+        raise Misfit(reason, value=value, expected=expected)
 
 
 def wrong(value: Any, expected: str) -> Misfit:
     """Return the error for a value of the wrong kind."""
-    words = f"got {show(value)}, expected {expected}"
-    return Misfit(words, value=value, expected=expected)
+    reason = f"got {show(value)}, expected {expected}"
+    return Misfit(reason, value=value, expected=expected)
 
 
 def expectation(field: Field) -> str:

@@ -65,7 +65,7 @@ class FanOut:
         listeners = [each for each in listeners if not each.undecoded]
         if not listeners:
             return
-        if self._offload.wants(message):
+        if self._offload.is_needed(message):
             types = frozenset(listener.decode for listener in listeners)
             self._offload.decode(
                 message,

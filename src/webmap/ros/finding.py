@@ -21,7 +21,7 @@ class Finding:
     about: str
     """A robot's name, or :data:`BRIDGE`."""
 
-    words: str
+    text: str
     """The result, in a sentence."""
 
     advice: str = ""

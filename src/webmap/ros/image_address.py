@@ -54,7 +54,9 @@ def parse_address(text: str) -> Address:
 
     """
     if not isinstance(text, str) or not text.isascii() or not text.isprintable():
-        raise ConfigError(f"{_MEANT}; write what is not ASCII with %, got {text!r}")
+        raise ConfigError(
+            f"{_MEANT}; encode characters outside of ASCII with %, got {text!r}"
+        )
     try:
         parts = urlsplit(text)
         port = parts.port

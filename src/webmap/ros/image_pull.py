@@ -28,8 +28,8 @@ class Pull:
         address: Where the camera is.
         throttle: The least time between two pictures, in seconds.
         show: Called with each picture.
-        complain: Called with each failure, in words; after it the connection is tried
-            again until the pull is stopped.
+        complain: Called with the reason of each failure; afterwards WebMap connects
+            again, until the pull is stopped.
         patience: Longest time for the next complete picture, in seconds.
         backoff: The delays between attempts.
 
@@ -58,7 +58,7 @@ class Pull:
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Begin to connect and to download."""
-        self._task = loop.create_task(self._pull_on())
+        self._task = loop.create_task(self._pull_forever())
 
     async def stop(self) -> None:
         """Disconnect, and wait until that is done."""
@@ -73,20 +73,20 @@ class Pull:
         if task is not None:
             task.cancel()
 
-    async def _pull_on(self) -> None:
+    async def _pull_forever(self) -> None:
         now = asyncio.get_running_loop().time
         while True:
-            began, words = now(), None
+            began, reason = now(), None
             try:
                 streams = await self._pull()
             except (ProtocolError, OSError, UnicodeError) as error:
-                words = self._words(error)
+                reason = self._describe(error)
             else:
-                words = "it hung up" if streams else None
-            if words is None:
+                reason = "it closed the connection" if streams else None
+            if reason is None:
                 await asyncio.sleep(max(0.0, began + self._throttle - now()))
             else:
-                self._complain(words)
+                self._complain(reason)
                 await asyncio.sleep(self._backoff.next(now() - began))
 
     async def _pull(self) -> bool:
@@ -118,26 +118,26 @@ class Pull:
             except TimeoutError:
                 if not waits:
                     raise
-                self._hand_on(now())
+                self._show_newest(now())
                 continue
             pictures = answer.feed(data) if data else answer.end()
             if pictures:
                 self._newest, deadline = pictures[-1], now() + self._patience
             if answer.streams is False and pictures:
-                self._hand_on(now())
+                self._show_newest(now())
                 return False
             if not data:
                 return bool(answer.streams)
             if self._newest is not None and now() >= due:
-                self._hand_on(now())
+                self._show_newest(now())
 
-    def _hand_on(self, now: float) -> None:
+    def _show_newest(self, now: float) -> None:
         picture, self._newest = self._newest, None
         self._shown_at = now
         if picture is not None:
             self._show(picture)
 
-    def _words(self, error: Exception) -> str:
+    def _describe(self, error: Exception) -> str:
         if isinstance(error, ProtocolError):
             return str(error)
         if isinstance(error, TimeoutError):
@@ -150,7 +150,7 @@ class Pull:
         if isinstance(error, ssl.SSLCertVerificationError):
             return f"its certificate is not trusted: {error.verify_message}"
         if isinstance(error, ssl.SSLError):
-            return "what answers there does not speak TLS"
+            return "the server there does not speak TLS"
         return f"the connection failed: {getattr(error, 'strerror', None) or error}"
 
 
@@ -159,9 +159,9 @@ MAX_HEAD = 16_384
 
 _ENDS = (b"\r\n\r\n", b"\n\n")
 
-_WORDS = {
-    401: "it wants a user and a password; put them into the address, before the host",
-    403: "it does not let us",
+_STATUS_REASONS = {
+    401: "it requires a user and a password; write them before the host in the address",
+    403: "access is forbidden",
     404: "there is nothing at this address",
     503: "it has no picture now",
 }
@@ -215,11 +215,11 @@ class Answer:
 
         """
         if self.streams is None:
-            raise ProtocolError("it hung up without an answer")
+            raise ProtocolError("it closed the connection without an answer")
         if self.streams or not self._body:
             return []
         if self._length is not None:
-            raise ProtocolError("it hung up in the middle of a picture")
+            raise ProtocolError("it closed the connection in the middle of a picture")
         return [self._take(len(self._body))]
 
     def _take(self, length: int) -> bytes:
@@ -229,14 +229,14 @@ class Answer:
 
     def _read_head(self, head: bytes) -> None:
         first, *lines = head.decode("latin-1").splitlines() or [""]
-        words = first.split(None, 2)
+        parts = first.split(None, 2)
         if (
-            len(words) < 2
-            or not words[0].startswith("HTTP/")
-            or not words[1].isdecimal()
+            len(parts) < 2
+            or not parts[0].startswith("HTTP/")
+            or not parts[1].isdecimal()
         ):
-            raise ProtocolError("what answers there does not speak HTTP")
-        status = int(words[1][:4])
+            raise ProtocolError("the server there does not speak HTTP")
+        status = int(parts[1][:4])
         headers = {
             name.strip().lower(): value.strip()
             for name, _, value in (line.partition(":") for line in lines)
@@ -254,7 +254,7 @@ class Answer:
                 "themselves, not that of a page that shows them"
             )
         if headers.get("transfer-encoding", "identity").lower() != "identity":
-            raise ProtocolError("it answers in chunks, which were not asked for")
+            raise ProtocolError("it answers in chunks, which WebMap did not request")
         length = headers.get("content-length", "")
         if self._parts is None and length.isdecimal() and len(length) < 12:
             self._length = int(length)
@@ -266,12 +266,12 @@ class Answer:
 def _check_status(status: int) -> None:
     if 300 <= status < 400:
         raise ProtocolError(
-            f"it answers {status} and sends us elsewhere, which is not followed; give "
-            "the address where the pictures are"
+            f"it answers {status} and redirects to another address, which is not "
+            "followed; use the address of the pictures"
         )
     if status != 200:
-        words = _WORDS.get(status, "200 was expected")
-        raise ProtocolError(f"it answers {status}: {words}")
+        reason = _STATUS_REASONS.get(status, "200 was expected")
+        raise ProtocolError(f"it answers {status}: {reason}")
 
 
 def _plain(text: str) -> str:

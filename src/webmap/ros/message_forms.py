@@ -43,7 +43,9 @@ def _form_fields(
             continue  # in ROS 1 the publisher sets it
         budget[0] -= 1
         if budget[0] < 0:
-            raise ConfigError(f"{owner}: more than {MAX_FIELDS} fields are no form")
+            raise ConfigError(
+                f"{owner}: more than {MAX_FIELDS} fields are too many for a form"
+            )
         if field.fields is not None:
             inner = _form_fields(field.type, field.fields, budget)
             field = replace(field, fields=inner)
@@ -153,7 +155,7 @@ def _zero(field: Field) -> Any:
 def _from_entry(field: Field, entry: Any, path: str) -> Any:
     """Return the value of an entry; text that is not a number stays text."""
     if isinstance(entry, str) and len(entry) > MAX_TEXT:
-        raise Misfit(f"at most {MAX_TEXT} characters are taken", path)
+        raise Misfit(f"at most {MAX_TEXT} characters are allowed", path)
     if field.is_array and isinstance(entry, str):
         if field.fields is not None:
             return _json(entry, path)
@@ -166,7 +168,7 @@ def _json(entry: str, path: str) -> Any:
     try:
         return json.loads(entry or "[]")
     except (ValueError, RecursionError) as error:
-        raise Misfit(f"this is no JSON: {error}", path) from None
+        raise Misfit(f"this is not JSON: {error}", path) from None
 
 
 def _scalar_entry(field: Field, entry: Any) -> Any:

@@ -145,7 +145,7 @@ def size_of(data: bytes) -> tuple[int, int]:
     else:
         size = 0, 0
     if not (size[0] > 0 and size[1] > 0):
-        raise ProtocolError("a picture whose head does not say how many pixels it has")
+        raise ProtocolError("a picture without a size in its header")
     return size
 
 
@@ -227,14 +227,14 @@ class CompressedImageMsg(msgspec.Struct):
         media_type = _media_type(data)
         if media_type is None:
             raise ProtocolError(
-                f"a picture with the format {self.format!r} that is no JPEG, PNG or "
-                "WebP"
+                f"a picture with the format {self.format!r} that is not JPEG, PNG "
+                "or WebP"
             )
         width, height = size_of(data)
         if width * height > MAX_PIXELS:
             raise ProtocolError(
-                f"a picture of {width} x {height}, {MAX_PIXELS} pixels at most: let "
-                "the camera send a smaller one"
+                f"a picture of {width} x {height}, {MAX_PIXELS} pixels at most: "
+                "configure the camera for a smaller one"
             )
         return media_type
 

@@ -12,7 +12,7 @@ from weakref import WeakValueDictionary
 from webmap.base.errors import ConfigError, MotionRefused
 from webmap.ros.names import TypeName, is_type, split_type
 
-STOP = "what STOP says"
+STOP = "the STOP"
 """Kind of a topic that is a robot's stop hook."""
 
 INSTEAD = {
@@ -186,7 +186,7 @@ class WrittenByGate(dict[str, str]):
         if carried is not None:
             instead = INSTEAD.get(carried, "Robot.twist() or Robot.move()")
             raise MotionRefused(
-                f"{topic} carries {carried} of a robot, which the gate alone writes: "
+                f"{topic} carries {carried} of a robot, which only the gate publishes: "
                 f"use {instead}"
             )
         for type in types:

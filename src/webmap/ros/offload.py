@@ -258,7 +258,7 @@ class Offload:
         self._turn = asyncio.Lock()
         self._rests_until = 0.0
 
-    def wants(self, message: ReceivedMessage) -> bool:
+    def is_needed(self, message: ReceivedMessage) -> bool:
         """Return whether ``message`` must be decoded by the worker."""
         return len(message.frame) > LARGE or message.topic in self._waiting
 
@@ -272,7 +272,7 @@ class Offload:
 
         ``then`` is called once for each type, or once for each part of a ``separable``
         one. A newer message of the topic replaces a message that waits, and ends the
-        delivery of one that is delivered in parts.
+        delivery of a message in parts.
         """
         job = _Job(message, types, (then,))
         waiting = self._waiting.get(message.topic)
@@ -316,9 +316,9 @@ class Offload:
                 worker = _acquire(self)
                 reply = await worker.ask(request, message.frame)
                 self._rests_until = time.monotonic() + reply.seconds
-            await self._hand_over(job, type, reply, waiting, worker.taking_over)
+            await self._deliver_in_parts(job, type, reply, waiting, worker.taking_over)
 
-    async def _hand_over(
+    async def _deliver_in_parts(
         self,
         job: _Job,
         type: Any,

@@ -81,7 +81,7 @@ class Throttle(Generic[T]):
         if now < self._due:
             self._held = thing
             return None
-        return self._let_through(thing, now)
+        return self._release(thing, now)
 
     @property
     def due(self) -> float | None:
@@ -93,13 +93,13 @@ class Throttle(Generic[T]):
         held = self._held
         if held is None or now < self._due:
             return None
-        return self._let_through(held, now)
+        return self._release(held, now)
 
     def drop(self) -> None:
         """Forget the held message: its connection has ended."""
         self._held = None
 
-    def _let_through(self, thing: T, now: float) -> T:
+    def _release(self, thing: T, now: float) -> T:
         # Half a period of slack: a topic at exactly this rate has jitter, and a message
         # that comes 1 ms early must not delay every second one.
         self._due = max(self._due + self.period, now + self.period / 2)
@@ -296,7 +296,7 @@ class Topic:
         """Forget the faults of an earlier connection: a new one is open."""
         self.count = 0
         self._found.clear()
-        self._mend()
+        self._clear_fault()
 
     def link_lost(self) -> None:
         """Forget the messages of the connection that has ended."""
@@ -318,7 +318,7 @@ class Topic:
                 check_size(size, limit_of(type, views), type)
             except TooLarge as error:
                 self.failing.add(TooLarge)
-                self._find_out(error, None)
+                self._determine_reason(error, None)
                 return False
         self._latest = message
         if size > LARGE and self.replay is None:  # too large to keep for nothing
@@ -345,14 +345,14 @@ class Topic:
         other messages were decoded since, the known reason is shown again.
         """
         self.failing.add(decode)
-        self._find_out(error, decode)
+        self._determine_reason(error, decode)
 
     def silent(self) -> None:
         """Report that no messages come, as for a topic of another type."""
         self.failing.add(_Silence)
-        self._find_out(_Silence("nothing will come"), None)
+        self._determine_reason(_Silence("no messages come"), None)
 
-    def _find_out(
+    def _determine_reason(
         self, error: ProtocolError, decode: type[msgspec.Struct] | None
     ) -> None:
         kind = type(error)
@@ -389,14 +389,14 @@ class Topic:
     def _succeeds(self, decode: type[msgspec.Struct] | None) -> None:
         self.failing.discard(decode)
         if not self.failing:
-            self._mend()
+            self._clear_fault()
 
     def _show(self, fault: BridgeError) -> None:
         self._fault = fault
         for listener in tuple(self.listeners):
             listener.report(fault)
 
-    def _mend(self) -> None:
+    def _clear_fault(self) -> None:
         self._fault = None
         self.failing.clear()
         for listener in tuple(self.listeners):

@@ -50,8 +50,8 @@ class TopicFaults:
             return
         if isinstance(error, Unreadable):
             # The frame matches no type, so do not ask for the type.
-            words = "got a frame that was cut off, or is not one message"
-            self._found(topic, ProtocolError(f"{topic.name}: {words}: {error}"), error)
+            text = "got a frame that was cut off, or is not one message"
+            self._found(topic, ProtocolError(f"{topic.name}: {text}: {error}"), error)
             return
         self._begin(self._explain(topic, expected, error))
 
@@ -73,11 +73,11 @@ class TopicFaults:
 
     async def _explain(self, topic: Topic, expected: str, error: ProtocolError) -> None:
         got = await self._topic_type(topic.name)
-        said = f"the bridge says it is {got}" if got else "its type is not known"
-        words = f"expected {expected}, {said}"
+        actual = f"the bridge reports {got}" if got else "its type is not known"
+        text = f"expected {expected}, {actual}"
         if got and is_type(got, expected):
-            words = f"got what is no whole {got}, though the bridge says it is"
-        self._found(topic, ProtocolError(f"{topic.name}: {words}: {error}"), error)
+            text = f"the bridge reports {got}, but a field is missing or wrong"
+        self._found(topic, ProtocolError(f"{topic.name}: {text}: {error}"), error)
 
     def _found(self, topic: Topic, full: ProtocolError, error: ProtocolError) -> None:
         log.warning("%s: %s", self._name, full)
@@ -89,8 +89,8 @@ class TopicFaults:
         if topic.count or not topic.listeners:
             return
         got = await self._topic_type(topic.name)
-        wanted = topic.message_type
-        if got is None or wanted is None or topic.count or same_type(got, wanted):
+        stated = topic.message_type
+        if got is None or stated is None or topic.count or same_type(got, stated):
             return
         topic.silent()
 

@@ -38,7 +38,9 @@ def odometry_view(type: str) -> type[OdometryView]:
     view = ODOMETRY_VIEWS.get(str(split_type(type)))
     if view is None:
         known = ", ".join(ODOMETRY_VIEWS)
-        raise ConfigError(f"{type!r} does not say where a robot is; these do: {known}")
+        raise ConfigError(
+            f"{type!r} has no pose of a robot; these types have one: {known}"
+        )
     return view
 
 
@@ -58,5 +60,5 @@ def odometry_view_by_shape(message: Mapping[str, Any]) -> type[OdometryView]:
     known = ", ".join(ODOMETRY_VIEWS)
     raise ProtocolError(
         f"a message with the fields {', '.join(sorted(message))} "
-        f"says nowhere where a robot is; these types do: {known}"
+        f"has no pose of a robot; these types have one: {known}"
     )

@@ -28,15 +28,15 @@ async def _run(options: dict[str, Any]) -> None:
     if options.pop("until_eof"):
         end_with_stdin(stop)
     await run_simulator(
-        **options, on_http_camera=_say_cameras, on_ready=_say_ready, stop=stop
+        **options, on_http_camera=_print_cameras, on_ready=_print_ready, stop=stop
     )
 
 
-def _say_ready(url: str) -> None:
+def _print_ready(url: str) -> None:
     print(f"rosbridge is ready at {url}", flush=True)
 
 
-def _say_cameras(url: str) -> None:
+def _print_cameras(url: str) -> None:
     print(f"cameras are at {url}", file=sys.stderr, flush=True)
 
 

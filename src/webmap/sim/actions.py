@@ -104,15 +104,15 @@ class ActionlibServer:
         return {"stamp": stamp, "id": f"{self.topic}-{self._made}-{now:.3f}"}
 
     def _on_cancel(self, publication: Publication) -> None:
-        wanted, stamp = publication.message["id"], publication.message["stamp"]
+        goal_id, stamp = publication.message["id"], publication.message["stamp"]
         before = _seconds(stamp)
         for tracked in self._goals:
             # An empty id with a stamp: all goals up to it. No stamp: all goals.
-            everything = not wanted and not before
+            everything = not goal_id and not before
             earlier = before and _seconds(tracked.goal_id["stamp"]) <= before
-            if everything or earlier or (wanted and tracked.goal_id["id"] == wanted):
+            if everything or earlier or (goal_id and tracked.goal_id["id"] == goal_id):
                 self._cancel(tracked)
-        if not wanted and not before:
+        if not goal_id and not before:
             # A goal from the simple topic ends too.
             self.node.world.navigators[self.index].cancel("canceled")
 
@@ -152,7 +152,7 @@ _NAV2_STATUS = {
 }
 _UNKNOWN_STATUS = 0
 _FAILED = 9000
-_NOBODY = bytes(16)
+_ALL_GOALS = bytes(16)
 _ERROR_NONE, _ERROR_REJECTED, _ERROR_UNKNOWN_GOAL = 0, 1, 2
 
 OnFeedback = Callable[[dict[str, Any]], None]
@@ -208,16 +208,16 @@ class NavigateToPose:
 
     def _on_cancel(self, request: dict[str, Any], respond: Respond) -> None:
         info = request["goal_info"]
-        wanted = info["goal_id"]["uuid"]
-        chosen = [h for h in self._running.values() if wanted in (_NOBODY, h.uuid)]
+        goal_id = info["goal_id"]["uuid"]
+        chosen = [h for h in self._running.values() if goal_id in (_ALL_GOALS, h.uuid)]
         stamp = self.node.graph.schema.dialect.time(0)
         canceling = [
             {"goal_id": {"uuid": handle.uuid}, "stamp": stamp} for handle in chosen
         ]
         code = _ERROR_NONE
         if not chosen:
-            code = _ERROR_REJECTED if wanted == _NOBODY else _ERROR_UNKNOWN_GOAL
-        if wanted == _NOBODY:
+            code = _ERROR_REJECTED if goal_id == _ALL_GOALS else _ERROR_UNKNOWN_GOAL
+        if goal_id == _ALL_GOALS:
             # A goal from a topic ends too.
             self.node.world.navigators[self.index].cancel("canceled")
         for handle in chosen:

@@ -143,7 +143,7 @@ class Navigator:
         pose = self.robot.pose
         if self._search is None:
             if self._plans >= _MOST_PLANS:
-                self._end(GoalState.ABORTED, "no way through")
+                self._end(GoalState.ABORTED, "no path to the goal")
                 return
             self._plans += 1
             radius = self.robot.options.radius
@@ -210,14 +210,14 @@ class Navigator:
 
     def _must_wait(self, here: Point, corner: Point, discs: Discs) -> bool:
         """Whether another robot is on the next metre of the path."""
-        way = math.dist(here, corner)
+        distance = math.dist(here, corner)
         x, y = corner[0] - here[0], corner[1] - here[1]
         for disc_x, disc_y, radius in discs:
             to_x, to_y = disc_x - here[0], disc_y - here[1]
-            along = (to_x * x + to_y * y) / way if way else 0.0
-            if not 0 < along < way + radius:
+            along = (to_x * x + to_y * y) / distance if distance else 0.0
+            if not 0 < along < distance + radius:
                 continue
-            aside = abs(to_x * y - to_y * x) / way
+            aside = abs(to_x * y - to_y * x) / distance
             near = radius + self.robot.options.radius + _GAP
             if aside < near and along < near + _BRAKING:
                 return True

@@ -181,16 +181,16 @@ class RobotsNode(Node):
 
     def _publish_scans(self) -> None:
         robots = self.world.robots
-        wanted = [
+        subscribed = [
             i
             for i, robot in enumerate(robots)
             if self.graph.is_wanted(f"{robot.topics}/base_scan")
         ]
-        if not wanted:
+        if not subscribed:
             return
         now = self.graph.clock()
         options = self.world.options.scanner
-        for i, ranges in zip(wanted, self.world.sweep(wanted), strict=True):
+        for i, ranges in zip(subscribed, self.world.sweep(subscribed), strict=True):
             if self.tilted:
                 ranges = overhead(ranges)
             topic = f"{robots[i].topics}/base_scan"

@@ -120,21 +120,21 @@ async def run_simulator(
         if http_camera is not None:
             video = WebVideoServer(graph)
             running.push_async_callback(video.stop)
-            with _said_in_words(host, http_camera):
+            with _port_errors_explained(host, http_camera):
                 url = await video.start(host, http_camera)
             if on_http_camera:
                 topic = f"{world.robots[0].topics}/{IMAGE}"
                 on_http_camera(f"{url}/stream?topic={topic}&type=mjpeg")
         running.push_async_callback(server.stop)
-        with _said_in_words(host, port):
+        with _port_errors_explained(host, port):
             url = await server.start(host, port)
         if on_ready:
             on_ready(url)
-        await _turn_the_clock(node, stop)
+        await _run_clock(node, stop)
 
 
 @contextlib.contextmanager
-def _said_in_words(host: str, port: int) -> Iterator[None]:
+def _port_errors_explained(host: str, port: int) -> Iterator[None]:
     """Turn the error of a port that cannot be opened into one sentence."""
     try:
         yield
@@ -153,7 +153,7 @@ def _check(robots: int, dialect: str, twist: str, robot_timeout: float | None) -
         raise ConfigError(f"robot_timeout must be above 0, got {robot_timeout}")
 
 
-async def _turn_the_clock(node: "RobotsNode", stop: asyncio.Event) -> None:
+async def _run_clock(node: "RobotsNode", stop: asyncio.Event) -> None:
     from webmap.sim.node import STEP
 
     loop = asyncio.get_running_loop()
@@ -163,7 +163,7 @@ async def _turn_the_clock(node: "RobotsNode", stop: asyncio.Event) -> None:
         due += STEP
         late = loop.time() - due
         if late > 1:
-            log.warning("the simulator is %.1f s behind: that time is left out", late)
+            log.warning("the simulator is %.1f s late: it skips that time", late)
             due = loop.time()
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(max(due - loop.time(), 0)):

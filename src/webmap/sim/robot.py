@@ -116,12 +116,18 @@ class Robot:
             is_blocked: Returns whether an obstacle blocks the base at a position.
 
         """
-        wanted = self._wanted(now)
+        target_twist = self._commanded(now)
         limits = self.options
         before = self.twist
-        vx = _towards(before.vx, wanted.vx, limits.v_max, limits.acceleration * dt)
-        wz = _towards(before.wz, wanted.wz, limits.w_max, limits.turn_acceleration * dt)
-        vz = _towards(before.vz, wanted.vz, limits.z_max, limits.acceleration * dt)
+        vx = _towards(
+            before.vx, target_twist.vx, limits.v_max, limits.acceleration * dt
+        )
+        wz = _towards(
+            before.wz, target_twist.wz, limits.w_max, limits.turn_acceleration * dt
+        )
+        vz = _towards(
+            before.vz, target_twist.vz, limits.z_max, limits.acceleration * dt
+        )
         self.height += (before.vz + vz) / 2 * dt
         # The mean of a ramp: a command of 1 m/s for 1 s moves 1 m, ramps included.
         ahead = (before.vx + vx) / 2 * dt
@@ -136,7 +142,7 @@ class Robot:
         self._measure(ahead, turn)
         self._drain(dt)
 
-    def _wanted(self, now: float) -> Twist:
+    def _commanded(self, now: float) -> Twist:
         if self._command is not None:
             if now - self._commanded_at <= self._holds_for(self._command):
                 return self._command
@@ -153,9 +159,9 @@ class Robot:
         if not drift:
             self.odometry = self.pose
             return
-        way = abs(ahead)
-        ahead += way * drift * self._random.gauss(0.5, 1)
-        turn += way * drift / 2 * self._random.gauss(0.5, 1)
+        distance = abs(ahead)
+        ahead += distance * drift * self._random.gauss(0.5, 1)
+        turn += distance * drift / 2 * self._random.gauss(0.5, 1)
         self.odometry = self.odometry @ _arc(ahead, turn)
 
     def _drain(self, dt: float) -> None:
@@ -165,9 +171,9 @@ class Robot:
         self.charge = max(self.charge - used, _LOWEST_CHARGE)
 
 
-def _towards(now: float, wanted: float, limit: float, change: float) -> float:
-    wanted = max(-limit, min(limit, wanted))
-    return max(now - change, min(now + change, wanted))
+def _towards(now: float, target: float, limit: float, change: float) -> float:
+    target = max(-limit, min(limit, target))
+    return max(now - change, min(now + change, target))
 
 
 def _arc(ahead: float, turn: float) -> Pose:

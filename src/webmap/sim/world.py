@@ -177,12 +177,12 @@ class World:
         A nonzero command ends the robot's goal; a zero command only stops the robot.
         """
         robot = self.robots[index]
-        taken = robot.command(twist, self.now)
-        if taken and not twist.is_zero:
+        accepted = robot.command(twist, self.now)
+        if accepted and not twist.is_zero:
             self.navigators[index].cancel("a client drives")
-        if taken:
+        if accepted:
             self._idle_since[index] = self.now
-        return taken
+        return accepted
 
     def send_goal(self, index: int, goal: Goal) -> None:
         """Send a robot to a goal."""
@@ -278,10 +278,10 @@ class World:
         """Return the heading with the longest free distance."""
         yaws = np.arange(8) * math.tau / 8 - math.pi
         ones = np.ones(8)
-        ways = cast_rays(
+        distances = cast_rays(
             self.obstacles, x * ones, y * ones, np.cos(yaws), np.sin(yaws), 12.0
         )
-        return float(yaws[int(np.argmax(np.minimum(ways, 12.0)))])
+        return float(yaws[int(np.argmax(np.minimum(distances, 12.0)))])
 
     def _wander(self) -> None:
         for i, navigator in enumerate(self.navigators):

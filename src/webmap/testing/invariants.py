@@ -91,14 +91,14 @@ def check_invariants(
         causes: When zeros may start again: a STOP, or a new connection.
 
     """
-    told = list(log)
-    if not told:
+    velocities = list(log)
+    if not velocities:
         return []
     story = Story(quiet, handovers, unreachable, causes)
     bounds = bounds or Bounds()
-    wrong = [found for rule in RULES for found in rule(told, bounds, story)]
-    begin = told[0].at
-    return [f"{at - begin:.3f} s: {words}" for at, words in sorted(wrong)]
+    wrong = [found for rule in RULES for found in rule(velocities, bounds, story)]
+    begin = velocities[0].at
+    return [f"{at - begin:.3f} s: {text}" for at, text in sorted(wrong)]
 
 
 Finding = tuple[float, str]
@@ -106,17 +106,23 @@ Finding = tuple[float, str]
 
 def _limits(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
     """Every velocity is finite and within the limits."""
-    for told in log:
-        if not told.twist.is_finite:
-            yield told.at, f"{told.twist} is not finite"
-        elif told.speed > bounds.v_max * (1 + 1e-9):
-            yield told.at, f"{told.speed:g} m/s is above the limit of {bounds.v_max:g}"
-        elif told.twist.turn > bounds.w_max * (1 + 1e-9):
-            turn = told.twist.turn
-            yield told.at, f"{turn:g} rad/s is above the limit of {bounds.w_max:g}"
-        elif abs(told.twist.vz) > bounds.z_max * (1 + 1e-9):
-            z = told.twist.vz
-            yield told.at, f"{z:g} m/s upward is above the limit of {bounds.z_max:g}"
+    for velocity in log:
+        if not velocity.twist.is_finite:
+            yield velocity.at, f"{velocity.twist} is not finite"
+        elif velocity.speed > bounds.v_max * (1 + 1e-9):
+            yield (
+                velocity.at,
+                f"{velocity.speed:g} m/s is above the limit of {bounds.v_max:g}",
+            )
+        elif velocity.twist.turn > bounds.w_max * (1 + 1e-9):
+            turn = velocity.twist.turn
+            yield velocity.at, f"{turn:g} rad/s is above the limit of {bounds.w_max:g}"
+        elif abs(velocity.twist.vz) > bounds.z_max * (1 + 1e-9):
+            z = velocity.twist.vz
+            yield (
+                velocity.at,
+                f"{z:g} m/s upward is above the limit of {bounds.z_max:g}",
+            )
 
 
 def _quiet(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
@@ -138,14 +144,14 @@ def _last_is_zero(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Fin
     If the robot was unreachable then, the first velocity that reaches it later is
     zero, except for the few that the connection had already buffered.
     """
-    for index, told in enumerate(log):
+    for index, velocity in enumerate(log):
         following = log[index + 1] if index + 1 < len(log) else None
-        over = following is None or following.at - told.at > BREATH + bounds.slack
-        if told.is_zero or not over:
+        over = following is None or following.at - velocity.at > BREATH + bounds.slack
+        if velocity.is_zero or not over:
             continue
         until = math.inf if following is None else following.at
-        if not any(b < until and e > told.at for b, e in story.unreachable):
-            yield told.at, "an activity ended with a velocity that is not zero"
+        if not any(b < until and e > velocity.at for b, e in story.unreachable):
+            yield velocity.at, "an activity ended with a velocity that is not zero"
             continue
         late = list(itertools.takewhile(lambda t: not t.is_zero, log[index + 1 :]))
         if len(late) > bounds.late:
@@ -169,16 +175,16 @@ def _silence(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]
     """Zeros end after a limited time, so that other programs can publish."""
     begun = -math.inf
     was_moving = True
-    for told in log:
-        if not told.is_zero:
+    for velocity in log:
+        if not velocity.is_zero:
             was_moving = True
             continue
         if was_moving:
-            begun, was_moving = told.at, False
-        cause = max((c for c in story.causes if c <= told.at), default=-math.inf)
-        lasted = told.at - max(begun, cause)
+            begun, was_moving = velocity.at, False
+        cause = max((c for c in story.causes if c <= velocity.at), default=-math.inf)
+        lasted = velocity.at - max(begun, cause)
         if lasted > bounds.zeros + bounds.slack:
-            yield told.at, f"zeros go on {lasted:.3f} s after the robot was stopped"
+            yield velocity.at, f"zeros go on {lasted:.3f} s after the robot was stopped"
             return
 
 
@@ -187,14 +193,15 @@ def _ramp(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
     if bounds.a_max is None:
         return
     before, at = 0.0, -math.inf
-    for told in log:
-        elapsed = min(told.at - at, RAMP_INTERVAL) + bounds.slack
-        if told.speed - before > bounds.a_max * elapsed + 1e-9:
+    for velocity in log:
+        elapsed = min(velocity.at - at, RAMP_INTERVAL) + bounds.slack
+        if velocity.speed - before > bounds.a_max * elapsed + 1e-9:
             yield (
-                told.at,
-                f"from {before:g} to {told.speed:g} m/s in {told.at - at:.3f} s",
+                velocity.at,
+                f"from {before:g} to {velocity.speed:g} m/s in "
+                f"{velocity.at - at:.3f} s",
             )
-        before, at = told.speed, told.at
+        before, at = velocity.speed, velocity.at
 
 
 RULES: tuple[Callable[[list[Told], Bounds, Story], Iterator[Finding]], ...] = (

@@ -71,9 +71,9 @@ class WitnessLog:
     def of(self, op: str, topic: str | None = None) -> list[Heard]:
         """Return the messages with an operation, and with a topic if given."""
         return [
-            heard
-            for heard in list(self.heard)
-            if heard.op == op and topic in (None, heard.topic)
+            message
+            for message in list(self.heard)
+            if message.op == op and topic in (None, message.topic)
         ]
 
     def first_zero(self, since: float) -> float | None:
@@ -101,13 +101,13 @@ class WitnessLog:
         return rest
 
 
-Noted = TypeVar("Noted", Told, Moved)
+Record = TypeVar("Record", Told, Moved)
 
 
-def _from(noted: list[Noted], since: float) -> list[Noted]:
+def _from(records: list[Record], since: float) -> list[Record]:
     """Return the records since a time.
 
     A log grows for the lifetime of a robot, and waiting tests read it repeatedly in the
     process of the witness: old records must cost nothing.
     """
-    return noted[bisect_left(noted, since, key=lambda one: one.at) :]
+    return records[bisect_left(records, since, key=lambda record: record.at) :]

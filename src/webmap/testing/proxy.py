@@ -112,7 +112,7 @@ class FaultProxy:
         self._tasks: set[asyncio.Task[None]] = set()
         self._writers: list[asyncio.StreamWriter] = []
         self._refusing = False
-        self._ways, self._server, self.port = self._thread.call(self._listen())
+        self._directions, self._server, self.port = self._thread.call(self._listen())
 
     def __enter__(self) -> "FaultProxy":
         return self
@@ -138,12 +138,16 @@ class FaultProxy:
     async def _listen(
         self,
     ) -> tuple[dict[str, Direction], asyncio.Server, int]:
-        ways = {"up": Direction(1), "down": Direction(2)}
+        directions = {"up": Direction(1), "down": Direction(2)}
         server = await asyncio.start_server(self._accept, "127.0.0.1", 0)
-        return ways, server, server.sockets[0].getsockname()[1]
+        return directions, server, server.sockets[0].getsockname()[1]
 
     def _choose(self, way: Way) -> list[Direction]:
-        return list(self._ways.values()) if way == "both" else [self._ways[way]]
+        return (
+            list(self._directions.values())
+            if way == "both"
+            else [self._directions[way]]
+        )
 
     # Faults; each takes effect before the call returns.
 
@@ -220,7 +224,7 @@ class FaultProxy:
             _reset(writer)
             return
         self._writers.append(far[1])
-        link = _Link((reader, writer), far, self._ways)
+        link = _Link((reader, writer), far, self._directions)
         self._links.add(link)
         try:
             await link.run()
@@ -231,12 +235,14 @@ class FaultProxy:
 class _Link:
     """One connection through the proxy."""
 
-    def __init__(self, near: Stream, far: Stream, ways: dict[str, Direction]) -> None:
+    def __init__(
+        self, near: Stream, far: Stream, directions: dict[str, Direction]
+    ) -> None:
         self._task = asyncio.current_task()
         self._writers = [near[1], far[1]]
         self._pumps = {
-            "up": _Pump(near[0], far[1], ways["up"]),
-            "down": _Pump(far[0], near[1], ways["down"]),
+            "up": _Pump(near[0], far[1], directions["up"]),
+            "down": _Pump(far[0], near[1], directions["down"]),
         }
 
     async def run(self) -> None:

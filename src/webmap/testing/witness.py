@@ -16,7 +16,7 @@ from webmap.sim.robot import BaseOptions, Robot
 from webmap.testing.log import Heard, Moved, Told, WitnessLog
 from webmap.testing.loop_thread import LoopThread
 
-Hear = Callable[[int, dict[str, Any]], None]
+OnMessage = Callable[[int, dict[str, Any]], None]
 
 
 class Socket:
@@ -32,15 +32,15 @@ class Socket:
 class WitnessBridge:
     """A rosbridge server that reports every message before it processes it.
 
-    The messages of one socket are processed in order, as in rosbridge, so one that
-    hangs delays all later ones while pings are still answered.
+    The messages of one socket are processed in order, as in rosbridge, so a message
+    that hangs delays all later ones while pings are still answered.
 
     Args:
-        hear: Called with the number of the socket and the message.
+        on_message: Called with the number of the socket and the message.
 
     """
 
-    def __init__(self, hear: Hear) -> None:
+    def __init__(self, on_message: OnMessage) -> None:
         self.answers_services = True
         """Whether calls are answered; else they hang, with all later messages of the
         socket."""
@@ -51,7 +51,7 @@ class WitnessBridge:
         self.publishers: dict[str, list[str]] = {}
         """The nodes that rosapi lists as publishers of a topic."""
         self.port = 0
-        self._hear = hear
+        self._on_message = on_message
         self._sockets: dict[int, Socket] = {}
         self._count = 0
         self._server: Server | None = None
@@ -100,14 +100,14 @@ class WitnessBridge:
         try:
             async for frame in connection:
                 for message in _read(frame):
-                    self._hear(socket.number, message)
-                    await self._obey(socket, message)
+                    self._on_message(socket.number, message)
+                    await self._process(socket, message)
         except ConnectionClosed:
             pass
         finally:
             del self._sockets[socket.number]
 
-    async def _obey(self, socket: Socket, message: dict[str, Any]) -> None:
+    async def _process(self, socket: Socket, message: dict[str, Any]) -> None:
         topic = str(message.get("topic"))
         match message.get("op"):
             case "subscribe":
@@ -205,7 +205,7 @@ class WitnessRobot:
         )
         self._base = Robot("", Pose(), options)
         self._thread = LoopThread("witness-robot")
-        self._bridge = self._thread.do(WitnessBridge, self._hear)
+        self._bridge = self._thread.do(WitnessBridge, self._on_message)
         self._bridge.goals_block = goals_block
         self._bridge.types = {
             self.TWIST_TOPIC: "geometry_msgs/Twist",
@@ -260,7 +260,7 @@ class WitnessRobot:
         """Publish a message to all subscribers of a topic."""
         self._thread.call(self._bridge.publish(topic, message))
 
-    def _hear(self, link: int, message: dict[str, Any]) -> None:
+    def _on_message(self, link: int, message: dict[str, Any]) -> None:
         now = time.monotonic()
         self.log.heard.append(Heard(now, link, message))
         if message.get("op") != "publish" or message.get("topic") != self.TWIST_TOPIC:

@@ -117,7 +117,9 @@ def test_many_frames_are_not_all_listed():
 
 def test_two_trees_are_said_with_their_roots(robot):
     robot.add("world_2", "odom_2", at(0), 10.0)
-    with pytest.raises(NotConnected, match="tree of 'map', the other in that of 'wor"):
+    with pytest.raises(
+        NotConnected, match="tree of 'map', 'odom_2' in the tree of 'wor"
+    ):
         robot.lookup("odom_2", "laser")
 
 

@@ -36,7 +36,7 @@ def report(url: str, findings: Sequence[Finding]) -> str:
         if finding.about != about:
             about = finding.about
             lines += ["", one_line(about)]
-        lines.append(f"  {MARKS[finding.level]:<8} {one_line(finding.words)}")
+        lines.append(f"  {MARKS[finding.level]:<8} {one_line(finding.text)}")
         if finding.advice:
             lines.append(f"           -> {one_line(finding.advice)}")
     counts = Counter(finding.level for finding in findings)

@@ -232,7 +232,7 @@ class FormView:
         while path and path not in self._errors:
             path = path[: max(path.rfind("."), path.rfind("["), 0)]
         if path:
-            self._errors[path].text = error.words
+            self._errors[path].text = error.reason
             self._inputs[path].set("aria-invalid", "true")
 
     def _fill(self, parent: Element, fields: Sequence[Field], outer: str) -> None:

@@ -161,7 +161,7 @@ def groups(findings: Sequence["Finding"]) -> "Iterator[Element]":
 def line(finding: "Finding") -> "Element":
     """Return one finding: a shape, a word, the fact, and the advice."""
     return entry(
-        finding.level, f"{LEVEL_NAMES[finding.level]}: ", finding.words, finding.advice
+        finding.level, f"{LEVEL_NAMES[finding.level]}: ", finding.text, finding.advice
     )
 
 

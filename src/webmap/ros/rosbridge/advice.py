@@ -6,18 +6,18 @@ from urllib.parse import urlsplit
 from webmap.ros.finding import BRIDGE, Finding
 from webmap.ros.rosbridge.checks import LinkFacts, is_loopback
 
-_AWAY = (
+_UNREACHABLE = (
     (
         "name is not known",
-        "Look how the host is spelled, or give its number, as in ws://192.168.1.20:9090.",
+        "Check how the host is spelled, or use its number, as in ws://192.168.1.20:9090.",
     ),
     (
         "nothing listens",
-        "Start rosbridge_server on the robot, and look at its address and port.",
+        "Start rosbridge_server on the robot, and check its address and port.",
     ),
     (
         "",
-        "Start rosbridge_server on the robot, and look at address and firewall.",
+        "Start rosbridge_server on the robot, and check address and firewall.",
     ),
 )
 """Advice by a part of the reason; the last entry fits any reason."""
@@ -29,7 +29,7 @@ def unreachable(trouble: str) -> Finding:
         "wrong",
         BRIDGE,
         f"The rosbridge cannot be reached: {trouble}.",
-        next(advice for words, advice in _AWAY if words in trouble),
+        next(advice for reason, advice in _UNREACHABLE if reason in trouble),
     )
 
 
@@ -44,9 +44,9 @@ def topics_not_listed(trouble: str, otherwise: str) -> Finding:
     return Finding(
         "warning" if otherwise else "note",
         BRIDGE,
-        f"rosapi does not say which topics there are: {trouble}.",
-        "Start the rosapi node beside rosbridge. Without it nobody tells who else "
-        "writes velocity, and robots that come later are not found."
+        f"rosapi does not list the topics: {trouble}.",
+        "Start the rosapi node beside rosbridge. Without it WebMap does not see "
+        "which other programs publish velocity, and finds no robot that is added later."
         + (f" {otherwise}" if otherwise else ""),
     )
 
@@ -65,7 +65,7 @@ def openness(
     """
     parts = urlsplit(url)
     hidden = (
-        f" Nothing is hidden from anybody either ({', '.join(shown)} is shown)."
+        f" No topic is hidden from its clients ({', '.join(shown)} is shown)."
         if shown
         else ""
     )
@@ -78,28 +78,29 @@ def openness(
             "warning",
             BRIDGE,
             f"The rosbridge is on this machine and listens at {', '.join(outward)}: it "
-            f"asks nobody who they are, so whoever reaches this machine can drive.",
+            f"has no sign-in, so everybody who reaches this machine can drive.",
             _listen_advice(dialect, "this machine alone (address: 127.0.0.1)"),
         )
     if here:
         return Finding(
             "note",
             BRIDGE,
-            "The rosbridge was reached at an address of this machine; whether others "
-            "reach it too cannot be seen.",
+            "The rosbridge was reached at an address of this machine; WebMap "
+            "cannot see whether other machines reach it too.",
         )
     secret = (
-        "the way there is encrypted"
+        "the connection is encrypted"
         if parts.scheme == "wss"
-        else "everybody on the way can read and change what is sent"
+        else "everybody on the network can read and change the messages"
     )
     return Finding(
         "note" if parts.scheme == "wss" else "warning",
         BRIDGE,
         f"The rosbridge is open to the network ({facts.peer or parts.hostname}): it "
-        f"asks nobody who they are, so whoever reaches it can drive; {secret}.{hidden}",
-        f"{_listen_advice(dialect, 'the robot alone or on a VPN (address)')} Hide what "
-        f"nobody needs (topics_glob, services_glob), and use wss with a certificate.",
+        f"has no sign-in, so everybody who reaches it can drive; {secret}.{hidden}",
+        f"{_listen_advice(dialect, 'the robot alone or on a VPN (address)')} Hide "
+        "topics and services that no client needs (topics_glob, services_glob), and "
+        "use wss with a certificate.",
     )
 
 
@@ -110,7 +111,7 @@ def _listen_advice(dialect: str | None, where: str) -> str:
             "Close its port for others in the firewall: rosbridge 0.11 for ROS 1 "
             "listens on all addresses, whatever its parameter address is."
         )
-    return f"Let it listen on {where}, or close its port in the firewall."
+    return f"Configure it to listen on {where}, or close its port in the firewall."
 
 
 def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
@@ -126,7 +127,7 @@ def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
         "Set call_services_in_new_thread: true on rosbridge_websocket. WebMap sends "
         "velocity and calls over different sockets in any case."
     )
-    how = " (tried)" if facts.tried else ", as the bridge says"
+    how = " (tried)" if facts.tried else ", by its parameter"
     if facts.calls_in_threads is True:
         return Finding("good", BRIDGE, f"A service that hangs blocks no socket{how}.")
     if facts.calls_in_threads is False:
@@ -136,12 +137,12 @@ def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
             f"A service that hangs blocks its whole socket{how}.",
             advice,
         )
-    if facts.untold:
+    if facts.no_result:
         return Finding(
             "note",
             BRIDGE,
             f"Whether a service that hangs blocks its socket was tried, and is not "
-            f"known: {facts.untold}.",
+            f"known: {facts.no_result}.",
         )
     if dialect is None:
         return Finding(
@@ -154,15 +155,15 @@ def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
             "note",
             BRIDGE,
             "A service that hangs may block its whole socket, as rosbridge for ROS 2 "
-            "does unless told otherwise; it was not tried.",
+            "does by default; it was not tried.",
             f"The button Try a call of the console's report finds out, or webmap "
             f"doctor {url} --try-call. {advice}",
         )
     return Finding(
         "good",
         BRIDGE,
-        "rosbridge for ROS 1 makes each call in a thread of its own, so one that hangs "
-        "blocks nothing.",
+        "rosbridge for ROS 1 makes each call in a thread of its own, so a call that "
+        "hangs blocks nothing.",
     )
 
 
@@ -174,14 +175,14 @@ def compression(facts: LinkFacts, packed: Sequence[str]) -> Finding:
         packed: The scans that came in a binary encoding.
 
     """
-    words = (
+    text = (
         "The socket could be compressed"
         if facts.deflate
         else "No compression is offered"
     )
     if packed:
-        words = f"Scans come packed as CBOR ({', '.join(packed)}). {words}"
-    return Finding("good", BRIDGE, f"{words}; WebMap does without.")
+        text = f"Scans come packed as CBOR ({', '.join(packed)}). {text}"
+    return Finding("good", BRIDGE, f"{text}; WebMap does not need it.")
 
 
 def too_large(robot: str, topic: str, size: int) -> Finding:

@@ -101,8 +101,8 @@ class _CallsLane:
         if self._unreadable is None:
             return f"{service} did not answer within {patience:g} s"
         return (
-            f"{service}: no answer that can be read within {patience:g} s; the bridge "
-            f"sent what is not rosbridge: {self._unreadable}"
+            f"{service}: no readable answer within {patience:g} s; the bridge sent "
+            f"data that is not rosbridge: {self._unreadable}"
         )
 
     async def ask(self, id: str, frame: bytes) -> ServiceResponse:
@@ -151,4 +151,6 @@ class _CallsLane:
         if isinstance(event, ServiceResponse):
             answer.set_result(event)
         elif event.level == "error":
-            answer.set_exception(ServiceError(f"the bridge says: {event.msg}"))
+            answer.set_exception(
+                ServiceError(f"the bridge reports an error: {event.msg}")
+            )

@@ -63,7 +63,7 @@ class LinkFacts:
     tried: bool = False
     """Whether a hanging call was tried, and not only the parameter read."""
 
-    untold: str = ""
+    no_result: str = ""
     """Why the try gave no result; empty if it did, or if there was none."""
 
     too_large: Mapping[str, int] = field(default_factory=dict)
@@ -123,16 +123,14 @@ async def tried_a_call(facts: LinkFacts, url: str) -> LinkFacts:
         return not_tried(facts, str(error) or type(error).__name__)
     if free is None:
         return not_tried(facts, "the bridge offers no services of its clients")
-    return replace(facts, calls_in_threads=free, tried=True, untold="")
+    return replace(facts, calls_in_threads=free, tried=True, no_result="")
 
 
-def not_tried(
-    facts: LinkFacts, why: str = "it takes a rosapi that answers"
-) -> LinkFacts:
+def not_tried(facts: LinkFacts, why: str = "rosapi does not answer") -> LinkFacts:
     """Return the facts after a call could not be tried."""
     if facts.tried:  # the earlier result may be outdated
         facts = replace(facts, calls_in_threads=None, tried=False)
-    return replace(facts, untold=why)
+    return replace(facts, no_result=why)
 
 
 def came_in_parts(message: ReceivedMessage) -> bool:
@@ -263,8 +261,8 @@ def is_loopback(address: str) -> bool:
 
 def _address(text: str) -> str:
     """Parse an address of the kernel's tables, 32-bit groups in native byte order."""
-    words = [text[i : i + 8] for i in range(0, len(text), 8)]
-    packed = b"".join(struct.pack("=I", int(word, 16)) for word in words)
+    groups = [text[i : i + 8] for i in range(0, len(text), 8)]
+    packed = b"".join(struct.pack("=I", int(group, 16)) for group in groups)
     return str(ipaddress.ip_address(packed))
 
 

@@ -40,7 +40,7 @@ MOST_FRAGMENTS = 4096
 MESSAGE_TOO_BIG = 1009
 """The close code for a message of too many fragments."""
 
-CLOSED_HERE = "the link was closed here"
+CLOSED_HERE = "WebMap closed the connection"
 
 
 class Lane:
@@ -117,12 +117,15 @@ class Lane:
 
         """
         if self.state == "new":
-            raise BridgeClosed(f"the link to {self.url} was never opened")
+            raise BridgeClosed(f"the connection to {self.url} was never opened")
         if self.state != "open":
-            raise BridgeClosed(f"the link to {self.url} is not open ({self.state})")
+            raise BridgeClosed(
+                f"the connection to {self.url} is not open ({self.state})"
+            )
         if self._unsent_size + len(frame) > MAX_UNSENT:
             raise BridgeClosed(
-                f"the link to {self.url} is stuck: {self._unsent_size} bytes unsent"
+                f"the connection to {self.url} accepts no more data: "
+                f"{self._unsent_size} bytes are not sent yet"
             )
         self._unsent.append(frame)
         self._unsent_size += len(frame)
@@ -153,7 +156,7 @@ class Lane:
         try:
             reason = await self._serve(link)
         except asyncio.CancelledError:
-            await _say_farewell(link)
+            await _close(link)
             raise
         finally:
             self._forget_link(link)
@@ -173,7 +176,7 @@ class Lane:
             while True:
                 frame = await _whole_message(socket)
                 self.last_heard = time.monotonic()
-                self._hand_over(frame)
+                self._deliver(frame)
                 if len(frame) > LARGE:
                     await asyncio.sleep(len(frame) / RATE)
                 count += 1
@@ -188,7 +191,7 @@ class Lane:
             writing.cancel()
             await asyncio.wait([keeping, writing])
 
-    def _hand_over(self, frame: bytes | bytearray) -> None:
+    def _deliver(self, frame: bytes | bytearray) -> None:
         try:
             self._received(frame)
         except Exception:
@@ -223,7 +226,7 @@ class Lane:
             while not liveness.is_dead(
                 time.monotonic(), _bytes_came(socket), busy=self._busy()
             ):
-                if liveness.wants_ping(time.monotonic()):
+                if liveness.is_ping_due(time.monotonic()):
                     liveness.pinged(time.monotonic())
                     pinging = {asyncio.create_task(self._ping(socket, liveness))}
                 await asyncio.sleep(LOOK_PERIOD)
@@ -295,7 +298,7 @@ def _bytes_came(socket: "ClientConnection") -> float:
     return float(getattr(socket, "bytes_came", -inf))
 
 
-async def _say_farewell(socket: "ClientConnection") -> None:
+async def _close(socket: "ClientConnection") -> None:
     with suppress(TimeoutError):
         async with asyncio.timeout(0.5):
             await socket.close()
@@ -317,7 +320,7 @@ def _not_reached(url: str, error: Exception) -> BridgeClosed:
 
 
 def _why(error: Exception) -> str:
-    return str(error) or "the link was lost"
+    return str(error) or "the connection was lost"
 
 
 class Liveness:
@@ -348,7 +351,7 @@ class Liveness:
         self._ponged = now
         self._looked = now
 
-    def wants_ping(self, now: float) -> bool:
+    def is_ping_due(self, now: float) -> bool:
         """Return whether the next ping is due."""
         if self._pinged is not None:
             return False
@@ -376,7 +379,9 @@ class Liveness:
         waiting = 0.0 if self._pinged is None else now - self._pinged
         return max(self._took, waiting)
 
-    def is_dead(self, now: float, heard: float = -inf, *, busy: bool = False) -> bool:
+    def is_dead(
+        self, now: float, bytes_came: float = -inf, *, busy: bool = False
+    ) -> bool:
         """Return whether the last ping was unanswered for too long.
 
         A late check decides nothing: if this process was delayed, the answer may be
@@ -385,7 +390,7 @@ class Liveness:
 
         Args:
             now: The time of the check.
-            heard: When the last bytes came.
+            bytes_came: When the last bytes came.
             busy: Whether the bridge is known to encode a large message.
 
         """
@@ -393,5 +398,5 @@ class Liveness:
         self._looked = now
         if late or self._pinged is None or now - self._pinged <= self.LIMIT:
             return False
-        silent = now - heard > self.LIMIT and not busy
+        silent = now - bytes_came > self.LIMIT and not busy
         return silent or now - self._pinged > self.LONGEST

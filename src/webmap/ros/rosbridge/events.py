@@ -56,7 +56,7 @@ class Publish(ReceivedMessage):
         if op != "publish" or topic != self.topic:
             raise ProtocolError(
                 f"a frame that begins as a message on {self.topic!r} "
-                f"turned out to be {op!r} on {topic!r}"
+                f"is {op!r} on {topic!r}"
             )
 
 

@@ -99,8 +99,8 @@ class Graph:
         """Return the time of the ROS system in seconds, or None without an answer."""
         try:
             answer = await self._call("/rosapi/get_time")
-            told = answer.get("time") if isinstance(answer, dict) else None
-            seconds: float = convert(told, Time).seconds
+            stamp = answer.get("time") if isinstance(answer, dict) else None
+            seconds: float = convert(stamp, Time).seconds
         except (BridgeError, ProtocolError):
             return None
         return seconds
@@ -141,7 +141,9 @@ class Graph:
             names = convert(answer, _Topics)
             found = dict(zip(names.topics, names.types, strict=True))
         except (ProtocolError, ValueError) as error:
-            raise ServiceError(f"/rosapi/topics made no sense: {error}") from None
+            raise ServiceError(
+                f"the answer of /rosapi/topics is invalid: {error}"
+            ) from None
         if any("/msg/" in type for type in found.values()):
             found = {**await self._feedbacks(), **found}
         self._types.update({name: type for name, type in found.items() if type})
@@ -190,11 +192,13 @@ class Graph:
         ros2 = await self.is_ros2()
         if ros2 is not False:
             why = (
-                "a ROS 2 bridge is not" if ros2 else "one whose ROS nobody knows is not"
+                "the bridge is of ROS 2"
+                if ros2
+                else "it is not known whether the bridge is of ROS 1 or ROS 2"
             )
             raise ServiceError(
-                f"{why} asked for the fields of {type}, since that can end its rosapi: "
-                "write the values into the button's configuration"
+                f"{why}, so it is not asked for the fields of {type}, since that can "
+                "end its rosapi: write the values into the button's configuration"
             )
         name = str(split_type(type))
         answer = await self._call(QUESTIONS[kind], {"type": name})
@@ -204,7 +208,9 @@ class Graph:
                 raise ProtocolError(f"got {len(parts)} definitions")
             texts = {part.type: _text(part) for part in parts}
         except (ProtocolError, ValueError) as error:
-            raise ServiceError(f"{QUESTIONS[kind]} made no sense: {error}") from None
+            raise ServiceError(
+                f"the answer of {QUESTIONS[kind]} is invalid: {error}"
+            ) from None
         # The first text is that of the type itself; of a service it is named
         # ...Request.
         texts[name] = texts[parts[0].type]

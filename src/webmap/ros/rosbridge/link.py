@@ -191,7 +191,7 @@ class RosbridgeLink:
     def _opened(self) -> None:
         self.stats.links += 1
         self.trouble, self._complained = None, False
-        log.info("%s: the link is open", self._name)
+        log.info("%s: the connection is open", self._name)
         self._protocol = Protocol()
         self.graph.forget()
         for topic, each in self._advertised.items():
@@ -204,7 +204,7 @@ class RosbridgeLink:
 
     def _lost(self, reason: str) -> None:
         level = logging.INFO if reason == CLOSED_HERE else logging.WARNING
-        log.log(level, "%s: the link ended: %s", self._name, reason)
+        log.log(level, "%s: the connection ended: %s", self._name, reason)
         self.trouble = reason
         self._renewals.forget()
         for subscription in self._subscriptions.values():
@@ -228,7 +228,7 @@ class RosbridgeLink:
             subscription = self._subscriptions.get(event.topic)
             if subscription is not None:
                 usable = self._on_message(subscription.topic, event)
-                if usable and subscription.doubts_cbor:
+                if usable and subscription.checks_json:
                     subscription.received(event)
         elif event is not None:
             self._other(event)
@@ -240,9 +240,11 @@ class RosbridgeLink:
                 self._complained = True
                 self._complain(event)
         elif isinstance(event, Status) and event.level == "error":
-            words = one_line(event.msg)
-            log.warning("%s says: %s", self._name, words)
-            self._report(BridgeError(f"{self._name} says: {words}"))
+            text = one_line(event.msg)
+            log.warning("%s: the bridge reports an error: %s", self._name, text)
+            self._report(
+                BridgeError(f"{self._name}: the bridge reports an error: {text}")
+            )
         elif isinstance(event, CallService):
             answer = "this client offers no services"
             id = None if event.id is None else str(event.id)
@@ -271,18 +273,18 @@ class RosbridgeLink:
         """
         # A page shows three lines: the advice comes before the details.
         if size is None:
-            words = (
+            text = (
                 f"{topic.name}: nothing came in CBOR for {IN_CBOR:g} s, though it is "
-                f"published, and the link ended before it came in JSON. If it is "
+                f"published, and the connection ended before it came in JSON. If it is "
                 f"larger than max_message_size of rosbridge_websocket, set that higher"
             )
         else:
-            words = (
+            text = (
                 f"{topic.name} is larger than the bridge sends in CBOR: set "
                 f"max_message_size of rosbridge_websocket to {size} or more. Until "
                 f"then it comes in JSON, once in {THROTTLE // 60_000} minutes"
             )
-        fault = BridgeError(words)
+        fault = BridgeError(text)
         log.warning("%s: %s", self._name, fault)
         self._report(fault)
         topic.over(fault)

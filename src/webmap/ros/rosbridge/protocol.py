@@ -97,11 +97,11 @@ class _Assembly:
         try:
             data = fragment.data.encode()
         except UnicodeEncodeError as error:
-            raise ProtocolError(f"fragments that are no text: {error}") from None
+            raise ProtocolError(f"fragments that are not text: {error}") from None
         self.received += 1
         self.size += len(data)
         if fragment.num in self.pieces:
-            # Another message of the same length: its pieces cannot be told apart.
+            # Another message of the same length: its pieces cannot be distinguished.
             if fragment.num == 0:
                 self.messages += 1
             self.messages = max(self.messages, 2)
@@ -172,7 +172,7 @@ class Fragments:
         if assembly.is_ambiguous:
             raise ProtocolError(
                 f"{assembly.messages} messages of {assembly.count} fragments each "
-                f"interleave under id {fragment.id!r}: they cannot be told apart"
+                f"interleave under id {fragment.id!r}: they cannot be distinguished"
             )
         return assembly.text()
 
@@ -182,7 +182,7 @@ class Fragments:
         if fragment.count > self.max_count:
             raise ProtocolError(
                 f"a message in {fragment.count} fragments, at most "
-                f"{self.max_count} are taken"
+                f"{self.max_count} are allowed"
             )
         if not 0 <= fragment.num < fragment.count:
             raise ProtocolError(f"fragment {fragment.num} of {fragment.count}")
@@ -328,7 +328,7 @@ def _check_other(frame: bytes | bytearray) -> None:
     if b"NaN" in frame and frame.count(b",") > MAX_NUMBERS:
         raise ProtocolError(
             f"a frame with NaN and more than {MAX_NUMBERS} values; without NaN, which "
-            "is no JSON, it may have more"
+            "is not JSON, it may have more"
         )
 
 

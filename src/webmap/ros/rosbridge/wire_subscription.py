@@ -136,7 +136,7 @@ class WireSubscription:
         too_large: Callable[[Topic, int | None], None],
     ) -> None:
         self.topic = topic
-        self.doubts_cbor = False
+        self.checks_json = False
         """Whether JSON was requested; :meth:`received` checks if that was needed."""
         self._send = send
         self._too_large = too_large
@@ -147,23 +147,23 @@ class WireSubscription:
         self._id = ""
 
     def update(self) -> None:
-        """Subscribe again if the wanted options have changed.
+        """Subscribe again if the needed options have changed.
 
         The new subscription begins before the old one ends, so no message is missed.
         """
-        wanted = self._wanted()
-        if self._asked == wanted:
+        options = self._wire_options()
+        if self._asked == options:
             return
         old, had = self._id, self._asked is not None
-        self._ask(wanted)
+        self._ask(options)
         if had:
             self._send(ops.unsubscribe(self.topic.name, id=old))
 
     def again(self) -> None:
         """Subscribe on a new connection."""
-        self.doubts_cbor = False
+        self.checks_json = False
         self._in_json.begin()
-        self._ask(self._wanted())
+        self._ask(self._wire_options())
 
     def renew(self) -> None:
         """End the subscription and subscribe again.
@@ -172,7 +172,7 @@ class WireSubscription:
         """
         if self._asked is not None:
             self._send(ops.unsubscribe(self.topic.name, id=self._id))
-            self._ask(self._wanted())
+            self._ask(self._wire_options())
 
     def end(self) -> None:
         """End the subscription."""
@@ -190,7 +190,7 @@ class WireSubscription:
             return False
         answer = self._in_json.silent(self._asked.type, self._asked.compression)
         if answer == "ask":
-            self.doubts_cbor = True
+            self.checks_json = True
             self.renew()
         elif answer == "given up":
             self._too_large(self.topic, None)
@@ -198,7 +198,7 @@ class WireSubscription:
 
     def received(self, message: Publish) -> None:
         """Handle the first message that came in JSON instead of CBOR."""
-        self.doubts_cbor = False
+        self.checks_json = False
         too_large = self._in_json.received(in_parts=message.in_parts)
         if too_large:
             self._too_large(self.topic, len(message.frame))
@@ -216,7 +216,7 @@ class WireSubscription:
         waited = time.monotonic() - self._asked_at
         return waited < PATIENCE.get(asked.compression or "", 0.0)
 
-    def _wanted(self) -> "_Asked":
+    def _wire_options(self) -> "_Asked":
         """Return options that serve every listener."""
         options = self.topic.options()
         type, throttle = options.type, options.throttle
@@ -299,7 +299,7 @@ class Silence:
         """Return whether it was published without messages for :data:`IN_CBOR`."""
         return self._unsent_at is not None and now >= self._unsent_at
 
-    def heard(self, published: bool | None, now: float) -> bool:
+    def answered(self, published: bool | None, now: float) -> bool:
         """Handle the answer about publishers; return whether to subscribe again.
 
         Args:
@@ -353,7 +353,7 @@ class Renewals:
         self.forget()
         self._unanswered = 0
         with no_scope():
-            self._task = asyncio.get_running_loop().create_task(self._look_on())
+            self._task = asyncio.get_running_loop().create_task(self._check_regularly())
 
     def forget(self) -> None:
         """Stop the checks: the connection has ended."""
@@ -368,24 +368,24 @@ class Renewals:
         if task is not None:
             await asyncio.gather(task, return_exceptions=True)
 
-    async def _look_on(self) -> None:
+    async def _check_regularly(self) -> None:
         silent: dict[WireSubscription, Silence] = {}
         while True:
             await asyncio.sleep(PERIOD)
             now = time.monotonic()
-            wanted = [each for each in self._subscriptions() if not each.topic.count]
-            silent = {each: silent.get(each) or Silence(now) for each in wanted}
+            without = [each for each in self._subscriptions() if not each.topic.count]
+            silent = {each: silent.get(each) or Silence(now) for each in without}
             for subscription, silence in silent.items():
                 if silence.due(now):
-                    await self._look(subscription, silence)
+                    await self._check(subscription, silence)
 
-    async def _look(self, subscription: WireSubscription, silence: Silence) -> None:
+    async def _check(self, subscription: WireSubscription, silence: Silence) -> None:
         topic, published = subscription.topic, None
         if self._unanswered < UNANSWERED:
             published = await self._published(topic.name)
             self._unanswered = self._unanswered + 1 if published is None else 0
         now = time.monotonic()
-        renew = silence.heard(published, now)
+        renew = silence.answered(published, now)
         if topic.count or not topic.listeners:
             return
         if silence.is_unsent(now) and subscription.ask_in_json():

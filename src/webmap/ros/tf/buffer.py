@@ -39,7 +39,7 @@ MOST_COMPARED = 200
 
 _LISTED = 12
 _SENTENCES = 100
-_WAYS = 1000
+_MOST_PATHS = 1000
 
 
 class Found(NamedTuple):
@@ -55,7 +55,7 @@ class Found(NamedTuple):
     """Whether the transform is of the requested time, not of the newest."""
 
 
-class _Way(NamedTuple):
+class _TrackPath(NamedTuple):
     """The tracks between two frames, up to their nearest common ancestor."""
 
     down: list[Track]
@@ -104,7 +104,7 @@ class Buffer:
         """The number of child frames of each parent frame."""
         self._missing: dict[str, str] = {}
         """The sentences about missing frames, until the frames change."""
-        self._ways: dict[tuple[str, str], _Way] = {}
+        self._paths: dict[tuple[str, str], _TrackPath] = {}
         """The results of lookups since the tree of frames last changed."""
 
     @property
@@ -206,8 +206,8 @@ class Buffer:
             NotKnownThen: If a transform between them is not known at that time.
 
         """
-        way = self._way(target, source)
-        return self._along(way, (way.newest or 0.0) if time is None else time, ahead)
+        path = self._path(target, source)
+        return self._along(path, (path.newest or 0.0) if time is None else time, ahead)
 
     def find(self, target: str, source: str, time: float = 0.0) -> Found:
         """Return the transform at a time, or the newest one if that time is not known.
@@ -223,14 +223,14 @@ class Buffer:
             NotKnownThen: If there is no time at which all transforms between are known.
 
         """
-        way = self._way(target, source)
-        newest = way.newest
+        path = self._path(target, source)
+        newest = path.newest
         if time:
             try:
-                return Found(self._along(way, time, 0.0), newest, True)
+                return Found(self._along(path, time, 0.0), newest, True)
             except NotKnownThen:
                 pass
-        return Found(self._along(way, newest or 0.0, 0.0), newest, False)
+        return Found(self._along(path, newest or 0.0, 0.0), newest, False)
 
     def newest(self, target: str, source: str) -> float | None:
         """Return the newest time at which all between is known; None for all times.
@@ -240,7 +240,7 @@ class Buffer:
             NotConnected: If the frames are in two trees.
 
         """
-        return self._way(target, source).newest
+        return self._path(target, source).newest
 
     def chain(self, frame: str) -> list[str]:
         """Return a frame and its ancestors, up to the root."""
@@ -252,7 +252,7 @@ class Buffer:
         if track is not None and track.parent == parent and track.static == static:
             self._tracks[child] = self._tracks.pop(child)
             return track, None
-        self._ways.clear()
+        self._paths.clear()
         self._refuse_loop(parent, child)
         if track is None and len(self._tracks) >= MOST_FRAMES:
             self._make_room(parent, child)
@@ -260,9 +260,9 @@ class Buffer:
         if track is not None and track.parent != parent:
             note = (
                 f"{child!r} was in {track.parent!r} and is in {parent!r} now; if that "
-                f"happens again and again, two nodes tell of it"
+                f"happens again and again, two nodes publish it"
             )
-            self._let_go(track.parent)
+            self._remove_child(track.parent)
         if track is None or parent not in self._roots:
             self._missing.clear()
         if track is None or track.parent != parent:
@@ -279,27 +279,27 @@ class Buffer:
         """
         for frame, track in self._tracks.items():
             if not track.static and frame not in self._roots and frame != parent:
-                self._let_go(track.parent)
+                self._remove_child(track.parent)
                 del self._tracks[frame]
                 return
         raise TransformError(
             f"{parent!r} -> {child!r}: there are {MOST_FRAMES} frames already"
         )
 
-    def _let_go(self, parent: str) -> None:
+    def _remove_child(self, parent: str) -> None:
         self._roots[parent] -= 1
         if not self._roots[parent]:
             del self._roots[parent]
             self._missing.clear()
 
     def _refuse_loop(self, parent: str, child: str) -> None:
-        way = [parent]
-        while way[-1] != child:
-            track = self._tracks.get(way[-1])
+        chain = [parent]
+        while chain[-1] != child:
+            track = self._tracks.get(chain[-1])
             if track is None:
                 return
-            way.append(track.parent)
-        loop = " -> ".join(map(repr, [child, *reversed(way[:-1]), child]))
+            chain.append(track.parent)
+        loop = " -> ".join(map(repr, [child, *reversed(chain[:-1]), child]))
         raise TransformError(f"{parent!r} -> {child!r} would close a loop: {loop}")
 
     def _known(self, frame: str) -> str:
@@ -329,46 +329,44 @@ class Buffer:
         more = f" and {len(frames) - _LISTED} more" if len(frames) > _LISTED else ""
         return f"there is no frame {name!r}{hint}; there are: {listed}{more}"
 
-    def _way(self, target: str, source: str) -> _Way:
+    def _path(self, target: str, source: str) -> _TrackPath:
         """Return the tracks between two frames, by their names as given."""
-        way = self._ways.get((target, source))
-        if way is None:
-            way = self._find_way(self._known(target), self._known(source))
-            if len(self._ways) >= _WAYS:
-                self._ways.clear()
-            self._ways[target, source] = way
-        return way
+        path = self._paths.get((target, source))
+        if path is None:
+            path = self._find_path(self._known(target), self._known(source))
+            if len(self._paths) >= _MOST_PATHS:
+                self._paths.clear()
+            self._paths[target, source] = path
+        return path
 
-    def _find_way(self, target: str, source: str) -> _Way:
+    def _find_path(self, target: str, source: str) -> _TrackPath:
         down, up = self._ancestors(target), self._ancestors(source)
         common = set(down) & set(up)
         if not common:
             raise NotConnected(
-                f"nothing leads from {source!r} to {target!r}: the one is in the tree "
-                f"of {up[-1]!r}, the other in that of {down[-1]!r}"
+                f"no transform connects {source!r} to {target!r}: {source!r} is in the "
+                f"tree of {up[-1]!r}, {target!r} in the tree of {down[-1]!r}"
             )
         meet = next(frame for frame in up if frame in common)
-        return _Way(
+        return _TrackPath(
             [self._tracks[frame] for frame in down[: down.index(meet)]],
             [self._tracks[frame] for frame in up[: up.index(meet)]],
         )
 
     def _ancestors(self, frame: str) -> list[str]:
-        way = [frame]
-        while (track := self._tracks.get(way[-1])) is not None:
-            way.append(track.parent)
-        return way
+        chain = [frame]
+        while (track := self._tracks.get(chain[-1])) is not None:
+            chain.append(track.parent)
+        return chain
 
-    def _along(self, way: _Way, time: float, ahead: float) -> Transform:
+    def _along(self, path: _TrackPath, time: float, ahead: float) -> Transform:
         """Return the transform from the source of the tracks to their target."""
-        if not way.down:
-            return self._to_the_meeting(way.up, time, ahead)
-        down = self._to_the_meeting(way.down, time, ahead)
-        return down.inverse @ self._to_the_meeting(way.up, time, ahead)
+        if not path.down:
+            return self._to_ancestor(path.up, time, ahead)
+        down = self._to_ancestor(path.down, time, ahead)
+        return down.inverse @ self._to_ancestor(path.up, time, ahead)
 
-    def _to_the_meeting(
-        self, tracks: list[Track], time: float, ahead: float
-    ) -> Transform:
+    def _to_ancestor(self, tracks: list[Track], time: float, ahead: float) -> Transform:
         """Return the transform from the first frame to the last one's parent."""
         total = None
         for track in reversed(tracks):

@@ -87,7 +87,7 @@ class Track:
 
         """
         if not self._stamps:
-            raise NotKnownThen("nothing was told since time jumped")
+            raise NotKnownThen("nothing was received since time jumped")
         if self.static:
             return self._transforms[0]
         place = bisect_left(self._stamps, time)

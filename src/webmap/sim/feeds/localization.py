@@ -36,13 +36,15 @@ class Belief:
     def __init__(self) -> None:
         self.error = Pose()
         """The estimated pose relative to the true pose."""
-        self.doubt = SURE
+        self.deviations = SURE
         self._travelled = 0.0
 
-    def reset(self, true: Pose, given: Pose, doubt: tuple[float, float, float]) -> None:
+    def reset(
+        self, true: Pose, given: Pose, deviations: tuple[float, float, float]
+    ) -> None:
         """Set the estimate to a pose with standard deviations."""
         self.error = true.inverse @ given
-        self.doubt = doubt
+        self.deviations = deviations
 
     def travel(self, travelled: float) -> None:
         """Reduce the error by driving.
@@ -57,10 +59,10 @@ class Belief:
             return
         error = self.error
         self.error = Pose(error.x * share, error.y * share, error.yaw * share)
-        self.doubt = (
-            SURE[0] + (self.doubt[0] - SURE[0]) * share,
-            SURE[1] + (self.doubt[1] - SURE[1]) * share,
-            SURE[2] + (self.doubt[2] - SURE[2]) * share,
+        self.deviations = (
+            SURE[0] + (self.deviations[0] - SURE[0]) * share,
+            SURE[1] + (self.deviations[1] - SURE[1]) * share,
+            SURE[2] + (self.deviations[2] - SURE[2]) * share,
         )
 
     def covariance(self, yaw: float) -> list[float]:
@@ -70,7 +72,7 @@ class Belief:
             yaw: The estimated heading, in radians.
 
         """
-        ahead, aside, turn = (deviation**2 for deviation in self.doubt)
+        ahead, aside, turn = (deviation**2 for deviation in self.deviations)
         cos, sin = math.cos(yaw), math.sin(yaw)
         found = [0.0] * 36
         found[0] = cos * cos * ahead + sin * sin * aside
@@ -83,7 +85,9 @@ class Belief:
         self, believed: Pose, random: np.random.Generator
     ) -> list[tuple[float, float, float]]:
         """Return particles as x, y and yaw, spread by the standard deviations."""
-        spread: NDArray[np.float64] = random.normal(size=(PARTICLES, 3)) * self.doubt
+        spread: NDArray[np.float64] = (
+            random.normal(size=(PARTICLES, 3)) * self.deviations
+        )
         cos, sin = math.cos(believed.yaw), math.sin(believed.yaw)
         return [
             (
@@ -102,9 +106,9 @@ class Localizations:
         self._node = node
         self._beliefs = [Belief() for _ in node.world.robots]
         self._random = np.random.default_rng(node.world.options.seed)
-        doubtful = "geometry_msgs/PoseWithCovarianceStamped"
+        with_covariance = "geometry_msgs/PoseWithCovarianceStamped"
         self.feeds = (
-            Feed("amcl_pose", doubtful, 0.5, self._make_pose),
+            Feed("amcl_pose", with_covariance, 0.5, self._make_pose),
             Feed("particlecloud", "geometry_msgs/PoseArray", 1.0, self._make_cloud),
         )
 

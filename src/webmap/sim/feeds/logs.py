@@ -12,7 +12,7 @@ INFO, WARN, ERROR = "info", "warn", "error"
 _ROS1 = {INFO: 2, WARN: 4, ERROR: 8}
 _ROS2 = {INFO: 20, WARN: 30, ERROR: 40}
 
-Said = tuple[str, str, str]
+Line = tuple[str, str, str]
 """A level, the last part of a node's name, and the text."""
 
 
@@ -30,7 +30,7 @@ class Logs:
     def __init__(self, node: Node) -> None:
         self._node = node
         self._before = [_Before() for _ in node.world.robots]
-        self._was_wanted = False
+        self._had_subscriber = False
 
     def start(self) -> None:
         """Advertise the topic."""
@@ -42,19 +42,22 @@ class Logs:
     def publish(self) -> None:
         """Publish the news since the last call, if the topic has subscribers."""
         world = self._node.world
-        wanted = self._node.graph.is_wanted(TOPIC)
-        begins, self._was_wanted = wanted and not self._was_wanted, wanted
+        has_subscriber = self._node.graph.is_wanted(TOPIC)
+        begins, self._had_subscriber = (
+            has_subscriber and not self._had_subscriber,
+            has_subscriber,
+        )
         pairs = zip(world.navigators, self._before, strict=True)
         for navigator, before in pairs:
             robot = navigator.robot
             if begins:
                 charge = f"{100 * robot.charge:.0f} %"
-                self._say(robot, INFO, "base", f"ready, the battery is at {charge}")
-            said = _news(robot, navigator.goal, navigator.path_changes, before)
-            for each in said if wanted else ():
-                self._say(robot, *each)
+                self._log(robot, INFO, "base", f"ready, the battery is at {charge}")
+            lines = _news(robot, navigator.goal, navigator.path_changes, before)
+            for line in lines if has_subscriber else ():
+                self._log(robot, *line)
 
-    def _say(self, robot: Robot, level: str, node: str, text: str) -> None:
+    def _log(self, robot: Robot, level: str, node: str, text: str) -> None:
         messages = self._node.messages
         now = self._node.graph.clock()
         if messages.dialect.is_ros2:
@@ -81,28 +84,28 @@ class Logs:
         self._node.publish(TOPIC, message)
 
 
-def _news(robot: Robot, goal: Goal | None, paths: int, before: _Before) -> list[Said]:
+def _news(robot: Robot, goal: Goal | None, paths: int, before: _Before) -> list[Line]:
     """Return the log messages that are due, and remember them."""
-    said: list[Said] = []
+    lines: list[Line] = []
     if goal is not before.goal:
         if before.goal is not None:
             state, why = before.goal.state, before.goal.text
             level = ERROR if state is GoalState.ABORTED else INFO
-            said.append((level, "navigator", f"the goal {state.value}: {why}"))
+            lines.append((level, "navigator", f"the goal {state.value}: {why}"))
         if goal is not None:
             at = f"({goal.pose.x:.2f}, {goal.pose.y:.2f})"
-            said.append((INFO, "navigator", f"a goal at {at}"))
+            lines.append((INFO, "navigator", f"a goal at {at}"))
     if paths != before.paths and goal is not None and goal is before.goal:
-        said.append((INFO, "planner", "a new path"))
+        lines.append((INFO, "planner", "a new path"))
     if robot.bumped and not before.bumped:
-        said.append((WARN, "base", "the way is blocked"))
+        lines.append((WARN, "base", "the path is blocked"))
     low = robot.charge < LOW
     if low and not before.low:
-        said.append((WARN, "base", f"the battery is at {100 * robot.charge:.0f} %"))
+        lines.append((WARN, "base", f"the battery is at {100 * robot.charge:.0f} %"))
     before.goal, before.paths, before.bumped, before.low = (
         goal,
         paths,
         robot.bumped,
         low,
     )
-    return said
+    return lines

@@ -165,7 +165,7 @@ class Published:
     def __init__(self) -> None:
         self._cells: NDArray[np.int8] | None = None
         self._place: tuple[float, float] | None = None
-        self._heard_by: frozenset[object] = frozenset()
+        self._subscribers: frozenset[object] = frozenset()
         self._since_whole = 0
 
     def next(
@@ -186,8 +186,8 @@ class Published:
         """
         who = frozenset(subscribers)
         before, moved = self._cells, place != self._place
-        new = bool(who - self._heard_by)
-        self._cells, self._place, self._heard_by = cells, place, who
+        new = bool(who - self._subscribers)
+        self._cells, self._place, self._subscribers = cells, place, who
         self._since_whole += 1
         if before is None or moved or new or self._since_whole >= AGAIN:
             self._since_whole = 0
@@ -229,10 +229,10 @@ class CostmapTopics:
         self._turn += 1
         for index, robot in enumerate(self._node.world.robots):
             local = self._topic(robot.topics, "local_costmap")
-            if self._wanted(local):
+            if self._has_subscriber(local):
                 self._publish_local(index, local)
             whole = self._topic(robot.topics, "global_costmap")
-            if self._turn % SLOWER == 0 and self._wanted(whole):
+            if self._turn % SLOWER == 0 and self._has_subscriber(whole):
                 cells = self.costs.whole(self._node.world.others(index))
                 plan = self._node.world.plan
                 self._send(whole, "map", cells, (plan.x, plan.y))
@@ -240,12 +240,12 @@ class CostmapTopics:
     def _topic(self, prefix: str, part: str) -> str:
         return f"{prefix}/{self._above}{part}/costmap"
 
-    def _wanted(self, topic: str) -> bool:
+    def _has_subscriber(self, topic: str) -> bool:
         graph = self._node.graph
-        wanted = graph.is_wanted(topic)
-        if not wanted:
+        has_subscriber = graph.is_wanted(topic)
+        if not has_subscriber:
             self._published.pop(topic, None)
-        return wanted
+        return has_subscriber
 
     def _publish_local(self, index: int, topic: str) -> None:
         world = self._node.world

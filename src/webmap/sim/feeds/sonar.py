@@ -34,12 +34,12 @@ class Sonars:
         turns = at.yaw + np.linspace(-FIELD / 2, FIELD / 2, _RAYS)
         along_x, along_y = np.cos(turns), np.sin(turns)
         ones = np.ones(_RAYS)
-        ways = cast_rays(
+        distances = cast_rays(
             world.obstacles, at.x * ones, at.y * ones, along_x, along_y, FARTHEST
         )
         for disc in world.others(index):
-            shade(ways, along_x, along_y, at, *disc)
-        nearest = float(ways.min())
+            shade(distances, along_x, along_y, at, *disc)
+        nearest = float(distances.min())
         if nearest > FARTHEST:
             return math.inf
         return nearest if nearest >= NEAREST else -math.inf

@@ -81,8 +81,8 @@ class Form:
 class Refusal(Exception):
     """A refused request, with the status and the text of the answer."""
 
-    def __init__(self, status: int, words: str) -> None:
-        super().__init__(words)
+    def __init__(self, status: int, text: str) -> None:
+        super().__init__(text)
         self.status = status
 
 
@@ -110,20 +110,22 @@ def read_request(head: bytes) -> Request:
 
     """
     line = head.decode("latin-1").partition("\n")[0].rstrip("\r")
-    words = line.split(" ")
-    if len(words) != 3 or not words[2].startswith("HTTP/1."):
+    parts = line.split(" ")
+    if len(parts) != 3 or not parts[2].startswith("HTTP/1."):
         raise Refusal(
-            400, f"{_plain(line)} is no request of HTTP/1.0 or 1.1, as GET / HTTP/1.1"
+            400,
+            f"{_plain(line)} is not a request of HTTP/1.0 or 1.1, "
+            "such as GET / HTTP/1.1",
         )
-    method, target, _ = words
+    method, target, _ = parts
     if method != "GET":
-        raise Refusal(405, f"pictures are asked for with GET, got {_plain(method)}")
+        raise Refusal(405, f"use GET for pictures, got {_plain(method)}")
     try:
-        parts = urlsplit(target)
-        said = dict(
+        address = urlsplit(target)
+        parameters = dict(
             reversed(  # of two equal keys, the first is used
                 parse_qsl(
-                    parts.query,
+                    address.query,
                     keep_blank_values=True,
                     max_num_fields=_MOST_PARAMETERS,
                 )
@@ -131,40 +133,43 @@ def read_request(head: bytes) -> Request:
         )
     except ValueError:
         raise Refusal(
-            400, f"{_plain(target)} is no address with parameters, as {EXAMPLE}"
+            400,
+            f"{_plain(target)} is not an address with parameters, such as {EXAMPLE}",
         ) from None
-    what = _PATHS.get(parts.path)
+    what = _PATHS.get(address.path)
     if what is None:
         raise Refusal(
             404,
-            f"there is nothing at {_plain(parts.path)}; there are / with a list of the "
-            "cameras, /stream?topic=... and /snapshot?topic=...",
+            f"there is nothing at {_plain(address.path)}; there are / with a list of "
+            "the cameras, /stream?topic=... and /snapshot?topic=...",
         )
     if what == "list":
         return Request(what)
-    if not said.get("topic", "").strip("/"):
+    if not parameters.get("topic", "").strip("/"):
         raise Refusal(400, f"the topic of the camera is missing, as in {EXAMPLE}")
-    kind = said.get("type", "mjpeg")
+    kind = parameters.get("type", "mjpeg")
     if what == "stream" and kind not in _TYPES:
         raise Refusal(
             400, f"type must be {' or '.join(_TYPES)} here, got {_plain(kind)}"
         )
     # ros_compressed streams the messages of the camera's topic unchanged.
     as_it_is = what == "stream" and kind == "ros_compressed"
-    return Request(what, resolve(said["topic"]), Form() if as_it_is else _form(said))
-
-
-def _form(said: Mapping[str, str]) -> Form:
-    return Form(
-        quality=_number(said, "quality", 100),
-        width=_number(said, "width", MOST_SIDE),
-        height=_number(said, "height", MOST_SIDE),
-        inverted="invert" in said,
+    return Request(
+        what, resolve(parameters["topic"]), Form() if as_it_is else _form(parameters)
     )
 
 
-def _number(said: Mapping[str, str], name: str, most: int) -> int | None:
-    text = said.get(name)
+def _form(parameters: Mapping[str, str]) -> Form:
+    return Form(
+        quality=_number(parameters, "quality", 100),
+        width=_number(parameters, "width", MOST_SIDE),
+        height=_number(parameters, "height", MOST_SIDE),
+        inverted="invert" in parameters,
+    )
+
+
+def _number(parameters: Mapping[str, str], name: str, most: int) -> int | None:
+    text = parameters.get(name)
     if text is None or text == "-1":  # web_video_server uses -1 for "unchanged"
         return None
     if text.isascii() and text.isdigit() and len(text) < 6 and 1 <= int(text) <= most:

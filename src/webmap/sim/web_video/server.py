@@ -87,7 +87,7 @@ class NewestPicture:
     def _take(self, publication: Publication) -> None:
         data = publication.message["data"]
         if not data.startswith(_JPEG):
-            log.warning("%s: left out what is no JPEG", self._topic)
+            log.warning("%s: a picture that is not JPEG is skipped", self._topic)
             return
         self._newest = data, publication.stamp
         self._came.set()
@@ -164,23 +164,29 @@ class WebVideoServer:
             else:
                 await _send(writer, 200, "text/html; charset=utf-8", self._list())
         except Refusal as refusal:
-            words = f"{refusal}\n".encode()
-            await _send(writer, refusal.status, "text/plain; charset=utf-8", words)
+            text = f"{refusal}\n".encode()
+            await _send(writer, refusal.status, "text/plain; charset=utf-8", text)
 
     async def _read(self, reader: asyncio.StreamReader) -> Request:
         if len(self._clients) > MOST_CONNECTIONS:
             raise Refusal(
-                503, f"{MOST_CONNECTIONS} clients have the cameras; end one of them"
+                503,
+                f"{MOST_CONNECTIONS} clients are connected, which is the limit; "
+                "close one of them",
             )
         try:
             async with asyncio.timeout(PATIENCE):
                 head = await reader.readuntil(b"\r\n\r\n")
         except TimeoutError:
-            raise Refusal(408, f"no whole request came within {PATIENCE:g} s") from None
+            raise Refusal(
+                408, f"no complete request came within {PATIENCE:g} s"
+            ) from None
         except asyncio.LimitOverrunError:
             raise Refusal(431, f"a request has {MOST_HEAD} bytes at the most") from None
         except asyncio.IncompleteReadError:
-            raise ConnectionError("hung up before the end of a request") from None
+            raise ConnectionError(
+                "the client closed the connection before the end of its request"
+            ) from None
         request = read_request(head)
         known = image_topics(self.graph)
         if request.what != "list" and request.topic not in known:
@@ -250,7 +256,7 @@ async def _next(newest: NewestPicture, request: Request) -> tuple[bytes, float]:
             # In a thread, because the world's clock runs in this one.
             return await asyncio.to_thread(request.form.apply, picture), stamp
         except NoPicture as error:
-            log.warning("%s: left out a picture: %s", request.topic, error)
+            log.warning("%s: a picture is skipped: %s", request.topic, error)
 
 
 async def _send_stream(

@@ -230,14 +230,16 @@ class Graph:
         topic = self.topics.get(name)
         if type_name is None:
             if topic is None:
-                raise GraphError(f"Cannot infer the type of {name}: nobody has it")
+                raise GraphError(
+                    f"Cannot infer the type of {name}: the topic does not exist"
+                )
             return topic
-        wanted = canonical(type_name)
-        if not self.schema.knows(wanted):
+        canonical_name = canonical(type_name)
+        if not self.schema.knows(canonical_name):
             raise GraphError(f"Unable to load the message type {type_name}")
         if topic is None:
-            topic = self.topics[name] = Topic(name, wanted)
-        if topic.type != wanted:
+            topic = self.topics[name] = Topic(name, canonical_name)
+        if topic.type != canonical_name:
             raise GraphError(f"{name} is a {topic.type}, not a {type_name}")
         return topic
 

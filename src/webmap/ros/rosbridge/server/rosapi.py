@@ -104,8 +104,8 @@ class Rosapi:
         return {**self._topics({}), "typedefs_full_text": texts}
 
     def _topics_for_type(self, request: Args) -> Any:
-        wanted = canonical(request["type"])
-        return {"topics": [t.name for t in self._listed() if t.type == wanted]}
+        type_name = canonical(request["type"])
+        return {"topics": [t.name for t in self._listed() if t.type == type_name]}
 
     def _topic_type(self, request: Args) -> Any:
         name = resolve(request["topic"])
@@ -116,9 +116,9 @@ class Rosapi:
         return {"services": list(self.graph.services)}
 
     def _services_for_type(self, request: Args) -> Any:
-        wanted = canonical(request["type"])
+        type_name = canonical(request["type"])
         services = self.graph.services.values()
-        return {"services": [s.name for s in services if s.type == wanted]}
+        return {"services": [s.name for s in services if s.type == type_name]}
 
     def _service_type(self, request: Args) -> Any:
         service = self.graph.services.get(resolve(request["service"]))

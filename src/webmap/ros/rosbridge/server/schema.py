@@ -112,14 +112,14 @@ class Schema:
             return conformer.message(self.fields(type_name), value)
         except Misfit as error:
             if not error.expected:
-                words = f"Message type {type_name} does not have a field {error.path}"
+                text = f"Message type {type_name} does not have a field {error.path}"
             else:
                 place = f" for field {error.path}" if error.path else ""
-                words = (
+                text = (
                     f"{type_name} message requires {error.expected}{place},"
                     f" but got a {type(error.value)}"
                 )
-            raise MessageMismatch(words) from None
+            raise MessageMismatch(text) from None
 
 
 class _FromClient(Conformer):

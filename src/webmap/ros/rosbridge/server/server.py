@@ -44,7 +44,7 @@ class RosbridgeServer:
             self._serve_client,
             host,
             port,
-            process_request=self._let_in,
+            process_request=self._delay_handshake,
             compression=None,
             max_size=_LARGEST_FRAME,
             ping_interval=None,  # as in rosbridge: pings are off by default
@@ -61,7 +61,9 @@ class RosbridgeServer:
             self._server.close()
             await self._server.wait_closed()
 
-    async def _let_in(self, _connection: ServerConnection, _request: Request) -> None:
+    async def _delay_handshake(
+        self, _connection: ServerConnection, _request: Request
+    ) -> None:
         await self._hang_if_spinning()
 
     async def _hang_if_spinning(self) -> None:
@@ -90,8 +92,8 @@ class RosbridgeServer:
                 session.receive(data)
                 self.hangs |= session.spinning
                 if session.overflowed:
-                    log.warning("a client lets everything pile up: let go")
-                    await connection.close(1008, "too much waits")
+                    log.warning("a client reads too slowly: its connection is closed")
+                    await connection.close(1008, "too many unsent messages")
 
     async def _write(
         self, connection: ServerConnection, session: Session, wake: asyncio.Event

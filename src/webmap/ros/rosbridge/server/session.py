@@ -279,7 +279,7 @@ class Services:
     def _response(self, operation: Operation) -> None:
         respond = self._asked.pop(text(operation, "id"), None)
         if respond is None:
-            raise GraphError("a response to a call that nobody waits for")
+            raise GraphError("a response to an unknown call")
         respond(operation.get("values", {}), ok=bool(operation.get("result", True)))
 
 
@@ -307,9 +307,9 @@ class Goals:
         action = text(operation, "action")
         identifier = operation.get("id")
         server = self._graph.actions.get(resolve(action))
-        wanted = canonical(text(operation, "action_type"))
-        if server is None or server.type != wanted:
-            reason = f"Action server {action} of type {wanted} is not available"
+        type_name = canonical(text(operation, "action_type"))
+        if server is None or server.type != type_name:
+            reason = f"Action server {action} of type {type_name} is not available"
             self._finish(action, identifier, _UNKNOWN, reason, ok=False)
             return
         args = operation.get("args", {})

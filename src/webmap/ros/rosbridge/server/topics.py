@@ -204,7 +204,9 @@ class Topics:
         topic = resolve(text(operation, "topic"))
         known = self._graph.topics.get(topic)
         if known is None:
-            raise GraphError(f"Cannot infer the type of {topic}: nobody has it")
+            raise GraphError(
+                f"Cannot infer the type of {topic}: the topic does not exist"
+            )
         message = self._graph.conform(
             known.type,
             operation.get("msg", {}),

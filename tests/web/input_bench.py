@@ -1,4 +1,4 @@
-"""A page with hands in a real Chromium, and what makes it doubtful that they drive."""
+"""A page with inputs in a real Chromium, and the events that block inputs."""
 
 import time
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from playwright.sync_api import Browser, Page
 
 from real_browser import Complaints
 
-DOUBTS = {
+INPUT_BLOCKERS = {
     "blur": "window.dispatchEvent(new Event('blur'))",
     "pagehide": "window.dispatchEvent(new PageTransitionEvent('pagehide'))",
     "freeze": "document.dispatchEvent(new Event('freeze'))",
@@ -45,7 +45,7 @@ class Bench:
         self.page.goto(gate.url + query)
         self.page.wait_for_selector("body[data-ready=yes]")
         self.until(lambda: self.state == "open")
-        self.page.wait_for_timeout(250)  # the hands' own rest after loading
+        self.page.wait_for_timeout(250)  # inputs are blocked for a moment after loading
 
     @property
     def state(self) -> str:
@@ -54,8 +54,10 @@ class Bench:
     def until(self, true: Callable[[], object], patience: float = 10.0) -> None:
         deadline = time.monotonic() + patience
         while not true():
-            assert time.monotonic() < deadline, f"waited in vain; {self.gate.said[-3:]}"
-            # A turn of the loop in which the page's own events are heard.
+            assert time.monotonic() < deadline, (
+                f"waited in vain; {self.gate.received[-3:]}"
+            )
+            # A turn of the loop in which the page's own events are handled.
             self.page.wait_for_timeout(10)
 
     def select(self, robot: str | None, map: int = 0) -> None:
@@ -80,10 +82,10 @@ class Bench:
             with suppress(AssertionError):
                 self.until(true, patience=1.5)
                 return
-            # On a busy machine the page may sleep for a moment, which is a doubt.
+            # On a busy machine the page may sleep for a moment, which blocks inputs.
             self.page.keyboard.up(key)
             self.page.wait_for_timeout(300)
-        raise AssertionError(f"{key} never drove: {self.gate.said[-3:]}")
+        raise AssertionError(f"{key} never drove: {self.gate.received[-3:]}")
 
     @property
     def losses(self) -> int:
