@@ -119,7 +119,9 @@ async function makeMap(number) {
     const { default: attach } = await import(`/_webmap/features/${name}.js`);
     const link = document.createElement("link");
     link.rel = "stylesheet";
-    link.href = `/_webmap/features/${name}.css`;
+    // The modules of the view share one style sheet.
+    const sheet = name.startsWith("view/") ? "view/view" : name;
+    link.href = `/_webmap/features/${sheet}.css`;
     styles.push(new Promise((resolve) => link.addEventListener("load", resolve)));
     document.head.append(link);
     map.halves.push(attach(map, options, (message) => map.sent.push(message)));
