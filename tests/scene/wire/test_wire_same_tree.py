@@ -33,7 +33,7 @@ async (frames) => {
     doubtProblems() {},
     hear() {},
     drive() {},
-    halves: { detachFrom() {} },
+    parts: { detachFrom() {} },
   });
   for (const frame of frames) {
     const bytes = Uint8Array.from(atob(frame), (c) => c.charCodeAt(0));

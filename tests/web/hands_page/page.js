@@ -113,7 +113,7 @@ async function makeMap(number) {
     map.clicks += 1;
     map.select(event.target.closest(".robot")?.getAttribute("data-robot") ?? null);
   });
-  map.halves = [];
+  map.parts = [];
   const styles = [];
   for (const name of modules) {
     const { default: attach } = await import(`/_webmap/features/${name}.js`);
@@ -124,7 +124,7 @@ async function makeMap(number) {
     link.href = `/_webmap/features/${sheet}.css`;
     styles.push(new Promise((resolve) => link.addEventListener("load", resolve)));
     document.head.append(link);
-    map.halves.push(attach(map, options, (message) => map.sent.push(message)));
+    map.parts.push(attach(map, options, (message) => map.sent.push(message)));
   }
   await Promise.all(styles);
   return map;

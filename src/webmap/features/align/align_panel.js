@@ -1,4 +1,4 @@
-import { button, html, say } from "../../web/tools/elements.js";
+import { button, html, setText } from "../../web/tools/elements.js";
 
 /** @typedef {import('./align_drawing.js').Alignment} Alignment */
 /** @typedef {import('./align_tool.js').Subject} Subject */
@@ -80,8 +80,8 @@ export class AlignPanel {
   }
 
   /** @param {string} words */
-  say(words) {
-    say(this._word, words);
+  showMessage(words) {
+    setText(this._word, words);
     this._line.toggleAttribute("hidden", true);
     this._showForm();
   }
@@ -106,13 +106,13 @@ export class AlignPanel {
     );
     this._body.removeAttribute("hidden");
     this._go.setAttribute("aria-pressed", "true");
-    this.say("");
+    this.showMessage("");
   }
 
   close() {
     this._body.setAttribute("hidden", "");
     this._go.setAttribute("aria-pressed", "false");
-    this.say("");
+    this.showMessage("");
   }
 
   /** @param {boolean} whole */
@@ -127,7 +127,7 @@ export class AlignPanel {
 
   /** @param {{line: string, lost: string}} saved */
   tellSaved({ line, lost }) {
-    say(this._word, lost || "Saved. The line for a fleet file:");
+    setText(this._word, lost || "Saved. The line for a fleet file:");
     this._line.textContent = line;
     this._line.toggleAttribute("hidden", false);
     this._showForm();

@@ -1,11 +1,11 @@
 import { onScreen } from "../../web/tools/aim.js";
-import { button, html, say, svg } from "../../web/tools/elements.js";
-import { look } from "../../web/tools/goal_words.js";
+import { button, html, setText, svg } from "../../web/tools/elements.js";
+import { look } from "../../web/tools/goal_texts.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
-/** @typedef {import('../../web/motion/report.js').GoalWord} GoalWord */
+/** @typedef {import('../../web/motion/report.js').GoalReport} GoalReport */
 
 /** Points along x, 44 pixels long, with a ring around the goal's position. */
 const ARROW = "M7 0H34M0 7a7 7 0 1 1 .01 0M44 0 30-8v16z";
@@ -60,7 +60,7 @@ export class GoalMarks {
   }
 
   /**
-   * @param {Map<string, {pose: Pose, state?: string, goal?: GoalWord, name?: string,
+   * @param {Map<string, {pose: Pose, state?: string, goal?: GoalReport, name?: string,
    *     mine?: boolean, cancels?: boolean}>} goals By robot. `state`: aimed, asked or
    *     sent, for goals that the gate does not report yet. `mine`: the robot is
    *     selected.
@@ -79,7 +79,7 @@ export class GoalMarks {
 
   /**
    * @param {string} robot
-   * @param {{pose: Pose, state?: string, goal?: GoalWord, name?: string, mine?: boolean,
+   * @param {{pose: Pose, state?: string, goal?: GoalReport, name?: string, mine?: boolean,
    *     cancels?: boolean}} told
    */
   _update(robot, { pose, state = "", goal, name = "", mine = false, cancels = false }) {
@@ -93,7 +93,7 @@ export class GoalMarks {
     mark.label.hidden = seen === null;
     if (seen === null) return;
     mark.label.className = `webmap-goal-label ${kind}${mine ? " mine" : ""}`;
-    say(mark.words, mine ? seen.text : `${name}: ${seen.text.split(",")[0]}`);
+    setText(mark.words, mine ? seen.text : `${name}: ${seen.text.split(",")[0]}`);
     mark.end.hidden = !mine || (!seen.over && !cancels) || goal?.state === "cancelling";
     const does = seen.over ? "Hide this goal" : "Cancel goal";
     mark.end.setAttribute("aria-label", does);

@@ -9,11 +9,11 @@ import {
   viewOf,
   writeLayout,
 } from "../../web/layout.js";
-import { button, html, say } from "../../web/tools/elements.js";
+import { button, html, setText } from "../../web/tools/elements.js";
 import { joinSaveMenu, offer } from "../../web/tools/save_menu.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/layout.js').Place} Place */
 /** @typedef {import('../../web/tools/save_menu.js').Where} Where */
 /** @typedef {Where & {of?: string, restore?: boolean}} Options */
@@ -43,7 +43,7 @@ const KEEP_WITHIN = 500;
  * @param {MapCanvas} map
  * @param {Options} options
  * @param {Send} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
   const views = new LastView(map, options, send);
@@ -202,7 +202,7 @@ class LayoutTool {
    */
   _say(text, bad = false) {
     this._word.classList.toggle("bad", bad);
-    say(this._word, text);
+    setText(this._word, text);
     this._word.scrollIntoView({ block: "nearest" });
   }
 }

@@ -1,8 +1,8 @@
-import { html, say, svg } from "../../web/tools/elements.js";
+import { html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {(message: Record<string, unknown>) => void} Send */
 
 /**
@@ -41,7 +41,7 @@ const LOOKS = /** @type {Record<string, [string, string, string]>} */ ({
  * @param {MapCanvas} map
  * @param {Options} options
  * @param {Send} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
   const panel = new RosoutPanel(map, options, send);
@@ -148,14 +148,14 @@ class RosoutPanel {
         if (!row.hidden) shown += 1;
         if (level === "error" || level === "fatal") bad += 1;
       }
-      book.say();
+      book.showState();
     }
-    say(this._badge, bad > 0 ? `${bad}` : "");
+    setText(this._badge, bad > 0 ? `${bad}` : "");
     this._badge.title = bad > 0 ? `${bad} errors in the newest lines` : "";
     const total = this._books.reduce((sum, book) => sum + book.total, 0);
     const lines = (/** @type {number} */ n) =>
       `${n.toLocaleString("en")} ${n === 1 ? "line" : "lines"}`;
-    say(
+    setText(
       this._count,
       total === 0 ? "No log lines yet." : `${lines(shown)} shown of ${lines(total)} received.`,
     );
@@ -165,7 +165,7 @@ class RosoutPanel {
     const now = this._map.clock;
     if (!this._details.open || now === null) return;
     for (const { rows } of this._books) {
-      for (const { age, heard } of rows.values()) say(age, ago(now - heard));
+      for (const { age, heard } of rows.values()) setText(age, ago(now - heard));
     }
   }
 
@@ -212,7 +212,7 @@ class Book {
     for (const [number, level, name, text, count, heard] of said) {
       const known = this.rows.get(number) ?? this._add(number, level, name, text);
       known.heard = heard;
-      say(known.times, count > 1 ? `× ${count.toLocaleString("en")}` : "");
+      setText(known.times, count > 1 ? `× ${count.toLocaleString("en")}` : "");
     }
     for (const [number, { row }] of this.rows) {
       if (this.rows.size <= most) break;
@@ -221,9 +221,9 @@ class Book {
     }
   }
 
-  say() {
+  showState() {
     const away = this._state !== "" && this._state !== "open";
-    say(this._note, away ? "No connection to this bridge: no new log lines." : "");
+    setText(this._note, away ? "No connection to this bridge: no new log lines." : "");
   }
 
   /**

@@ -1,4 +1,4 @@
-import { deskOf } from "../../web/inputs/desk.js";
+import { devicesOf } from "../../web/inputs/devices.js";
 import { attentive } from "../../web/motion/attention.js";
 import { apply } from "../../web/view.js";
 import { button, html, svg } from "../../web/tools/elements.js";
@@ -85,7 +85,7 @@ export class RouteArea {
     const { signal } = this._ending;
     window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
     // While corners are pressed the aim handles Escape.
-    this._offEscape = deskOf(map.drive).claimEscape(() => this._closed && this.leave());
+    this._offEscape = devicesOf(map.drive).claimEscape(() => this._closed && this.leave());
     this._draw();
   }
 

@@ -86,7 +86,7 @@ export class Keys {
   _down(event) {
     if (this._isStop(event)) return;
     if (MODIFIERS.has(event.key)) {
-      this._drive.doubt();
+      this._drive.goNeutral();
       return;
     }
     if (!this._drives(event)) return;
@@ -102,7 +102,7 @@ export class Keys {
   _up(event) {
     // A key that is let go of while Meta is held says nothing on a Mac, and which
     // others did is unknown: a Meta that goes up is as doubtful as one going down.
-    if (event.key === "Meta" || event.key === "OS") this._drive.doubt();
+    if (event.key === "Meta" || event.key === "OS") this._drive.goNeutral();
     if (this._held.delete(event.code)) this._tell();
   }
 

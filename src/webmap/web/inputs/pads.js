@@ -1,5 +1,5 @@
 import { attentive } from "../motion/attention.js";
-import { past, throwOf } from "./stick.js";
+import { beyondDeadZone, axesOfStick } from "./stick.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
 /** @typedef {import('../motion/axes.js').Axes} Axes */
@@ -101,8 +101,8 @@ export class Pads {
  */
 function axesOfPad({ axes }, holonomic) {
   const [right = 0, down = 0, turn = 0] = axes;
-  if (!holonomic) return throwOf(right, down);
-  return { ...throwOf(right, down, { sideways: true }), turn: past(-turn) };
+  if (!holonomic) return axesOfStick(right, down);
+  return { ...axesOfStick(right, down, { sideways: true }), turn: beyondDeadZone(-turn) };
 }
 
 /**

@@ -4,7 +4,7 @@ import { takesKeys } from "../motion/attention.js";
 /** @typedef {import('../motion/axes.js').Axes} Axes */
 
 /** How far from its middle the knob goes, as a share of the pad's radius. */
-const WAY = 0.62;
+const TRAVEL = 0.62;
 
 /**
  * A pad with a knob as a drive input, for one finger, pen or mouse button.
@@ -84,7 +84,7 @@ export class Stick {
     const focused = document.activeElement;
     if (focused instanceof HTMLElement && takesKeys(focused)) focused.blur();
     const { left, top, width, height } = this._pad.getBoundingClientRect();
-    this._middle = { x: left + width / 2, y: top + height / 2, way: (WAY * width) / 2 };
+    this._middle = { x: left + width / 2, y: top + height / 2, way: (TRAVEL * width) / 2 };
     this._pointer = event.pointerId;
     this._pad.setPointerCapture(event.pointerId);
     this._pad.classList.add("held");
@@ -100,7 +100,7 @@ export class Stick {
     const right = (event.clientX - x) / way;
     const down = (event.clientY - y) / way;
     this._draw(right, down);
-    this._drive.setInput("stick", throwOf(right, down, { sideways: this._sideways() }));
+    this._drive.setInput("stick", axesOfStick(right, down, { sideways: this._sideways() }));
   }
 
   /**
@@ -127,11 +127,11 @@ export const DEAD_ZONE = 0.15;
  * @param {{sideways?: boolean}} [options]
  * @returns {Axes}
  */
-export function throwOf(right, down, { sideways = false } = {}) {
+export function axesOfStick(right, down, { sideways = false } = {}) {
   // Pulled beyond its edge, a stick still points the same way.
   const beyond = Math.max(1, Math.hypot(right, down));
-  const ahead = past(-down / beyond);
-  const left = past(-right / beyond);
+  const ahead = beyondDeadZone(-down / beyond);
+  const left = beyondDeadZone(-right / beyond);
   return sideways ? { x: ahead, y: left, turn: 0 } : { x: ahead, y: 0, turn: left };
 }
 
@@ -139,7 +139,7 @@ export function throwOf(right, down, { sideways = false } = {}) {
  * @param {number} value In [-1, 1].
  * @returns {number} What of it lies beyond the dead zone, again up to 1.
  */
-export function past(value) {
+export function beyondDeadZone(value) {
   const size = Math.abs(value) - DEAD_ZONE;
   return size > 0 ? (Math.sign(value) * size) / (1 - DEAD_ZONE) : 0;
 }

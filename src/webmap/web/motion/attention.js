@@ -43,17 +43,17 @@ export function attentive() {
 /**
  * Watch for everything that makes it doubtful that the operator is still driving.
  *
- * @param {(left: boolean) => void} onDoubt Called at once; `left` says that the page
+ * @param {(left: boolean) => void} onDistraction Called at once; `left` says that the page
  *     is hidden or going away, so that leases should be given back as well.
  * @param {() => void} onReturn Called when the page comes back from a freeze or from
  *     the back-forward cache, where its connections have died unnoticed.
  * @returns {() => void} Stops watching.
  */
-export function watchAttention(onDoubt, onReturn) {
+export function watchAttention(onDistraction, onReturn) {
   const ending = new AbortController();
   const options = { signal: ending.signal, capture: true };
-  const doubt = () => onDoubt(false);
-  const leave = () => onDoubt(true);
+  const doubt = () => onDistraction(false);
+  const leave = () => onDistraction(true);
   window.addEventListener(
     "blur",
     (event) => {

@@ -1,8 +1,8 @@
 import { Leases } from "./leases.js";
-import { Reach } from "./reach.js";
+import { LeaseRequests } from "./lease_requests.js";
 import { Stream } from "./stream.js";
 
-/** @typedef {import('./hands.js').Hands} Hands */
+/** @typedef {import('./inputs.js').Inputs} Inputs */
 /** @typedef {import('./loop.js').Loop} Loop */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 /** @typedef {import('./stream.js').Command} Command */
@@ -15,29 +15,29 @@ const RENEW = 10_000;
  * and the axes to send with it.
  *
  * It is stepped at 20 Hz and at once when something changed, and returns the
- * messages to send. Motion needs all of: an attentive page, hands that are alive, an
+ * messages to send. Motion needs all of: an attentive page, inputs that are alive, an
  * open loop, a lease on the chosen robot, and a stretch of neutral that the gate has
  * seen since the last doubt. Times are in milliseconds of one clock.
  */
 export class Pilot {
   /**
-   * @param {Hands} hands
+   * @param {Inputs} inputs
    * @param {Loop} loop
    * @param {number} now
    * @param {{releaseAfter?: number}} [options] `releaseAfter`: after this long
    *     without motion the lease is given back, in ms.
    */
-  constructor(hands, loop, now, { releaseAfter = 30_000 } = {}) {
-    this.hands = hands;
+  constructor(inputs, loop, now, { releaseAfter = 30_000 } = {}) {
+    this.inputs = inputs;
     this.releaseAfter = releaseAfter;
-    this._stream = new Stream(hands, loop, now);
+    this._stream = new Stream(inputs, loop, now);
     this._leases = new Leases();
     /**
      * When leases were last said to be needed still.
      * @type {Map<string, number>}
      */
     this._renewed = new Map();
-    this._reach = new Reach(hands, this._leases, this._stream);
+    this._requests = new LeaseRequests(inputs, this._leases, this._stream);
   }
 
   /** The newest report of each robot. */
@@ -66,9 +66,9 @@ export class Pilot {
     return driven !== null && this.robots.get(driven)?.armed !== false;
   }
 
-  /** What the operator should know of the chosen robot and of the hands. */
+  /** What the operator should know of the chosen robot and of the inputs. */
   get status() {
-    const { choice, refusal, refused, robot } = this._reach;
+    const { choice, refusal, refused, robot } = this._requests;
     return {
       choice,
       report: choice === null ? null : (this.robots.get(choice) ?? null),
@@ -76,9 +76,9 @@ export class Pilot {
       taking: robot !== null,
       settled: this.settled,
       early: this._stream.early,
-      pressed: this.hands.pressed,
-      dead: this.hands.dead,
-      axes: this.hands.axes,
+      pressed: this.inputs.pressed,
+      blocked: this.inputs.blocked,
+      axes: this.inputs.axes,
       refusal,
       refused,
       delay: this._stream.delay,
@@ -102,10 +102,10 @@ export class Pilot {
    * @returns {Command[]}
    */
   choose(robot, now) {
-    if (robot === this._reach.choice) return [];
+    if (robot === this._requests.choice) return [];
     const messages = this.letGo(now);
-    this._reach.choose(robot);
-    if (this.hands.pressed) this.hands.kill(now);
+    this._requests.choose(robot);
+    if (this.inputs.pressed) this.inputs.block(now);
     return messages;
   }
 
@@ -116,7 +116,7 @@ export class Pilot {
    * @param {number} now
    */
   take(robot, now) {
-    return this._reach.take(robot, now);
+    return this._requests.take(robot, now);
   }
 
   /**
@@ -125,7 +125,7 @@ export class Pilot {
    * @param {string} robot
    */
   ask(robot) {
-    return this._reach.ask(robot);
+    return this._requests.ask(robot);
   }
 
   /**
@@ -141,7 +141,7 @@ export class Pilot {
   grant(robot, now) {
     const grant = { op: "grant", robot };
     if (robot !== this.driven) return [grant];
-    this.doubt(now);
+    this.goNeutral(now);
     return [...this._stream.neutral(now), grant];
   }
 
@@ -168,10 +168,10 @@ export class Pilot {
    * @returns {Command[]}
    */
   letGo(now) {
-    const robot = this.driven ?? this._reach.robot;
+    const robot = this.driven ?? this._requests.robot;
     if (robot === null) return [];
     const last = this._stream.neutral(now);
-    if (this.hands.pressed) this.hands.kill(now);
+    if (this.inputs.pressed) this.inputs.block(now);
     this._end();
     return [...last, { op: "release", robot }];
   }
@@ -216,8 +216,8 @@ export class Pilot {
    * @param {{drop?: boolean}} [how] `drop`: also forget what is held, as its release
    *     may never be heard of here.
    */
-  doubt(now, how) {
-    this._stream.doubt(now, how);
+  goNeutral(now, how) {
+    this._stream.goNeutral(now, how);
   }
 
   /**
@@ -227,7 +227,7 @@ export class Pilot {
    * @param {number} now
    */
   stopped(robot, now) {
-    this.doubt(now);
+    this.goNeutral(now);
     this._leases.unpark(robot);
     if (robot === "*" || this._concerns(robot)) this._end();
   }
@@ -239,13 +239,13 @@ export class Pilot {
    * @param {number} now
    */
   reset(robot, now) {
-    this._reach.reset(robot);
-    this.hands.kill(now);
+    this._requests.reset(robot);
+    this.inputs.block(now);
   }
 
   /** Forget all leases: they ended with the connection. */
   disconnect() {
-    this._reach.forget();
+    this._requests.forget();
     this._leases.forget();
     this._stream.restart();
   }
@@ -264,9 +264,9 @@ export class Pilot {
       const lost = lease.epoch !== this.epoch(robot);
       if (lost) this._stream.close();
       // If it disarms, the gate saw a reason to stop that we did not.
-      if (lost || (before?.armed && !armed)) this.doubt(now);
+      if (lost || (before?.armed && !armed)) this.goNeutral(now);
     }
-    this._reach.report(report, before, now);
+    this._requests.report(report, before, now);
   }
 
   /**
@@ -277,11 +277,11 @@ export class Pilot {
    */
   gone(robot, now) {
     this._leases.gone(robot);
-    this._reach.gone(robot);
+    this._requests.gone(robot);
     if (!this._concerns(robot)) return;
-    this._reach.end();
+    this._requests.end();
     this._stream.close();
-    this.doubt(now);
+    this.goNeutral(now);
   }
 
   /**
@@ -293,7 +293,7 @@ export class Pilot {
    * @param {number} now
    */
   refuse(robot, what, why, now) {
-    this._reach.refuse(robot, what, why, now);
+    this._requests.refuse(robot, what, why, now);
   }
 
   /**
@@ -306,7 +306,7 @@ export class Pilot {
    */
   step(now, attentive) {
     this._stream.look(now, attentive);
-    const reached = this._reach.step(now);
+    const reached = this._requests.step(now);
     return [...reached, ...this._stream.step(this._armed, now), ...this._tidy(now)];
   }
 
@@ -328,7 +328,7 @@ export class Pilot {
   _end() {
     const { lease } = this._stream;
     if (lease) this._leases.giveBack(lease.robot, lease.epoch);
-    this._reach.end();
+    this._requests.end();
     this._stream.close();
   }
 
@@ -337,6 +337,6 @@ export class Pilot {
    * @returns {boolean} Whether this page drives it or is about to.
    */
   _concerns(robot) {
-    return robot === this.driven || robot === this._reach.robot;
+    return robot === this.driven || robot === this._requests.robot;
   }
 }

@@ -24,7 +24,7 @@
  * What follows an older gate does not say.
  *
  * @property {boolean} [latched] Whether a STOP stands, until it is reset.
- * @property {StopWord | null} [stop] What became of that STOP.
+ * @property {StopResult | null} [stop] What became of that STOP.
  * @property {Asker | null} [asker] Who asks the holder for it.
  * @property {boolean} [changing] Whether a hand-over waits until the robot stands.
  * @property {string | null} [alarm] How the robot does not obey.
@@ -40,12 +40,12 @@
  * @property {string | null} [way] How goals are sent to it; null if they cannot be.
  * @property {boolean} [cancels] Whether goals can be called off.
  * @property {boolean} [locates] Whether it can be told where it is.
- * @property {GoalWord | null} [goal] How it stands with its newest goal.
+ * @property {GoalReport | null} [goal] How it stands with its newest goal.
  * @property {string[]} [hooks] Which of its stop hooks failed, and why.
  */
 
 /**
- * @typedef {object} GoalWord
+ * @typedef {object} GoalReport
  * @property {string} id
  * @property {number} x Metres.
  * @property {number} y Metres.
@@ -62,7 +62,7 @@
  */
 
 /**
- * @typedef {object} StopWord
+ * @typedef {object} StopResult
  * @property {string} by Who said STOP.
  * @property {boolean | null} confirmed Whether odometry says that the robot stands; null
  *     while that is looked for.
@@ -132,7 +132,7 @@ export function stopOf(key) {
  * @param {RobotReport} report
  * @returns {boolean} Whether a press may ask for the lease without asking a person.
  */
-export function mayReach(report) {
+export function mayTake(report) {
   if (isLatched(report)) return false;
   return report.armable && (!heldByAnother(report) || heldByProgram(report));
 }

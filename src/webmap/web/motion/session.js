@@ -6,16 +6,16 @@
  * `pilot.js` and `stream.js`. What reads the devices is in `../inputs`.
  */
 
-import { Asking } from "./asking.js";
-import { Hands } from "./hands.js";
+import { Requests } from "./requests.js";
+import { Inputs } from "./inputs.js";
 import { Loop } from "./loop.js";
 import { Onset } from "./onset.js";
 import { Pilot } from "./pilot.js";
 import { Stopping } from "./stopping.js";
 import { Unanswered } from "./unanswered.js";
 
-/** @typedef {import('./news.js').Item} Item */
-/** @typedef {import('./news.js').LinkState} LinkState */
+/** @typedef {import('./drive_events.js').DriveEvent} DriveEvent */
+/** @typedef {import('./drive_events.js').LinkState} LinkState */
 /** @typedef {import('./stream.js').Command} Command */
 
 /**
@@ -31,11 +31,11 @@ export class Session {
    * @param {{releaseAfter?: number}} options See {@link Pilot}.
    */
   constructor(now, options) {
-    this.hands = new Hands(now);
+    this.inputs = new Inputs(now);
     this.loop = new Loop();
-    this.pilot = new Pilot(this.hands, this.loop, now, options);
+    this.pilot = new Pilot(this.inputs, this.loop, now, options);
     this.stopping = new Stopping();
-    this.asking = new Asking();
+    this.requests = new Requests();
     this.onset = new Onset();
     /**
      * This connection's name at the gate; null while there is none.
@@ -72,7 +72,7 @@ export class Session {
    * @param {number} now
    */
   stopped(robot, left, now) {
-    if (left) this._unanswered.said(robot, this.pilot.robots);
+    if (left) this._unanswered.sent(robot, this.pilot.robots);
     else this._unsent.add(robot);
     this.pilot.stopped(robot, now);
     this.stopping.start(robot, this.pilot.robots, now);
@@ -95,18 +95,18 @@ export class Session {
    *
    * @param {any} message
    * @param {number} now
-   * @returns {{say: Command[], news: Item[]}} What to send, and then to tell.
+   * @returns {{send: Command[], events: DriveEvent[]}} What to send, then the events to emit.
    */
   receive(message, now) {
     if (message.op === "hello") return this._greeted(message.connection, now);
-    return { say: [], news: this._heard(message, now) };
+    return { send: [], events: this._received(message, now) };
   }
 
   /**
    * Judge the link by how the loop is.
    *
    * @param {number} now
-   * @returns {Item[] | null} What to tell; null if the connection is to be given up.
+   * @returns {DriveEvent[] | null} What to tell; null if the connection is to be given up.
    */
   judge(now) {
     const state = this.loop.state(now);
@@ -119,37 +119,37 @@ export class Session {
    * The connection is lost.
    *
    * @param {number} now
-   * @returns {Item[]} What to tell.
+   * @returns {DriveEvent[]} What to tell.
    */
   lost(now) {
     this.connection = null;
     this._forget(now);
-    const news = this._change("lost");
-    for (const report of this.pilot.robots.values()) news.push(["robot", report]);
-    return news;
+    const events = this._change("lost");
+    for (const report of this.pilot.robots.values()) events.push(["robot", report]);
+    return events;
   }
 
   /**
    * @param {string} connection
    * @param {number} now
-   * @returns {{say: Command[], news: Item[]}}
+   * @returns {{send: Command[], events: DriveEvent[]}}
    */
   _greeted(connection, now) {
     // A second greeting on a connection: the gate was started anew.
     if (this.connection !== null) this._forget(now);
     this.connection = connection;
-    const say = [...this._unsent].map((robot) => ({ op: "stop", robot }));
-    for (const robot of this._unsent) this._unanswered.said(robot, this.pilot.robots);
+    const send = [...this._unsent].map((robot) => ({ op: "stop", robot }));
+    for (const robot of this._unsent) this._unanswered.sent(robot, this.pilot.robots);
     this._unsent.clear();
-    return { say, news: this._change("open") };
+    return { send, events: this._change("open") };
   }
 
   /**
    * @param {any} message
    * @param {number} now
-   * @returns {Item[]}
+   * @returns {DriveEvent[]}
    */
-  _heard(message, now) {
+  _received(message, now) {
     switch (message.op) {
       case "tick":
         this.loop.receive(message.tick, message.ack, now);
@@ -170,7 +170,7 @@ export class Session {
 
   /** Those who follow what the gate says of each robot. */
   get _watching() {
-    return [this.pilot, this.stopping, this.asking, this.onset, this._unanswered];
+    return [this.pilot, this.stopping, this.requests, this.onset, this._unanswered];
   }
 
   /**
@@ -181,15 +181,15 @@ export class Session {
    */
   _forget(now) {
     for (const robot of this._unanswered.take()) this._unsent.add(robot);
-    this.pilot.doubt(now);
+    this.pilot.goNeutral(now);
     this.pilot.disconnect();
-    this.asking.forget();
+    this.requests.forget();
     this.loop.open(now);
   }
 
   /**
    * @param {LinkState} state
-   * @returns {Item[]}
+   * @returns {DriveEvent[]}
    */
   _change(state) {
     if (state === this.state) return [];

@@ -3,7 +3,7 @@ import { doingOf, heldByAnother, isLatched } from "./report.js";
 import { WORDS } from "./state_words.js";
 import { stopWords } from "./stopping.js";
 
-/** @typedef {import('./asking.js').Request} Request */
+/** @typedef {import('./requests.js').Request} Request */
 /** @typedef {import('./pilot.js').Pilot} Pilot */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 /** @typedef {import('./stopping.js').Verdict} Verdict */
@@ -64,7 +64,7 @@ export function describe(status, robot, report, active, more = {}) {
   // Whatever else there is to say: who else moves it, and that its STOP is not what it
   // was made to be.
   const words = [said.detail, other ?? "", ...hooks].filter(Boolean).map(sentence);
-  return say(said.state, said.title, words.join(" "));
+  return description(said.state, said.title, words.join(" "));
 }
 
 /**
@@ -77,27 +77,27 @@ export function describe(status, robot, report, active, more = {}) {
 function ofRobot(status, robot, report, active, more) {
   const { verdict, inputs = KEYS, seen = "", since = "" } = more;
   if (verdict?.state === "unconfirmed" && !(report && isLatched(report))) {
-    return say("unconfirmed", WORDS.unconfirmed, reasonOf(verdict));
+    return description("unconfirmed", WORDS.unconfirmed, reasonOf(verdict));
   }
   if (robot === null) {
-    return say("none", "No robot selected", "Select a robot to drive it.");
+    return description("none", "No robot selected", "Select a robot to drive it.");
   }
   if (report === null) {
     const title = wordsOf(seen in WORDS ? seen : "watched", { since });
-    return say("fixed", title, "This robot has no velocity topic.");
+    return description("fixed", title, "This robot has no velocity topic.");
   }
   const name = doingOf(report, seen);
   const title = wordsOf(name, { report, since });
   if (isLatched(report)) return ofStopped(title, status, report);
   if (name === "changing") {
-    return say("taking", title, "The robot stops first.");
+    return description("taking", title, "The robot stops first.");
   }
   if (heldByAnother(report)) return ofOther(title, status, report, more.request);
   if (!active) {
-    return say("free", "Map not active", "Click this map to drive from it.");
+    return description("free", "Map not active", "Click this map to drive from it.");
   }
   const driven = status.driven === robot;
-  const kept = driven ? ofHands(status, report, title) : ofReach(status, report, title);
+  const kept = driven ? ofInputs(status, report, title) : ofTaking(status, report, title);
   if (kept) return kept;
   const ready = status.settled && !status.early;
   if (name === "held" && driven && !ready) return gettingReady();
@@ -150,16 +150,16 @@ function velocityWords(velocity) {
 
 /** @param {Status} status */
 function ofLink({ link }) {
-  if (link === "connecting") return say("connecting", "Preparing input", "Connecting.");
+  if (link === "connecting") return description("connecting", "Preparing input", "Connecting.");
   if (link === "lost") {
-    return say(
+    return description(
       "lost",
       "Connection lost",
       "No robot can be driven from this page. Reconnecting…",
     );
   }
   if (link === "late") {
-    return say(
+    return description(
       "late",
       "Slow connection",
       "Command too old (over 300 ms): ignored",
@@ -180,7 +180,7 @@ function ofStopped(title, status, report) {
   const refused = status.refused === "reset" ? status.refusal : null;
   const refusal = refused ? ` ${sentence(refused)}` : "";
   const state = confirmed === false ? "unconfirmed" : "stopped";
-  return say(state, title, `${detail}${refusal}`);
+  return description(state, title, `${detail}${refusal}`);
 }
 
 /** @param {Verdict} verdict */
@@ -201,22 +201,22 @@ function ofOther(title, status, report, request) {
     words.push(`Control requested: handed over in ${request.left} s unless ${who} refuses.`);
   } else if (request) words.push(`${request.who} requests control.`);
   else if (status.refusal) words.push(sentence(status.refusal));
-  return say("held", title, words.join(" "));
+  return description("held", title, words.join(" "));
 }
 
 /**
- * Describe why the hands of this page do not move the robot that it holds.
+ * Describe why the inputs of this page do not move the robot that it holds.
  *
  * @param {Status} status
  * @param {RobotReport} report
  * @param {string} title
  * @returns {Description | null} null if they do.
  */
-function ofHands(status, report, title) {
-  if (isTested(report)) return say("driving", "Stop test running", "Do not touch any input.");
+function ofInputs(status, report, title) {
+  if (isTested(report)) return description("driving", "Stop test running", "Do not touch any input.");
   if (report.state === "driving") return null;
-  if (report.reason) return say("fixed", title, sentence(report.reason));
-  return status.pressed && status.dead ? handsOff() : null;
+  if (report.reason) return description("fixed", title, sentence(report.reason));
+  return status.pressed && status.blocked ? inputBlocked() : null;
 }
 
 /**
@@ -227,14 +227,14 @@ function ofHands(status, report, title) {
  * @param {string} title
  * @returns {Description | null} null if nothing does.
  */
-function ofReach(status, report, title) {
+function ofTaking(status, report, title) {
   if (status.taking) return gettingReady();
   if (report.state === "stopping") return null;
   if (!report.armable) {
-    return say("fixed", title, sentence(report.reason ?? "no reason given"));
+    return description("fixed", title, sentence(report.reason ?? "no reason given"));
   }
-  if (status.refusal) return say("free", title, sentence(status.refusal));
-  if (status.pressed && status.dead) return handsOff();
+  if (status.refusal) return description("free", title, sentence(status.refusal));
+  if (status.pressed && status.blocked) return inputBlocked();
   return status.early ? gettingReady() : null;
 }
 
@@ -251,30 +251,30 @@ function ofDoing(name, title, report, inputs) {
   switch (name) {
     case "blocked": {
       const sent = `Sent: ${velocityWords(report.sent)}.`;
-      return say("blocked", title, `${sent} Measured: ${speedOf(report)}.`);
+      return description("blocked", title, `${sent} Measured: ${speedOf(report)}.`);
     }
     case "driven":
-      return say("driving", title, speedOf(report));
+      return description("driving", title, speedOf(report));
     case "stopping":
     case "settling":
-      return say("stopping", title, speedOf(report));
+      return description("stopping", title, speedOf(report));
     case "moving":
     case "other":
-      return say("moving", title, report.measured ? speedOf(report) : "");
+      return description("moving", title, report.measured ? speedOf(report) : "");
     case "navigating":
     case "navigating_held":
-      return say("moving", title, `To drive, hold ${inputs}. This cancels the goal.`);
+      return description("moving", title, `To drive, hold ${inputs}. This cancels the goal.`);
   }
-  if (name !== "held") return say("free", title, `Hold ${inputs} to drive.`);
-  return say("ready", title, `Hold ${inputs} to drive. Press Space for STOP.`);
+  if (name !== "held") return description("free", title, `Hold ${inputs} to drive.`);
+  return description("ready", title, `Hold ${inputs} to drive. Press Space for STOP.`);
 }
 
 function gettingReady() {
-  return say("taking", "Preparing input", "");
+  return description("taking", "Preparing input", "");
 }
 
-function handsOff() {
-  return say("hands-off", "Input blocked: release all keys, then press again", "");
+function inputBlocked() {
+  return description("hands-off", "Input blocked: release all keys, then press again", "");
 }
 
 /**
@@ -283,7 +283,7 @@ function handsOff() {
  * @param {string} detail
  * @returns {Description}
  */
-function say(state, title, detail) {
+function description(state, title, detail) {
   return { state, title, detail };
 }
 

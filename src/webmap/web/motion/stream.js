@@ -2,7 +2,7 @@ import { NEUTRAL, isNeutral } from "./axes.js";
 import { Pictures } from "./pictures.js";
 
 /** @typedef {import('./axes.js').Axes} Axes */
-/** @typedef {import('./hands.js').Hands} Hands */
+/** @typedef {import('./inputs.js').Inputs} Inputs */
 /** @typedef {import('./loop.js').Loop} Loop */
 
 /** @typedef {{op: string, robot: string, [field: string]: unknown}} Command */
@@ -33,7 +33,7 @@ export const ASLEEP = 250;
 export const CALM = 500;
 
 /**
- * The stream of commands under one lease: how the hands are, or neutral.
+ * The stream of commands under one lease: how the inputs are, or neutral.
  *
  * It is neutral until the gate has seen neutral for a stretch since the last doubt, and
  * whatever it notices itself of a page that is not attentive, a loop that is not open
@@ -41,12 +41,12 @@ export const CALM = 500;
  */
 export class Stream {
   /**
-   * @param {Hands} hands
+   * @param {Inputs} inputs
    * @param {Loop} loop
    * @param {number} now
    */
-  constructor(hands, loop, now) {
-    this.hands = hands;
+  constructor(inputs, loop, now) {
+    this.inputs = inputs;
     this.loop = loop;
     this.pictures = new Pictures();
     /** @type {Lease | null} */
@@ -59,10 +59,10 @@ export class Stream {
 
   /** Whether a press would come too early: the page gets ready for one by itself. */
   get early() {
-    if (!this._attentive || this.hands.pressed) return false;
+    if (!this._attentive || this.inputs.pressed) return false;
     const now = this._lookedAt;
     const calm = now - this._sleptAt >= CALM;
-    return this.loop.tick === null || !calm || !this.hands.ready(now);
+    return this.loop.tick === null || !calm || !this.inputs.ready(now);
   }
 
   /** Whether the gate has seen enough neutral, as far as can be known here. */
@@ -108,9 +108,9 @@ export class Stream {
    * @param {{drop?: boolean}} [how] `drop`: also forget what is held, as its release
    *     may never be heard of here.
    */
-  doubt(now, { drop = false } = {}) {
-    if (drop) this.hands.drop(now);
-    else this.hands.kill(now);
+  goNeutral(now, { drop = false } = {}) {
+    if (drop) this.inputs.drop(now);
+    else this.inputs.block(now);
     if (!this.lease) return;
     this.lease.firstNeutral = null;
     this.lease.seenSince = null;
@@ -129,9 +129,9 @@ export class Stream {
     this._attentive = attentive;
     const slept = gap < 0 || gap > ASLEEP;
     if (slept) this._sleptAt = now;
-    if (!attentive || slept) this.doubt(now, { drop: true });
-    if (this.loop.tick === null || this.loop.state(now) !== "open") this.doubt(now);
-    if (this.lease && this.pictures.blind(this.lease.robot)) this.doubt(now);
+    if (!attentive || slept) this.goNeutral(now, { drop: true });
+    if (this.loop.tick === null || this.loop.state(now) !== "open") this.goNeutral(now);
+    if (this.lease && this.pictures.blind(this.lease.robot)) this.goNeutral(now);
   }
 
   /**
@@ -145,7 +145,7 @@ export class Stream {
     if (lease.firstNeutral !== null && this.loop.acknowledged(lease.firstNeutral)) {
       lease.seenSince ??= now;
     }
-    const { axes } = this.hands;
+    const { axes } = this.inputs;
     if (!isNeutral(axes)) lease.usedAt = now;
     return [this._command(lease, armed && this.settled ? axes : NEUTRAL, now)];
   }

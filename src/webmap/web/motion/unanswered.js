@@ -17,7 +17,7 @@ export class Unanswered {
      * that stood for each, if one did.
      * @type {Map<string, Map<string, string>>}
      */
-    this._said = new Map();
+    this._sent = new Map();
     /** Whether the STOP for all met no robot known, and none stopped was reported since. */
     this._metNone = false;
   }
@@ -28,11 +28,11 @@ export class Unanswered {
    * @param {string} robot Or "*".
    * @param {ReadonlyMap<string, RobotReport>} known The robots that there are.
    */
-  said(robot, known) {
+  sent(robot, known) {
     const meant = robot === "*" ? [...known.keys()] : [robot];
     const before = (/** @type {string} */ id) => known.get(id)?.stop?.id ?? "";
     if (robot === "*") this._metNone = known.size === 0;
-    this._said.set(robot, new Map(meant.map((id) => [id, before(id)])));
+    this._sent.set(robot, new Map(meant.map((id) => [id, before(id)])));
   }
 
   /**
@@ -43,11 +43,11 @@ export class Unanswered {
   report(report) {
     if (!isLatched(report)) {
       // It may have been told before the STOP arrived, which may never arrive: no answer.
-      if (this._metNone) this._said.get("*")?.set(report.robot, "");
+      if (this._metNone) this._sent.get("*")?.set(report.robot, "");
       return;
     }
     this._answered(report.robot, report.stop?.id);
-    if (this._metNone && this._said.get("*")?.size === 0) this._said.delete("*");
+    if (this._metNone && this._sent.get("*")?.size === 0) this._sent.delete("*");
     this._metNone = false;
   }
 
@@ -66,10 +66,10 @@ export class Unanswered {
    *     when STOP was said here is no answer, as somebody may be resetting it.
    */
   _answered(robot, stop) {
-    for (const [said, waiting] of this._said) {
+    for (const [target, waiting] of this._sent) {
       if (!waiting.has(robot) || waiting.get(robot) === (stop ?? null)) continue;
       waiting.delete(robot);
-      if (waiting.size === 0) this._said.delete(said);
+      if (waiting.size === 0) this._sent.delete(target);
     }
   }
 
@@ -79,8 +79,8 @@ export class Unanswered {
    * @returns {string[]} What is to be said again.
    */
   take() {
-    const again = [...this._said.keys()];
-    this._said.clear();
+    const again = [...this._sent.keys()];
+    this._sent.clear();
     this._metNone = false;
     return again;
   }

@@ -1,5 +1,5 @@
-import { deskOf } from "../inputs/desk.js";
-import { html, say, svg } from "./elements.js";
+import { devicesOf } from "../inputs/devices.js";
+import { html, setText, svg } from "./elements.js";
 import { lay, ownPlace } from "./overlay.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
@@ -88,7 +88,7 @@ class SaveMenu {
     this._element.addEventListener("keydown", escape, { signal });
     this._offs = [
       this._lay(place),
-      deskOf(map.drive).claimEscape(() => this._leave()),
+      devicesOf(map.drive).claimEscape(() => this._leave()),
     ];
     this._open(false);
   }
@@ -132,8 +132,8 @@ class SaveMenu {
   }
 
   /** @param {string} text Text next to the button while something is saved. */
-  say(text) {
-    say(this._word, text);
+  showMessage(text) {
+    setText(this._word, text);
   }
 
   /**

@@ -17,7 +17,7 @@
  *
  * Times are in milliseconds of one clock.
  */
-export class Asking {
+export class Requests {
   constructor() {
     /** @type {Map<string, {report: RobotReport, ends: number}>} */
     this._requests = new Map();

@@ -1,7 +1,7 @@
 import { isNeutral } from "./axes.js";
-import { heldByAnother, mayReach } from "./report.js";
+import { heldByAnother, mayTake } from "./report.js";
 
-/** @typedef {import('./hands.js').Hands} Hands */
+/** @typedef {import('./inputs.js').Inputs} Inputs */
 /** @typedef {import('./leases.js').Leases} Leases */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 /** @typedef {import('./stream.js').Command} Command */
@@ -18,14 +18,14 @@ export const TAKE_PATIENCE = 1500;
  * held when the lease comes was not meant for that. Times are in milliseconds of one
  * clock.
  */
-export class Reach {
+export class LeaseRequests {
   /**
-   * @param {Hands} hands
+   * @param {Inputs} inputs
    * @param {Leases} leases
    * @param {Stream} stream
    */
-  constructor(hands, leases, stream) {
-    this._hands = hands;
+  constructor(inputs, leases, stream) {
+    this._inputs = inputs;
     this._leases = leases;
     this._stream = stream;
     /**
@@ -49,7 +49,7 @@ export class Reach {
      * Robots that another holds and that were asked for.
      * @type {Set<string>}
      */
-    this._begged = new Set();
+    this._requested = new Set();
   }
 
   /** The robot whose lease was asked for to drive it, while that is not answered. */
@@ -85,7 +85,7 @@ export class Reach {
    * @returns {Command[]}
    */
   ask(robot) {
-    this._begged.add(robot);
+    this._requested.add(robot);
     if (robot === this.choice) this.refusal = null;
     return [{ op: "ask", robot }];
   }
@@ -110,15 +110,15 @@ export class Reach {
       }
       return [];
     }
-    if (this._stream.lease || !choice || isNeutral(this._hands.axes)) return [];
+    if (this._stream.lease || !choice || isNeutral(this._inputs.axes)) return [];
     const report = this._leases.robots.get(choice);
     const epoch = this._leases.epoch(choice);
     if (epoch !== null) {
       this._open(choice, epoch, now);
       return [];
     }
-    if (!report || !mayReach(report)) {
-      this._hands.kill(now);
+    if (!report || !mayTake(report)) {
+      this._inputs.block(now);
       return [];
     }
     this.refusal = null;
@@ -137,11 +137,11 @@ export class Reach {
     const { robot } = report;
     const epoch = this._leases.epoch(robot);
     const asked = this._asked?.robot === robot ? this._asked : null;
-    const handed = epoch !== null && this._begged.delete(robot);
+    const handed = epoch !== null && this._requested.delete(robot);
     if (asked && epoch !== null) {
       this._asked = null;
       // Taken over, or not taken by a press: what is held now was meant for nothing.
-      if (!asked.alive || (before && heldByAnother(before))) this._hands.kill(now);
+      if (!asked.alive || (before && heldByAnother(before))) this._inputs.block(now);
       this._open(robot, epoch, now);
     } else if (asked && asked.alive && heldByAnother(report)) {
       this._giveUp(now);
@@ -159,7 +159,7 @@ export class Reach {
    * @param {number} now
    */
   refuse(robot, what, why, now) {
-    if (what === "ask" && robot !== null) this._begged.delete(robot);
+    if (what === "ask" && robot !== null) this._requested.delete(robot);
     if (robot !== this.choice) return;
     // The tool that sent a goal or a pose shows why.
     if (what === "goal" || what === "locate") return;
@@ -168,7 +168,7 @@ export class Reach {
     this.refusal = why;
     this.refused = what;
     if (what === "take" && this._asked?.robot === robot) this._giveUp(now);
-    if (what === "drive") this._stream.doubt(now);
+    if (what === "drive") this._stream.goNeutral(now);
   }
 
   /** Wait no more for the lease that was asked for. */
@@ -178,13 +178,13 @@ export class Reach {
 
   /** @param {string} robot The gate does not know it any more. */
   gone(robot) {
-    this._begged.delete(robot);
+    this._requested.delete(robot);
   }
 
   /** Nothing is answered any more: the connection ended. */
   forget() {
     this._asked = null;
-    this._begged.clear();
+    this._requested.clear();
   }
 
   /**
@@ -195,7 +195,7 @@ export class Reach {
    * @param {number} now
    */
   _handed(robot, epoch, now) {
-    if (this._hands.pressed) this._hands.kill(now);
+    if (this._inputs.pressed) this._inputs.block(now);
     if (robot === this.choice) this._open(robot, epoch, now);
     // The operator has turned to another one; it is given back unless they return.
     else this._leases.park(robot, now);
@@ -214,6 +214,6 @@ export class Reach {
   /** @param {number} now */
   _giveUp(now) {
     this._asked = null;
-    this._hands.kill(now);
+    this._inputs.block(now);
   }
 }

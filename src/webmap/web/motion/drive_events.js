@@ -10,7 +10,7 @@
  * that must be asked for their state (gamepads) are asked now. `drop`: inputs must
  * forget what is held. `step`: a 20 Hz step is over.
  *
- * @typedef {object} News
+ * @typedef {object} DriveEvents
  * @property {RobotReport} robot
  * @property {string} gone
  * @property {LinkState} state
@@ -22,19 +22,19 @@
  * @property {null} step
  */
 
-/** @typedef {{[K in keyof News]: [kind: K, news: News[K]]}[keyof News]} Item */
+/** @typedef {{[K in keyof DriveEvents]: [kind: K, event: DriveEvents[K]]}[keyof DriveEvents]} DriveEvent */
 
 /** Who wants to hear what. */
 export class Listeners {
   constructor() {
-    /** @type {Map<keyof News, Set<Function>>} */
+    /** @type {Map<keyof DriveEvents, Set<Function>>} */
     this._listeners = new Map();
   }
 
   /**
-   * @template {keyof News} K
+   * @template {keyof DriveEvents} K
    * @param {K} kind
-   * @param {(news: News[K]) => void} fn
+   * @param {(event: DriveEvents[K]) => void} fn
    * @returns {() => void} Stops listening.
    */
   on(kind, fn) {
@@ -46,14 +46,14 @@ export class Listeners {
   }
 
   /**
-   * @template {keyof News} K
+   * @template {keyof DriveEvents} K
    * @param {K} kind
-   * @param {News[K]} news
+   * @param {DriveEvents[K]} event
    */
-  tell(kind, news) {
+  emit(kind, event) {
     for (const fn of this._listeners.get(kind) ?? []) {
       try {
-        fn(news);
+        fn(event);
       } catch (error) {
         // A broken display must never keep a neutral or a STOP from leaving.
         reportError(error);

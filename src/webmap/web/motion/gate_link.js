@@ -9,7 +9,7 @@ const PAUSE = { first: 250, longest: 5000 };
 /**
  * What a line tells its owner.
  *
- * @typedef {object} LineEvents
+ * @typedef {object} GateLinkEvents
  * @property {() => void} open
  * @property {(message: any) => void} receive One JSON object with an `op`.
  * @property {() => void} lost The connection ended or was given up.
@@ -20,10 +20,10 @@ const PAUSE = { first: 250, longest: 5000 };
  *
  * Nothing is ever kept to be sent later: a command is for now or not at all.
  */
-export class Line {
+export class GateLink {
   /**
    * @param {URL} url
-   * @param {LineEvents} events
+   * @param {GateLinkEvents} events
    */
   constructor(url, events) {
     this._url = url;
@@ -63,7 +63,7 @@ export class Line {
     if (this.open) this._socket?.send(JSON.stringify(message));
   }
 
-  /** Give this connection up; {@link Line#mind} opens another after a pause. */
+  /** Give this connection up; {@link GateLink#mind} opens another after a pause. */
   lose() {
     this.abandon();
     this._retryAt = performance.now() + this._pause * (0.5 + Math.random() / 2);

@@ -1,4 +1,4 @@
-import { TAKE_PATIENCE } from "./reach.js";
+import { TAKE_PATIENCE } from "./lease_requests.js";
 
 /** @typedef {import('./loop.js').Loop} Loop */
 /** @typedef {import('./pilot.js').Pilot} Pilot */
@@ -21,7 +21,7 @@ import { TAKE_PATIENCE } from "./reach.js";
  *
  * Times are in milliseconds of one clock.
  */
-export class Errands {
+export class PoseCommands {
   /**
    * @param {Pilot} pilot
    * @param {Loop} loop

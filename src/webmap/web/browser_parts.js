@@ -5,7 +5,7 @@ import { BASE, resolve } from "./addresses.js";
 /**
  * The browser half of a module, from its default export.
  *
- * @typedef {object} Half
+ * @typedef {object} BrowserPart
  * @property {(message: any) => void} [receive] Handles messages of the other half.
  * @property {() => void} destroy Reverts everything that the half did.
  */
@@ -13,21 +13,21 @@ import { BASE, resolve } from "./addresses.js";
 /**
  * @typedef {object} Attached
  * @property {MapCanvas} canvas
- * @property {Half | null} half null until the module is loaded.
+ * @property {BrowserPart | null} half null until the module is loaded.
  * @property {unknown[]} waiting Messages that came before the module was loaded.
  */
 
 /**
- * @typedef {object} HalvesPage
+ * @typedef {object} BrowserPartsPage
  * @property {(message: object) => void} send Sends to the server.
  * @property {(text: string) => void} notice Shows to the viewer, sends to the server.
  * @property {() => Promise<unknown>} ready Resolves when modules may be loaded.
  * @property {() => void} onStyles Called when a style sheet was loaded.
  */
 
-/** Loads, attaches and detaches the browser halves of modules. */
-export class Halves {
-  /** @param {HalvesPage} page */
+/** Loads, attaches and detaches the browser parts of modules. */
+export class BrowserParts {
+  /** @param {BrowserPartsPage} page */
   constructor(page) {
     this._page = page;
     /** @type {Map<number, Attached>} */

@@ -10,7 +10,7 @@ export const LATEST = 4000;
  *
  * Times are in milliseconds of one clock.
  */
-export class Twice {
+export class DoublePress {
   constructor() {
     /** @type {number | null} */
     this._since = null;

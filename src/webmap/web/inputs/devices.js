@@ -13,26 +13,26 @@ import { Keys } from "./keys.js";
 /**
  * A map that robots can be driven from.
  *
- * @typedef {object} Seat
+ * @typedef {object} DrivingMap
  * @property {object} map
  * @property {() => string | null} robot The robot that is selected there.
  * @property {boolean} holonomic Whether its keys move a base sideways, too.
- * @property {(active: boolean) => void} onActive Called when the page's hands start or
+ * @property {(active: boolean) => void} onActive Called when the page's inputs start or
  *     stop to belong to this map.
  */
 
-/** @type {WeakMap<Drive, Desk>} */
-const desks = new WeakMap();
+/** @type {WeakMap<Drive, Devices>} */
+const known = new WeakMap();
 
 /**
  * Return the desk of a page, made when it is first asked for.
  *
  * @param {Drive} drive
  */
-export function deskOf(drive) {
-  const desk = desks.get(drive) ?? new Desk(drive);
-  desks.set(drive, desk);
-  return desk;
+export function devicesOf(drive) {
+  const devices = known.get(drive) ?? new Devices(drive);
+  known.set(drive, devices);
+  return devices;
 }
 
 /**
@@ -41,13 +41,13 @@ export function deskOf(drive) {
  * They drive the robot that is selected on the map that was touched last, so that two
  * maps on a page never both drive.
  */
-export class Desk {
+export class Devices {
   /** @param {Drive} drive */
   constructor(drive) {
     this._drive = drive;
-    /** @type {Seat[]} */
-    this._seats = [];
-    /** @type {Seat | null} */
+    /** @type {DrivingMap[]} */
+    this._maps = [];
+    /** @type {DrivingMap | null} */
     this.active = null;
     /** @type {Set<() => boolean>} */
     this._escapes = new Set();
@@ -100,31 +100,31 @@ export class Desk {
   /**
    * Drive from a map. The first one is active until another is touched.
    *
-   * @param {Seat} seat
+   * @param {DrivingMap} map
    * @returns {() => void} Leaves.
    */
-  sit(seat) {
+  addMap(map) {
     const close = this.open();
-    this._seats.push(seat);
-    if (this.active === null) this.activate(seat);
+    this._maps.push(map);
+    if (this.active === null) this.activate(map);
     return () => {
       close();
-      this._seats = this._seats.filter((other) => other !== seat);
-      if (this.active === seat) this.activate(this._seats[0] ?? null);
+      this._maps = this._maps.filter((other) => other !== map);
+      if (this.active === map) this.activate(this._maps[0] ?? null);
     };
   }
 
   /**
    * Make a map the one that is driven from.
    *
-   * @param {Seat | null} seat
+   * @param {DrivingMap | null} map
    */
-  activate(seat) {
-    if (seat === this.active) return;
+  activate(map) {
+    if (map === this.active) return;
     this.active?.onActive(false);
-    this.active = seat;
+    this.active = map;
     this.choose();
-    seat?.onActive(true);
+    map?.onActive(true);
   }
 
   /** Look again which robot is selected on the active map. */

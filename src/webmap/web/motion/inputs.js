@@ -6,20 +6,20 @@ import { NEUTRAL, clean, isNeutral } from "./axes.js";
 export const REST = 200;
 
 /**
- * What the operator's hands ask for, and whether that counts.
+ * What the operator's inputs ask for, and whether that counts.
  *
  * Several inputs (keyboard, stick, gamepad) say their state; one of them owns the
  * motion at a time: the first to leave neutral. Another that is pressed meanwhile
  * does nothing until it has been let go of.
  *
- * Hands are dead at first and after every doubt ({@link Hands#kill}). They come to
+ * Inputs are dead at first and after every doubt ({@link Inputs#block}). They come to
  * life by a press that follows at least {@link REST} ms of all inputs neutral, and
  * stay alive while the operator presses and releases. So nothing ever resumes by
  * itself: a key held through an outage moves nothing.
  *
  * Times are in milliseconds of one clock that the caller reads.
  */
-export class Hands {
+export class Inputs {
   /** @param {number} now */
   constructor(now) {
     /**
@@ -32,7 +32,7 @@ export class Hands {
      * @type {Set<string>}
      */
     this._void = new Set();
-    this._dead = true;
+    this._blocked = true;
     /** Since when all inputs have been neutral, no earlier than the last doubt. */
     this._quietSince = now;
   }
@@ -43,13 +43,13 @@ export class Hands {
   }
 
   /** Whether the inputs do nothing until they were let go of and pressed again. */
-  get dead() {
-    return this._dead;
+  get blocked() {
+    return this._blocked;
   }
 
   /** The axes that may act: neutral while dead. */
   get axes() {
-    if (this._dead) return NEUTRAL;
+    if (this._blocked) return NEUTRAL;
     for (const [source, axes] of this._pressed) {
       if (!this._void.has(source)) return axes;
     }
@@ -62,7 +62,7 @@ export class Hands {
    */
   ready(now) {
     if (this.pressed) return false;
-    return !this._dead || now - this._quietSince >= REST;
+    return !this._blocked || now - this._quietSince >= REST;
   }
 
   /**
@@ -90,8 +90,8 @@ export class Hands {
    *
    * @param {number} now
    */
-  kill(now) {
-    this._dead = true;
+  block(now) {
+    this._blocked = true;
     this._quietSince = now;
   }
 
@@ -103,7 +103,7 @@ export class Hands {
   drop(now) {
     this._pressed.clear();
     this._void.clear();
-    this.kill(now);
+    this.block(now);
   }
 
   /**
@@ -113,7 +113,7 @@ export class Hands {
    */
   _press(source, axes, counts) {
     this._pressed.set(source, axes);
-    if (counts) this._dead = false;
+    if (counts) this._blocked = false;
     else this._void.add(source);
   }
 
