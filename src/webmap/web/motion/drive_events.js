@@ -2,13 +2,13 @@
 /** @typedef {'connecting' | 'open' | 'late' | 'lost'} LinkState */
 
 /**
- * The kinds of news, and what each tells.
+ * The kinds of events, and the value of each.
  *
- * `robot`: the gate's newest word on a robot. `gone`: the gate knows a robot no more.
- * `state`: the link's state changed. `refused`: the gate refused something. `stop`:
- * STOP was sent for a robot or "*". `goal`: a goal was sent for a robot. `read`: inputs
- * that must be asked for their state (gamepads) are asked now. `drop`: inputs must
- * forget what is held. `step`: a 20 Hz step is over.
+ * `robot`: the gate's newest report on a robot. `gone`: the gate does not know a robot any
+ * more. `state`: the link's state changed. `refused`: the gate refused an operation.
+ * `stop`: STOP was sent for a robot or "*". `goal`: a goal was sent for a robot. `read`:
+ * inputs without events of their own (gamepads) must be read now. `drop`: inputs must
+ * forget what is pressed. `step`: a 20 Hz step has ended.
  *
  * @typedef {object} DriveEvents
  * @property {RobotReport} robot
@@ -24,7 +24,7 @@
 
 /** @typedef {{[K in keyof DriveEvents]: [kind: K, event: DriveEvents[K]]}[keyof DriveEvents]} DriveEvent */
 
-/** Who wants to hear what. */
+/** The listeners of each kind of event. */
 export class Listeners {
   constructor() {
     /** @type {Map<keyof DriveEvents, Set<Function>>} */
@@ -55,7 +55,7 @@ export class Listeners {
       try {
         fn(event);
       } catch (error) {
-        // A broken display must never keep a neutral or a STOP from leaving.
+        // An error of a listener must never prevent the sending of neutral or of STOP.
         reportError(error);
       }
     }

@@ -1,13 +1,13 @@
 import { protocols } from "../key.js";
 
-/** A connection that does not open within this time is given up, in ms. */
+/** An attempt to connect is given up after this time, in ms. */
 const OPENING_PATIENCE = 5000;
 
 /** The first and the longest pause before connecting again, in ms. */
 const PAUSE = { first: 250, longest: 5000 };
 
 /**
- * What a line tells its owner.
+ * What the link calls.
  *
  * @typedef {object} GateLinkEvents
  * @property {() => void} open
@@ -18,7 +18,7 @@ const PAUSE = { first: 250, longest: 5000 };
 /**
  * A WebSocket that is opened again when it is lost, with growing, jittered pauses.
  *
- * Nothing is ever kept to be sent later: a command is for now or not at all.
+ * No message is kept to be sent later: a late command would be wrong.
  */
 export class GateLink {
   /**
@@ -41,7 +41,7 @@ export class GateLink {
   }
 
   /**
-   * Open a connection when it is time to, and give up one that does not come about.
+   * Connect if it is time for that, and give up an attempt that takes too long.
    *
    * @param {number} now
    */
@@ -53,7 +53,7 @@ export class GateLink {
     }
   }
 
-  /** The other side is really there: the next pause is a short one again. */
+  /** Note that the gate answers: the next pause is short again. */
   trust() {
     this._pause = PAUSE.first;
   }
@@ -71,14 +71,14 @@ export class GateLink {
     this._events.lost();
   }
 
-  /** Connect again at once: this connection has died unnoticed. */
+  /** Connect again immediately: this connection may be dead. */
   renew() {
     this._pause = PAUSE.first;
     this.lose();
     this._retryAt = 0;
   }
 
-  /** Close, and hear nothing any more from a connection that may linger. */
+  /** Close, and ignore everything that still arrives on this connection. */
   abandon() {
     const socket = this._socket;
     this._socket = null;
@@ -103,7 +103,7 @@ export class GateLink {
 
 /**
  * @param {unknown} data
- * @returns {any} The message, or null for what is none.
+ * @returns {any} The message, or null if the data is not a message.
  */
 function parse(data) {
   try {

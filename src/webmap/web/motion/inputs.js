@@ -2,52 +2,52 @@ import { NEUTRAL, clean, isNeutral } from "./axes.js";
 
 /** @typedef {import('./axes.js').Axes} Axes */
 
-/** How long every input must be neutral before a press counts again, in ms. */
+/** How long all inputs must be neutral before a press counts again, in ms. */
 export const REST = 200;
 
 /**
- * What the operator's inputs ask for, and whether that counts.
+ * The state of all inputs, and whether it may move a robot.
  *
- * Several inputs (keyboard, stick, gamepad) say their state; one of them owns the
- * motion at a time: the first to leave neutral. Another that is pressed meanwhile
- * does nothing until it has been let go of.
+ * There are several inputs (keyboard, stick, gamepad), but only one moves the robot at a
+ * time: the first that leaves neutral. Another that is pressed meanwhile has no effect
+ * until it is released.
  *
- * Inputs are dead at first and after every doubt ({@link Inputs#block}). They come to
- * life by a press that follows at least {@link REST} ms of all inputs neutral, and
- * stay alive while the operator presses and releases. So nothing ever resumes by
- * itself: a key held through an outage moves nothing.
+ * Inputs are blocked at first and after {@link Inputs#block}. A press unblocks them if
+ * all inputs were neutral for at least {@link REST} ms before; they stay unblocked while
+ * the operator presses and releases. So no motion resumes by itself: a key that is held
+ * during an outage moves nothing.
  *
- * Times are in milliseconds of one clock that the caller reads.
+ * Times are in milliseconds of the caller's clock.
  */
 export class Inputs {
   /** @param {number} now */
   constructor(now) {
     /**
-     * The inputs that are away from neutral.
+     * The inputs that are not neutral.
      * @type {Map<string, Readonly<Axes>>}
      */
     this._pressed = new Map();
     /**
-     * Inputs that were pressed while they could not act.
+     * Inputs that were pressed when a press had no effect.
      * @type {Set<string>}
      */
     this._void = new Set();
     this._blocked = true;
-    /** Since when all inputs have been neutral, no earlier than the last doubt. */
+    /** Since when all inputs are neutral, at the earliest since the last block. */
     this._quietSince = now;
   }
 
-  /** Whether any input is away from neutral, dead or not. */
+  /** Whether any input is not neutral, blocked or not. */
   get pressed() {
     return this._pressed.size > 0;
   }
 
-  /** Whether the inputs do nothing until they were let go of and pressed again. */
+  /** Whether inputs have no effect until they are released and pressed again. */
   get blocked() {
     return this._blocked;
   }
 
-  /** The axes that may act: neutral while dead. */
+  /** The axes that may move a robot: neutral while blocked. */
   get axes() {
     if (this._blocked) return NEUTRAL;
     for (const [source, axes] of this._pressed) {
@@ -58,7 +58,7 @@ export class Inputs {
 
   /**
    * @param {number} now
-   * @returns {boolean} Whether a press at this moment would act.
+   * @returns {boolean} Whether a press would have an effect now.
    */
   ready(now) {
     if (this.pressed) return false;
@@ -66,13 +66,13 @@ export class Inputs {
   }
 
   /**
-   * Take the state of one input.
+   * Set the state of one input.
    *
    * @param {string} source
-   * @param {Partial<Axes> | null} asked Its axes; null when it is gone.
+   * @param {Partial<Axes> | null} asked Its axes; null if the input is gone.
    * @param {number} now
-   * @param {{fresh?: boolean}} [how] `fresh`: whether the press was heard. An input that
-   *     was pressed before does nothing until it is released.
+   * @param {{fresh?: boolean}} [how] `fresh`: whether this page received the press. An
+   *     input that was pressed before has no effect until it is released.
    */
   set(source, asked, now, { fresh = true } = {}) {
     const axes = clean(asked);
@@ -86,7 +86,7 @@ export class Inputs {
   }
 
   /**
-   * Make the inputs dead until all were neutral for {@link REST} and pressed again.
+   * Block the inputs until all were neutral for {@link REST} and one is pressed again.
    *
    * @param {number} now
    */
@@ -96,7 +96,7 @@ export class Inputs {
   }
 
   /**
-   * Forget what is held: its release may have gone to another window.
+   * Forget the pressed inputs: another window may have received the release.
    *
    * @param {number} now
    */

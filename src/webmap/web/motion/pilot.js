@@ -7,25 +7,25 @@ import { Stream } from "./stream.js";
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 /** @typedef {import('./stream.js').Command} Command */
 
-/** Between two words that a lease is needed still, in ms. */
+/** The time between two renewals of a lease, in ms. */
 const RENEW = 10_000;
 
 /**
- * Decides what this page says to the gate: which lease to take, keep and give back,
- * and the axes to send with it.
+ * Decides what this page sends to the gate: which lease to take, keep and release, and
+ * the axes to send with it.
  *
- * It is stepped at 20 Hz and at once when something changed, and returns the
- * messages to send. Motion needs all of: an attentive page, inputs that are alive, an
- * open loop, a lease on the chosen robot, and a stretch of neutral that the gate has
- * seen since the last doubt. Times are in milliseconds of one clock.
+ * It is called at 20 Hz and after every change, and returns the messages to send. A robot
+ * moves only with: an attentive page, inputs that are not blocked, an open loop, a lease
+ * on the chosen robot, and neutral commands that the gate has received for a while since
+ * {@link Pilot#goNeutral}. Times are in milliseconds of one clock.
  */
 export class Pilot {
   /**
    * @param {Inputs} inputs
    * @param {Loop} loop
    * @param {number} now
-   * @param {{releaseAfter?: number}} [options] `releaseAfter`: after this long
-   *     without motion the lease is given back, in ms.
+   * @param {{releaseAfter?: number}} [options] `releaseAfter`: the lease is
+   *     released after this time without motion, in ms.
    */
   constructor(inputs, loop, now, { releaseAfter = 30_000 } = {}) {
     this.inputs = inputs;
@@ -33,7 +33,7 @@ export class Pilot {
     this._stream = new Stream(inputs, loop, now);
     this._leases = new Leases();
     /**
-     * When leases were last said to be needed still.
+     * When each lease was last renewed.
      * @type {Map<string, number>}
      */
     this._renewed = new Map();
@@ -45,7 +45,7 @@ export class Pilot {
     return this._leases.robots;
   }
 
-  /** The ages of the pictures that the operator goes by. */
+  /** The ages of the camera pictures that the operator drives by. */
   get pictures() {
     return this._stream.pictures;
   }
@@ -55,18 +55,18 @@ export class Pilot {
     return this._stream.lease?.robot ?? null;
   }
 
-  /** Whether the gate has seen enough neutral to let a press through. */
+  /** Whether the gate has received enough neutral commands to accept a press. */
   get settled() {
     return this._armed && this._stream.settled;
   }
 
-  /** Whether the gate lets the driven robot move, as far as it said. */
+  /** Whether the gate lets the driven robot move, by its last report. */
   get _armed() {
     const { driven } = this;
     return driven !== null && this.robots.get(driven)?.armed !== false;
   }
 
-  /** What the operator should know of the chosen robot and of the inputs. */
+  /** The state of the chosen robot and of the inputs, for the operator. */
   get status() {
     const { choice, refusal, refused, robot } = this._requests;
     return {
@@ -94,8 +94,8 @@ export class Pilot {
   }
 
   /**
-   * Choose the robot that a press drives. The one driven until now is let go of,
-   * and what is held at this moment does nothing to the new one.
+   * Choose the robot that a press drives. The lease of the previous robot is released,
+   * and inputs that are pressed now do not move the new one.
    *
    * @param {string | null} robot
    * @param {number} now
@@ -110,7 +110,7 @@ export class Pilot {
   }
 
   /**
-   * Ask for a lease by name rather than by a press.
+   * Request a lease by a button, not by a press of a drive input.
    *
    * @param {string} robot
    * @param {number} now
@@ -120,7 +120,7 @@ export class Pilot {
   }
 
   /**
-   * Ask the holder for a robot.
+   * Request a robot from its holder.
    *
    * @param {string} robot
    */
@@ -129,10 +129,10 @@ export class Pilot {
   }
 
   /**
-   * Hand a robot to the one who asks for it, neutral first.
+   * Hand a robot over to the requester, neutral first.
    *
-   * The lease is kept until the gate says that it is another's, as the one who asks may
-   * be gone by now.
+   * The lease is kept until the gate reports another holder, because the requester may be
+   * gone.
    *
    * @param {string} robot
    * @param {number} now
@@ -146,7 +146,7 @@ export class Pilot {
   }
 
   /**
-   * Give a lease back, neutral first.
+   * Release a lease, neutral first.
    *
    * @param {string} robot
    * @param {number} now
@@ -162,7 +162,7 @@ export class Pilot {
   }
 
   /**
-   * Let go of the robot that is driven or about to be, neutral first.
+   * Release the robot that is driven or requested, neutral first.
    *
    * @param {number} now
    * @returns {Command[]}
@@ -177,8 +177,8 @@ export class Pilot {
   }
 
   /**
-   * Say where a robot should go, or where it is. Its lease is kept, and given back when
-   * it is not used.
+   * Return the command that sends a goal or sets a pose. The lease is kept, and released
+   * when it is unused.
    *
    * @param {'goal' | 'locate'} op
    * @param {string} robot
@@ -192,7 +192,7 @@ export class Pilot {
   }
 
   /**
-   * Say that the lease of a robot that goes somewhere is needed still.
+   * Renew the lease of a robot that has a goal.
    *
    * @param {string} robot
    * @param {number} now
@@ -210,18 +210,18 @@ export class Pilot {
   }
 
   /**
-   * Doubt: neutral now, and nothing until the inputs were let go of and pressed anew.
+   * Go neutral now; inputs have no effect until they are released and pressed again.
    *
    * @param {number} now
-   * @param {{drop?: boolean}} [how] `drop`: also forget what is held, as its release
-   *     may never be heard of here.
+   * @param {{drop?: boolean}} [how] `drop`: also forget the pressed inputs,
+   *     because this page may not receive their release.
    */
   goNeutral(now, how) {
     this._stream.goNeutral(now, how);
   }
 
   /**
-   * STOP was said: the leases of that robot, or of all, are over by that.
+   * STOP was pressed: it ends the leases of that robot, or of all.
    *
    * @param {string} robot Or "*".
    * @param {number} now
@@ -233,7 +233,7 @@ export class Pilot {
   }
 
   /**
-   * A STOP is being ended by hand: what is held at this moment means nothing.
+   * The operator resets a STOP: inputs that are pressed now have no effect.
    *
    * @param {string} robot Or "*".
    * @param {number} now
@@ -251,7 +251,7 @@ export class Pilot {
   }
 
   /**
-   * Take what the gate says of a robot.
+   * Process a report of the gate.
    *
    * @param {RobotReport} report
    * @param {number} now
@@ -263,7 +263,7 @@ export class Pilot {
     if (lease?.robot === robot) {
       const lost = lease.epoch !== this.epoch(robot);
       if (lost) this._stream.close();
-      // If it disarms, the gate saw a reason to stop that we did not.
+      // If the gate disarms, it has a reason to stop that this page does not know.
       if (lost || (before?.armed && !armed)) this.goNeutral(now);
     }
     this._requests.report(report, before, now);
@@ -285,7 +285,7 @@ export class Pilot {
   }
 
   /**
-   * Take the gate's refusal.
+   * Process a refusal of the gate.
    *
    * @param {string | null} robot
    * @param {string} what
@@ -300,8 +300,8 @@ export class Pilot {
    * Decide what to send now.
    *
    * @param {number} now
-   * @param {boolean} attentive Whether the page is visible, has the focus, and
-   *     nobody types in it.
+   * @param {boolean} attentive Whether the page is visible, has the focus, and no
+   *     text field has it.
    * @returns {Command[]}
    */
   step(now, attentive) {
@@ -311,7 +311,7 @@ export class Pilot {
   }
 
   /**
-   * Give back what has not been used for a while.
+   * Release leases that were not used for a while.
    *
    * @param {number} now
    * @returns {Command[]}
@@ -324,7 +324,7 @@ export class Pilot {
     return [...driven, ...parked.flatMap((robot) => this.release(robot, now))];
   }
 
-  /** What this page drives or is about to drive is over, and reports of it are old. */
+  /** End driving or the request for it: reports of that lease are outdated. */
   _end() {
     const { lease } = this._stream;
     if (lease) this._leases.giveBack(lease.robot, lease.epoch);
@@ -334,7 +334,7 @@ export class Pilot {
 
   /**
    * @param {string} robot
-   * @returns {boolean} Whether this page drives it or is about to.
+   * @returns {boolean} Whether this page drives the robot or has requested it.
    */
   _concerns(robot) {
     return robot === this.driven || robot === this._requests.robot;

@@ -1,9 +1,9 @@
 /**
- * The page's half of motion, without sockets and timers: inputs and messages in,
- * commands and news out.
+ * The page's decisions about motion, without sockets and timers: from inputs and messages
+ * to commands and events.
  *
  * This folder decides what the page sends to the gate. Open this file first, then
- * `pilot.js` and `stream.js`. What reads the devices is in `../inputs`.
+ * `pilot.js` and `stream.js`. The devices are read in `../inputs`.
  */
 
 import { Requests } from "./requests.js";
@@ -19,11 +19,11 @@ import { Unanswered } from "./unanswered.js";
 /** @typedef {import('./stream.js').Command} Command */
 
 /**
- * What this page and the gate know of each other, over one connection after another.
+ * The state that this page shares with the gate, across all its connections.
  *
- * Leases, numbers and ticks belong to one connection to one gate; what is held in the
- * hand, and a STOP that could not leave, outlive it. It hears what the gate says and
- * returns what is to be sent and told. Times are in milliseconds of one clock.
+ * Leases, numbers and ticks belong to one connection to one gate. The inputs, and a STOP
+ * that was not sent, do not. A session processes the gate's messages and returns what to
+ * send and which events to emit. Times are in milliseconds of one clock.
  */
 export class Session {
   /**
@@ -46,14 +46,14 @@ export class Session {
     this.state = "connecting";
     this._unanswered = new Unanswered();
     /**
-     * STOPs that are the first thing to be said on the next connection.
+     * STOPs to send first on the next connection.
      * @type {Set<string>}
      */
     this._unsent = new Set();
   }
 
   /**
-   * What became of the STOPs of this page.
+   * Return the results of this page's STOPs.
    *
    * @param {number} now
    */
@@ -63,12 +63,12 @@ export class Session {
   }
 
   /**
-   * STOP was said.
+   * Note that STOP was pressed.
    *
    * @param {string} robot Or "*".
-   * @param {boolean} left Whether it has left this page; if not, or if the gate has not
-   *     answered it when the connection is lost, it will be the first thing said on the
-   *     next, as a stop that comes late is still a stop.
+   * @param {boolean} left Whether it was sent. If not, or if the gate has not answered when
+   *     the connection is lost, it is the first message on the next connection: a late stop
+   *     is still a stop.
    * @param {number} now
    */
   stopped(robot, left, now) {
@@ -79,7 +79,7 @@ export class Session {
   }
 
   /**
-   * A command was sent.
+   * Note that a command was sent.
    *
    * @param {Command} command
    * @param {number} now
@@ -91,7 +91,7 @@ export class Session {
   }
 
   /**
-   * Take what the gate says.
+   * Process a message of the gate.
    *
    * @param {any} message
    * @param {number} now
@@ -103,23 +103,24 @@ export class Session {
   }
 
   /**
-   * Judge the link by how the loop is.
+   * Update the state of the link from the state of the loop.
    *
    * @param {number} now
-   * @returns {DriveEvent[] | null} What to tell; null if the connection is to be given up.
+   * @returns {DriveEvent[] | null} The events to emit; null if the connection must be
+   *     closed.
    */
   judge(now) {
     const state = this.loop.state(now);
     if (state === "lost") return null;
-    // Before its first word a gate may be anybody.
+    // Before its first message the other side may not be a gate.
     return this.connection === null ? [] : this._change(state);
   }
 
   /**
-   * The connection is lost.
+   * Note that the connection is lost.
    *
    * @param {number} now
-   * @returns {DriveEvent[]} What to tell.
+   * @returns {DriveEvent[]} The events to emit.
    */
   lost(now) {
     this.connection = null;
@@ -135,7 +136,7 @@ export class Session {
    * @returns {{send: Command[], events: DriveEvent[]}}
    */
   _greeted(connection, now) {
-    // A second greeting on a connection: the gate was started anew.
+    // A second greeting on one connection: the gate was restarted.
     if (this.connection !== null) this._forget(now);
     this.connection = connection;
     const send = [...this._unsent].map((robot) => ({ op: "stop", robot }));
@@ -168,14 +169,14 @@ export class Session {
     }
   }
 
-  /** Those who follow what the gate says of each robot. */
+  /** The objects that process each report of the gate. */
   get _watching() {
     return [this.pilot, this.stopping, this.requests, this.onset, this._unanswered];
   }
 
   /**
-   * Forget leases, numbers and ticks: they belong to one connection to one gate.
-   * A STOP that it has not answered does not.
+   * Forget leases, numbers and ticks: they belong to one connection to one gate. A STOP
+   * without an answer does not, and is kept.
    *
    * @param {number} now
    */

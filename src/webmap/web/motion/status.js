@@ -9,9 +9,8 @@ import { stopWords } from "./stopping.js";
 /** @typedef {import('./stopping.js').Verdict} Verdict */
 
 /**
- * How it stands with driving a robot from this page, to be shown as words, a shape and
- * a colour: the state names all three. Every page has the same words for what
- * a robot is doing.
+ * The state of driving a robot from this page. A page shows it as text, a shape and a
+ * colour, all three by this name. Every page has the same text for what a robot is doing.
  *
  * @typedef {'none' | 'connecting' | 'lost' | 'late' | 'fixed' | 'held' | 'free' |
  *     'taking' | 'ready' | 'hands-off' | 'driving' | 'blocked' | 'moving' |
@@ -23,10 +22,10 @@ import { stopWords } from "./stopping.js";
 /**
  * @typedef {object} More
  * @property {Verdict} [verdict] The result of a STOP of this page.
- * @property {Request} [request] Who asks for the robot.
- * @property {string} [inputs] What there is to drive with.
+ * @property {Request} [request] The request for control of the robot.
+ * @property {string} [inputs] The available inputs, as text.
  * @property {string} [seen] The state that the display shows: a name of `WORDS`.
- * @property {string} [since] When the display had the newest pose of a robot that is gone.
+ * @property {string} [since] When the display received the last pose of a robot that is gone.
  */
 
 /** @typedef {import('../drive.js').Drive['status']} Status */
@@ -34,10 +33,10 @@ import { stopWords } from "./stopping.js";
 const KEYS = "W A S D or the arrow keys";
 
 /**
- * Say what there is to drive with.
+ * Return the available inputs, as text.
  *
  * @param {{touch: boolean, stick: boolean, gamepad: boolean}} what `touch`: whether
- *     fingers are the pointer, so that there may be no keys.
+ *     the pointer is a finger, so that there may be no keyboard.
  */
 export function inputsOf({ touch, stick, gamepad }) {
   const pad = gamepad ? ", or LB and the left stick of the gamepad" : "";
@@ -46,25 +45,24 @@ export function inputsOf({ touch, stick, gamepad }) {
 }
 
 /**
- * Say how it stands.
+ * Describe the state of driving a robot from this page.
  *
  * @param {Status} status
  * @param {string | null} robot The robot that is selected where this is shown.
- * @param {RobotReport | null} report The gate's word on it.
- * @param {boolean} active Whether the page's keys belong to that map.
+ * @param {RobotReport | null} report The gate's report on it.
+ * @param {boolean} active Whether the page's inputs belong to that map.
  * @param {More} [more]
  * @returns {Description}
  */
 export function describe(status, robot, report, active, more = {}) {
   const link = ofLink(status);
   if (link) return link;
-  const said = ofRobot(status, robot, report, active, more);
+  const state = ofRobot(status, robot, report, active, more);
   const { other_writer: other, hooks = [] } = report ?? {};
-  if (!other && hooks.length === 0) return said;
-  // Whatever else there is to say: who else moves it, and that its STOP is not what it
-  // was made to be.
-  const words = [said.detail, other ?? "", ...hooks].filter(Boolean).map(sentence);
-  return description(said.state, said.title, words.join(" "));
+  if (!other && hooks.length === 0) return state;
+  // In every state: another program that moves the robot, and failed stop hooks.
+  const words = [state.detail, other ?? "", ...hooks].filter(Boolean).map(sentence);
+  return description(state.state, state.title, words.join(" "));
 }
 
 /**
@@ -105,7 +103,7 @@ function ofRobot(status, robot, report, active, more) {
 }
 
 /**
- * Return the words of a state, for this page.
+ * Return the text of a state, for this page.
  *
  * @param {string} name Of `WORDS`.
  * @param {{report?: RobotReport, since?: string}} about
@@ -120,7 +118,7 @@ function wordsOf(name, { report, since = "" }) {
 }
 
 /**
- * Say how fast the robot may go, and why not faster.
+ * Return the speed limits and their reasons, as text.
  *
  * @param {RobotReport} report
  */
@@ -131,7 +129,7 @@ export function capOf(report) {
 }
 
 /**
- * Say how fast the robot moves, as odometry has it.
+ * Return the speed of the robot by odometry, as text.
  *
  * @param {RobotReport} report
  */
@@ -142,7 +140,7 @@ export function speedOf({ measured }) {
 
 /**
  * @param {readonly number[]} velocity As a report has it.
- * @returns {string} Backwards and clockwise are below zero.
+ * @returns {string} Backwards and clockwise are negative.
  */
 function velocityWords(velocity) {
   return `${signed(speedAlong(velocity) ?? 0)} m/s, ${signed(velocity[2])} rad/s`;
@@ -176,7 +174,7 @@ function ofLink({ link }) {
 function ofStopped(title, status, report) {
   const { confirmed, text } = stopWords(report);
   const detail = text || report.reason || "";
-  // That commands are refused now is no news.
+  // A refusal of other commands needs no message here.
   const refused = status.refused === "reset" ? status.refusal : null;
   const refusal = refused ? ` ${sentence(refused)}` : "";
   const state = confirmed === false ? "unconfirmed" : "stopped";
@@ -205,12 +203,12 @@ function ofOther(title, status, report, request) {
 }
 
 /**
- * Describe why the inputs of this page do not move the robot that it holds.
+ * Describe why the inputs of this page do not move the robot that it controls.
  *
  * @param {Status} status
  * @param {RobotReport} report
  * @param {string} title
- * @returns {Description | null} null if they do.
+ * @returns {Description | null} null if they move it.
  */
 function ofInputs(status, report, title) {
   if (isTested(report)) return description("driving", "Stop test running", "Do not touch any input.");
@@ -220,12 +218,12 @@ function ofInputs(status, report, title) {
 }
 
 /**
- * Describe what keeps a press from taking a robot.
+ * Describe why a press does not take a robot.
  *
  * @param {Status} status
  * @param {RobotReport} report
  * @param {string} title
- * @returns {Description | null} null if nothing does.
+ * @returns {Description | null} null if it takes it.
  */
 function ofTaking(status, report, title) {
   if (status.taking) return gettingReady();
@@ -288,7 +286,7 @@ function description(state, title, detail) {
 }
 
 /**
- * Return words of the gate as a sentence. A name at the beginning, such as a URL or a
+ * Return a text of the gate as a sentence. A name at the beginning, such as a URL or a
  * topic, keeps its small letter.
  *
  * @param {string} text

@@ -13,31 +13,30 @@ import { Pictures } from "./pictures.js";
  * @typedef {object} Lease
  * @property {string} robot
  * @property {number} epoch
- * @property {number | null} firstNeutral The first command since the last doubt.
- * @property {number | null} seenSince Since when the gate is known to see neutral.
- * @property {number} usedAt When it moved the robot last, or was needed otherwise.
+ * @property {number | null} firstNeutral The first command since `goNeutral`.
+ * @property {number | null} seenSince Since when the gate acknowledges neutral commands.
+ * @property {number} usedAt When it was last used, for motion or otherwise.
  */
 
 /**
- * For how long neutral is streamed, counted from the gate's first acknowledgement of
- * it, before a new lease moves anything; ms. The gate asks for 200 ms of neutral as
- * it saw them; counting from the acknowledgement makes sure that it did, whatever
- * the delay on the way.
+ * How long a new lease sends neutral before it may move a robot, from the gate's first
+ * acknowledgement; ms. The gate requires 200 ms of neutral commands. Because the time
+ * begins with the acknowledgement, the delay of the connection does not shorten it.
  */
 export const SETTLE = 250;
 
-/** Steps come every 50 ms; after a longer gap than this the page was not awake; ms. */
+/** Steps come every 50 ms; after a longer gap the page was frozen or too busy; ms. */
 export const ASLEEP = 250;
 
-/** A page that kept time for so long has loaded what made it late, most likely; ms. */
+/** After this time without such a gap the page has probably finished loading; ms. */
 export const CALM = 500;
 
 /**
- * The stream of commands under one lease: how the inputs are, or neutral.
+ * The stream of commands under one lease: the state of the inputs, or neutral.
  *
- * It is neutral until the gate has seen neutral for a stretch since the last doubt, and
- * whatever it notices itself of a page that is not attentive, a loop that is not open
- * and a picture that is too old is a doubt. Times are in milliseconds of one clock.
+ * It is neutral until the gate has received neutral for {@link SETTLE} ms. It becomes
+ * neutral again when the page is not attentive, the loop is not open, or the camera
+ * picture is too old. Times are in milliseconds of one clock.
  */
 export class Stream {
   /**
@@ -57,7 +56,7 @@ export class Stream {
     this._attentive = true;
   }
 
-  /** Whether a press would come too early: the page gets ready for one by itself. */
+  /** Whether a press would be too early. The page becomes ready without any input. */
   get early() {
     if (!this._attentive || this.inputs.pressed) return false;
     const now = this._lookedAt;
@@ -65,20 +64,20 @@ export class Stream {
     return this.loop.tick === null || !calm || !this.inputs.ready(now);
   }
 
-  /** Whether the gate has seen enough neutral, as far as can be known here. */
+  /** Whether the gate has received enough neutral, by its acknowledgements. */
   get settled() {
     const since = this.lease?.seenSince ?? null;
     return since !== null && this._lookedAt - since >= SETTLE;
   }
 
-  /** How long a command takes to be acknowledged, in ms; null before any was. */
+  /** How long an acknowledgement takes, in ms; null before the first. */
   get delay() {
     const { delay } = this.loop;
     return delay === null ? null : Math.max(delay, this.loop.age(this._lookedAt));
   }
 
   /**
-   * Go out under this lease from now on.
+   * Send commands under this lease.
    *
    * @param {string} robot
    * @param {number} epoch
@@ -89,24 +88,24 @@ export class Stream {
     this.lease = { robot, epoch, firstNeutral: null, seenSince: null, usedAt: now };
   }
 
-  /** There is no lease to go out under. */
+  /** Stop sending: there is no lease. */
   close() {
     this.lease = null;
     this.loop.rest();
   }
 
-  /** Number from the start: this is another connection. */
+  /** Start the numbers again, for another connection. */
   restart() {
     this.close();
     this._seq = 0;
   }
 
   /**
-   * Doubt: neutral now, and nothing until the inputs were let go of and pressed anew.
+   * Go neutral now; inputs have no effect until they are released and pressed again.
    *
    * @param {number} now
-   * @param {{drop?: boolean}} [how] `drop`: also forget what is held, as its release
-   *     may never be heard of here.
+   * @param {{drop?: boolean}} [how] `drop`: also forget the pressed inputs,
+   *     because this page may not receive their release.
    */
   goNeutral(now, { drop = false } = {}) {
     if (drop) this.inputs.drop(now);
@@ -117,11 +116,11 @@ export class Stream {
   }
 
   /**
-   * Look whether the operator can be driving at all.
+   * Go neutral if the operator cannot be driving.
    *
    * @param {number} now
-   * @param {boolean} attentive Whether the page is visible, has the focus, and
-   *     nobody types in it.
+   * @param {boolean} attentive Whether the page is visible, has the focus, and no
+   *     text field has it.
    */
   look(now, attentive) {
     const gap = now - this._lookedAt;
@@ -135,9 +134,9 @@ export class Stream {
   }
 
   /**
-   * @param {boolean} armed Whether the gate would take a command to move.
+   * @param {boolean} armed Whether the gate accepts a command to move.
    * @param {number} now
-   * @returns {Command[]} What goes out at this step.
+   * @returns {Command[]} The commands to send at this step.
    */
   step(armed, now) {
     const { lease } = this;
@@ -152,7 +151,7 @@ export class Stream {
 
   /**
    * @param {number} now
-   * @returns {Command[]} A last word under this lease, if there is one.
+   * @returns {Command[]} A neutral command under this lease, if there is one.
    */
   neutral(now) {
     return this.lease ? [this._command(this.lease, NEUTRAL, now)] : [];

@@ -3,30 +3,30 @@ import { isLatched } from "./report.js";
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
 /**
- * The STOPs of this page that no gate has answered yet.
+ * The STOPs of this page that the gate has not answered yet.
  *
- * A connection may be dead long before that shows: what left through it may not have
- * arrived. So each is kept until the gate says that its robots are stopped, and is said
- * again on the next connection if that does not come; a stop that comes late, or twice,
- * is still a stop.
+ * A connection may be dead for a while before the page notices, so a sent STOP may not
+ * have arrived. Each STOP is kept until the gate reports its robots as stopped. If that
+ * does not happen, it is sent again on the next connection: a late or repeated stop is
+ * still a stop.
  */
 export class Unanswered {
   constructor() {
     /**
-     * What was said, "*" for all, and the robots that have not answered: with the STOP
-     * that stood for each, if one did.
+     * For each STOP, "*" for all: the robots without an answer, each with the id of the
+     * STOP that was active before, or "".
      * @type {Map<string, Map<string, string>>}
      */
     this._sent = new Map();
-    /** Whether the STOP for all met no robot known, and none stopped was reported since. */
+    /** Whether no robot was known at the STOP for all, and none was reported stopped since. */
     this._metNone = false;
   }
 
   /**
-   * A STOP was said.
+   * Note that a STOP was sent.
    *
    * @param {string} robot Or "*".
-   * @param {ReadonlyMap<string, RobotReport>} known The robots that there are.
+   * @param {ReadonlyMap<string, RobotReport>} known The known robots.
    */
   sent(robot, known) {
     const meant = robot === "*" ? [...known.keys()] : [robot];
@@ -36,13 +36,13 @@ export class Unanswered {
   }
 
   /**
-   * The gate spoke of a robot.
+   * Process a report of the gate.
    *
    * @param {RobotReport} report
    */
   report(report) {
     if (!isLatched(report)) {
-      // It may have been told before the STOP arrived, which may never arrive: no answer.
+      // This report may be older than the arrival of the STOP: it is no answer.
       if (this._metNone) this._sent.get("*")?.set(report.robot, "");
       return;
     }
@@ -52,7 +52,7 @@ export class Unanswered {
   }
 
   /**
-   * A robot is gone.
+   * Forget a robot that is gone.
    *
    * @param {string} robot
    */
@@ -62,8 +62,8 @@ export class Unanswered {
 
   /**
    * @param {string} robot
-   * @param {string | undefined} stop The STOP that stands for it. The one that stood
-   *     when STOP was said here is no answer, as somebody may be resetting it.
+   * @param {string | undefined} stop The STOP that is active for it. The one that was
+   *     active before is no answer, because another operator may be resetting it.
    */
   _answered(robot, stop) {
     for (const [target, waiting] of this._sent) {
@@ -74,9 +74,9 @@ export class Unanswered {
   }
 
   /**
-   * The connection is lost.
+   * Note that the connection is lost.
    *
-   * @returns {string[]} What is to be said again.
+   * @returns {string[]} The STOPs to send again.
    */
   take() {
     const again = [...this._sent.keys()];
