@@ -45,7 +45,7 @@ export class Page {
       notice: (text) => this.trouble(text),
       error: (text) => this.notices.error(text),
       problem: (number, text) => this.notices.problem(number, text),
-      doubtProblems: () => this.notices.doubtProblems(),
+      recheckProblems: () => this.notices.recheckProblems(),
       onEvent: (mount, item, kind, event) => this._reports.report(mount, item, kind, event),
       drive: () => this.drive,
       parts: this.parts,

@@ -24,7 +24,7 @@ const MOST_LOST = 20;
  * @property {(text: string) => void} error Shows an error of the server.
  * @property {(number: number, text: string) => void} problem Shows a problem until it
  *     is solved; an empty text means solved.
- * @property {() => void} doubtProblems All unsolved problems are reported again now.
+ * @property {() => void} recheckProblems All unsolved problems are reported again now.
  * @property {(mount: number, item: Item, kind: string, event: Event) => void} onEvent
  *     Handles an event.
  * @property {() => import('./drive.js').Drive} drive The page's connection to the gate.
@@ -101,7 +101,7 @@ export class Scene {
     for (const mount of [...this._mounts.values()].reverse()) this.unmount(mount.id);
     this._targets = [];
     this._clock.reset();
-    this._page.doubtProblems();
+    this._page.recheckProblems();
   }
 
   /** Note that sizes in styles may have changed. */

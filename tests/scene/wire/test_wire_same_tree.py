@@ -30,7 +30,7 @@ async (frames) => {
     notice: (text) => said.push(text),
     error: (text) => said.push(text),
     problem: (number, text) => said.push(text),
-    doubtProblems() {},
+    recheckProblems() {},
     hear() {},
     drive() {},
     parts: { detachFrom() {} },

@@ -43,10 +43,10 @@ export class CameraView {
     places.append(signButton("close", () => acts.close()));
     this.head = make("div", "camera-head");
     this.head.append(this._name, this._choice, this._age, places);
-    this._word = make("p", "camera-word");
-    this._word.setAttribute("role", "status");
+    this._message = make("p", "camera-word");
+    this._message.setAttribute("role", "status");
     this._frame = make("div", "camera-frame");
-    this._frame.append(this._word);
+    this._frame.append(this._message);
     this.element = make("section", "camera-panel");
     this.element.setAttribute("aria-label", "Camera");
     this.element.hidden = true;
@@ -132,7 +132,7 @@ export class CameraView {
     if (old && mine) {
       words += " Commands are ignored: choose another camera or close this one.";
     }
-    setText(this._word, words);
+    setText(this._message, words);
   }
 }
 

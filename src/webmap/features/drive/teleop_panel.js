@@ -1,5 +1,5 @@
 import { Stick } from "../../web/inputs/stick.js";
-import { isTested, motions, ownStop, testWords, timings } from "../../web/motion/figures.js";
+import { isTested, motions, ownStop, stopTestText, timings } from "../../web/motion/figures.js";
 import { heldByProgram, isLatched, stopKey } from "../../web/motion/report.js";
 import { capOf } from "../../web/motion/status.js";
 import { button, html, setText, stopButton, TwiceButton } from "../../web/tools/elements.js";
@@ -56,8 +56,8 @@ export class Panel {
       " ",
       this._detail,
     );
-    const twice = [this._reset.element, this._tester.element];
-    const buttons = [this._lease, ...twice, this._stick];
+    const confirmed = [this._reset.element, this._tester.element];
+    const buttons = [this._lease, ...confirmed, this._stick];
     this.element = html(
       "section",
       "webmap-panel webmap-teleop",
@@ -91,7 +91,7 @@ export class Panel {
    */
   showFigures(report, loop, moving) {
     setText(this._own, report ? ownStop(report) : "");
-    setText(this._test, report ? testWords(report) : "");
+    setText(this._test, report ? stopTestText(report) : "");
     this._figures.hidden = report === null || isLatched(report);
     this._figures.classList.toggle("idle", !report?.mine);
     if (report === null) return;

@@ -64,7 +64,7 @@ class GoalTool {
     this._go = button("webmap-aim-go webmap-goal-go", "Send goal", () => this._toggle());
     this._go.title = `Key ${key}`;
     this._cancel = button("webmap-goal-cancel", "Cancel goal", () => this._callOff());
-    this._word = html("span", "webmap-aim-word webmap-goal-word", { role: "status" });
+    this._message = html("span", "webmap-aim-word webmap-goal-word", { role: "status" });
     this._spacing = html("input", "webmap-goal-spacing-value", {
       type: "number",
       min: `${SPACING[0]}`,
@@ -86,7 +86,7 @@ class GoalTool {
       this._go,
       this._apart,
       this._cancel,
-      this._word,
+      this._message,
     );
     this._marks = new GoalMarks(map, (robot) => this._end(robot));
     this._marking = new Marking(map, (robot) => send({ mark: robot }));
@@ -129,9 +129,9 @@ class GoalTool {
   /** @param {boolean} active */
   _changed(active) {
     if (this._wanted && !active && this._map.selected === null) {
-      setText(this._word, "Select a robot first.");
+      setText(this._message, "Select a robot first.");
     } else {
-      setText(this._word, active ? "Press on the map and drag for the heading." : "");
+      setText(this._message, active ? "Press on the map and drag for the heading." : "");
     }
     this._wanted = false;
     this._show();
@@ -199,7 +199,7 @@ class GoalTool {
       }
       this._show();
     }
-    if (problems.length > 0) setText(this._word, `Goal not sent: ${problems.join("; ")}`);
+    if (problems.length > 0) setText(this._message, `Goal not sent: ${problems.join("; ")}`);
   }
 
   _callOff() {
@@ -237,7 +237,7 @@ class GoalTool {
    * @param {string} why
    */
   _refused(robot, what, why) {
-    if (what === "cancel" && robot !== null) setText(this._word, `Goal not cancelled: ${why}`);
+    if (what === "cancel" && robot !== null) setText(this._message, `Goal not cancelled: ${why}`);
   }
 
   /** @param {string} robot */
@@ -258,7 +258,7 @@ class GoalTool {
   _selected() {
     // The aimed goal was for the robots that were selected before.
     this._aim.leave();
-    setText(this._word, "");
+    setText(this._message, "");
     this._show();
   }
 

@@ -61,13 +61,13 @@ class InitialPoseTool {
     });
     this._go = button("webmap-aim-go webmap-locate-go", "Set pose", () => this._aim.toggle());
     this._go.title = `Key ${key}`;
-    this._word = html("span", "webmap-aim-word webmap-locate-word", { role: "status" });
+    this._message = html("span", "webmap-aim-word webmap-locate-word", { role: "status" });
     this._panel = html(
       "section",
       "webmap-panel webmap-aim webmap-locate",
       { "aria-label": "Initial pose" },
       this._go,
-      this._word,
+      this._message,
     );
     this._uncertainty = new PoseUncertainty();
     this._outline = svg("path", { d: OUTLINE, class: "webmap-locate-arrow" });
@@ -97,14 +97,14 @@ class InitialPoseTool {
   receive(message) {
     if (message && "doubt" in message) {
       const { doubt } = message;
-      this._uncertainty.know(doubt?.robot === this._map.selected ? doubt : null);
+      this._uncertainty.setVariances(doubt?.robot === this._map.selected ? doubt : null);
       this._explain();
       this._draw();
     }
     if (typeof message?.active !== "boolean") return;
     this._aim.activate(message.active);
     if (message.active && !this._aim.active) {
-      setText(this._word, "This robot has no topic for an initial pose.");
+      setText(this._message, "This robot has no topic for an initial pose.");
     }
   }
 
@@ -116,16 +116,16 @@ class InitialPoseTool {
   /** @param {boolean} active */
   _changed(active) {
     if (active) this._send({ doubt: this._map.selected });
-    if (!active) setText(this._word, "");
+    if (!active) setText(this._message, "");
     this._explain();
     this._show();
   }
 
   _explain() {
     if (!this._aim.active) return;
-    const sure = this._uncertainty.words;
-    const words = "Press where the robot is and drag for the heading";
-    setText(this._word, sure === "" ? `${words}.` : `${words} (${sure}).`);
+    const sure = this._uncertainty.text;
+    const text = "Press where the robot is and drag for the heading";
+    setText(this._message, sure === "" ? `${text}.` : `${text} (${sure}).`);
   }
 
   /** @param {Pose | null} pose */
@@ -138,30 +138,30 @@ class InitialPoseTool {
   _done(pose) {
     const { selected: robot } = this._map;
     this._aim.activate(false);
-    if (robot !== null) void this._tell(robot, pose);
+    if (robot !== null) void this._setPose(robot, pose);
   }
 
   /**
    * @param {string} robot
    * @param {Pose} pose
    */
-  async _tell(robot, pose) {
+  async _setPose(robot, pose) {
     try {
       await this._drive.locate(robot, pose);
-      setText(this._word, SENT);
-      setTimeout(() => this._word.textContent === SENT && setText(this._word, ""), 4000);
+      setText(this._message, SENT);
+      setTimeout(() => this._message.textContent === SENT && setText(this._message, ""), 4000);
       this._send({ told: { robot, ...pose } });
     } catch (error) {
       const why = error instanceof Error ? error.message : String(error);
-      setText(this._word, `Pose not sent: ${why}`);
+      setText(this._message, `Pose not sent: ${why}`);
     }
     this._preview(null);
   }
 
   _selected() {
-    this._uncertainty.know(null);
+    this._uncertainty.setVariances(null);
     this._aim.leave();
-    setText(this._word, "");
+    setText(this._message, "");
     this._show();
   }
 
@@ -207,12 +207,12 @@ export class PoseUncertainty {
   }
 
   /** @param {Variances | null} variances */
-  know(variances) {
+  setVariances(variances) {
     this._variances = variances;
   }
 
   /** The drawn standard deviations as text; empty while unknown. */
-  get words() {
+  get text() {
     if (!this._variances) return "";
     const { x, y, yaw } = this._variances;
     const [along, across] = [x, y].map((variance) => metres(deviation(variance)));

@@ -52,14 +52,14 @@ class Labels {
     this._go = button("webmap-labels-go", "Label", () => this._activate(!this._active));
     this._go.title = `Key ${key}`;
     this._go.hidden = !editable;
-    this._word = html("span", "webmap-labels-word", { role: "status" });
+    this._message = html("span", "webmap-labels-word", { role: "status" });
     this._sheet = html("div", "webmap-labels-sheet");
     this._panel = html(
       "section",
       "webmap-panel webmap-labels",
       { "aria-label": "Labels" },
       this._go,
-      this._word,
+      this._message,
       this._sheet,
     );
     this._ending = new AbortController();
@@ -86,7 +86,7 @@ class Labels {
       this._move?.accepted();
       this._close("");
     }
-    if (typeof refused === "string") setText(this._word, refused);
+    if (typeof refused === "string") setText(this._message, refused);
     this._fit();
   }
 
@@ -142,7 +142,7 @@ class Labels {
     this._active = active && this._editable;
     this._go.setAttribute("aria-pressed", String(this._active));
     this._map.svg.classList.toggle("webmap-labelling", this._active);
-    setText(this._word, this._active ? "Press on the map where the label goes." : "");
+    setText(this._message, this._active ? "Press on the map where the label goes." : "");
     this._fit();
   }
 
@@ -161,14 +161,14 @@ class Labels {
     this._chosen = null;
     this._sheet.replaceChildren();
     this._sheet.hidden = true;
-    setText(this._word, words);
+    setText(this._message, words);
     this._fit();
   }
 
   /** Take no room on the map while the panel is empty. */
   _fit() {
     this._panel.hidden =
-      Boolean(this._go.hidden) && Boolean(this._sheet.hidden) && !this._word.textContent;
+      Boolean(this._go.hidden) && Boolean(this._sheet.hidden) && !this._message.textContent;
   }
 
   /** @param {SVGGraphicsElement} label */
@@ -207,7 +207,7 @@ class Labels {
   _openMove(label) {
     const place = placeOf(label);
     if (!place) return;
-    setText(this._word, "Drag the label on the map or enter its position.");
+    setText(this._message, "Drag the label on the map or enter its position.");
     this._move = new LabelMove(this._map, label, place, (to) => {
       if (to) this._send({ move: label.dataset.label ?? "", to });
       else this._close("");
@@ -231,7 +231,7 @@ class Labels {
     const save = () => {
       const add = { name: name.value, icon: icon.value, x: place.x, y: place.y };
       if (name.value.trim()) this._send({ add });
-      else setText(this._word, "Enter a name for the label.");
+      else setText(this._message, "Enter a name for the label.");
     };
     name.addEventListener("keydown", (event) => {
       if (event.key === "Enter" && !event.isComposing) save();
@@ -261,7 +261,7 @@ class Labels {
       this._send({ goal: { robot, ...place, yaw } });
       this._close(`Goal sent to ${label.dataset.name ?? "the label"}.`);
     } catch (error) {
-      setText(this._word, `Goal not sent: ${error instanceof Error ? error.message : error}`);
+      setText(this._message, `Goal not sent: ${error instanceof Error ? error.message : error}`);
       this._fit();
     }
   }

@@ -14,7 +14,7 @@ import { lay } from "../../web/tools/overlay.js";
  */
 
 /**
- * @typedef {[number, string, string, string, number, number]} Said Number, level, node,
+ * @typedef {[number, string, string, string, number, number]} LogLine Number, level, node,
  *     text, repetitions, and time in seconds of the display's clock.
  */
 
@@ -115,10 +115,10 @@ class RosoutPanel {
   }
 
   /** @param {any} message */
-  receive({ bridge, said, total, state }) {
+  receive({ bridge, said: lines, total, state }) {
     const book = this._books[bridge];
     if (!book) return;
-    book.take(said, total, state, this._most);
+    book.add(lines, total, state, this._most);
     this._filter();
     this._age();
   }
@@ -165,7 +165,7 @@ class RosoutPanel {
     const now = this._map.clock;
     if (!this._details.open || now === null) return;
     for (const { rows } of this._books) {
-      for (const { age, heard } of rows.values()) setText(age, ago(now - heard));
+      for (const { age, receivedAt } of rows.values()) setText(age, ago(now - receivedAt));
     }
   }
 
@@ -190,7 +190,7 @@ class Book {
     this._state = "";
     /**
      * @type {Map<number, {row: HTMLElement, level: string, times: HTMLElement,
-     *     age: HTMLElement, heard: number}>}
+     *     age: HTMLElement, receivedAt: number}>}
      */
     this.rows = new Map();
     this._list = html("ol", "webmap-rosout-lines", { "aria-label": `Log of ${name}` });
@@ -201,17 +201,17 @@ class Book {
   }
 
   /**
-   * @param {Said[]} said
+   * @param {LogLine[]} lines
    * @param {number} total
    * @param {string} state Of the bridge.
    * @param {number} most
    */
-  take(said, total, state, most) {
+  add(lines, total, state, most) {
     this.total = total;
     this._state = state;
-    for (const [number, level, name, text, count, heard] of said) {
+    for (const [number, level, name, text, count, receivedAt] of lines) {
       const known = this.rows.get(number) ?? this._add(number, level, name, text);
-      known.heard = heard;
+      known.receivedAt = receivedAt;
       setText(known.times, count > 1 ? `× ${count.toLocaleString("en")}` : "");
     }
     for (const [number, { row }] of this.rows) {
@@ -254,7 +254,7 @@ class Book {
       html("span", "webmap-rosout-text", {}, text),
     );
     this._list.prepend(row);
-    const known = { row, level, times, age, heard: 0 };
+    const known = { row, level, times, age, receivedAt: 0 };
     this.rows.set(number, known);
     return known;
   }

@@ -51,13 +51,13 @@ class MeasureTool {
     this._line = null;
     this._button = button("webmap-measure-go", "Measure", () => this._toggle());
     this._button.title = `Key ${key}`;
-    this._word = html("span", "webmap-measure-word", { role: "status" });
+    this._message = html("span", "webmap-measure-word", { role: "status" });
     const panel = html(
       "section",
       "webmap-panel webmap-measure",
       { "aria-label": "Measure" },
       this._button,
-      this._word,
+      this._message,
     );
     this._path = svg("path", { class: "webmap-measure-line" });
     this._drawing = svg(
@@ -114,7 +114,7 @@ class MeasureTool {
     this._pointer = this._line = null;
     this._button.setAttribute("aria-pressed", String(active));
     this._map.svg.classList.toggle("webmap-measuring", active);
-    setText(this._word, active ? "Press on the map and drag to measure." : "");
+    setText(this._message, active ? "Press on the map and drag to measure." : "");
     this._draw();
   }
 
@@ -168,6 +168,6 @@ class MeasureTool {
     const from = apply(this._map.view, line.from.x, line.from.y);
     const to = apply(this._map.view, line.to.x, line.to.y);
     this._path.setAttribute("d", `M${from.x} ${from.y}L${to.x} ${to.y}`);
-    setText(this._word, measured(line.from, line.to));
+    setText(this._message, measured(line.from, line.to));
   }
 }

@@ -95,7 +95,7 @@ class RouteTool {
     this._pause = button("webmap-route-pause", "Pause", () => this._pauseOrGoOn());
     this._skip = button("webmap-route-skip", "Skip point", () => this._do("skip"));
     this._end = button("webmap-route-end", "End route", () => this._do("end"));
-    this._word = html("p", "webmap-route-word", { role: "status" });
+    this._message = html("p", "webmap-route-word", { role: "status" });
     this._saved = new SavedRoutes(saves, send, () => ({
       points: this._points,
       loop: this._loops,
@@ -114,7 +114,7 @@ class RouteTool {
       this._area.element,
       this._list,
       html("div", "webmap-route-row", {}, this._loop, this._run, this._pause, this._skip, this._end),
-      this._word,
+      this._message,
       this._saved.element,
     );
     this._details.open = before?.open ?? false;
@@ -241,9 +241,9 @@ class RouteTool {
     for (const each of [this._pause, this._skip, this._end]) each.hidden = !live;
     for (const each of [this._pause, this._skip]) each.disabled = busy;
     setText(this._pause, run?.state === "going" ? "Pause" : "Resume");
-    setText(this._word, this._words(run, report?.name ?? ""));
+    setText(this._message, this._text(run, report?.name ?? ""));
     const refused = this._area.refused ? "refused" : "";
-    this._word.dataset.state = this._area.active ? refused : (run?.state ?? "");
+    this._message.dataset.state = this._area.active ? refused : (run?.state ?? "");
     this._showList();
     const points = this._aimed ? [...this._points, this._aimed] : this._points;
     const shown = open ? points : live ? run.points : [];
@@ -255,10 +255,10 @@ class RouteTool {
   }
 
   /** @param {import('./route_run.js').RouteRun | undefined} run @param {string} name */
-  _words(run, name) {
+  _text(run, name) {
     if (this._aim.active) return "Press on the map for each point and drag for the heading.";
     if (this._aim.waits) return "Waiting: finish the other tool, then add more points.";
-    if (this._area.active) return this._area.words;
+    if (this._area.active) return this._area.text;
     const how = this._running(run, name);
     const short = this._loops && this._points.length < LEAST_LOOP;
     return short ? `${how} ${TOO_SHORT}`.trim() : how;

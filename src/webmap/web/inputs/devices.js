@@ -25,7 +25,7 @@ import { Keys } from "./keys.js";
 const known = new WeakMap();
 
 /**
- * Return the desk of a page, made when it is first asked for.
+ * Return the input devices of a page. The first call makes them.
  *
  * @param {Drive} drive
  */

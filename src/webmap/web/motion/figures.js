@@ -128,7 +128,7 @@ export function ownStop({ stop_time, stop_source, stop_date, why }) {
  * @param {RobotReport} report
  * @returns {string} "" if {@link ownStop} contains everything.
  */
-export function testWords({ test }) {
+export function stopTestText({ test }) {
   return test && test.state !== "done" ? `Stop test: ${test.text}` : "";
 }
 

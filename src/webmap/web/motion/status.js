@@ -1,7 +1,7 @@
 import { isTested, signed, speedAlong } from "./figures.js";
 import { doingOf, heldByAnother, isLatched } from "./report.js";
 import { WORDS } from "./state_words.js";
-import { stopWords } from "./stopping.js";
+import { stopText } from "./stopping.js";
 
 /** @typedef {import('./requests.js').Request} Request */
 /** @typedef {import('./pilot.js').Pilot} Pilot */
@@ -135,14 +135,14 @@ export function capOf(report) {
  */
 export function speedOf({ measured }) {
   if (!measured) return "Speed unknown";
-  return velocityWords(measured);
+  return velocityText(measured);
 }
 
 /**
  * @param {readonly number[]} velocity As a report has it.
  * @returns {string} Backwards and clockwise are negative.
  */
-function velocityWords(velocity) {
+function velocityText(velocity) {
   return `${signed(speedAlong(velocity) ?? 0)} m/s, ${signed(velocity[2])} rad/s`;
 }
 
@@ -172,7 +172,7 @@ function ofLink({ link }) {
  * @param {RobotReport} report
  */
 function ofStopped(title, status, report) {
-  const { confirmed, text } = stopWords(report);
+  const { confirmed, text } = stopText(report);
   const detail = text || report.reason || "";
   // A refusal of other commands needs no message here.
   const refused = status.refused === "reset" ? status.refusal : null;
@@ -248,7 +248,7 @@ function ofTaking(status, report, title) {
 function ofDoing(name, title, report, inputs) {
   switch (name) {
     case "blocked": {
-      const sent = `Sent: ${velocityWords(report.sent)}.`;
+      const sent = `Sent: ${velocityText(report.sent)}.`;
       return description("blocked", title, `${sent} Measured: ${speedOf(report)}.`);
     }
     case "driven":

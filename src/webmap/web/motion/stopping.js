@@ -214,8 +214,8 @@ function judge(robot, report, watch, connected, now) {
   if (report?.link === "down") return unsure("no connection to the robot");
   if (watch.stoodAt !== null) {
     const more = [...besides(report?.stop?.why), ...(report?.hooks ?? [])];
-    const words = ["stopped, confirmed by odometry", ...more];
-    return { robot, name, state: "confirmed", text: words.join("; ") };
+    const parts = ["stopped, confirmed by odometry", ...more];
+    return { robot, name, state: "confirmed", text: parts.join("; ") };
   }
   if (waited <= STAND_PATIENCE) {
     return { robot, name, state: "stopping", text: "stopping" };
@@ -231,7 +231,7 @@ function judge(robot, report, watch, connected, now) {
  * @returns {{confirmed: boolean | null, text: string}} `confirmed` is null while it
  *     is unknown.
  */
-export function stopWords({ stop }) {
+export function stopText({ stop }) {
   if (!stop) return { confirmed: null, text: "" };
   const by = stop.by ? `By ${stop.by}` : "";
   const more = besides(stop.why);

@@ -70,8 +70,8 @@ class SaveMenu {
     );
     this._go.addEventListener("click", () => this._open(Boolean(this._menu.hidden)));
     this._menu = html("div", "webmap-panel webmap-export-menu");
-    this._word = html("span", "webmap-export-word", { role: "status" });
-    this._element = html("div", "webmap-export", {}, this._go, this._menu, this._word);
+    this._message = html("span", "webmap-export-word", { role: "status" });
+    this._element = html("div", "webmap-export", {}, this._go, this._menu, this._message);
     this._ending = new AbortController();
     const { signal } = this._ending;
     const outside = (/** @type {Event} */ event) => {
@@ -133,7 +133,7 @@ class SaveMenu {
 
   /** @param {string} text Text next to the button while something is saved. */
   showMessage(text) {
-    setText(this._word, text);
+    setText(this._message, text);
   }
 
   /**
