@@ -71,7 +71,8 @@ def test_wall_unknown_and_free_have_exactly_their_colours(tmp_path, name):
 
 
 def test_the_floor_s_colours_are_those_of_the_style_sheet():
-    text = (Path(console.__file__).parent / "tokens.css").read_text("utf-8")
+    package = Path(console.__file__).parents[1]
+    text = (package / "web/style/tokens.css").read_text("utf-8")
     for token, index in (("--map-void", 1), ("--map-floor", 2)):
         values = re.findall(rf"{token}: (#\w+);", text)
         assert values == [COLOURS["day"][index], COLOURS["night"][index]]

@@ -9,28 +9,28 @@ test("the clock is unknown until a frame came", () => {
 
 test("a frame that was late makes nothing look younger", () => {
   const clock = new DisplayClock();
-  clock.hear(100, 10.01);
-  clock.hear(101, 14);
+  clock.update(100, 10.01);
+  clock.update(101, 14);
   assert.ok(Math.abs(clock.at(14) - 103.99) < 1e-3);
 });
 
 test("a quicker frame tells better", () => {
   const clock = new DisplayClock();
-  clock.hear(100, 12);
-  clock.hear(101, 11.05);
+  clock.update(100, 12);
+  clock.update(101, 11.05);
   assert.ok(Math.abs(clock.at(12.05) - 102) < 1e-9);
 });
 
 test("clocks that drift apart are followed slowly", () => {
   const clock = new DisplayClock();
-  for (let s = 0; s < 10_000; s++) clock.hear(s, s * 1.00005 + 0.01);
+  for (let s = 0; s < 10_000; s++) clock.update(s, s * 1.00005 + 0.01);
   assert.ok(Math.abs(clock.at(9999 * 1.00005) - 9999) < 0.1);
 });
 
 test("another display's clock is another", () => {
   const clock = new DisplayClock();
-  clock.hear(1000, 1);
+  clock.update(1000, 1);
   clock.reset();
-  clock.hear(5, 2);
+  clock.update(5, 2);
   assert.equal(clock.at(3), 6);
 });

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { mock, test } from "node:test";
 
-import { importOf } from "../../src/webmap/web/halves.js";
+import { importOf } from "../../src/webmap/web/browser_parts.js";
 
 let modules = 0;
 

@@ -638,7 +638,7 @@ def test_readouts_follow_the_view_and_everything_goes_away(open_bench) -> None:
     bench.select("r1")
     bench.page.get_by_role("button", name="Follow").click()
     bench.until(lambda: {"follow": "r1"} in bench.page.evaluate("bench.maps[0].sent"))
-    bench.page.evaluate("bench.maps[0].halves.forEach((half) => half.destroy())")
+    bench.page.evaluate("bench.maps[0].parts.forEach((part) => part.destroy())")
     assert bench.page.locator(".webmap-panel, .webmap-overlay").count() == 0
     bench.page.keyboard.press("Escape")
     bench.page.keyboard.down("w")

@@ -273,7 +273,7 @@ def test_a_module_goes_with_its_map(host, tab, open_map):
     host.call(shown.session.unmount, shown.mount)
     tab.wait_for_selector("svg", state="detached")
     assert tab.evaluate(
-        "import('/_webmap/web/page.js').then(({ page }) => page.halves._attached.size)"
+        "import('/_webmap/web/page.js').then(({ page }) => page.parts._attached.size)"
     ) in (0, 1)
 
 

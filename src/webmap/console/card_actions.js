@@ -50,7 +50,7 @@ export function listenToActions(map, send, signal) {
   };
 }
 
-/** Milliseconds; an earlier second press is the other half of a double click. */
+/** Milliseconds; an earlier second press belongs to a double click. */
 const SOONEST = 400;
 
 /** Milliseconds after which the first press is forgotten. */

@@ -1,5 +1,5 @@
 import { listenToActions } from "./card_actions.js";
-import { byId, listenToSheet, nameSheet, say, typing } from "../web/tools/dom.js";
+import { byId, listenToSheet, nameSheet, setText, typing } from "../web/tools/dom.js";
 import { keepSizes, listenToList, listenToTools } from "./view_tools.js";
 
 /**
@@ -79,7 +79,7 @@ function count() {
   const rows = document.querySelectorAll("#robots > .row").length;
   const old = document.querySelectorAll("#robots > .row .age.stale").length;
   const robots = rows === 1 ? "1 robot" : `${rows} robots`;
-  say(byId("robots-count"), old > 0 ? `${robots}, ${old} with stale data` : robots);
+  setText(byId("robots-count"), old > 0 ? `${robots}, ${old} with stale data` : robots);
 }
 
 /**
@@ -198,7 +198,7 @@ function listenToSearch(signal) {
       row.classList.toggle("filtered", !name.includes(wanted));
     }
     const none = wanted !== "" && hits().length === 0;
-    say(byId("not-found"), none ? `No robot has “${input.value.trim()}” in its name.` : "");
+    setText(byId("not-found"), none ? `No robot has “${input.value.trim()}” in its name.` : "");
   };
   input.addEventListener("input", filter, { signal });
   const newcomers = new MutationObserver(filter);
@@ -238,7 +238,7 @@ function listenToHelp(drive, signal) {
   const turn = () => {
     if (help.open) help.close();
     else {
-      drive.doubt();
+      drive.goNeutral();
       help.show();
       byId("help-open").setAttribute("aria-expanded", "true");
     }

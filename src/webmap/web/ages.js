@@ -137,7 +137,7 @@ export class DisplayClock {
    * @param {number} sent The display's clock when it sent a frame, in seconds.
    * @param {number} received This page's clock when the frame came, in seconds.
    */
-  hear(sent, received) {
+  update(sent, received) {
     const ahead = received - sent;
     const drift = (received - this._then) * 1e-4;
     this._ahead = this._ahead === null ? ahead : Math.min(ahead, this._ahead + drift);

@@ -1,12 +1,12 @@
 import { attentive, watchAttention } from "./motion/attention.js";
-import { Errands } from "./motion/errands.js";
-import { Line } from "./motion/line.js";
-import { Listeners } from "./motion/news.js";
+import { PoseCommands } from "./motion/pose_commands.js";
+import { GateLink } from "./motion/gate_link.js";
+import { Listeners } from "./motion/drive_events.js";
 import { Session } from "./motion/session.js";
 
 /** @typedef {import('./motion/axes.js').Axes} Axes */
-/** @typedef {import('./motion/news.js').Item} Item */
-/** @typedef {import('./motion/news.js').News} News */
+/** @typedef {import('./motion/drive_events.js').DriveEvent} DriveEvent */
+/** @typedef {import('./motion/drive_events.js').DriveEvents} DriveEvents */
 /** @typedef {import('./motion/report.js').RobotReport} RobotReport */
 /** @typedef {import('./motion/stream.js').Command} Command */
 /** @typedef {{x: number, y: number, yaw: number}} Pose Metres and radians. */
@@ -37,23 +37,23 @@ export class Drive {
     this._session = new Session(now, options);
     this._pilot = this._session.pilot;
     this._listeners = new Listeners();
-    this._errands = new Errands(
+    this._poseCommands = new PoseCommands(
       this._pilot,
       this._session.loop,
       (commands) => this._send(commands),
       () => performance.now(),
     );
-    this._line = new Line(socketUrl(baseUrl, options.id), {
+    this._link = new GateLink(socketUrl(baseUrl, options.id), {
       open: () => this._session.loop.open(performance.now()),
       receive: (message) => this._receive(message),
-      lost: () => this._tellAll(this._session.lost(performance.now())),
+      lost: () => this._emitAll(this._session.lost(performance.now())),
     });
     this._unwatch = watchAttention(
-      (left) => this._doubt(left),
+      (left) => this._goNeutral(left),
       () => this._renew(),
     );
     this._timer = setInterval(() => this._tick(), PERIOD);
-    this._line.mind(now);
+    this._link.mind(now);
   }
 
   /** The state of the connection: may commands arrive, and do they? */
@@ -81,7 +81,7 @@ export class Drive {
 
   /** The requests for control. */
   get requests() {
-    return this._session.asking.requests(performance.now());
+    return this._session.requests.requests(performance.now());
   }
 
   /** The results of this page's STOPs. */
@@ -107,9 +107,9 @@ export class Drive {
   /**
    * Add a listener.
    *
-   * @template {keyof News} K
+   * @template {keyof DriveEvents} K
    * @param {K} kind
-   * @param {(news: News[K]) => void} fn
+   * @param {(event: DriveEvents[K]) => void} fn
    * @returns {() => void} Removes the listener.
    */
   on(kind, fn) {
@@ -123,14 +123,14 @@ export class Drive {
    *
    * @param {string} source
    * @param {Partial<Axes> | null} axes null if the input is gone.
-   * @param {{fresh?: boolean}} [how] See {@link Hands#set}.
+   * @param {{fresh?: boolean}} [how] See {@link Inputs#set}.
    */
   setInput(source, axes, how) {
-    const { hands } = this._session;
-    const was = hands.pressed;
-    hands.set(source, axes, performance.now(), how);
+    const { inputs } = this._session;
+    const was = inputs.pressed;
+    inputs.set(source, axes, performance.now(), how);
     // A release and a press are sent immediately.
-    if (was !== hands.pressed) this._step();
+    if (was !== inputs.pressed) this._step();
   }
 
   /**
@@ -146,8 +146,8 @@ export class Drive {
   }
 
   /** Discard all inputs and go neutral immediately: for inputs that may be wrong. */
-  doubt() {
-    this._doubt(false);
+  goNeutral() {
+    this._goNeutral(false);
   }
 
   // Control --------------------------------------------------------------------
@@ -214,7 +214,7 @@ export class Drive {
    * @throws {Error} When the gate refuses it or does not answer.
    */
   async goal(robot, pose) {
-    await this._errands.place("goal", robot, pose);
+    await this._poseCommands.place("goal", robot, pose);
   }
 
   /**
@@ -226,7 +226,7 @@ export class Drive {
    * @throws {Error} When the gate refuses it or does not answer.
    */
   async locate(robot, pose) {
-    const taken = await this._errands.place("locate", robot, pose);
+    const taken = await this._poseCommands.place("locate", robot, pose);
     if (taken) this.release(robot);
   }
 
@@ -248,10 +248,10 @@ export class Drive {
    */
   stop(robot) {
     // The first message: everything else that a STOP causes here comes after it.
-    const left = this._line.open;
-    if (left) this._line.send({ op: "stop", robot });
+    const left = this._link.open;
+    if (left) this._link.send({ op: "stop", robot });
     this._session.stopped(robot, left, performance.now());
-    this._listeners.tell("stop", robot);
+    this._listeners.emit("stop", robot);
     return left;
   }
 
@@ -275,80 +275,80 @@ export class Drive {
    * @param {string} robot
    */
   stopTest(robot) {
-    this._pilot.doubt(performance.now());
+    this._pilot.goNeutral(performance.now());
     this._send([{ op: "stop-test", robot }]);
   }
 
   /** End: neutral, control released, connection closed. */
   close() {
-    this._doubt(true);
+    this._goNeutral(true);
     clearInterval(this._timer);
     this._unwatch();
-    this._line.abandon();
+    this._link.abandon();
   }
 
   // The page's events, its timer and its socket --------------------------------
 
   /** @param {boolean} left Whether the page is hidden or going away. */
-  _doubt(left) {
+  _goNeutral(left) {
     const now = performance.now();
-    this._pilot.doubt(now, { drop: true });
+    this._pilot.goNeutral(now, { drop: true });
     this._step();
     if (left) this._send(this._pilot.letGo(now));
-    this._listeners.tell("drop", null);
+    this._listeners.emit("drop", null);
   }
 
   /** Reconnect after the page was frozen or stored: the connection may be dead. */
   _renew() {
-    this._pilot.doubt(performance.now(), { drop: true });
-    this._listeners.tell("drop", null);
-    this._line.renew();
+    this._pilot.goNeutral(performance.now(), { drop: true });
+    this._listeners.emit("drop", null);
+    this._link.renew();
   }
 
   _tick() {
-    this._listeners.tell("read", null);
+    this._listeners.emit("read", null);
     this._step();
     const now = performance.now();
-    if (this._line.open) {
-      const news = this._session.judge(now);
-      if (news === null) this._line.lose();
-      else this._tellAll(news);
+    if (this._link.open) {
+      const events = this._session.judge(now);
+      if (events === null) this._link.lose();
+      else this._emitAll(events);
     }
-    this._line.mind(now);
-    this._errands.step(now);
-    this._listeners.tell("step", null);
+    this._link.mind(now);
+    this._poseCommands.step(now);
+    this._listeners.emit("step", null);
   }
 
   _step() {
-    const { hands } = this._session;
-    const held = hands.pressed;
+    const { inputs } = this._session;
+    const held = inputs.pressed;
     this._send(this._pilot.step(performance.now(), attentive()));
-    if (held && !hands.pressed) this._listeners.tell("drop", null);
+    if (held && !inputs.pressed) this._listeners.emit("drop", null);
   }
 
   /** @param {any} message */
   _receive(message) {
-    if (message.op === "hello") this._line.trust();
-    const { say, news } = this._session.receive(message, performance.now());
-    this._send(say);
+    if (message.op === "hello") this._link.trust();
+    const { send, events } = this._session.receive(message, performance.now());
+    this._send(send);
     if (message.op === "refused") {
-      this._errands.refused(message.robot, message.what, message.why);
+      this._poseCommands.refused(message.robot, message.what, message.why);
     }
-    this._tellAll(news);
+    this._emitAll(events);
   }
 
   /** @param {Command[]} commands */
   _send(commands) {
     for (const command of commands) {
-      this._line.send(command);
+      this._link.send(command);
       this._session.sent(command, performance.now());
-      if (command.op === "goal") this._listeners.tell("goal", command.robot);
+      if (command.op === "goal") this._listeners.emit("goal", command.robot);
     }
   }
 
-  /** @param {Item[]} news */
-  _tellAll(news) {
-    for (const [kind, what] of news) this._listeners.tell(kind, what);
+  /** @param {DriveEvent[]} events */
+  _emitAll(events) {
+    for (const [kind, what] of events) this._listeners.emit(kind, what);
   }
 }
 

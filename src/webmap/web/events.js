@@ -15,11 +15,11 @@ import { FLAG } from "./opcodes.js";
 export class Listeners {
   /**
    * @param {Item} item
-   * @param {(kind: string, event: Event) => void} hear
+   * @param {(kind: string, event: Event) => void} onEvent
    */
-  constructor(item, hear) {
+  constructor(item, onEvent) {
     this._item = item;
-    this._hear = hear;
+    this._onEvent = onEvent;
     /** @type {Map<string, Listening>} */
     this._kinds = new Map();
   }
@@ -74,7 +74,7 @@ export class Listeners {
         const flags = (listening.owner ?? 0) | (listening.viewer ?? 0);
         if (flags & FLAG.PREVENT) event.preventDefault();
         if (flags & FLAG.STOP) event.stopPropagation();
-        this._hear(kind, event);
+        this._onEvent(kind, event);
       },
     };
     // Not passive: the flags may require preventDefault later.
@@ -91,21 +91,21 @@ export class Listeners {
  */
 export function describe(event) {
   /** @type {Record<string, string | number | boolean>} */
-  const told = {};
+  const description = {};
   if (event instanceof MouseEvent) {
-    Object.assign(told, { x: event.clientX, y: event.clientY });
-    if (event.button > 0) told.button = event.button;
+    Object.assign(description, { x: event.clientX, y: event.clientY });
+    if (event.button > 0) description.button = event.button;
   }
-  if (event instanceof WheelEvent) told.delta = event.deltaY;
-  if (event instanceof KeyboardEvent) told.key = event.key.slice(0, LONGEST_TEXTS.name);
+  if (event instanceof WheelEvent) description.delta = event.deltaY;
+  if (event instanceof KeyboardEvent) description.key = event.key.slice(0, LONGEST_TEXTS.name);
   if (event instanceof MouseEvent || event instanceof KeyboardEvent) {
-    if (event.shiftKey) told.shift = true;
-    if (event.ctrlKey) told.ctrl = true;
-    if (event.altKey) told.alt = true;
-    if (event.metaKey) told.meta = true;
+    if (event.shiftKey) description.shift = true;
+    if (event.ctrlKey) description.ctrl = true;
+    if (event.altKey) description.alt = true;
+    if (event.metaKey) description.meta = true;
   }
-  Object.assign(told, describeInput(event.currentTarget));
-  return told;
+  Object.assign(description, describeInput(event.currentTarget));
+  return description;
 }
 
 /**
@@ -146,9 +146,9 @@ export class Reports {
    * @param {string} kind
    * @param {Event} event
    */
-  hear(mount, item, kind, event) {
-    const told = { op: "event", mount, element: item.id, event: kind, ...describe(event) };
-    const message = { ...told, ...this._whereabouts(item, event) };
+  report(mount, item, kind, event) {
+    const description = { op: "event", mount, element: item.id, event: kind, ...describe(event) };
+    const message = { ...description, ...this._whereabouts(item, event) };
     if (FREQUENT.has(kind)) {
       this._keep(`${mount} ${item.id} ${kind}`, message);
     } else {

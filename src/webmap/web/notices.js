@@ -62,7 +62,7 @@ export class Notices {
   }
 
   /** Remove every problem that is not reported again soon. */
-  doubtProblems() {
+  recheckProblems() {
     for (const key of this._shown.keys()) if (isProblem(key)) this._leave(key);
   }
 

@@ -9,7 +9,7 @@
 import { BASE, pagePath, socketAddress } from "./addresses.js";
 import { LONGEST_TEXTS } from "./constants.js";
 import { Reports } from "./events.js";
-import { Halves, importOf } from "./halves.js";
+import { BrowserParts, importOf } from "./browser_parts.js";
 import { takeIdentity, takeKey, whyRefused } from "./key.js";
 import { Link } from "./link.js";
 import { contentSize } from "./map.js";
@@ -34,7 +34,7 @@ export class Page {
     this.path = pagePath();
     this.id = takeIdentity(this.path);
     this.notices = new Notices();
-    this.halves = new Halves({
+    this.parts = new BrowserParts({
       send: (message) => this.send(message),
       notice: (text) => this.trouble(text),
       ready: () => this._loadDrive(),
@@ -45,10 +45,10 @@ export class Page {
       notice: (text) => this.trouble(text),
       error: (text) => this.notices.error(text),
       problem: (number, text) => this.notices.problem(number, text),
-      doubtProblems: () => this.notices.doubtProblems(),
-      hear: (mount, item, kind, event) => this._reports.hear(mount, item, kind, event),
+      recheckProblems: () => this.notices.recheckProblems(),
+      onEvent: (mount, item, kind, event) => this._reports.report(mount, item, kind, event),
       drive: () => this.drive,
-      halves: this.halves,
+      parts: this.parts,
     });
     this._reports = new Reports(
       (message) => this.send(message),
@@ -62,7 +62,7 @@ export class Page {
     this._frames = [];
     this._drawing = 0;
     this._failures = 0;
-    this._heard = performance.now();
+    this._listening = performance.now();
     this._theme = matchMedia("(prefers-color-scheme: dark)");
     this._theme.addEventListener("change", () => this.scene.restyle());
     this._link = new Link(() => socketAddress("scene", { page: this.path, id: this.id }), {
@@ -111,7 +111,7 @@ export class Page {
   // The connection -------------------------------------------------------------
 
   _opened() {
-    this._heard = performance.now();
+    this._listening = performance.now();
     this._frames = [];
     this.send({
       op: "hello",
@@ -127,7 +127,7 @@ export class Page {
 
   /** @param {ArrayBuffer} data */
   _received(data) {
-    this._heard = performance.now();
+    this._listening = performance.now();
     this._frames.push({ data, received: performance.now() / 1000 });
     this._drawing ||= requestAnimationFrame(() => this._draw());
     this._connected();
@@ -159,7 +159,7 @@ export class Page {
   _disconnected(text) {
     const { classList } = document.documentElement;
     // The operator drives by the picture: end all inputs when it stops updating.
-    if (!classList.contains("disconnected")) this._drive?.doubt();
+    if (!classList.contains("disconnected")) this._drive?.goNeutral();
     classList.add("disconnected");
     this.notices.show("link", text);
   }
@@ -168,8 +168,8 @@ export class Page {
   _look() {
     this._link.look();
     // A hidden page draws nothing, so the server stops sending to it.
-    if (document.hidden || this._frames.length > 0) this._heard = performance.now();
-    const silent = performance.now() - this._heard;
+    if (document.hidden || this._frames.length > 0) this._listening = performance.now();
+    const silent = performance.now() - this._listening;
     if (silent < SILENT || !this._link.isOpen) return;
     this._disconnected("No data from WebMap. The page shows stale data.");
     if (silent > DEAD) this._link.renew();

@@ -24,11 +24,11 @@ const MOST_LOST = 20;
  * @property {(text: string) => void} error Shows an error of the server.
  * @property {(number: number, text: string) => void} problem Shows a problem until it
  *     is solved; an empty text means solved.
- * @property {() => void} doubtProblems All unsolved problems are reported again now.
- * @property {(mount: number, item: Item, kind: string, event: Event) => void} hear
+ * @property {() => void} recheckProblems All unsolved problems are reported again now.
+ * @property {(mount: number, item: Item, kind: string, event: Event) => void} onEvent
  *     Handles an event.
  * @property {() => import('./drive.js').Drive} drive The page's connection to the gate.
- * @property {import('./halves.js').Halves} halves
+ * @property {import('./browser_parts.js').BrowserParts} parts
  */
 
 /**
@@ -45,7 +45,7 @@ export class Scene {
     this._dots = new Dots();
     this._maps = new Maps(
       (svg) => this._surroundings(svg),
-      (canvas) => page.halves.detachFrom(canvas),
+      (canvas) => page.parts.detachFrom(canvas),
     );
     /** @type {Map<number, Mount>} */
     this._mounts = new Map();
@@ -56,7 +56,7 @@ export class Scene {
     /** @type {WeakMap<Item, Listeners>} */
     this._listeners = new WeakMap();
     /** @type {WeakMap<Mount, Map<number, Map<string, number>>>} */
-    this._heard = new WeakMap();
+    this._listening = new WeakMap();
     this._reselected = false;
     this._onGone = this._onGone.bind(this);
     /** @type {Set<string>} Paths of images that could not be loaded. */
@@ -84,7 +84,7 @@ export class Scene {
   apply(buffer, received) {
     const header = readFrame(buffer, ({ reset, now }) => {
       if (reset) this._clear();
-      this._clock.hear(now, received);
+      this._clock.update(now, received);
       return this;
     });
     this._targets = [];
@@ -101,7 +101,7 @@ export class Scene {
     for (const mount of [...this._mounts.values()].reverse()) this.unmount(mount.id);
     this._targets = [];
     this._clock.reset();
-    this._page.doubtProblems();
+    this._page.recheckProblems();
   }
 
   /** Note that sizes in styles may have changed. */
@@ -213,7 +213,7 @@ export class Scene {
    * @param {number} flags
    */
   listen(id, element, kind, flags) {
-    this._hear(id, element, kind, flags);
+    this._listen(id, element, kind, flags);
   }
 
   /**
@@ -222,7 +222,7 @@ export class Scene {
    * @param {string} kind
    */
   unlisten(id, element, kind) {
-    this._hear(id, element, kind, undefined);
+    this._listen(id, element, kind, undefined);
   }
 
   /**
@@ -231,17 +231,17 @@ export class Scene {
    * @param {string} kind
    * @param {number | undefined} flags undefined to stop listening.
    */
-  _hear(id, element, kind, flags) {
+  _listen(id, element, kind, flags) {
     const mount = this._mounts.get(id);
     if (!mount) return;
     // Kept separately, for a new element with the same id.
-    const heard = this._heard.get(mount) ?? new Map();
-    this._heard.set(mount, heard);
-    const kinds = heard.get(element) ?? new Map();
+    const listening = this._listening.get(mount) ?? new Map();
+    this._listening.set(mount, listening);
+    const kinds = listening.get(element) ?? new Map();
     if (flags === undefined) kinds.delete(kind);
     else kinds.set(kind, flags);
-    if (kinds.size > 0) heard.set(element, kinds);
-    else heard.delete(element);
+    if (kinds.size > 0) listening.set(element, kinds);
+    else listening.delete(element);
     const item = mount.items.get(element);
     if (item) this._listenersOf(mount, item).setViewer(kind, flags);
   }
@@ -256,7 +256,7 @@ export class Scene {
     if (known) return known;
     const { id } = mount;
     const listeners = new Listeners(item, (kind, event) =>
-      this._page.hear(id, item, kind, event),
+      this._page.onEvent(id, item, kind, event),
     );
     this._listeners.set(item, listeners);
     return listeners;
@@ -304,12 +304,12 @@ export class Scene {
    */
   attach(svg, instance, module, css, options) {
     const canvas = this._maps.get(svg);
-    if (canvas) this._page.halves.attach(canvas, instance, module, css, options);
+    if (canvas) this._page.parts.attach(canvas, instance, module, css, options);
   }
 
   /** @param {number} instance */
   detach(instance) {
-    this._page.halves.detach(instance);
+    this._page.parts.detach(instance);
   }
 
   /**
@@ -317,7 +317,7 @@ export class Scene {
    * @param {unknown} message
    */
   message(instance, message) {
-    this._page.halves.receive(instance, message);
+    this._page.parts.receive(instance, message);
   }
 
   // Records about elements -----------------------------------------------------
@@ -332,9 +332,9 @@ export class Scene {
   create(id, parent, place, tag, svg) {
     for (const mount of this._targets) {
       const item = mount.create(id, parent, place, tag, svg);
-      const heard = item && this._heard.get(mount)?.get(id);
-      if (!heard) continue;
-      for (const [kind, flags] of heard) {
+      const listening = item && this._listening.get(mount)?.get(id);
+      if (!listening) continue;
+      for (const [kind, flags] of listening) {
         this._listenersOf(mount, item).setViewer(kind, flags);
       }
     }

@@ -30,10 +30,10 @@ async (frames) => {
     notice: (text) => said.push(text),
     error: (text) => said.push(text),
     problem: (number, text) => said.push(text),
-    doubtProblems() {},
+    recheckProblems() {},
     hear() {},
     drive() {},
-    halves: { detachFrom() {} },
+    parts: { detachFrom() {} },
   });
   for (const frame of frames) {
     const bytes = Uint8Array.from(atob(frame), (c) => c.charCodeAt(0));

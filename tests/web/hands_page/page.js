@@ -113,16 +113,18 @@ async function makeMap(number) {
     map.clicks += 1;
     map.select(event.target.closest(".robot")?.getAttribute("data-robot") ?? null);
   });
-  map.halves = [];
+  map.parts = [];
   const styles = [];
   for (const name of modules) {
     const { default: attach } = await import(`/_webmap/features/${name}.js`);
     const link = document.createElement("link");
     link.rel = "stylesheet";
-    link.href = `/_webmap/features/${name}.css`;
+    // The modules of the view share one style sheet.
+    const sheet = name.startsWith("view/") ? "view/view" : name;
+    link.href = `/_webmap/features/${sheet}.css`;
     styles.push(new Promise((resolve) => link.addEventListener("load", resolve)));
     document.head.append(link);
-    map.halves.push(attach(map, options, (message) => map.sent.push(message)));
+    map.parts.push(attach(map, options, (message) => map.sent.push(message)));
   }
   await Promise.all(styles);
   return map;

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { DEAD_ZONE, past, throwOf } from "../../../src/webmap/web/inputs/stick.js";
+import { DEAD_ZONE, beyondDeadZone, axesOfStick } from "../../../src/webmap/web/inputs/stick.js";
 
 const near = (axes, x, y, turn) => {
   for (const [value, expected] of [[axes.x, x], [axes.y, y], [axes.turn, turn]]) {
@@ -10,28 +10,28 @@ const near = (axes, x, y, turn) => {
 };
 
 test("up is ahead, down is back, across turns on the spot", () => {
-  near(throwOf(0, -1), 1, 0, 0);
-  near(throwOf(0, 1), -1, 0, 0);
-  near(throwOf(-1, 0), 0, 0, 1);
-  near(throwOf(1, 0), 0, 0, -1);
+  near(axesOfStick(0, -1), 1, 0, 0);
+  near(axesOfStick(0, 1), -1, 0, 0);
+  near(axesOfStick(-1, 0), 0, 0, 1);
+  near(axesOfStick(1, 0), 0, 0, -1);
 });
 
 test("sideways, across moves and does not turn", () => {
-  near(throwOf(-1, 0, { sideways: true }), 0, 1, 0);
-  near(throwOf(1, 0, { sideways: true }), 0, -1, 0);
+  near(axesOfStick(-1, 0, { sideways: true }), 0, 1, 0);
+  near(axesOfStick(1, 0, { sideways: true }), 0, -1, 0);
 });
 
 test("a tremble in the middle or across does nothing", () => {
-  near(throwOf(DEAD_ZONE, -DEAD_ZONE), 0, 0, 0);
-  assert.equal(throwOf(DEAD_ZONE, -0.9).turn, 0);
+  near(axesOfStick(DEAD_ZONE, -DEAD_ZONE), 0, 0, 0);
+  assert.equal(axesOfStick(DEAD_ZONE, -0.9).turn, 0);
 });
 
 test("beyond the dead zone it begins at nothing and ends at all", () => {
-  assert.ok(past(DEAD_ZONE + 0.001) < 0.01);
-  assert.equal(past(1), 1);
-  assert.equal(past(-1), -1);
+  assert.ok(beyondDeadZone(DEAD_ZONE + 0.001) < 0.01);
+  assert.equal(beyondDeadZone(1), 1);
+  assert.equal(beyondDeadZone(-1), -1);
 });
 
 test("a pull beyond the edge points the same way and is not more", () => {
-  assert.deepEqual(throwOf(30, -40), throwOf(0.6, -0.8));
+  assert.deepEqual(axesOfStick(30, -40), axesOfStick(0.6, -0.8));
 });

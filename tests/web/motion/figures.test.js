@@ -7,7 +7,7 @@ import {
   speedAlong,
   speedNow,
   stoppingDistance,
-  testWords,
+  stopTestText,
   timings,
 } from "../../../src/webmap/web/motion/figures.js";
 
@@ -74,7 +74,7 @@ test("times are the gate's own where it gives them", () => {
   assert.deepEqual(texts(standing, null, null), ["unknown", "unknown", "not moving"]);
 });
 
-test("a robot is said to stand only where odometry says so", () => {
+test("a robot is text to stand only where odometry says so", () => {
   const stop = (fields) => timings(report(fields), null, null)[2].text;
   const rest = { sent: [0, 0, 0], echoed: null };
   assert.equal(stop({ ...rest, measured: [0, 0, 0] }), "not moving");
@@ -83,23 +83,23 @@ test("a robot is said to stand only where odometry says so", () => {
 });
 
 test("the test of its own stop is told while it goes on, and when it failed", () => {
-  const said = (state) => testWords({ test: { state, text: "creeping" } });
-  assert.equal(said("creeping"), "Stop test: creeping");
-  assert.equal(said("failed"), "Stop test: creeping");
-  assert.equal(said("done"), "");
-  assert.equal(testWords({ test: null }), "");
-  assert.equal(testWords({}), "");
+  const text = (state) => stopTestText({ test: { state, text: "creeping" } });
+  assert.equal(text("creeping"), "Stop test: creeping");
+  assert.equal(text("failed"), "Stop test: creeping");
+  assert.equal(text("done"), "");
+  assert.equal(stopTestText({ test: null }), "");
+  assert.equal(stopTestText({}), "");
 });
 
-test("how a robot stops by itself is said with where that is known from", () => {
-  const said = (stop_time, stop_source, stop_date, why = []) =>
+test("how a robot stops by itself is text with where that is known from", () => {
+  const text = (stop_time, stop_source, stop_date, why = []) =>
     ownStop({ stop_time, stop_source, stop_date, why });
-  assert.equal(said(undefined), "");
-  assert.equal(said(null, null, null), "Command timeout of the base: unknown.");
+  assert.equal(text(undefined), "");
+  assert.equal(text(null, null, null), "Command timeout of the base: unknown.");
   const failed = "Command timeout of the base: none (tested 2026-11-21).";
-  assert.equal(said(null, "tested", "2026-11-21"), failed);
-  assert.equal(said(null, null, null, ["stop test failed on 2026-11-21"]), "");
-  assert.equal(said(0.25, "stated", null), "Command timeout of the base: 0.25 s (stated).");
+  assert.equal(text(null, "tested", "2026-11-21"), failed);
+  assert.equal(text(null, null, null, ["stop test failed on 2026-11-21"]), "");
+  assert.equal(text(0.25, "stated", null), "Command timeout of the base: 0.25 s (stated).");
   const tested = "Command timeout of the base: 0.31 s (tested 2026-11-21).";
-  assert.equal(said(0.31, "tested", "2026-11-21"), tested);
+  assert.equal(text(0.31, "tested", "2026-11-21"), tested);
 });

@@ -74,7 +74,7 @@ function pressAt(at) {
     if (now > CONNECTED) session.receive({ op: "tick", tick: ++tick, ack }, now);
     if (now >= at && !heard) {
       heard = true;
-      session.hands.set("keys", FORWARD, now);
+      session.inputs.set("keys", FORWARD, now);
       take(pilot.step(now, true), now);
     }
     if (now % 50 > 0) continue;

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, describe, test } from "node:test";
 
-import { TAKE_PATIENCE } from "../../../src/webmap/web/motion/reach.js";
+import { TAKE_PATIENCE } from "../../../src/webmap/web/motion/lease_requests.js";
 import { Bench, FORWARD } from "./pilot_bench.js";
 
 const moves = (messages) =>
@@ -175,14 +175,14 @@ describe("while driving", () => {
       happen();
       bench.run(100);
       // A key that is held and says so again is still not a new press.
-      bench.hands.set("keys", FORWARD, bench.now);
+      bench.inputs.set("keys", FORWARD, bench.now);
       assert.deepEqual(moves(bench.run(1500)), []);
     });
   }
 
   test("after a doubt, a release and a new press drive again", () => {
     bench.drive();
-    bench.pilot.doubt(bench.now);
+    bench.pilot.goNeutral(bench.now);
     bench.run(300);
     bench.letGo();
     bench.run(300);
@@ -193,7 +193,7 @@ describe("while driving", () => {
     bench.drive();
     bench.letGo();
     bench.run(300);
-    bench.pilot.doubt(bench.now);
+    bench.pilot.goNeutral(bench.now);
     bench.acking = false;
     bench.run(200);
     assert.deepEqual(moves(bench.press()), []);
@@ -282,7 +282,7 @@ describe("leases", () => {
   test("asked for by name do not move by what is held", () => {
     bench.press({ x: 0, y: 0, turn: 0 });
     bench.keep(bench.pilot.take("r1", bench.now));
-    bench.hands.set("keys", FORWARD, bench.now);
+    bench.inputs.set("keys", FORWARD, bench.now);
     bench.grant("r1");
     assert.deepEqual(moves(bench.run(600)), []);
   });
@@ -325,7 +325,7 @@ describe("leases", () => {
     bench.drive();
     bench.pilot.stopped("r2", bench.now);
     assert.equal(bench.pilot.driven, "r1");
-    assert.deepEqual(moves(bench.run(500)), [], "but the hands are dead");
+    assert.deepEqual(moves(bench.run(500)), [], "but the inputs are dead");
   });
 
   test("end with the connection", () => {
@@ -424,7 +424,7 @@ describe("a camera that the operator goes by", () => {
     assert.ok(!("video" in last()));
   });
 
-  test("stops the robot when it freezes, until hands are off and press again", () => {
+  test("stops the robot when it freezes, until inputs are off and press again", () => {
     let age = 100;
     bench.pilot.pictures.goBy("r1", () => age);
     bench.drive();

@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 
-import { Hands } from "../../../src/webmap/web/motion/hands.js";
+import { Inputs } from "../../../src/webmap/web/motion/inputs.js";
 import { Loop } from "../../../src/webmap/web/motion/loop.js";
 import { Pilot } from "../../../src/webmap/web/motion/pilot.js";
 
@@ -20,8 +20,8 @@ export class Bench {
     /** @type {any[]} */
     this.sent = [];
     this.loop = new Loop();
-    this.hands = new Hands(-1000);
-    this.pilot = new Pilot(this.hands, this.loop, 0, options);
+    this.inputs = new Inputs(-1000);
+    this.pilot = new Pilot(this.inputs, this.loop, 0, options);
     this.loop.open(0);
     this.loop.receive(this.tick, -1, 0);
     this.say("r1");
@@ -68,12 +68,12 @@ export class Bench {
   }
 
   press(axes = FORWARD) {
-    this.hands.set("keys", axes, this.now);
+    this.inputs.set("keys", axes, this.now);
     return this.step(0);
   }
 
   letGo() {
-    this.hands.set("keys", null, this.now);
+    this.inputs.set("keys", null, this.now);
     return this.step(0);
   }
 

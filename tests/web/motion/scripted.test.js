@@ -7,7 +7,7 @@ import { describe as words } from "../../../src/webmap/web/motion/status.js";
 import { Bench } from "./pilot_bench.js";
 
 /**
- * What a page sends and shows for scripted hands, as a digest of each script.
+ * What a page sends and shows for scripted inputs, as a digest of each script.
  *
  * WEBMAP_SCRIPTED=write node --test tests/web/motion/scripted.test.js makes the file anew;
  * with WEBMAP_SCRIPTED=print each step is printed.
@@ -38,7 +38,7 @@ const POSE = { x: 1, y: 2, yaw: 0.5 };
 /** @typedef {<T>(from: T[]) => T} Pick */
 
 /**
- * What hands, the gate and the connection do, by chance.
+ * What inputs, the gate and the connection do, by chance.
  *
  * @type {Record<string, (bench: Bench, pick: Pick) => any>}
  */
@@ -65,7 +65,7 @@ const EVENTS = {
   goal: ({ pilot, now }, pick) => [pilot.place("goal", pick(["r1", "r2"]), POSE, now)],
   locate: ({ pilot, now }) => [pilot.place("locate", "r1", POSE, now)],
   keep: ({ pilot, now }, pick) => pilot.keep(pick(["r1", "r2"]), now),
-  doubt: ({ pilot, now }, pick) => pilot.doubt(now, { drop: pick([true, false]) }),
+  doubt: ({ pilot, now }, pick) => pilot.goNeutral(now, { drop: pick([true, false]) }),
   stop: ({ pilot, now }, pick) => pilot.stopped(pick(["r1", "*"]), now),
   reset: ({ pilot, now }) => pilot.reset("r1", now),
   disconnect: ({ pilot }) => pilot.disconnect(),
@@ -119,7 +119,7 @@ function digestOf(seed) {
   return hash.digest("hex").slice(0, 12);
 }
 
-test("pages send and show for scripted hands what was recorded", () => {
+test("pages send and show for scripted inputs what was recorded", () => {
   const found = Array.from({ length: SCRIPTS }, (_, seed) => digestOf(seed + 1));
   if (MODE === "write") writeFileSync(FILE, `${JSON.stringify(found, null, 0)}\n`);
   assert.deepEqual(found, JSON.parse(readFileSync(FILE, "utf8")));

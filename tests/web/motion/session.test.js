@@ -35,7 +35,7 @@ function drive() {
   session.receive({ op: "tick", tick: 100, ack: -1 }, 0);
   session.receive(REPORT, 0);
   session.pilot.choose("r1", 0);
-  session.hands.set("keys", { x: 1 }, 250);
+  session.inputs.set("keys", { x: 1 }, 250);
   let last;
   for (let now = 250; now < 800; now += 50) {
     [last] = session.pilot.step(now, true);
@@ -50,7 +50,7 @@ describe("a connection", () => {
   test("is open with the gate's first word, and not before", () => {
     assert.deepEqual(session.judge(100), []);
     assert.equal(session.state, "connecting");
-    const { say, news } = session.receive(HELLO, 100);
+    const { send: say, events: news } = session.receive(HELLO, 100);
     assert.deepEqual([say, news], [[], [["state", "open"]]]);
     assert.equal(session.connection, "c1");
     assert.deepEqual(session.judge(110), [], "what is no news is not told");
@@ -72,16 +72,16 @@ describe("a connection", () => {
     assert.equal(session.connection, null);
     assert.equal(session.pilot.driven, null);
     assert.equal(session.loop.tick, null);
-    assert.equal(session.hands.dead, true);
+    assert.equal(session.inputs.blocked, true);
   });
 
   test("to a gate that was started anew begins with nothing", () => {
     drive();
-    const { news } = session.receive({ op: "hello", connection: "c2" }, 800);
+    const { events: news } = session.receive({ op: "hello", connection: "c2" }, 800);
     assert.deepEqual(news, [], "the link was open all the time");
     assert.equal(session.connection, "c2");
     assert.equal(session.pilot.driven, null);
-    assert.equal(session.hands.dead, true);
+    assert.equal(session.inputs.blocked, true);
   });
 });
 
@@ -89,10 +89,10 @@ describe("a STOP", () => {
   test("that could not leave is the first thing said, once", () => {
     session.stopped("*", false, 0);
     session.stopped("*", false, 10);
-    assert.deepEqual(session.receive(HELLO, 100).say, [{ op: "stop", robot: "*" }]);
+    assert.deepEqual(session.receive(HELLO, 100).send, [{ op: "stop", robot: "*" }]);
     session.receive({ ...REPORT, latched: true }, 150);
     session.lost(200);
-    assert.deepEqual(session.receive(HELLO, 300).say, []);
+    assert.deepEqual(session.receive(HELLO, 300).send, []);
   });
 
   test("that left by a connection which died of it is said again until answered", () => {
@@ -101,12 +101,12 @@ describe("a STOP", () => {
     session.stopped("r1", true, 10);
     session.receive({ ...REPORT, measured: [0.1, 0, 0] }, 20);
     session.lost(500);
-    assert.deepEqual(session.receive(HELLO, 600).say, [{ op: "stop", robot: "r1" }]);
+    assert.deepEqual(session.receive(HELLO, 600).send, [{ op: "stop", robot: "r1" }]);
     session.lost(700);
-    assert.deepEqual(session.receive(HELLO, 800).say, [{ op: "stop", robot: "r1" }]);
+    assert.deepEqual(session.receive(HELLO, 800).send, [{ op: "stop", robot: "r1" }]);
     session.receive({ ...REPORT, latched: true }, 850);
     session.lost(900);
-    assert.deepEqual(session.receive(HELLO, 1000).say, []);
+    assert.deepEqual(session.receive(HELLO, 1000).send, []);
   });
 
   test("for all is said again until every robot is stopped or gone", () => {
@@ -119,12 +119,12 @@ describe("a STOP", () => {
     session.receive({ ...REPORT, latched: true }, 20);
     session.receive({ ...third, stop: { id: "s2" } }, 20);
     session.lost(500);
-    assert.deepEqual(session.receive(HELLO, 600).say, [{ op: "stop", robot: "*" }]);
+    assert.deepEqual(session.receive(HELLO, 600).send, [{ op: "stop", robot: "*" }]);
     session.receive({ ...REPORT, latched: true, stop: { id: "s3" } }, 650);
     session.receive({ ...third, stop: { id: "s3" } }, 650);
     session.receive({ op: "gone", robot: "r2" }, 650);
     session.lost(700);
-    assert.deepEqual(session.receive(HELLO, 800).say, []);
+    assert.deepEqual(session.receive(HELLO, 800).send, []);
   });
 
   test("pressed while one stands is answered by another STOP, not by the same", () => {
@@ -138,24 +138,24 @@ describe("a STOP", () => {
     session.receive(stands("s1"), 20);
     session.receive(REPORT, 30); // somebody else's reset was quicker
     session.lost(500);
-    assert.deepEqual(session.receive(HELLO, 600).say, [{ op: "stop", robot: "r1" }]);
+    assert.deepEqual(session.receive(HELLO, 600).send, [{ op: "stop", robot: "r1" }]);
     session.receive(stands("s2"), 650);
     session.lost(700);
-    assert.deepEqual(session.receive(HELLO, 800).say, []);
+    assert.deepEqual(session.receive(HELLO, 800).send, []);
   });
 
   test("that a gate took to its end is said to the one started anew", () => {
     drive();
     session.stopped("r1", true, 800);
-    const { say } = session.receive({ op: "hello", connection: "c2" }, 810);
+    const { send: say } = session.receive({ op: "hello", connection: "c2" }, 810);
     assert.deepEqual(say, [{ op: "stop", robot: "r1" }]);
   });
 
-  test("ends the lease, kills the hands, and is followed up", () => {
+  test("ends the lease, kills the inputs, and is followed up", () => {
     drive();
     session.stopped("r1", true, 800);
     assert.equal(session.pilot.driven, null);
-    assert.equal(session.hands.dead, true);
+    assert.equal(session.inputs.blocked, true);
     const [verdict] = session.verdicts(810);
     assert.deepEqual([verdict.robot, verdict.state], ["r1", "stopping"]);
   });
@@ -167,7 +167,7 @@ describe("a STOP", () => {
       session.stopped("*", true, 10);
       for (const message of said) session.receive(message, 20);
       session.lost(30);
-      return session.receive({ ...HELLO, connection: "c2" }, 40).say;
+      return session.receive({ ...HELLO, connection: "c2" }, 40).send;
     };
     const stop = [{ op: "stop", robot: "*" }];
     const latched = { ...REPORT, state: "stopped", latched: true };
@@ -185,10 +185,10 @@ describe("a STOP", () => {
 describe("what the gate says", () => {
   test("of a robot is known, followed and told", () => {
     const asker = { connection: "c9", name: "Ann", left: 8 };
-    const { news } = session.receive({ ...REPORT, asker }, 0);
+    const { events: news } = session.receive({ ...REPORT, asker }, 0);
     assert.equal(news[0][0], "robot");
     assert.equal(session.pilot.robots.get("r1")?.name, "Bob");
-    assert.equal(session.asking.requests(0)[0].who, "Ann");
+    assert.equal(session.requests.requests(0)[0].who, "Ann");
   });
 
   test("tells how long a robot took to move", () => {
@@ -200,22 +200,22 @@ describe("what the gate says", () => {
   test("of a robot that is gone is forgotten by all", () => {
     session.receive({ ...REPORT, asker: { connection: "c9", name: "", left: 8 } }, 0);
     session.stopped("r1", true, 0);
-    assert.deepEqual(session.receive({ op: "gone", robot: "r1" }, 0).news, [
+    assert.deepEqual(session.receive({ op: "gone", robot: "r1" }, 0).events, [
       ["gone", "r1"],
     ]);
     assert.equal(session.pilot.robots.size, 0);
-    assert.deepEqual(session.asking.requests(0), []);
+    assert.deepEqual(session.requests.requests(0), []);
     assert.deepEqual(session.verdicts(0), []);
   });
 
   test("in refusal is told, and a doubt if it was a command", () => {
     drive();
     const no = { op: "refused", robot: "r1", what: "drive", why: "too old" };
-    assert.deepEqual(session.receive(no, 800).news, [["refused", no]]);
-    assert.equal(session.hands.dead, true);
+    assert.deepEqual(session.receive(no, 800).events, [["refused", no]]);
+    assert.equal(session.inputs.blocked, true);
   });
 
   test("in words of another version is nothing", () => {
-    assert.deepEqual(session.receive({ op: "sing" }, 0), { say: [], news: [] });
+    assert.deepEqual(session.receive({ op: "sing" }, 0), { send: [], events: [] });
   });
 });

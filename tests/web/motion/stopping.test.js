@@ -7,7 +7,7 @@ import {
   STAND_PATIENCE,
   Stopping,
   standingStops,
-  stopWords,
+  stopText,
 } from "../../../src/webmap/web/motion/stopping.js";
 
 const STILL = [0, 0, 0];
@@ -203,7 +203,7 @@ describe("a STOP that latches", () => {
   });
 
   test("is told with who said it and what became of it", () => {
-    const text = (stop) => stopWords(latched({ stop })).text;
+    const text = (stop) => stopText(latched({ stop })).text;
     assert.equal(text(word(true)), "By Ann, confirmed by odometry.");
     assert.equal(text(word(null)), "By Ann, waiting for odometry to confirm.");
     assert.equal(text(word(false, "no odometry")), "By Ann: no odometry.");
@@ -214,7 +214,7 @@ describe("a STOP that latches", () => {
   test("that the disk does not have is said to be forgotten at a restart", () => {
     const forgotten = "a restart would end this STOP: the disk is full";
     const text = (confirmed, why) =>
-      stopWords(latched({ stop: { by: "Ann", confirmed, why: `${why}; ${forgotten}` } }))
+      stopText(latched({ stop: { by: "Ann", confirmed, why: `${why}; ${forgotten}` } }))
         .text;
     const said = "stopped, confirmed by odometry";
     assert.equal(text(true, said), `By Ann, confirmed by odometry; ${forgotten}.`);

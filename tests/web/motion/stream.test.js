@@ -1,22 +1,22 @@
 import assert from "node:assert/strict";
 import { beforeEach, describe, test } from "node:test";
 
-import { Hands } from "../../../src/webmap/web/motion/hands.js";
+import { Inputs } from "../../../src/webmap/web/motion/inputs.js";
 import { Loop } from "../../../src/webmap/web/motion/loop.js";
 import { ASLEEP, SETTLE, Stream } from "../../../src/webmap/web/motion/stream.js";
 
 const FORWARD = { x: 1, y: 0, turn: 0 };
 
-/** @type {{hands: Hands, loop: Loop, stream: Stream, now: number}} */
+/** @type {{inputs: Inputs, loop: Loop, stream: Stream, now: number}} */
 let it;
 beforeEach(() => {
-  const hands = new Hands(-1000);
+  const inputs = new Inputs(-1000);
   const loop = new Loop();
-  it = { hands, loop, stream: new Stream(hands, loop, 0), now: 0 };
+  it = { inputs, loop, stream: new Stream(inputs, loop, 0), now: 0 };
   loop.open(0);
   loop.receive(100, -1, 0);
   it.stream.open("r1", 7, 0);
-  hands.set("keys", FORWARD, 0);
+  inputs.set("keys", FORWARD, 0);
 });
 
 /**
@@ -83,10 +83,10 @@ describe("a stream", () => {
     assert.equal(it.stream.stamp().seq, 0);
   });
 
-  test("counts as used while hands ask for motion", () => {
+  test("counts as used while inputs ask for motion", () => {
     run(200);
     assert.equal(it.stream.lease?.usedAt, 200);
-    it.hands.set("keys", null, 200);
+    it.inputs.set("keys", null, 200);
     run(200);
     assert.equal(it.stream.lease?.usedAt, 200);
   });
@@ -102,7 +102,7 @@ describe("a stream", () => {
 describe("a stream that moves a robot", () => {
   beforeEach(() => {
     run(600);
-    assert.equal(it.hands.dead, false, "it moves");
+    assert.equal(it.inputs.blocked, false, "it moves");
   });
 
   const doubts = {
@@ -118,12 +118,12 @@ describe("a stream that moves a robot", () => {
       it.loop.open(it.now);
       it.stream.look(it.now, true);
     },
-    "somebody says so": () => it.stream.doubt(it.now),
+    "somebody says so": () => it.stream.goNeutral(it.now),
   };
   for (const [what, happen] of Object.entries(doubts)) {
     test(`is neutral and settles anew when ${what}`, () => {
       happen();
-      assert.equal(it.hands.dead, true);
+      assert.equal(it.inputs.blocked, true);
       assert.equal(it.stream.settled, false);
       const [said] = it.stream.step(true, it.now);
       assert.deepEqual([said.x, said.turn], [0, 0]);

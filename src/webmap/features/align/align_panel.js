@@ -1,4 +1,4 @@
-import { button, html, say } from "../../web/tools/elements.js";
+import { button, html, setText } from "../../web/tools/elements.js";
 
 /** @typedef {import('./align_drawing.js').Alignment} Alignment */
 /** @typedef {import('./align_tool.js').Subject} Subject */
@@ -6,7 +6,7 @@ import { button, html, say } from "../../web/tools/elements.js";
 /**
  * Callbacks of the panel.
  *
- * @typedef {object} Wishes
+ * @typedef {object} AlignActions
  * @property {() => void} toggle
  * @property {(whole: boolean) => void} choose Whether everything of the bridge is
  *     aligned.
@@ -26,12 +26,12 @@ const FIELDS = [
 
 /** The button that begins an alignment, and its text and fields. */
 export class AlignPanel {
-  /** @param {Wishes} wishes */
-  constructor(wishes) {
-    this._wishes = wishes;
-    this._go = button("webmap-align-go", "Align maps", () => wishes.toggle());
+  /** @param {AlignActions} actions */
+  constructor(actions) {
+    this._actions = actions;
+    this._go = button("webmap-align-go", "Align maps", () => actions.toggle());
     this._what = html("select", "webmap-align-what", { "aria-label": "What to align" });
-    this._what.addEventListener("change", () => wishes.choose(this._what.value === "whole"));
+    this._what.addEventListener("change", () => actions.choose(this._what.value === "whole"));
     /** @type {Map<Field, HTMLInputElement>} */
     this._inputs = new Map();
     const fields = FIELDS.map(([name, label, step]) => this._field(name, label, step));
@@ -52,14 +52,14 @@ export class AlignPanel {
         "webmap-align-ends",
         {},
         html("button", "webmap-button webmap-align-save", { type: "submit" }, "Save"),
-        button("webmap-align-cancel", "Cancel", () => wishes.cancel()),
+        button("webmap-align-cancel", "Cancel", () => actions.cancel()),
       ),
     );
     this._body.addEventListener("submit", (event) => {
       event.preventDefault();
-      wishes.save();
+      actions.save();
     });
-    this._word = html("span", "webmap-align-word", { role: "status" });
+    this._message = html("span", "webmap-align-word", { role: "status" });
     this._line = html("code", "webmap-align-line", { hidden: "" });
     /** The button and the text; they share the room with those of other tools. */
     this.element = html(
@@ -74,20 +74,20 @@ export class AlignPanel {
       "webmap-panel webmap-align-form",
       { "aria-label": "Alignment in numbers", hidden: "" },
       this._body,
-      this._word,
+      this._message,
       this._line,
     );
   }
 
-  /** @param {string} words */
-  say(words) {
-    say(this._word, words);
+  /** @param {string} text */
+  showMessage(text) {
+    setText(this._message, text);
     this._line.toggleAttribute("hidden", true);
     this._showForm();
   }
 
   _showForm() {
-    const empty = this._body.hidden && this._word.textContent === "";
+    const empty = this._body.hidden && this._message.textContent === "";
     this.form.toggleAttribute("hidden", empty);
     if (empty) return;
     // Below the buttons, which may take several rows.
@@ -106,13 +106,13 @@ export class AlignPanel {
     );
     this._body.removeAttribute("hidden");
     this._go.setAttribute("aria-pressed", "true");
-    this.say("");
+    this.showMessage("");
   }
 
   close() {
     this._body.setAttribute("hidden", "");
     this._go.setAttribute("aria-pressed", "false");
-    this.say("");
+    this.showMessage("");
   }
 
   /** @param {boolean} whole */
@@ -127,7 +127,7 @@ export class AlignPanel {
 
   /** @param {{line: string, lost: string}} saved */
   tellSaved({ line, lost }) {
-    say(this._word, lost || "Saved. The line for a fleet file:");
+    setText(this._message, lost || "Saved. The line for a fleet file:");
     this._line.textContent = line;
     this._line.toggleAttribute("hidden", false);
     this._showForm();
@@ -169,6 +169,6 @@ export class AlignPanel {
 
   _typed() {
     const [x, y, angle] = FIELDS.map(([name]) => this._inputs.get(name)?.valueAsNumber ?? NaN);
-    if ([x, y, angle].every(Number.isFinite)) this._wishes.type({ x, y, angle });
+    if ([x, y, angle].every(Number.isFinite)) this._actions.type({ x, y, angle });
   }
 }

@@ -1,4 +1,4 @@
-import { deskOf } from "../../web/inputs/desk.js";
+import { devicesOf } from "../../web/inputs/devices.js";
 import { unapply } from "../../web/view.js";
 import { AlignDrawing, moved, rounded, turned } from "./align_drawing.js";
 import { AlignPanel } from "./align_panel.js";
@@ -8,7 +8,7 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('./align_drawing.js').Alignment} Alignment */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 
 /**
  * What the display offers to align.
@@ -51,7 +51,7 @@ const ARROWS = {
  * @param {MapCanvas} map
  * @param {object} _options
  * @param {Send} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, _options, send) {
   const tool = new AlignTool(map, send);
@@ -96,7 +96,7 @@ class AlignTool {
       lay(map, this._drawing.element),
       lay(map, this._panel.element, "top-left"),
       lay(map, this._panel.form),
-      deskOf(map.drive).claimEscape(() => this._leave()),
+      devicesOf(map.drive).claimEscape(() => this._leave()),
       map.onSelect(() => {
         this._leave();
         this._panel.close();
@@ -114,7 +114,7 @@ class AlignTool {
   /** @param {any} message */
   receive(message) {
     if (message?.align) this._begin(message.align);
-    if (typeof message?.refused === "string") this._panel.say(message.refused);
+    if (typeof message?.refused === "string") this._panel.showMessage(message.refused);
     if (message?.saved) {
       this._leave();
       this._panel.tellSaved(message.saved);
@@ -147,7 +147,7 @@ class AlignTool {
       return;
     }
     const robot = this._map.selected;
-    if (robot === null) this._panel.say("Select a robot first.");
+    if (robot === null) this._panel.showMessage("Select a robot first.");
     else this._send({ begin: robot });
   }
 
@@ -198,7 +198,7 @@ class AlignTool {
   _save() {
     if (!this._subject) return;
     const { robot } = this._subject;
-    this._panel.say("Saving…");
+    this._panel.showMessage("Saving…");
     this._send({ save: { robot, whole: this._whole, ...this._now } });
   }
 

@@ -229,7 +229,7 @@ class CameraPanel {
     if (!this._open) return;
     const { age, shown } = this._picture;
     const mine = this._map.drive.robots.get(this._there.robot)?.mine === true;
-    this._view.tell(age, shown, age > OLD, mine);
+    this._view.showAge(age, shown, age > OLD, mine);
   }
 
   _place() {

@@ -1,4 +1,4 @@
-import { say } from "../../web/tools/dom.js";
+import { setText } from "../../web/tools/dom.js";
 
 /** @typedef {import('./camera_panel.js').Camera} Camera */
 /** @typedef {import('./camera_panel.js').Cameras} Cameras */
@@ -43,10 +43,10 @@ export class CameraView {
     places.append(signButton("close", () => acts.close()));
     this.head = make("div", "camera-head");
     this.head.append(this._name, this._choice, this._age, places);
-    this._word = make("p", "camera-word");
-    this._word.setAttribute("role", "status");
+    this._message = make("p", "camera-word");
+    this._message.setAttribute("role", "status");
     this._frame = make("div", "camera-frame");
-    this._frame.append(this._word);
+    this._frame.append(this._message);
     this.element = make("section", "camera-panel");
     this.element.setAttribute("aria-label", "Camera");
     this.element.hidden = true;
@@ -82,7 +82,7 @@ export class CameraView {
     if (!open || camera === null) return;
     this.element.dataset.dock = dock;
     this.element.dataset.robot = there.robot;
-    say(this._name, `${there.name}: ${camera.name}`);
+    setText(this._name, `${there.name}: ${camera.name}`);
     for (const [which, button] of this._docks) {
       button.setAttribute("aria-pressed", String(which === dock));
     }
@@ -120,9 +120,9 @@ export class CameraView {
    * @param {boolean} old
    * @param {boolean} mine Whether this page has control of the robot.
    */
-  tell(age, shown, old, mine) {
+  showAge(age, shown, old, mine) {
     this.element.classList.toggle("stale", old);
-    say(this._age, shown ? ageText(age) : "");
+    setText(this._age, shown ? ageText(age) : "");
     // Whole seconds, so that a screen reader does not read ten values a second.
     const seconds = Math.floor(age / 1000);
     let words = "";
@@ -132,7 +132,7 @@ export class CameraView {
     if (old && mine) {
       words += " Commands are ignored: choose another camera or close this one.";
     }
-    say(this._word, words);
+    setText(this._message, words);
   }
 }
 
@@ -199,20 +199,20 @@ const KEY = "webmap.camera";
 /** @returns {Kept} The stored state, or the defaults. */
 export function readKept() {
   /** @type {any} */
-  let said = null;
+  let stored = null;
   try {
-    said = JSON.parse(localStorage.getItem(KEY) ?? "null");
+    stored = JSON.parse(localStorage.getItem(KEY) ?? "null");
   } catch {
     // Not written by WebMap, or no storage: use the defaults.
   }
   const part = (/** @type {unknown} */ value, /** @type {number} */ otherwise) =>
     typeof value === "number" && value >= 0 && value <= 1 ? value : otherwise;
   return {
-    open: said?.open === true,
-    dock: DOCKS.includes(said?.dock) ? said.dock : "side",
-    camera: typeof said?.camera === "string" ? said.camera : "",
-    x: part(said?.x, 0),
-    y: part(said?.y, 0),
+    open: stored?.open === true,
+    dock: DOCKS.includes(stored?.dock) ? stored.dock : "side",
+    camera: typeof stored?.camera === "string" ? stored.camera : "",
+    x: part(stored?.x, 0),
+    y: part(stored?.y, 0),
   };
 }
 

@@ -6,7 +6,7 @@
  */
 
 /** Milliseconds for which a button confirms that it has copied. */
-const SAYS = 2000;
+const SHOWN = 2000;
 
 /** @param {Element} text */
 function select(text) {
@@ -40,7 +40,7 @@ export default function attach() {
     const text = button?.closest(".doctor")?.querySelector("pre");
     if (!button || !text || !(await copy(text))) return;
     button.classList.add("copied");
-    setTimeout(() => button.classList.remove("copied"), SAYS);
+    setTimeout(() => button.classList.remove("copied"), SHOWN);
   };
   document.addEventListener("click", click, { signal: ending.signal });
   return {

@@ -1,13 +1,13 @@
-import { deskOf } from "../../web/inputs/desk.js";
+import { devicesOf } from "../../web/inputs/devices.js";
 import { stoppingDistance } from "../../web/motion/figures.js";
-import { heldByAnother, isLatched, mayReach, stopOf } from "../../web/motion/report.js";
+import { heldByAnother, isLatched, mayTake, stopOf } from "../../web/motion/report.js";
 import { describe, inputsOf } from "../../web/motion/status.js";
 import { svg } from "../../web/tools/elements.js";
 import { lay, overlayOf, ownPlace } from "../../web/tools/overlay.js";
 import { Panel, Requests, StickPad } from "./teleop_panel.js";
 
 /** @typedef {import('../../web/drive.js').Drive} Drive */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/motion/status.js').Description} Description */
 
@@ -27,7 +27,7 @@ import { Panel, Requests, StickPad } from "./teleop_panel.js";
  * @param {MapCanvas} map
  * @param {Options} options
  * @param {Send} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
   const teleop = new Teleop(map, options, send);
@@ -63,8 +63,8 @@ class Teleop {
       lay(map, this._stick.element, "bottom-right"),
     ];
     if (ownPlace(stopPlace)) takes.push(lay(map, this._panel.stop, undefined, stopPlace));
-    this._desk = deskOf(this._drive);
-    this._seat = {
+    this._devices = devicesOf(this._drive);
+    this._drivingMap = {
       map,
       get holonomic() {
         return holonomic ?? map.world.querySelector(SELECTED_HOLONOMIC) !== null;
@@ -81,14 +81,14 @@ class Teleop {
     const touched = { capture: true, signal: this._ending.signal };
     for (const part of [map.svg, overlayOf(map)]) {
       for (const kind of ["pointerdown", "focusin"]) {
-        part?.addEventListener(kind, () => this._desk.activate(this._seat), touched);
+        part?.addEventListener(kind, () => this._devices.activate(this._drivingMap), touched);
       }
     }
     this._touch = matchMedia("(pointer: coarse)");
     const show = () => this._show();
     this._offs = [
       ...takes,
-      this._desk.sit(this._seat),
+      this._devices.addMap(this._drivingMap),
       map.onSelect(() => this._select()),
       // STOP between the two presses of a button cancels the first press.
       this._drive.on("stop", () => this._panel.forget()),
@@ -114,7 +114,7 @@ class Teleop {
   }
 
   _select() {
-    if (this._desk.active === this._seat) this._desk.choose();
+    if (this._devices.active === this._drivingMap) this._devices.choose();
     this._show();
   }
 
@@ -149,9 +149,9 @@ class Teleop {
   }
 
   _show() {
-    const active = this._desk.active === this._seat;
+    const active = this._devices.active === this._drivingMap;
     const status = this._drive.status;
-    if (this._desk.spent) Object.assign(status, { pressed: true, dead: true });
+    if (this._devices.spent) Object.assign(status, { pressed: true, blocked: true });
     const report = this._report;
     const robot = this._map.selected;
     const requests = this._drive.requests;
@@ -159,22 +159,22 @@ class Teleop {
     const request = requests.find((one) => one.robot === robot);
     this._requests.show(requests);
     const useful = report !== null && ofUse(report);
-    this._stick.holonomic = this._seat.holonomic;
-    this._stick.show(useful, status.pressed && status.dead);
-    const hands = { touch: this._touch.matches, stick: this._stick.wanted };
-    const inputs = inputsOf({ ...hands, gamepad: this._desk.gamepad });
+    this._stick.holonomic = this._drivingMap.holonomic;
+    this._stick.show(useful, status.pressed && status.blocked);
+    const pointers = { touch: this._touch.matches, stick: this._stick.wanted };
+    const inputs = inputsOf({ ...pointers, gamepad: this._devices.gamepad });
     const drawn = this._map.world.querySelector(".robot.selected");
     const seen = drawn?.getAttribute("data-state") ?? "";
     const since = drawn?.getAttribute("data-since") ?? "";
     const more = { verdict, request, inputs, seen, since };
     const words = describe(status, robot, report, active, more);
-    this._panel.showState(withoutKeys(words, hands, inputs), report, status.delay);
+    this._panel.showState(withoutKeys(words, pointers, inputs), report, status.delay);
     const asking = request?.by === status.connection;
     this._panel.showButtons(report, asking, useful ? this._stick.wanted : null);
     const moving = robot === null ? null : this._drive.motionDelay(robot);
     // Reports from before the connection was lost do not describe the present.
-    const heard = status.link === "lost" ? null : report;
-    this._panel.showFigures(heard, status.delay, moving);
+    const current = status.link === "lost" ? null : report;
+    this._panel.showFigures(current, status.delay, moving);
   }
 }
 
@@ -184,7 +184,7 @@ class Teleop {
  *     operator.
  */
 function ofUse(report) {
-  return mayReach(report) || (report.mine && !isLatched(report));
+  return mayTake(report) || (report.mine && !isLatched(report));
 }
 
 /**

@@ -1,11 +1,11 @@
 import { Stick } from "../../web/inputs/stick.js";
-import { isTested, motions, ownStop, testWords, timings } from "../../web/motion/figures.js";
+import { isTested, motions, ownStop, stopTestText, timings } from "../../web/motion/figures.js";
 import { heldByProgram, isLatched, stopKey } from "../../web/motion/report.js";
 import { capOf } from "../../web/motion/status.js";
-import { button, html, say, stopButton, TwiceButton } from "../../web/tools/elements.js";
+import { button, html, setText, stopButton, TwiceButton } from "../../web/tools/elements.js";
 
 /** @typedef {import('../../web/drive.js').Drive} Drive */
-/** @typedef {import('../../web/motion/asking.js').Request} Request */
+/** @typedef {import('../../web/motion/requests.js').Request} Request */
 /** @typedef {import('../../web/motion/report.js').RobotReport} RobotReport */
 
 /** Round trip from which the panel shows a warning, in ms. */
@@ -56,8 +56,8 @@ export class Panel {
       " ",
       this._detail,
     );
-    const twice = [this._reset.element, this._tester.element];
-    const buttons = [this._lease, ...twice, this._stick];
+    const confirmed = [this._reset.element, this._tester.element];
+    const buttons = [this._lease, ...confirmed, this._stick];
     this.element = html(
       "section",
       "webmap-panel webmap-teleop",
@@ -77,11 +77,11 @@ export class Panel {
    */
   showState({ state, title, detail }, report, delay) {
     if (this.element.dataset.state !== state) this.element.dataset.state = state;
-    say(this._title, title);
-    say(this._detail, detail);
-    const told = report?.why.some((why) => why.startsWith("slow connection"));
+    setText(this._title, title);
+    setText(this._detail, detail);
+    const stated = report?.why.some((why) => why.startsWith("slow connection"));
     const age = report?.age ?? delay;
-    say(this._cap, report ? capOf(report) + (told ? "" : slowness(age)) : "");
+    setText(this._cap, report ? capOf(report) + (stated ? "" : slowness(age)) : "");
   }
 
   /**
@@ -90,8 +90,8 @@ export class Panel {
    * @param {number | null} moving
    */
   showFigures(report, loop, moving) {
-    say(this._own, report ? ownStop(report) : "");
-    say(this._test, report ? testWords(report) : "");
+    setText(this._own, report ? ownStop(report) : "");
+    setText(this._test, report ? stopTestText(report) : "");
     this._figures.hidden = report === null || isLatched(report);
     this._figures.classList.toggle("idle", !report?.mine);
     if (report === null) return;
@@ -100,8 +100,8 @@ export class Panel {
       const figure = this._figure(name, kind);
       set(figure, "title", title);
       const [value, rest] = figure.querySelectorAll("dd > span");
-      say(value, text);
-      say(rest, more);
+      setText(value, text);
+      setText(rest, more);
     }
   }
 
@@ -137,7 +137,7 @@ export class Panel {
     const act = actOf(report, asking);
     this._lease.hidden = act === null;
     if (act !== null) {
-      say(this._lease, act);
+      setText(this._lease, act);
       // Begins with the button's text, for people who use speech control.
       set(this._lease, "aria-label", `${act} of ${name}`);
     }
@@ -273,7 +273,7 @@ export class Requests {
     }
     for (const request of asked) {
       const { left } = this._items.get(keyOf(request)) ?? this._add(request);
-      say(left, `(${request.left} s)`);
+      setText(left, `(${request.left} s)`);
     }
     this.element.hidden = asked.length === 0;
   }

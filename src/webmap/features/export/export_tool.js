@@ -3,7 +3,7 @@ import { Copier, embed, keepLength, standingAlone } from "./export_copy.js";
 import { overlayOf } from "../../web/tools/overlay.js";
 import { joinSaveMenu, offer } from "../../web/tools/save_menu.js";
 
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/tools/save_menu.js').Where} Where */
 
@@ -16,7 +16,7 @@ import { joinSaveMenu, offer } from "../../web/tools/save_menu.js";
  * @param {MapCanvas} map
  * @param {Where} options
  * @param {(message: Record<string, unknown>) => void} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
   const tool = new ExportTool(map, options, send);
@@ -50,7 +50,7 @@ class ExportTool {
   async _save(kind) {
     this._menu.close();
     const now = new Date();
-    this._menu.say("Saving");
+    this._menu.showMessage("Saving");
     try {
       const view = await viewAsSvg(this._map);
       const scale = Math.min(Math.max(devicePixelRatio, 1), 3);
@@ -59,10 +59,10 @@ class ExportTool {
           ? new Blob([view.text], { type: "image/svg+xml" })
           : await asPng(view, scale);
       offer(file, fileName(now, kind));
-      this._menu.say("");
+      this._menu.showMessage("");
       if (view.missing.length > 0) this._send({ missing: view.missing.length });
     } catch (error) {
-      this._menu.say("");
+      this._menu.showMessage("");
       this._send({ failed: error instanceof Error ? error.message : String(error) });
     }
   }

@@ -30,7 +30,7 @@ class ExportTool:
             self,
             "features/export/export_tool.js",
             {"place": place, "classes": classes},
-            "features/export/export_tool.css",
+            "web/tools/save_menu.css",
         )
 
     def on_message(self, message: dict[str, Any]) -> None:

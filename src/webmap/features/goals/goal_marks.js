@@ -1,11 +1,11 @@
 import { onScreen } from "../../web/tools/aim.js";
-import { button, html, say, svg } from "../../web/tools/elements.js";
-import { look } from "../../web/tools/goal_words.js";
+import { button, html, setText, svg } from "../../web/tools/elements.js";
+import { look } from "../../web/tools/goal_texts.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
-/** @typedef {import('../../web/motion/report.js').GoalWord} GoalWord */
+/** @typedef {import('../../web/motion/report.js').GoalReport} GoalReport */
 
 /** Points along x, 44 pixels long, with a ring around the goal's position. */
 const ARROW = "M7 0H34M0 7a7 7 0 1 1 .01 0M44 0 30-8v16z";
@@ -27,7 +27,7 @@ const SIGNS = {
  * @property {SVGPathElement} arrow
  * @property {SVGPathElement} sign
  * @property {HTMLElement} label
- * @property {HTMLElement} words
+ * @property {HTMLElement} text
  * @property {HTMLButtonElement} end
  * @property {Pose} pose
  */
@@ -60,7 +60,7 @@ export class GoalMarks {
   }
 
   /**
-   * @param {Map<string, {pose: Pose, state?: string, goal?: GoalWord, name?: string,
+   * @param {Map<string, {pose: Pose, state?: string, goal?: GoalReport, name?: string,
    *     mine?: boolean, cancels?: boolean}>} goals By robot. `state`: aimed, asked or
    *     sent, for goals that the gate does not report yet. `mine`: the robot is
    *     selected.
@@ -72,15 +72,15 @@ export class GoalMarks {
       mark.label.remove();
       this._marks.delete(robot);
     }
-    for (const [robot, told] of goals) this._update(robot, told);
+    for (const [robot, shown] of goals) this._update(robot, shown);
     this._elsewhere.hideFor(new Set(goals.keys()));
     this._place();
   }
 
   /**
    * @param {string} robot
-   * @param {{pose: Pose, state?: string, goal?: GoalWord, name?: string, mine?: boolean,
-   *     cancels?: boolean}} told
+   * @param {{pose: Pose, state?: string, goal?: GoalReport, name?: string, mine?: boolean,
+   *     cancels?: boolean}} shown
    */
   _update(robot, { pose, state = "", goal, name = "", mine = false, cancels = false }) {
     const mark = this._marks.get(robot) ?? this._make(robot);
@@ -93,7 +93,7 @@ export class GoalMarks {
     mark.label.hidden = seen === null;
     if (seen === null) return;
     mark.label.className = `webmap-goal-label ${kind}${mine ? " mine" : ""}`;
-    say(mark.words, mine ? seen.text : `${name}: ${seen.text.split(",")[0]}`);
+    setText(mark.text, mine ? seen.text : `${name}: ${seen.text.split(",")[0]}`);
     mark.end.hidden = !mine || (!seen.over && !cancels) || goal?.state === "cancelling";
     const does = seen.over ? "Hide this goal" : "Cancel goal";
     mark.end.setAttribute("aria-label", does);
@@ -105,12 +105,12 @@ export class GoalMarks {
     const arrow = svg("path", { d: ARROW });
     const sign = svg("path", { class: "webmap-goal-sign" });
     const group = svg("g", { "data-goal-of": robot }, arrow, sign);
-    const words = html("span", "webmap-goal-words");
+    const text = html("span", "webmap-goal-words");
     const end = button("webmap-goal-end", "×", () => this._onEnd(robot));
-    const label = html("div", "webmap-goal-label", { "data-goal-of": robot }, words, end);
+    const label = html("div", "webmap-goal-label", { "data-goal-of": robot }, text, end);
     this._drawing.append(group);
     this._labels.append(label);
-    const mark = { group, arrow, sign, label, words, end, pose: { x: 0, y: 0, yaw: 0 } };
+    const mark = { group, arrow, sign, label, text, end, pose: { x: 0, y: 0, yaw: 0 } };
     this._marks.set(robot, mark);
     return mark;
   }

@@ -1,11 +1,11 @@
 import { SPACING } from "../../web/constants.js";
 import { chosen, poseOf, PressAim } from "../../web/tools/aim.js";
-import { button, html, say } from "../../web/tools/elements.js";
+import { button, html, setText } from "../../web/tools/elements.js";
 import { GoalMarks } from "./goal_marks.js";
-import { look, sendGoal, ShownGoals } from "../../web/tools/goal_words.js";
+import { look, sendGoal, ShownGoals } from "../../web/tools/goal_texts.js";
 import { lay } from "../../web/tools/overlay.js";
 
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
 /** @typedef {import('../../web/view.js').Point} Point */
@@ -27,7 +27,7 @@ import { lay } from "../../web/tools/overlay.js";
  * @param {MapCanvas} map
  * @param {Options} options
  * @param {Send} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
   const tool = new GoalTool(map, options, send);
@@ -64,7 +64,7 @@ class GoalTool {
     this._go = button("webmap-aim-go webmap-goal-go", "Send goal", () => this._toggle());
     this._go.title = `Key ${key}`;
     this._cancel = button("webmap-goal-cancel", "Cancel goal", () => this._callOff());
-    this._word = html("span", "webmap-aim-word webmap-goal-word", { role: "status" });
+    this._message = html("span", "webmap-aim-word webmap-goal-word", { role: "status" });
     this._spacing = html("input", "webmap-goal-spacing-value", {
       type: "number",
       min: `${SPACING[0]}`,
@@ -86,7 +86,7 @@ class GoalTool {
       this._go,
       this._apart,
       this._cancel,
-      this._word,
+      this._message,
     );
     this._marks = new GoalMarks(map, (robot) => this._end(robot));
     this._marking = new Marking(map, (robot) => send({ mark: robot }));
@@ -129,9 +129,9 @@ class GoalTool {
   /** @param {boolean} active */
   _changed(active) {
     if (this._wanted && !active && this._map.selected === null) {
-      say(this._word, "Select a robot first.");
+      setText(this._message, "Select a robot first.");
     } else {
-      say(this._word, active ? "Press on the map and drag for the heading." : "");
+      setText(this._message, active ? "Press on the map and drag for the heading." : "");
     }
     this._wanted = false;
     this._show();
@@ -199,7 +199,7 @@ class GoalTool {
       }
       this._show();
     }
-    if (problems.length > 0) say(this._word, `Goal not sent: ${problems.join("; ")}`);
+    if (problems.length > 0) setText(this._message, `Goal not sent: ${problems.join("; ")}`);
   }
 
   _callOff() {
@@ -223,7 +223,7 @@ class GoalTool {
 
   /**
    * @param {string} robot
-   * @param {import('../../web/motion/report.js').GoalWord | null | undefined} goal
+   * @param {import('../../web/motion/report.js').GoalReport | null | undefined} goal
    */
   _hear(robot, goal) {
     this._shown.report(robot, goal, performance.now());
@@ -237,7 +237,7 @@ class GoalTool {
    * @param {string} why
    */
   _refused(robot, what, why) {
-    if (what === "cancel" && robot !== null) say(this._word, `Goal not cancelled: ${why}`);
+    if (what === "cancel" && robot !== null) setText(this._message, `Goal not cancelled: ${why}`);
   }
 
   /** @param {string} robot */
@@ -258,7 +258,7 @@ class GoalTool {
   _selected() {
     // The aimed goal was for the robots that were selected before.
     this._aim.leave();
-    say(this._word, "");
+    setText(this._message, "");
     this._show();
   }
 
@@ -281,7 +281,7 @@ class GoalTool {
     const way = robots.some((robot) => this._drive.robots.get(robot)?.way !== null);
     this._go.disabled = robots.length === 0 || !way;
     const words = robots.length > 1 ? `Send goal to ${robots.length} robots` : "Send goal";
-    say(this._go, words);
+    setText(this._go, words);
     this._go.setAttribute("aria-pressed", String(this._aim.active));
     this._apart.hidden = robots.length < 2;
     this._cancel.hidden = !robots.some((robot) => this._mayCancel(robot));

@@ -1,9 +1,9 @@
 import { scaleOf } from "../../web/view.js";
 import { onScreen, PressAim } from "../../web/tools/aim.js";
-import { button, html, say, svg } from "../../web/tools/elements.js";
+import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
 /** @typedef {import('../../web/view.js').Matrix} Matrix */
@@ -30,7 +30,7 @@ const OUTLINE = "M-14-11H8l9 11-9 11h-22zM17 0h26M43 0l-9-6M43 0l-9 6";
  * @param {MapCanvas} map
  * @param {{button?: boolean, key?: string}} options
  * @param {Send} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
   const tool = new InitialPoseTool(map, options, send);
@@ -61,20 +61,20 @@ class InitialPoseTool {
     });
     this._go = button("webmap-aim-go webmap-locate-go", "Set pose", () => this._aim.toggle());
     this._go.title = `Key ${key}`;
-    this._word = html("span", "webmap-aim-word webmap-locate-word", { role: "status" });
+    this._message = html("span", "webmap-aim-word webmap-locate-word", { role: "status" });
     this._panel = html(
       "section",
       "webmap-panel webmap-aim webmap-locate",
       { "aria-label": "Initial pose" },
       this._go,
-      this._word,
+      this._message,
     );
-    this._covariance = new Covariance();
+    this._uncertainty = new PoseUncertainty();
     this._outline = svg("path", { d: OUTLINE, class: "webmap-locate-arrow" });
     this._drawing = svg(
       "svg",
       { class: "webmap-aim-drawing", "aria-hidden": "true" },
-      this._covariance.element,
+      this._uncertainty.element,
       this._outline,
     );
     this._offs = [
@@ -97,14 +97,14 @@ class InitialPoseTool {
   receive(message) {
     if (message && "covariance" in message) {
       const { covariance } = message;
-      this._covariance.set(covariance?.robot === this._map.selected ? covariance : null);
+      this._uncertainty.setVariances(covariance?.robot === this._map.selected ? covariance : null);
       this._explain();
       this._draw();
     }
     if (typeof message?.active !== "boolean") return;
     this._aim.activate(message.active);
     if (message.active && !this._aim.active) {
-      say(this._word, "This robot has no topic for an initial pose.");
+      setText(this._message, "This robot has no topic for an initial pose.");
     }
   }
 
@@ -116,16 +116,16 @@ class InitialPoseTool {
   /** @param {boolean} active */
   _changed(active) {
     if (active) this._send({ covariance: this._map.selected });
-    if (!active) say(this._word, "");
+    if (!active) setText(this._message, "");
     this._explain();
     this._show();
   }
 
   _explain() {
     if (!this._aim.active) return;
-    const sure = this._covariance.words;
-    const words = "Press where the robot is and drag for the heading";
-    say(this._word, sure === "" ? `${words}.` : `${words} (${sure}).`);
+    const sure = this._uncertainty.text;
+    const text = "Press where the robot is and drag for the heading";
+    setText(this._message, sure === "" ? `${text}.` : `${text} (${sure}).`);
   }
 
   /** @param {Pose | null} pose */
@@ -138,30 +138,30 @@ class InitialPoseTool {
   _done(pose) {
     const { selected: robot } = this._map;
     this._aim.activate(false);
-    if (robot !== null) void this._tell(robot, pose);
+    if (robot !== null) void this._setPose(robot, pose);
   }
 
   /**
    * @param {string} robot
    * @param {Pose} pose
    */
-  async _tell(robot, pose) {
+  async _setPose(robot, pose) {
     try {
       await this._drive.locate(robot, pose);
-      say(this._word, SENT);
-      setTimeout(() => this._word.textContent === SENT && say(this._word, ""), 4000);
+      setText(this._message, SENT);
+      setTimeout(() => this._message.textContent === SENT && setText(this._message, ""), 4000);
       this._send({ told: { robot, ...pose } });
     } catch (error) {
       const why = error instanceof Error ? error.message : String(error);
-      say(this._word, `Pose not sent: ${why}`);
+      setText(this._message, `Pose not sent: ${why}`);
     }
     this._preview(null);
   }
 
   _selected() {
-    this._covariance.set(null);
+    this._uncertainty.setVariances(null);
     this._aim.leave();
-    say(this._word, "");
+    setText(this._message, "");
     this._show();
   }
 
@@ -172,7 +172,7 @@ class InitialPoseTool {
   }
 
   _draw() {
-    this._covariance.draw(this._map.view, this._pose);
+    this._uncertainty.draw(this._map.view, this._pose);
     this._outline.toggleAttribute("hidden", this._pose === null);
     if (this._pose === null) return;
     const { x, y, degrees } = onScreen(this._map.view, this._pose);
@@ -196,7 +196,7 @@ const DEVIATIONS = 2;
 const WEDGE = 64;
 
 /** The ellipse and the wedge of an aimed pose. */
-export class Covariance {
+export class PoseUncertainty {
   constructor() {
     this._ellipse = svg("ellipse", { class: "webmap-locate-ellipse" });
     this._wedge = svg("path", { class: "webmap-locate-wedge" });
@@ -207,12 +207,12 @@ export class Covariance {
   }
 
   /** @param {Variances | null} variances */
-  set(variances) {
+  setVariances(variances) {
     this._variances = variances;
   }
 
   /** The drawn standard deviations as text; empty while unknown. */
-  get words() {
+  get text() {
     if (!this._variances) return "";
     const { x, y, yaw } = this._variances;
     const [along, across] = [x, y].map((variance) => metres(deviation(variance)));
@@ -259,7 +259,7 @@ function transform({ x, y, degrees }) {
 
 /**
  * @param {number} radius In pixels.
- * @param {number} half Half the angle, in radians.
+ * @param {number} half BrowserPart the angle, in radians.
  * @returns {string} The path of a sector about x.
  */
 function sector(radius, half) {

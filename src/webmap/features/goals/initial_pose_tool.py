@@ -41,7 +41,7 @@ class InitialPoseTool:
             self,
             "features/goals/initial_pose_tool.js",
             {"button": button, "key": key},
-            "features/goals/initial_pose_tool.css",
+            "features/goals/goal_tool.css",
         )
 
     def aim(self) -> None:

@@ -1,11 +1,11 @@
-import { deskOf } from "../../web/inputs/desk.js";
+import { devicesOf } from "../../web/inputs/devices.js";
 import { attentive } from "../../web/motion/attention.js";
 import { scaleOf, unapply } from "../../web/view.js";
-import { button, html, say } from "../../web/tools/elements.js";
+import { button, html, setText } from "../../web/tools/elements.js";
 import { LabelMove } from "./labels_move.js";
 import { lay } from "../../web/tools/overlay.js";
 
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 
 /** @typedef {{editable?: boolean, key?: string, icons?: string[], longest?: number}} Options */
@@ -21,7 +21,7 @@ import { lay } from "../../web/tools/overlay.js";
  * @param {MapCanvas} map
  * @param {Options} options
  * @param {Send} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
   const labels = new Labels(map, options, send);
@@ -52,14 +52,14 @@ class Labels {
     this._go = button("webmap-labels-go", "Label", () => this._activate(!this._active));
     this._go.title = `Key ${key}`;
     this._go.hidden = !editable;
-    this._word = html("span", "webmap-labels-word", { role: "status" });
+    this._message = html("span", "webmap-labels-word", { role: "status" });
     this._sheet = html("div", "webmap-labels-sheet");
     this._panel = html(
       "section",
       "webmap-panel webmap-labels",
       { "aria-label": "Labels" },
       this._go,
-      this._word,
+      this._message,
       this._sheet,
     );
     this._ending = new AbortController();
@@ -67,7 +67,7 @@ class Labels {
     this._offs = [
       keepLabels(map),
       lay(map, this._panel, "top-left"),
-      deskOf(map.drive).claimEscape(() => this._leave()),
+      devicesOf(map.drive).claimEscape(() => this._leave()),
       map.onSelect(() => this._refresh()),
     ];
     this._activate(false);
@@ -86,7 +86,7 @@ class Labels {
       this._move?.accepted();
       this._close("");
     }
-    if (typeof refused === "string") say(this._word, refused);
+    if (typeof refused === "string") setText(this._message, refused);
     this._fit();
   }
 
@@ -105,7 +105,7 @@ class Labels {
   _keyDown(event) {
     if (event.key !== this._key || event.repeat || event.isComposing) return;
     if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
-    const { active } = deskOf(this._map.drive);
+    const { active } = devicesOf(this._map.drive);
     if (!this._editable || (active !== null && active.map !== this._map)) return;
     this._activate(!this._active);
   }
@@ -142,7 +142,7 @@ class Labels {
     this._active = active && this._editable;
     this._go.setAttribute("aria-pressed", String(this._active));
     this._map.svg.classList.toggle("webmap-labelling", this._active);
-    say(this._word, this._active ? "Press on the map where the label goes." : "");
+    setText(this._message, this._active ? "Press on the map where the label goes." : "");
     this._fit();
   }
 
@@ -161,14 +161,14 @@ class Labels {
     this._chosen = null;
     this._sheet.replaceChildren();
     this._sheet.hidden = true;
-    say(this._word, words);
+    setText(this._message, words);
     this._fit();
   }
 
   /** Take no room on the map while the panel is empty. */
   _fit() {
     this._panel.hidden =
-      Boolean(this._go.hidden) && Boolean(this._sheet.hidden) && !this._word.textContent;
+      Boolean(this._go.hidden) && Boolean(this._sheet.hidden) && !this._message.textContent;
   }
 
   /** @param {SVGGraphicsElement} label */
@@ -207,7 +207,7 @@ class Labels {
   _openMove(label) {
     const place = placeOf(label);
     if (!place) return;
-    say(this._word, "Drag the label on the map or enter its position.");
+    setText(this._message, "Drag the label on the map or enter its position.");
     this._move = new LabelMove(this._map, label, place, (to) => {
       if (to) this._send({ move: label.dataset.label ?? "", to });
       else this._close("");
@@ -231,7 +231,7 @@ class Labels {
     const save = () => {
       const add = { name: name.value, icon: icon.value, x: place.x, y: place.y };
       if (name.value.trim()) this._send({ add });
-      else say(this._word, "Enter a name for the label.");
+      else setText(this._message, "Enter a name for the label.");
     };
     name.addEventListener("keydown", (event) => {
       if (event.key === "Enter" && !event.isComposing) save();
@@ -261,7 +261,7 @@ class Labels {
       this._send({ goal: { robot, ...place, yaw } });
       this._close(`Goal sent to ${label.dataset.name ?? "the label"}.`);
     } catch (error) {
-      say(this._word, `Goal not sent: ${error instanceof Error ? error.message : error}`);
+      setText(this._message, `Goal not sent: ${error instanceof Error ? error.message : error}`);
       this._fit();
     }
   }
@@ -299,7 +299,7 @@ function placeOf(element) {
 
 /** @typedef {{x: number, y: number, across: number}} Name */
 
-/** Half the height of a name with its spot, in pixels. */
+/** BrowserPart the height of a name with its spot, in pixels. */
 const HEIGHT = 46;
 
 /**

@@ -9,11 +9,11 @@ import {
   viewOf,
   writeLayout,
 } from "../../web/layout.js";
-import { button, html, say } from "../../web/tools/elements.js";
+import { button, html, setText } from "../../web/tools/elements.js";
 import { joinSaveMenu, offer } from "../../web/tools/save_menu.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/layout.js').Place} Place */
 /** @typedef {import('../../web/tools/save_menu.js').Where} Where */
 /** @typedef {Where & {of?: string, restore?: boolean}} Options */
@@ -43,7 +43,7 @@ const KEEP_WITHIN = 500;
  * @param {MapCanvas} map
  * @param {Options} options
  * @param {Send} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
   const views = new LastView(map, options, send);
@@ -145,7 +145,7 @@ class LayoutTool {
     this._file = html("input", "", { type: "file", accept: ".json,application/json" });
     this._file.hidden = true;
     this._file.addEventListener("change", () => void this._load());
-    this._word = html("p", "webmap-layout-word", { role: "status" });
+    this._message = html("p", "webmap-layout-word", { role: "status" });
     const content = html(
       "div",
       "webmap-layout",
@@ -154,7 +154,7 @@ class LayoutTool {
       button("webmap-layout-load", "Load", () => this._file.click()),
       button("webmap-layout-reset", "Reset layout", () => this._reset()),
       this._file,
-      this._word,
+      this._message,
     );
     const title = "Save or load the layout";
     const group = { order: 2, title, heading: "Layout", content };
@@ -201,8 +201,8 @@ class LayoutTool {
    * @param {boolean} [bad]
    */
   _say(text, bad = false) {
-    this._word.classList.toggle("bad", bad);
-    say(this._word, text);
-    this._word.scrollIntoView({ block: "nearest" });
+    this._message.classList.toggle("bad", bad);
+    setText(this._message, text);
+    this._message.scrollIntoView({ block: "nearest" });
   }
 }

@@ -1,8 +1,8 @@
-import { html, say, svg } from "../../web/tools/elements.js";
+import { html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {(message: Record<string, unknown>) => void} Send */
 
 /**
@@ -14,7 +14,7 @@ import { lay } from "../../web/tools/overlay.js";
  */
 
 /**
- * @typedef {[number, string, string, string, number, number]} Said Number, level, node,
+ * @typedef {[number, string, string, string, number, number]} LogLine Number, level, node,
  *     text, repetitions, and time in seconds of the display's clock.
  */
 
@@ -41,7 +41,7 @@ const LOOKS = /** @type {Record<string, [string, string, string]>} */ ({
  * @param {MapCanvas} map
  * @param {Options} options
  * @param {Send} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
   const panel = new RosoutPanel(map, options, send);
@@ -115,10 +115,10 @@ class RosoutPanel {
   }
 
   /** @param {any} message */
-  receive({ bridge, said, total, state }) {
+  receive({ bridge, said: lines, total, state }) {
     const book = this._books[bridge];
     if (!book) return;
-    book.take(said, total, state, this._most);
+    book.add(lines, total, state, this._most);
     this._filter();
     this._age();
   }
@@ -148,14 +148,14 @@ class RosoutPanel {
         if (!row.hidden) shown += 1;
         if (level === "error" || level === "fatal") bad += 1;
       }
-      book.say();
+      book.showState();
     }
-    say(this._badge, bad > 0 ? `${bad}` : "");
+    setText(this._badge, bad > 0 ? `${bad}` : "");
     this._badge.title = bad > 0 ? `${bad} errors in the newest lines` : "";
     const total = this._books.reduce((sum, book) => sum + book.total, 0);
     const lines = (/** @type {number} */ n) =>
       `${n.toLocaleString("en")} ${n === 1 ? "line" : "lines"}`;
-    say(
+    setText(
       this._count,
       total === 0 ? "No log lines yet." : `${lines(shown)} shown of ${lines(total)} received.`,
     );
@@ -165,7 +165,7 @@ class RosoutPanel {
     const now = this._map.clock;
     if (!this._details.open || now === null) return;
     for (const { rows } of this._books) {
-      for (const { age, heard } of rows.values()) say(age, ago(now - heard));
+      for (const { age, receivedAt } of rows.values()) setText(age, ago(now - receivedAt));
     }
   }
 
@@ -190,7 +190,7 @@ class Book {
     this._state = "";
     /**
      * @type {Map<number, {row: HTMLElement, level: string, times: HTMLElement,
-     *     age: HTMLElement, heard: number}>}
+     *     age: HTMLElement, receivedAt: number}>}
      */
     this.rows = new Map();
     this._list = html("ol", "webmap-rosout-lines", { "aria-label": `Log of ${name}` });
@@ -201,18 +201,18 @@ class Book {
   }
 
   /**
-   * @param {Said[]} said
+   * @param {LogLine[]} lines
    * @param {number} total
    * @param {string} state Of the bridge.
    * @param {number} most
    */
-  take(said, total, state, most) {
+  add(lines, total, state, most) {
     this.total = total;
     this._state = state;
-    for (const [number, level, name, text, count, heard] of said) {
+    for (const [number, level, name, text, count, receivedAt] of lines) {
       const known = this.rows.get(number) ?? this._add(number, level, name, text);
-      known.heard = heard;
-      say(known.times, count > 1 ? `× ${count.toLocaleString("en")}` : "");
+      known.receivedAt = receivedAt;
+      setText(known.times, count > 1 ? `× ${count.toLocaleString("en")}` : "");
     }
     for (const [number, { row }] of this.rows) {
       if (this.rows.size <= most) break;
@@ -221,9 +221,9 @@ class Book {
     }
   }
 
-  say() {
+  showState() {
     const away = this._state !== "" && this._state !== "open";
-    say(this._note, away ? "No connection to this bridge: no new log lines." : "");
+    setText(this._note, away ? "No connection to this bridge: no new log lines." : "");
   }
 
   /**
@@ -254,7 +254,7 @@ class Book {
       html("span", "webmap-rosout-text", {}, text),
     );
     this._list.prepend(row);
-    const known = { row, level, times, age, heard: 0 };
+    const known = { row, level, times, age, receivedAt: 0 };
     this.rows.set(number, known);
     return known;
   }

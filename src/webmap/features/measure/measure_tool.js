@@ -1,12 +1,12 @@
-import { deskOf } from "../../web/inputs/desk.js";
+import { devicesOf } from "../../web/inputs/devices.js";
 import { attentive } from "../../web/motion/attention.js";
 import { apply, unapply } from "../../web/view.js";
-import { button, html, say, svg } from "../../web/tools/elements.js";
+import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/view.js').Point} Point */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 
 /**
  * Measure on the map: press at the beginning, drag, release. The measurement stays
@@ -18,7 +18,7 @@ import { lay } from "../../web/tools/overlay.js";
  *
  * @param {MapCanvas} map
  * @param {{key?: string}} options
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options) {
   const tool = new MeasureTool(map, options);
@@ -51,13 +51,13 @@ class MeasureTool {
     this._line = null;
     this._button = button("webmap-measure-go", "Measure", () => this._toggle());
     this._button.title = `Key ${key}`;
-    this._word = html("span", "webmap-measure-word", { role: "status" });
+    this._message = html("span", "webmap-measure-word", { role: "status" });
     const panel = html(
       "section",
       "webmap-panel webmap-measure",
       { "aria-label": "Measure" },
       this._button,
-      this._word,
+      this._message,
     );
     this._path = svg("path", { class: "webmap-measure-line" });
     this._drawing = svg(
@@ -70,7 +70,7 @@ class MeasureTool {
     this._offs = [
       lay(map, this._drawing),
       lay(map, panel, "top-left"),
-      deskOf(map.drive).claimEscape(() => this._leave()),
+      devicesOf(map.drive).claimEscape(() => this._leave()),
       map.onView(() => this._draw()),
     ];
     this._activate(false);
@@ -99,7 +99,7 @@ class MeasureTool {
   _keyDown(event) {
     if (event.key !== this._key || event.repeat || event.isComposing) return;
     if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
-    const { active } = deskOf(this._map.drive);
+    const { active } = devicesOf(this._map.drive);
     if (active !== null && active.map !== this._map) return;
     this._toggle();
   }
@@ -114,7 +114,7 @@ class MeasureTool {
     this._pointer = this._line = null;
     this._button.setAttribute("aria-pressed", String(active));
     this._map.svg.classList.toggle("webmap-measuring", active);
-    say(this._word, active ? "Press on the map and drag to measure." : "");
+    setText(this._message, active ? "Press on the map and drag to measure." : "");
     this._draw();
   }
 
@@ -168,6 +168,6 @@ class MeasureTool {
     const from = apply(this._map.view, line.from.x, line.from.y);
     const to = apply(this._map.view, line.to.x, line.to.y);
     this._path.setAttribute("d", `M${from.x} ${from.y}L${to.x} ${to.y}`);
-    say(this._word, measured(line.from, line.to));
+    setText(this._message, measured(line.from, line.to));
   }
 }

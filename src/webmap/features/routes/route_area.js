@@ -1,4 +1,4 @@
-import { deskOf } from "../../web/inputs/desk.js";
+import { devicesOf } from "../../web/inputs/devices.js";
 import { attentive } from "../../web/motion/attention.js";
 import { apply } from "../../web/view.js";
 import { button, html, svg } from "../../web/tools/elements.js";
@@ -29,7 +29,7 @@ import { planSweeps, SPACING } from "./sweeps.js";
 const NEAR = 20;
 
 /**
- * A press this close to the last corner is the second half of a double press, in
+ * A press this close to the last corner is the second press of a double press, in
  * pixels.
  */
 const TWICE = 4;
@@ -85,7 +85,7 @@ export class RouteArea {
     const { signal } = this._ending;
     window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
     // While corners are pressed the aim handles Escape.
-    this._offEscape = deskOf(map.drive).claimEscape(() => this._closed && this.leave());
+    this._offEscape = devicesOf(map.drive).claimEscape(() => this._closed && this.leave());
     this._draw();
   }
 
@@ -107,9 +107,9 @@ export class RouteArea {
   }
 
   /** @returns {string} The text for the operator; empty without an area. */
-  get words() {
+  get text() {
     if (this._aim.waits) return "Waiting: finish the other tool, then add more corners.";
-    if (this.draws) return this._refused || this._drawingWords();
+    if (this.draws) return this._refused || this._drawingText();
     if (!this._closed) return "";
     const { problem, points, sweeps } = this._plan;
     return problem || `${points.length} points, ${sweeps.length} sweeps.`;
@@ -138,7 +138,7 @@ export class RouteArea {
     this._panel.focus();
   }
 
-  _drawingWords() {
+  _drawingText() {
     const count = this._corners.length;
     if (count < 3) return "Press each corner of the area on the map.";
     return `${count} corners. Press the first again, or Done.`;

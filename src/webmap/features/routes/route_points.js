@@ -1,6 +1,6 @@
 import { LONGEST_NAME } from "../../web/constants.js";
 import { onScreen } from "../../web/tools/aim.js";
-import { button, html, say, svg } from "../../web/tools/elements.js";
+import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -121,7 +121,7 @@ export class SavedRoutes {
       "aria-label": "Name of the route",
     });
     this._save = button("webmap-route-save", "Save", () => this._keep());
-    this._word = html("p", "webmap-route-word", { role: "status" });
+    this._message = html("p", "webmap-route-word", { role: "status" });
     this._there = html(
       "div",
       "webmap-route-row",
@@ -137,7 +137,7 @@ export class SavedRoutes {
       {},
       this._there,
       ...(saves ? [keep] : []),
-      this._word,
+      this._message,
     );
     this._there.hidden = true;
   }
@@ -152,13 +152,13 @@ export class SavedRoutes {
       );
       if (routes.includes(saved ?? value)) this._chosen.value = saved ?? value;
       this._there.hidden = routes.length === 0;
-      say(this._word, saved ? `Saved as ${saved}.` : "");
+      setText(this._message, saved ? `Saved as ${saved}.` : "");
     }
     if (loaded) {
       this._name.value = loaded.name;
-      say(this._word, `Loaded ${loaded.name}.`);
+      setText(this._message, `Loaded ${loaded.name}.`);
     }
-    if (typeof problem === "string") say(this._word, problem);
+    if (typeof problem === "string") setText(this._message, problem);
   }
 
   /** @param {'load' | 'delete'} op */
@@ -168,8 +168,8 @@ export class SavedRoutes {
 
   _keep() {
     const { points, loop } = this._route();
-    if (points.length === 0) say(this._word, "There are no points to save.");
-    else if (this._name.value.trim() === "") say(this._word, "Give the route a name.");
+    if (points.length === 0) setText(this._message, "There are no points to save.");
+    else if (this._name.value.trim() === "") setText(this._message, "Give the route a name.");
     else this._send({ op: "save", name: this._name.value.trim(), route: { points, loop } });
   }
 }

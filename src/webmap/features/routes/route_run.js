@@ -1,4 +1,4 @@
-import { look, sendGoal } from "../../web/tools/goal_words.js";
+import { look, sendGoal } from "../../web/tools/goal_texts.js";
 
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
 /** @typedef {import('../../web/motion/report.js').RobotReport} RobotReport */
@@ -360,9 +360,9 @@ export class RouteRobots {
     const at = this._poseOf(robot);
     const point = run.points[run.index];
     const away = at && Math.hypot(at.x - point.x, at.y - point.y);
-    const told = { ...report, mine: this._drive.holds(robot) };
+    const shown = { ...report, mine: this._drive.holds(robot) };
     const now = performance.now();
-    this._perform(robot, going, going.order ? run.waits(told) : run.report(told, away, now));
+    this._perform(robot, going, going.order ? run.waits(shown) : run.report(shown, away, now));
   }
 
   /** @param {string} robot */

@@ -1,6 +1,6 @@
 import { MOST_POINTS } from "../../web/constants.js";
 import { poseOf, PressAim } from "../../web/tools/aim.js";
-import { button, html, say } from "../../web/tools/elements.js";
+import { button, html, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { RouteArea } from "./route_area.js";
 import { RoutePoints, SavedRoutes } from "./route_points.js";
@@ -9,7 +9,7 @@ import { keepRoute, keptRoute, LEAST_LOOP, RouteRobots } from "./route_run.js";
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {(message: object) => void} Send */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 
 const TOO_SHORT = `A loop needs at least ${LEAST_LOOP} points.`;
 
@@ -26,7 +26,7 @@ const TOO_SHORT = `A loop needs at least ${LEAST_LOOP} points.`;
  * @param {MapCanvas} map
  * @param {{saves?: boolean}} options
  * @param {Send} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
   const tool = new RouteTool(map, options, send);
@@ -95,7 +95,7 @@ class RouteTool {
     this._pause = button("webmap-route-pause", "Pause", () => this._pauseOrGoOn());
     this._skip = button("webmap-route-skip", "Skip point", () => this._do("skip"));
     this._end = button("webmap-route-end", "End route", () => this._do("end"));
-    this._word = html("p", "webmap-route-word", { role: "status" });
+    this._message = html("p", "webmap-route-word", { role: "status" });
     this._saved = new SavedRoutes(saves, send, () => ({
       points: this._points,
       loop: this._loops,
@@ -114,7 +114,7 @@ class RouteTool {
       this._area.element,
       this._list,
       html("div", "webmap-route-row", {}, this._loop, this._run, this._pause, this._skip, this._end),
-      this._word,
+      this._message,
       this._saved.element,
     );
     this._details.open = before?.open ?? false;
@@ -227,7 +227,7 @@ class RouteTool {
     const report = this._drive.robots.get(this._map.selected ?? "");
     const open = this._details.open;
     this._edit.setAttribute("aria-pressed", String(this._aim.active));
-    say(this._edit, this._aim.active ? "Done" : "Add points");
+    setText(this._edit, this._aim.active ? "Done" : "Add points");
     // Leaves a part of the map free to press on, also on a phone.
     const adding = this._aim.active || this._aim.waits || this._area.draws;
     this._details.classList.toggle("adding", adding);
@@ -237,13 +237,13 @@ class RouteTool {
     this._here.disabled = this._robotPose() === null;
     this._clear.disabled = this._points.length === 0;
     this._run.disabled = this._points.length === 0 || !report?.way || busy;
-    say(this._run, live ? "Run again" : "Start route");
+    setText(this._run, live ? "Run again" : "Start route");
     for (const each of [this._pause, this._skip, this._end]) each.hidden = !live;
     for (const each of [this._pause, this._skip]) each.disabled = busy;
-    say(this._pause, run?.state === "going" ? "Pause" : "Resume");
-    say(this._word, this._words(run, report?.name ?? ""));
+    setText(this._pause, run?.state === "going" ? "Pause" : "Resume");
+    setText(this._message, this._text(run, report?.name ?? ""));
     const refused = this._area.refused ? "refused" : "";
-    this._word.dataset.state = this._area.active ? refused : (run?.state ?? "");
+    this._message.dataset.state = this._area.active ? refused : (run?.state ?? "");
     this._showList();
     const points = this._aimed ? [...this._points, this._aimed] : this._points;
     const shown = open ? points : live ? run.points : [];
@@ -255,10 +255,10 @@ class RouteTool {
   }
 
   /** @param {import('./route_run.js').RouteRun | undefined} run @param {string} name */
-  _words(run, name) {
+  _text(run, name) {
     if (this._aim.active) return "Press on the map for each point and drag for the heading.";
     if (this._aim.waits) return "Waiting: finish the other tool, then add more points.";
-    if (this._area.active) return this._area.words;
+    if (this._area.active) return this._area.text;
     const how = this._running(run, name);
     const short = this._loops && this._points.length < LEAST_LOOP;
     return short ? `${how} ${TOO_SHORT}`.trim() : how;

@@ -1,11 +1,11 @@
-import { deskOf } from "../../web/inputs/desk.js";
+import { devicesOf } from "../../web/inputs/devices.js";
 import { isLatched, stopKey, stopOf } from "../../web/motion/report.js";
 import { Obedience, standingStops } from "../../web/motion/stopping.js";
-import { button, html, say, stopButton, TwiceButton } from "../../web/tools/elements.js";
+import { button, html, setText, stopButton, TwiceButton } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/drive.js').Drive} Drive */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/motion/stopping.js').Verdict} Verdict */
 
@@ -28,7 +28,7 @@ const RESET_AT_ONCE = 60;
  *
  * @param {MapCanvas} map
  * @param {{place?: string}} options
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options) {
   const stop = new Stop(map, options);
@@ -88,7 +88,7 @@ class Stop {
     const drive = this._drive;
     this._offs = [
       lay(map, panel, "top-right", place),
-      deskOf(drive).open(),
+      devicesOf(drive).open(),
       drive.on("stop", () => this._stopped()),
       drive.on("robot", (report) => this._report(report)),
       drive.on("goal", (robot) => this._obedience.excuse(robot)),
@@ -127,7 +127,7 @@ class Stop {
     this._alarm.show(this._alarms());
     const { robots, verdicts } = this._drive;
     const standing = standingStops(robots.values());
-    say(this._standing, [standing, ...this._refusals()].join(" "));
+    setText(this._standing, [standing, ...this._refusals()].join(" "));
     const latched = [...robots.values()].filter(isLatched).map(stopKey);
     const reset = latched.length > 1 ? "Reset all" : "Reset";
     this._reset.show(latched.length > 0, latched, reset);
@@ -228,7 +228,7 @@ class Alarm {
     this._current = alarms;
     for (const robot of this._seen) if (!alarms.has(robot)) this._seen.delete(robot);
     const news = [...alarms].filter(([robot]) => !this._seen.has(robot));
-    say(this._names, news.map(([, words]) => words).join(", "));
+    setText(this._names, news.map(([, words]) => words).join(", "));
     if (news.length === 0) this.destroy();
     else {
       if (!this._element.isConnected) this._begin();
@@ -329,7 +329,7 @@ class StopTwins {
   _twinOf(original) {
     const known = this._twins.get(original);
     const twin = known ?? stopButton("webmap-stop-twin", "", () => original.click());
-    say(twin, original.textContent ?? "");
+    setText(twin, original.textContent ?? "");
     twin.dataset.robot = original.dataset.robot ?? "";
     const label = original.getAttribute("aria-label") ?? "";
     if (twin.ariaLabel !== label && label) twin.ariaLabel = label;

@@ -2,7 +2,7 @@ import { html } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 
 /**
  * Show the attribution of a map's tiles.
@@ -11,7 +11,7 @@ import { lay } from "../../web/tools/overlay.js";
  *
  * @param {MapCanvas} map
  * @param {{attribution?: string}} options
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, { attribution = "" }) {
   if (!attribution) return { destroy() {} };

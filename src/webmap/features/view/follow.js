@@ -2,7 +2,7 @@ import { button } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 
 /**
  * A button that keeps the selected robot at its place on the screen, until the user
@@ -13,7 +13,7 @@ import { lay } from "../../web/tools/overlay.js";
  * @param {MapCanvas} map
  * @param {object} _options
  * @param {(message: object) => void} send
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, _options, send) {
   const toggle = button("webmap-panel webmap-follow", "Follow", () => {

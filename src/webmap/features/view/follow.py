@@ -18,7 +18,7 @@ class Follow:
     def __init__(self, map: "Map") -> None:
         self.map = map
         self.half = map.add_browser_half(
-            self, "features/view/follow.js", {}, "features/view/follow.css"
+            self, "features/view/follow.js", {}, "features/view/view.css"
         )
 
     def on_message(self, message: dict[str, Any]) -> None:

@@ -1,8 +1,8 @@
-import { html, say } from "../../web/tools/elements.js";
+import { html, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 
 /** The key of the choice in this browser's storage. */
 const KEPT = "webmap.layers";
@@ -29,7 +29,7 @@ let maps = 0;
  *
  * @param {MapCanvas} map
  * @param {{layers?: [string, string][], off?: string[]}} options
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options) {
   const switches = new LayerSwitches(map, options);
@@ -132,7 +132,7 @@ class LayerSwitches {
     }
     for (const key of there) if (!this._rows.has(key)) this._add(key);
     for (const [key, row] of this._rows) row.hidden = !there.has(key);
-    say(this._none, there.size > 0 ? "" : "No layers yet.");
+    setText(this._none, there.size > 0 ? "" : "No layers yet.");
   }
 
   /** @param {string} key A layer, or one of its drawings. */
@@ -162,7 +162,7 @@ class LayerSwitches {
     const known = this._notes.get(name);
     if (more <= 0 && !known) return;
     const note = known ?? html("p", "webmap-layers-row one");
-    say(note, `${more} more: “${name}” switches all of them`);
+    setText(note, `${more} more: “${name}” switches all of them`);
     note.hidden = more <= 0;
     if (known) return;
     this._notes.set(name, note);

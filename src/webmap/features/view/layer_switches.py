@@ -86,5 +86,5 @@ class LayerSwitches:
             self,
             "features/view/layer_switches.js",
             {"layers": [list(item) for item in chosen.items()], "off": hidden},
-            "features/view/layer_switches.css",
+            "features/view/view.css",
         )

@@ -2,7 +2,7 @@ import { scaleOf } from "../../web/view.js";
 import { svg } from "../../web/tools/elements.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 
 let grids = 0;
 
@@ -30,7 +30,7 @@ function gridStep(scale, least) {
  *
  * @param {MapCanvas} map
  * @param {{least?: number}} options
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, { least = 32 }) {
   const id = `webmap-metre-grid-${++grids}`;

@@ -31,5 +31,5 @@ class MetreGrid:
             self,
             "features/view/metre_grid.js",
             {"least": least},
-            "features/view/metre_grid.css",
+            "features/view/view.css",
         )

@@ -1,6 +1,6 @@
 import { fit, rotate, scale, scaleOf, translate } from "../../web/view.js";
 
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/view.js').Matrix} Matrix */
 /** @typedef {import('../../web/view.js').Point} Point */
@@ -20,7 +20,7 @@ const KEY_ANGLE = Math.PI / 24;
  *
  * @param {MapCanvas} map
  * @param {{min_zoom?: number, max_zoom?: number}} options
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, options) {
   const control = new MouseViewControl(map, options);

@@ -21,5 +21,5 @@ class MouseViewControl:
         self.half = map.add_browser_half(
             self,
             "features/view/mouse_view_control.js",
-            style="features/view/mouse_view_control.css",
+            style="features/view/view.css",
         )

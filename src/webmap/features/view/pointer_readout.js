@@ -1,8 +1,8 @@
-import { html, say } from "../../web/tools/elements.js";
+import { html, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 
 /**
  * Show the pointer's position, in metres of the map.
@@ -11,7 +11,7 @@ import { lay } from "../../web/tools/overlay.js";
  *
  * @param {MapCanvas} map
  * @param {{digits?: number}} options
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, { digits = 2 }) {
   const output = html("output", "webmap-panel webmap-pointer-readout", {
@@ -26,7 +26,7 @@ export default function attach(map, { digits = 2 }) {
     output.hidden = pointer === null;
     if (pointer === null) return;
     const { x, y } = map.toWorld(pointer.x, pointer.y);
-    say(output, `x ${metres(x, digits)}  y ${metres(y, digits)} m`);
+    setText(output, `x ${metres(x, digits)}  y ${metres(y, digits)} m`);
   };
 
   const ending = new AbortController();

@@ -28,5 +28,5 @@ class PointerReadout:
             self,
             "features/view/pointer_readout.js",
             {"digits": digits},
-            "features/view/pointer_readout.css",
+            "features/view/view.css",
         )

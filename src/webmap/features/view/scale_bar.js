@@ -3,7 +3,7 @@ import { html, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/halves.js').Half} Half */
+/** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 
 /**
  * Return the longest round length that fits.
@@ -37,7 +37,7 @@ export function lengthText(metres) {
  *
  * @param {MapCanvas} map
  * @param {{width?: number}} options
- * @returns {Half}
+ * @returns {BrowserPart}
  */
 export default function attach(map, { width = 120 }) {
   const line = svg("path", { class: "webmap-scale-bar-line" });

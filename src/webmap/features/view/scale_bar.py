@@ -28,5 +28,5 @@ class ScaleBar:
             self,
             "features/view/scale_bar.js",
             {"width": width},
-            "features/view/scale_bar.css",
+            "features/view/view.css",
         )

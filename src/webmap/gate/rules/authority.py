@@ -72,8 +72,8 @@ class MotionConditions:
             return f"STOP by {self._latch.by} is active: reset it first"
         if not self.lock.held:
             return self.lock.why
-        if doubt := self._display_pulse.doubt(now):
-            return doubt
+        if fault := self._display_pulse.fault(now):
+            return fault
         if self._robots.drivable:
             return None if self._control.up else f"no connection to {self._url}"
         goals = self._robots.goals[self._robots.newest.id]
@@ -81,7 +81,7 @@ class MotionConditions:
             return "the robot has no velocity topic and no goal topic"
         return None if goals.link.up else "no connection to the bridge of its goals"
 
-    def doubt(self, now: float) -> str | None:
+    def why_blocked(self, now: float) -> str | None:
         """Return why the machine must not be driven now, or ``None``."""
         if reason := self.why_unavailable(now):
             return reason
@@ -89,9 +89,9 @@ class MotionConditions:
             return "the robot has no velocity topic"
         if not self._control.fresh(now):
             return f"no answer from {self._url}"
-        if self._robots.has_odometry and (blind := self._observation.doubt(now)):
-            return blind
-        return self.video.doubt(now)
+        if self._robots.has_odometry and (fault := self._observation.fault(now)):
+            return fault
+        return self.video.fault(now)
 
 
 REQUEST_TIMEOUT = 10.0

@@ -280,7 +280,7 @@ class CommandHandler:
             except Refusal as refusal:
                 self._emit(SendToDisplay(TakeReply(request, robot, None, refusal.why)))
                 continue
-            if now < until and base.robots.drivable and base.conditions.doubt(now):
+            if now < until and base.robots.drivable and base.conditions.why_blocked(now):
                 self._takes.append((request, robot, epoch, until))
             else:
                 self._emit(SendToDisplay(TakeReply(request, robot, epoch, None)))

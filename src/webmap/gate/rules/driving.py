@@ -51,7 +51,7 @@ class Driving:
         """
         lease = self._authority.lease
         assert lease is not None
-        if reason := self._conditions.doubt(now):
+        if reason := self._conditions.why_blocked(now):
             self._fault(reason, now)
             return None if neutral else reason
         self._authority.deadman.accept(neutral, tick, now)
@@ -93,7 +93,7 @@ class Driving:
         """
         if self._tests.running is not None:
             raise Refusal("a stop test is running")
-        if reason := self._conditions.doubt(now):
+        if reason := self._conditions.why_blocked(now):
             raise Refusal(reason)
         self._tests.begin(self._authority.deadman.armed, now)
 
@@ -160,7 +160,7 @@ class Driving:
     def step(self, now: float) -> None:
         """Check the conditions and the dead-man timeout, and continue a stop test."""
         if self._authority.lease is not None:
-            if reason := self._conditions.doubt(now):
+            if reason := self._conditions.why_blocked(now):
                 self._fault(reason, now)
             elif self._authority.deadman.expired(now):
                 self._disarm_and_halt("the page stopped sending commands", now)

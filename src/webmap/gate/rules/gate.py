@@ -65,7 +65,7 @@ class Gate:
 
     def step(self, now: float) -> list[Action]:
         """Do what is due at ``now``; return the actions to execute, in order."""
-        if self._display_there and self._display_pulse.doubt(now):
+        if self._display_there and self._display_pulse.fault(now):
             self._display_there = False
             self._end_unsupervised_goals(now)
         self._machines.step(now)

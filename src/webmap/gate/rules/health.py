@@ -114,7 +114,7 @@ class DisplayPulse:
         """Note a heartbeat."""
         self._beat_at = now
 
-    def doubt(self, now: float) -> str | None:
+    def fault(self, now: float) -> str | None:
         """Return why no page or program may move a machine, or ``None``."""
         if self.ended is not None:
             return self.ended
@@ -248,7 +248,7 @@ class Observation:
             return None
         return self.measured
 
-    def doubt(self, now: float) -> str | None:
+    def fault(self, now: float) -> str | None:
         """Return why odometry does not show the motion now, as text, or ``None``."""
         if self._seen is None:
             return "no odometry yet"
@@ -294,7 +294,7 @@ class Video:
         """Forget the picture: the machine is not driven any more."""
         self._taken_at = None
 
-    def doubt(self, now: float) -> str | None:
+    def fault(self, now: float) -> str | None:
         """Return that the driver sees no picture, as text, or ``None``."""
         if self._taken_at is None or now - self._taken_at <= BLIND_LIMIT:
             return None

@@ -108,7 +108,7 @@ def _reason(base: Machine, now: float) -> str | None:
     """Return why the machine cannot be driven now, or ``None``."""
     if base.authority.lease is None:
         return base.authority.why_unavailable(now)
-    return base.conditions.doubt(now)
+    return base.conditions.why_blocked(now)
 
 
 def _link(base: Machine, spec: RobotSpec) -> LinkHealth:

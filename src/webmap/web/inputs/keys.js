@@ -4,7 +4,7 @@ import { attentive, takesKeys } from "../motion/attention.js";
 /** @typedef {import('../motion/axes.js').Axes} Axes */
 
 /**
- * What each key asks for. By place on the keyboard (`code`), so that any layout works.
+ * The axes of each key, by position on the keyboard (`code`), for any layout.
  *
  * @type {Readonly<Record<string, Readonly<Partial<Axes>>>>}
  */
@@ -19,16 +19,16 @@ const MEANING = {
   ArrowRight: { turn: -1 },
 };
 
-/** What they ask for besides, on a base that can move sideways. */
+/** More keys, for a base that can move sideways. */
 const SIDEWAYS = { KeyQ: { y: 1 }, KeyE: { y: -1 } };
 
-/** Keys whose press makes the others' releases doubtful: shortcuts, window switches. */
+/** After a press of these keys, releases of others may be lost: shortcuts, other windows. */
 const MODIFIERS = new Set(["Control", "Alt", "AltGraph", "Meta", "OS"]);
 
 /**
  * @param {Iterable<string>} codes The keys that are held.
  * @param {{holonomic?: boolean}} [options]
- * @returns {Axes} What they ask for together; opposite ones cancel each other.
+ * @returns {Axes} Their common axes; opposite keys cancel each other.
  */
 export function axesOf(codes, { holonomic = false } = {}) {
   /** @type {Record<string, Partial<Axes>>} */
@@ -51,17 +51,17 @@ export function axesOf(codes, { holonomic = false } = {}) {
 /**
  * The keyboard as a drive input, and its STOP keys.
  *
- * It listens on the whole window, before anybody else, as a STOP must not depend on
- * which element has the focus.
+ * It listens on the window, before all other listeners, because a STOP must not depend on
+ * the focus.
  */
 export class Keys {
   /**
    * @param {Drive} drive
    * @param {object} owner
-   * @param {() => boolean} owner.wanted Whether there is a robot that keys could drive.
+   * @param {() => boolean} owner.wanted Whether there is a robot to drive.
    * @param {() => boolean} owner.holonomic Whether it can move sideways.
    * @param {(all: boolean, event: KeyboardEvent) => boolean} owner.stop Called for a
-   *     STOP key; returns whether it was one.
+   *     STOP key; returns whether it used the key.
    */
   constructor(drive, owner) {
     this._drive = drive;
@@ -75,7 +75,7 @@ export class Keys {
     this._off = drive.on("drop", () => this._held.clear());
   }
 
-  /** Stop listening, neutral. */
+  /** Stop listening and go neutral. */
   destroy() {
     this._ending.abort();
     this._off();
@@ -86,24 +86,24 @@ export class Keys {
   _down(event) {
     if (this._isStop(event)) return;
     if (MODIFIERS.has(event.key)) {
-      this._drive.doubt();
+      this._drive.goNeutral();
       return;
     }
     if (!this._drives(event)) return;
-    // Arrow keys scroll the page otherwise, also while they repeat.
+    // Otherwise arrow keys scroll the page, also while they repeat.
     event.preventDefault();
     if (this._held.has(event.code)) return;
     this._held.add(event.code);
-    // The first event of a key is a repetition if this page did not hear the press.
-    this._tell({ fresh: !event.repeat });
+    // If the first event is a repetition, this page did not receive the press.
+    this._send({ fresh: !event.repeat });
   }
 
   /** @param {KeyboardEvent} event */
   _up(event) {
-    // A key that is let go of while Meta is held says nothing on a Mac, and which
-    // others did is unknown: a Meta that goes up is as doubtful as one going down.
-    if (event.key === "Meta" || event.key === "OS") this._drive.doubt();
-    if (this._held.delete(event.code)) this._tell();
+    // On a Mac, keys that are released while Meta is held send no event. So after the
+    // release of Meta too, the state of the other keys is unknown.
+    if (event.key === "Meta" || event.key === "OS") this._drive.goNeutral();
+    if (this._held.delete(event.code)) this._send();
   }
 
   /** @param {KeyboardEvent} event */
@@ -115,7 +115,7 @@ export class Keys {
     }
     if (!escape && takesKeys(event.target)) return false;
     if (event.repeat) {
-      // Held on, Space would scroll the page.
+      // Otherwise a held Space scrolls the page.
       if (!escape) event.preventDefault();
       return true;
     }
@@ -126,7 +126,7 @@ export class Keys {
 
   /**
    * @param {KeyboardEvent} event
-   * @returns {boolean} Whether the key is one to drive with, here and now.
+   * @returns {boolean} Whether the key drives a robot now.
    */
   _drives(event) {
     if (event.isComposing || event.ctrlKey || event.altKey || event.metaKey) {
@@ -138,7 +138,7 @@ export class Keys {
   }
 
   /** @param {{fresh?: boolean}} [how] */
-  _tell(how) {
+  _send(how) {
     const holonomic = this._owner.holonomic();
     this._drive.setInput("keys", axesOf(this._held, { holonomic }), how);
   }

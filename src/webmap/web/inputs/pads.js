@@ -1,5 +1,5 @@
 import { attentive } from "../motion/attention.js";
-import { past, throwOf } from "./stick.js";
+import { beyondDeadZone, axesOfStick } from "./stick.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
 /** @typedef {import('../motion/axes.js').Axes} Axes */
@@ -7,11 +7,11 @@ import { past, throwOf } from "./stick.js";
 /** The button that must be held for a gamepad to drive: the left shoulder, LB or L1. */
 export const DEAD_MAN = 4;
 
-/** A gamepad that says nothing new for this long may be gone unnoticed; ms. */
+/** A gamepad without a change for this time may be disconnected; ms. */
 export const SILENT = 2000;
 
 /**
- * What is read of a gamepad, as the browser has it.
+ * The parts of the browser's `Gamepad` that are read.
  *
  * @typedef {object} Pad
  * @property {number} index
@@ -24,31 +24,31 @@ export const SILENT = 2000;
  */
 
 /**
- * Decides what gamepads ask for: nothing, unless the dead-man button of one is held.
+ * Computes the axes of gamepads: neutral, unless a dead-man button is held.
  *
- * The button must have been seen up since the gamepad came and since the last doubt.
- * A gamepad that lost its radio link goes on showing the last thing it said; so one
- * that says nothing new while its button is held is doubted as well. Times are in
- * milliseconds of one clock.
+ * The button must have been released since the gamepad was connected and since the last
+ * {@link Pads#drop}. A gamepad that lost its radio connection keeps its last state; so the
+ * button also has no effect when the gamepad does not change for {@link SILENT} ms. Times
+ * are in milliseconds of one clock.
  */
 export class Pads {
   constructor() {
-    /** @type {Map<string, {timestamp: number, newsAt: number, fresh: boolean}>} */
+    /** @type {Map<string, {timestamp: number, changedAt: number, fresh: boolean}>} */
     this._known = new Map();
-    /** Whether a dead-man button is held that does nothing. */
+    /** Whether a dead-man button is held without effect. */
     this.spent = false;
   }
 
-  /** Whether there is a gamepad that could drive. */
+  /** Whether there is a gamepad for driving. */
   get present() {
     return this._known.size > 0;
   }
 
   /**
-   * @param {Iterable<Pad | null>} pads What the browser lists.
+   * @param {Iterable<Pad | null>} pads The browser's list.
    * @param {number} now
    * @param {{holonomic?: boolean}} [options]
-   * @returns {Axes | null} Null when none drives.
+   * @returns {Axes | null} null if no gamepad drives.
    */
   read(pads, now, { holonomic = false } = {}) {
     const seen = new Set();
@@ -66,7 +66,7 @@ export class Pads {
     return axes;
   }
 
-  /** Doubt: no button that is held now counts any more. */
+  /** Buttons that are held now have no effect until they are released. */
   drop() {
     for (const state of this._known.values()) state.fresh = false;
   }
@@ -78,22 +78,22 @@ export class Pads {
    */
   _drives(key, pad, now) {
     const { timestamp } = pad;
-    const state = this._known.get(key) ?? { timestamp, newsAt: now, fresh: false };
+    const state = this._known.get(key) ?? { timestamp, changedAt: now, fresh: false };
     this._known.set(key, state);
-    if (timestamp !== state.timestamp) Object.assign(state, { timestamp, newsAt: now });
+    if (timestamp !== state.timestamp) Object.assign(state, { timestamp, changedAt: now });
     if (!pad.buttons[DEAD_MAN]?.pressed) {
       state.fresh = true;
       return false;
     }
-    if (now - state.newsAt > SILENT) state.fresh = false;
+    if (now - state.changedAt > SILENT) state.fresh = false;
     if (!state.fresh) this.spent = true;
     return state.fresh;
   }
 }
 
 /**
- * The left stick drives and turns. For a base that moves sideways it moves it, and the
- * right stick turns.
+ * The left stick drives and turns. For a holonomic base the left stick drives in all
+ * directions, and the right stick turns.
  *
  * @param {Pad} pad
  * @param {boolean} holonomic
@@ -101,19 +101,19 @@ export class Pads {
  */
 function axesOfPad({ axes }, holonomic) {
   const [right = 0, down = 0, turn = 0] = axes;
-  if (!holonomic) return throwOf(right, down);
-  return { ...throwOf(right, down, { sideways: true }), turn: past(-turn) };
+  if (!holonomic) return axesOfStick(right, down);
+  return { ...axesOfStick(right, down, { sideways: true }), turn: beyondDeadZone(-turn) };
 }
 
 /**
- * Gamepads as a drive input. They tell nothing by themselves: they are asked at each
- * step, and when one is unplugged.
+ * Gamepads as a drive input. They have no events for their axes, so they are read at each
+ * step, and when one is disconnected.
  */
 export class Gamepads {
   /**
    * @param {Drive} drive
    * @param {object} owner
-   * @param {() => boolean} owner.wanted Whether there is a robot that they could drive.
+   * @param {() => boolean} owner.wanted Whether there is a robot to drive.
    * @param {() => boolean} owner.holonomic Whether it can move sideways.
    */
   constructor(drive, owner) {
@@ -129,17 +129,17 @@ export class Gamepads {
     ];
   }
 
-  /** Whether there is a gamepad that could drive. */
+  /** Whether there is a gamepad for driving. */
   get present() {
     return this._pads.present;
   }
 
-  /** Whether a dead-man button is held that does nothing. */
+  /** Whether a dead-man button is held without effect. */
   get spent() {
     return this._pads.spent;
   }
 
-  /** Stop listening, neutral. */
+  /** Stop listening and go neutral. */
   destroy() {
     this._ending.abort();
     for (const off of this._offs) off();
@@ -153,7 +153,7 @@ export class Gamepads {
     this._drive.setInput("gamepad", this._owner.wanted() ? axes : null);
   }
 
-  /** One is gone, and the list may not say so yet. */
+  /** A gamepad is gone; the browser's list may still contain it. */
   _lost() {
     this._pads.drop();
     this._drive.setInput("gamepad", null);
@@ -165,7 +165,7 @@ function listed() {
   try {
     return navigator.getGamepads?.() ?? [];
   } catch {
-    // A page in a frame may not be allowed to ask.
+    // A page in a frame may not have the permission.
     return [];
   }
 }

@@ -3,14 +3,15 @@ import { takesKeys } from "../motion/attention.js";
 /** @typedef {import('../drive.js').Drive} Drive */
 /** @typedef {import('../motion/axes.js').Axes} Axes */
 
-/** How far from its middle the knob goes, as a share of the pad's radius. */
-const WAY = 0.62;
+/** How far the knob moves from the centre, as a share of the pad's radius. */
+const TRAVEL = 0.62;
 
 /**
  * A pad with a knob as a drive input, for one finger, pen or mouse button.
  *
- * The pointer is captured: wherever it goes, its release is heard here. Whatever ends it
- * is neutral, and a pointer that was forgotten does nothing until it presses anew.
+ * The pointer is captured, so its release arrives here from everywhere. Every end of the
+ * press is neutral. After {@link Stick#release} the pointer has no effect until the next
+ * press.
  */
 export class Stick {
   /**
@@ -24,8 +25,8 @@ export class Stick {
     this._sideways = sideways;
     /** @type {number | null} */
     this._pointer = null;
-    /** Where the pad was when it was pressed; it may move as words around it change. */
-    this._middle = { x: 0, y: 0, way: 1 };
+    /** The pad's position at the press: texts around it may change and move it. */
+    this._middle = { x: 0, y: 0, travel: 1 };
     this._ending = new AbortController();
     const options = { signal: this._ending.signal };
     pad.addEventListener("pointerdown", (event) => this._down(event), options);
@@ -41,7 +42,7 @@ export class Stick {
         options,
       );
     }
-    // A finger that rests would open a menu, and a menu is a doubt.
+    // A resting finger would open a menu, and a menu ends driving.
     pad.addEventListener("touchstart", (event) => event.preventDefault(), {
       ...options,
       passive: false,
@@ -52,7 +53,7 @@ export class Stick {
     ];
   }
 
-  /** Forget the pointer, neutral. */
+  /** Forget the pointer and go neutral. */
   release() {
     const pointer = this._pointer;
     if (pointer === null) return;
@@ -63,14 +64,14 @@ export class Stick {
     this._drive.setInput("stick", null);
   }
 
-  /** Stop listening, neutral. */
+  /** Stop listening and go neutral. */
   destroy() {
     this._ending.abort();
     for (const off of this._offs) off();
     this.release();
   }
 
-  /** A capture that is lost is not told before the pointer moves again. */
+  /** A lost capture has no event before the pointer moves again. */
   _check() {
     if (this._pointer === null) return;
     if (!this._pad.hasPointerCapture(this._pointer)) this.release();
@@ -80,11 +81,11 @@ export class Stick {
   _down(event) {
     event.preventDefault();
     if (this._pointer !== null || event.button !== 0) return;
-    // As the press is not heard of elsewhere, it would leave the keys in a text field.
+    // The press is handled here only, so a text field would keep the focus and the keys.
     const focused = document.activeElement;
     if (focused instanceof HTMLElement && takesKeys(focused)) focused.blur();
     const { left, top, width, height } = this._pad.getBoundingClientRect();
-    this._middle = { x: left + width / 2, y: top + height / 2, way: (WAY * width) / 2 };
+    this._middle = { x: left + width / 2, y: top + height / 2, travel: (TRAVEL * width) / 2 };
     this._pointer = event.pointerId;
     this._pad.setPointerCapture(event.pointerId);
     this._pad.classList.add("held");
@@ -94,13 +95,13 @@ export class Stick {
   /** @param {PointerEvent} event */
   _move(event) {
     if (event.pointerId !== this._pointer) return;
-    // While another mouse button is held, that this one went up is told as a move.
+    // While another mouse button is held, the release of this one is a move event.
     if ((event.buttons & 1) === 0) return this.release();
-    const { x, y, way } = this._middle;
-    const right = (event.clientX - x) / way;
-    const down = (event.clientY - y) / way;
+    const { x, y, travel } = this._middle;
+    const right = (event.clientX - x) / travel;
+    const down = (event.clientY - y) / travel;
     this._draw(right, down);
-    this._drive.setInput("stick", throwOf(right, down, { sideways: this._sideways() }));
+    this._drive.setInput("stick", axesOfStick(right, down, { sideways: this._sideways() }));
   }
 
   /**
@@ -114,32 +115,32 @@ export class Stick {
   }
 }
 
-/** What of a stick's way does nothing, so that straight ahead is straight; a share. */
+/** The share of a stick's travel without effect, so that straight ahead is straight. */
 export const DEAD_ZONE = 0.15;
 
 /**
- * Return what a stick asks for that is moved so far.
+ * Return the axes for a position of a stick.
  *
- * Across the screen it turns the robot on the spot or on its way, or moves it sideways.
+ * To the left and right, it turns the robot or moves it sideways.
  *
- * @param {number} right Share of the stick's whole way, to the right.
- * @param {number} down Likewise, towards the operator.
+ * @param {number} right To the right, as a share of the stick's travel.
+ * @param {number} down Towards the operator, likewise.
  * @param {{sideways?: boolean}} [options]
  * @returns {Axes}
  */
-export function throwOf(right, down, { sideways = false } = {}) {
-  // Pulled beyond its edge, a stick still points the same way.
+export function axesOfStick(right, down, { sideways = false } = {}) {
+  // Beyond the edge of the pad, the direction stays the same.
   const beyond = Math.max(1, Math.hypot(right, down));
-  const ahead = past(-down / beyond);
-  const left = past(-right / beyond);
+  const ahead = beyondDeadZone(-down / beyond);
+  const left = beyondDeadZone(-right / beyond);
   return sideways ? { x: ahead, y: left, turn: 0 } : { x: ahead, y: 0, turn: left };
 }
 
 /**
  * @param {number} value In [-1, 1].
- * @returns {number} What of it lies beyond the dead zone, again up to 1.
+ * @returns {number} The part beyond the dead zone, scaled to [-1, 1].
  */
-export function past(value) {
+export function beyondDeadZone(value) {
   const size = Math.abs(value) - DEAD_ZONE;
   return size > 0 ? (Math.sign(value) * size) / (1 - DEAD_ZONE) : 0;
 }

@@ -1,9 +1,9 @@
 /**
- * Whether somebody looks at this page and drives with it, rather than typing in it or
+ * Whether the operator is looking at this page and can drive with it, not typing in it or
  * working in another window.
  */
 
-/** Input types that one does not type into and that arrow keys do not change. */
+/** Input types without text, whose value arrow keys do not change. */
 const BUTTON_LIKE = new Set([
   "button",
   "submit",
@@ -27,10 +27,10 @@ export function takesKeys(target) {
   );
 }
 
-/** What covers the page, or says (`data-hands-off`) that nobody drives while it is open. */
+/** Elements that cover the page, or forbid driving while open (`data-hands-off`). */
 const COVERS = ":modal, dialog[open][data-hands-off]";
 
-/** @returns {boolean} Whether an input held now may move a robot. */
+/** @returns {boolean} Whether inputs may move a robot now. */
 export function attentive() {
   return (
     document.visibilityState === "visible" &&
@@ -41,39 +41,39 @@ export function attentive() {
 }
 
 /**
- * Watch for everything that makes it doubtful that the operator is still driving.
+ * Watch for all events after which the operator may not be driving any more.
  *
- * @param {(left: boolean) => void} onDoubt Called at once; `left` says that the page
- *     is hidden or going away, so that leases should be given back as well.
- * @param {() => void} onReturn Called when the page comes back from a freeze or from
- *     the back-forward cache, where its connections have died unnoticed.
+ * @param {(left: boolean) => void} onDistraction Called immediately; `left`: whether
+ *     the page is hidden or going away, so that leases should be released too.
+ * @param {() => void} onReturn Called when the page returns from a freeze or from the
+ *     back-forward cache: its connections may be dead.
  * @returns {() => void} Stops watching.
  */
-export function watchAttention(onDoubt, onReturn) {
+export function watchAttention(onDistraction, onReturn) {
   const ending = new AbortController();
   const options = { signal: ending.signal, capture: true };
-  const doubt = () => onDoubt(false);
-  const leave = () => onDoubt(true);
+  const distract = () => onDistraction(false);
+  const leave = () => onDistraction(true);
   window.addEventListener(
     "blur",
     (event) => {
-      if (event.target === window) doubt();
+      if (event.target === window) distract();
     },
     options,
   );
-  window.addEventListener("contextmenu", doubt, options);
-  // While something is dragged out of its place no key is heard, nor its release.
+  window.addEventListener("contextmenu", distract, options);
+  // During a drag the page receives neither keys nor their releases.
   window.addEventListener(
     "dragstart",
     (event) => {
-      if (!event.defaultPrevented) doubt();
+      if (!event.defaultPrevented) distract();
     },
     { signal: ending.signal },
   );
   window.addEventListener(
     "focusin",
     (event) => {
-      if (takesKeys(event.target)) doubt();
+      if (takesKeys(event.target)) distract();
     },
     options,
   );

@@ -1,5 +1,5 @@
 /**
- * What a hand asks for, each axis in [-1, 1]: a share of the speed in force.
+ * The motion that an input requests. Each axis is a share of the speed limit, in [-1, 1].
  *
  * @typedef {object} Axes
  * @property {number} x Forward.
@@ -13,8 +13,8 @@ export const NEUTRAL = Object.freeze({ x: 0, y: 0, turn: 0 });
 /**
  * Return axes with every value in [-1, 1].
  *
- * Doubt is neutral: one value that is not a finite number makes all of them zero,
- * as half of a command may be the dangerous half.
+ * If one value is not a finite number, all are zero: a part of a command may be
+ * dangerous without the rest.
  *
  * @param {Partial<Axes> | null | undefined} asked
  * @returns {Readonly<Axes>}
@@ -32,7 +32,7 @@ export function clean(asked) {
 
 /**
  * @param {Readonly<Axes>} axes
- * @returns {boolean} Whether they ask for no motion at all.
+ * @returns {boolean} Whether all axes are zero.
  */
 export function isNeutral(axes) {
   return axes.x === 0 && axes.y === 0 && axes.turn === 0;
@@ -40,6 +40,6 @@ export function isNeutral(axes) {
 
 /** @param {number} value */
 function unit(value) {
-  // Adding zero turns -0 into 0, which reads better in a log.
+  // Adding zero changes -0 to 0, which is clearer in a log.
   return Math.max(-1, Math.min(1, value)) + 0;
 }

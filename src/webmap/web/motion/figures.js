@@ -1,6 +1,6 @@
 import { linearSpeed } from "./report.js";
 
-/** What stands where a figure would. */
+/** Shown instead of an unknown value. */
 const UNKNOWN = "unknown";
 
 /** @typedef {import('./report.js').RobotReport} RobotReport */
@@ -10,20 +10,20 @@ const UNKNOWN = "unknown";
  * @property {string} name
  * @property {'motion' | 'time'} kind
  * @property {string} text
- * @property {string} [more] What there may be no room for.
- * @property {string} [title] What the figure is made of.
+ * @property {string} [more] The part that is hidden where there is no room.
+ * @property {string} [title] An explanation of the value.
  */
 
-/** Slower than this a robot is as good as standing, and has no halo; m/s. */
+/** Below this speed a robot counts as not moving, and has no halo; m/s. */
 export const STANDING = 0.02;
 
-/** What is assumed where an older gate does not say it: seconds, m/s². */
+/** Assumed if an older gate does not report it: seconds, m/s². */
 const ASSUMED = { reaction: 1, brake: 0.5 };
 
 /**
  * @param {readonly number[] | null | undefined} velocity
- * @returns {number | null} In m/s, whatever the direction, below zero for backwards; null
- *     when it is not known.
+ * @returns {number | null} In m/s, in any direction, negative for backwards; null if
+ *     unknown.
  */
 export function speedAlong(velocity) {
   if (!velocity) return null;
@@ -33,19 +33,19 @@ export function speedAlong(velocity) {
 
 /**
  * @param {RobotReport} report
- * @returns {number} How fast it moves, in m/s, by the best word that there is: what was
- *     measured, else what its ROS said back, else what was sent.
+ * @returns {number} Its speed, in m/s, from the best source that there is: measured, else
+ *     echoed, else sent.
  */
 export function speedNow({ measured, echoed, sent }) {
   return Math.abs(speedAlong(measured) ?? speedAlong(echoed) ?? speedAlong(sent) ?? 0);
 }
 
 /**
- * Say how far a robot goes at most from now until it stands.
+ * Return the longest distance that a robot may still move until it has stopped.
  *
  * @param {RobotReport} report
- * @returns {number | null} Metres from its middle; null when it stands, or when nobody
- *     drives it from here.
+ * @returns {number | null} Metres from its centre; null if it does not move, or if no
+ *     operator has control.
  */
 export function stoppingDistance(report) {
   const speed = speedNow(report);
@@ -56,8 +56,7 @@ export function stoppingDistance(report) {
 }
 
 /**
- * Say one motion three times: as it was sent, as the robot's ROS said it back, and as it
- * was measured.
+ * Return the velocity as it was sent, as the robot's ROS echoed it, and as it was measured.
  *
  * @param {RobotReport} report
  * @returns {Figure[]}
@@ -76,11 +75,11 @@ export function motions({ sent, echoed, measured }) {
 }
 
 /**
- * Say how long things take, and how the robot would stop.
+ * Return the delays and the stopping distance.
  *
  * @param {RobotReport} report
- * @param {number | null} loop How long commands take to the gate and back, in ms.
- * @param {number | null} motion How long from the last press to motion, in ms.
+ * @param {number | null} loop Time of a command to the gate and back, in ms.
+ * @param {number | null} motion Time from the last press to motion, in ms.
  * @returns {Figure[]}
  */
 export function timings(report, loop, motion) {
@@ -105,10 +104,10 @@ export function timings(report, loop, motion) {
 }
 
 /**
- * Say within what time the robot stops when nothing tells it to.
+ * Return the command timeout of the base, as text.
  *
  * @param {RobotReport} report
- * @returns {string} "" when an older gate does not say.
+ * @returns {string} "" if an older gate does not report it.
  */
 export function ownStop({ stop_time, stop_source, stop_date, why }) {
   if (stop_time === undefined) return "";
@@ -116,7 +115,7 @@ export function ownStop({ stop_time, stop_source, stop_date, why }) {
   if (stop_time === null && stop_source === "tested") {
     return `Command timeout of the base: none (${tested}).`;
   }
-  // Else what limits the speed says it already.
+  // Otherwise the reasons of the speed limit contain it already.
   const failed = why.some((reason) => reason.startsWith("stop test failed"));
   if (stop_time === null) return failed ? "" : "Command timeout of the base: unknown.";
   const how = stop_source === "tested" ? tested : "stated";
@@ -124,18 +123,18 @@ export function ownStop({ stop_time, stop_source, stop_date, why }) {
 }
 
 /**
- * Say how the test of its own stopping goes, or why it failed.
+ * Return the progress of the stop test, or why it failed, as text.
  *
  * @param {RobotReport} report
- * @returns {string} "" when there is nothing to say that {@link ownStop} does not.
+ * @returns {string} "" if {@link ownStop} contains everything.
  */
-export function testWords({ test }) {
+export function stopTestText({ test }) {
   return test && test.state !== "done" ? `Stop test: ${test.text}` : "";
 }
 
 /**
  * @param {RobotReport} report
- * @returns {boolean} Whether the robot is left to itself just now to see if it stops.
+ * @returns {boolean} Whether a stop test moves the robot, or waits for it to stop.
  */
 export function isTested({ test }) {
   return test?.state === "creeping" || test?.state === "waiting";

@@ -1,8 +1,7 @@
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
 /**
- * Which leases this page has, which of them it keeps without driving, and which it gave
- * back.
+ * The leases that this page has, keeps without driving, or has released.
  *
  * Times are in milliseconds of one clock.
  */
@@ -14,12 +13,12 @@ export class Leases {
      */
     this.robots = new Map();
     /**
-     * When leases that serve a goal were last used.
+     * When each lease that is kept without driving was last used.
      * @type {Map<string, number>}
      */
     this._parked = new Map();
     /**
-     * Epochs that were given back, of which late reports must not be believed.
+     * The epochs of released leases: later reports of these are outdated.
      * @type {Map<string, number>}
      */
     this._given = new Map();
@@ -36,7 +35,7 @@ export class Leases {
   }
 
   /**
-   * A lease was given back: whatever is said of it still is old.
+   * Note that a lease was released: later reports of it are outdated.
    *
    * @param {string} robot
    * @param {number} epoch
@@ -56,7 +55,7 @@ export class Leases {
   }
 
   /**
-   * A lease is needed still, if it is one that is kept without driving.
+   * Note the use of a lease, if it is kept without driving.
    *
    * @param {string} robot
    * @param {number} now
@@ -66,7 +65,7 @@ export class Leases {
   }
 
   /**
-   * A lease is not kept without driving any more.
+   * End keeping a lease without driving.
    *
    * @param {string} robot Or "*".
    */
@@ -78,7 +77,7 @@ export class Leases {
   /**
    * @param {number} now
    * @param {number} patience In ms.
-   * @returns {string[]} Whose leases are kept and were not used for so long.
+   * @returns {string[]} The robots whose kept leases were not used for this time.
    */
   unused(now, patience) {
     return [...this._parked]
@@ -87,10 +86,10 @@ export class Leases {
   }
 
   /**
-   * Take what the gate says of a robot.
+   * Process a report of the gate.
    *
    * @param {RobotReport} report
-   * @returns {RobotReport | undefined} What it said before.
+   * @returns {RobotReport | undefined} The previous report.
    */
   report(report) {
     const before = this.robots.get(report.robot);
@@ -112,7 +111,7 @@ export class Leases {
     this._parked.delete(robot);
   }
 
-  /** All leases ended with the connection. */
+  /** Forget all leases: they ended with the connection. */
   forget() {
     this._parked.clear();
     this._given.clear();

@@ -1,28 +1,28 @@
-/** Older than this, and what comes back no longer says that a command arrives; ms. */
+/** If an answer is older than this, commands may not arrive in time; ms. */
 export const LATE = 300;
 
-/** No tick for this long and the connection is given up; ms. */
+/** Without a tick for this time the connection is given up; ms. */
 export const LOST = 500;
 
-/** How many commands may wait for their acknowledgement at once. */
+/** The most commands that may wait for an acknowledgement. */
 const REMEMBERED = 256;
 
 /**
- * The loop from this page to the gate and back: is it alive, and how old is it?
+ * Measures the loop from this page to the gate and back.
  *
- * The gate ticks at 20 Hz and says in each tick which command of ours it accepted
- * last. `WebSocket.bufferedAmount` stays 0 through a stall of seconds; these two do
- * not. Times are in milliseconds of one clock that the caller reads.
+ * The gate sends ticks at 20 Hz, each with the number of the last command of this page that
+ * it accepted. These show a stall; `WebSocket.bufferedAmount` stays 0 during a stall of
+ * seconds. Times are in milliseconds of the caller's clock.
  */
 export class Loop {
   constructor() {
     /**
-     * The newest tick, to be echoed in every command; null before the first.
+     * The newest tick, which every command contains; null before the first.
      * @type {number | null}
      */
     this.tick = null;
     /**
-     * How long the newest acknowledgement took to come back, in ms.
+     * The time from the newest acknowledged command to its acknowledgement, in ms.
      * @type {number | null}
      */
     this.delay = null;
@@ -36,7 +36,7 @@ export class Loop {
   }
 
   /**
-   * Start anew, for a connection that opened at this moment.
+   * Start again, for a connection that has just opened.
    *
    * @param {number} now
    */
@@ -48,10 +48,10 @@ export class Loop {
   }
 
   /**
-   * Take a tick.
+   * Process a tick.
    *
    * @param {number} tick
-   * @param {number} ack The newest command of ours that was accepted, or -1.
+   * @param {number} ack The newest accepted command of this page, or -1.
    * @param {number} now
    */
   receive(tick, ack, now) {
@@ -67,17 +67,17 @@ export class Loop {
   }
 
   /**
-   * Expect the acknowledgement of a command that was sent at this moment.
+   * Expect the acknowledgement of a command that was sent now.
    *
    * @param {number} seq
    * @param {number} now
    */
   sent(seq, now) {
-    // Beyond this many the oldest one has said all that there is to say.
+    // With so many, the oldest already shows that the loop is late.
     if (this._waiting.size < REMEMBERED) this._waiting.set(seq, now);
   }
 
-  /** Stop measuring: nothing is being sent any more. */
+  /** Stop measuring: no more commands are sent. */
   rest() {
     this._waiting.clear();
     this.delay = null;
@@ -93,8 +93,8 @@ export class Loop {
 
   /**
    * @param {number} now
-   * @returns {number} For how long the oldest command waits to be acknowledged, in
-   *     ms; 0 when none does.
+   * @returns {number} How long the oldest command has waited for its acknowledgement, in
+   *     ms; 0 if there is none.
    */
   age(now) {
     const [oldest] = this._waiting.values();
@@ -107,7 +107,7 @@ export class Loop {
    */
   state(now) {
     const silence = now - this._tickAt;
-    // A clock that was set back would hide a silence for as long as it lost.
+    // A clock that was set back would hide a silence.
     if (silence > LOST || silence < 0) return "lost";
     return silence > LATE || this.age(now) > LATE ? "late" : "open";
   }

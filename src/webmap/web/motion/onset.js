@@ -4,33 +4,33 @@ import { angularSpeed } from "./report.js";
 /** @typedef {import('./axes.js').Axes} Axes */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
-/** Turning slower than this a robot is as good as standing; rad/s. */
+/** Below this turn rate a robot counts as not moving; rad/s. */
 const TURNS = 0.05;
 
-/** A robot that has not moved by then does so for another reason; ms. */
+/** A robot that moves later than this moves for another reason; ms. */
 const PATIENCE = 3000;
 
 /**
- * Measures how long it takes from the first command to move until odometry says that the
- * robot moves: all of the way there, the robot itself, and the way back.
+ * Measures the time from the first command to move until odometry shows motion: the path
+ * to the robot, the robot itself, and the path back.
  *
  * Times are in milliseconds of one clock.
  */
 export class Onset {
   constructor() {
     /**
-     * How long it took the last time.
+     * The last measured time, by robot.
      * @type {Map<string, number>}
      */
     this._delays = new Map();
     /** @type {Map<string, boolean>} */
     this._moves = new Map();
     /**
-     * The command whose motion is waited for.
+     * The command that has not caused motion yet.
      * @type {{robot: string, since: number} | null}
      */
     this._waiting = null;
-    /** Whether the last command asked for motion. */
+    /** Whether the last command requested motion. */
     this._asked = false;
   }
 
@@ -38,14 +38,14 @@ export class Onset {
    * A command was sent.
    *
    * @param {string} robot
-   * @param {boolean} moving Whether it asks for motion.
+   * @param {boolean} moving Whether it requests motion.
    * @param {number} now
    */
   sent(robot, moving, now) {
     const first = moving && !this._asked;
     this._asked = moving;
     if (!moving) this._waiting = null;
-    // Of a robot that moves already it cannot be told what moves it.
+    // If a robot moves already, the cause of its motion is unknown.
     else if (first && !this._moves.get(robot)) this._waiting = { robot, since: now };
   }
 
@@ -71,7 +71,7 @@ export class Onset {
 
   /**
    * @param {string} robot
-   * @returns {number | null} In ms; null before it moved for the first time.
+   * @returns {number | null} In ms; null before the first motion.
    */
   delay(robot) {
     return this._delays.get(robot) ?? null;

@@ -1,8 +1,8 @@
-/** The oldest picture that a robot is driven by, once a camera was chosen; ms. */
+/** The oldest camera picture that an operator may drive by; ms. */
 export const BLIND = 1000;
 
 /**
- * How old the pictures are that the operator goes by, of each robot with a camera.
+ * The ages of the camera pictures that the operator drives by, for each robot.
  */
 export class Pictures {
   constructor() {
@@ -12,8 +12,8 @@ export class Pictures {
 
   /**
    * @param {string} robot
-   * @param {() => number} age How old the picture is that is shown now, in ms.
-   * @returns {() => void} The operator goes by it no more.
+   * @param {() => number} age Age of the picture that is shown now, in ms.
+   * @returns {() => void} Ends this.
    */
   goBy(robot, age) {
     this._ages.set(robot, age);

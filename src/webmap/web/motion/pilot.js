@@ -1,43 +1,43 @@
 import { Leases } from "./leases.js";
-import { Reach } from "./reach.js";
+import { LeaseRequests } from "./lease_requests.js";
 import { Stream } from "./stream.js";
 
-/** @typedef {import('./hands.js').Hands} Hands */
+/** @typedef {import('./inputs.js').Inputs} Inputs */
 /** @typedef {import('./loop.js').Loop} Loop */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 /** @typedef {import('./stream.js').Command} Command */
 
-/** Between two words that a lease is needed still, in ms. */
+/** The time between two renewals of a lease, in ms. */
 const RENEW = 10_000;
 
 /**
- * Decides what this page says to the gate: which lease to take, keep and give back,
- * and the axes to send with it.
+ * Decides what this page sends to the gate: which lease to take, keep and release, and
+ * the axes to send with it.
  *
- * It is stepped at 20 Hz and at once when something changed, and returns the
- * messages to send. Motion needs all of: an attentive page, hands that are alive, an
- * open loop, a lease on the chosen robot, and a stretch of neutral that the gate has
- * seen since the last doubt. Times are in milliseconds of one clock.
+ * It is called at 20 Hz and after every change, and returns the messages to send. A robot
+ * moves only with: an attentive page, inputs that are not blocked, an open loop, a lease
+ * on the chosen robot, and neutral commands that the gate has received for a while since
+ * {@link Pilot#goNeutral}. Times are in milliseconds of one clock.
  */
 export class Pilot {
   /**
-   * @param {Hands} hands
+   * @param {Inputs} inputs
    * @param {Loop} loop
    * @param {number} now
-   * @param {{releaseAfter?: number}} [options] `releaseAfter`: after this long
-   *     without motion the lease is given back, in ms.
+   * @param {{releaseAfter?: number}} [options] `releaseAfter`: the lease is
+   *     released after this time without motion, in ms.
    */
-  constructor(hands, loop, now, { releaseAfter = 30_000 } = {}) {
-    this.hands = hands;
+  constructor(inputs, loop, now, { releaseAfter = 30_000 } = {}) {
+    this.inputs = inputs;
     this.releaseAfter = releaseAfter;
-    this._stream = new Stream(hands, loop, now);
+    this._stream = new Stream(inputs, loop, now);
     this._leases = new Leases();
     /**
-     * When leases were last said to be needed still.
+     * When each lease was last renewed.
      * @type {Map<string, number>}
      */
     this._renewed = new Map();
-    this._reach = new Reach(hands, this._leases, this._stream);
+    this._requests = new LeaseRequests(inputs, this._leases, this._stream);
   }
 
   /** The newest report of each robot. */
@@ -45,7 +45,7 @@ export class Pilot {
     return this._leases.robots;
   }
 
-  /** The ages of the pictures that the operator goes by. */
+  /** The ages of the camera pictures that the operator drives by. */
   get pictures() {
     return this._stream.pictures;
   }
@@ -55,20 +55,20 @@ export class Pilot {
     return this._stream.lease?.robot ?? null;
   }
 
-  /** Whether the gate has seen enough neutral to let a press through. */
+  /** Whether the gate has received enough neutral commands to accept a press. */
   get settled() {
     return this._armed && this._stream.settled;
   }
 
-  /** Whether the gate lets the driven robot move, as far as it said. */
+  /** Whether the gate lets the driven robot move, by its last report. */
   get _armed() {
     const { driven } = this;
     return driven !== null && this.robots.get(driven)?.armed !== false;
   }
 
-  /** What the operator should know of the chosen robot and of the hands. */
+  /** The state of the chosen robot and of the inputs, for the operator. */
   get status() {
-    const { choice, refusal, refused, robot } = this._reach;
+    const { choice, refusal, refused, robot } = this._requests;
     return {
       choice,
       report: choice === null ? null : (this.robots.get(choice) ?? null),
@@ -76,9 +76,9 @@ export class Pilot {
       taking: robot !== null,
       settled: this.settled,
       early: this._stream.early,
-      pressed: this.hands.pressed,
-      dead: this.hands.dead,
-      axes: this.hands.axes,
+      pressed: this.inputs.pressed,
+      blocked: this.inputs.blocked,
+      axes: this.inputs.axes,
       refusal,
       refused,
       delay: this._stream.delay,
@@ -94,45 +94,45 @@ export class Pilot {
   }
 
   /**
-   * Choose the robot that a press drives. The one driven until now is let go of,
-   * and what is held at this moment does nothing to the new one.
+   * Choose the robot that a press drives. The lease of the previous robot is released,
+   * and inputs that are pressed now do not move the new one.
    *
    * @param {string | null} robot
    * @param {number} now
    * @returns {Command[]}
    */
   choose(robot, now) {
-    if (robot === this._reach.choice) return [];
+    if (robot === this._requests.choice) return [];
     const messages = this.letGo(now);
-    this._reach.choose(robot);
-    if (this.hands.pressed) this.hands.kill(now);
+    this._requests.choose(robot);
+    if (this.inputs.pressed) this.inputs.block(now);
     return messages;
   }
 
   /**
-   * Ask for a lease by name rather than by a press.
+   * Request a lease by a button, not by a press of a drive input.
    *
    * @param {string} robot
    * @param {number} now
    */
   take(robot, now) {
-    return this._reach.take(robot, now);
+    return this._requests.take(robot, now);
   }
 
   /**
-   * Ask the holder for a robot.
+   * Request a robot from its holder.
    *
    * @param {string} robot
    */
   ask(robot) {
-    return this._reach.ask(robot);
+    return this._requests.ask(robot);
   }
 
   /**
-   * Hand a robot to the one who asks for it, neutral first.
+   * Hand a robot over to the requester, neutral first.
    *
-   * The lease is kept until the gate says that it is another's, as the one who asks may
-   * be gone by now.
+   * The lease is kept until the gate reports another holder, because the requester may be
+   * gone.
    *
    * @param {string} robot
    * @param {number} now
@@ -141,12 +141,12 @@ export class Pilot {
   grant(robot, now) {
     const grant = { op: "grant", robot };
     if (robot !== this.driven) return [grant];
-    this.doubt(now);
+    this.goNeutral(now);
     return [...this._stream.neutral(now), grant];
   }
 
   /**
-   * Give a lease back, neutral first.
+   * Release a lease, neutral first.
    *
    * @param {string} robot
    * @param {number} now
@@ -162,23 +162,23 @@ export class Pilot {
   }
 
   /**
-   * Let go of the robot that is driven or about to be, neutral first.
+   * Release the robot that is driven or requested, neutral first.
    *
    * @param {number} now
    * @returns {Command[]}
    */
   letGo(now) {
-    const robot = this.driven ?? this._reach.robot;
+    const robot = this.driven ?? this._requests.robot;
     if (robot === null) return [];
     const last = this._stream.neutral(now);
-    if (this.hands.pressed) this.hands.kill(now);
+    if (this.inputs.pressed) this.inputs.block(now);
     this._end();
     return [...last, { op: "release", robot }];
   }
 
   /**
-   * Say where a robot should go, or where it is. Its lease is kept, and given back when
-   * it is not used.
+   * Return the command that sends a goal or sets a pose. The lease is kept, and released
+   * when it is unused.
    *
    * @param {'goal' | 'locate'} op
    * @param {string} robot
@@ -192,7 +192,7 @@ export class Pilot {
   }
 
   /**
-   * Say that the lease of a robot that goes somewhere is needed still.
+   * Renew the lease of a robot that has a goal.
    *
    * @param {string} robot
    * @param {number} now
@@ -210,48 +210,48 @@ export class Pilot {
   }
 
   /**
-   * Doubt: neutral now, and nothing until the inputs were let go of and pressed anew.
+   * Go neutral now; inputs have no effect until they are released and pressed again.
    *
    * @param {number} now
-   * @param {{drop?: boolean}} [how] `drop`: also forget what is held, as its release
-   *     may never be heard of here.
+   * @param {{drop?: boolean}} [how] `drop`: also forget the pressed inputs,
+   *     because this page may not receive their release.
    */
-  doubt(now, how) {
-    this._stream.doubt(now, how);
+  goNeutral(now, how) {
+    this._stream.goNeutral(now, how);
   }
 
   /**
-   * STOP was said: the leases of that robot, or of all, are over by that.
+   * STOP was pressed: it ends the leases of that robot, or of all.
    *
    * @param {string} robot Or "*".
    * @param {number} now
    */
   stopped(robot, now) {
-    this.doubt(now);
+    this.goNeutral(now);
     this._leases.unpark(robot);
     if (robot === "*" || this._concerns(robot)) this._end();
   }
 
   /**
-   * A STOP is being ended by hand: what is held at this moment means nothing.
+   * The operator resets a STOP: inputs that are pressed now have no effect.
    *
    * @param {string} robot Or "*".
    * @param {number} now
    */
   reset(robot, now) {
-    this._reach.reset(robot);
-    this.hands.kill(now);
+    this._requests.reset(robot);
+    this.inputs.block(now);
   }
 
   /** Forget all leases: they ended with the connection. */
   disconnect() {
-    this._reach.forget();
+    this._requests.forget();
     this._leases.forget();
     this._stream.restart();
   }
 
   /**
-   * Take what the gate says of a robot.
+   * Process a report of the gate.
    *
    * @param {RobotReport} report
    * @param {number} now
@@ -263,10 +263,10 @@ export class Pilot {
     if (lease?.robot === robot) {
       const lost = lease.epoch !== this.epoch(robot);
       if (lost) this._stream.close();
-      // If it disarms, the gate saw a reason to stop that we did not.
-      if (lost || (before?.armed && !armed)) this.doubt(now);
+      // If the gate disarms, it has a reason to stop that this page does not know.
+      if (lost || (before?.armed && !armed)) this.goNeutral(now);
     }
-    this._reach.report(report, before, now);
+    this._requests.report(report, before, now);
   }
 
   /**
@@ -277,15 +277,15 @@ export class Pilot {
    */
   gone(robot, now) {
     this._leases.gone(robot);
-    this._reach.gone(robot);
+    this._requests.gone(robot);
     if (!this._concerns(robot)) return;
-    this._reach.end();
+    this._requests.end();
     this._stream.close();
-    this.doubt(now);
+    this.goNeutral(now);
   }
 
   /**
-   * Take the gate's refusal.
+   * Process a refusal of the gate.
    *
    * @param {string | null} robot
    * @param {string} what
@@ -293,25 +293,25 @@ export class Pilot {
    * @param {number} now
    */
   refuse(robot, what, why, now) {
-    this._reach.refuse(robot, what, why, now);
+    this._requests.refuse(robot, what, why, now);
   }
 
   /**
    * Decide what to send now.
    *
    * @param {number} now
-   * @param {boolean} attentive Whether the page is visible, has the focus, and
-   *     nobody types in it.
+   * @param {boolean} attentive Whether the page is visible, has the focus, and no
+   *     text field has it.
    * @returns {Command[]}
    */
   step(now, attentive) {
     this._stream.look(now, attentive);
-    const reached = this._reach.step(now);
+    const reached = this._requests.step(now);
     return [...reached, ...this._stream.step(this._armed, now), ...this._tidy(now)];
   }
 
   /**
-   * Give back what has not been used for a while.
+   * Release leases that were not used for a while.
    *
    * @param {number} now
    * @returns {Command[]}
@@ -324,19 +324,19 @@ export class Pilot {
     return [...driven, ...parked.flatMap((robot) => this.release(robot, now))];
   }
 
-  /** What this page drives or is about to drive is over, and reports of it are old. */
+  /** End driving or the request for it: reports of that lease are outdated. */
   _end() {
     const { lease } = this._stream;
     if (lease) this._leases.giveBack(lease.robot, lease.epoch);
-    this._reach.end();
+    this._requests.end();
     this._stream.close();
   }
 
   /**
    * @param {string} robot
-   * @returns {boolean} Whether this page drives it or is about to.
+   * @returns {boolean} Whether this page drives the robot or has requested it.
    */
   _concerns(robot) {
-    return robot === this.driven || robot === this._reach.robot;
+    return robot === this.driven || robot === this._requests.robot;
   }
 }

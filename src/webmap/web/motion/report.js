@@ -1,51 +1,51 @@
 /**
- * What the gate says of one robot.
+ * The gate's report on one robot.
  *
  * @typedef {object} RobotReport
  * @property {string} robot
  * @property {string} name
  * @property {'free' | 'held' | 'driving' | 'stopping' | 'stopped'} state
- * @property {string} doing The same in the words of an operator: a name of `WORDS`.
+ * @property {string} doing The state as the page shows it: a name of `WORDS`.
  * @property {{connection: string, name: string} | null} holder
  * @property {boolean} mine Whether this page's connection holds the lease.
  * @property {number | null} epoch
- * @property {boolean} armed Whether a command to move would be taken now.
- * @property {number} v The speed in force, in m/s.
- * @property {number} w The turning speed in force, in rad/s.
+ * @property {boolean} armed Whether the gate accepts a command to move now.
+ * @property {number} v The speed limit, in m/s.
+ * @property {number} w The turn limit, in rad/s.
  * @property {string[]} why What limits the speed.
  * @property {'up' | 'down'} link
- * @property {number[]} sent Velocity that was written: x, y in m/s, turn in rad/s, then
+ * @property {number[]} sent The velocity that was sent: x, y in m/s, turn in rad/s, then
  *     z in m/s, and rx, ry in rad/s.
  * @property {number[] | null} echoed
  * @property {number[] | null} measured
  * @property {boolean} armable
  * @property {string | null} reason Why it cannot be driven.
  *
- * What follows an older gate does not say.
+ * Older gates do not report the following.
  *
- * @property {boolean} [latched] Whether a STOP stands, until it is reset.
- * @property {StopWord | null} [stop] What became of that STOP.
- * @property {Asker | null} [asker] Who asks the holder for it.
- * @property {boolean} [changing] Whether a hand-over waits until the robot stands.
- * @property {string | null} [alarm] How the robot does not obey.
- * @property {string | null} [other_writer] That another program publishes velocities to
- *     it, and which.
- * @property {number | null} [stop_time] Within how many seconds it stops by itself.
- * @property {'stated' | 'tested' | null} [stop_source] How that is known.
+ * @property {boolean} [latched] Whether a STOP is active, until it is reset.
+ * @property {StopResult | null} [stop] The result of that STOP.
+ * @property {Asker | null} [asker] Who requests control.
+ * @property {boolean} [changing] Whether a handover waits until the robot has stopped.
+ * @property {string | null} [alarm] Why the robot counts as not obeying.
+ * @property {string | null} [other_writer] A sentence if another program publishes
+ *     velocities to the robot, and on which topic.
+ * @property {number | null} [stop_time] The command timeout of the base, in seconds.
+ * @property {'stated' | 'tested' | null} [stop_source] The source of `stop_time`.
  * @property {string | null} [stop_date] When it was tested, as in 2026-11-21.
- * @property {number} [reaction] Seconds from a finger to the robot at worst.
- * @property {number} [brake] How hard it brakes, in m/s², as far as is known.
- * @property {number | null} [age] How old commands are when the gate gets them, in ms.
- * @property {StopTest | null} [test] How the test of its own stopping goes.
- * @property {string | null} [way] How goals are sent to it; null if they cannot be.
- * @property {boolean} [cancels] Whether goals can be called off.
- * @property {boolean} [locates] Whether it can be told where it is.
- * @property {GoalWord | null} [goal] How it stands with its newest goal.
- * @property {string[]} [hooks] Which of its stop hooks failed, and why.
+ * @property {number} [reaction] The longest time from an input to the robot, in seconds.
+ * @property {number} [brake] The deceleration, in m/s², if known.
+ * @property {number | null} [age] The age of commands when they arrive at the gate, in ms.
+ * @property {StopTest | null} [test] The progress of the stop test.
+ * @property {string | null} [way] How goals are sent to it; null if that is impossible.
+ * @property {boolean} [cancels] Whether goals can be cancelled.
+ * @property {boolean} [locates] Whether its pose can be set.
+ * @property {GoalReport | null} [goal] The state of its newest goal.
+ * @property {string[]} [hooks] The stop hooks that failed, and why.
  */
 
 /**
- * @typedef {object} GoalWord
+ * @typedef {object} GoalReport
  * @property {string} id
  * @property {number} x Metres.
  * @property {number} y Metres.
@@ -62,12 +62,12 @@
  */
 
 /**
- * @typedef {object} StopWord
- * @property {string} by Who said STOP.
- * @property {boolean | null} confirmed Whether odometry says that the robot stands; null
- *     while that is looked for.
+ * @typedef {object} StopResult
+ * @property {string} by Who pressed STOP.
+ * @property {boolean | null} confirmed Whether odometry confirms that the robot has
+ *     stopped; null until that is decided.
  * @property {string} why Why it is not confirmed.
- * @property {string} [id] Its identity, which a reset must name. Each press has its own.
+ * @property {string} [id] Its identity, for a reset. Each press has its own.
  */
 
 /**
@@ -130,9 +130,9 @@ export function stopOf(key) {
 
 /**
  * @param {RobotReport} report
- * @returns {boolean} Whether a press may ask for the lease without asking a person.
+ * @returns {boolean} Whether a press may take the lease without a request to a person.
  */
-export function mayReach(report) {
+export function mayTake(report) {
   if (isLatched(report)) return false;
   return report.armable && (!heldByAnother(report) || heldByProgram(report));
 }

@@ -1,29 +1,29 @@
 /**
- * The page's half of motion, without sockets and timers: inputs and messages in,
- * commands and news out.
+ * The page's decisions about motion, without sockets and timers: from inputs and messages
+ * to commands and events.
  *
  * This folder decides what the page sends to the gate. Open this file first, then
- * `pilot.js` and `stream.js`. What reads the devices is in `../inputs`.
+ * `pilot.js` and `stream.js`. The devices are read in `../inputs`.
  */
 
-import { Asking } from "./asking.js";
-import { Hands } from "./hands.js";
+import { Requests } from "./requests.js";
+import { Inputs } from "./inputs.js";
 import { Loop } from "./loop.js";
 import { Onset } from "./onset.js";
 import { Pilot } from "./pilot.js";
 import { Stopping } from "./stopping.js";
 import { Unanswered } from "./unanswered.js";
 
-/** @typedef {import('./news.js').Item} Item */
-/** @typedef {import('./news.js').LinkState} LinkState */
+/** @typedef {import('./drive_events.js').DriveEvent} DriveEvent */
+/** @typedef {import('./drive_events.js').LinkState} LinkState */
 /** @typedef {import('./stream.js').Command} Command */
 
 /**
- * What this page and the gate know of each other, over one connection after another.
+ * The state that this page shares with the gate, across all its connections.
  *
- * Leases, numbers and ticks belong to one connection to one gate; what is held in the
- * hand, and a STOP that could not leave, outlive it. It hears what the gate says and
- * returns what is to be sent and told. Times are in milliseconds of one clock.
+ * Leases, numbers and ticks belong to one connection to one gate. The inputs, and a STOP
+ * that was not sent, do not. A session processes the gate's messages and returns what to
+ * send and which events to emit. Times are in milliseconds of one clock.
  */
 export class Session {
   /**
@@ -31,11 +31,11 @@ export class Session {
    * @param {{releaseAfter?: number}} options See {@link Pilot}.
    */
   constructor(now, options) {
-    this.hands = new Hands(now);
+    this.inputs = new Inputs(now);
     this.loop = new Loop();
-    this.pilot = new Pilot(this.hands, this.loop, now, options);
+    this.pilot = new Pilot(this.inputs, this.loop, now, options);
     this.stopping = new Stopping();
-    this.asking = new Asking();
+    this.requests = new Requests();
     this.onset = new Onset();
     /**
      * This connection's name at the gate; null while there is none.
@@ -46,14 +46,14 @@ export class Session {
     this.state = "connecting";
     this._unanswered = new Unanswered();
     /**
-     * STOPs that are the first thing to be said on the next connection.
+     * STOPs to send first on the next connection.
      * @type {Set<string>}
      */
     this._unsent = new Set();
   }
 
   /**
-   * What became of the STOPs of this page.
+   * Return the results of this page's STOPs.
    *
    * @param {number} now
    */
@@ -63,23 +63,23 @@ export class Session {
   }
 
   /**
-   * STOP was said.
+   * Note that STOP was pressed.
    *
    * @param {string} robot Or "*".
-   * @param {boolean} left Whether it has left this page; if not, or if the gate has not
-   *     answered it when the connection is lost, it will be the first thing said on the
-   *     next, as a stop that comes late is still a stop.
+   * @param {boolean} left Whether it was sent. If not, or if the gate has not answered when
+   *     the connection is lost, it is the first message on the next connection: a late stop
+   *     is still a stop.
    * @param {number} now
    */
   stopped(robot, left, now) {
-    if (left) this._unanswered.said(robot, this.pilot.robots);
+    if (left) this._unanswered.sent(robot, this.pilot.robots);
     else this._unsent.add(robot);
     this.pilot.stopped(robot, now);
     this.stopping.start(robot, this.pilot.robots, now);
   }
 
   /**
-   * A command was sent.
+   * Note that a command was sent.
    *
    * @param {Command} command
    * @param {number} now
@@ -91,65 +91,66 @@ export class Session {
   }
 
   /**
-   * Take what the gate says.
+   * Process a message of the gate.
    *
    * @param {any} message
    * @param {number} now
-   * @returns {{say: Command[], news: Item[]}} What to send, and then to tell.
+   * @returns {{send: Command[], events: DriveEvent[]}} What to send, then the events to emit.
    */
   receive(message, now) {
     if (message.op === "hello") return this._greeted(message.connection, now);
-    return { say: [], news: this._heard(message, now) };
+    return { send: [], events: this._received(message, now) };
   }
 
   /**
-   * Judge the link by how the loop is.
+   * Update the state of the link from the state of the loop.
    *
    * @param {number} now
-   * @returns {Item[] | null} What to tell; null if the connection is to be given up.
+   * @returns {DriveEvent[] | null} The events to emit; null if the connection must be
+   *     closed.
    */
   judge(now) {
     const state = this.loop.state(now);
     if (state === "lost") return null;
-    // Before its first word a gate may be anybody.
+    // Before its first message the other side may not be a gate.
     return this.connection === null ? [] : this._change(state);
   }
 
   /**
-   * The connection is lost.
+   * Note that the connection is lost.
    *
    * @param {number} now
-   * @returns {Item[]} What to tell.
+   * @returns {DriveEvent[]} The events to emit.
    */
   lost(now) {
     this.connection = null;
     this._forget(now);
-    const news = this._change("lost");
-    for (const report of this.pilot.robots.values()) news.push(["robot", report]);
-    return news;
+    const events = this._change("lost");
+    for (const report of this.pilot.robots.values()) events.push(["robot", report]);
+    return events;
   }
 
   /**
    * @param {string} connection
    * @param {number} now
-   * @returns {{say: Command[], news: Item[]}}
+   * @returns {{send: Command[], events: DriveEvent[]}}
    */
   _greeted(connection, now) {
-    // A second greeting on a connection: the gate was started anew.
+    // A second greeting on one connection: the gate was restarted.
     if (this.connection !== null) this._forget(now);
     this.connection = connection;
-    const say = [...this._unsent].map((robot) => ({ op: "stop", robot }));
-    for (const robot of this._unsent) this._unanswered.said(robot, this.pilot.robots);
+    const send = [...this._unsent].map((robot) => ({ op: "stop", robot }));
+    for (const robot of this._unsent) this._unanswered.sent(robot, this.pilot.robots);
     this._unsent.clear();
-    return { say, news: this._change("open") };
+    return { send, events: this._change("open") };
   }
 
   /**
    * @param {any} message
    * @param {number} now
-   * @returns {Item[]}
+   * @returns {DriveEvent[]}
    */
-  _heard(message, now) {
+  _received(message, now) {
     switch (message.op) {
       case "tick":
         this.loop.receive(message.tick, message.ack, now);
@@ -168,28 +169,28 @@ export class Session {
     }
   }
 
-  /** Those who follow what the gate says of each robot. */
+  /** The objects that process each report of the gate. */
   get _watching() {
-    return [this.pilot, this.stopping, this.asking, this.onset, this._unanswered];
+    return [this.pilot, this.stopping, this.requests, this.onset, this._unanswered];
   }
 
   /**
-   * Forget leases, numbers and ticks: they belong to one connection to one gate.
-   * A STOP that it has not answered does not.
+   * Forget leases, numbers and ticks: they belong to one connection to one gate. A STOP
+   * without an answer does not, and is kept.
    *
    * @param {number} now
    */
   _forget(now) {
     for (const robot of this._unanswered.take()) this._unsent.add(robot);
-    this.pilot.doubt(now);
+    this.pilot.goNeutral(now);
     this.pilot.disconnect();
-    this.asking.forget();
+    this.requests.forget();
     this.loop.open(now);
   }
 
   /**
    * @param {LinkState} state
-   * @returns {Item[]}
+   * @returns {DriveEvent[]}
    */
   _change(state) {
     if (state === this.state) return [];

@@ -1,17 +1,16 @@
 import { isTested, signed, speedAlong } from "./figures.js";
 import { doingOf, heldByAnother, isLatched } from "./report.js";
 import { WORDS } from "./state_words.js";
-import { stopWords } from "./stopping.js";
+import { stopText } from "./stopping.js";
 
-/** @typedef {import('./asking.js').Request} Request */
+/** @typedef {import('./requests.js').Request} Request */
 /** @typedef {import('./pilot.js').Pilot} Pilot */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 /** @typedef {import('./stopping.js').Verdict} Verdict */
 
 /**
- * How it stands with driving a robot from this page, to be shown as words, a shape and
- * a colour: the state names all three. Every page has the same words for what
- * a robot is doing.
+ * The state of driving a robot from this page. A page shows it as text, a shape and a
+ * colour, all three by this name. Every page has the same text for what a robot is doing.
  *
  * @typedef {'none' | 'connecting' | 'lost' | 'late' | 'fixed' | 'held' | 'free' |
  *     'taking' | 'ready' | 'hands-off' | 'driving' | 'blocked' | 'moving' |
@@ -23,10 +22,10 @@ import { stopWords } from "./stopping.js";
 /**
  * @typedef {object} More
  * @property {Verdict} [verdict] The result of a STOP of this page.
- * @property {Request} [request] Who asks for the robot.
- * @property {string} [inputs] What there is to drive with.
+ * @property {Request} [request] The request for control of the robot.
+ * @property {string} [inputs] The available inputs, as text.
  * @property {string} [seen] The state that the display shows: a name of `WORDS`.
- * @property {string} [since] When the display had the newest pose of a robot that is gone.
+ * @property {string} [since] When the display received the last pose of a robot that is gone.
  */
 
 /** @typedef {import('../drive.js').Drive['status']} Status */
@@ -34,10 +33,10 @@ import { stopWords } from "./stopping.js";
 const KEYS = "W A S D or the arrow keys";
 
 /**
- * Say what there is to drive with.
+ * Return the available inputs, as text.
  *
  * @param {{touch: boolean, stick: boolean, gamepad: boolean}} what `touch`: whether
- *     fingers are the pointer, so that there may be no keys.
+ *     the pointer is a finger, so that there may be no keyboard.
  */
 export function inputsOf({ touch, stick, gamepad }) {
   const pad = gamepad ? ", or LB and the left stick of the gamepad" : "";
@@ -46,25 +45,24 @@ export function inputsOf({ touch, stick, gamepad }) {
 }
 
 /**
- * Say how it stands.
+ * Describe the state of driving a robot from this page.
  *
  * @param {Status} status
  * @param {string | null} robot The robot that is selected where this is shown.
- * @param {RobotReport | null} report The gate's word on it.
- * @param {boolean} active Whether the page's keys belong to that map.
+ * @param {RobotReport | null} report The gate's report on it.
+ * @param {boolean} active Whether the page's inputs belong to that map.
  * @param {More} [more]
  * @returns {Description}
  */
 export function describe(status, robot, report, active, more = {}) {
   const link = ofLink(status);
   if (link) return link;
-  const said = ofRobot(status, robot, report, active, more);
+  const state = ofRobot(status, robot, report, active, more);
   const { other_writer: other, hooks = [] } = report ?? {};
-  if (!other && hooks.length === 0) return said;
-  // Whatever else there is to say: who else moves it, and that its STOP is not what it
-  // was made to be.
-  const words = [said.detail, other ?? "", ...hooks].filter(Boolean).map(sentence);
-  return say(said.state, said.title, words.join(" "));
+  if (!other && hooks.length === 0) return state;
+  // In every state: another program that moves the robot, and failed stop hooks.
+  const words = [state.detail, other ?? "", ...hooks].filter(Boolean).map(sentence);
+  return description(state.state, state.title, words.join(" "));
 }
 
 /**
@@ -77,27 +75,27 @@ export function describe(status, robot, report, active, more = {}) {
 function ofRobot(status, robot, report, active, more) {
   const { verdict, inputs = KEYS, seen = "", since = "" } = more;
   if (verdict?.state === "unconfirmed" && !(report && isLatched(report))) {
-    return say("unconfirmed", WORDS.unconfirmed, reasonOf(verdict));
+    return description("unconfirmed", WORDS.unconfirmed, reasonOf(verdict));
   }
   if (robot === null) {
-    return say("none", "No robot selected", "Select a robot to drive it.");
+    return description("none", "No robot selected", "Select a robot to drive it.");
   }
   if (report === null) {
     const title = wordsOf(seen in WORDS ? seen : "watched", { since });
-    return say("fixed", title, "This robot has no velocity topic.");
+    return description("fixed", title, "This robot has no velocity topic.");
   }
   const name = doingOf(report, seen);
   const title = wordsOf(name, { report, since });
   if (isLatched(report)) return ofStopped(title, status, report);
   if (name === "changing") {
-    return say("taking", title, "The robot stops first.");
+    return description("taking", title, "The robot stops first.");
   }
   if (heldByAnother(report)) return ofOther(title, status, report, more.request);
   if (!active) {
-    return say("free", "Map not active", "Click this map to drive from it.");
+    return description("free", "Map not active", "Click this map to drive from it.");
   }
   const driven = status.driven === robot;
-  const kept = driven ? ofHands(status, report, title) : ofReach(status, report, title);
+  const kept = driven ? ofInputs(status, report, title) : ofTaking(status, report, title);
   if (kept) return kept;
   const ready = status.settled && !status.early;
   if (name === "held" && driven && !ready) return gettingReady();
@@ -105,7 +103,7 @@ function ofRobot(status, robot, report, active, more) {
 }
 
 /**
- * Return the words of a state, for this page.
+ * Return the text of a state, for this page.
  *
  * @param {string} name Of `WORDS`.
  * @param {{report?: RobotReport, since?: string}} about
@@ -120,7 +118,7 @@ function wordsOf(name, { report, since = "" }) {
 }
 
 /**
- * Say how fast the robot may go, and why not faster.
+ * Return the speed limits and their reasons, as text.
  *
  * @param {RobotReport} report
  */
@@ -131,35 +129,35 @@ export function capOf(report) {
 }
 
 /**
- * Say how fast the robot moves, as odometry has it.
+ * Return the speed of the robot by odometry, as text.
  *
  * @param {RobotReport} report
  */
 export function speedOf({ measured }) {
   if (!measured) return "Speed unknown";
-  return velocityWords(measured);
+  return velocityText(measured);
 }
 
 /**
  * @param {readonly number[]} velocity As a report has it.
- * @returns {string} Backwards and clockwise are below zero.
+ * @returns {string} Backwards and clockwise are negative.
  */
-function velocityWords(velocity) {
+function velocityText(velocity) {
   return `${signed(speedAlong(velocity) ?? 0)} m/s, ${signed(velocity[2])} rad/s`;
 }
 
 /** @param {Status} status */
 function ofLink({ link }) {
-  if (link === "connecting") return say("connecting", "Preparing input", "Connecting.");
+  if (link === "connecting") return description("connecting", "Preparing input", "Connecting.");
   if (link === "lost") {
-    return say(
+    return description(
       "lost",
       "Connection lost",
       "No robot can be driven from this page. Reconnecting…",
     );
   }
   if (link === "late") {
-    return say(
+    return description(
       "late",
       "Slow connection",
       "Command too old (over 300 ms): ignored",
@@ -174,13 +172,13 @@ function ofLink({ link }) {
  * @param {RobotReport} report
  */
 function ofStopped(title, status, report) {
-  const { confirmed, text } = stopWords(report);
+  const { confirmed, text } = stopText(report);
   const detail = text || report.reason || "";
-  // That commands are refused now is no news.
+  // A refusal of other commands needs no message here.
   const refused = status.refused === "reset" ? status.refusal : null;
   const refusal = refused ? ` ${sentence(refused)}` : "";
   const state = confirmed === false ? "unconfirmed" : "stopped";
-  return say(state, title, `${detail}${refusal}`);
+  return description(state, title, `${detail}${refusal}`);
 }
 
 /** @param {Verdict} verdict */
@@ -201,40 +199,40 @@ function ofOther(title, status, report, request) {
     words.push(`Control requested: handed over in ${request.left} s unless ${who} refuses.`);
   } else if (request) words.push(`${request.who} requests control.`);
   else if (status.refusal) words.push(sentence(status.refusal));
-  return say("held", title, words.join(" "));
+  return description("held", title, words.join(" "));
 }
 
 /**
- * Describe why the hands of this page do not move the robot that it holds.
+ * Describe why the inputs of this page do not move the robot that it controls.
  *
  * @param {Status} status
  * @param {RobotReport} report
  * @param {string} title
- * @returns {Description | null} null if they do.
+ * @returns {Description | null} null if they move it.
  */
-function ofHands(status, report, title) {
-  if (isTested(report)) return say("driving", "Stop test running", "Do not touch any input.");
+function ofInputs(status, report, title) {
+  if (isTested(report)) return description("driving", "Stop test running", "Do not touch any input.");
   if (report.state === "driving") return null;
-  if (report.reason) return say("fixed", title, sentence(report.reason));
-  return status.pressed && status.dead ? handsOff() : null;
+  if (report.reason) return description("fixed", title, sentence(report.reason));
+  return status.pressed && status.blocked ? inputBlocked() : null;
 }
 
 /**
- * Describe what keeps a press from taking a robot.
+ * Describe why a press does not take a robot.
  *
  * @param {Status} status
  * @param {RobotReport} report
  * @param {string} title
- * @returns {Description | null} null if nothing does.
+ * @returns {Description | null} null if it takes it.
  */
-function ofReach(status, report, title) {
+function ofTaking(status, report, title) {
   if (status.taking) return gettingReady();
   if (report.state === "stopping") return null;
   if (!report.armable) {
-    return say("fixed", title, sentence(report.reason ?? "no reason given"));
+    return description("fixed", title, sentence(report.reason ?? "no reason given"));
   }
-  if (status.refusal) return say("free", title, sentence(status.refusal));
-  if (status.pressed && status.dead) return handsOff();
+  if (status.refusal) return description("free", title, sentence(status.refusal));
+  if (status.pressed && status.blocked) return inputBlocked();
   return status.early ? gettingReady() : null;
 }
 
@@ -250,31 +248,31 @@ function ofReach(status, report, title) {
 function ofDoing(name, title, report, inputs) {
   switch (name) {
     case "blocked": {
-      const sent = `Sent: ${velocityWords(report.sent)}.`;
-      return say("blocked", title, `${sent} Measured: ${speedOf(report)}.`);
+      const sent = `Sent: ${velocityText(report.sent)}.`;
+      return description("blocked", title, `${sent} Measured: ${speedOf(report)}.`);
     }
     case "driven":
-      return say("driving", title, speedOf(report));
+      return description("driving", title, speedOf(report));
     case "stopping":
     case "settling":
-      return say("stopping", title, speedOf(report));
+      return description("stopping", title, speedOf(report));
     case "moving":
     case "other":
-      return say("moving", title, report.measured ? speedOf(report) : "");
+      return description("moving", title, report.measured ? speedOf(report) : "");
     case "navigating":
     case "navigating_held":
-      return say("moving", title, `To drive, hold ${inputs}. This cancels the goal.`);
+      return description("moving", title, `To drive, hold ${inputs}. This cancels the goal.`);
   }
-  if (name !== "held") return say("free", title, `Hold ${inputs} to drive.`);
-  return say("ready", title, `Hold ${inputs} to drive. Press Space for STOP.`);
+  if (name !== "held") return description("free", title, `Hold ${inputs} to drive.`);
+  return description("ready", title, `Hold ${inputs} to drive. Press Space for STOP.`);
 }
 
 function gettingReady() {
-  return say("taking", "Preparing input", "");
+  return description("taking", "Preparing input", "");
 }
 
-function handsOff() {
-  return say("hands-off", "Input blocked: release all keys, then press again", "");
+function inputBlocked() {
+  return description("hands-off", "Input blocked: release all keys, then press again", "");
 }
 
 /**
@@ -283,12 +281,12 @@ function handsOff() {
  * @param {string} detail
  * @returns {Description}
  */
-function say(state, title, detail) {
+function description(state, title, detail) {
   return { state, title, detail };
 }
 
 /**
- * Return words of the gate as a sentence. A name at the beginning, such as a URL or a
+ * Return a text of the gate as a sentence. A name at the beginning, such as a URL or a
  * topic, keeps its small letter.
  *
  * @param {string} text

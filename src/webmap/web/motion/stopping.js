@@ -2,26 +2,26 @@ import { isLatched, linearSpeed, angularSpeed } from "./report.js";
 
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
-/** Stands for all robots. */
+/** Means all robots. */
 const ALL = "*";
 
-/** Slower than this a robot stands: m/s and rad/s. */
+/** Below these speeds a robot counts as not moving: m/s and rad/s. */
 const STANDS = { v: 0.02, w: 0.05 };
 
-/** Faster than this a robot that was told to stop does not obey: m/s and rad/s. */
+/** Above these speeds a robot that must stop does not obey: m/s and rad/s. */
 const MOVES = { v: 0.05, w: 0.1 };
 
-/** The gate has answered a STOP by then, in ms. */
+/** The gate answers a STOP within this time, in ms. */
 export const ANSWER_PATIENCE = 300;
 
-/** A robot that was stopped stands by then, in ms. */
+/** A stopped robot does not move any more after this time, in ms. */
 export const STAND_PATIENCE = 1000;
 
-/** How long a verdict that is good is shown, in ms. */
+/** How long a confirmed result is shown, in ms. */
 const SHOWN = 5000;
 
 /**
- * What became of the STOP of one robot.
+ * The result of the STOP of one robot.
  *
  * @typedef {object} Verdict
  * @property {string} robot
@@ -33,30 +33,30 @@ const SHOWN = 5000;
 /** @typedef {{since: number, answered: boolean, stoodAt: number | null}} Watch */
 
 /**
- * Watches what becomes of the STOPs of this page, by what odometry says and by nothing
- * else: the gate says what it makes of that, and where it does not, the page looks.
+ * Watches the results of this page's STOPs. Only odometry confirms a STOP: the gate decides
+ * that, or, if an older gate does not report it, the page.
  *
  * Times are in milliseconds of one clock.
  */
 export class Stopping {
   constructor() {
     /**
-     * By robot; with that of all if no robot was known to be stopped by it.
+     * By robot; "*" for a STOP of all robots while none was known.
      * @type {Map<string, Watch>}
      */
     this._watched = new Map();
   }
 
   /**
-   * A STOP was sent.
+   * Note that a STOP was sent.
    *
    * @param {string} robot Or "*" for all.
-   * @param {ReadonlyMap<string, RobotReport>} known The robots that there are.
+   * @param {ReadonlyMap<string, RobotReport>} known The known robots.
    * @param {number} now
    */
   start(robot, known, now) {
     for (const id of robot === ALL && known.size > 0 ? known.keys() : [robot]) {
-      // Where a STOP stands already there may be no news to answer with.
+      // If a STOP is active already, there may be no new report as an answer.
       const answered = known.get(id)?.latched === true;
       this._watched.set(id, { since: now, answered, stoodAt: null });
       const report = known.get(id);
@@ -65,7 +65,7 @@ export class Stopping {
   }
 
   /**
-   * The gate spoke of a robot.
+   * Process a report of the gate.
    *
    * @param {RobotReport} report
    * @param {number} now
@@ -76,7 +76,7 @@ export class Stopping {
     const watch = this._watched.get(report.robot);
     if (!watch) return;
     if (!stopped && watch.answered) {
-      // It was reset, or somebody drives it again; that is another story.
+      // It was reset, or an operator drives it again: this STOP is over.
       this._watched.delete(report.robot);
       return;
     }
@@ -87,8 +87,8 @@ export class Stopping {
   }
 
   /**
-   * Watch a robot that is heard of after a STOP for all that met none. Others will be,
-   * until the gate says of one that it is stopped.
+   * Watch a robot that is first reported after a STOP for all, if none was known then.
+   * This ends when the gate reports a stopped robot.
    *
    * @param {string} robot
    * @param {boolean} stopped
@@ -109,14 +109,14 @@ export class Stopping {
     this._watched.delete(robot);
   }
 
-  /** Forget all that is settled or was seen. */
+  /** Forget all results, decided or not. */
   dismiss() {
     this._watched.clear();
   }
 
   /**
    * @param {ReadonlyMap<string, RobotReport>} robots
-   * @param {boolean} connected Whether the gate can be heard.
+   * @param {boolean} connected Whether messages of the gate arrive.
    * @param {number} now
    * @returns {Verdict[]}
    */
@@ -133,15 +133,15 @@ export class Stopping {
 }
 
 /**
- * Tells which robots move although they were given zero for a second: not obeying.
+ * Finds robots that do not obey: they move although only zero was sent for a second.
  *
- * A robot that stood once after its zero, or was given something else since, obeys: it
- * may be on its way to a goal, or somebody else's to drive.
+ * A robot that stopped once since then, or that got another command, obeys: it may move to
+ * a goal, or another operator may drive it.
  */
 export class Obedience {
   constructor() {
     /**
-     * When robots that moved were given zero.
+     * When zero was first sent to robots that moved.
      * @type {Map<string, number>}
      */
     this._zeroSince = new Map();
@@ -162,7 +162,7 @@ export class Obedience {
   }
 
   /**
-   * A robot was told to go somewhere by itself, or is gone.
+   * Stop watching a robot that has a new goal, or is gone.
    *
    * @param {string} robot
    */
@@ -172,7 +172,7 @@ export class Obedience {
 
   /**
    * @param {number} now
-   * @returns {RobotReport[]} The newest word on each robot that does not obey.
+   * @returns {RobotReport[]} The newest report on each robot that does not obey.
    */
   disobeying(now) {
     return [...this._zeroSince]
@@ -214,8 +214,8 @@ function judge(robot, report, watch, connected, now) {
   if (report?.link === "down") return unsure("no connection to the robot");
   if (watch.stoodAt !== null) {
     const more = [...besides(report?.stop?.why), ...(report?.hooks ?? [])];
-    const words = ["stopped, confirmed by odometry", ...more];
-    return { robot, name, state: "confirmed", text: words.join("; ") };
+    const parts = ["stopped, confirmed by odometry", ...more];
+    return { robot, name, state: "confirmed", text: parts.join("; ") };
   }
   if (waited <= STAND_PATIENCE) {
     return { robot, name, state: "stopping", text: "stopping" };
@@ -225,13 +225,13 @@ function judge(robot, report, watch, connected, now) {
 }
 
 /**
- * Say of a robot for which a STOP stands what became of that.
+ * Return the result of a robot's active STOP, as text.
  *
  * @param {RobotReport} report
- * @returns {{confirmed: boolean | null, text: string}} In words for a person; `confirmed`
- *     is null while it is not known.
+ * @returns {{confirmed: boolean | null, text: string}} `confirmed` is null while it
+ *     is unknown.
  */
-export function stopWords({ stop }) {
+export function stopText({ stop }) {
   if (!stop) return { confirmed: null, text: "" };
   const by = stop.by ? `By ${stop.by}` : "";
   const more = besides(stop.why);
@@ -245,31 +245,31 @@ export function stopWords({ stop }) {
 }
 
 /**
- * @param {string} [why] What the gate says of a STOP.
- * @returns {string[]} What it says besides whether the robot stands: that the disk does
- *     not have the STOP.
+ * @param {string} [why] The gate's text about a STOP.
+ * @returns {string[]} Its parts that are not about motion: that the STOP is not stored on
+ *     the disk.
  */
 function besides(why = "") {
   return why.split("; ").slice(1);
 }
 
 /**
- * Say which STOPs stand.
+ * Return the active STOPs, as text.
  *
  * @param {Iterable<RobotReport>} reports
- * @returns {string} "" when none does.
+ * @returns {string} "" if there is none.
  */
 export function standingStops(reports) {
   const stopped = [...reports].filter(isLatched);
   if (stopped.length === 0) return "";
-  const doubtful = stopped.filter(({ stop }) => stop?.confirmed === false).length;
+  const unconfirmed = stopped.filter(({ stop }) => stop?.confirmed === false).length;
   const one = stopped.length === 1;
   const who = one ? stopped[0].name : `${stopped.length} robots`;
-  const doubt = one ? "NOT CONFIRMED" : `${doubtful} NOT CONFIRMED`;
+  const result = one ? "NOT CONFIRMED" : `${unconfirmed} NOT CONFIRMED`;
   const unhooked = stopped.filter(({ hooks }) => hooks?.length).map(({ name }) => name);
   const hooks = unhooked.length ? ` Stop hooks failed: ${unhooked.join(", ")}.` : "";
-  const doubts = doubtful ? `, ${doubt}` : "";
-  return `STOP active: ${who}${doubts}.${hooks}`;
+  const results = unconfirmed ? `, ${result}` : "";
+  return `STOP active: ${who}${results}.${hooks}`;
 }
 
 /** @param {RobotReport} report */

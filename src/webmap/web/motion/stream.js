@@ -2,7 +2,7 @@ import { NEUTRAL, isNeutral } from "./axes.js";
 import { Pictures } from "./pictures.js";
 
 /** @typedef {import('./axes.js').Axes} Axes */
-/** @typedef {import('./hands.js').Hands} Hands */
+/** @typedef {import('./inputs.js').Inputs} Inputs */
 /** @typedef {import('./loop.js').Loop} Loop */
 
 /** @typedef {{op: string, robot: string, [field: string]: unknown}} Command */
@@ -13,40 +13,39 @@ import { Pictures } from "./pictures.js";
  * @typedef {object} Lease
  * @property {string} robot
  * @property {number} epoch
- * @property {number | null} firstNeutral The first command since the last doubt.
- * @property {number | null} seenSince Since when the gate is known to see neutral.
- * @property {number} usedAt When it moved the robot last, or was needed otherwise.
+ * @property {number | null} firstNeutral The first command since `goNeutral`.
+ * @property {number | null} seenSince Since when the gate acknowledges neutral commands.
+ * @property {number} usedAt When it was last used, for motion or otherwise.
  */
 
 /**
- * For how long neutral is streamed, counted from the gate's first acknowledgement of
- * it, before a new lease moves anything; ms. The gate asks for 200 ms of neutral as
- * it saw them; counting from the acknowledgement makes sure that it did, whatever
- * the delay on the way.
+ * How long a new lease sends neutral before it may move a robot, from the gate's first
+ * acknowledgement; ms. The gate requires 200 ms of neutral commands. Because the time
+ * begins with the acknowledgement, the delay of the connection does not shorten it.
  */
 export const SETTLE = 250;
 
-/** Steps come every 50 ms; after a longer gap than this the page was not awake; ms. */
+/** Steps come every 50 ms; after a longer gap the page was frozen or too busy; ms. */
 export const ASLEEP = 250;
 
-/** A page that kept time for so long has loaded what made it late, most likely; ms. */
+/** After this time without such a gap the page has probably finished loading; ms. */
 export const CALM = 500;
 
 /**
- * The stream of commands under one lease: how the hands are, or neutral.
+ * The stream of commands under one lease: the state of the inputs, or neutral.
  *
- * It is neutral until the gate has seen neutral for a stretch since the last doubt, and
- * whatever it notices itself of a page that is not attentive, a loop that is not open
- * and a picture that is too old is a doubt. Times are in milliseconds of one clock.
+ * It is neutral until the gate has received neutral for {@link SETTLE} ms. It becomes
+ * neutral again when the page is not attentive, the loop is not open, or the camera
+ * picture is too old. Times are in milliseconds of one clock.
  */
 export class Stream {
   /**
-   * @param {Hands} hands
+   * @param {Inputs} inputs
    * @param {Loop} loop
    * @param {number} now
    */
-  constructor(hands, loop, now) {
-    this.hands = hands;
+  constructor(inputs, loop, now) {
+    this.inputs = inputs;
     this.loop = loop;
     this.pictures = new Pictures();
     /** @type {Lease | null} */
@@ -57,28 +56,28 @@ export class Stream {
     this._attentive = true;
   }
 
-  /** Whether a press would come too early: the page gets ready for one by itself. */
+  /** Whether a press would be too early. The page becomes ready without any input. */
   get early() {
-    if (!this._attentive || this.hands.pressed) return false;
+    if (!this._attentive || this.inputs.pressed) return false;
     const now = this._lookedAt;
     const calm = now - this._sleptAt >= CALM;
-    return this.loop.tick === null || !calm || !this.hands.ready(now);
+    return this.loop.tick === null || !calm || !this.inputs.ready(now);
   }
 
-  /** Whether the gate has seen enough neutral, as far as can be known here. */
+  /** Whether the gate has received enough neutral, by its acknowledgements. */
   get settled() {
     const since = this.lease?.seenSince ?? null;
     return since !== null && this._lookedAt - since >= SETTLE;
   }
 
-  /** How long a command takes to be acknowledged, in ms; null before any was. */
+  /** How long an acknowledgement takes, in ms; null before the first. */
   get delay() {
     const { delay } = this.loop;
     return delay === null ? null : Math.max(delay, this.loop.age(this._lookedAt));
   }
 
   /**
-   * Go out under this lease from now on.
+   * Send commands under this lease.
    *
    * @param {string} robot
    * @param {number} epoch
@@ -89,39 +88,39 @@ export class Stream {
     this.lease = { robot, epoch, firstNeutral: null, seenSince: null, usedAt: now };
   }
 
-  /** There is no lease to go out under. */
+  /** Stop sending: there is no lease. */
   close() {
     this.lease = null;
     this.loop.rest();
   }
 
-  /** Number from the start: this is another connection. */
+  /** Start the numbers again, for another connection. */
   restart() {
     this.close();
     this._seq = 0;
   }
 
   /**
-   * Doubt: neutral now, and nothing until the inputs were let go of and pressed anew.
+   * Go neutral now; inputs have no effect until they are released and pressed again.
    *
    * @param {number} now
-   * @param {{drop?: boolean}} [how] `drop`: also forget what is held, as its release
-   *     may never be heard of here.
+   * @param {{drop?: boolean}} [how] `drop`: also forget the pressed inputs,
+   *     because this page may not receive their release.
    */
-  doubt(now, { drop = false } = {}) {
-    if (drop) this.hands.drop(now);
-    else this.hands.kill(now);
+  goNeutral(now, { drop = false } = {}) {
+    if (drop) this.inputs.drop(now);
+    else this.inputs.block(now);
     if (!this.lease) return;
     this.lease.firstNeutral = null;
     this.lease.seenSince = null;
   }
 
   /**
-   * Look whether the operator can be driving at all.
+   * Go neutral if the operator cannot be driving.
    *
    * @param {number} now
-   * @param {boolean} attentive Whether the page is visible, has the focus, and
-   *     nobody types in it.
+   * @param {boolean} attentive Whether the page is visible, has the focus, and no
+   *     text field has it.
    */
   look(now, attentive) {
     const gap = now - this._lookedAt;
@@ -129,15 +128,15 @@ export class Stream {
     this._attentive = attentive;
     const slept = gap < 0 || gap > ASLEEP;
     if (slept) this._sleptAt = now;
-    if (!attentive || slept) this.doubt(now, { drop: true });
-    if (this.loop.tick === null || this.loop.state(now) !== "open") this.doubt(now);
-    if (this.lease && this.pictures.blind(this.lease.robot)) this.doubt(now);
+    if (!attentive || slept) this.goNeutral(now, { drop: true });
+    if (this.loop.tick === null || this.loop.state(now) !== "open") this.goNeutral(now);
+    if (this.lease && this.pictures.blind(this.lease.robot)) this.goNeutral(now);
   }
 
   /**
-   * @param {boolean} armed Whether the gate would take a command to move.
+   * @param {boolean} armed Whether the gate accepts a command to move.
    * @param {number} now
-   * @returns {Command[]} What goes out at this step.
+   * @returns {Command[]} The commands to send at this step.
    */
   step(armed, now) {
     const { lease } = this;
@@ -145,14 +144,14 @@ export class Stream {
     if (lease.firstNeutral !== null && this.loop.acknowledged(lease.firstNeutral)) {
       lease.seenSince ??= now;
     }
-    const { axes } = this.hands;
+    const { axes } = this.inputs;
     if (!isNeutral(axes)) lease.usedAt = now;
     return [this._command(lease, armed && this.settled ? axes : NEUTRAL, now)];
   }
 
   /**
    * @param {number} now
-   * @returns {Command[]} A last word under this lease, if there is one.
+   * @returns {Command[]} A neutral command under this lease, if there is one.
    */
   neutral(now) {
     return this.lease ? [this._command(this.lease, NEUTRAL, now)] : [];

@@ -3,56 +3,56 @@ import { isLatched } from "./report.js";
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
 /**
- * The STOPs of this page that no gate has answered yet.
+ * The STOPs of this page that the gate has not answered yet.
  *
- * A connection may be dead long before that shows: what left through it may not have
- * arrived. So each is kept until the gate says that its robots are stopped, and is said
- * again on the next connection if that does not come; a stop that comes late, or twice,
- * is still a stop.
+ * A connection may be dead for a while before the page notices, so a sent STOP may not
+ * have arrived. Each STOP is kept until the gate reports its robots as stopped. If that
+ * does not happen, it is sent again on the next connection: a late or repeated stop is
+ * still a stop.
  */
 export class Unanswered {
   constructor() {
     /**
-     * What was said, "*" for all, and the robots that have not answered: with the STOP
-     * that stood for each, if one did.
+     * For each STOP, "*" for all: the robots without an answer, each with the id of the
+     * STOP that was active before, or "".
      * @type {Map<string, Map<string, string>>}
      */
-    this._said = new Map();
-    /** Whether the STOP for all met no robot known, and none stopped was reported since. */
+    this._sent = new Map();
+    /** Whether no robot was known at the STOP for all, and none was reported stopped since. */
     this._metNone = false;
   }
 
   /**
-   * A STOP was said.
+   * Note that a STOP was sent.
    *
    * @param {string} robot Or "*".
-   * @param {ReadonlyMap<string, RobotReport>} known The robots that there are.
+   * @param {ReadonlyMap<string, RobotReport>} known The known robots.
    */
-  said(robot, known) {
+  sent(robot, known) {
     const meant = robot === "*" ? [...known.keys()] : [robot];
     const before = (/** @type {string} */ id) => known.get(id)?.stop?.id ?? "";
     if (robot === "*") this._metNone = known.size === 0;
-    this._said.set(robot, new Map(meant.map((id) => [id, before(id)])));
+    this._sent.set(robot, new Map(meant.map((id) => [id, before(id)])));
   }
 
   /**
-   * The gate spoke of a robot.
+   * Process a report of the gate.
    *
    * @param {RobotReport} report
    */
   report(report) {
     if (!isLatched(report)) {
-      // It may have been told before the STOP arrived, which may never arrive: no answer.
-      if (this._metNone) this._said.get("*")?.set(report.robot, "");
+      // This report may be older than the arrival of the STOP: it is no answer.
+      if (this._metNone) this._sent.get("*")?.set(report.robot, "");
       return;
     }
     this._answered(report.robot, report.stop?.id);
-    if (this._metNone && this._said.get("*")?.size === 0) this._said.delete("*");
+    if (this._metNone && this._sent.get("*")?.size === 0) this._sent.delete("*");
     this._metNone = false;
   }
 
   /**
-   * A robot is gone.
+   * Forget a robot that is gone.
    *
    * @param {string} robot
    */
@@ -62,25 +62,25 @@ export class Unanswered {
 
   /**
    * @param {string} robot
-   * @param {string | undefined} stop The STOP that stands for it. The one that stood
-   *     when STOP was said here is no answer, as somebody may be resetting it.
+   * @param {string | undefined} stop The STOP that is active for it. The one that was
+   *     active before is no answer, because another operator may be resetting it.
    */
   _answered(robot, stop) {
-    for (const [said, waiting] of this._said) {
+    for (const [target, waiting] of this._sent) {
       if (!waiting.has(robot) || waiting.get(robot) === (stop ?? null)) continue;
       waiting.delete(robot);
-      if (waiting.size === 0) this._said.delete(said);
+      if (waiting.size === 0) this._sent.delete(target);
     }
   }
 
   /**
-   * The connection is lost.
+   * Note that the connection is lost.
    *
-   * @returns {string[]} What is to be said again.
+   * @returns {string[]} The STOPs to send again.
    */
   take() {
-    const again = [...this._said.keys()];
-    this._said.clear();
+    const again = [...this._sent.keys()];
+    this._sent.clear();
     this._metNone = false;
     return again;
   }

@@ -1,4 +1,4 @@
-import { deskOf } from "../inputs/desk.js";
+import { devicesOf } from "../inputs/devices.js";
 import { attentive } from "../motion/attention.js";
 import { apply, unapply } from "../view.js";
 
@@ -94,7 +94,7 @@ export class PressAim {
     this._press = null;
     this._ending = new AbortController();
     this._listen();
-    this._offEscape = deskOf(map.drive).claimEscape(() => this.leave());
+    this._offEscape = devicesOf(map.drive).claimEscape(() => this.leave());
   }
 
   destroy() {
@@ -177,8 +177,8 @@ export class PressAim {
   _keyDown(event) {
     if (event.key !== this._key || event.repeat || event.isComposing) return;
     if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
-    const { active: desk } = deskOf(this._map.drive);
-    if (desk !== null && desk.map !== this._map) return;
+    const { active: drivingMap } = devicesOf(this._map.drive);
+    if (drivingMap !== null && drivingMap.map !== this._map) return;
     this.toggle();
   }
 

@@ -13,7 +13,7 @@ export function byId(id) {
  * @param {Element} element
  * @param {string} text
  */
-export function say(element, text) {
+export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
@@ -50,7 +50,7 @@ export function nameSheet(map) {
       .filter((one) => getComputedStyle(one).display !== "none")
       .map((one) => one.textContent);
     const count = byId("robots-count").textContent ?? "";
-    say(text, name ? `${name}: ${states.join(" \u00b7 ")}` : count);
+    setText(text, name ? `${name}: ${states.join(" \u00b7 ")}` : count);
   };
   show();
   const timer = setInterval(show, 500);

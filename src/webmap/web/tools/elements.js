@@ -1,4 +1,4 @@
-import { Twice } from "../motion/twice.js";
+import { DoublePress } from "../motion/double_press.js";
 
 /**
  * Make an HTML element.
@@ -97,7 +97,7 @@ export function stopButton(className, label, act) {
  * @param {Element} element
  * @param {string} text
  */
-export function say(element, text) {
+export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
@@ -117,13 +117,13 @@ export class TwiceButton {
    *     STOPs, that were there at the first press and still are.
    */
   constructor(className, label, again, act) {
-    this._twice = new Twice();
+    this._doublePress = new DoublePress();
     /** @type {readonly string[]} */
     this._robots = [];
     this._label = label;
     this._again = again;
     this.element = button(`webmap-twice ${className}`, label, () => {
-      if (this._twice.press(performance.now(), this._robots)) act(this._twice.meant);
+      if (this._doublePress.press(performance.now(), this._robots)) act(this._doublePress.meant);
       this.show(true);
     });
     this.element.addEventListener("blur", () => {
@@ -134,7 +134,7 @@ export class TwiceButton {
 
   /** Forget the first press. */
   forget() {
-    this._twice.forget();
+    this._doublePress.forget();
   }
 
   /**
@@ -147,10 +147,10 @@ export class TwiceButton {
     this._robots = robots;
     this._label = label;
     this.element.hidden = !visible;
-    this._twice.look(robots);
+    this._doublePress.look(robots);
     if (!visible) this.forget();
-    const waiting = visible && this._twice.waiting(performance.now());
+    const waiting = visible && this._doublePress.waiting(performance.now());
     this.element.classList.toggle("asking", waiting);
-    say(this.element, waiting ? this._again : label);
+    setText(this.element, waiting ? this._again : label);
   }
 }

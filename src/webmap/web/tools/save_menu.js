@@ -1,5 +1,5 @@
-import { deskOf } from "../inputs/desk.js";
-import { html, say, svg } from "./elements.js";
+import { devicesOf } from "../inputs/devices.js";
+import { html, setText, svg } from "./elements.js";
 import { lay, ownPlace } from "./overlay.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
@@ -70,8 +70,8 @@ class SaveMenu {
     );
     this._go.addEventListener("click", () => this._open(Boolean(this._menu.hidden)));
     this._menu = html("div", "webmap-panel webmap-export-menu");
-    this._word = html("span", "webmap-export-word", { role: "status" });
-    this._element = html("div", "webmap-export", {}, this._go, this._menu, this._word);
+    this._message = html("span", "webmap-export-word", { role: "status" });
+    this._element = html("div", "webmap-export", {}, this._go, this._menu, this._message);
     this._ending = new AbortController();
     const { signal } = this._ending;
     const outside = (/** @type {Event} */ event) => {
@@ -88,7 +88,7 @@ class SaveMenu {
     this._element.addEventListener("keydown", escape, { signal });
     this._offs = [
       this._lay(place),
-      deskOf(map.drive).claimEscape(() => this._leave()),
+      devicesOf(map.drive).claimEscape(() => this._leave()),
     ];
     this._open(false);
   }
@@ -132,8 +132,8 @@ class SaveMenu {
   }
 
   /** @param {string} text Text next to the button while something is saved. */
-  say(text) {
-    say(this._word, text);
+  showMessage(text) {
+    setText(this._message, text);
   }
 
   /**

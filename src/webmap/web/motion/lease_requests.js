@@ -1,31 +1,30 @@
 import { isNeutral } from "./axes.js";
-import { heldByAnother, mayReach } from "./report.js";
+import { heldByAnother, mayTake } from "./report.js";
 
-/** @typedef {import('./hands.js').Hands} Hands */
+/** @typedef {import('./inputs.js').Inputs} Inputs */
 /** @typedef {import('./leases.js').Leases} Leases */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 /** @typedef {import('./stream.js').Command} Command */
 /** @typedef {import('./stream.js').Stream} Stream */
 
-/** A take that was not answered for this long is given up; ms. */
+/** A request for a lease without an answer is given up after this time; ms. */
 export const TAKE_PATIENCE = 1500;
 
 /**
- * How this page comes by the lease of the robot that was chosen: by a press, by name, or
- * from a holder who was asked for it.
+ * Requests the lease of the chosen robot: by a press, by a button, or from its holder.
  *
- * Only a press that took a free robot goes on to drive it; in all other cases what is
- * held when the lease comes was not meant for that. Times are in milliseconds of one
- * clock.
+ * Only a press that takes a free robot also drives it. In all other cases the inputs that
+ * are pressed when the lease arrives do not move the robot. Times are in milliseconds of
+ * one clock.
  */
-export class Reach {
+export class LeaseRequests {
   /**
-   * @param {Hands} hands
+   * @param {Inputs} inputs
    * @param {Leases} leases
    * @param {Stream} stream
    */
-  constructor(hands, leases, stream) {
-    this._hands = hands;
+  constructor(inputs, leases, stream) {
+    this._inputs = inputs;
     this._leases = leases;
     this._stream = stream;
     /**
@@ -34,37 +33,37 @@ export class Reach {
      */
     this.choice = null;
     /**
-     * Why the gate refused the last thing that was asked for the chosen robot.
+     * Why the gate refused the last request for the chosen robot.
      * @type {string | null}
      */
     this.refusal = null;
-    /** What it was that was refused. */
+    /** The operation that was refused. */
     this.refused = "";
     /**
-     * A lease that was asked for; `alive`: the press that did may drive by it.
+     * The requested lease; `alive`: the press that requested it may drive the robot.
      * @type {{robot: string, since: number, alive: boolean} | null}
      */
     this._asked = null;
     /**
-     * Robots that another holds and that were asked for.
+     * Robots of other holders that were requested.
      * @type {Set<string>}
      */
-    this._begged = new Set();
+    this._requested = new Set();
   }
 
-  /** The robot whose lease was asked for to drive it, while that is not answered. */
+  /** The robot whose lease was requested for driving, until the answer arrives. */
   get robot() {
     return this._asked?.robot ?? null;
   }
 
-  /** @param {string | null} robot The robot that a press drives from now on. */
+  /** @param {string | null} robot The robot that a press drives now. */
   choose(robot) {
     this.choice = robot;
     this.refusal = null;
   }
 
   /**
-   * Ask for a lease by name rather than by a press.
+   * Request a lease by a button, not by a press of a drive input.
    *
    * @param {string} robot
    * @param {number} now
@@ -79,24 +78,24 @@ export class Reach {
   }
 
   /**
-   * Ask the holder for a robot.
+   * Request a robot from its holder.
    *
    * @param {string} robot
    * @returns {Command[]}
    */
   ask(robot) {
-    this._begged.add(robot);
+    this._requested.add(robot);
     if (robot === this.choice) this.refusal = null;
     return [{ op: "ask", robot }];
   }
 
-  /** @param {string} robot Whose STOP is being ended; or "*". */
+  /** @param {string} robot The robot whose STOP the operator resets; or "*". */
   reset(robot) {
     if (robot === "*" || robot === this.choice) this.refusal = null;
   }
 
   /**
-   * A press reaches for a lease where there is none.
+   * Request the lease if an input is pressed and there is none.
    *
    * @param {number} now
    * @returns {Command[]}
@@ -110,15 +109,15 @@ export class Reach {
       }
       return [];
     }
-    if (this._stream.lease || !choice || isNeutral(this._hands.axes)) return [];
+    if (this._stream.lease || !choice || isNeutral(this._inputs.axes)) return [];
     const report = this._leases.robots.get(choice);
     const epoch = this._leases.epoch(choice);
     if (epoch !== null) {
       this._open(choice, epoch, now);
       return [];
     }
-    if (!report || !mayReach(report)) {
-      this._hands.kill(now);
+    if (!report || !mayTake(report)) {
+      this._inputs.block(now);
       return [];
     }
     this.refusal = null;
@@ -127,21 +126,21 @@ export class Reach {
   }
 
   /**
-   * The gate spoke of a robot: its lease may have come, or be another's.
+   * Process a report of the gate: this page or another may have the lease now.
    *
    * @param {RobotReport} report
-   * @param {RobotReport | undefined} before What it said before.
+   * @param {RobotReport | undefined} before The previous report.
    * @param {number} now
    */
   report(report, before, now) {
     const { robot } = report;
     const epoch = this._leases.epoch(robot);
     const asked = this._asked?.robot === robot ? this._asked : null;
-    const handed = epoch !== null && this._begged.delete(robot);
+    const handed = epoch !== null && this._requested.delete(robot);
     if (asked && epoch !== null) {
       this._asked = null;
-      // Taken over, or not taken by a press: what is held now was meant for nothing.
-      if (!asked.alive || (before && heldByAnother(before))) this._hands.kill(now);
+      // Taken over, or not taken by a press: the pressed inputs must not move it.
+      if (!asked.alive || (before && heldByAnother(before))) this._inputs.block(now);
       this._open(robot, epoch, now);
     } else if (asked && asked.alive && heldByAnother(report)) {
       this._giveUp(now);
@@ -151,7 +150,7 @@ export class Reach {
   }
 
   /**
-   * Take the gate's refusal.
+   * Process a refusal of the gate.
    *
    * @param {string | null} robot
    * @param {string} what
@@ -159,45 +158,45 @@ export class Reach {
    * @param {number} now
    */
   refuse(robot, what, why, now) {
-    if (what === "ask" && robot !== null) this._begged.delete(robot);
+    if (what === "ask" && robot !== null) this._requested.delete(robot);
     if (robot !== this.choice) return;
     // The tool that sent a goal or a pose shows why.
     if (what === "goal" || what === "locate") return;
-    // A command that met the end of its lease on the way is no news.
+    // A command that arrived after the end of its lease needs no message.
     if (what === "drive" && !this._stream.lease) return;
     this.refusal = why;
     this.refused = what;
     if (what === "take" && this._asked?.robot === robot) this._giveUp(now);
-    if (what === "drive") this._stream.doubt(now);
+    if (what === "drive") this._stream.goNeutral(now);
   }
 
-  /** Wait no more for the lease that was asked for. */
+  /** Stop waiting for the requested lease. */
   end() {
     this._asked = null;
   }
 
-  /** @param {string} robot The gate does not know it any more. */
+  /** @param {string} robot A robot that the gate does not know any more. */
   gone(robot) {
-    this._begged.delete(robot);
+    this._requested.delete(robot);
   }
 
-  /** Nothing is answered any more: the connection ended. */
+  /** Forget all requests: the connection ended. */
   forget() {
     this._asked = null;
-    this._begged.clear();
+    this._requested.clear();
   }
 
   /**
-   * A robot came that was asked for some time ago: what is held now was not meant for it.
+   * The holder handed a robot over: inputs that are pressed now must not move it.
    *
    * @param {string} robot
    * @param {number} epoch
    * @param {number} now
    */
   _handed(robot, epoch, now) {
-    if (this._hands.pressed) this._hands.kill(now);
+    if (this._inputs.pressed) this._inputs.block(now);
     if (robot === this.choice) this._open(robot, epoch, now);
-    // The operator has turned to another one; it is given back unless they return.
+    // The operator has chosen another robot; unused, this lease is released later.
     else this._leases.park(robot, now);
   }
 
@@ -214,6 +213,6 @@ export class Reach {
   /** @param {number} now */
   _giveUp(now) {
     this._asked = null;
-    this._hands.kill(now);
+    this._inputs.block(now);
   }
 }

@@ -1,21 +1,21 @@
-/** A second press that comes sooner is the other half of a double click; ms. */
+/** An earlier second press belongs to a double click; ms. */
 export const SOONEST = 400;
 
 /** After this long the first press is forgotten; ms. */
 export const LATEST = 4000;
 
 /**
- * Decides whether something was meant: it has to be said twice, neither too fast nor
- * too slowly.
+ * Decides whether the operator confirms an action: by two presses, neither too fast nor
+ * too slow.
  *
  * Times are in milliseconds of one clock.
  */
-export class Twice {
+export class DoublePress {
   constructor() {
     /** @type {number | null} */
     this._since = null;
     /**
-     * What the first press was said of, as far as it is still there.
+     * What the first press applies to, without what has disappeared since.
      * @type {readonly string[]}
      */
     this.meant = [];
@@ -23,8 +23,8 @@ export class Twice {
 
   /**
    * @param {number} now
-   * @param {readonly string[]} [there] What a first press is said of: robots by id, or
-   *     their STOPs.
+   * @param {readonly string[]} [there] What a first press applies to: ids of robots, or
+   *     of their STOPs.
    * @returns {boolean} Whether this is a deliberate second press.
    */
   press(now, there = []) {
@@ -47,7 +47,7 @@ export class Twice {
   }
 
   /**
-   * Look what is there now: something that the first press was not said of takes it back.
+   * Forget the first press if something appeared that it does not apply to.
    *
    * @param {readonly string[]} there
    */

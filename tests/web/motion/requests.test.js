@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Asking } from "../../../src/webmap/web/motion/asking.js";
+import { Requests } from "../../../src/webmap/web/motion/requests.js";
 
 function report(fields = {}) {
   const asker = { connection: "c9", name: "Ann", left: 8 };
@@ -9,7 +9,7 @@ function report(fields = {}) {
 }
 
 test("a request is counted down from what the gate said last", () => {
-  const asking = new Asking();
+  const asking = new Requests();
   asking.report(report(), 1000);
   assert.deepEqual(asking.requests(1000), [
     { robot: "r1", name: "Bob", by: "c9", who: "Ann", mine: true, left: 8 },
@@ -20,7 +20,7 @@ test("a request is counted down from what the gate said last", () => {
 
 test("a request is over when the gate says nothing of it any more", () => {
   for (const asker of [null, undefined]) {
-    const asking = new Asking();
+    const asking = new Requests();
     asking.report(report(), 0);
     asking.report(report({ asker }), 100);
     assert.deepEqual(asking.requests(100), []);
@@ -28,13 +28,13 @@ test("a request is over when the gate says nothing of it any more", () => {
 });
 
 test("who has no name is called by the connection", () => {
-  const asking = new Asking();
+  const asking = new Requests();
   asking.report(report({ asker: { connection: "c9", name: "", left: 1 } }), 0);
   assert.equal(asking.requests(0)[0].who, "c9");
 });
 
 test("requests for a robot that is gone are forgotten", () => {
-  const asking = new Asking();
+  const asking = new Requests();
   asking.report(report(), 0);
   asking.gone("r1");
   assert.deepEqual(asking.requests(0), []);

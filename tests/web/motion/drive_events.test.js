@@ -1,17 +1,17 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Listeners } from "../../../src/webmap/web/motion/news.js";
+import { Listeners } from "../../../src/webmap/web/motion/drive_events.js";
 
 test("who listens is told, until that is ended", () => {
   const listeners = new Listeners();
   /** @type {string[]} */
   const heard = [];
   const end = listeners.on("stop", (robot) => heard.push(robot));
-  listeners.tell("stop", "r1");
-  listeners.tell("gone", "r2");
+  listeners.emit("stop", "r1");
+  listeners.emit("gone", "r2");
   end();
-  listeners.tell("stop", "r3");
+  listeners.emit("stop", "r3");
   assert.deepEqual(heard, ["r1"]);
 });
 
@@ -26,7 +26,7 @@ test("a listener that fails is reported, and keeps nobody from hearing", () => {
     throw failure;
   });
   listeners.on("drop", () => heard.push("drop"));
-  listeners.tell("drop", null);
+  listeners.emit("drop", null);
   assert.deepEqual(heard, ["drop"]);
   assert.deepEqual(reported, [failure]);
 });

@@ -1,6 +1,6 @@
 import { GOALS } from "../constants.js";
 
-/** @typedef {import('../motion/report.js').GoalWord} GoalWord */
+/** @typedef {import('../motion/report.js').GoalReport} GoalReport */
 
 /**
  * The look of a goal; text and shape always belong together.
@@ -12,7 +12,7 @@ import { GOALS } from "../constants.js";
  */
 
 /**
- * @param {GoalWord} goal
+ * @param {GoalReport} goal
  * @returns {GoalLook}
  */
 export function look(goal) {
@@ -50,7 +50,7 @@ const LINGER = 4000;
 /** Decides which goals a page shows. Times are in milliseconds of one clock. */
 export class ShownGoals {
   constructor() {
-    /** @type {Map<string, {goal: GoalWord | null, endedAt: number | null}>} */
+    /** @type {Map<string, {goal: GoalReport | null, endedAt: number | null}>} */
     this._seen = new Map();
     /** @type {Set<string>} */
     this._dismissed = new Set();
@@ -60,7 +60,7 @@ export class ShownGoals {
    * Update a robot's goal from a report of the gate.
    *
    * @param {string} robot
-   * @param {GoalWord | null | undefined} goal
+   * @param {GoalReport | null | undefined} goal
    * @param {number} now
    */
   report(robot, goal, now) {
@@ -94,7 +94,7 @@ export class ShownGoals {
 
   /**
    * @param {number} now
-   * @returns {Map<string, GoalWord>} The goals to show, by robot.
+   * @returns {Map<string, GoalReport>} The goals to show, by robot.
    */
   shown(now) {
     const shown = new Map();

@@ -1,23 +1,23 @@
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 
 /**
- * Somebody asks the holder of a robot for it.
+ * A request for control of a robot.
  *
  * @typedef {object} Request
  * @property {string} robot
  * @property {string} name The robot's.
- * @property {string} by The connection that asks.
- * @property {string} who The name of who asks.
- * @property {boolean} mine Whether this page's connection is the one that is asked.
- * @property {number} left Whole seconds until the robot is handed over by itself.
+ * @property {string} by The connection of the requester.
+ * @property {string} who The name of the requester.
+ * @property {boolean} mine Whether this page's connection has control.
+ * @property {number} left Whole seconds until control is handed over automatically.
  */
 
 /**
- * Counts down how long holders have to answer, from what the gate said last.
+ * Counts down the time that holders have to answer, from the gate's last report.
  *
  * Times are in milliseconds of one clock.
  */
-export class Asking {
+export class Requests {
   constructor() {
     /** @type {Map<string, {report: RobotReport, ends: number}>} */
     this._requests = new Map();
@@ -40,7 +40,7 @@ export class Asking {
     this._requests.delete(robot);
   }
 
-  /** Forget all: the gate will say anew who asks. */
+  /** Forget all: the gate will report the requests again. */
   forget() {
     this._requests.clear();
   }

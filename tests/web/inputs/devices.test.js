@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { afterEach, beforeEach, test } from "node:test";
 
-import { deskOf } from "../../../src/webmap/web/inputs/desk.js";
+import { devicesOf } from "../../../src/webmap/web/inputs/devices.js";
 
 let reported = [];
 
@@ -20,7 +20,7 @@ afterEach(() => {
 /** A desk with these claims on Escape, pressed once; what was stopped. */
 function escapeAt(...claims) {
   const stopped = [];
-  const desk = deskOf({
+  const desk = devicesOf({
     status: { driven: null, taking: false, choice: "r1" },
     robots: new Map(),
     on: () => () => {},

@@ -1,8 +1,8 @@
 /**
- * Which map of the page is driven, and the devices that drive it.
+ * The input devices of a page, and the map that they belong to.
  *
- * This folder reads keys, gamepads and the on-screen stick. Open this file first. What
- * becomes of the inputs is decided in `../motion`.
+ * This folder reads keys, gamepads and the on-screen stick. Open this file first. Whether
+ * the inputs move a robot is decided in `../motion`.
  */
 
 import { Gamepads } from "./pads.js";
@@ -13,41 +13,41 @@ import { Keys } from "./keys.js";
 /**
  * A map that robots can be driven from.
  *
- * @typedef {object} Seat
+ * @typedef {object} DrivingMap
  * @property {object} map
  * @property {() => string | null} robot The robot that is selected there.
- * @property {boolean} holonomic Whether its keys move a base sideways, too.
- * @property {(active: boolean) => void} onActive Called when the page's hands start or
- *     stop to belong to this map.
+ * @property {boolean} holonomic Whether its inputs also move a base sideways.
+ * @property {(active: boolean) => void} onActive Called when this map gets or loses the
+ *     page's inputs.
  */
 
-/** @type {WeakMap<Drive, Desk>} */
-const desks = new WeakMap();
+/** @type {WeakMap<Drive, Devices>} */
+const known = new WeakMap();
 
 /**
- * Return the desk of a page, made when it is first asked for.
+ * Return the input devices of a page. The first call makes them.
  *
  * @param {Drive} drive
  */
-export function deskOf(drive) {
-  const desk = desks.get(drive) ?? new Desk(drive);
-  desks.set(drive, desk);
-  return desk;
+export function devicesOf(drive) {
+  const devices = known.get(drive) ?? new Devices(drive);
+  known.set(drive, devices);
+  return devices;
 }
 
 /**
- * Where the operator sits: one keyboard and its gamepads for all the maps of a page.
+ * The keyboard and the gamepads, which all maps of a page share.
  *
- * They drive the robot that is selected on the map that was touched last, so that two
- * maps on a page never both drive.
+ * They drive the robot that is selected on the map that the operator used last, so that two
+ * maps of a page never drive at the same time.
  */
-export class Desk {
+export class Devices {
   /** @param {Drive} drive */
   constructor(drive) {
     this._drive = drive;
-    /** @type {Seat[]} */
-    this._seats = [];
-    /** @type {Seat | null} */
+    /** @type {DrivingMap[]} */
+    this._maps = [];
+    /** @type {DrivingMap | null} */
     this.active = null;
     /** @type {Set<() => boolean>} */
     this._escapes = new Set();
@@ -58,18 +58,18 @@ export class Desk {
     this._pads = null;
   }
 
-  /** Whether a gamepad is there to drive with. */
+  /** Whether there is a gamepad for driving. */
   get gamepad() {
     return this._pads?.present ?? false;
   }
 
-  /** Whether a gamepad's dead-man button is held that does nothing. */
+  /** Whether a gamepad's dead-man button is held without effect. */
   get spent() {
     return this._pads?.spent ?? false;
   }
 
   /**
-   * Use the STOP keys and the inputs of the page, whether or not anything can be driven from here.
+   * Use the STOP keys and the inputs of the page, also if there is no robot to drive.
    *
    * @returns {() => void} Ends the use.
    */
@@ -98,45 +98,45 @@ export class Desk {
   }
 
   /**
-   * Drive from a map. The first one is active until another is touched.
+   * Add a map to drive from. The first map is active until the operator uses another.
    *
-   * @param {Seat} seat
-   * @returns {() => void} Leaves.
+   * @param {DrivingMap} map
+   * @returns {() => void} Removes the map.
    */
-  sit(seat) {
+  addMap(map) {
     const close = this.open();
-    this._seats.push(seat);
-    if (this.active === null) this.activate(seat);
+    this._maps.push(map);
+    if (this.active === null) this.activate(map);
     return () => {
       close();
-      this._seats = this._seats.filter((other) => other !== seat);
-      if (this.active === seat) this.activate(this._seats[0] ?? null);
+      this._maps = this._maps.filter((other) => other !== map);
+      if (this.active === map) this.activate(this._maps[0] ?? null);
     };
   }
 
   /**
-   * Make a map the one that is driven from.
+   * Give the inputs to a map.
    *
-   * @param {Seat | null} seat
+   * @param {DrivingMap | null} map
    */
-  activate(seat) {
-    if (seat === this.active) return;
+  activate(map) {
+    if (map === this.active) return;
     this.active?.onActive(false);
-    this.active = seat;
+    this.active = map;
     this.choose();
-    seat?.onActive(true);
+    map?.onActive(true);
   }
 
-  /** Look again which robot is selected on the active map. */
+  /** Choose the robot that is selected on the active map. */
   choose() {
     this._drive.choose(this.active?.robot() ?? null);
   }
 
   /**
-   * Let Escape end something smaller first: a tool, a menu. Not while a robot is driven.
+   * Let Escape end a tool or close a menu instead of STOP, unless a robot is driven.
    *
-   * @param {() => boolean} leave Returns whether there was something to end.
-   * @returns {() => void} Gives the key back.
+   * @param {() => boolean} leave Ends it; returns whether it was active.
+   * @returns {() => void} Removes this use of Escape.
    */
   claimEscape(leave) {
     this._escapes.add(leave);
@@ -162,20 +162,20 @@ export class Desk {
       if (!held && leaves(closesMenu)) return true;
       for (const leave of this._escapes) if (leaves(leave)) return true;
     }
-    // With none to mean they mean all: a STOP too many is harmless.
+    // Without a robot the key means all: an unnecessary STOP is harmless.
     this._drive.stop(driven ?? choice ?? "*");
     return true;
   }
 }
 
-/** Inputs in which Escape has a use of its own. */
+/** Inputs that use Escape themselves. */
 const TYPED = "input:not([type=checkbox], [type=radio], [type=button], [type=submit])";
 
-/** What Escape closes: elements with the attribute, and popovers of the browser. */
+/** Menus that Escape closes: elements with the attribute, and popovers. */
 const MENUS = "[data-webmap-menu], [popover]:not([popover=manual])";
 
 /**
- * Close an open menu. Not under the alarm, which covers it.
+ * Close an open menu, unless the alarm covers it.
  *
  * @returns {boolean} Whether there was one.
  */
@@ -190,7 +190,7 @@ function closesMenu() {
   if (menu instanceof HTMLDialogElement) menu.close();
   else if (menu instanceof HTMLDetailsElement) menu.open = false;
   else menu.hidePopover();
-  // On the line that folds a menu out the space bar would be no STOP.
+  // With the focus on a summary, Space would open it and not be STOP.
   const map = /** @type {SVGElement | null} */ (document.querySelector("svg.webmap"));
   if (inside) map?.focus();
   return true;
@@ -198,8 +198,8 @@ function closesMenu() {
 
 /**
  * @param {() => boolean} leave
- * @returns {boolean} Whether it ended something. One that fails did not, as it must never
- *     keep a STOP from leaving.
+ * @returns {boolean} Whether it ended something; false after an error, which must never prevent
+ *     a STOP.
  */
 function leaves(leave) {
   try {
@@ -212,14 +212,14 @@ function leaves(leave) {
 
 /**
  * @param {KeyboardEvent} event
- * @returns {boolean} Whether the key has a meaning of its own where it was pressed, and
- *     nothing else (Enter, a click) would do the same.
+ * @returns {boolean} Whether the focused element uses the key itself, and no other input (Enter,
+ *     a click) does the same.
  */
 function keepsKey(event) {
   const target = event.target;
   if (!(target instanceof Element)) return false;
   if (event.code === "Escape") {
-    // One that is opened and closed by hand alone, as the alarm is, has no use for it.
+    // A manual popover, such as the alarm, does not use Escape.
     const closes = "dialog:modal, [popover]:not([popover=manual]), textarea, select";
     return target.closest(closes) !== null || target.matches(TYPED);
   }

@@ -1,19 +1,19 @@
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 
-import { Errands } from "../../../src/webmap/web/motion/errands.js";
-import { TAKE_PATIENCE } from "../../../src/webmap/web/motion/reach.js";
+import { PoseCommands } from "../../../src/webmap/web/motion/pose_commands.js";
+import { TAKE_PATIENCE } from "../../../src/webmap/web/motion/lease_requests.js";
 import { Session } from "../../../src/webmap/web/motion/session.js";
 
 const POSE = { x: 1, y: 2, yaw: 0 };
 
-/** @type {{now: number, sent: any[], session: Session, errands: Errands}} */
+/** @type {{now: number, sent: any[], session: Session, poseCommands: PoseCommands}} */
 let it;
 beforeEach(() => {
   const session = new Session(0, {});
   const send = (/** @type {any[]} */ commands) => it.sent.push(...commands);
-  const errands = new Errands(session.pilot, session.loop, send, () => it.now);
-  it = { now: 0, sent: [], session, errands };
+  const poseCommands = new PoseCommands(session.pilot, session.loop, send, () => it.now);
+  it = { now: 0, sent: [], session, poseCommands };
   session.receive({ op: "hello", connection: "c1" }, 0);
   say(false);
 });
@@ -28,7 +28,7 @@ function say(mine) {
 /** A turn of the loop, in which promises go on. */
 async function step(ms = 50) {
   it.now += ms;
-  it.errands.step(it.now);
+  it.poseCommands.step(it.now);
   await new Promise(setImmediate);
 }
 
@@ -39,7 +39,7 @@ const acknowledge = (ack) =>
 const said = () => it.sent.map(({ op }) => op);
 
 test("a robot that is free is taken first, and sent when it came", async () => {
-  const placed = it.errands.place("goal", "r1", POSE);
+  const placed = it.poseCommands.place("goal", "r1", POSE);
   await step();
   assert.deepEqual(said(), ["take"]);
   say(true);
@@ -54,7 +54,7 @@ test("a robot that is free is taken first, and sent when it came", async () => {
 
 test("a robot that this page has is sent at once", async () => {
   say(true);
-  const placed = it.errands.place("locate", "r1", POSE);
+  const placed = it.poseCommands.place("locate", "r1", POSE);
   assert.deepEqual(said(), ["locate"]);
   acknowledge(it.sent[0].seq);
   await step();
@@ -62,26 +62,26 @@ test("a robot that this page has is sent at once", async () => {
 });
 
 test("a lease that was taken for nothing is given back", async () => {
-  const placed = it.errands.place("goal", "r1", POSE);
+  const placed = it.poseCommands.place("goal", "r1", POSE);
   const failed = assert.rejects(placed, /no such place/);
   say(true);
   await step();
-  it.errands.refused("r1", "take", "a refusal of something else");
-  it.errands.refused("r2", "goal", "a refusal of another's");
-  it.errands.refused("r1", "goal", "no such place");
+  it.poseCommands.refused("r1", "take", "a refusal of something else");
+  it.poseCommands.refused("r2", "goal", "a refusal of another's");
+  it.poseCommands.refused("r1", "goal", "no such place");
   await failed;
   assert.deepEqual(said(), ["take", "goal", "release"]);
 });
 
 test("a lease that is refused is the end of it", async () => {
-  const placed = it.errands.place("goal", "r1", POSE);
-  it.errands.refused("r1", "take", "Ann has control");
+  const placed = it.poseCommands.place("goal", "r1", POSE);
+  it.poseCommands.refused("r1", "take", "Ann has control");
   await assert.rejects(placed, /Ann has control/);
   assert.deepEqual(said(), ["take"]);
 });
 
 test("a gate that does not answer is not waited for", async () => {
-  const failed = assert.rejects(it.errands.place("goal", "r1", POSE), /No answer/);
+  const failed = assert.rejects(it.poseCommands.place("goal", "r1", POSE), /No answer/);
   await step(TAKE_PATIENCE);
   await step(1);
   await failed;
@@ -89,6 +89,6 @@ test("a gate that does not answer is not waited for", async () => {
 
 test("a place needs finite numbers", async () => {
   const nowhere = { ...POSE, yaw: NaN };
-  await assert.rejects(it.errands.place("goal", "r1", nowhere), /finite.+1, 2, NaN/);
+  await assert.rejects(it.poseCommands.place("goal", "r1", nowhere), /finite.+1, 2, NaN/);
   assert.deepEqual(it.sent, []);
 });

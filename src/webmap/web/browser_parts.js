@@ -3,31 +3,31 @@ import { BASE, resolve } from "./addresses.js";
 /** @typedef {import('./map.js').MapCanvas} MapCanvas */
 
 /**
- * The browser half of a module, from its default export.
+ * The part of a module that runs in the browser, from its default export.
  *
- * @typedef {object} Half
- * @property {(message: any) => void} [receive] Handles messages of the other half.
- * @property {() => void} destroy Reverts everything that the half did.
+ * @typedef {object} BrowserPart
+ * @property {(message: any) => void} [receive] Handles messages of the part in Python.
+ * @property {() => void} destroy Reverts everything that the part did.
  */
 
 /**
  * @typedef {object} Attached
  * @property {MapCanvas} canvas
- * @property {Half | null} half null until the module is loaded.
+ * @property {BrowserPart | null} part null until the module is loaded.
  * @property {unknown[]} waiting Messages that came before the module was loaded.
  */
 
 /**
- * @typedef {object} HalvesPage
+ * @typedef {object} BrowserPartsPage
  * @property {(message: object) => void} send Sends to the server.
  * @property {(text: string) => void} notice Shows to the viewer, sends to the server.
  * @property {() => Promise<unknown>} ready Resolves when modules may be loaded.
  * @property {() => void} onStyles Called when a style sheet was loaded.
  */
 
-/** Loads, attaches and detaches the browser halves of modules. */
-export class Halves {
-  /** @param {HalvesPage} page */
+/** Loads, attaches and detaches the browser parts of modules. */
+export class BrowserParts {
+  /** @param {BrowserPartsPage} page */
   constructor(page) {
     this._page = page;
     /** @type {Map<number, Attached>} */
@@ -46,7 +46,7 @@ export class Halves {
   attach(canvas, instance, module, css, options) {
     this.detach(instance);
     /** @type {Attached} */
-    const attached = { canvas, half: null, waiting: [] };
+    const attached = { canvas, part: null, waiting: [] };
     this._attached.set(instance, attached);
     if (css) this._addStyle(css);
     this._load(attached, instance, module, options).catch((error) => {
@@ -71,7 +71,7 @@ export class Halves {
     const { send } = this._page;
     /** @param {object} data */
     const sendData = (data) => send({ op: "module", instance, data });
-    attached.half = code.default(attached.canvas, options, sendData) ?? null;
+    attached.part = code.default(attached.canvas, options, sendData) ?? null;
     send({ op: "ready", instance });
     for (const message of attached.waiting.splice(0)) this.receive(instance, message);
   }
@@ -83,15 +83,15 @@ export class Halves {
   receive(instance, message) {
     const attached = this._attached.get(instance);
     if (!attached) return;
-    if (!attached.half) attached.waiting.push(message);
-    else this._try(() => attached.half?.receive?.(message));
+    if (!attached.part) attached.waiting.push(message);
+    else this._try(() => attached.part?.receive?.(message));
   }
 
   /** @param {number} instance */
   detach(instance) {
     const attached = this._attached.get(instance);
     this._attached.delete(instance);
-    if (attached) this._try(() => attached.half?.destroy());
+    if (attached) this._try(() => attached.part?.destroy());
   }
 
   /** @param {MapCanvas} canvas Detach all modules of this map. */

@@ -1,10 +1,10 @@
 import assert from "node:assert/strict";
 import { beforeEach, describe, test } from "node:test";
 
-import { Hands } from "../../../src/webmap/web/motion/hands.js";
+import { Inputs } from "../../../src/webmap/web/motion/inputs.js";
 import { Leases } from "../../../src/webmap/web/motion/leases.js";
 import { Loop } from "../../../src/webmap/web/motion/loop.js";
-import { Reach, TAKE_PATIENCE } from "../../../src/webmap/web/motion/reach.js";
+import { LeaseRequests, TAKE_PATIENCE } from "../../../src/webmap/web/motion/lease_requests.js";
 import { Stream } from "../../../src/webmap/web/motion/stream.js";
 
 const TAKE = [{ op: "take", robot: "r1" }];
@@ -12,13 +12,13 @@ const MINE = { holder: { connection: "c1", name: "me" }, mine: true, epoch: 7 };
 const ANN = { holder: { connection: "c2", name: "Ann" }, epoch: 3 };
 const PROGRAM = { holder: { connection: "program", name: "program" }, epoch: 3 };
 
-/** @type {{hands: Hands, leases: Leases, stream: Stream, reach: Reach}} */
+/** @type {{inputs: Inputs, leases: Leases, stream: Stream, reach: LeaseRequests}} */
 let it;
 beforeEach(() => {
-  const hands = new Hands(-1000);
+  const inputs = new Inputs(-1000);
   const leases = new Leases();
-  const stream = new Stream(hands, new Loop(), 0);
-  it = { hands, leases, stream, reach: new Reach(hands, leases, stream) };
+  const stream = new Stream(inputs, new Loop(), 0);
+  it = { inputs, leases, stream, reach: new LeaseRequests(inputs, leases, stream) };
   say("r1", {}, 0);
   it.reach.choose("r1");
 });
@@ -35,7 +35,7 @@ function say(robot, fields, now) {
 }
 
 function press() {
-  it.hands.set("keys", { x: 1 }, 0);
+  it.inputs.set("keys", { x: 1 }, 0);
   return it.reach.step(0);
 }
 
@@ -47,7 +47,7 @@ describe("a press", () => {
     say("r1", MINE, 100);
     assert.equal(it.stream.lease?.epoch, 7);
     assert.equal(it.reach.robot, null);
-    assert.equal(it.hands.dead, false);
+    assert.equal(it.inputs.blocked, false);
   });
 
   test("uses a lease that is there already", () => {
@@ -60,7 +60,7 @@ describe("a press", () => {
     assert.deepEqual(it.reach.step(0), []);
     it.reach.choose(null);
     assert.deepEqual(press(), []);
-    assert.equal(it.hands.dead, false);
+    assert.equal(it.inputs.blocked, false);
   });
 
   const barred = {
@@ -72,7 +72,7 @@ describe("a press", () => {
     test(`means nothing for a robot that ${how}`, () => {
       say("r1", fields, 0);
       assert.deepEqual(press(), []);
-      assert.equal(it.hands.dead, true);
+      assert.equal(it.inputs.blocked, true);
     });
   }
 
@@ -81,7 +81,7 @@ describe("a press", () => {
     assert.deepEqual(press(), TAKE);
     say("r1", MINE, 50);
     assert.equal(it.stream.lease?.robot, "r1");
-    assert.equal(it.hands.dead, true);
+    assert.equal(it.inputs.blocked, true);
   });
 
   const endings = {
@@ -94,7 +94,7 @@ describe("a press", () => {
       press();
       happen();
       assert.equal(it.reach.robot, null);
-      assert.equal(it.hands.dead, true);
+      assert.equal(it.inputs.blocked, true);
       say("r1", MINE, 60);
       assert.equal(it.stream.lease, null);
     });
@@ -102,12 +102,12 @@ describe("a press", () => {
 });
 
 describe("a lease that was asked for by name", () => {
-  test("comes with hands that are dead", () => {
+  test("comes with inputs that are dead", () => {
     assert.deepEqual(it.reach.take("r1", 0), TAKE);
-    it.hands.set("keys", { x: 1 }, 0);
+    it.inputs.set("keys", { x: 1 }, 0);
     say("r1", MINE, 50);
     assert.equal(it.stream.lease?.robot, "r1");
-    assert.equal(it.hands.dead, true);
+    assert.equal(it.inputs.blocked, true);
   });
 
   test("of another robot than the chosen one does not drive", () => {
@@ -128,13 +128,13 @@ describe("a robot that its holder was asked for", () => {
   beforeEach(() => {
     say("r1", ANN, 0);
     assert.deepEqual(it.reach.ask("r1"), [{ op: "ask", robot: "r1" }]);
-    it.hands.set("keys", { x: 1 }, 0);
+    it.inputs.set("keys", { x: 1 }, 0);
   });
 
-  test("comes with hands that are dead", () => {
+  test("comes with inputs that are dead", () => {
     say("r1", MINE, 50);
     assert.equal(it.stream.lease?.robot, "r1");
-    assert.equal(it.hands.dead, true);
+    assert.equal(it.inputs.blocked, true);
   });
 
   test("is kept for later if the operator has turned to another", () => {
@@ -186,6 +186,6 @@ describe("a refusal", () => {
     say("r1", MINE, 0);
     it.reach.refuse("r1", "drive", "too old", 50);
     assert.equal(it.reach.refusal, "too old");
-    assert.equal(it.hands.dead, true);
+    assert.equal(it.inputs.blocked, true);
   });
 });

@@ -1,27 +1,27 @@
-import { TAKE_PATIENCE } from "./reach.js";
+import { TAKE_PATIENCE } from "./lease_requests.js";
 
 /** @typedef {import('./loop.js').Loop} Loop */
 /** @typedef {import('./pilot.js').Pilot} Pilot */
 /** @typedef {import('./stream.js').Command} Command */
 
 /**
- * Something that was asked of the gate.
+ * An operation that the gate has not answered yet.
  *
- * @typedef {object} Question
+ * @typedef {object} PendingOperation
  * @property {string} robot
  * @property {string} what
  * @property {number} since
- * @property {() => boolean} reached Whether it was done.
+ * @property {() => boolean} reached Whether the gate has accepted it.
  * @property {(problem: string | null) => void} end
  */
 
 /**
- * Sends robots to places, and tells them where they are: takes the lease of each for that
- * when it is free, and waits for what the gate says to it.
+ * Sends goals and sets poses: takes the lease of a free robot for that, and waits for the
+ * gate's answer.
  *
  * Times are in milliseconds of one clock.
  */
-export class Errands {
+export class PoseCommands {
   /**
    * @param {Pilot} pilot
    * @param {Loop} loop
@@ -33,15 +33,15 @@ export class Errands {
     this._loop = loop;
     this._send = send;
     this._clock = clock;
-    /** @type {Set<Question>} */
-    this._questions = new Set();
+    /** @type {Set<PendingOperation>} */
+    this._pending = new Set();
   }
 
   /**
    * @param {'goal' | 'locate'} op
    * @param {string} robot
    * @param {{x: number, y: number, yaw: number}} pose Metres and radians.
-   * @returns {Promise<boolean>} Whether the lease was taken for it.
+   * @returns {Promise<boolean>} Whether the lease was taken for this.
    * @throws {Error} When the gate refuses it or does not answer.
    */
   async place(op, robot, { x, y, yaw }) {
@@ -65,23 +65,23 @@ export class Errands {
   }
 
   /**
-   * The gate refused something.
+   * Process a refusal of the gate.
    *
    * @param {string | null} robot
    * @param {string} what
    * @param {string} why
    */
   refused(robot, what, why) {
-    for (const question of this._questions) {
-      if (question.robot === robot && question.what === what) question.end(why);
+    for (const operation of this._pending) {
+      if (operation.robot === robot && operation.what === what) operation.end(why);
     }
   }
 
   /** @param {number} now */
   step(now) {
-    for (const question of this._questions) {
-      if (question.reached()) question.end(null);
-      else if (now - question.since > TAKE_PATIENCE) question.end("No answer from the gate.");
+    for (const operation of this._pending) {
+      if (operation.reached()) operation.end(null);
+      else if (now - operation.since > TAKE_PATIENCE) operation.end("No answer from the gate.");
     }
   }
 
@@ -93,19 +93,19 @@ export class Errands {
    */
   _until(robot, what, reached) {
     return new Promise((resolve, reject) => {
-      /** @type {Question} */
-      const question = {
+      /** @type {PendingOperation} */
+      const operation = {
         robot,
         what,
         since: this._clock(),
         reached,
         end: (problem) => {
-          this._questions.delete(question);
+          this._pending.delete(operation);
           if (problem === null) resolve();
           else reject(new Error(problem));
         },
       };
-      this._questions.add(question);
+      this._pending.add(operation);
     });
   }
 }

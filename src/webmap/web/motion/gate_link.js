@@ -1,15 +1,15 @@
 import { protocols } from "../key.js";
 
-/** A connection that does not open within this time is given up, in ms. */
+/** An attempt to connect is given up after this time, in ms. */
 const OPENING_PATIENCE = 5000;
 
 /** The first and the longest pause before connecting again, in ms. */
 const PAUSE = { first: 250, longest: 5000 };
 
 /**
- * What a line tells its owner.
+ * What the link calls.
  *
- * @typedef {object} LineEvents
+ * @typedef {object} GateLinkEvents
  * @property {() => void} open
  * @property {(message: any) => void} receive One JSON object with an `op`.
  * @property {() => void} lost The connection ended or was given up.
@@ -18,12 +18,12 @@ const PAUSE = { first: 250, longest: 5000 };
 /**
  * A WebSocket that is opened again when it is lost, with growing, jittered pauses.
  *
- * Nothing is ever kept to be sent later: a command is for now or not at all.
+ * No message is kept to be sent later: a late command would be wrong.
  */
-export class Line {
+export class GateLink {
   /**
    * @param {URL} url
-   * @param {LineEvents} events
+   * @param {GateLinkEvents} events
    */
   constructor(url, events) {
     this._url = url;
@@ -41,7 +41,7 @@ export class Line {
   }
 
   /**
-   * Open a connection when it is time to, and give up one that does not come about.
+   * Connect if it is time for that, and give up an attempt that takes too long.
    *
    * @param {number} now
    */
@@ -53,7 +53,7 @@ export class Line {
     }
   }
 
-  /** The other side is really there: the next pause is a short one again. */
+  /** Note that the gate answers: the next pause is short again. */
   trust() {
     this._pause = PAUSE.first;
   }
@@ -63,7 +63,7 @@ export class Line {
     if (this.open) this._socket?.send(JSON.stringify(message));
   }
 
-  /** Give this connection up; {@link Line#mind} opens another after a pause. */
+  /** Give this connection up; {@link GateLink#mind} opens another after a pause. */
   lose() {
     this.abandon();
     this._retryAt = performance.now() + this._pause * (0.5 + Math.random() / 2);
@@ -71,14 +71,14 @@ export class Line {
     this._events.lost();
   }
 
-  /** Connect again at once: this connection has died unnoticed. */
+  /** Connect again immediately: this connection may be dead. */
   renew() {
     this._pause = PAUSE.first;
     this.lose();
     this._retryAt = 0;
   }
 
-  /** Close, and hear nothing any more from a connection that may linger. */
+  /** Close, and ignore everything that still arrives on this connection. */
   abandon() {
     const socket = this._socket;
     this._socket = null;
@@ -103,7 +103,7 @@ export class Line {
 
 /**
  * @param {unknown} data
- * @returns {any} The message, or null for what is none.
+ * @returns {any} The message, or null if the data is not a message.
  */
 function parse(data) {
   try {
