@@ -138,11 +138,11 @@ def test_goals_and_initial_pose_go_to_one_bridge():
     one, other = Link(), Link("ws://other:9090")
     robot = Robot("Bob")
     robot.set_move_topic(one, "/goal")
-    with pytest.raises(ConfigError, match="both go to one bridge"):
+    with pytest.raises(ConfigError, match="expected one bridge for both"):
         robot.set_initial_pose_topic(other)
     assert robot.motion.config.initial_pose is None
     robot.set_initial_pose_topic(one)
-    with pytest.raises(ConfigError, match="both go to one bridge"):
+    with pytest.raises(ConfigError, match="expected one bridge for both"):
         robot.set_move_topic(other, "/goal")
     assert robot.motion.bridge("move") is one
 

@@ -244,7 +244,7 @@ def test_a_radius_becomes_corners_that_come_back_as_they_are(robot):
         (LOCK, "stop_hooks: got the table .* expected an array such as"),
         ("/lock", 'stop_hooks: got the text "/lock", expected an array such as'),
         (5, "stop_hooks: got the whole number 5, expected an array such as"),
-        ([{"topic": "cmd_vel"}], "its velocity goes to /cmd_vel"),
+        ([{"topic": "cmd_vel"}], "/cmd_vel is the velocity topic"),
     ],
 )
 def test_a_stop_hook_that_cannot_be_meant_is_refused_at_once(robot, hooks, said):

@@ -38,7 +38,7 @@ class PacedBench(Bench):
                 if self.answering and self.up:
                     self.tell(
                         events.PingAnswered(
-                            next(iter(self.gate._machines._bases)).url, self.now
+                            next(iter(self.gate._machines._by_key)).url, self.now
                         )
                     )
             if each is not None and self.now >= self.each_at + BEAT - 1e-6:

@@ -221,7 +221,7 @@ class Motion(RuleBasedStateMachine):
         holder = self.bench.report().holder
         self.bench.goal(who)
         if len(self.bench.did(actions.SendGoal)) > before:
-            assert not self.is_still, "no goal starts while STOP stands"
+            assert not self.stopped, "no goal starts while STOP stands"
             assert holder is not None
             assert holder.connection == who, "only who has it sends it somewhere"
             self.last_seq[who] = self.bench.seq
@@ -232,7 +232,7 @@ class Motion(RuleBasedStateMachine):
         at, before = self.bench.now, len(self._attempts())
         self.bench.say(who, op="stop", robot=robot)
         assert self.bench.report().holder is None
-        self.is_still = True
+        self.stopped = True
         self._doubt()
         zeros = [w for w in self._attempts() if w.at == at and w.twist.is_zero]
         assert zeros, "STOP is zero at once"
@@ -249,9 +249,9 @@ class Motion(RuleBasedStateMachine):
         named = self.seen if late else newest
         self.bench.say(who, op="reset", robot="r1", stop=named)
         assert len(self._attempts()) == before, "reset moves nothing"
-        assert self.bench.report().holder is None or not self.is_still
+        assert self.bench.report().holder is None or not self.stopped
         if named == newest:
-            self.is_still = False
+            self.stopped = False
 
     @rule(by=st.sampled_from(["Ann", "Ben"]))
     def another_gate_is_told_stop(self, by):
@@ -259,7 +259,7 @@ class Motion(RuleBasedStateMachine):
         self.others += 1
         self.bench.disk[KEY] = Press(by, f"other-{self.others}")
         self.bench.tell(events.StopFileChanged(KEY, self.bench.disk[KEY]))
-        self.is_still = True
+        self.stopped = True
         self._doubt()
 
     @rule()
@@ -372,7 +372,7 @@ class Motion(RuleBasedStateMachine):
     """Whether there was a stop test, which creeps while every input is released."""
     epoch = 0
     """The newest epoch that was seen."""
-    stands = False
+    stopped = False
     """Whether somebody said STOP, and nobody has reset it since."""
     seen = "none"
     """The identity of the STOP that somebody looked at a while ago."""
@@ -403,7 +403,7 @@ class Motion(RuleBasedStateMachine):
         self._rest(4.0)  # zeros on a new link go on for three seconds
         assert not self.bench.report().changing or not self.bench.up
         late = [w for w in self._attempts() if w.at > self.bench.now - 0.7]
-        if self.is_still:
+        if self.stopped:
             assert all(w.twist.is_zero for w in late)
             assert len(late) >= 6 or not self.bench.up, "zeros while STOP stands"
         else:
@@ -504,9 +504,9 @@ class Motion(RuleBasedStateMachine):
 
     @invariant()
     def a_stop_stands_until_a_reset(self):
-        assert self.bench.report().latched == self.is_still
-        assert (KEY in self.bench.disk) == self.is_still
-        if self.is_still:
+        assert self.bench.report().latched == self.stopped
+        assert (KEY in self.bench.disk) == self.stopped
+        if self.stopped:
             assert self.bench.report().holder is None
             assert all(w.twist.is_zero for w in self.bench.written[self.checked :])
 

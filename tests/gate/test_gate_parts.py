@@ -327,13 +327,13 @@ class TestHealth:
 
     def test_a_display_is_there_for_250_ms_after_its_heartbeat(self):
         pulse = DisplayPulse()
-        assert pulse.doubt(0.0)
+        assert pulse.fault(0.0)
         pulse.beat(0.0)
-        assert pulse.doubt(0.25) is None
-        assert pulse.doubt(0.26) == "the display process does not respond"
+        assert pulse.fault(0.25) is None
+        assert pulse.fault(0.26) == "the display process does not respond"
         pulse.beat(1.0)
         pulse.ended = "the end"
-        assert pulse.doubt(1.0) == "the end"
+        assert pulse.fault(1.0) == "the end"
 
 
 class TestConnection:

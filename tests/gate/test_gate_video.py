@@ -92,9 +92,9 @@ def test_the_next_driver_does_not_inherit_an_old_picture(bench):
 def test_an_old_picture_stands_against_nobody_who_does_not_drive(bench):
     video = Video()
     video.observe(5.0, 100.0)
-    assert video.doubt(100.0)
+    assert video.fault(100.0)
     video.forget()
-    assert video.doubt(100.0) is None
+    assert video.fault(100.0) is None
 
 
 @pytest.mark.parametrize("video", [-1, 1.5, None, "100", True, [], 2**53])

@@ -99,7 +99,7 @@ class Tap:
                 goal = message["goal"] and goal_number(message["goal"]["id"])
                 if goal is not None:
                     self.names.grow("goal", goal)
-            case {"type": "program-take", "request": request}:
+            case {"type": "program", "request": request}:
                 self.names.grow("request", request)
             case {"type": "take-reply", "epoch": int(epoch)}:
                 self.names.grow("epoch", epoch)

@@ -167,7 +167,7 @@ class WriterNodes(msgspec.Struct, frozen=True, tag="writer-nodes"):
     nodes: tuple[str, ...]
 
 
-class FromProgram(msgspec.Struct, frozen=True, tag="program"):
+class FromProgram(msgspec.Struct, frozen=True, tag="program", omit_defaults=True):
     """A command of the display's Python code; its ``seq`` is not checked."""
 
     command: ProgramCommand

@@ -165,7 +165,8 @@ def _resolved(
     resolved = normalise_topic(where)
     if twist_topic and resolved == normalise_topic(twist_topic):
         raise ConfigError(
-            f"robot {name!r}: its velocity goes to {resolved}, so that is no stop hook"
+            f"robot {name!r}: {resolved} is the velocity topic, "
+            "which cannot be a stop hook"
         )
     return {place: resolved, "type": given}
 

@@ -178,12 +178,16 @@ SAID = {
     "an angle of NaN": ("/scan", scan(1, angle_min=None), "angle_min"),
     "a million beams": ("/scan", ONE_MILLION, "1000000 rays"),
     "ten million beams": ("/scan", TEN_MILLION, "may have 4 MiB"),
-    "ranges of text": ("/scan", scan(1, ranges=["far"]), "no whole sensor_msgs/Laser"),
+    "ranges of text": (
+        "/scan",
+        scan(1, ranges=["far"]),
+        "but a field is missing or wrong",
+    ),
     "another type": ("/scan", {"data": "hello"}, "angle_min"),
     "odometry of another type": (
         "/odom",
         {"data": "hello"},
-        "no whole nav_msgs/Odometry",
+        "reports nav_msgs/Odometry, but a field is missing",
     ),
     "odometry that was cut": (
         "/odom",

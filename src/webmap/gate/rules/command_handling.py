@@ -81,11 +81,11 @@ class CommandHandler:
             case SetVelocity():
                 self._set_velocity(connection, command, now)
             case Goal(robot):
-                base, _ = self._authorized(connection, command, now)
-                base.driving.goal(robot, _pose(command), connection.id, now)
+                machine, _ = self._authorized(connection, command, now)
+                machine.driving.goal(robot, _pose(command), connection.id, now)
             case Locate(robot):
-                base, _ = self._authorized(connection, command, now)
-                base.driving.locate(robot, _pose(command), connection.id, now)
+                machine, _ = self._authorized(connection, command, now)
+                machine.driving.locate(robot, _pose(command), connection.id, now)
             case Take(robot):
                 self.take(connection, robot, now)
             case Release(robot):
@@ -99,10 +99,10 @@ class CommandHandler:
             case Grant() | Deny():
                 self._answer(connection, command, now)
             case StopTest(robot):
-                base = self._machines.find(robot)
-                if not base.authority.is_held_by(connection.id):
+                machine = self._machines.find(robot)
+                if not machine.authority.is_held_by(connection.id):
                     raise Refusal("take control first")
-                base.driving.begin_test(now)
+                machine.driving.begin_test(now)
             case _:
                 self.cancel(connection, command.robot, now)
 
@@ -115,8 +115,10 @@ class CommandHandler:
     def stop(self, robot: str | None, by: Connection, now: float) -> None:
         """STOP a robot or, with ``None``, all robots."""
         press = new_press(by.name or by.id)
-        for base in self._machines if robot is None else [self._machines.find(robot)]:
-            base.stop(press, now)
+        for machine in (
+            self._machines if robot is None else [self._machines.find(robot)]
+        ):
+            machine.stop(press, now)
 
     def stop_malformed(self, robot: str | None, by: Connection, now: float) -> str:
         """STOP the robot that a malformed STOP names, or all if that is unknown.
@@ -144,18 +146,18 @@ class CommandHandler:
 
     def take(self, connection: Connection, robot: str, now: float) -> int | None:
         """Give the lease and return its epoch; ``None`` if a standstill comes first."""
-        base = self._machines.find(robot)
-        if base.authority.is_held_by(connection.id):
-            return base.authority.lease.epoch  # type: ignore[union-attr]
-        if base.authority.handover.successor is connection:
+        machine = self._machines.find(robot)
+        if machine.authority.is_held_by(connection.id):
+            return machine.authority.lease.epoch  # type: ignore[union-attr]
+        if machine.authority.handover.successor is connection:
             return None
-        check_take(base.authority.lease, connection.role, connection.program)
-        if reason := base.authority.why_unavailable(now):
+        check_take(machine.authority.lease, connection.role, connection.program)
+        if reason := machine.authority.why_unavailable(now):
             raise Refusal(reason)
-        if base.authority.lease is not None:
-            base.authority.hand_over(connection, now)
+        if machine.authority.lease is not None:
+            machine.authority.hand_over(connection, now)
             return None
-        return base.authority.give(connection, now)
+        return machine.authority.give(connection, now)
 
     def release(self, connection: Connection, robot: str, now: float) -> None:
         """Release a connection's control of a robot."""
@@ -163,23 +165,23 @@ class CommandHandler:
 
     def _ask(self, connection: Connection, robot: str, now: float) -> None:
         check_role(connection.role)
-        base = self._machines.find(robot)
-        if base.authority.is_held_by(connection.id):
+        machine = self._machines.find(robot)
+        if machine.authority.is_held_by(connection.id):
             raise Refusal("you already have control")
-        base.authority.ask(connection, now)
+        machine.authority.ask(connection, now)
 
     def _answer(self, connection: Connection, answer: Grant | Deny, now: float) -> None:
-        base = self._machines.find(answer.robot)
-        if not base.authority.is_held_by(connection.id):
+        machine = self._machines.find(answer.robot)
+        if not machine.authority.is_held_by(connection.id):
             raise Refusal("only the operator who has control can answer")
-        asker = base.authority.handover.asker
+        asker = machine.authority.handover.asker
         if asker is None:
             raise Refusal("no operator requests control")
         if isinstance(answer, Grant):
-            base.authority.hand_over(asker, now)
+            machine.authority.hand_over(asker, now)
         else:
-            base.authority.deny(f"{connection.name or connection.id} keeps control")
-            base.authority.renew(now)
+            machine.authority.deny(f"{connection.name or connection.id} keeps control")
+            machine.authority.renew(now)
 
     def checked(
         self, connection: Connection, robot: str, epoch: int, tick: int, now: float
@@ -190,54 +192,54 @@ class CommandHandler:
             Refusal: If the connection may not move the machine with this command.
 
         """
-        base = self._machines.find(robot)
-        check_lease(base.authority.lease, connection.id, epoch)
+        machine = self._machines.find(robot)
+        check_lease(machine.authority.lease, connection.id, epoch)
         try:
-            return base, self._ticks.check(tick, now)
+            return machine, self._ticks.check(tick, now)
         except Refusal:
             # Only the holder's commands stop the machine: the lease was checked first.
-            base.driving.late(now)
+            machine.driving.late(now)
             raise
 
     def _authorized(
         self, connection: Connection, command: Drive | Goal | Locate, now: float
     ) -> tuple[Machine, float]:
-        base, age = self.checked(
+        machine, age = self.checked(
             connection, command.robot, command.epoch, command.tick, now
         )
         if not connection.program:
             if command.seq <= connection.acked:
                 raise Refusal("seq is not larger than the previous seq")
             connection.acked = command.seq
-        return base, age
+        return machine, age
 
     def _drive(self, connection: Connection, drive: Drive, now: float) -> None:
-        base, age = self._authorized(connection, drive, now)
-        base.speeds.ages.add(age, now)
+        machine, age = self._authorized(connection, drive, now)
+        machine.speeds.ages.add(age, now)
         if drive.clamped and not connection.flagged:
             connection.flagged = True
             log.warning("connection %s asks for more than full speed", connection.id)
         # The picture of the page has aged since the page sent the command.
         seen = None if drive.video is None else drive.video + age
-        base.conditions.video.observe(seen, now)
-        speed = base.speeds.speed
+        machine.conditions.video.observe(seen, now)
+        speed = machine.speeds.speed
         wanted = Twist(drive.x * speed.v, drive.y * speed.v, drive.turn * speed.w)
-        if reason := base.driving.drive(wanted, drive.neutral, drive.tick, now):
+        if reason := machine.driving.drive(wanted, drive.neutral, drive.tick, now):
             raise Refusal(reason)
 
     def _set_velocity(
         self, connection: Connection, command: SetVelocity, now: float
     ) -> None:
-        base, age = self.checked(
+        machine, age = self.checked(
             connection, command.robot, command.epoch, command.tick, now
         )
-        base.speeds.ages.add(age, now)
+        machine.speeds.ages.add(age, now)
         wanted = Twist(*command.velocity)
         if not wanted.is_finite:
             raise Refusal(f"expected finite numbers, got {command.velocity}")
-        if reason := base.robots.axes.refusal(wanted):
+        if reason := machine.robots.axes.refusal(wanted):
             raise Refusal(reason)
-        if reason := base.driving.drive(wanted, wanted.is_zero, command.tick, now):
+        if reason := machine.driving.drive(wanted, wanted.is_zero, command.tick, now):
             raise Refusal(reason)
 
     # Programs.
@@ -275,12 +277,16 @@ class CommandHandler:
         waiting, self._takes = self._takes, []
         for request, robot, epoch, until in waiting:
             try:
-                base = self._machines.find(robot)
-                check_lease(base.authority.lease, PROGRAM, epoch)
+                machine = self._machines.find(robot)
+                check_lease(machine.authority.lease, PROGRAM, epoch)
             except Refusal as refusal:
                 self._emit(SendToDisplay(TakeReply(request, robot, None, refusal.why)))
                 continue
-            if now < until and base.robots.drivable and base.conditions.why_blocked(now):
+            if (
+                now < until
+                and machine.robots.drivable
+                and machine.conditions.why_blocked(now)
+            ):
                 self._takes.append((request, robot, epoch, until))
             else:
                 self._emit(SendToDisplay(TakeReply(request, robot, epoch, None)))

@@ -102,14 +102,14 @@ class Gate:
 
     def _shut_down(self, event: events.Shutdown, now: float) -> None:
         self._display_pulse.ended = event.why
-        for base in self._machines:
-            base.authority.end(event.why, now)
+        for machine in self._machines:
+            machine.authority.end(event.why, now)
         self._end_unsupervised_goals(now)
 
     def _end_unsupervised_goals(self, now: float) -> None:
         """Cancel goals where the robot asks for it: no display supervises them."""
-        for base in self._machines:
-            for goals in base.robots.goals.values():
+        for machine in self._machines:
+            for goals in machine.robots.goals.values():
                 goals.lost(now)
 
     def _connect(self, message: protocol.Connect, now: float) -> None:
@@ -122,17 +122,17 @@ class Gate:
             message.connection
         ):
             return
-        for base in self._machines:
-            base.lost(message.connection, now)
+        for machine in self._machines:
+            machine.lost(message.connection, now)
 
     def _speeds(self, message: protocol.Speeds, now: float) -> None:
         connection = self._connections.find(message.connection)
         if connection is None:
             return
         connection.set_speeds(message.v, message.w)
-        for base in self._machines:
-            if base.authority.is_held_by(connection.id):
-                base.authority.set_cap(connection.cap)
+        for machine in self._machines:
+            if machine.authority.is_held_by(connection.id):
+                machine.authority.set_cap(connection.cap)
 
     def _from_page(self, message: protocol.FromPage, now: float) -> None:
         connection = self._connections.find(message.connection)

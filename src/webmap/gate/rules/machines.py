@@ -49,7 +49,7 @@ class Machines:
         self._epochs = epochs
         self._emit = emit
         self._refuse = refuse
-        self._bases: dict[events.Key, Machine] = {}
+        self._by_key: dict[events.Key, Machine] = {}
         self._latches: dict[events.Key, StopLatch] = {}
         self._stopped_as: dict[events.Key, dict[events.Key, str]] = {}
         """For each machine with a STOP: the keys that it had before and under which the
@@ -83,23 +83,23 @@ class Machines:
 
     def __iter__(self) -> Iterator[Machine]:
         """Iterate over the machines; each is reported again, as it may change."""
-        for base in list(self._bases.values()):
-            self._touched.add(base.key)
-            yield base
+        for machine in list(self._by_key.values()):
+            self._touched.add(machine.key)
+            yield machine
 
     def look(self) -> None:
         """Mark every machine as possibly changed, so that it is reported."""
-        self._touched.update(self._bases)
+        self._touched.update(self._by_key)
 
     @property
     def busy(self) -> bool:
         """Whether :meth:`step` has anything to do for any machine."""
-        return any(base.active for base in self._bases.values())
+        return any(machine.active for machine in self._by_key.values())
 
     @property
     def silent(self) -> bool:
         """Whether no machine is driven or being stopped."""
-        return all(base.silent for base in self._bases.values())
+        return all(machine.silent for machine in self._by_key.values())
 
     def find(self, robot: str) -> Machine:
         """Return the machine of a robot, and mark it as possibly changed.
@@ -109,9 +109,9 @@ class Machines:
 
         """
         self.check_known(robot)
-        base = self._by_robot[robot]
-        self._touched.add(base.key)
-        return base
+        machine = self._by_robot[robot]
+        self._touched.add(machine.key)
+        return machine
 
     def check_known(self, robot: str | None) -> None:
         """Check that a robot is declared; ``None`` means all robots and passes.
@@ -123,11 +123,11 @@ class Machines:
         if robot is not None and robot not in self._by_robot:
             raise Refusal(f"there is no robot {robot!r}")
 
-    def reset(self, base: Machine, stop: str, now: float) -> None:
+    def reset(self, machine: Machine, stop: str, now: float) -> None:
         """End the STOP of a machine, also under the keys that it had before.
 
         Args:
-            base: The machine.
+            machine: The machine.
             stop: The identity of the STOP to end.
             now: Seconds, monotonic.
 
@@ -136,10 +136,10 @@ class Machines:
                 machine.
 
         """
-        base.reset(stop, now)
-        for key, earlier in self._stopped_as.pop(base.key, {}).items():
+        machine.reset(stop, now)
+        for key, earlier in self._stopped_as.pop(machine.key, {}).items():
             # If a machine with that key still has robots, the STOP is theirs too.
-            there, latch = self._bases.get(key), self._latches[key]
+            there, latch = self._by_key.get(key), self._latches[key]
             left = there is None or set(there.robots.specs) <= there.robots.leaving
             same = latch.press is not None and latch.press.id in (earlier, stop)
             if left and same:
@@ -147,11 +147,11 @@ class Machines:
 
     def step(self, now: float) -> None:
         """Do what is due for each machine, and close stalled control links."""
-        for base in list(self._bases.values()):
-            if base.active:
-                base.step(now)
-                self._touched.add(base.key)
-                self._drop_if_empty(base)
+        for machine in list(self._by_key.values()):
+            if machine.active:
+                machine.step(now)
+                self._touched.add(machine.key)
+                self._drop_if_empty(machine)
         for (url, lane), link in self._links.items():
             if lane == "control" and link.stalled(now):
                 self._emit(CutLink(url))
@@ -161,22 +161,22 @@ class Machines:
         """Send a report on each robot whose machine may have changed."""
         touched, self._touched = self._touched, set()
         for key in touched:
-            base = self._bases.get(key)
+            machine = self._by_key.get(key)
             # Until the shell reports the lock, it is unknown whether STOP is active.
-            if base is not None and base.known:
-                for spec in list(base.robots.specs.values()):
-                    self._report(base, spec, now)
+            if machine is not None and machine.known:
+                for spec in list(machine.robots.specs.values()):
+                    self._report(machine, spec, now)
 
-    def _report(self, base: Machine, spec: RobotSpec, now: float) -> None:
+    def _report(self, machine: Machine, spec: RobotSpec, now: float) -> None:
         reporter = self._reporters.get(spec.id)
         if reporter is None:  # forgotten; it stays only until the machine has stopped
             return
-        latest = report(base, spec, now)
+        latest = report(machine, spec, now)
         due = reporter.worth_saying(latest, now)
         if due:
             self._emit(SendToDisplay(latest))
         elif due is None:
-            self._touched.add(base.key)
+            self._touched.add(machine.key)
 
     # Declarations of the display.
 
@@ -202,20 +202,20 @@ class Machines:
                 earlier.robots.specs[spec.id] = spec
                 self._emit(Attach(key, spec))
                 return
-        base = self._bases.get(key) or self._new_base(key)
+        machine = self._by_key.get(key) or self._new_machine(key)
         tasks = self._link(spec.goal_url or key.url, "tasks")
-        base.declare(spec, tasks, self._link(spec.bridge_url, "tasks"), now)
+        machine.declare(spec, tasks, self._link(spec.bridge_url, "tasks"), now)
         self._emit(Attach(key, spec))
-        if not base.known:
+        if not machine.known:
             self._emit(Lock(key))
         if earlier is not None and stopped is not None:
             # It is the same robot under another key: its STOP stays active.
             others = {**self._stopped_as.get(earlier.key, {}), earlier.key: stopped.id}
             self._stopped_as.setdefault(key, {}).update(others)
-            base.stop(stopped, now)
+            machine.stop(stopped, now)
         else:
-            base.attached(now)
-        self._by_robot[spec.id] = base
+            machine.attached(now)
+        self._by_robot[spec.id] = machine
         self._reporters.setdefault(spec.id, Reporter())
         self._touched.add(key)
 
@@ -239,32 +239,32 @@ class Machines:
     def _staying(self) -> list[RobotSpec]:
         """Return the declarations of the robots that are not forgotten."""
         by_robot = self._by_robot.items()
-        return [base.robots.specs[robot] for robot, base in by_robot]
+        return [machine.robots.specs[robot] for robot, machine in by_robot]
 
-    def _new_base(self, key: events.Key) -> Machine:
+    def _new_machine(self, key: events.Key) -> Machine:
         if key not in self._latches:
             self._latches[key] = StopLatch(key, self._emit)
         control, latch = self._link(key.url, "control"), self._latches[key]
-        base = Machine(
+        machine = Machine(
             key, control, self._display_pulse, latch, self._epochs, self._emit
         )
-        self._bases[key] = base
-        return base
+        self._by_key[key] = machine
+        return machine
 
     def _forget(self, message: Forget, now: float) -> None:
-        base = self._by_robot.pop(message.robot, None)
-        if base is None:
+        machine = self._by_robot.pop(message.robot, None)
+        if machine is None:
             return
         del self._reporters[message.robot]
         self._emit(SendToDisplay(RobotGone(message.robot)))
-        base.forget(message.robot, now)
-        self._touched.add(base.key)
-        self._drop_if_empty(base)
+        machine.forget(message.robot, now)
+        self._touched.add(machine.key)
+        self._drop_if_empty(machine)
 
-    def _drop_if_empty(self, base: Machine) -> None:
-        if not base.robots.specs:
-            del self._bases[base.key]
-            self._emit(Unlock(base.key))
+    def _drop_if_empty(self, machine: Machine) -> None:
+        if not machine.robots.specs:
+            del self._by_key[machine.key]
+            self._emit(Unlock(machine.key))
 
     # Events of the shell.
 
@@ -274,39 +274,39 @@ class Machines:
     def _link_up(self, event: events.LinkUp, now: float) -> None:
         link = self._link(event.url, event.lane)
         link.opened(now)
-        for base in self:
-            if base.control is link:
-                base.link_up(now)
-            base.active_stop.tasks_up(link, now)
+        for machine in self:
+            if machine.control is link:
+                machine.link_up(now)
+            machine.active_stop.tasks_up(link, now)
 
     def _link_down(self, event: events.LinkDown, now: float) -> None:
         link = self._link(event.url, event.lane)
         link.closed()
-        for base in self:
-            if base.control is link:
-                base.link_down(now)
+        for machine in self:
+            if machine.control is link:
+                machine.link_down(now)
             if not event.spent:
-                base.active_stop.tasks_down(link, now)
+                machine.active_stop.tasks_down(link, now)
 
     def _ping_answered(self, event: events.PingAnswered, now: float) -> None:
         self._link(event.url, "control").answered(event.asked_at, now)
 
     def _twist_written(self, event: events.TwistWritten, now: float) -> None:
-        base = self._of_key(event.key)
-        if base is None:
+        machine = self._of_key(event.key)
+        if machine is None:
             return
-        base.on_written(event, now)
+        machine.on_written(event, now)
         if event.by is not None and not event.done:
             why = "a command was dropped: the connection or the gate was held up"
-            self._refuse(event.by, base.robots.newest.id, "drive", why, now)
+            self._refuse(event.by, machine.robots.newest.id, "drive", why, now)
 
     def _goal_written(self, event: events.GoalWritten, now: float) -> None:
-        base = self._by_robot.get(event.robot)
-        if base is None:
+        machine = self._by_robot.get(event.robot)
+        if machine is None:
             return
         if event.done:
-            self._touched.add(base.key)
-            base.on_goal_written(event)
+            self._touched.add(machine.key)
+            machine.on_goal_written(event)
             sent = SentGoal(event.robot, event.x, event.y, event.yaw, event.by)
             self._emit(SendToDisplay(sent))
         else:
@@ -335,66 +335,66 @@ class Machines:
             goals.on_progress_lost(event, now)
 
     def _hook_ended(self, event: events.HookEnded, now: float) -> None:
-        base = self._by_robot.get(event.robot)
-        if base is not None:
-            self._touched.add(base.key)
-            base.robots.hooks[event.robot].ended(event)
+        machine = self._by_robot.get(event.robot)
+        if machine is not None:
+            self._touched.add(machine.key)
+            machine.robots.hooks[event.robot].ended(event)
 
     def _goals_of(self, robot: str) -> Goals | None:
         """Return a robot's goals and mark it as changed; ``None`` if it is gone."""
-        base = self._by_robot.get(robot)
-        if base is None:
+        machine = self._by_robot.get(robot)
+        if machine is None:
             return None
-        self._touched.add(base.key)
-        return base.robots.goals[robot]
+        self._touched.add(machine.key)
+        return machine.robots.goals[robot]
 
     def _echo_received(self, event: events.EchoReceived, now: float) -> None:
-        base = self._of_key(event.key)
-        if base is not None:
-            base.on_echo(event.twist, now)
+        machine = self._of_key(event.key)
+        if machine is not None:
+            machine.on_echo(event.twist, now)
 
     def _odometry_received(self, event: events.OdometryReceived, now: float) -> None:
-        base = self._of_key(event.key)
-        if base is not None:
-            base.observe(event.twist, event.sent_after, now)
+        machine = self._of_key(event.key)
+        if machine is not None:
+            machine.observe(event.twist, event.sent_after, now)
 
     def _scan_received(self, event: events.ScanReceived, now: float) -> None:
-        base = self._of_key(event.key)
-        if base is not None and base.observation.on:
-            base.scan_assist.observe(event.topic, event.sweep)
+        machine = self._of_key(event.key)
+        if machine is not None and machine.observation.on:
+            machine.scan_assist.observe(event.topic, event.sweep)
 
     def _lock_reported(self, event: events.LockState, now: float) -> None:
-        base = self._of_key(event.key)
-        if base is not None:
-            base.locked(event, now)
+        machine = self._of_key(event.key)
+        if machine is not None:
+            machine.locked(event, now)
 
     def _stop_saved(self, event: events.StopSaved, now: float) -> None:
-        base = self._of_key(event.key)
-        if base is not None:
-            base.latch.kept(event)
+        machine = self._of_key(event.key)
+        if machine is not None:
+            machine.latch.kept(event)
         else:  # the robot was forgotten in the meantime; its STOP was not
             self._latches[event.key].kept(event)
 
     def _stop_file_changed(self, event: events.StopFileChanged, now: float) -> None:
-        base = self._of_key(event.key)
-        if base is not None:
-            base.on_stop_file_changed(event.press, now)
+        machine = self._of_key(event.key)
+        if machine is not None:
+            machine.on_stop_file_changed(event.press, now)
 
     def _writer_nodes(self, message: WriterNodes, now: float) -> None:
-        base = self._by_robot.get(message.robot)
-        if base is not None:
-            self._touched.add(base.key)
-            base.other_writer.named(message.nodes)
+        machine = self._by_robot.get(message.robot)
+        if machine is not None:
+            self._touched.add(machine.key)
+            machine.other_writer.named(message.nodes)
 
     def _stop_test_saved(self, event: events.StopTestSaved, now: float) -> None:
-        base = self._of_key(event.key)
-        if base is not None:
-            base.speeds.tested = event.record
+        machine = self._of_key(event.key)
+        if machine is not None:
+            machine.speeds.tested = event.record
 
     def _of_key(self, key: events.Key) -> Machine | None:
         """Return a machine and mark it as changed; ``None`` if it is gone."""
         self._touched.add(key)
-        return self._bases.get(key)
+        return self._by_key.get(key)
 
 
 def _assumed(spec: RobotSpec, assumed: bool) -> RobotSpec:

@@ -29,116 +29,116 @@ BRAKE = 0.5
 _DIGITS = 3
 
 
-def report(base: Machine, spec: RobotSpec, now: float) -> RobotReport:
+def report(machine: Machine, spec: RobotSpec, now: float) -> RobotReport:
     """Return the report on one robot at ``now``."""
-    lease = base.authority.lease
-    speed = base.speeds.own if lease is None else base.speeds.speed
-    age, test = base.speeds.ages.p95, base.tests.last
-    echoed, measured = base.observation.echoed, base.observation.shown(now)
+    lease = machine.authority.lease
+    speed = machine.speeds.own if lease is None else machine.speeds.speed
+    age, test = machine.speeds.ages.p95, machine.tests.last
+    echoed, measured = machine.observation.echoed, machine.observation.shown(now)
     holder = None if lease is None else Holder(lease.connection, lease.name)
-    goals = base.robots.goals[spec.id]
+    goals = machine.robots.goals[spec.id]
     return RobotReport(
         robot=spec.id,
         name=spec.name,
-        state=base.state,
-        doing=_activity(base, spec, now),
-        latched=base.latch.acknowledged,
-        stop=_stop(base),
+        state=machine.state,
+        doing=_activity(machine, spec, now),
+        latched=machine.latch.acknowledged,
+        stop=_stop(machine),
         holder=holder,
         epoch=None if lease is None else lease.epoch,
-        asker=_asker(base, now),
-        changing=base.authority.handover.successor is not None,
-        armed=lease is not None and base.authority.deadman.armed,
+        asker=_asker(machine, now),
+        changing=machine.authority.handover.successor is not None,
+        armed=lease is not None and machine.authority.deadman.armed,
         v=speed.v,
         w=speed.w,
-        why=speed.why + base.scan_assist.why,
-        link="up" if _link(base, spec).up else "down",
-        sent=_velocity(base.motion.sent),
+        why=speed.why + machine.scan_assist.why,
+        link="up" if _link(machine, spec).up else "down",
+        sent=_velocity(machine.motion.sent),
         echoed=None if echoed is None else _velocity(echoed),
         measured=None if measured is None else _velocity(measured),
-        alarm=base.obedience.alarm(now),
-        other_writer=base.other_writer.words(base.key.topic),
+        alarm=machine.obedience.alarm(now),
+        other_writer=machine.other_writer.words(machine.key.topic),
         age=None if age is None else round(age * 1000, 0),
-        reaction=round(reaction(age, base.speeds.stop_time), 3),
-        brake=base.robots.a_max or BRAKE,
-        stop_time=base.speeds.stop_time,
-        stop_source=_stop_source(base),
-        stop_date=None if base.speeds.tested is None else base.speeds.tested.date,
+        reaction=round(reaction(age, machine.speeds.stop_time), 3),
+        brake=machine.robots.a_max or BRAKE,
+        stop_time=machine.speeds.stop_time,
+        stop_source=_stop_source(machine),
+        stop_date=None if machine.speeds.tested is None else machine.speeds.tested.date,
         test=None if test is None else TestReport(test.state, test.text),
-        armable=base.authority.why_unavailable(now) is None,
-        reason=_reason(base, now),
+        armable=machine.authority.why_unavailable(now) is None,
+        reason=_reason(machine, now),
         way=goals.way,
         cancels=goals.can_cancel,
         locates=spec.pose_topic is not None,
         goal=goals.report,
-        hooks=base.robots.hook_failures,
+        hooks=machine.robots.hook_failures,
     )
 
 
-def _activity(base: Machine, spec: RobotSpec, now: float) -> Activity:
+def _activity(machine: Machine, spec: RobotSpec, now: float) -> Activity:
     """Return the activity of one robot: the first that applies."""
-    state, goals = base.state, base.robots.goals[spec.id]
+    state, goals = machine.state, machine.robots.goals[spec.id]
     if state == "stopped":
-        confirmed = base.latch.shown and base.active_stop.confirmation.confirmed
+        confirmed = machine.latch.shown and machine.active_stop.confirmation.confirmed
         return "unconfirmed" if confirmed is False else "stopped"
-    if not _link(base, spec).up:
+    if not _link(machine, spec).up:
         return "down"
-    if base.authority.handover.successor is not None:
+    if machine.authority.handover.successor is not None:
         return "changing"
-    if base.other_writer.words(base.key.topic) and state in ("free", "stopping"):
+    if machine.other_writer.words(machine.key.topic) and state in ("free", "stopping"):
         return "other"
     if state == "stopping":
         return "stopping"
     if state == "driving":
-        return "blocked" if base.obedience.blocked(now) else "driven"
-    measured, held = base.observation.shown(now), state == "held"
+        return "blocked" if machine.obedience.blocked(now) else "driven"
+    measured, held = machine.observation.shown(now), state == "held"
     moving = measured is not None and moves(measured, MOVES, TURNS)
     if goals.navigates(moving=moving):
         return "navigating_held" if held else "navigating"
     if moving:
-        braking = base.obedience.watching(now) or goals.may_still_move(now)
+        braking = machine.obedience.watching(now) or goals.may_still_move(now)
         return "settling" if braking else "moving"
-    barred = _reason(base, now) is not None
+    barred = _reason(machine, now) is not None
     if held:
         return "barred_held" if barred else "held"
     return "barred" if barred else "free"
 
 
-def _reason(base: Machine, now: float) -> str | None:
+def _reason(machine: Machine, now: float) -> str | None:
     """Return why the machine cannot be driven now, or ``None``."""
-    if base.authority.lease is None:
-        return base.authority.why_unavailable(now)
-    return base.conditions.why_blocked(now)
+    if machine.authority.lease is None:
+        return machine.authority.why_unavailable(now)
+    return machine.conditions.why_blocked(now)
 
 
-def _link(base: Machine, spec: RobotSpec) -> LinkHealth:
+def _link(machine: Machine, spec: RobotSpec) -> LinkHealth:
     """Return the link that moves the robot."""
-    return base.control if spec.twist_topic else base.robots.goals[spec.id].link
+    return machine.control if spec.twist_topic else machine.robots.goals[spec.id].link
 
 
-def _stop_source(base: Machine) -> Literal["stated", "tested"] | None:
-    if base.speeds.tested is not None:
+def _stop_source(machine: Machine) -> Literal["stated", "tested"] | None:
+    if machine.speeds.tested is not None:
         return "tested"
-    return None if base.speeds.stop_time is None else "stated"
+    return None if machine.speeds.stop_time is None else "stated"
 
 
-def _asker(base: Machine, now: float) -> AskerReport | None:
-    asker = base.authority.handover.asker
+def _asker(machine: Machine, now: float) -> AskerReport | None:
+    asker = machine.authority.handover.asker
     if asker is None:
         return None
     return AskerReport(
-        asker.id, asker.name, round(base.authority.handover.left(now), 1)
+        asker.id, asker.name, round(machine.authority.handover.left(now), 1)
     )
 
 
-def _stop(base: Machine) -> StopReport | None:
-    press = base.latch.shown
+def _stop(machine: Machine) -> StopReport | None:
+    press = machine.latch.shown
     if press is None:
         return None
-    seen = base.active_stop.confirmation
+    seen = machine.active_stop.confirmation
     why = seen.why
-    if base.latch.trouble is not None:
-        why = f"{why}; a restart would end this STOP: {base.latch.trouble}"
+    if machine.latch.trouble is not None:
+        why = f"{why}; a restart would end this STOP: {machine.latch.trouble}"
     return StopReport(press.by, seen.confirmed, why, press.id)
 
 
