@@ -351,7 +351,7 @@ class Motion(RuleBasedStateMachine):
 
     @property
     def bench_key(self):
-        return next(iter(self.bench.gate._machines._bases))
+        return next(iter(self.bench.gate._machines._by_key))
 
     def _rest(self, seconds):
         """Let time pass in which nobody does anything, and the gate is looked at less.
