@@ -86,11 +86,10 @@ test-gate: $(DEV)
 
 ## test-python: pytest without test-gate; tests that measure time run at the end
 .PHONY: test-python test-parallel test-serial
-OF_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py))
 test-python: test-parallel test-serial
 WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | sort)
 test-parallel: $(DEV) $(NODE)
-	$(PY) tools/pytest_beside.py $(WAITING_JOBS) -m "not browser and not serial" $(addprefix --ignore ,$(OF_GATE))
+	$(PY) tools/pytest_beside.py $(WAITING_JOBS) -m "not browser and not serial" $(addprefix --ignore ,$(WITH_GATE))
 	$(PY) tools/pytest_beside.py $(JOBS) -m "browser and not serial" $(WITH_BROWSER)
 # Tests that measure time wait most of the time, so two files of them run in parallel on
 # any machine, the longest first. Safety tests allow for the delays of the machine and do

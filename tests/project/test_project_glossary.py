@@ -50,6 +50,8 @@ def found(name: str) -> Any:
     else:
         value = importlib.import_module(first)
     for other in others:
+        if inspect.ismodule(value) and not hasattr(value, other):
+            importlib.import_module(f"{value.__name__}.{other}")
         value = member(value, other)
     return value
 

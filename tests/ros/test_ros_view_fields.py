@@ -27,7 +27,9 @@ SCALARS = {
 def views():
     """Every struct whose docstring names the message types that it is a view of."""
     for module in pkgutil.walk_packages(webmap.__path__, "webmap."):
-        if module.name.startswith(("webmap.ros.", "webmap.modules.")):
+        if module.name.startswith(
+            ("webmap.ros.", "webmap.modules.", "webmap.features.")
+        ):
             importlib.import_module(module.name)
     found, waiting = {}, [msgspec.Struct]
     for struct in waiting:

@@ -1,0 +1,140 @@
+"""The gate's process imports little from other folders; every branch of that runs."""
+
+import asyncio
+import logging
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import Affine, Pose
+from webmap.base.logs import OutsideText, budgets
+from webmap.base.nesting import MAX_DEPTH
+from webmap.base.scope import Removal, Scope, break_off
+from webmap.ros.arrays import Floats, dec_hook
+from webmap.ros.decoding import decode_json
+from webmap.ros.limits import GENERAL, check_items, check_size
+from webmap.ros.rosbridge import cbor, ops
+
+LOADED = """
+import sys
+import webmap.gate.__main__, webmap.gate.display.client, webmap.ros.rosbridge.cbor
+print(*(name for name in sys.modules if name.startswith("webmap.")))
+"""
+
+
+def test_the_branches_of_all_that_it_imports_are_counted() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED], capture_output=True, text=True, check=True
+    )
+    ours = {name for name in done.stdout.split() if name.split(".")[1] != "gate"}
+    config = Path(__file__).with_name("coverage.toml").read_text()
+    counted = set(tomllib.loads(config)["tool"]["coverage"]["run"]["source"])
+    folders = {"webmap.base", "webmap.ros", "webmap.ros.rosbridge"}
+    assert counted == (ours - folders) | {"webmap.gate"}
+
+
+def test_a_process_hears_of_data_before_its_parent_ends() -> None:
+    program = (
+        "from webmap.base.children import end_with_parent; import time\n"
+        "end_with_parent(lambda: None, lambda: print('data', flush=True), 0.0)\n"
+        "time.sleep(60)"
+    )
+    child = subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert child.stdin
+    assert child.stdout
+    child.stdin.write(b"x")
+    child.stdin.flush()
+    assert child.stdout.readline() == b"data\n"
+    child.stdin.close()
+    assert child.wait(30) == 1
+    child.stdout.close()
+
+
+def test_a_pose_is_a_transform_too() -> None:
+    assert Affine.of_pose(Pose(1.0, 2.0, 0.0)).values == (1.0, 0.0, 0.0, 1.0, 1.0, 2.0)
+
+
+def test_a_traceback_that_cannot_be_shown_loses_no_line_of_the_log() -> None:
+    class Odd(Exception):
+        def __str__(self) -> str:
+            raise KeyError
+
+    about = (Odd, Odd(), "no traceback")
+    record = logging.LogRecord("webmap", logging.ERROR, "", 0, "it failed", (), about)  # type: ignore[arg-type]
+    assert OutsideText(budgets).filter(record)
+    assert record.exc_text == "  the traceback cannot be shown"
+
+
+def test_a_scope_closes_also_when_a_removal_raises(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    removed = []
+    scope = Scope("Bob")
+    thing = Removal(lambda: removed.append("first"))
+    scope.add(thing)
+    scope.add(Removal(lambda: 1 / 0))
+    scope.close()
+    thing.remove()
+    assert removed == ["first"]
+    assert "scope 'Bob': a removal failed" in caplog.text
+
+
+def test_a_task_is_cancelled_from_a_thread_without_a_loop() -> None:
+    loop = asyncio.new_event_loop()
+    future = loop.create_future()
+    break_off(future)
+    assert future.cancelled()
+    loop.close()
+
+
+def test_arrays_show_their_length_and_hold_no_other_types() -> None:
+    assert repr(Floats.from_wire([1.0, 2.0])) == "<Floats of 2>"
+    with pytest.raises(NotImplementedError, match="a message cannot hold"):
+        dec_hook(set, [])
+
+
+@pytest.mark.parametrize(("inside", "type"), [('"\\ud800"', list), ("NaN", int)])
+def test_json_that_is_not_strict_may_not_be_deep_either(
+    inside: str, type: object
+) -> None:
+    text = "[" * (MAX_DEPTH + 1) + inside + "]" * (MAX_DEPTH + 1)
+    with pytest.raises(ProtocolError, match="nested deeper"):
+        decode_json(text.encode(), type)
+
+
+def test_what_is_within_its_limits_passes() -> None:
+    check_size(GENERAL.size, GENERAL, None)
+    check_items("points", 1)
+
+
+@pytest.mark.parametrize(
+    ("frame", "why"),
+    [
+        (b"\x01", "expected a map in CBOR, got int"),
+        (b"\xa1\x61a\x5b\x7f\xff\xff\xff\xff\xff\xff\xff", "CBOR"),
+    ],
+)
+def test_cbor_that_is_no_map_is_refused(frame: bytes, why: str) -> None:
+    with pytest.raises(ProtocolError, match=why):
+        cbor.decode(frame)
+
+
+def test_operations_are_json_or_an_error() -> None:
+    assert msgspec.json.decode(ops.status("info", "ready")) == {
+        "op": "status",
+        "level": "info",
+        "msg": "ready",
+    }
+    assert msgspec.json.decode(ops.set_level("none"))["level"] == "none"
+    deep: list[object] = []
+    for _ in range(100_000):
+        deep = [deep]
+    with pytest.raises(ValueError, match="nested too deeply"):
+        ops.publish("/deep", {"data": deep})
