@@ -151,7 +151,9 @@ def watched_tab(browser: Browser, width: int, height: int) -> Iterator[Page]:
     complaints.listen(context)
     page = context.new_page()
     page.allowed = []
-    yield page
-    context.close()
+    try:
+        yield page
+    finally:  # a page that goes on would slow down all later tests
+        context.close()
     complaints.allowed = page.allowed
     assert not complaints.unexpected, complaints.unexpected

@@ -7,9 +7,9 @@ from playwright.sync_api import Page, expect
 
 READY = """async () => {
   const { page } = await import(document.querySelector("script[type=module]").src);
-  const halves = [...page.halves._attached.values()];
+  const parts = [...page.parts._attached.values()];
   const styles = [...document.querySelectorAll("link[rel=stylesheet]")];
-  return halves.every(({ half }) => half) && styles.every(({ sheet }) => sheet);
+  return parts.every(({ part }) => part) && styles.every(({ sheet }) => sheet);
 }"""
 """Whether every module of the page is there and listens, and every style sheet."""
 

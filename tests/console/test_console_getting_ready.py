@@ -28,7 +28,7 @@ def test_it_says_so_before_what_drives_and_stops_has_come(chromium, demo):
     context = chromium.new_context(viewport={"width": 1280, "height": 800})
     page = context.new_page()
     page.route(
-        "**/modules/teleop.js*",
+        "**/drive/teleop.js*",
         lambda r: r.continue_() if come.is_set() else held.append(r),
     )
     page.goto(demo.url, wait_until="commit")

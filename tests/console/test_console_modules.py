@@ -1,4 +1,4 @@
-"""The modules of maps that the console brings, without their browser halves."""
+"""The modules of maps that the console brings, without their browser parts."""
 
 from pathlib import Path
 

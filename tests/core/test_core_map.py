@@ -206,22 +206,24 @@ def test_a_map_knows_where_its_browser_has_it(container):
     assert (place.left, place.top) == (12.0, 34.0)
 
 
-def test_a_browser_half_sends_to_its_module_and_ends_with_it(container, channel):
+def test_a_browser_part_sends_to_its_module_and_ends_with_it(container, channel):
     map = Map(container, 700, 500)
     got = []
 
     class Pad:
         def __init__(self, map) -> None:
-            self.half = map.add_browser_half(self, "modules/pad.js", {"size": 3})
+            self.browser_part = map.add_browser_part(
+                self, "modules/pad.js", {"size": 3}
+            )
 
         def on_message(self, message):
             got.append(message)
 
     pad = map.add_module(Pad)
-    assert map.on_module_message(pad.half.instance, {"x": 1})
-    pad.half.send({"hello": 1})
+    assert map.on_module_message(pad.browser_part.instance, {"x": 1})
+    pad.browser_part.send({"hello": 1})
     map.remove_module(pad)
-    assert not map.on_module_message(pad.half.instance, {"x": 2})
+    assert not map.on_module_message(pad.browser_part.instance, {"x": 2})
     assert got == [{"x": 1}]
     assert [call[0] for call in channel.calls] == ["attach", "send", "detach"]
 

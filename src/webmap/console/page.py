@@ -189,7 +189,7 @@ class Frame:
         self._looks = 0
         self._placed = False
         self._dot_size = 0.0
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self, "console/console.js", {"title": title, "bounds": self._bounds}
         )
 
@@ -274,7 +274,7 @@ class Layout:
         restore: bool = True,
     ) -> None:
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/layout/layout_tool.js",
             {"of": of, "place": place, "classes": classes, "restore": restore},
@@ -287,7 +287,7 @@ class Layout:
             self.map.notify_modules("on_own_view")
             # The page receives this after all messages about the view that were sent
             # before.
-            self.half.send({"own": True})
+            self.browser_part.send({"own": True})
         elif message.get("found") is True:
             self.map.notify_modules("on_view_found")
 

@@ -23,7 +23,7 @@ log = logging.getLogger("webmap.map")
 _numbers = itertools.count(1)
 
 
-class BrowserHalf:
+class BrowserPart:
     """An ES module in one page that belongs to one module of one map."""
 
     def __init__(
@@ -74,7 +74,7 @@ class WorldView(Extendable):
     """An extendable that shows the world from above on one page; base class of maps.
 
     It has the canvas, the view, images, mounted fragments, listeners and the browser
-    halves of modules, but no robots.
+    parts of modules, but no robots.
 
     Args:
         container: The page's element to draw in.
@@ -114,7 +114,7 @@ class WorldView(Extendable):
         self.root.set("aria-label", "Map")
         self.root.set_map(self.world, canvas_width or 0.0, canvas_height or 0.0)
         self.fragment = Fragment(self.root)
-        self._halves: dict[int, BrowserHalf] = {}
+        self._parts: dict[int, BrowserPart] = {}
         self._published: dict[Element, Removal] = {}
         self._mount = self.page.channel.mount(
             self.fragment, under=container.id, within=self.page.mount
@@ -244,41 +244,41 @@ class WorldView(Extendable):
             mount, element, event, handler, prevent=prevent, stop=stop
         )
 
-    def add_browser_half(
+    def add_browser_part(
         self,
         module: Any,
         script: str | Path,
         options: dict[str, Any] | None = None,
         style: str | Path | None = None,
-    ) -> BrowserHalf:
-        """Give a module an ES module in the browser, its browser half.
+    ) -> BrowserPart:
+        """Give a module an ES module in the browser, its browser part.
 
         Args:
             module: The module. Its ``on_message(message)`` gets the messages of the
-                browser half; its ``on_ready()`` is called whenever the browser half was
+                browser part; its ``on_ready()`` is called whenever the browser part was
                 loaded.
             script: An ES module: the name of a built-in one, or a file's path. Its
                 default export is called with the map, the options and a function that
                 sends a message, and returns an object with ``destroy()`` and, to
                 receive messages, ``receive(message)``.
-            options: Plain data for the browser half.
+            options: Plain data for the browser part.
             style: A style sheet to load with it: a built-in name or a path.
 
         Returns:
-            The browser half, for sending messages; it ends with the module.
+            The browser part, for sending messages; it ends with the module.
 
         """
-        half = BrowserHalf(
+        part = BrowserPart(
             self.page,
             self.root.id,
             module,
             script,
             options or {},
             style,
-            self._halves.pop,
+            self._parts.pop,
         )
-        self._halves[half.instance] = half
-        return keep(half)
+        self._parts[part.instance] = part
+        return keep(part)
 
     # View.
 
@@ -326,17 +326,17 @@ class WorldView(Extendable):
 
     def on_module_message(self, instance: int, message: Any) -> bool:
         """Pass a message to its module; return whether the module is of this map."""
-        half = self._halves.get(instance)
-        if half is None:
+        part = self._parts.get(instance)
+        if part is None:
             return False
-        self._call(half.module, "on_message", (message,))
+        self._call(part.module, "on_message", (message,))
         return True
 
     def on_module_ready(self, instance: int) -> None:
-        """Notify a module that its browser half was loaded, possibly after a reload."""
-        half = self._halves.get(instance)
-        if half is not None:
-            self._call(half.module, "on_ready", ())
+        """Notify a module that its browser part was loaded, possibly after a reload."""
+        part = self._parts.get(instance)
+        if part is not None:
+            self._call(part.module, "on_ready", ())
 
     def report_error(self, text: str) -> None:
         """Log a failure and show it on this map's page."""

@@ -20,7 +20,7 @@ NAME = "ws://test:9090 Bob"
 
 
 class Saying(Channel):
-    """Notes what browser halves are told."""
+    """Notes what browser parts are told."""
 
     def send(self, instance, message):
         self.__dict__.setdefault("told", []).append(message)

@@ -51,7 +51,11 @@ HORN = {
             "args.data",
             "got 1, expected true or false",
         ),
-        ({"type": "my/Srv", "args": {"x": {1, 2}}}, "args", "it cannot be written as JSON"),
+        (
+            {"type": "my/Srv", "args": {"x": {1, 2}}},
+            "args",
+            "it cannot be written as JSON",
+        ),
         ({"type": None, "form": True}, "type", "a form needs the type"),
     ],
 )

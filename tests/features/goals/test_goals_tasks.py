@@ -115,7 +115,7 @@ class TestInitialPose:
         map.add_robot(robot)
         tool, said = map.add_module("InitialPoseTool"), []
         bridge = Bridge("ws://127.0.0.1:9")
-        monkeypatch.setattr(tool.half, "send", said.append)
+        monkeypatch.setattr(tool.browser_part, "send", said.append)
         tool.on_message({"covariance": robot.id})
         robot.set_initial_pose_topic(bridge, "/initialpose", covariance=(1, 4, 0.25))
         robot.set_alignment(3, 0, 90)
@@ -148,7 +148,7 @@ class TestRoutes:
                 page = Page(entry, channel, viewer, None, {})
                 tool = Map(page.element("map"), 700, 500).add_module("RouteTool")
                 sent = []
-                monkeypatch.setattr(tool.half, "send", sent.append)
+                monkeypatch.setattr(tool.browser_part, "send", sent.append)
                 for number, message in enumerate(messages):
                     tool.on_message(message)
                     async with asyncio.timeout(30):

@@ -24,7 +24,7 @@ def said(monkeypatch):
     """What modules send to their halves."""
     sent = []
     monkeypatch.setattr(
-        "webmap.core.world_view.BrowserHalf.send",
+        "webmap.core.world_view.BrowserPart.send",
         lambda self, message: sent.append(message),
     )
     return sent

@@ -43,7 +43,7 @@ class LogLink:
 def said(monkeypatch):
     sent = []
     monkeypatch.setattr(
-        "webmap.core.world_view.BrowserHalf.send",
+        "webmap.core.world_view.BrowserPart.send",
         lambda self, message: sent.append(message),
     )
     return sent

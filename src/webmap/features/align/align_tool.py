@@ -43,7 +43,7 @@ class AlignTool:
         self.map = map
         for robot in map.robots:
             store.restore(robot)
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self, "features/align/align_tool.js", {}, "features/align/align_tool.css"
         )
 
@@ -60,7 +60,7 @@ class AlignTool:
             try:
                 self._save(save)
             except ConfigError as error:
-                self.half.send({"refused": str(error)})
+                self.browser_part.send({"refused": str(error)})
         else:
             log.warning("%r: an unknown message of the page was ignored", self.map)
 
@@ -68,12 +68,12 @@ class AlignTool:
         robot = self.map.find_robot(id)
         why = self._barred(robot)
         if robot is None or why is not None:
-            self.half.send({"refused": why})
+            self.browser_part.send({"refused": why})
             return
         bridge = robot.pose_source.bridge
         assert bridge is not None  # else it is barred
         together = [r.id for r in self._together(robot)]
-        self.half.send(
+        self.browser_part.send(
             {
                 "align": {
                     "robot": robot.id,
@@ -119,7 +119,7 @@ class AlignTool:
         else:
             log.info("%s is aligned by %s: %s", name, by, path)
             lost = ""
-        self.half.send({"saved": {"line": toml_line(pose), "lost": lost}})
+        self.browser_part.send({"saved": {"line": toml_line(pose), "lost": lost}})
 
     def _barred(self, robot: "Robot | None", *, whole: bool = False) -> str | None:
         """Return why a robot cannot be aligned from this page now, None if it can."""

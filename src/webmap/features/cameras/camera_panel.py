@@ -95,7 +95,7 @@ class CameraPanel:
         self._sent: dict[str, Any] | None = None
         self._watched: Any = None
         self._watching: Any = None
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/cameras/camera_panel.js",
             {},
@@ -133,7 +133,7 @@ class CameraPanel:
         self._sent = message
         self._cameras = {camera_number(camera): camera for camera in cameras}
         self._watch(None)
-        self.half.send(message)
+        self.browser_part.send(message)
 
     def on_message(self, message: dict[str, Any]) -> None:
         """Send the pictures of the camera that the page has chosen, or none."""
@@ -154,7 +154,7 @@ class CameraPanel:
     def _show(self) -> None:
         camera = self._watched
         if camera is not None and camera.url is not None:
-            self.half.send(
+            self.browser_part.send(
                 {
                     "op": "picture",
                     "camera": camera_number(camera),

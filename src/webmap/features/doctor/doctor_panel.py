@@ -47,7 +47,7 @@ class DoctorReports:
         self, map: "Map", element: "Element", bridges: Sequence["Bridge"]
     ) -> None:
         self.map = map
-        map.add_browser_half(
+        map.add_browser_part(
             self,
             "features/doctor/doctor_panel.js",
             {},

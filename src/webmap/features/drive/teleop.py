@@ -45,7 +45,7 @@ class Teleop:
         self.speed = speed
         self.rotation_speed = rotation_speed
         map.page.set_speeds(self, speed, rotation_speed)
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/drive/teleop.js",
             {"holonomic": holonomic, "stopPlace": stop_place},

@@ -26,7 +26,7 @@ class ExportTool:
 
     def __init__(self, map: "Map", *, place: str = "", classes: str = "") -> None:
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/export/export_tool.js",
             {"place": place, "classes": classes},

@@ -57,7 +57,7 @@ class GoalTool:
                 f"GoalTool: spacing is {least:g} to {most:g} m, got {spacing!r}"
             )
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/goals/goal_tool.js",
             {"button": button, "key": key, "spacing": spacing},
@@ -66,11 +66,11 @@ class GoalTool:
 
     def aim(self) -> None:
         """Make the operator's next press on the map the goal."""
-        self.half.send({"active": True})
+        self.browser_part.send({"active": True})
 
     def forget(self, robot: "Robot") -> None:
         """Remove the arrow of a goal that was reached or is not driven to."""
-        self.half.send({"reached": robot.id})
+        self.browser_part.send({"reached": robot.id})
 
     def on_message(self, message: dict[str, Any]) -> None:
         """Handle the page's messages about sent and canceled goals."""

@@ -259,7 +259,7 @@ function transform({ x, y, degrees }) {
 
 /**
  * @param {number} radius In pixels.
- * @param {number} half BrowserPart the angle, in radians.
+ * @param {number} half Half the angle, in radians.
  * @returns {string} The path of a sector about x.
  */
 function sector(radius, half) {

@@ -37,7 +37,7 @@ class InitialPoseTool:
         if len(key) != 1:
             raise ValueError(f"InitialPoseTool: key must be one character, got {key!r}")
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/goals/initial_pose_tool.js",
             {"button": button, "key": key},
@@ -46,7 +46,7 @@ class InitialPoseTool:
 
     def aim(self) -> None:
         """Make the operator's next press on the map the robot's pose."""
-        self.half.send({"active": True})
+        self.browser_part.send({"active": True})
 
     def on_message(self, message: dict[str, Any]) -> None:
         """Handle the page's message of a sent pose, or send the page variances."""
@@ -63,7 +63,7 @@ class InitialPoseTool:
         robot = self.map.find_robot(id)
         spec = robot.motion.spec() if robot is not None else None
         if robot is None or spec is None or spec.pose_topic is None:
-            self.half.send({"covariance": None})
+            self.browser_part.send({"covariance": None})
             return
         x, y, yaw = spec.pose_covariance
         covariance = {
@@ -73,4 +73,4 @@ class InitialPoseTool:
             "yaw": yaw,
             "turn": spec.own_map[2],
         }
-        self.half.send({"covariance": covariance})
+        self.browser_part.send({"covariance": covariance})

@@ -299,7 +299,7 @@ class Labels:
         self.may_edit = editable and map.page.viewer.role in MAY_ADD
         self.layer = LabelLayer.shared(name, configured)
         self.layer.show_on(map, order=ORDER)
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/labels/labels.js",
             {
@@ -322,12 +322,12 @@ class Labels:
                 raise ConfigError("only operators can add, move and delete labels")
             elif "add" in message:
                 self.layer.add(new_label(message["add"]))
-                self.half.send({"done": True})
+                self.browser_part.send({"done": True})
             elif "move" in message:
                 self.layer.move(str(message["move"]), message.get("to"))
-                self.half.send({"done": True})
+                self.browser_part.send({"done": True})
             elif "remove" in message:
                 self.layer.remove(str(message["remove"]))
-                self.half.send({"done": True})
+                self.browser_part.send({"done": True})
         except ConfigError as error:
-            self.half.send({"refused": str(error)})
+            self.browser_part.send({"refused": str(error)})

@@ -161,7 +161,7 @@ class RosoutPanel:
         self._sent: list[tuple[int, str]] = []
         self._watching: list[Removal] = []
         self._task: asyncio.Task[None] | None = None
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/log/rosout_panel.js",
             {
@@ -200,7 +200,7 @@ class RosoutPanel:
                 ]
                 for line in log.since(version)[-self._lines :]
             ]
-            self.half.send(
+            self.browser_part.send(
                 {"bridge": number, "said": lines, "total": log.total, "state": state}
             )
 

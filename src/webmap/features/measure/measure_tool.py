@@ -28,7 +28,7 @@ class MeasureTool:
         if len(key) != 1:
             raise ValueError(f"MeasureTool: key must be one character, got {key!r}")
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/measure/measure_tool.js",
             {"key": key},

@@ -185,7 +185,7 @@ class RouteTool:
         self._store = RouteStore(
             state_folder() / "routes", name or f"page {map.page.entry.path}"
         )
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/routes/route_tool.js",
             {"saves": map.page.viewer.role != "viewer"},
@@ -204,7 +204,9 @@ class RouteTool:
         elif op not in ("save", "delete"):
             log.warning("%r: an unknown message of the page was ignored", self.map)
         elif self.map.page.viewer.role == "viewer":
-            self.half.send({"problem": "Who may not drive may not change routes."})
+            self.browser_part.send(
+                {"problem": "Who may not drive may not change routes."}
+            )
         elif op == "save":
             self._do(lambda: self._save(message))
         else:
@@ -226,8 +228,8 @@ class RouteTool:
             try:
                 answer = await asyncio.to_thread(work) or {}
                 names = await asyncio.to_thread(self._store.names)
-                self.half.send({**answer, "routes": names})
+                self.browser_part.send({**answer, "routes": names})
             except ConfigError as error:
-                self.half.send({"problem": str(error)})
+                self.browser_part.send({"problem": str(error)})
 
         spawn(do())

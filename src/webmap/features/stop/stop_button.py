@@ -22,7 +22,7 @@ class StopButton:
 
     def __init__(self, map: "Map", *, place: str = "") -> None:
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/stop/stop_button.js",
             {"place": place},

@@ -98,7 +98,7 @@ class TileLayer:
         map.mount(self._fragment, order=ORDER)
         keep(Removal(self._end))
         words = self.source.attribution if attribution is None else attribution
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/tiles/tile_layer.js",
             {"attribution": words},

@@ -17,7 +17,7 @@ class Follow:
 
     def __init__(self, map: "Map") -> None:
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self, "features/view/follow.js", {}, "features/view/view.css"
         )
 

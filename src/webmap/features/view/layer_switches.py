@@ -82,7 +82,7 @@ class LayerSwitches:
                     f"LayerSwitches: no layer {name!r}; there are {known}"
                 )
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/view/layer_switches.js",
             {"layers": [list(item) for item in chosen.items()], "off": hidden},

@@ -27,7 +27,7 @@ class MetreGrid:
         if least < 4:
             raise ValueError(f"MetreGrid: least must be at least 4 pixels, got {least}")
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/view/metre_grid.js",
             {"least": least},

@@ -18,7 +18,7 @@ class MouseViewControl:
 
     def __init__(self, map: "Map") -> None:
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/view/mouse_view_control.js",
             style="features/view/view.css",

@@ -24,7 +24,7 @@ class PointerReadout:
         if not 0 <= digits <= 6:
             raise ValueError(f"PointerReadout: digits must be 0 to 6, got {digits}")
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/view/pointer_readout.js",
             {"digits": digits},

@@ -24,7 +24,7 @@ class ScaleBar:
         if width < 20:
             raise ValueError(f"ScaleBar: width must be at least 20 pixels, got {width}")
         self.map = map
-        self.half = map.add_browser_half(
+        self.browser_part = map.add_browser_part(
             self,
             "features/view/scale_bar.js",
             {"width": width},

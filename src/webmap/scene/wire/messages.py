@@ -105,13 +105,13 @@ class ViewReport(Message, frozen=True, tag="view"):
 
 
 class ModuleReady(Message, frozen=True, tag="ready"):
-    """A module's browser half was attached, possibly again after a reload."""
+    """A module's browser part was attached, possibly again after a reload."""
 
     instance: _Id
 
 
 class ModuleMessage(Message, frozen=True, tag="module"):
-    """A message of a module's browser half to the module."""
+    """A message of a module's browser part to the module."""
 
     instance: _Id
     data: dict[str, Any]

@@ -212,7 +212,7 @@ class SceneSession:
         options: dict[str, Any],
         css_url: str | None = None,
     ) -> None:
-        """Make the page load a module's browser half and attach it to a map.
+        """Make the page load a module's browser part and attach it to a map.
 
         Args:
             map_element: Id of the map's ``<svg>``.
@@ -230,12 +230,12 @@ class SceneSession:
         self._pending.record(record)
 
     def detach(self, instance: int) -> None:
-        """Remove a module's browser half."""
+        """Remove a module's browser part."""
         if self._attached.pop(instance, None) is not None:
             self._pending.record(bytes((Op.DETACH, *varint(instance))))
 
     def send(self, instance: int, message: dict[str, Any]) -> None:
-        """Send a message to a module's browser half."""
+        """Send a message to a module's browser part."""
         if instance in self._attached:
             text = msgspec.json.encode(message).decode()
             self._pending.message(bytes((Op.MESSAGE, *varint(instance))) + string(text))
