@@ -1,4 +1,4 @@
-"""GateProcess processes: what they import, and what ends them."""
+"""Child processes: what they import, and what ends them."""
 
 import ast
 import asyncio
@@ -181,3 +181,22 @@ def test_the_children_of_a_parent_that_is_killed_end(parent, bag):
         finally:
             process.kill()
     assert all(map(gone, children))
+
+
+def test_a_process_hears_of_data_before_its_parent_ends() -> None:
+    program = (
+        "from webmap.base.children import end_with_parent; import time\n"
+        "end_with_parent(lambda: None, lambda: print('data', flush=True), 0.0)\n"
+        "time.sleep(60)"
+    )
+    child = subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert child.stdin
+    assert child.stdout
+    child.stdin.write(b"x")
+    child.stdin.flush()
+    assert child.stdout.readline() == b"data\n"
+    child.stdin.close()
+    assert child.wait(30) == 1
+    child.stdout.close()

@@ -42,7 +42,7 @@ def playing(dialect: str) -> Iterator[str]:
 @contextmanager
 def viewing(*urls: str, robots: list[str]) -> Iterator:
     options = [part for robot in robots for part in ("--robot", robot)]
-    command = ("view", *urls, *options, "--as-told", "--port", 0, "--no-browser")
+    command = ("view", *urls, *options, "--only-given", "--port", 0, "--no-browser")
     with running(*command, pattern=WEB) as process:
         yield process
 

@@ -100,7 +100,7 @@ def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
     robot.destroy()
 
 
-@pytest.mark.parametrize(("said", "drawn_of"), [([], ["Bob"]), (["--as-told"], [])])
+@pytest.mark.parametrize(("said", "drawn_of"), [([], ["Bob"]), (["--only-given"], [])])
 def test_with_as_told_it_stays_with_what_was_told(monkeypatch, said, drawn_of):
     asked = []
 

@@ -187,7 +187,7 @@ def test_view_shows_what_it_would_draw_of_a_robot_that_is_told(ros1):
     assert "/robot_0/points" in drawn
     assert " /map " in drawn
     assert "robot_1" not in shown.stdout
-    assert view(*given, "--as-told").stdout.strip() == bob.strip()
+    assert view(*given, "--only-given").stdout.strip() == bob.strip()
 
 
 def test_view_says_of_a_told_robot_why_no_more_is_known():

@@ -67,7 +67,7 @@ class TestFold:
         fold = folded(dense(array("f", [2.0]) * count))
         assert MOST / 2 <= len(fold.ranges) <= MOST
         assert len(points_of(SPEC, fold)) <= MOST
-        assert sum(fold.fold.asked) == count
+        assert sum(fold.fold.total) == count
 
     @given(PROFILES, COUNTS, st.integers(0, 99), st.sampled_from([1.0, -1.0]))
     @settings(max_examples=40, deadline=None)
@@ -105,7 +105,7 @@ class TestFold:
         assert math.isnan(fold.ranges[0])
         # The hit at 2 m lies between the third and the fourth, where one touches.
         assert fold.ranges[1:6] == [inf, 2.0, -inf, 1.0, inf]
-        assert fold.fold.said[:4] == [1, 2, 1, 2]
+        assert fold.fold.known[:4] == [1, 2, 1, 2]
 
     def test_a_scan_of_which_most_is_unknown_is_so_whatever_its_few_hits(self):
         ranges = [5.0 if ray % 10 == 0 else math.nan for ray in range(16_000)]

@@ -38,25 +38,6 @@ def test_the_branches_of_all_that_it_imports_are_counted() -> None:
     assert counted == (ours - folders) | {"webmap.gate"}
 
 
-def test_a_process_hears_of_data_before_its_parent_ends() -> None:
-    program = (
-        "from webmap.base.children import end_with_parent; import time\n"
-        "end_with_parent(lambda: None, lambda: print('data', flush=True), 0.0)\n"
-        "time.sleep(60)"
-    )
-    child = subprocess.Popen(
-        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    )
-    assert child.stdin
-    assert child.stdout
-    child.stdin.write(b"x")
-    child.stdin.flush()
-    assert child.stdout.readline() == b"data\n"
-    child.stdin.close()
-    assert child.wait(30) == 1
-    child.stdout.close()
-
-
 def test_a_pose_is_a_transform_too() -> None:
     assert Affine.of_pose(Pose(1.0, 2.0, 0.0)).values == (1.0, 0.0, 0.0, 1.0, 1.0, 2.0)
 

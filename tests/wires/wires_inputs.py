@@ -120,7 +120,15 @@ VIEWS = {
     "told": ("captured_ros1", ("--robot", TOLD)),
     "told_alone": (
         "captured_ros1",
-        ("--robot", TOLD, "--robot", "Al:::/scan", "--as-told", "--stops-within", "1"),
+        (
+            "--robot",
+            TOLD,
+            "--robot",
+            "Al:::/scan",
+            "--only-given",
+            "--stops-within",
+            "1",
+        ),
     ),
     "told_and_found": ("captured_ros1", ("--robot", TOLD, "--discover")),
     "told_better": (
@@ -131,7 +139,7 @@ VIEWS = {
             *("--set", "Bob.goal=/robot_0/goal", "--set", "Bob.cancel=/robot_0/cancel"),
             *("--set", "Bob.initialpose=/robot_0/initialpose"),
             *("--set", "Bob.camera=/robot_0/front,/robot_0/rear"),
-            *("--set", "Bob.name=Robert", "--as-told"),
+            *("--set", "Bob.name=Robert", "--only-given"),
         ),
     ),
     "found_better": (

@@ -18,7 +18,7 @@ from webmap.cli.options import Finite, one_bridge, topics_option, web_options
     "2@bob:/odom:/cmd_vel:",
 )
 @click.option(
-    "--as-told",
+    "--only-given",
     "only_given",
     is_flag=True,
     help="Draw only the given topics of robots of --robot. Without it, the costmaps, "

@@ -19,11 +19,11 @@ class Console:
     """What every page of the console shows in addition to the initial content.
 
     Args:
-        told: The robots that the console was opened with.
+        given: The robots that the console was opened with.
     """
 
-    def __init__(self, told: "Sequence[Robot]" = ()) -> None:
-        self.told = tuple(told)
+    def __init__(self, given: "Sequence[Robot]" = ()) -> None:
+        self.given = tuple(given)
         """The robots that the console was opened with, in that order."""
         self.robots: list[Robot] = []
         """The robots that were added, in that order."""
@@ -144,7 +144,7 @@ class Console:
         for image in self.images:
             _show_image(image, page)
         self._show_grids(page)
-        for robot in (*self.told, *self.robots):
+        for robot in (*self.given, *self.robots):
             if robot not in self._removed:
                 _show(robot, page)
 

@@ -97,7 +97,7 @@ class FoundFleet:
         config = self.overrides.config
         given = [
             ShownRobot(bridge, found, made, config(bridge.url, found))
-            for (bridge, found), made in zip(self.given, console.told, strict=True)
+            for (bridge, found), made in zip(self.given, console.given, strict=True)
             if not only_given
         ]
         bridges = dict.fromkeys([*self.behind, *(robot.bridge for robot in given)])

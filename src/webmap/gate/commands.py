@@ -240,7 +240,7 @@ P = TypeVar("P", Goal, Locate)
 
 
 def parse(data: bytes) -> PageCommand:
-    """Return the command that ``data`` says.
+    """Return the command in ``data``.
 
     Raises:
         Refusal: If ``data`` is not a command; no bytes raise any other error.
@@ -282,7 +282,7 @@ def _object(data: bytes) -> dict[str, Any]:
 def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     fields = dict(pairs)
     if len(fields) != len(pairs):
-        _refuse("a field stands there twice")
+        _refuse("a field is given twice")
     return fields
 
 

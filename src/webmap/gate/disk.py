@@ -263,9 +263,9 @@ class Disk:
         return seen
 
     def keep(
-        self, action: SaveStop | SaveStopTest, tell: Callable[[Event], None]
+        self, action: SaveStop | SaveStopTest, emit: Callable[[Event], None]
     ) -> None:
-        """Write a record; ``tell`` is called with an event when it is on disk."""
+        """Write a record; ``emit`` is called with an event when it is on disk."""
         loop = asyncio.get_running_loop()
         work = loop.run_in_executor(self._thread, self._do, action)
         self._under_way.add(work)
@@ -273,7 +273,7 @@ class Disk:
         def done(work: asyncio.Future[Event]) -> None:
             self._under_way.discard(work)
             if not work.cancelled():
-                tell(work.result())
+                emit(work.result())
 
         work.add_done_callback(done)
 

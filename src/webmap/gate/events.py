@@ -37,9 +37,9 @@ class ScanFold(msgspec.Struct, frozen=True):
     """The number of beams before the fold."""
     behind: Sequence[Sequence[float]]
     """For each beam of the fold, the next things behind its nearest hit, in metres."""
-    said: Sequence[int]
+    known: Sequence[int]
     """For each beam of the fold, the number of known beams folded into it."""
-    asked: Sequence[int]
+    total: Sequence[int]
     """For each beam of the fold, the number of beams folded into it."""
 
 

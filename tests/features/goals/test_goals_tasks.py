@@ -96,12 +96,12 @@ class TestInitialPose:
     def test_what_the_page_told_fires_a_trigger(self, map, robot):
         map.add_robot(robot)
         tool, listener = map.add_module("InitialPoseTool"), map.add_module(Told)
-        tool.on_message({"told": {"robot": robot.id, "x": 1, "y": 2.0, "yaw": 0.5}})
+        tool.on_message({"pose": {"robot": robot.id, "x": 1, "y": 2.0, "yaw": 0.5}})
         for broken in (
-            {"told": {"robot": robot.id, "x": 1, "y": 2}},
-            {"told": {"robot": "r999", "x": 1, "y": 2, "yaw": 0}},
-            {"told": {"robot": robot.id, "x": 10**400, "y": 2, "yaw": 0}},
-            {"told": {"robot": robot.id, "x": 1, "y": math.nan, "yaw": 0}},
+            {"pose": {"robot": robot.id, "x": 1, "y": 2}},
+            {"pose": {"robot": "r999", "x": 1, "y": 2, "yaw": 0}},
+            {"pose": {"robot": robot.id, "x": 10**400, "y": 2, "yaw": 0}},
+            {"pose": {"robot": robot.id, "x": 1, "y": math.nan, "yaw": 0}},
             {"told": None},
             {},
         ):

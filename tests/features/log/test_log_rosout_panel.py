@@ -61,15 +61,15 @@ def test_lines_of_both_dialects_come_while_the_panel_is_open(map, page, said):
         panel.send_new_lines()
         first, second = said
         assert (first["bridge"], first["total"], first["state"]) == (0, 1, "open")
-        assert first["said"][0][1:5] == ["error", "/planner", "stuck", 1]
-        assert second["said"][0][1:5] == ["info", "nav", "on my way", 1]
+        assert first["lines"][0][1:5] == ["error", "/planner", "stuck", 1]
+        assert second["lines"][0][1:5] == ["info", "nav", "on my way", 1]
         said.clear()
         panel.send_new_lines()
         assert said == [], "what was told is not told again"
         old.say("error", "stuck")
         old.state = "closed"
         panel.send_new_lines()
-        assert said[0]["said"][0][4] == 2, "what is said again is counted"
+        assert said[0]["lines"][0][4] == 2, "what is said again is counted"
         assert said[0]["state"] == "closed"
         panel.on_message({"open": False})
         assert old.listeners == new.listeners == []

@@ -20,7 +20,7 @@ const OUTLINE = "M-14-11H8l9 11-9 11h-22zM17 0h26M43 0l-9-6M43 0l-9 6";
  * release.
  *
  * The tool begins with its button, with `i`, or with a message `{active: true}`; Escape
- * ends it. Sends `{told: {robot, x, y, yaw}}` when the gate has accepted the pose.
+ * ends it. Sends `{pose: {robot, x, y, yaw}}` when the gate has accepted the pose.
  * Sends `{covariance: robot}` to request the variances of the pose. The answer is
  * `{covariance: {robot, x, y, yaw, turn}}` with variances in m² and rad², or null, and
  * the rotation of the robot's own map on this map, in radians.
@@ -150,7 +150,7 @@ class InitialPoseTool {
       await this._drive.locate(robot, pose);
       setText(this._message, SENT);
       setTimeout(() => this._message.textContent === SENT && setText(this._message, ""), 4000);
-      this._send({ told: { robot, ...pose } });
+      this._send({ pose: { robot, ...pose } });
     } catch (error) {
       const why = error instanceof Error ? error.message : String(error);
       setText(this._message, `Pose not sent: ${why}`);

@@ -52,8 +52,8 @@ class InitialPoseTool:
         """Handle the page's message of a sent pose, or send the page variances."""
         if "covariance" in message:
             self._send_covariance(message["covariance"])
-        elif isinstance(message.get("told"), dict):
-            pose = robot_and_pose(self.map, message["told"])
+        elif isinstance(message.get("pose"), dict):
+            pose = robot_and_pose(self.map, message["pose"])
             if pose is not None:
                 self.map.notify_modules("on_pose_told", *pose)
         else:

@@ -115,7 +115,7 @@ class RosoutPanel {
   }
 
   /** @param {any} message */
-  receive({ bridge, said: lines, total, state }) {
+  receive({ bridge, lines, total, state }) {
     const book = this._books[bridge];
     if (!book) return;
     book.add(lines, total, state, this._most);

@@ -201,7 +201,7 @@ class RosoutPanel:
                 for line in log.since(version)[-self._lines :]
             ]
             self.browser_part.send(
-                {"bridge": number, "said": lines, "total": log.total, "state": state}
+                {"bridge": number, "lines": lines, "total": log.total, "state": state}
             )
 
     def _open(self) -> None:

@@ -27,7 +27,7 @@ from webmap.gate.display.supervisor import Supervisor
 from webmap.gate.protocol import FromGate, FromProgram, Report, RobotSpec, Role
 from webmap.gate.specs import checked
 
-HEEDED = 2.0
+CONFIRMED_AFTER = 2.0
 """Seconds for which a gate must go on after it received a STOP."""
 
 
@@ -38,10 +38,10 @@ class PendingStops:
         self._sent: dict[tuple[str | None, str | None], float] = {}
 
     def __iter__(self) -> Iterator[tuple[str | None, str | None]]:
-        """Yield the connection and the robot of each; see :meth:`say`."""
+        """Yield the connection and the robot of each; see :meth:`add`."""
         return iter(list(self._sent))
 
-    def say(self, by: str | None, robot: str | None, now: float) -> None:
+    def add(self, by: str | None, robot: str | None, now: float) -> None:
         """Keep a STOP that is sent now to the gate, if it runs.
 
         Args:
@@ -52,15 +52,15 @@ class PendingStops:
         """
         self._sent[by, robot] = now
 
-    def told(self, now: float) -> None:
+    def on_gate_ready(self, now: float) -> None:
         """Note that a new gate has received all of them only now."""
         self._sent = dict.fromkeys(self._sent, now)
 
-    def lives(self, now: float) -> None:
+    def on_tick(self, now: float) -> None:
         """Note that the gate still runs: drop the STOPs that it has obeyed."""
         if self._sent:
             self._sent = {
-                who: at for who, at in self._sent.items() if now - at < HEEDED
+                who: at for who, at in self._sent.items() if now - at < CONFIRMED_AFTER
             }
 
 
@@ -262,7 +262,7 @@ class GateClient:
     def _keep_stop(self, by: str | None, robot: str | None) -> None:
         if not self.ready:
             log.error("STOP: the gate is not running; STOP is sent as soon as it runs")
-        self._pending_stops.say(by, robot, time.monotonic())
+        self._pending_stops.add(by, robot, time.monotonic())
 
     def _stop_again(self, by: str | None, robot: str | None) -> protocol.ToGate:
         if by is None or not self._pages.knows(by):
@@ -288,7 +288,7 @@ class GateClient:
                 self._program.on_tick(tick)
                 self._pages.on_tick(message)
                 with self._lock:
-                    self._pending_stops.lives(time.monotonic())
+                    self._pending_stops.on_tick(time.monotonic())
             case protocol.RobotReport():
                 self._program.on_report(message)
                 self._pages.on_report(message)
@@ -307,7 +307,7 @@ class GateClient:
                 self._report(message)
             case protocol.Ready():
                 with self._lock:
-                    self._pending_stops.told(time.monotonic())
+                    self._pending_stops.on_gate_ready(time.monotonic())
                 self._report(protocol.GateUp())
             case _:  # for listeners alone
                 self._report(message)

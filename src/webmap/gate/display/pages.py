@@ -166,7 +166,7 @@ class DriveConnection:
         # Text that is not Unicode is passed on, too: the gate refuses and counts it.
         data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
         too_much = 2 * 1024  # refused as too long all the same
-        self._pages.said(self.id, data[:too_much])
+        self._pages.forward(self.id, data[:too_much])
 
     def set_speeds(self, v: float, w: float) -> None:
         """Set the page's own speed limits, in m/s and rad/s."""
@@ -183,7 +183,7 @@ class DriveConnection:
         """The messages that make this connection known to a gate."""
         return [self._hello] if self._speeds is None else [self._hello, self._speeds]
 
-    def say(self, text: str) -> None:
+    def send_text(self, text: str) -> None:
         """Send a text to the page, if it has received hello."""
         if self.greeted:
             self._call(self._send, text)
@@ -252,7 +252,7 @@ class Pages:
         """Return whether there is a connection with this id."""
         return id in self._connections
 
-    def said(self, id: str, data: bytes) -> None:
+    def forward(self, id: str, data: bytes) -> None:
         """Pass a page's frame to the gate."""
         message = protocol.FromPage(id, data)
         with self._lock:
@@ -280,7 +280,7 @@ class Pages:
         for connection in self._all():
             ack = tick.acks.get(connection.id)
             if ack is not None:
-                connection.say(tick_text(tick.tick, ack))
+                connection.send_text(tick_text(tick.tick, ack))
 
     def on_report(self, report: protocol.RobotReport) -> None:
         """Send a robot's report to all pages."""
@@ -293,20 +293,20 @@ class Pages:
                 if (mine, page) not in texts:  # most pages receive the same text
                     text = robot_text(report, mine=mine, page=page)
                     texts[mine, page] = text
-                connection.say(texts[mine, page])
+                connection.send_text(texts[mine, page])
 
     def on_robot_gone(self, gone: protocol.RobotGone) -> None:
         """Report to all pages that a robot was removed."""
         with self._lock:
             self._latest.pop(gone.robot, None)
         for connection in self._all():
-            connection.say(gone_text(gone))
+            connection.send_text(gone_text(gone))
 
     def on_refusal(self, refused: protocol.Refused) -> None:
         """Send a refusal to its page."""
         connection = self._connections.get(refused.connection)
         if connection is not None:
-            connection.say(refused_text(refused))
+            connection.send_text(refused_text(refused))
 
     def on_close(self, close: protocol.CloseConnection) -> None:
         """Close a page's socket for the gate."""
@@ -321,7 +321,7 @@ class Pages:
             if connection is None:
                 return
             connection.greeted = True
-            connection.say(hello_text(hello))
+            connection.send_text(hello_text(hello))
             for report in list(self._latest.values()):
                 self._show(connection, report)
 
@@ -335,7 +335,7 @@ class Pages:
     def _show(self, connection: DriveConnection, report: protocol.RobotReport) -> None:
         holder = None if report.holder is None else report.holder.connection
         mine = holder == connection.id
-        connection.say(robot_text(report, mine=mine, page=connection.cap))
+        connection.send_text(robot_text(report, mine=mine, page=connection.cap))
 
     def _all(self) -> list[DriveConnection]:
         with self._lock:

@@ -43,7 +43,7 @@ class StopHooks:
         what = "stop hook" if self._stopped else "reset of stop hook"
         return tuple(f"{what} {name}: {why}" for (_, name), why in self._failed.items())
 
-    def say(self, stopped: bool) -> None:
+    def send(self, stopped: bool) -> None:
         """Send the robot that STOP is active, or that it was reset."""
         if stopped != self._stopped:
             self._failed.clear()
@@ -74,7 +74,7 @@ class StopHooks:
     def link_up(self) -> None:
         """Send the reset that could not be sent before."""
         if self._owes_reset:
-            self.say(stopped=False)
+            self.send(stopped=False)
 
     def drop(self) -> None:
         """Send nothing more: another gate has the machine and its STOP."""

@@ -47,7 +47,7 @@ class CommandHandler:
 
     Args:
         machines: The machines.
-        connections: Who may send commands; they are told what is refused.
+        connections: Who may send commands; they receive refusals.
         ticks: The ticks that commands echo.
         emit: Called with each action.
 

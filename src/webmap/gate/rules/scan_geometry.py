@@ -115,7 +115,8 @@ def known(sweep: Scan, rays: Sequence[int]) -> tuple[int, int]:
     In a folded scan, the rays before the fold are counted.
     """
     if (fold := sweep.fold) is not None:
-        return sum(fold.said[ray] for ray in rays), sum(fold.asked[ray] for ray in rays)
+        count = sum(fold.known[ray] for ray in rays)
+        return count, sum(fold.total[ray] for ray in rays)
     return _known_count([sweep.ranges[ray] for ray in rays], sweep.range_min), len(rays)
 
 

@@ -280,7 +280,7 @@ class ActiveStop:
         for goals in self._robots.goals.values():
             goals.stop(now)
         for hooks in self._robots.hooks.values():
-            hooks.say(stopped=True)
+            hooks.send(stopped=True)
         self.confirmation.begin(now)
         self.confirm(now)
 
@@ -298,7 +298,7 @@ class ActiveStop:
         self.latch.reset()
         self._motion.release_hold()
         for hooks in self._robots.hooks.values():
-            hooks.say(stopped=False)
+            hooks.send(stopped=False)
 
     def on_file_changed(self, press: Press | None, elsewhere: bool) -> bool:
         """Process a change of the STOP file that this gate did not make.
@@ -350,7 +350,7 @@ class ActiveStop:
                 goals.link_up(now)
         for hooks in self._robots.hooks.values():
             if hooks.link is link and self.latch.on:
-                hooks.say(stopped=True)
+                hooks.send(stopped=True)
             elif hooks.link is link:
                 hooks.link_up()
 

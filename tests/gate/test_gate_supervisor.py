@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.gate.display.client import HEEDED, PendingStops
+from webmap.gate.display.client import CONFIRMED_AFTER, PendingStops
 from webmap.gate.display.supervisor import LIVED, LONGEST_PAUSE, Restarts, in_words
 
 
@@ -64,22 +64,22 @@ class TestRestarts:
 
 class TestUnheard:
     @pytest.fixture
-    def unheard(self):
-        unheard = PendingStops()
-        unheard.say(None, "r1", 10.0)
-        unheard.say("c1", None, 10.5)
-        return unheard
+    def pending(self):
+        pending = PendingStops()
+        pending.add(None, "r1", 10.0)
+        pending.add("c1", None, 10.5)
+        return pending
 
-    def test_a_stop_is_kept_until_a_gate_has_gone_on_for_a_while(self, unheard):
-        unheard.lives(10.0 + HEEDED - 0.1)
-        assert list(unheard) == [(None, "r1"), ("c1", None)]
-        unheard.lives(10.0 + HEEDED)
-        assert list(unheard) == [("c1", None)]
-        unheard.lives(10.5 + HEEDED)
-        assert list(unheard) == []
-        unheard.lives(99.0)
+    def test_a_stop_is_kept_until_a_gate_has_gone_on_for_a_while(self, pending):
+        pending.on_tick(10.0 + CONFIRMED_AFTER - 0.1)
+        assert list(pending) == [(None, "r1"), ("c1", None)]
+        pending.on_tick(10.0 + CONFIRMED_AFTER)
+        assert list(pending) == [("c1", None)]
+        pending.on_tick(10.5 + CONFIRMED_AFTER)
+        assert list(pending) == []
+        pending.on_tick(99.0)
 
-    def test_for_a_new_gate_the_time_begins_anew(self, unheard):
-        unheard.told(50.0)
-        unheard.lives(50.0 + HEEDED - 0.1)
-        assert len(list(unheard)) == 2
+    def test_for_a_new_gate_the_time_begins_anew(self, pending):
+        pending.on_gate_ready(50.0)
+        pending.on_tick(50.0 + CONFIRMED_AFTER - 0.1)
+        assert len(list(pending)) == 2
