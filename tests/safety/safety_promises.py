@@ -48,7 +48,7 @@ PROMISES = (
     ),
     Promise(
         3,
-        "doubt releases all inputs",
+        "a page that may lose its inputs releases them",
         "another tab .*|the tab is .*|an alert .*|the page (is frozen|opens .*)",
         "test_doubt_is_neutral_within_50_ms_and_nothing_resumes",
     ),
