@@ -64,7 +64,7 @@ def drawn(bridge, topics, *given):
     console = Console([made(about) for about in given])
     known = [
         ShownRobot(*about, robot, about.found.config(about.bridge.url))
-        for about, robot in zip(given, console.told, strict=True)
+        for about, robot in zip(given, console.given, strict=True)
     ]
     layers = LookingForLayers(bridge, ShownRobots(console), given=known)
     asyncio.run(layers.take(topics))
@@ -86,7 +86,7 @@ def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
         bridge, odometry="/a/odom", velocity="/a/cmd_vel", scan="/a/rear/scan"
     )
     console = drawn(bridge, TOPICS, given)
-    (robot,) = console.told
+    (robot,) = console.given
     assert what_of(robot) == [
         ("LaserScanner", "/a/rear/scan"),
         ("Markers", "/a/markers"),
@@ -121,7 +121,7 @@ def test_a_told_robot_is_drawn_in_the_frame_of_the_map_if_frames_lead_there(brid
     placed = described(bridge, odometry="/a/odom")
     nowhere = described(bridge, name="b", velocity="/b/cmd_vel")
     console = drawn(bridge, TOPICS | FRAMES, placed, nowhere)
-    one, other = console.told
+    one, other = console.given
     assert (one.tf["map_frame"], one.tf["quiet"]) == ("map", True)
     assert other.tf is None, "without odometry it was to be nowhere"
     one.destroy()
@@ -133,30 +133,30 @@ def test_a_told_robot_that_discovery_does_not_know_has_its_namespace_too(bridge)
     given = described(bridge, odometry="/c/where")
     assert offer(given.found, topics, discover(topics)).found is None
     console = drawn(bridge, topics, given)
-    assert what_of(console.told[0]) == [("Path", "/c/plan")]
-    console.told[0].destroy()
+    assert what_of(console.given[0]) == [("Path", "/c/plan")]
+    console.given[0].destroy()
 
 
 def test_what_is_in_a_namespace_is_drawn_with_the_first_robot_told_there(bridge):
     first = described(bridge, name="Al", odometry="/a/odom")
     second = described(bridge, name="Bo", odometry="/a/ekf/odometry/filtered")
     console = drawn(bridge, TOPICS, first, second)
-    assert [len(what_of(robot)) for robot in console.told] == [4, 0]
-    made = [[type(module).__name__ for module in r.modules] for r in console.told]
+    assert [len(what_of(robot)) for robot in console.given] == [4, 0]
+    made = [[type(module).__name__ for module in r.modules] for r in console.given]
     assert [names.count("Trail") for names in made] == [1, 1], "each goes its own way"
     behind = {bridge: Found(URL, "bob", discover(TOPICS), topics=TOPICS)}
     fleet = FoundFleet([first, second], behind=behind)
     assert fleet.table(grid=True, only_given=False).count("/a/points") == 1
-    for robot in console.told:
+    for robot in console.given:
         robot.destroy()
 
 
 def test_robots_behind_another_bridge_are_left_alone(bridge):
     elsewhere = described(Bridge("ws://al:9090"), odometry="/a/odom")
     console = drawn(bridge, TOPICS, elsewhere)
-    assert what_of(console.told[0]) == []
+    assert what_of(console.given[0]) == []
     assert console.grids == {}
-    console.told[0].destroy()
+    console.given[0].destroy()
 
 
 @pytest.mark.parametrize(
