@@ -87,6 +87,6 @@ def test_a_display_that_is_killed_stops_the_robot(server, witness, tab):
     tab.allowed = ["WebSocket", "ERR_CONNECTION"]
     os.kill(server.popen.pid, signal.SIGKILL)
     wait_until(lambda: standing(witness), what="standing still")
-    expect(tab.locator("html")).to_have_class("disconnected")
+    expect(tab.locator("html")).to_have_class(re.compile("disconnected"))
     expect(tab.locator(".webmap-teleop")).to_have_attribute("data-state", "lost")
     server.popen.wait()

@@ -59,7 +59,7 @@ LOSE_SIGN_IN = """async () => {
     if (name.startsWith("webmap key")) localStorage.setItem(name, "lost");
   }
   page._link.renew();
-  page.drive._line.lose();
+  page.drive._link.lose();
 }"""
 """Cut both connections and replace the key, so that the page has to sign in again."""
 

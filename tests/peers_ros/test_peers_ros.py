@@ -230,7 +230,7 @@ def test_a_list_of_its_topics_makes_a_fleet_with_the_map_that_was_published_befo
 def test_the_readiness_check_says_how_it_stands_with_the_real_robot(ros):
     code, said, _ = webmap("doctor", ros.url, "--seconds", "2")
     assert code == 0, said
-    assert "those that were given; robots found: robot_0." in said
+    assert "The topics come from the given list; robots found: robot_0." in said
     rate = re.search(rf"{ROBOT}/odom: (\d+\.\d) messages a second", said)
     assert rate, said
     assert float(rate[1]) == pytest.approx(20, abs=8)
