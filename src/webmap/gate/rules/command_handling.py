@@ -64,7 +64,7 @@ class CommandHandler:
         """Request, robot, epoch, and until when the reply may wait."""
 
     def handle(self, connection: Connection, command: Command, now: float) -> None:
-        """Execute the command of a page.
+        """Execute the command of a page or of the program.
 
         Raises:
             Refusal: If the command is not executed.
@@ -245,7 +245,7 @@ class CommandHandler:
     # Programs.
 
     def handle_program(self, message: FromProgram, now: float) -> None:
-        """Carry out a command of the program, which is told if it is refused."""
+        """Execute a command of the program; a refusal is sent to the program."""
         program, command = self._connections.program, message.command
         if isinstance(command, Take):
             self._take_for_program(message.request, command.robot, now)
@@ -269,7 +269,7 @@ class CommandHandler:
             self.reply_to_takes(now)
 
     def reply_to_takes(self, now: float) -> None:
-        """Reply to the program once its robot would move, not before.
+        """Reply to the program when its robot can be driven, or after ``SETTLE``.
 
         A page waits until its inputs were seen released. A program that drives at once
         would lose its first commands to a link that has not answered a ping yet.
