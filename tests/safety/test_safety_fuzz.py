@@ -263,4 +263,4 @@ def test_nothing_of_the_corpus_moves_the_robot_through_all_processes(bench):
     assert result["refused"] > 0
     assert [t for t in bench.robot.log.told[before:] if not t.is_zero] == []
     bench.drive_off()
-    bench.release_hold()
+    bench.let_go()
