@@ -74,6 +74,8 @@ class Bench:
     """What was written and what was dropped, in order."""
     done: list[actions.Action] = field(default_factory=list)
     said: list[protocol.FromGate] = field(default_factory=list)
+    reports: dict[str, protocol.RobotReport] = field(default_factory=dict)
+    """The newest of each robot."""
     tick: int = -1
     seq: int = 0
 
@@ -107,6 +109,8 @@ class Bench:
                     self.said.append(message)
                     if isinstance(message, protocol.Tick):
                         self.tick = message.tick
+                    elif isinstance(message, protocol.RobotReport):
+                        self.reports[message.robot] = message
                 case actions.Lock(key):
                     why = None if self.lock_held else "another has it"
                     self.tell(
@@ -244,8 +248,7 @@ class Bench:
         return [action for action in self.done if isinstance(action, type)]
 
     def report(self, robot="r1"):
-        reports = self.of(protocol.RobotReport)
-        return next(r for r in reversed(reports) if r.robot == robot)
+        return self.reports[robot]
 
     def refusals(self, who="a"):
         return [r for r in self.of(protocol.Refused) if r.connection == who]
@@ -254,7 +257,7 @@ class Bench:
         """Return the identity of the STOP that a page shows for a robot."""
         try:
             stop = self.report(robot).stop
-        except (StopIteration, KeyError):
+        except KeyError:
             stop = None
         return "none" if stop is None else stop.id
 

@@ -1,6 +1,7 @@
 """The health of the bridge, the display, the odometry and the camera. No I/O."""
 
 import math
+from bisect import bisect_left, insort
 from collections import deque
 
 from webmap.base.geometry import Twist
@@ -16,34 +17,31 @@ class Ages:
 
     def __init__(self) -> None:
         self._ages: deque[tuple[float, float]] = deque()
-        self._p95: float | None = None
-        self._stale = False
+        self._sorted: list[float] = []
 
     def add(self, age: float, now: float) -> None:
         """Add an age in seconds."""
         self._ages.append((now, age))
-        self._stale = True
+        insort(self._sorted, age)
         self.forget_old(now)
 
     def forget_old(self, now: float) -> None:
         """Forget the ages from before the window."""
         while self._ages and now - self._ages[0][0] > WINDOW:
-            self._ages.popleft()
-            self._stale = True
+            _, age = self._ages.popleft()
+            del self._sorted[bisect_left(self._sorted, age)]
 
     def clear(self) -> None:
         """Forget everything."""
         self._ages.clear()
-        self._stale = True
+        self._sorted.clear()
 
     @property
     def p95(self) -> float | None:
         """The 95th percentile in seconds, if there are ages."""
-        if self._stale:
-            ages = sorted(age for _, age in self._ages)
-            self._p95 = ages[math.ceil(0.95 * len(ages)) - 1] if ages else None
-            self._stale = False
-        return self._p95
+        if not self._sorted:
+            return None
+        return self._sorted[math.ceil(0.95 * len(self._sorted)) - 1]
 
 
 PROOF_LIMIT = 0.3
