@@ -29,14 +29,19 @@ class Demo:
 
     url: str
     process: subprocess.Popen
+    robots: int
 
 
 @pytest.fixture(scope="module")
-def demo() -> Iterator[Demo]:
-    """Run ``webmap demo`` with ten robots, so that there is a search."""
-    command = [sys.executable, "-m", "webmap", "demo", "--robots", "10", "--port", "0"]
+def demo(request: pytest.FixtureRequest) -> Iterator[Demo]:
+    """Run ``webmap demo`` with the number of robots in the module's ``ROBOTS``, or 3.
+
+    Each robot costs the simulator, the display and the browser time.
+    """
+    robots = getattr(request.module, "ROBOTS", 3)
+    command = [sys.executable, "-m", "webmap", "demo", "--robots", str(robots)]
     with subprocess.Popen(
-        [*command, "--no-browser"],
+        [*command, "--port", "0", "--no-browser"],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
@@ -49,7 +54,7 @@ def demo() -> Iterator[Demo]:
         try:
             found = re.search(r"ready at (\S+)", line)
             assert found, line
-            yield Demo(found[1], process)
+            yield Demo(found[1], process, robots)
         finally:
             process.send_signal(signal.SIGINT)
             try:
@@ -73,8 +78,8 @@ def open_console(chromium: Browser, demo: Demo):
         page = context.new_page()
         page.goto(demo.url)
         # A phone has the list in the sheet, which is closed at first.
-        expect(page.locator("#robots .row")).to_have_count(10)
-        expect(page.locator(".robot:not(.unplaced)")).to_have_count(10)
+        expect(page.locator("#robots .row")).to_have_count(demo.robots)
+        expect(page.locator(".robot:not(.unplaced)")).to_have_count(demo.robots)
         expect(page.locator("#link")).to_have_attribute("data-link", "open")
         wait_until_ready(page)
         return page

@@ -43,7 +43,7 @@ def test_a_bridge_is_checked_when_asked_and_each_finding_says_how_bad_it_is(
         for line in (velocity, notes.first)
     )
     assert good != note, "not by colour alone"
-    expect(report.get_by_role("heading", name="Robot 9")).to_be_attached()
+    expect(report.get_by_role("heading", name="Robot 2")).to_be_attached()
     expect(page.get_by_role("button", name="STOP ALL")).to_be_in_viewport(ratio=1)
 
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])
@@ -76,8 +76,8 @@ def test_a_call_is_tried_from_the_report_and_what_that_told_stands_in_it(open_co
     expect(question).to_contain_text("advertises a service of its own")
     expect(question).to_contain_text("test while nobody drives")
     question.get_by_role("button", name="Run test").click()
-    told = report.locator(".finding").filter(has_text="blocks no socket (tried)")
-    expect(told).to_have_attribute("data-level", "good")
+    received = report.locator(".finding").filter(has_text="blocks no socket (tried)")
+    expect(received).to_have_attribute("data-level", "good")
     expect(question).to_be_hidden()
 
 

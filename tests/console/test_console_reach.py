@@ -9,6 +9,9 @@ from real_browser import end_stops
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
+ROBOTS = 10
+"""So many that the list of stopped robots is long."""
+
 COVERED = """(e, reach) => {
   const box = e.getBoundingClientRect();
   const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
@@ -71,8 +74,8 @@ def test_stop_is_hit_and_works_whatever_is_open(open_console, size):
         expect(page.locator("#card .state .holder")).to_have_text("Free")
 
     every.click()
-    expect(page.locator(".webmap-stop-verdict")).to_have_count(10)
-    expect(page.locator(".webmap-stop-standing")).to_contain_text("10 robots")
+    expect(page.locator(".webmap-stop-verdict")).to_have_count(ROBOTS)
+    expect(page.locator(".webmap-stop-standing")).to_contain_text(f"{ROBOTS} robots")
     expect(help_).to_be_hidden()
     reset()
     # Esc closes the help first, and is STOP then.

@@ -9,6 +9,9 @@ from real_browser import hold
 
 pytestmark = pytest.mark.browser
 
+ROBOTS = 10
+"""So many that the list of stopped robots is long."""
+
 SIZES = [
     (320, 480),
     (390, 844),

@@ -13,6 +13,9 @@ from webmap_process import simulator, webmap
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
+ROBOTS = 10
+"""So many that the list has a search."""
+
 PLACE = """() => {
   const { e, f } = document.querySelector(".robot.selected").getScreenCTM();
   return [e, f];
@@ -198,6 +201,15 @@ def test_the_space_bar_is_stop_again_after_escape_closed_a_menu(open_console):
     page.keyboard.press("Space")
     same_word(page, "STOP active")
     end_stops(page.locator(".webmap-teleop .webmap-reset"))
+
+
+def test_the_search_leaves_the_robots_whose_name_has_it(open_console):
+    page = open_console()
+    page.keyboard.press("/")
+    page.keyboard.type("robot 7")
+    expect(page.locator("#robots .row:visible")).to_have_count(1)
+    row = page.locator("#robots .row", has_text="Robot 7")
+    expect(row).to_be_visible()
 
 
 def test_enter_selects_the_only_hit_and_a_search_in_vain_says_so(open_console):
