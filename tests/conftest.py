@@ -10,8 +10,12 @@ import pytest
 from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser, expect
 
+from command_fixtures import later_port, ros1, ros2
 from real_browser import launched
 from webmap.base.logs import budgets
+
+__all__ = ["later_port", "ros1", "ros2"]
+"""Fixtures of another file."""
 
 # Two noisy cores: how long an example takes says nothing about the code.
 settings.register_profile(

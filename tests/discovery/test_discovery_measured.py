@@ -318,7 +318,7 @@ def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
         site(dialect, rosapi=False), seconds=LONG, topics=TOPICS
     )
     assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
-    assert said(findings, "rosapi does not say") == "note"
+    assert said(findings, "rosapi does not list the topics") == "note"
     assert said(findings, "The topics come from the given list") == "good"
     assert said(findings, "/robot_0/odom:") == "good"
     assert said(findings, "The bridge does not list the publishers of") == "note"
