@@ -244,8 +244,8 @@ def test_a_driven_robot_stops_when_its_camera_freezes(open_page, camera):
     expect(panel).to_have_class(re.compile("stale"))
     expect(panel.get_by_role("status")).to_contain_text("Frozen")
     expect(sent(page)).to_have_text("0.00")
-    told = page.locator(".webmap-teleop")
-    expect(told).to_contain_text("o picture from the camera for 1 s")
+    received = page.locator(".webmap-teleop")
+    expect(received).to_contain_text("o picture from the camera for 1 s")
     # It comes again, and the key is still held: nothing moves by that.
     camera.frozen = False
     expect(panel).not_to_have_class(re.compile("stale"))

@@ -74,9 +74,9 @@ def test_the_page_hears_of_the_cameras_of_the_selected_robot(map, robot, panel, 
 def test_a_camera_that_comes_or_goes_later_is_told(map, robot, panel, said):
     map.set_selected(robot)
     panel.poll()
-    told = len(said)
+    received = len(said)
     panel.poll()
-    assert len(said) == told
+    assert len(said) == received
     rear = robot.add_module(Feed, "Rear")
     panel.poll()
     assert [camera["name"] for camera in said[-1]["cameras"]] == ["Rear"]

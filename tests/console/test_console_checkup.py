@@ -106,10 +106,10 @@ async def seen_at(url, **_):
 
 
 def test_a_call_is_tried_when_somebody_asks_and_the_report_says_what_that_told():
-    told = []
+    received = []
 
     async def tried(seen):
-        told.append(checkup.doing)
+        received.append(checkup.doing)
         return replace(seen, link=LinkFacts(calls_in_threads=False, tried=True))
 
     checkup = Checkup("ws://bob:9090", observe=seen_at, tried=tried)
@@ -117,7 +117,7 @@ def test_a_call_is_tried_when_somebody_asks_and_the_report_says_what_that_told()
     async def run():
         checkup.start()
         await until(lambda: not checkup.is_running)
-        assert not told, "it is not tried of itself"
+        assert not received, "it is not tried of itself"
         ended = checkup.ended
         checkup.try_call()
         assert not checkup.can_try, "one at a time"
@@ -125,7 +125,7 @@ def test_a_call_is_tried_when_somebody_asks_and_the_report_says_what_that_told()
         assert checkup.ended == ended, "nothing was listened to again"
 
     asyncio.run(run())
-    assert told == ["Testing what a slow service call delays."]
+    assert received == ["Testing what a slow service call delays."]
     assert "hangs blocks its whole socket (tried)" in checkup.text
 
 

@@ -62,9 +62,9 @@ def assert_no_robot_was_told_anything(page: Page) -> None:
         assert command.get("op", "drive") == "drive", command
         assert not any(command.get(axis) for axis in ("x", "y", "turn")), command
     assert {message["op"] for message in scene} <= {"seen", "view", "module"}
-    told = [message["data"] for message in scene if message["op"] == "module"]
-    assert {"found": True} in told
-    assert {key for data in told for key in data} <= {"found", "open"}, told
+    received = [message["data"] for message in scene if message["op"] == "module"]
+    assert {"found": True} in received
+    assert {key for data in received for key in data} <= {"found", "open"}, received
 
 
 def test_a_layout_is_saved_and_loaded_and_the_last_view_is_there_again(

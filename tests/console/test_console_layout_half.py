@@ -74,7 +74,7 @@ def test_as_it_was_found_the_page_shows_the_robots_again(map, frame, layout):
 )
 def test_a_layout_says_nothing_else_to_the_display(map, robot, frame, layout, message):
     before = map.world.tf
-    heard = []
-    layout.browser_part.send = heard.append
+    received = []
+    layout.browser_part.send = received.append
     layout.on_message(message)
-    assert (heard, map.world.tf, map.selected) == ([], before, None)
+    assert (received, map.world.tf, map.selected) == ([], before, None)

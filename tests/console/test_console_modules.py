@@ -20,13 +20,13 @@ class Hearing:
     """Writes down what the goal tool's triggers tell."""
 
     def __init__(self, map: Map) -> None:
-        self.heard: list[tuple] = []
+        self.received: list[tuple] = []
 
-    def on_goal_sent(self, *told) -> None:
-        self.heard.append(("sent", *told))
+    def on_goal_sent(self, *received) -> None:
+        self.received.append(("sent", *received))
 
-    def on_goal_canceled(self, *told) -> None:
-        self.heard.append(("canceled", *told))
+    def on_goal_canceled(self, *received) -> None:
+        self.received.append(("canceled", *received))
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def test_a_goal_that_the_page_sent_fires_a_trigger(map):
     tool, hearing = map.add_module(GoalTool), map.add_module(Hearing)
     tool.on_message({"goal": {"robot": robot.id, "x": 1, "y": 2.0, "yaw": 0.5}})
     tool.on_message({"cancel": robot.id})
-    assert hearing.heard == [("sent", robot, 1, 2.0, 0.5), ("canceled", robot)]
+    assert hearing.received == [("sent", robot, 1, 2.0, 0.5), ("canceled", robot)]
     robot.destroy()
 
 
@@ -91,7 +91,7 @@ def test_a_goal_that_the_page_sent_fires_a_trigger(map):
 def test_nonsense_of_a_page_fires_nothing(map, message):
     tool, hearing = map.add_module(GoalTool), map.add_module(Hearing)
     tool.on_message(message)
-    assert hearing.heard == []
+    assert hearing.received == []
 
 
 def test_a_view_follows_only_a_robot_of_its_map(map):

@@ -153,7 +153,7 @@ def test_a_press_goes_on_when_its_button_is_shown_no_more(page, monkeypatch):
         page.close()
         answer.set()
         await settled()
-        assert (button.state, button.words) == ("done", "docked")
+        assert (button.state, button.result) == ("done", "docked")
         bob.destroy()
 
     asyncio.run(scenario())

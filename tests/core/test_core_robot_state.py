@@ -7,7 +7,7 @@ from typing import get_args
 import pytest
 
 from webmap.base.geometry import Twist
-from webmap.console.words import LOOKS
+from webmap.console.texts import LOOKS
 from webmap.core.robot_state import STATE_TEXTS, Facts, state_of
 from webmap.gate.protocol import Activity
 

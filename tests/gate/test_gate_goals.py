@@ -327,10 +327,10 @@ class TestWay:
     )
     def test_goals_go_the_way_that_the_robot_has(self, changes, way):
         bench = Bench().begin(spec(**changes))
-        assert bench.report().way == way
+        assert bench.report().method == way
         bench.take()
         bench.goal()
-        assert [goal.way for goal in goals(bench)] == [way][: way is not None]
+        assert [goal.method for goal in goals(bench)] == [way][: way is not None]
 
     def test_a_bridge_without_actions_gets_the_next_goal_on_the_topic(self):
         bench = Bench().begin(spec(action="/go"))
@@ -343,10 +343,10 @@ class TestWay:
         report = bench.report()
         assert report.goal.state == "failed"
         assert report.goal.why == "too old; the next goal goes to /goal"
-        assert report.way == "topic"
+        assert report.method == "topic"
         assert len(goals(bench)) == 1, "nothing is sent by itself"
         bench.goal()
-        assert goals(bench)[-1].way == "topic"
+        assert goals(bench)[-1].method == "topic"
 
     def test_without_a_topic_it_stays_with_the_action(self):
         bench = Bench().begin(spec(action="/go", goal_topic=None))
@@ -357,7 +357,7 @@ class TestWay:
             events.GoalEnded("r1", first.id, "failed", "too old", no_actions=True)
         )
         assert bench.report().goal.why == "too old"
-        assert bench.report().way == "navigate_to_pose"
+        assert bench.report().method == "navigate_to_pose"
 
 
 class TestHowItGoes:
@@ -598,8 +598,13 @@ class TestWhereItIs:
         assert bench.report().locates
         bench.take()
         bench.hold(0.1)
-        (told,) = self.locate(bench)
-        assert (told.robot, told.x, told.y, told.yaw) == ("r1", 1.0, 2.0, 0.5)
+        (received,) = self.locate(bench)
+        assert (received.robot, received.x, received.y, received.yaw) == (
+            "r1",
+            1.0,
+            2.0,
+            0.5,
+        )
         bench.tell(events.PoseWritten("r1", 1.0, 2.0, 0.5, "a", done=True))
         assert bench.of(protocol.SentPose) == [
             protocol.SentPose("r1", 1.0, 2.0, 0.5, "a")
@@ -666,14 +671,14 @@ class TestWhereItIs:
         assert len(self.locate(bench)) == 1
 
     def test_a_program_with_the_lease_tells_it_too(self, bench):
-        told = commands.Locate("r1", 0, 0, bench.tick, 1.0, 2.0, 0.5)
-        bench.tell(protocol.FromProgram(told))
+        received = commands.Locate("r1", 0, 0, bench.tick, 1.0, 2.0, 0.5)
+        bench.tell(protocol.FromProgram(received))
         assert bench.did(actions.SendPose) == []
         bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
         bench.run(0.1)
         epoch = bench.report().epoch
-        told = msgspec.structs.replace(told, epoch=epoch, tick=bench.tick)
-        bench.tell(protocol.FromProgram(told))
+        received = msgspec.structs.replace(received, epoch=epoch, tick=bench.tick)
+        bench.tell(protocol.FromProgram(received))
         assert len(bench.did(actions.SendPose)) == 1
 
     @pytest.mark.parametrize(

@@ -39,9 +39,9 @@ def hear(writer, twist, times, now=100.0, every=0.1):
 class TestWhatIsAnothers:
     def test_two_velocities_within_a_while_are_and_one_is_not(self, writer):
         hear(writer, THEIRS, SURE - 1)
-        assert writer.words("/cmd_vel") is None
+        assert writer.description("/cmd_vel") is None
         hear(writer, THEIRS, 1, 100.0 + WITHIN)
-        assert writer.words("/cmd_vel") == SAID
+        assert writer.description("/cmd_vel") == SAID
         other = OtherWriter()
         hear(other, THEIRS, 5, every=WITHIN + 0.1)
         assert other.seen is None
@@ -50,12 +50,14 @@ class TestWhatIsAnothers:
         hear(writer, THEIRS, 3, every=0.0)
         writer.named(("/teleop",))
         writer.step(100.0 + WITHIN)
-        assert writer.words("/cmd_vel") == f"{SAID}: /teleop"
+        assert writer.description("/cmd_vel") == f"{SAID}: /teleop"
         writer.step(100.1 + WITHIN)
-        assert writer.words("/cmd_vel") is None
+        assert writer.description("/cmd_vel") is None
         writer.named(("/teleop",))
         hear(writer, THEIRS, 3, 200.0)
-        assert writer.words("/cmd_vel") == SAID, "who it was then is not known now"
+        assert writer.description("/cmd_vel") == SAID, (
+            "who it was then is not known now"
+        )
 
     def test_while_the_gate_writes_too_it_is_found(self, writer):
         for n in range(40):
@@ -83,7 +85,7 @@ class TestWhatIsAnothers:
         writer.named(("/a\x1b[31m", " ", "/b" * 100, "/c", "/d", "/e"))
         assert writer.nodes == (("/b" * 100)[:80], "/c", "/d")
         writer.named(())
-        assert writer.words("/v").endswith("): another client of the bridge")
+        assert writer.description("/v").endswith("): another client of the bridge")
 
     @pytest.mark.parametrize(
         ("twist", "words"),
@@ -95,7 +97,7 @@ class TestWhatIsAnothers:
     )
     def test_it_is_said_how_fast(self, writer, twist, words):
         hear(writer, twist, 2)
-        assert words in writer.words("/cmd_vel")
+        assert words in writer.description("/cmd_vel")
 
 
 class TestWhatIsNot:

@@ -65,7 +65,11 @@ class Recorder(Page):
 
 
 def moving(witness, since=0.0):
-    return [told for told in witness.log.told if told.at >= since and not told.is_zero]
+    return [
+        received
+        for received in witness.log.twists
+        if received.at >= since and not received.is_zero
+    ]
 
 
 def press(page, reached, what):
@@ -110,15 +114,19 @@ def test_a_robot_is_not_sped_up_more_than_it_may_be(driven, witness):
     with Sentinel() as sentinel:
         page = driven(a_max=0.4)
         page.take()
-        press(page, lambda: any(told.speed > 0.25 for told in moving(witness)), "speed")
+        press(
+            page,
+            lambda: any(received.speed > 0.25 for received in moving(witness)),
+            "speed",
+        )
         page.x = 0.0
-        eventually(lambda: witness.log.told[-1].is_zero, "a zero at once")
+        eventually(lambda: witness.log.twists[-1].is_zero, "a zero at once")
         slack = 0.1 + sentinel.worst(0.0)
     wrong = check_invariants(
-        witness.log.told, Bounds(V_MAX, 1.5, a_max=0.4, slack=slack)
+        witness.log.twists, Bounds(V_MAX, 1.5, a_max=0.4, slack=slack)
     )
     assert not wrong
-    speeds = [told.speed for told in witness.log.told]
+    speeds = [received.speed for received in witness.log.twists]
     assert any(0.0 < speed < 0.2 for speed in speeds), "it was sped up by and by"
 
 
@@ -141,9 +149,9 @@ class LatePage(Recorder):
         until = (
             time.monotonic() - self._latency - self._lateness.uniform(0, self._jitter)
         )
-        heard = [tick for at, tick in self._ticks if at <= until]
-        if heard:
-            self.tick = heard[-1]
+        seen = [tick for at, tick in self._ticks if at <= until]
+        if seen:
+            self.tick = seen[-1]
             super().drive(x, robot)
 
 
@@ -153,7 +161,7 @@ def test_a_link_that_is_slow_by_fits_and_starts_slows_the_robot_down(driven, wit
     press(page, lambda: len(moving(witness)) > 60, "a drive")
     # A quarter of a metre until anything takes effect: the loop, 200 ms of dead-man
     # and 250 ms of the robot's own. The first words are from before it is known.
-    fastest = max(told.speed for told in moving(witness)[30:])
+    fastest = max(received.speed for received in moving(witness)[30:])
     assert fastest <= 0.25 / (0.2 + 0.25 + 0.15)
 
 

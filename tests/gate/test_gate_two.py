@@ -139,19 +139,19 @@ def test_a_disk_tells_of_each_file_that_changed_once(tmp_path):
     async def scenario():
         mine, theirs = Disk(Records(tmp_path)), Records(tmp_path)
         mine.recall(LockState(KEY, held=True))
-        assert await mine.look() == []
+        assert await mine.check() == []
         theirs.keep_latch(KEY, ANN, IDS)
         # Recalled again, it is news all the same.
         assert mine.recall(LockState(KEY, held=False)).latched == ANN
-        assert await mine.look() == [StopFileChanged(KEY, ANN)]
-        assert await mine.look() == []
+        assert await mine.check() == [StopFileChanged(KEY, ANN)]
+        assert await mine.check() == []
         theirs.keep_latch(KEY, BEN, IDS)
-        assert await mine.look() == [StopFileChanged(KEY, BEN)]
+        assert await mine.check() == [StopFileChanged(KEY, BEN)]
         theirs.keep_latch(KEY, None, IDS)
-        assert await mine.look() == [StopFileChanged(KEY, None)]
+        assert await mine.check() == [StopFileChanged(KEY, None)]
         mine.forget(KEY)
         theirs.keep_latch(KEY, ANN, IDS)
-        assert await mine.look() == []
+        assert await mine.check() == []
 
     asyncio.run(scenario())
 
@@ -166,12 +166,12 @@ def test_a_stop_that_is_said_while_another_is_reset_is_not_overlooked(tmp_path):
                 theirs.keep_latch(key, BEN, ids)
                 return result
 
-        disk, told = Disk(Slow(tmp_path)), []
+        disk, received = Disk(Slow(tmp_path)), []
         disk.recall(LockState(KEY, held=True))
-        disk.keep(actions.SaveStop(KEY, 1, None, IDS), told.append)
+        disk.keep(actions.SaveStop(KEY, 1, None, IDS), received.append)
         await disk.settle()
-        assert await disk.look() == [StopFileChanged(KEY, BEN)]
-        assert told == [StopSaved(KEY, 1, None)]
+        assert await disk.check() == [StopFileChanged(KEY, BEN)]
+        assert received == [StopSaved(KEY, 1, None)]
 
     asyncio.run(scenario())
 
@@ -183,7 +183,7 @@ def test_what_comes_and_goes_between_two_looks_is_seen_by_who_wrote_it(tmp_path)
         disk.keep(actions.SaveStop(KEY, 1, ANN, IDS), lambda event: None)
         await disk.settle()
         Records(tmp_path).keep_latch(KEY, None, IDS)
-        assert await disk.look() == [StopFileChanged(KEY, None)]
+        assert await disk.check() == [StopFileChanged(KEY, None)]
 
     asyncio.run(scenario())
 

@@ -384,7 +384,7 @@ def a_declaration_that_changes(b):
     known("told where it is", lambda r: r["locates"])
     b.model(robots.goals, bob, bridge)
     b.tasks_up(site, "/goal")
-    known("goals later", lambda r: r["way"] == "topic")
+    known("goals later", lambda r: r["method"] == "topic")
     b.model(robots.velocity, bob, bridge, type="geometry_msgs/Twist")
     known("velocity later", lambda r: r["link"] == "up" and r["armable"])
     b.model(robots.odometry, bob, second)
@@ -397,13 +397,15 @@ def a_declaration_that_changes(b):
     b.model(robots.goals, bob, bridge, "/goal_pose", frame="hall")
     b.tasks_up(site, "/goal_pose")
     b.model(robots.goals, bob, bridge, action="/drive_to", on_operator_loss="cancel")
-    known("an action later", lambda r: r["way"] == "navigate_to_pose" and r["cancels"])
+    known(
+        "an action later", lambda r: r["method"] == "navigate_to_pose" and r["cancels"]
+    )
     b.model(robots.velocity, bob, bridge, "/other/cmd_vel", type="geometry_msgs/Twist")
     known("another topic", lambda r: r["stop_time"] is None and r["armable"])
     b.model(robots.no_odometry, bob)
     b.model(robots.no_assist, bob)
     b.model(robots.no_goals, bob)
-    known("no goals", lambda r: r["way"] is None)
+    known("no goals", lambda r: r["method"] is None)
     b.model(robots.no_velocity, bob)
     known("no velocity", lambda r: r["armable"] is False)
     b.until(lambda: site.received("unadvertise", "/other/cmd_vel"), "the last word")
@@ -413,11 +415,11 @@ def a_state_that_is_stored(b):
     """What an earlier version left of STOPs and of stop tests holds for robots."""
     for name, url, *where in STORED:
         robot = b.robot(robots.at, name, url, *where)
-        told = b.until(lambda r=robot: b.tap.reports.get(r.id), f"a report of {name}")
-        stop = told["stop"] or {"by": None, "id": None}
+        seen = b.until(lambda r=robot: b.tap.reports.get(r.id), f"a report of {name}")
+        stop = seen["stop"] or {"by": None, "id": None}
         if not stop["id"] or stop["id"].startswith("file-"):
             stop["id"] = None  # of a file that tells none it is that file's
-        tested = [told[f"stop_{key}"] for key in ("source", "time", "date")]
+        tested = [seen[f"stop_{key}"] for key in ("source", "time", "date")]
         b.note(name, f"STOP by {stop['by']}, {stop['id']}\nstop test {tested}")
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from webmap import html, refusals
-from webmap.console.words import icon
+from webmap.console.texts import icon
 
 if TYPE_CHECKING:
     from datetime import datetime

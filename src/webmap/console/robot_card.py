@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from webmap import html
 from webmap.console.card_parts import GoalLine, OwnStop, SpeedTable
 from webmap.console.robot_list import AGE_LIMIT, StateShape
-from webmap.console.words import UNKNOWN, heading, icon, look_of, number, sentence
+from webmap.console.texts import UNKNOWN, heading, icon, look_of, number, sentence
 from webmap.features.cameras.camera_panel import CameraViews
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ class RobotCard:
         self._speeds.show(robot)
         self._own_stop.show(robot)
         able = {
-            "send": report is not None and report.way is not None,
+            "send": report is not None and report.method is not None,
             "cancel": report is not None and report.cancels,
             "locate": report is not None and report.locates,
         }

@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from webmap import html, svg
-from webmap.console.words import battery_tone, look_of
+from webmap.console.texts import battery_tone, look_of
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot

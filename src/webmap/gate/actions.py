@@ -61,7 +61,7 @@ class SendGoal:
     y: float
     yaw: float
     by: str
-    way: GoalMethod
+    method: GoalMethod
     until: float = math.inf
     """When it is too old, by the gate's clock."""
 

@@ -244,16 +244,16 @@ class Disk:
         """Stop checking the files of a machine."""
         self._stamps.pop(key, None)
 
-    async def look(self) -> list[StopFileChanged]:
+    async def check(self) -> list[StopFileChanged]:
         """Return the STOPs whose files have changed since the last check.
 
         The check runs in the same thread as :meth:`keep`: it sees what was kept
         before it, and nothing that is kept after it.
         """
         loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._thread, self._look)
+        return await loop.run_in_executor(self._thread, self._changed)
 
-    def _look(self) -> list[StopFileChanged]:
+    def _changed(self) -> list[StopFileChanged]:
         seen = []
         for key, before in list(self._stamps.items()):
             stamp = self._records.stamp_of(key)

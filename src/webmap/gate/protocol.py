@@ -141,7 +141,7 @@ class Disconnect(msgspec.Struct, frozen=True, tag="disconnect"):
     connection: str
 
 
-class FromPage(msgspec.Struct, frozen=True, tag="browser"):
+class FromPage(msgspec.Struct, frozen=True, tag="from_page"):
     """A message of a page, which the display does not read."""
 
     connection: str
@@ -167,7 +167,7 @@ class WriterNodes(msgspec.Struct, frozen=True, tag="writer-nodes"):
     nodes: tuple[str, ...]
 
 
-class FromProgram(msgspec.Struct, frozen=True, tag="program", omit_defaults=True):
+class FromProgram(msgspec.Struct, frozen=True, tag="from_program", omit_defaults=True):
     """A command of the display's Python code; its ``seq`` is not checked."""
 
     command: ProgramCommand
@@ -233,7 +233,7 @@ class GoalReport(msgspec.Struct, frozen=True, kw_only=True):
     yaw: float
     by: str
     """The connection that sent it."""
-    way: GoalMethod
+    method: GoalMethod
     state: Literal[
         "sent",
         "accepted",
@@ -328,7 +328,7 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     armable: bool
     reason: str | None
     """Why the robot cannot be taken or moved now, as text."""
-    way: GoalMethod | None = None
+    method: GoalMethod | None = None
     """The method for goals; ``None`` if goals cannot be sent."""
     cancels: bool = False
     """Whether goals can be cancelled."""

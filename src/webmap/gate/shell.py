@@ -116,7 +116,7 @@ class Shell:
     async def _keep_looking(self) -> None:
         while True:
             await asyncio.sleep(LOOK)
-            for seen in await self._disk.look():
+            for seen in await self._disk.check():
                 self.deliver(seen)
 
     def _do(self, todo: list[actions.Action]) -> None:

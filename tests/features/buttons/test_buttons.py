@@ -190,46 +190,46 @@ def pressed(robot, button, url, values=None, *, before=None, **world):
             if before is not None:
                 before(bridge)
             await only.press(values, by="Ann")
-            await until(lambda: only.state != "done" or node.heard or node.calls)
+            await until(lambda: only.state != "done" or node.received or node.calls)
             return only, node
 
     return asyncio.run(scenario())
 
 
 def test_a_press_calls_the_service_and_says_what_it_answered(sim, robot):
-    heard = []
+    received = []
     robot.add_module(
-        lambda _: SimpleNamespace(on_button=lambda b: heard.append((b.state, b.by)))
+        lambda _: SimpleNamespace(on_button=lambda b: received.append((b.state, b.by)))
     )
     button, node = pressed(robot, DOCK, sim["ros1"], services={"/dock": trigger()})
-    assert (button.state, button.words) == ("done", "Done: docked")
+    assert (button.state, button.result) == ("done", "Done: docked")
     assert [name for name, _ in node.calls] == ["/dock"]
-    assert heard == [("running", "Ann"), ("done", "Ann")]
+    assert received == [("running", "Ann"), ("done", "Ann")]
 
 
 def test_success_false_is_a_failure_in_the_robots_words(sim, robot):
     services = {"/dock": trigger(False, "no dock in sight")}
     button, _ = pressed(robot, DOCK, sim["ros1"], services=services)
-    assert (button.state, button.words) == ("failed", "Failed: no dock in sight")
+    assert (button.state, button.result) == ("failed", "Failed: no dock in sight")
 
 
 def test_a_service_that_is_not_there_is_a_failure(sim, robot):
     button, _ = pressed(robot, DOCK, sim["ros1"])
     assert button.state == "failed"
-    assert "/dock" in button.words
-    assert "does not exist" in button.words
+    assert "/dock" in button.result
+    assert "does not exist" in button.result
 
 
 def test_a_service_that_does_not_answer_is_given_up_after_the_timeout(sim, robot):
     services = {"/dock": ("std_srvs/Trigger", lambda args: None)}
     button, _ = pressed(robot, {**DOCK, "timeout": 0.2}, sim["ros1"], services=services)
-    assert button.words == "Failed: /dock did not answer within 0.2 s"
+    assert button.result == "Failed: /dock did not answer within 0.2 s"
 
 
 def test_a_press_publishes_the_message(sim, robot):
     button, node = pressed(robot, HORN, sim["ros1"], topics={"/horn": "std_msgs/Bool"})
-    assert button.words == "Published"
-    assert node.heard == [("/horn", {"data": True})]
+    assert button.result == "Published"
+    assert node.received == [("/horn", {"data": True})]
 
 
 def test_while_it_runs_it_cannot_be_pressed_again(sim, robot):
@@ -267,7 +267,7 @@ def test_while_stop_stands_only_what_may_act_then_does(sim, robot):
             report = SimpleNamespace(latched=True, other_writer=None, **said)
             robot.on_gate_report(report)
             assert await module["Dock"].press() is False
-            assert module["Dock"].words == "Not done: STOP is active: reset it first"
+            assert module["Dock"].result == "Not done: STOP is active: reset it first"
             assert node.calls == []
             assert await module["Light"].press() is True
 
@@ -280,8 +280,8 @@ def test_a_topic_that_turns_out_to_be_a_velocity_is_refused_at_the_press(sim, ro
         robot, button, sim["ros1"], topics={"/wheels": "geometry_msgs/Twist"}
     )
     assert pressed_.state == "failed"
-    assert "refused: /wheels of type geometry_msgs/Twist carries" in pressed_.words
-    assert node.heard == []
+    assert "refused: /wheels of type geometry_msgs/Twist carries" in pressed_.result
+    assert node.received == []
 
 
 def test_a_service_that_turns_out_to_cancel_goals_is_refused_at_the_press(sim, robot):
@@ -289,7 +289,7 @@ def test_a_service_that_turns_out_to_cancel_goals_is_refused_at_the_press(sim, r
     button, node = pressed(
         robot, {"label": "Dock", "service": "/dock"}, sim["ros1"], services=services
     )
-    assert "refused: /dock of type action_msgs/CancelGoal" in button.words
+    assert "refused: /dock of type action_msgs/CancelGoal" in button.result
     assert node.calls == []
 
 
@@ -300,8 +300,8 @@ def test_a_topic_that_is_declared_later_is_refused_at_the_press(sim, robot):
     button, node = pressed(
         robot, HORN, sim["ros1"], before=declare, topics={"/horn": "std_msgs/Bool"}
     )
-    assert "refused: /horn carries a goal" in button.words
-    assert node.heard == []
+    assert "refused: /horn carries a goal" in button.result
+    assert node.received == []
 
 
 def test_a_topic_of_another_type_is_not_published_on(sim, robot):
@@ -309,9 +309,10 @@ def test_a_topic_of_another_type_is_not_published_on(sim, robot):
         robot, HORN, sim["ros1"], topics={"/horn": "std_msgs/String"}
     )
     assert (
-        button.words == "Failed: /horn is of type std_msgs/String, not of std_msgs/Bool"
+        button.result
+        == "Failed: /horn is of type std_msgs/String, not of std_msgs/Bool"
     )
-    assert node.heard == []
+    assert node.received == []
 
 
 def params(store):
@@ -344,7 +345,7 @@ def test_a_parameter_that_stays_as_it_was_is_a_failure(sim, robot):
     store = {"/fixed/x": "1"}
     button = {"label": "P", "parameter": "/fixed/x", "value": 2}
     failed, _ = pressed(robot, button, sim["ros1"], services=params(store))
-    assert failed.words == "Failed: /fixed/x was to be 2, but the robot reports 1"
+    assert failed.result == "Failed: /fixed/x was to be 2, but the robot reports 1"
 
 
 @pytest.mark.parametrize(
@@ -372,7 +373,7 @@ def test_a_parameter_of_ros_2_is_set_by_its_node(sim, robot, result, state, word
         )
     }
     done, node = pressed(robot, button, sim["ros2"], services=services)
-    assert (done.state, done.words) == (state, words)
+    assert (done.state, done.result) == (state, words)
     ((_, args),) = node.calls
     (parameter,) = args["parameters"]
     assert parameter["name"] == "max_vel"
@@ -386,7 +387,7 @@ def test_without_a_link_it_says_so(robot):
     async def scenario():
         module = robot.add_module("Buttons", Bridge("ws://127.0.0.1:1"), [HORN])
         assert await module["Horn"].press() is False
-        return module["Horn"].words
+        return module["Horn"].result
 
     assert "was never opened" in asyncio.run(scenario())
 

@@ -130,14 +130,16 @@ def test_a_form_takes_what_fits_and_names_the_field_that_does_not(tab, bench):
         "Not done: r: got 1e+39, expected a number"
     )
     expect(light.locator("[data-field=r]")).to_have_attribute("aria-invalid", "true")
-    assert bench.node.heard == []
+    assert bench.node.received == []
     light.locator("[data-field=r]").fill("0.25")
     light.locator(".yes").click()
     expect(light.locator(".result")).to_have_text("Published")
     deadline = time.monotonic() + 15
-    while not bench.node.heard and time.monotonic() < deadline:
+    while not bench.node.received and time.monotonic() < deadline:
         tab.wait_for_timeout(20)
-    assert bench.node.heard == [("/light", {"r": 0.25, "g": 0.5, "b": 0.0, "a": 1.0})]
+    assert bench.node.received == [
+        ("/light", {"r": 0.25, "g": 0.5, "b": 0.0, "a": 1.0})
+    ]
     expect(light.locator(".sheet")).to_be_hidden()
 
 

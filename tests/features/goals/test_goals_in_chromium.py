@@ -148,16 +148,16 @@ def label(tab: Page):
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "expected"),
     [
         ("Old 0", r"Navigating to goal, [\d.]+ m to go"),
         ("New 0", r"m to go, about \d+ s left"),
     ],
 )
-def test_a_goal_is_followed_on_the_map_until_it_is_reached(tab, name, told):
+def test_a_goal_is_followed_on_the_map_until_it_is_reached(tab, name, expected):
     send(tab, name)
     expect(label(tab)).to_contain_text("Navigating to goal")
-    expect(label(tab)).to_contain_text(re.compile(told))
+    expect(label(tab)).to_contain_text(re.compile(expected))
     expect(tab.locator(".webmap-goal-arrow.way")).to_have_count(1)
     expect(label(tab)).to_contain_text("Goal reached", timeout=15_000)
 
@@ -273,14 +273,14 @@ def told_and_refused(tab: Page, robot: ClientConnection) -> None:
 
     taken(tab, again, word)
     expect(word).to_have_text("Pose sent.")
-    told = json.loads(robot.recv(timeout=10))["msg"]
-    at, turn = (told["pose"]["pose"][part] for part in ("position", "orientation"))
-    assert told["header"]["frame_id"] == "map"
+    received = json.loads(robot.recv(timeout=10))["msg"]
+    at, turn = (received["pose"]["pose"][part] for part in ("position", "orientation"))
+    assert received["header"]["frame_id"] == "map"
     assert [at["x"], at["y"]] == pytest.approx(
         tab.evaluate(WORLD, pressed[-1]), abs=0.02
     )
     assert 2 * math.atan2(turn["z"], turn["w"]) == pytest.approx(0.0, abs=0.01)
-    sure = told["pose"]["covariance"]
+    sure = received["pose"]["covariance"]
     assert (sure[0], sure[7], sure[35]) == (0.25, 0.25, 0.068)
     send(tab, "Old 0", "Plain 1")
     expect(label(tab)).to_contain_text("Navigating to goal")
@@ -434,8 +434,8 @@ def test_a_route_is_put_in_order_and_goes_round(tab, bridges):
     with hearing(bridges["ROS1"], "/robot_0/move_base/goal") as robot:
         taken(tab, tab.locator(".webmap-route-run").click, word)
         there = [tab.evaluate(WORLD, [across, y])[0] for across in (a, c, b, a)]
-        heard = [next_goal(tab, robot) for _ in there]
-    assert heard == pytest.approx(there, abs=0.02)
+        seen = [next_goal(tab, robot) for _ in there]
+    assert seen == pytest.approx(there, abs=0.02)
     expect(word).to_have_text("Old 0 is navigating to point 1 of 3, round 2.")
     tab.locator(".webmap-route-end").click()
     expect(word).to_have_text("Route of Old 0 ended.")

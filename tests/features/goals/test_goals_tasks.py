@@ -14,19 +14,19 @@ from webmap.gate.protocol import GoalReport
 
 
 def goal(state="under way", **fields):
-    about = {"id": "g", "x": 1.0, "y": 2.0, "yaw": 0.0, "by": "c1", "way": "topic"}
+    about = {"id": "g", "x": 1.0, "y": 2.0, "yaw": 0.0, "by": "c1", "method": "topic"}
     return GoalReport(state=state, **{**about, **fields})
 
 
-class Told:
+class GoalListener:
     def __init__(self, map):
-        self.told = []
+        self.received = []
 
-    def on_pose_told(self, *told):
-        self.told.append(told)
+    def on_pose_told(self, *seen):
+        self.received.append(seen)
 
     def on_mark(self):
-        self.told.append("mark")
+        self.received.append("mark")
 
 
 class TestMarked:
@@ -41,7 +41,7 @@ class TestMarked:
 
     def test_robots_are_selected_besides_the_one(self, map, robots):
         ann, bob, cid = robots
-        listener = map.add_module(Told)
+        listener = map.add_module(GoalListener)
         map.toggle_marked(ann)
         assert map.selected is ann, "the first one is selected"
         map.toggle_marked(bob)
@@ -50,7 +50,7 @@ class TestMarked:
         assert map.selected is ann, "who is driven stays"
         map.toggle_marked(bob)
         assert map.marked == [cid]
-        assert listener.told == ["mark"] * 3
+        assert listener.received == ["mark"] * 3
 
     def test_the_selected_robot_is_not_marked_besides(self, map, robots):
         map.set_selected(robots[0])
@@ -95,7 +95,7 @@ def test_a_spacing_that_makes_no_sense_is_refused(map, spacing):
 class TestInitialPose:
     def test_what_the_page_told_fires_a_trigger(self, map, robot):
         map.add_robot(robot)
-        tool, listener = map.add_module("InitialPoseTool"), map.add_module(Told)
+        tool, listener = map.add_module("InitialPoseTool"), map.add_module(GoalListener)
         tool.on_message({"pose": {"robot": robot.id, "x": 1, "y": 2.0, "yaw": 0.5}})
         for broken in (
             {"pose": {"robot": robot.id, "x": 1, "y": 2}},
@@ -106,7 +106,7 @@ class TestInitialPose:
             {},
         ):
             tool.on_message(broken)
-        assert listener.told == [(robot, 1, 2.0, 0.5)]
+        assert listener.received == [(robot, 1, 2.0, 0.5)]
         tool.aim()
 
     def test_the_page_hears_how_sure_the_robot_is_told_to_be(
@@ -200,21 +200,21 @@ class TestRoutes:
 class TestOnTheCard:
     def test_every_state_has_words_a_shape_and_a_figure_only_on_the_way(self):
         for state in GOALS:
-            told = figures(goal(state, left=2.0))
-            assert told == (
+            seen = figures(goal(state, left=2.0))
+            assert seen == (
                 "2.0 m to go" if state in ("under way", "cancelling") else ""
             )
 
     def test_what_the_robot_tells_is_said_with_units(self):
-        told = goal(left=3.25, eta=12.4, time=4.6, recoveries=2)
+        seen = goal(left=3.25, eta=12.4, time=4.6, recoveries=2)
         text = "3.2 m to go, about 12 s left, 5 s elapsed, 2 recoveries"
-        assert figures(told) == text
+        assert figures(seen) == text
         assert figures(goal(recoveries=1)) == "1 recovery"
 
     def test_the_line_has_the_time_and_how_often_it_got_stuck(self):
         line = GoalLine()
-        told = goal(left=3.25, eta=12.4, time=4.6, recoveries=2)
-        report = SimpleNamespace(goal=told)
+        seen = goal(left=3.25, eta=12.4, time=4.6, recoveries=2)
+        report = SimpleNamespace(goal=seen)
         line.show(SimpleNamespace(report=report, goal_ended_at=None))
         _, words = line.element.children
         assert line.element.get("hidden") is None

@@ -56,7 +56,7 @@ class FakeDrive {
 }
 
 function goal(id, state = "under way") {
-  return { id, state, why: "", way: "navigate_to_pose", left: null, eta: null };
+  return { id, state, why: "", method: "navigate_to_pose", left: null, eta: null };
 }
 
 /** A robot whose first goal waits for the link that another robot's goal used up. */

@@ -6,7 +6,7 @@ import { RouteRun } from "../../../src/webmap/features/routes/route_run.js";
 const POINTS = [1, 2, 3].map((x) => ({ x, y: 0, yaw: 0 }));
 
 function goal(id, state = "under way", more = {}) {
-  return { id, state, why: "", way: "move_base", left: null, eta: null, ...more };
+  return { id, state, why: "", method: "move_base", left: null, eta: null, ...more };
 }
 
 /** A run whose first goal, `g1`, is under way. */
@@ -53,7 +53,7 @@ test("a loop of points that are all reached already sends one goal a second", ()
   run.accepted(0);
   const sent = [];
   for (let now = 0; now < 10_000; now += 50) {
-    const there = goal(`g${sent.length}`, "sent", { way: "topic" });
+    const there = goal(`g${sent.length}`, "sent", { method: "topic" });
     if (say(run, there, { away: 0.1, now }) === null) continue;
     sent.push(now);
     run.accepted(now);
@@ -160,7 +160,7 @@ test("a robot that does not say how it goes is there when it is near", () => {
   const run = new RouteRun(POINTS);
   run.go(null);
   run.accepted(0);
-  const sent = goal("g1", "sent", { way: "topic" });
+  const sent = goal("g1", "sent", { method: "topic" });
   assert.equal(say(run, sent, { away: 0.5 }), null);
   assert.deepEqual(say(run, sent, { away: 0.2 }), { send: POINTS[1] });
 });

@@ -184,7 +184,7 @@ def _result_text(button: RobotButton, why: str | None) -> str:
     """Return the text under a button that cannot be pressed because of ``why``."""
     if button.state == "running":
         return f"Running for {button.by}"
-    return button.words or (f"Not available: {why}" if why else "")
+    return button.result or (f"Not available: {why}" if why else "")
 
 
 class FormView:

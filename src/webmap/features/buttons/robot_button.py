@@ -42,7 +42,7 @@ class RobotButton:
         self.robot = robot
         self.spec = spec
         self.state: State = "idle"
-        self.words = ""
+        self.result = ""
         """The result of the last press; empty before the first."""
         self.by = ""
         """Who pressed last."""
@@ -148,7 +148,7 @@ class RobotButton:
         return checked(fields, self.spec.values, ros2=self.ros2)
 
     def _become(self, state: State, words: str, by: str) -> None:
-        self.state, self.words, self.by = state, words, by
+        self.state, self.result, self.by = state, words, by
         self.since = time.monotonic()
         self.notify()
 

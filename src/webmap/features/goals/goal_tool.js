@@ -278,7 +278,7 @@ class GoalTool {
 
   _show() {
     const robots = chosen(this._map);
-    const way = robots.some((robot) => this._drive.robots.get(robot)?.way !== null);
+    const way = robots.some((robot) => this._drive.robots.get(robot)?.method !== null);
     this._go.disabled = robots.length === 0 || !way;
     const words = robots.length > 1 ? `Send goal to ${robots.length} robots` : "Send goal";
     setText(this._go, words);

@@ -156,7 +156,7 @@ export class RouteRun {
       const what = goal.state === "failed" ? "failed" : "its goal was cancelled";
       return this._halted(goal.why ? `${what}: ${goal.why}` : what);
     }
-    const silent = goal.way === "topic" && away !== null && away < THERE;
+    const silent = goal.method === "topic" && away !== null && away < THERE;
     return silent ? this._arrived(goal.id, since) : null;
   }
 

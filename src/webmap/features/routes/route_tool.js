@@ -236,7 +236,7 @@ class RouteTool {
     this._loop.setAttribute("aria-pressed", String(this._loops));
     this._here.disabled = this._robotPose() === null;
     this._clear.disabled = this._points.length === 0;
-    this._run.disabled = this._points.length === 0 || !report?.way || busy;
+    this._run.disabled = this._points.length === 0 || !report?.method || busy;
     setText(this._run, live ? "Run again" : "Start route");
     for (const each of [this._pause, this._skip, this._end]) each.hidden = !live;
     for (const each of [this._pause, this._skip]) each.disabled = busy;

@@ -12,9 +12,9 @@
      "measured": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "alarm": null,
      "other_writer": null, "age": 42.0, "reaction": 0.492, "brake": 0.5,
      "stop_time": 0.25, "stop_source": "stated", "stop_date": null, "test": null,
-     "armable": true, "reason": null, "way": "navigate_to_pose", "cancels": true,
+     "armable": true, "reason": null, "method": "navigate_to_pose", "cancels": true,
      "locates": true, "goal": {"id": "g7", "x": 1.0, "y": 2.0, "yaw": 0.5, "by": "c5",
-     "way": "navigate_to_pose", "state": "under way", "why": "", "left": 3.2,
+     "method": "navigate_to_pose", "state": "under way", "why": "", "left": 3.2,
      "time": 4.5, "eta": 5.3, "recoveries": 0}, "hooks": []}
     {"op": "gone", "robot": "r1"}
     {"op": "refused", "robot": "r1", "what": "take", "why": "Ann drives it"}
@@ -61,7 +61,7 @@ fields:
 ``test``
     The stop test: ``{"state": "creeping", "text": "..."}``, then ``"waiting"``,
     ``"done"`` or ``"failed"``.
-``way``, ``cancels``, ``locates``
+``method``, ``cancels``, ``locates``
     How goals are sent to the robot (null if it accepts none), whether they can be
     cancelled, and whether the robot accepts a pose.
 ``goal``

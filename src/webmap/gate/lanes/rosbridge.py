@@ -80,10 +80,10 @@ def velocity(topic: str, type: str, twist: Twist, frame: str = "") -> bytes:
 
 def goal(spec: RobotSpec, goal: SendGoal) -> bytes:
     """Return the operation that sends the robot to a goal."""
-    if goal.way == "topic":
+    if goal.method == "topic":
         topic = spec.goal_topic or ""  # never empty: the rules checked it
         return ops.publish(topic, _stamped(spec.goal_type, spec, _pose(goal)))
-    if goal.way == "move_base":
+    if goal.method == "move_base":
         target = _stamped("geometry_msgs/PoseStamped", spec, _pose(goal))
         return ops.publish(
             f"{spec.action}/goal",

@@ -195,12 +195,12 @@ class TasksLane:
     def send(self, spec: RobotSpec, goal: SendGoal) -> bool:
         """Write a goal now or drop it; return whether it was written."""
         goal = in_own_map(spec, goal)
-        if goal.way == "move_base":
+        if goal.method == "move_base":
             # First, to miss no message: they may come at once.
             self._follow(spec, goal)
         data = rosbridge.goal(spec, goal)
         done = self.lane.write(data, only_if_clear=True, until=goal.until)
-        if done and goal.way == "navigate_to_pose":
+        if done and goal.method == "navigate_to_pose":
             self._keep_for_result(goal)
         if not done:
             self.forget(goal.robot)

@@ -163,7 +163,7 @@ class Aliases:
     def follow_goals(self) -> bool:
         """Whether a goal is active whose end the gate would notice."""
         return any(
-            goals.following and (goals.can_cancel or goals.way != "topic")
+            goals.following and (goals.can_cancel or goals.method != "topic")
             for goals in self.goals.values()
         )
 

@@ -98,7 +98,7 @@ class Gate:
         self._display_pulse.beat(now)
         if not self._display_there:
             self._display_there = True
-            self._machines.look()
+            self._machines.touch_all()
 
     def _shut_down(self, event: events.Shutdown, now: float) -> None:
         self._display_pulse.ended = event.why

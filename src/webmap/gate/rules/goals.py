@@ -63,7 +63,7 @@ class Goals:
         """Whether the bridge reported that it does not support action goals."""
 
     @property
-    def way(self) -> GoalMethod | None:
+    def method(self) -> GoalMethod | None:
         """The method for goals of this robot; ``None`` if goals cannot be sent."""
         spec = self.spec
         if spec.action is None or (self._no_actions and spec.goal_topic is not None):
@@ -73,7 +73,7 @@ class Goals:
     @property
     def can_send(self) -> bool:
         """Whether goals can be sent to this robot."""
-        return self.way is not None
+        return self.method is not None
 
     @property
     def can_cancel(self) -> bool:
@@ -97,7 +97,9 @@ class Goals:
         """
         report = self.report
         return (
-            self.following and report is not None and (report.way != "topic" or moving)
+            self.following
+            and report is not None
+            and (report.method != "topic" or moving)
         )
 
     def may_still_move(self, now: float) -> bool:
@@ -111,7 +113,7 @@ class Goals:
             Refusal: If the robot takes no goals, or its link is down.
 
         """
-        method = self.way
+        method = self.method
         if method is None:
             raise Refusal("no goal topic and no action is set")
         if not self.link.up:
@@ -130,7 +132,7 @@ class Goals:
         if self.spec.pose_topic is None:
             raise Refusal("no topic for the initial pose is set")
         # A goal without feedback and without a cancel would block this for ever.
-        if self.following and (self.can_cancel or self.way != "topic"):
+        if self.following and (self.can_cancel or self.method != "topic"):
             raise Refusal("the robot is navigating: cancel the goal first")
         if not self.link.up:
             raise Refusal("no connection to the bridge of its initial pose")
@@ -141,14 +143,14 @@ class Goals:
         """Note that a goal was written."""
         self._running, self._by, self._perhaps = goal.id, goal.by, True
         self._cancelled_at = float("-inf")  # it was for earlier goals
-        method = self.way or "topic"
+        method = self.method or "topic"
         self.report = GoalReport(
             id=goal.id,
             x=goal.x,
             y=goal.y,
             yaw=goal.yaw,
             by=goal.by,
-            way=method,
+            method=method,
             state="sent",
             why="this robot reports no progress" if method == "topic" else "",
         )
@@ -214,7 +216,7 @@ class Goals:
             self._emit(CancelGoals(self._key, self.spec.id))
         if self.following:
             assert self.report is not None  # because it follows a goal
-            waits = self._cancel_owed or self.report.way != "topic"
+            waits = self._cancel_owed or self.report.method != "topic"
             self._show("cancelling" if waits else "cancelled", why, now)
 
     def cancel_again(self, news: GoalProgress, stopped: bool, now: float) -> None:
@@ -292,7 +294,10 @@ class Goals:
         if now - self._cancelled_at >= IN_VAIN:
             return
         self._cancel_owed, report = True, self.report
-        if report is not None and (report.state, report.way) == ("cancelled", "topic"):
+        if report is not None and (report.state, report.method) == (
+            "cancelled",
+            "topic",
+        ):
             self._show("cancelling", report.why, now)
 
     def _report_on(self, id: str) -> GoalReport | None:

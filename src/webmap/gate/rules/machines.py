@@ -87,7 +87,7 @@ class Machines:
             self._touched.add(machine.key)
             yield machine
 
-    def look(self) -> None:
+    def touch_all(self) -> None:
         """Mark every machine as possibly changed, so that it is reported."""
         self._touched.update(self._by_key)
 
@@ -172,7 +172,7 @@ class Machines:
         if reporter is None:  # forgotten; it stays only until the machine has stopped
             return
         latest = report(machine, spec, now)
-        due = reporter.worth_saying(latest, now)
+        due = reporter.is_due(latest, now)
         if due:
             self._emit(SendToDisplay(latest))
         elif due is None:

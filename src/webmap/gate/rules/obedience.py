@@ -216,7 +216,7 @@ class OtherWriter:
         if self.seen is not None and now - self._received_at[-1] > WITHIN:
             self.seen = self.nodes = None
 
-    def words(self, topic: str) -> str | None:
+    def description(self, topic: str) -> str | None:
         """Return who publishes what to ``topic``, as text, or ``None``."""
         if self.seen is None:
             return None

@@ -57,7 +57,7 @@ def report(machine: Machine, spec: RobotSpec, now: float) -> RobotReport:
         echoed=None if echoed is None else _velocity(echoed),
         measured=None if measured is None else _velocity(measured),
         alarm=machine.obedience.alarm(now),
-        other_writer=machine.other_writer.words(machine.key.topic),
+        other_writer=machine.other_writer.description(machine.key.topic),
         age=None if age is None else round(age * 1000, 0),
         reaction=round(reaction(age, machine.speeds.stop_time), 3),
         brake=machine.robots.a_max or BRAKE,
@@ -67,7 +67,7 @@ def report(machine: Machine, spec: RobotSpec, now: float) -> RobotReport:
         test=None if test is None else TestReport(test.state, test.text),
         armable=machine.authority.why_unavailable(now) is None,
         reason=_reason(machine, now),
-        way=goals.way,
+        method=goals.method,
         cancels=goals.can_cancel,
         locates=spec.pose_topic is not None,
         goal=goals.report,
@@ -85,7 +85,10 @@ def _activity(machine: Machine, spec: RobotSpec, now: float) -> Activity:
         return "down"
     if machine.authority.handover.successor is not None:
         return "changing"
-    if machine.other_writer.words(machine.key.topic) and state in ("free", "stopping"):
+    if machine.other_writer.description(machine.key.topic) and state in (
+        "free",
+        "stopping",
+    ):
         return "other"
     if state == "stopping":
         return "stopping"
@@ -154,7 +157,7 @@ class Reporter:
         self._last: RobotReport | None = None
         self._at = float("-inf")
 
-    def worth_saying(self, report: RobotReport, now: float) -> bool | None:
+    def is_due(self, report: RobotReport, now: float) -> bool | None:
         """Return whether to send ``report`` now; ``None`` means later."""
         last = self._last
         if report == last:

@@ -37,7 +37,7 @@
  * @property {number} [brake] The deceleration, in m/s², if known.
  * @property {number | null} [age] The age of commands when they arrive at the gate, in ms.
  * @property {StopTest | null} [test] The progress of the stop test.
- * @property {string | null} [way] How goals are sent to it; null if that is impossible.
+ * @property {string | null} [method] How goals are sent to it; null if that is impossible.
  * @property {boolean} [cancels] Whether goals can be cancelled.
  * @property {boolean} [locates] Whether its pose can be set.
  * @property {GoalReport | null} [goal] The state of its newest goal.
@@ -51,7 +51,7 @@
  * @property {number} y Metres.
  * @property {number} yaw Radians.
  * @property {string} by The connection that sent it.
- * @property {string} way
+ * @property {string} method
  * @property {'sent' | 'accepted' | 'under way' | 'cancelling' | 'unknown' | 'reached'
  *     | 'failed' | 'cancelled'} state
  * @property {string} why

@@ -8,7 +8,7 @@ import pytest
 from webmap.console.bar import summary
 from webmap.console.card_parts import cap, linear
 from webmap.console.robot_list import BatteryMark
-from webmap.console.words import (
+from webmap.console.texts import (
     LOOKS,
     battery_tone,
     heading,
