@@ -37,8 +37,8 @@ def test_a_bag_tells_its_topics_its_types_and_how_long_it_is(made, bag):
 
 def test_messages_come_in_their_order_from_a_moment_on(bag):
     recording = Recording([bag])
-    heard = [(one.topic, one.time) for one in recording.messages(BEGIN + 10**9)]
-    assert heard == [
+    received = [(one.topic, one.time) for one in recording.messages(BEGIN + 10**9)]
+    assert received == [
         ("/odom", BEGIN + 10**9),
         ("/cmd_vel", BEGIN + 2 * 10**9),
         ("/odom", BEGIN + 4 * 10**9),
@@ -110,8 +110,8 @@ def test_several_bags_of_ros_1_are_played_as_one(tmp_path):
         for name, at in (("late", 1.0), ("early", 0.0))
     ]
     recording = Recording(bags)
-    heard = [one.topic for one in recording.messages(recording.begin)]
-    assert heard == ["/early/odom", "/late/odom"]
+    received = [one.topic for one in recording.messages(recording.begin)]
+    assert received == ["/early/odom", "/late/odom"]
     assert recording.name == "late.bag and 1 more"
     recording.close()
 

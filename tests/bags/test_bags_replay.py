@@ -29,7 +29,7 @@ class Client:
         graph = player.replay.graph
         encoder = Encoder(graph.schema, POLITE)
         self.session = Session(graph, encoder, clock=lambda: 0.0, wake=lambda: None)
-        self.heard = []
+        self.received = []
 
     def send(self, **operation):
         self.session.receive(json.dumps(operation))
@@ -41,8 +41,8 @@ class Client:
 
     def operations(self):
         while frames := self.session.next_frames():
-            self.heard += [json.loads(frame) for frame in frames]
-        return self.heard
+            self.received += [json.loads(frame) for frame in frames]
+        return self.received
 
     def messages(self, topic):
         return [one["msg"] for one in self.operations() if one.get("topic") == topic]
@@ -265,11 +265,11 @@ def test_nothing_is_taken_in_whatever_a_client_sends(bag, operation):
         async with played(bag) as player:
             other = Client(player).listen("/cmd_vel")
             await until(lambda: "ended" in player.status)
-            heard = len(other.messages("/cmd_vel"))
+            received = len(other.messages("/cmd_vel"))
             client = Client(player)
             client.send(**operation)
             assert [one["msg"] for one in client.operations()] == [REFUSED]
-            assert len(other.messages("/cmd_vel")) == heard == 1
+            assert len(other.messages("/cmd_vel")) == received == 1
 
     asyncio.run(story())
 

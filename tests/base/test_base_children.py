@@ -74,13 +74,13 @@ def test_the_decoder_imports_nothing_from_the_working_folder(hostile):
 
 
 def test_the_gate_imports_nothing_from_the_working_folder(hostile):
-    heard = []
+    received = []
     child = GateProcess(
-        lambda child, message: heard.append(message), lambda child: None
+        lambda child, message: received.append(message), lambda child: None
     )
     child.start()
     child.stop(15.0)
-    assert isinstance(heard[0], Ready)
+    assert isinstance(received[0], Ready)
 
 
 def test_the_simulator_of_a_demo_imports_nothing_from_the_working_folder(hostile):

@@ -50,10 +50,10 @@ def test_frames_of_real_bridges_are_drawn_as_they_were(chromium):
         running(*played("ros1"), "--port", 0, pattern=BRIDGE, **PLAYER) as one,
         running(*played("ros2"), "--port", 0, pattern=BRIDGE, **PLAYER) as other,
     ):
-        told = ("--robot", f"1@Anna:{ROBOT}", "--robot", f"2@Berta:{ROBOT}")
+        received = ("--robot", f"1@Anna:{ROBOT}", "--robot", f"2@Berta:{ROBOT}")
         options = ("--only-given", "--port", "0", "--no-browser")
         with (
-            webmap("view", one.url, other.url, *told, *options) as url,
+            webmap("view", one.url, other.url, *received, *options) as url,
             opened(chromium, url, robots(2), SCAN) as page,
         ):
             expect_drawn(page, "captured")

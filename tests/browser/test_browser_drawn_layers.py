@@ -54,10 +54,10 @@ def test_each_way_to_a_pose_and_each_option_of_a_layer_is_drawn_as_it_was(
 ):
     make_files(tmp_path)
     with fixed_bridge("ros1") as bridge:
-        told = {"DRAWN_BRIDGE": bridge.url, "DRAWN_FILES": str(tmp_path)}
+        received = {"DRAWN_BRIDGE": bridge.url, "DRAWN_FILES": str(tmp_path)}
         file = HERE / "page_of_drawn.py"
         with (
-            page_of(file, PYTHONPATH=str(HERE), **told) as url,
+            page_of(file, PYTHONPATH=str(HERE), **received) as url,
             opened(chromium, url, robots(6)) as page,
         ):
             go_along(page, bridge, ".trail")

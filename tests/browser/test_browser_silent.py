@@ -24,8 +24,8 @@ def robots():
 @pytest.fixture
 def server(robots):
     urls = [robot.url for robot in robots]
-    told = ("--robot", "1@Bob:/odom:/cmd_vel:", "--robot", "2@Ann:/odom:/cmd_vel:")
-    command = ("view", *urls, *told, "--only-given", "--port", 0, "--no-browser")
+    received = ("--robot", "1@Bob:/odom:/cmd_vel:", "--robot", "2@Ann:/odom:/cmd_vel:")
+    command = ("view", *urls, *received, "--only-given", "--port", 0, "--no-browser")
     with running(*command, pattern=WEB) as process:
         yield process
 

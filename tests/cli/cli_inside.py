@@ -26,7 +26,7 @@ class Done:
     stderr: str
 
 
-def run_inside(*arguments: object, told: str = "") -> Done:
+def run_inside(*arguments: object, stdin: str = "") -> Done:
     """Run a command.
 
     Args:
@@ -43,7 +43,7 @@ def run_inside(*arguments: object, told: str = "") -> Done:
             after.callback(logger.setLevel, logger.level)
         words = ["webmap", *map(str, arguments)]
         after.enter_context(patch.object(sys, "argv", words))
-        stdin = io.TextIOWrapper(io.BytesIO(told.encode()), "utf-8")
+        stdin = io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8")
         after.enter_context(patch.object(sys, "stdin", stdin))
         after.enter_context(redirect_stdout(out))
         after.enter_context(redirect_stderr(err))

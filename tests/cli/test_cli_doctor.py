@@ -68,9 +68,9 @@ def test_a_list_of_topics_takes_the_place_of_rosapi(ros1, tmp_path):
 
 
 def test_robots_are_looked_at_as_they_were_told(ros1):
-    told = ("--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
+    received = ("--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
     sent = ("--set", "Bob.velocity_type=geometry_msgs/TwistStamped")
-    said = webmap("doctor", ros1, "--seconds", "2", *told, *sent)
+    said = webmap("doctor", ros1, "--seconds", "2", *received, *sent)
     assert said.returncode == 1, said.stdout
     assert (
         "\nBob\n  WRONG    /robot_0/cmd_vel has the type Twist, but WebMap"

@@ -13,10 +13,10 @@ from webmap.cli.options import parse_topics
 TOPICS = "/bob/odom [nav_msgs/msg/Odometry]\n/bob/cmd_vel [geometry_msgs/msg/Twist]\n"
 
 
-def webmap(*arguments, told=""):
+def webmap(*arguments, stdin=""):
     return subprocess.run(
         [sys.executable, "-m", "webmap", *arguments],
-        input=told,
+        input=stdin,
         capture_output=True,
         text=True,
         timeout=30,
@@ -26,7 +26,7 @@ def webmap(*arguments, told=""):
 
 def test_robots_of_a_list_are_found_without_asking_the_bridge():
     command = ("discover", "ws://127.0.0.1:1", "--topics", "-", "--toml")
-    said = run_inside(*command, told=TOPICS)
+    said = run_inside(*command, stdin=TOPICS)
     assert said.returncode == 0, said.stderr
     (robot,) = tomllib.loads(said.stdout)["robots"]
     assert robot["name"] == "bob"
@@ -34,7 +34,7 @@ def test_robots_of_a_list_are_found_without_asking_the_bridge():
 
 
 def test_a_wrong_line_is_said_with_its_number_and_what_was_expected():
-    said = webmap("discover", "ws://127.0.0.1:1", "--topics", "-", told="/odom\n")
+    said = webmap("discover", "ws://127.0.0.1:1", "--topics", "-", stdin="/odom\n")
     assert said.returncode == 2
     assert said.stderr.startswith("Error: <stdin>, line 1: got '/odom'; expected a")
 

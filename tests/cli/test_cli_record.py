@@ -25,7 +25,7 @@ class Ear:
     """Hears topics behind a bridge as any client does, in a thread of its own."""
 
     def __init__(self, socket, *topics):
-        self.heard = {topic: [] for topic in topics}
+        self.received = {topic: [] for topic in topics}
         self._socket = socket
         for topic in topics:
             socket.send(json.dumps({"op": "subscribe", "topic": topic}))
@@ -36,14 +36,14 @@ class Ear:
             for frame in self._socket:
                 operation = json.loads(frame)
                 if operation["op"] == "publish":
-                    self.heard[operation["topic"]].append(operation["msg"])
+                    self.received[operation["topic"]].append(operation["msg"])
 
     def wait_for(self, topic, number, within=20.0):
         deadline = time.monotonic() + within
-        while len(self.heard[topic]) < number:
-            assert time.monotonic() < deadline, f"{topic}: {len(self.heard[topic])}"
+        while len(self.received[topic]) < number:
+            assert time.monotonic() < deadline, f"{topic}: {len(self.received[topic])}"
             time.sleep(0.02)
-        return self.heard[topic]
+        return self.received[topic]
 
 
 @contextlib.contextmanager
@@ -71,14 +71,16 @@ def age(message):
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_a_recording_that_is_played_says_what_the_robot_said(tmp_path, dialect):
     odom, scan = "/robot_0/odom", "/robot_0/base_scan"
-    told = ("--robots", "1", "--wander", "--dialect", dialect)
+    received = ("--robots", "1", "--wander", "--dialect", dialect)
     bag = tmp_path / ("drive.bag" if dialect == "ros1" else "drive")
-    with simulator(*told) as url, hearing(url, odom, scan) as ear:
+    with simulator(*received) as url, hearing(url, odom, scan) as ear:
         ear.wait_for(scan, 1)
         done = run(url, "--out", bag, "--duration", "2")
         assert done.returncode == 0, done.stderr
-        ear.wait_for(scan, len(ear.heard[scan]) + 2)
-        said = {topic: {*map(without_times, ear.heard[topic])} for topic in ear.heard}
+        ear.wait_for(scan, len(ear.received[scan]) + 2)
+        said = {
+            topic: {*map(without_times, ear.received[topic])} for topic in ear.received
+        }
     lasted = r"Recorded \d+ messages of \d+ topics in [2-9]\.\d s to "
     assert re.search(lasted, done.stderr)
     assert done.stdout == f"Recording {url} to {bag}\n"

@@ -28,8 +28,8 @@ def test_everything_that_is_found_is_on_the_page(chromium, ros1):
 
 
 def test_a_robot_that_is_told_has_all_that_is_in_its_namespace(chromium, ros1):
-    told = "Bob:/robot_0/odom:/robot_0/cmd_vel:"
-    with shown(chromium, "view", ros1, "--robot", told) as page:
+    received = "Bob:/robot_0/odom:/robot_0/cmd_vel:"
+    with shown(chromium, "view", ros1, "--robot", received) as page:
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(1, timeout=15_000)
         for drawn in (
             ".occupancy-grid.map image",

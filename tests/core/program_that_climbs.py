@@ -11,7 +11,7 @@ from webmap.testing import Bounds, WitnessRobot, check_invariants
 
 LIMITS = {"z_max": 0.5, "rx_max": 0.2, "ry_max": 0.1}
 PATIENCE = 20.0
-told: dict[str, object] = {}
+received: dict[str, object] = {}
 
 
 async def repeat(act, until, what: str) -> None:
@@ -34,8 +34,8 @@ async def fly(base: WitnessRobot) -> None:
     try:
         bob.twist(0.1, z=0.3)
     except MotionError as error:
-        told["without a limit"] = str(error)
-    told["moved without a limit"] = len(base.log.moving_since(0.0))
+        received["without a limit"] = str(error)
+    received["moved without a limit"] = len(base.log.moving_since(0.0))
 
     bob.set_twist_topic(bridge, base.TWIST_TOPIC, **known, **LIMITS)
     await bob.acquire_lease(timeout=PATIENCE)
@@ -47,7 +47,9 @@ async def fly(base: WitnessRobot) -> None:
             bob.motion.take()
 
     await repeat(climb, lambda: bob.position.z > 0.2, "odometry does not climb")
-    told["twists"] = [told.twist.numbers for told in base.log.moving_since(0.0)]
+    received["twists"] = [
+        received.twist.numbers for received in base.log.moving_since(0.0)
+    ]
 
     base.obeys = False  # what it was told last, it goes on with
     bob.stop()
@@ -55,14 +57,14 @@ async def fly(base: WitnessRobot) -> None:
     await repeat(
         lambda: None, lambda: stop() and stop().confirmed is not None, "no word of it"
     )
-    told["a robot that climbs on"] = (stop().confirmed, stop().why)
-    told["measured"] = bob.report.measured
-    told["last"] = base.log.told[-1].twist.numbers
+    received["a robot that climbs on"] = (stop().confirmed, stop().why)
+    received["measured"] = bob.report.measured
+    received["last"] = base.log.twists[-1].twist.numbers
     base.obeys = True
     await repeat(lambda: None, lambda: stop().confirmed, "it does not stand")
-    told["standing"] = bob.report.measured
-    told["wrong"] = check_invariants(
-        base.log.told, Bounds(v_max=1.0, z_max=0.5, zeros=PATIENCE)
+    received["standing"] = bob.report.measured
+    received["wrong"] = check_invariants(
+        base.log.twists, Bounds(v_max=1.0, z_max=0.5, zeros=PATIENCE)
     )
 
 
@@ -81,7 +83,7 @@ def main() -> None:
         done.wait(90)
         webmap.stop()
     tasks[0].result()  # whatever went wrong
-    print(json.dumps(told))
+    print(json.dumps(received))
 
 
 main()

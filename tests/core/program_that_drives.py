@@ -22,7 +22,7 @@ bob.set_alignment(10.0, 0.0, 90.0)
 # Navigation alone, of the same machine.
 ann = webmap.Robot("Ann")
 ann.set_move_topic(bridge, GOAL)
-told: dict[str, object] = {}
+received: dict[str, object] = {}
 
 
 class Ears:
@@ -65,34 +65,36 @@ def taken(act) -> str:
 
 async def drive() -> None:
     ears = bob.add_module(Ears)
-    heard: list[dict] = []
-    bridge.subscribe(GOAL, heard.append, "geometry_msgs/PoseStamped")
+    seen: list[dict] = []
+    bridge.subscribe(GOAL, seen.append, "geometry_msgs/PoseStamped")
     # At once after the start: neither the gate nor a link is there yet.
-    told["epoch"] = await bob.acquire_lease(timeout=20.0)
+    received["epoch"] = await bob.acquire_lease(timeout=20.0)
     begun = bob.yaw
     await repeat(
         lambda: bob.twist(0.1, rz=0.5),
         lambda: abs(math.remainder(bob.yaw - begun, math.tau)) > 0.1,
         "odometry does not turn",
     )
-    told["twists"] = [(msg["linear"]["x"], msg["angular"]["z"]) for msg in ears.twists]
+    received["twists"] = [
+        (msg["linear"]["x"], msg["angular"]["z"]) for msg in ears.twists
+    ]
     # A metre ahead of the robot, wherever that is.
     at = Pose(bob.position.x, bob.position.y, bob.yaw) @ Pose(1.0, 0.0, 0.0)
     place, turn = Vector3(at.x, at.y), Quaternion.from_yaw(at.yaw)
     # What comes before the robot stands is refused.
     await repeat(
         lambda: ears.goals or bob.move(place, turn),
-        lambda: ears.goals and heard,
+        lambda: ears.goals and seen,
         "no goal arrives",
     )
-    told["asked"] = (at.x, at.y)
-    told["said"] = [ears.goals[0]["position"][axis] for axis in "xy"]
-    told["heard"] = [heard[0]["pose"]["position"][axis] for axis in "xy"]
-    told["frame"] = heard[0]["header"]["frame_id"]
+    received["asked"] = (at.x, at.y)
+    received["said"] = [ears.goals[0]["position"][axis] for axis in "xy"]
+    received["heard"] = [seen[0]["pose"]["position"][axis] for axis in "xy"]
+    received["frame"] = seen[0]["header"]["frame_id"]
     bob.release_lease()
-    told["twist afterwards"] = taken(lambda: bob.twist(0.1))
-    told["move afterwards"] = taken(lambda: bob.move(place, turn))
-    told["epoch of goals alone"] = await ann.acquire_lease()
+    received["twist afterwards"] = taken(lambda: bob.twist(0.1))
+    received["move afterwards"] = taken(lambda: bob.move(place, turn))
+    received["epoch of goals alone"] = await ann.acquire_lease()
 
 
 def main() -> None:
@@ -108,7 +110,7 @@ def main() -> None:
     done.wait(90)
     webmap.stop()
     tasks[0].result()  # whatever went wrong
-    print(json.dumps(told))
+    print(json.dumps(received))
 
 
 main()

@@ -83,7 +83,7 @@ def test_a_module_whose_constructor_raises_leaves_nothing(namespace):
 
 
 def test_a_module_that_raises_does_not_keep_the_others_from_hearing(namespace):
-    heard, reported = [], []
+    seen, reported = [], []
 
     class Bad:
         def __init__(self, owner) -> None:
@@ -94,7 +94,7 @@ def test_a_module_that_raises_does_not_keep_the_others_from_hearing(namespace):
 
     class Good(Bad):
         def on_ring(self, n):
-            heard.append(n)
+            seen.append(n)
 
     class Owner(Extendable):
         def report_error(self, text):
@@ -105,7 +105,7 @@ def test_a_module_that_raises_does_not_keep_the_others_from_hearing(namespace):
     owner.add_module(Good)
     owner.notify_modules("on_ring", 3)
     owner.notify_modules("on_silence")
-    assert heard == [3]
+    assert seen == [3]
     assert reported == ["Bad.on_ring failed: RuntimeError: flat battery"]
 
 
@@ -122,11 +122,11 @@ class Slow:
     """A module whose trigger waits."""
 
     def __init__(self, owner) -> None:
-        self.go, self.heard = asyncio.Event(), []
+        self.go, self.received = asyncio.Event(), []
 
     async def on_ring(self, n):
         await self.go.wait()
-        self.heard.append((n, 10 // n, current_scope()))
+        self.received.append((n, 10 // n, current_scope()))
 
 
 def test_a_trigger_that_is_a_coroutine_goes_on_beside_the_others(namespace):
@@ -136,13 +136,16 @@ def test_a_trigger_that_is_a_coroutine_goes_on_beside_the_others(namespace):
         owner.notify_modules("on_ring", 5)
         for module in (slower, slow):
             module.go.set()
-            await asyncio.wait_for(heard(module), 10)
-        assert [told[:2] for told in slow.heard + slower.heard] == [(5, 2), (5, 2)]
-        assert slow.heard[0][2] is not slower.heard[0][2], "each in its own scope"
+            await asyncio.wait_for(seen(module), 10)
+        assert [received[:2] for received in slow.received + slower.received] == [
+            (5, 2),
+            (5, 2),
+        ]
+        assert slow.received[0][2] is not slower.received[0][2], "each in its own scope"
         assert owner.reported == []
 
-    async def heard(module):
-        while not module.heard:
+    async def seen(module):
+        while not module.received:
             await asyncio.sleep(0)
 
     asyncio.run(scenario())
@@ -158,7 +161,7 @@ def test_a_coroutine_that_still_waits_ends_with_its_module(namespace):
         slow.go.set()
         while len(asyncio.all_tasks()) > 1:
             await asyncio.sleep(0)
-        assert slow.heard == owner.reported == []
+        assert slow.received == owner.reported == []
 
     asyncio.run(scenario())
 
@@ -252,7 +255,7 @@ def test_what_a_module_made_reports_to_its_owner_until_it_is_mended(namespace):
 
 
 def test_modules_may_fire_triggers_of_their_own():
-    heard = []
+    seen = []
 
     class Bumper:
         def __init__(self, robot) -> None:
@@ -266,12 +269,12 @@ def test_modules_may_fire_triggers_of_their_own():
             pass
 
         def on_bump(self, side):
-            heard.append(side)
+            seen.append(side)
 
     robot = Robot("Bob")
     robot.add_module(Listener)
     robot.add_module(Bumper).hit()
-    assert heard == ["left"]
+    assert seen == ["left"]
 
 
 def test_a_subclass_may_have_a_namespace_of_its_own(namespace):

@@ -11,7 +11,7 @@ PROGRAM = Path(__file__).with_name("program_that_climbs.py")
 
 
 @pytest.fixture(scope="module")
-def told():
+def received():
     """What came of a program that flew a robot behind a rosbridge of its own."""
     done = subprocess.run(
         [sys.executable, PROGRAM],
@@ -24,29 +24,29 @@ def told():
     return json.loads(done.stdout)
 
 
-def test_without_a_limit_the_whole_velocity_is_refused(told):
-    assert "got z = 0.3 m/s, but no limit of the robot" in told["without a limit"]
-    assert told["moved without a limit"] == 0
+def test_without_a_limit_the_whole_velocity_is_refused(received):
+    assert "got z = 0.3 m/s, but no limit of the robot" in received["without a limit"]
+    assert received["moved without a limit"] == 0
 
 
-def test_the_robot_gets_all_six_numbers_within_its_limits(told):
-    assert told["twists"]
-    for x, y, turn, z, rx, ry in told["twists"]:
+def test_the_robot_gets_all_six_numbers_within_its_limits(received):
+    assert received["twists"]
+    for x, y, turn, z, rx, ry in received["twists"]:
         # 0.9 m/s upward is too fast, so all of the linear part is slower. How much
         # depends on how quick this machine is.
         assert 0.1 < z <= 0.5
         assert x / z == pytest.approx(0.05 / 0.9)
         assert (y, turn, rx, ry) == (0.0, 0.2, 0.1, -0.05)
-    assert told["wrong"] == []
+    assert received["wrong"] == []
 
 
-def test_a_stop_of_a_robot_that_climbs_on_is_not_confirmed(told):
-    confirmed, why = told["a robot that climbs on"]
+def test_a_stop_of_a_robot_that_climbs_on_is_not_confirmed(received):
+    confirmed, why = received["a robot that climbs on"]
     assert confirmed is False
     assert why.startswith("still moving at 0.")
-    assert told["measured"][3] > 0.1
-    assert told["last"] == [0.0] * 6
+    assert received["measured"][3] > 0.1
+    assert received["last"] == [0.0] * 6
 
 
-def test_the_stop_is_confirmed_when_it_climbs_no_more(told):
-    assert told["standing"] == [0.0] * 6
+def test_the_stop_is_confirmed_when_it_climbs_no_more(received):
+    assert received["standing"] == [0.0] * 6

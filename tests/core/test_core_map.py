@@ -89,17 +89,17 @@ class Witness:
 
     def __init__(self, map) -> None:
         self.map = map
-        self.heard: list[tuple] = []
+        self.received: list[tuple] = []
 
     def on_add_robot(self, robot):
-        self.heard.append(("add", robot.name))
+        self.received.append(("add", robot.name))
 
     def on_remove_robot(self, robot):
-        self.heard.append(("remove", robot.name))
+        self.received.append(("remove", robot.name))
 
     def on_select(self):
         selected = self.map.selected
-        self.heard.append(("select", selected and selected.name))
+        self.received.append(("select", selected and selected.name))
 
 
 def test_triggers_fire_for_robots_that_come_go_and_are_selected(container):
@@ -111,7 +111,7 @@ def test_triggers_fire_for_robots_that_come_go_and_are_selected(container):
     map.set_selected(bob)
     map.set_selected(bob)
     map.remove_robot(bob)
-    assert witness.heard == [
+    assert witness.received == [
         ("add", "Bob"),
         ("select", "Bob"),
         ("select", None),

@@ -47,7 +47,7 @@ class Lines:
         return [record.getMessage() for record in self._caplog.records]
 
 
-def told(channel) -> list[tuple]:
+def received(channel) -> list[tuple]:
     return [call for call in channel.calls if call[0] in ("error", "mended")]
 
 
@@ -63,7 +63,7 @@ def test_a_text_whose_numbers_change_is_said_once_and_its_newest_stands(
         clock.now += 0.1
         problems.set("plan", nan_at(number))
     assert lines.all == ["Bob: " + nan_at(0)]
-    assert [call[:2] for call in told(channel)] == [("error", "Bob: " + nan_at(0))]
+    assert [call[:2] for call in received(channel)] == [("error", "Bob: " + nan_at(0))]
     assert problems.current == {"plan": nan_at(99)}
 
 
@@ -100,18 +100,18 @@ def test_other_words_take_the_place_of_those_before(problems, channel, lines):
     problems.set("tf", "no frame 'map'")
     problems.set("tf", "two trees")
     assert lines.all == ["Bob: no frame 'map'", "Bob: two trees"]
-    (_, first, number), (_, second, again) = told(channel)
+    (_, first, number), (_, second, again) = received(channel)
     assert (first, second) == ("Bob: no frame 'map'", "Bob: two trees")
     assert number == again
 
 
 def test_what_is_mended_is_taken_back_once(problems, channel):
     problems.set("plan", nan_at(1))
-    number = told(channel)[0][2]
+    number = received(channel)[0][2]
     problems.clear("plan")
     problems.clear("plan")
     problems.clear("never said")
-    assert told(channel)[1:] == [("mended", number)]
+    assert received(channel)[1:] == [("mended", number)]
     assert problems.current == {}
 
 
@@ -121,8 +121,8 @@ def test_what_comes_and_goes_is_logged_once_a_minute(problems, channel, lines, c
         clock.now += 0.1
         problems.clear("plan")
     assert len(lines.all) == 3, "at 0, 60 and 120 seconds"
-    assert len(told(channel)) == 2500, "but the page knows how it is"
-    assert len({call[-1] for call in told(channel)}) == 1
+    assert len(received(channel)) == 2500, "but the page knows how it is"
+    assert len({call[-1] for call in received(channel)}) == 1
 
 
 def test_two_wordings_in_turns_are_logged_once_a_minute_each(problems, lines, clock):
@@ -152,7 +152,7 @@ def test_what_fails_again_is_the_same_trouble_unless_it_was_good_for_a_minute(
     problems.clear("plan")
     clock.now += good_for
     problems.set("plan", nan_at(1))
-    first, _, second = told(channel)
+    first, _, second = received(channel)
     assert (first[2] == second[2]) is same
 
 
@@ -168,9 +168,9 @@ def test_what_was_mended_long_ago_is_forgotten(problems, clock):
 def test_a_map_that_comes_later_shows_the_newest_text(problems, channel, page):
     problems.set("plan", nan_at(1))
     problems.set("plan", nan_at(2))
-    number = told(channel)[0][2]
+    number = received(channel)[0][2]
     problems.join(Map(page.element("other"), 100, 100))
-    assert told(channel)[1:] == [("error", "Bob: " + nan_at(2), number)]
+    assert received(channel)[1:] == [("error", "Bob: " + nan_at(2), number)]
 
 
 def test_what_stands_is_told_once_to_a_page_with_two_maps_and_leaves_with_the_last(
@@ -178,13 +178,13 @@ def test_what_stands_is_told_once_to_a_page_with_two_maps_and_leaves_with_the_la
 ):
     problems.join(Map(page.element("other"), 100, 100))
     problems.set("plan", nan_at(1))
-    number = told(channel)[0][2]
-    assert len(told(channel)) == 1
+    number = received(channel)[0][2]
+    assert len(received(channel)) == 1
     one, other = problems.maps
     problems.leave(one)
-    assert len(told(channel)) == 1
+    assert len(received(channel)) == 1
     problems.leave(other)
-    assert told(channel)[1:] == [("mended", number)]
+    assert received(channel)[1:] == [("mended", number)]
 
 
 def test_a_robot_that_leaves_its_map_takes_its_problems_along(container, channel):
@@ -192,8 +192,8 @@ def test_a_robot_that_leaves_its_map_takes_its_problems_along(container, channel
     map.add_robot(robot)
     robot.set_problem("odometry", "no pose")
     map.remove_robot(robot)
-    number = told(channel)[0][2]
-    assert told(channel)[1:] == [("mended", number)]
+    number = received(channel)[0][2]
+    assert received(channel)[1:] == [("mended", number)]
     robot.destroy()
 
 
@@ -203,7 +203,7 @@ def test_a_page_that_is_closed_is_told_nothing(problems, channel, page):
     problems.set("tf", "two trees")
     problems.clear("plan")
     problems.leave(problems.maps[0])
-    assert len(told(channel)) == 1
+    assert len(received(channel)) == 1
     page.closed = False
 
 

@@ -274,14 +274,14 @@ def test_a_robot_whose_odometry_is_unsubscribed_stays_where_it_was_last():
 
 
 def test_odometry_update_fires_only_when_something_changed():
-    heard = []
+    seen = []
 
     class Listener:
         def __init__(self, robot) -> None:
             pass
 
         def on_odometry_update(self):
-            heard.append(1)
+            seen.append(1)
 
     link = Link()
     robot = Robot("Bob")
@@ -290,7 +290,7 @@ def test_odometry_update_fires_only_when_something_changed():
     link.say("/odom", pose())
     link.say("/odom", pose())
     link.say("/odom", pose(x=3.0))
-    assert len(heard) == 2
+    assert len(seen) == 2
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 1e300])
@@ -373,17 +373,17 @@ def test_what_the_gate_is_told_of_a_robot():
 
 
 def test_triggers_tell_what_the_gate_wrote():
-    heard = []
+    seen = []
 
     class Listener:
         def __init__(self, robot) -> None:
             pass
 
         def on_send_twist(self, message):
-            heard.append(message)
+            seen.append(message)
 
         def on_send_move(self, message):
-            heard.append(message["position"]["y"])
+            seen.append(message["position"]["y"])
 
     robot = Robot("Bob")
     robot.add_module(Listener)
@@ -391,7 +391,7 @@ def test_triggers_tell_what_the_gate_wrote():
     robot.on_written("twist", twist_message(sent))
     robot.on_written("move", goal_message(SentGoal(robot.id, 1, 2, 3, "c1")))
     linear, angular = {"x": 1, "y": 2, "z": 3}, {"x": 4, "y": 5, "z": 6}
-    assert heard == [{"linear": linear, "angular": angular}, 2]
+    assert seen == [{"linear": linear, "angular": angular}, 2]
 
 
 def test_a_robot_made_for_a_page_ends_with_it():
@@ -463,10 +463,10 @@ def test_scan_assist_is_told_to_the_gate_and_off_without_a_word():
     robot.set_twist_topic(link, "/cmd_vel", type="geometry_msgs/Twist")
     assert robot.motion.spec().assist is None
     robot.set_scan_assist("scan", 0.3, x=0.1, angle=90)
-    told = robot.motion.spec().assist
-    assert told.topic == "/scan"
-    assert told.sensor == pytest.approx((0.1, 0.0, math.pi / 2))
-    assert all(math.hypot(x, y) >= 0.3 for x, y in told.footprint)
+    received = robot.motion.spec().assist
+    assert received.topic == "/scan"
+    assert received.sensor == pytest.approx((0.1, 0.0, math.pi / 2))
+    assert all(math.hypot(x, y) >= 0.3 for x, y in received.footprint)
     with pytest.raises(ConfigError, match="3 corners of its outline or more"):
         robot.set_scan_assist("scan", [(0, 0), (1, 0)])
     robot.clear_scan_assist()

@@ -22,7 +22,7 @@ Chain = list[tuple[str, str, Pose]]
 
 @contextmanager
 def telling(
-    told: Mapping[str, Chain], dialect: str = "ros1", extra: Mapping[str, str] = {}
+    received: Mapping[str, Chain], dialect: str = "ros1", extra: Mapping[str, str] = {}
 ) -> Iterator[str]:
     """Serve topics with frames, told 20 times a second; yield the address.
 
@@ -41,7 +41,7 @@ def telling(
         quirks = parse_quirks("real", dialect)
         Rosapi(graph, quirks).start()
         node = object()
-        for topic in told:
+        for topic in received:
             graph.advertise(node, topic, TF, node="/robots", latch=False)
         for topic, kind in extra.items():
             graph.advertise(node, topic, kind, node="/robots", latch=False)
@@ -49,7 +49,7 @@ def telling(
         urls.append(await server.start("127.0.0.1", 0))
         ready.set()
         while not over.is_set():
-            for topic, chain in told.items():
+            for topic, chain in received.items():
                 message = {"transforms": [_transform(graph, topic, *t) for t in chain]}
                 graph.publish(node, topic, message)
             await asyncio.sleep(0.05)

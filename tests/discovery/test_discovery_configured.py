@@ -240,11 +240,11 @@ def test_where_nobody_said_anything_all_that_is_found_is_measured():
 
 
 def test_the_frames_are_followed_from_the_frame_that_was_said():
-    told = {**BOB, "tf": (("/tf", ""),)}
-    seen = looked_at(site(), ConfiguredRobot("Bob", told, map_frame="site"))
+    received = {**BOB, "tf": (("/tf", ""),)}
+    seen = looked_at(site(), ConfiguredRobot("Bob", received, map_frame="site"))
     assert seen.frame_paths["Bob"].start == "site"
     assert "site" in seen.frame_paths["Bob"].missing
-    seen = looked_at(site(), ConfiguredRobot("Bob", told, map_frame="map"))
+    seen = looked_at(site(), ConfiguredRobot("Bob", received, map_frame="map"))
     assert seen.frame_paths["Bob"] == FramePath(
         "robot_0/odom", base="robot_0/base_link"
     )

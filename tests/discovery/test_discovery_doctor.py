@@ -50,7 +50,7 @@ def said(seen, words):
     return found.level
 
 
-def heard(**changes):
+def noted(**changes):
     odometry = replace(LISTENED["/odom"], **changes)
     return replace(GOOD, measured={**LISTENED, "/odom": odometry})
 
@@ -391,7 +391,7 @@ def test_a_robot_without_velocity_or_place_is_warned_of():
     ],
 )
 def test_odometry_has_a_rate_and_an_age(changes, level, words):
-    assert said(heard(**changes), words) == level
+    assert said(noted(**changes), words) == level
 
 
 def test_a_silent_scan_is_a_warning_and_no_more():
@@ -401,7 +401,7 @@ def test_a_silent_scan_is_a_warning_and_no_more():
 
 
 def test_the_worst_comes_first_for_each_robot():
-    levels = [each.level for each in judge(heard(count=0)) if each.about == "bob"]
+    levels = [each.level for each in judge(noted(count=0)) if each.about == "bob"]
     assert levels == sorted(levels, key=["wrong", "warning", "note", "good"].index)
 
 
@@ -438,9 +438,9 @@ def chain(*frames):
     return [(*pair, PLACED) for pair in pairwise(frames)]
 
 
-def checked(told, extra=None):
+def checked(seen, extra=None):
     """What the check sees of robots that tell of their frames."""
-    with telling(told, extra=extra or {}) as url:
+    with telling(seen, extra=extra or {}) as url:
         return asyncio.run(observe(url, seconds=0.5))
 
 
@@ -486,12 +486,12 @@ def test_a_robot_whose_frames_are_silent_is_nowhere():
 
 def test_robots_with_a_map_each_are_followed_from_what_holds_the_maps():
     names = ("ann", "bob")
-    told = [
+    seen = [
         transform
         for name in names
         for transform in chain("world", f"{name}/map", f"{name}/base_link")
     ]
-    seen = checked({"/tf": told})
+    seen = checked({"/tf": seen})
     for name in names:
         assert said(seen, f"from its frames, {name}/base_link in world") == "good"
 
@@ -505,7 +505,7 @@ def test_odd_frames_are_a_warning():
 
 def frames(*transforms, topic="/tf"):
     listening = FrameListening()
-    told = [
+    seen = [
         {
             "header": {"stamp": {"sec": 5}, "frame_id": parent},
             "child_frame_id": child,
@@ -516,7 +516,7 @@ def frames(*transforms, topic="/tf"):
         }
         for parent, child, w in transforms
     ]
-    operation = {"op": "publish", "topic": topic, "msg": {"transforms": told}}
+    operation = {"op": "publish", "topic": topic, "msg": {"transforms": seen}}
     listening.received(Publish(topic, json.dumps(operation).encode()))
     return listening
 

@@ -43,9 +43,9 @@ def quick(monkeypatch):
 def test_a_robot_whose_frames_come_while_running_is_shown_where_they_have_it(
     quick, dialect, capsys
 ):
-    told = {"/tf": chain("ann", 1.0, 2.0)}
+    received = {"/tf": chain("ann", 1.0, 2.0)}
     extra = {"/ann/points": CLOUD, "/bob/points": CLOUD}
-    with telling(told, dialect, extra) as url:
+    with telling(received, dialect, extra) as url:
 
         async def scenario() -> None:
             loop = asyncio.get_running_loop()
@@ -54,7 +54,7 @@ def test_a_robot_whose_frames_come_while_running_is_shown_where_they_have_it(
             late = ShownRobots(console)
             topics = {"/tf": TF, **extra}
             trees = Trees()
-            for parent, child, _ in told["/tf"]:
+            for parent, child, _ in received["/tf"]:
                 trees.take("", parent, child)
             (ann,) = discover(topics, "host", trees).robots
             looking = LookingForRobots(bridge, [ann], late.came)
@@ -64,7 +64,7 @@ def test_a_robot_whose_frames_come_while_running_is_shown_where_they_have_it(
                 service.start(loop)
             try:
                 await until(lambda: late_frames(bridge).trees.parents)
-                told["/tf"] += chain("bob", 5.0, 3.0)
+                received["/tf"] += chain("bob", 5.0, 3.0)
                 await until(lambda: late.robots)
                 (bob,) = late.robots
                 assert (bob.name, console.robots) == ("bob", [bob])
@@ -92,8 +92,8 @@ def test_a_robot_that_is_localised_while_running_is_drawn_on_the_map(
 ):
     """As with a localiser that waits for its initial pose."""
     base = ("odom", "base_link", Pose(0.0, 3.0, 0.5))
-    told = {"/tf": [base]}
-    with telling(told, dialect) as url:
+    received = {"/tf": [base]}
+    with telling(received, dialect) as url:
 
         async def scenario() -> None:
             loop = asyncio.get_running_loop()
@@ -106,13 +106,13 @@ def test_a_robot_that_is_localised_while_running_is_drawn_on_the_map(
                 await until(lambda: late.robots and late.robots[0].valid)
                 (robot,) = late.robots
                 assert (robot.position.x, robot.position.y) == (0.0, 3.0)
-                told["/tf"] = [("map", "odom", Pose(5.0, 1.0, 0.0)), base]
+                received["/tf"] = [("map", "odom", Pose(5.0, 1.0, 0.0)), base]
                 await until(lambda: robot.position.x)
                 at = (robot.position.x, robot.position.y)
                 assert at == pytest.approx((5.0, 4.0))
-                told["/tf"] = [base]
-                heard = bridge._topics["/tf"].count
-                await until(lambda: bridge._topics["/tf"].count > heard + 20)
+                received["/tf"] = [base]
+                seen = bridge._topics["/tf"].count
+                await until(lambda: bridge._topics["/tf"].count > seen + 20)
                 assert robot.tf["map_frame"] == "map", "never back"
                 robot.destroy()
             finally:
@@ -142,9 +142,9 @@ def test_what_was_heard_once_is_kept_for_the_next_look():
             try:
                 await until(lambda: bridge.state == "open")
                 late = late_frames(bridge)
-                heard = await late.listen({"/tf": TF}, seconds=0.5)
-                assert [base.space for base in heard.bases()] == ["/ann"]
-                assert late_frames(bridge).trees.bases() == heard.bases()
+                seen = await late.listen({"/tf": TF}, seconds=0.5)
+                assert [base.space for base in seen.bases()] == ["/ann"]
+                assert late_frames(bridge).trees.bases() == seen.bases()
             finally:
                 await bridge.stop()
 

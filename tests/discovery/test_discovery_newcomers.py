@@ -75,8 +75,8 @@ def test_frames_are_news_once_if_they_lead_above_those_that_are_known(
 ):
     newcomers = Newcomers(with_frames(*first).robots)
     later = with_frames(*then)
-    told = [[news.moved for news in newcomers.look(later)] for _ in range(3)]
-    assert told == [[], [True] if moved else [], []]
+    received = [[news.moved for news in newcomers.look(later)] for _ in range(3)]
+    assert received == [[], [True] if moved else [], []]
 
 
 def test_what_a_robot_has_more_is_told_with_the_frames_that_are_known_of_it():

@@ -92,10 +92,10 @@ def test_it_creeps_and_ends_with_zero_when_it_is_interrupted(folder):
             rest = process.stdout.read()
             assert process.wait(10) == 2
         moving = robot.log.moving_since(0.0)
-        ended = robot.log.told[-1]
+        ended = robot.log.twists[-1]
     assert "the robot is stopped" in rest
     assert moving
-    assert max(told.speed for told in moving) <= 0.1 + 1e-9
+    assert max(received.speed for received in moving) <= 0.1 + 1e-9
     assert ended.is_zero
     assert time.monotonic() > ended.at > moving[-1].at
 

@@ -21,10 +21,10 @@ ODOM, TWIST = "nav_msgs/Odometry", "geometry_msgs/Twist"
 TF = "tf2_msgs/TFMessage"
 
 
-def trees(**told) -> Trees:
+def trees(**received) -> Trees:
     """Trees from chains such as ``"map odom base_link"``, by namespace."""
     found = Trees()
-    for namespace, chains in told.items():
+    for namespace, chains in received.items():
         for chain in chains:
             frames = chain.split()
             for parent, child in pairwise(frames):
@@ -140,23 +140,23 @@ def test_a_loop_of_frames_ends():
 
 
 def test_a_flood_of_frames_is_forgotten_and_robots_are_not():
-    told = shared("map odom base_link laser", "map bob/odom bob/base_link")
+    received = shared("map odom base_link laser", "map bob/odom bob/base_link")
     for number in range(3 * MOST_FRAMES):
-        told.take("", "map", f"object_{number}")
-    assert len(told.parents[""]) <= MOST_FRAMES
-    assert f"object_{3 * MOST_FRAMES - 1}" in told.parents[""]
-    assert [(base.space, base.above) for base in told.bases()] == [
+        received.take("", "map", f"object_{number}")
+    assert len(received.parents[""]) <= MOST_FRAMES
+    assert f"object_{3 * MOST_FRAMES - 1}" in received.parents[""]
+    assert [(base.space, base.above) for base in received.bases()] == [
         ("", ("odom", "map")),
         ("/bob", ("bob/odom", "map")),
     ]
 
 
 def test_a_flood_of_bases_ends_too():
-    told = Trees()
+    received = Trees()
     for number in range(2 * MOST_FRAMES):
-        told.take("", "map", f"r{number}/base_link")
-    assert len(told.parents[""]) <= MOST_FRAMES
-    assert f"r{2 * MOST_FRAMES - 1}/base_link" in told.parents[""]
+        received.take("", "map", f"r{number}/base_link")
+    assert len(received.parents[""]) <= MOST_FRAMES
+    assert f"r{2 * MOST_FRAMES - 1}/base_link" in received.parents[""]
 
 
 def test_only_topics_with_frames_are_listened_to():
@@ -165,8 +165,8 @@ def test_only_topics_with_frames_are_listened_to():
 
 
 def test_a_bridge_that_is_gone_tells_of_no_frames():
-    heard = asyncio.run(receive_frames("ws://127.0.0.1:1", {"/tf": TF}))
-    assert heard.bases() == ()
+    seen = asyncio.run(receive_frames("ws://127.0.0.1:1", {"/tf": TF}))
+    assert seen.bases() == ()
 
 
 MAP_TO_BASE = [
@@ -206,8 +206,8 @@ def test_what_was_found_is_drawn_where_its_frames_have_it():
     with telling({"/tf": MAP_TO_BASE}) as url:
 
         async def scenario() -> None:
-            heard = await receive_frames(url, {"/tf": TF})
-            (found,) = discover({"/tf": TF}, "host", heard).robots
+            seen = await receive_frames(url, {"/tf": TF})
+            (found,) = discover({"/tf": TF}, "host", seen).robots
             bridge = Bridge(url)
             robot = Robot.from_config(found.config(url), {url: bridge})
             bridge.start(asyncio.get_running_loop())
@@ -224,14 +224,14 @@ def test_what_was_found_is_drawn_where_its_frames_have_it():
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_ten_namespaces_on_one_bridge_are_ten_robots_by_their_own_frames(dialect):
-    told = {
+    received = {
         f"/r{n}/tf": [
             ("map", "odom", Pose(10.0 * n, 0.0, 0.0)),
             ("odom", "base_link", Pose(1.0, 0.1 * n, 0.0)),
         ]
         for n in range(10)
     }
-    with telling(told, dialect) as url:
+    with telling(received, dialect) as url:
 
         async def scenario() -> None:
             bridge = Bridge(url)

@@ -28,7 +28,7 @@ class RobotNode:
         topics: dict[str, str],
     ) -> None:
         self.calls: list[tuple[str, dict]] = []
-        self.heard: list[tuple[str, Any]] = []
+        self.received: list[tuple[str, Any]] = []
         self._answers = {name: answer for name, (_, answer) in services.items()}
         self._link = link
         for name, (type, _) in services.items():
@@ -53,7 +53,7 @@ class RobotNode:
         for frame in self._link:
             op = json.loads(frame)
             if op["op"] == "publish":
-                self.heard.append((op["topic"], op["msg"]))
+                self.received.append((op["topic"], op["msg"]))
             elif op["op"] == "call_service":
                 self._answer(op)
 

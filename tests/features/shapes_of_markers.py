@@ -1,7 +1,7 @@
 """Markers of every type that is drawn, and which points they cover.
 
-Told twice: once as a message, and once in plain numbers, of the marker's own frame, so
-that what is drawn can be held against them.
+Described twice: once as a message, and once in plain numbers in the frame of the
+marker, so that what is drawn can be compared with them.
 """
 
 import math

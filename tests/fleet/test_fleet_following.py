@@ -219,10 +219,10 @@ def test_a_told_robot_is_drawn_in_a_map_that_comes_later(bridge, monkeypatch, ca
     given = [ShownRobot(*about, robot, config)]
     drawing = LookingForLayers(bridge, ShownRobots(Console()), given=given)
     frames = late_frames(bridge)
-    heard = []
+    received = []
 
     async def listen(topics):
-        heard.append(topics)
+        received.append(topics)
         return frames.trees
 
     monkeypatch.setattr(frames, "listen", listen)
@@ -234,7 +234,7 @@ def test_a_told_robot_is_drawn_in_a_map_that_comes_later(bridge, monkeypatch, ca
         asyncio.run(drawing.take(TF | ODOM))
         assert robot.tf["map_frame"] == "bob/map"
         assert robot.motion.spec().goal_frame == "bob/map"
-    assert len(heard) == 3, "also once it is drawn by frames"
+    assert len(received) == 3, "also once it is drawn by frames"
     assert (
         capsys.readouterr().err.count("Al now is drawn by bob/base_link in bob/map")
         == 1

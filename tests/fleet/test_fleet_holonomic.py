@@ -31,12 +31,12 @@ def test_q_moves_the_robot_sideways_whose_base_can_and_no_other(
 ):
     file = tmp_path / "fleet.toml"
     file.write_text(FLEET.replace("URL", ros1))
-    said, heard = [], []
+    said, seen = [], []
     with shown(chromium, "run", str(file)) as page:
 
         def listen(link):
             link.on("framesent", lambda frame: said.append(frame))
-            link.on("framereceived", lambda frame: heard.append(frame))
+            link.on("framereceived", lambda frame: seen.append(frame))
 
         page.on("websocket", listen)
         page.reload()
@@ -70,11 +70,13 @@ def test_q_moves_the_robot_sideways_whose_base_can_and_no_other(
             raise AssertionError(f"{keys} moved nothing: {said[-3:]}")
 
         def asked(axis):
-            return any(one[axis] for one in told(said, "drive"))
+            return any(one[axis] for one in received(said, "drive"))
 
         def written(name):
             """What the gate wrote to a robot that is not zero."""
-            words = [one["sent"] for one in told(heard, "robot") if one["name"] == name]
+            words = [
+                one["sent"] for one in received(seen, "robot") if one["name"] == name
+            ]
             return [sent for sent in words if any(sent)]
 
         select("Omni")
@@ -93,7 +95,7 @@ def test_q_moves_the_robot_sideways_whose_base_can_and_no_other(
         expect(help_.get_by_text("Sideways to the left, right")).to_be_visible()
 
 
-def told(frames, op):
+def received(frames, op):
     """The messages of one kind among the frames of a page."""
     found = (json.loads(frame) for frame in frames if str(frame)[:1] == "{")
     return [one for one in found if one.get("op") == op]

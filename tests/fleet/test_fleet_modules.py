@@ -115,9 +115,9 @@ def test_what_comes_with_a_robot_to_maps_is_checked_before_any_map(
 ):
     args = '"OccupancyGrid", { bridge = "hall" }, "/c"'
     assert f"FILE:11: robots[0].modules[0].options.{options.split(' ')[0]}: " in (
-        told := refused(module("OnMaps", options, args=args))
+        received := refused(module("OnMaps", options, args=args))
     )
-    assert said in told
+    assert said in received
 
 
 def test_a_place_in_a_list_of_arguments_is_that_of_the_file(refused):

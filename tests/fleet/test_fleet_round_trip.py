@@ -74,9 +74,9 @@ def shown(robot):
     for module in robot.modules:
         if isinstance(module, OnMaps):
             (_, topic), options = module._arguments
-            told = {key: value for key, value in options.items() if key != "robot"}
-            told = {key: value for key, value in told.items() if value != ""}
-            listed.append((module.module, topic, str(sorted(told.items()))))
+            received = {key: value for key, value in options.items() if key != "robot"}
+            received = {key: value for key, value in received.items() if value != ""}
+            listed.append((module.module, topic, str(sorted(received.items()))))
         else:
             drawn = getattr(module, "svg", None)
             classes = [] if drawn is None else list(drawn.classes)

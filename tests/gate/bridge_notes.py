@@ -1,11 +1,11 @@
-"""What a robot's end of a rosbridge was told, as tests ask for it."""
+"""The messages that the robot's end of a rosbridge received, for tests."""
 
 from dataclasses import dataclass
 from typing import Any
 
 
 @dataclass
-class Told:
+class BridgeMessage:
     at: float
     """When, in seconds of the monotonic clock."""
 
@@ -22,11 +22,13 @@ class Told:
 
 
 class Noting:
-    """Has noted all that it was told, in ``told``."""
+    """Keeps all messages in ``received``."""
 
-    told: list[Told]
+    received: list[BridgeMessage]
 
     def of(self, op, topic=None):
         return [
-            t for t in self.told if t.op == op and (topic is None or t.topic == topic)
+            t
+            for t in self.received
+            if t.op == op and (topic is None or t.topic == topic)
         ]

@@ -6,7 +6,7 @@ import json
 import threading
 import time
 
-from bridge_notes import Noting, Told
+from bridge_notes import BridgeMessage, Noting
 from websockets.asyncio.server import serve
 from websockets.exceptions import ConnectionClosed
 
@@ -24,7 +24,7 @@ class FakeRobot(Noting):
     """
 
     def __init__(self, port=0, *, answers_services=True):
-        self.told = []
+        self.received = []
         self._port = port
         self.answers_services = answers_services
         self.sends_odometry = True
@@ -75,7 +75,7 @@ class FakeRobot(Noting):
         try:
             async for frame in socket:
                 message = json.loads(frame)
-                self.told.append(Told(time.monotonic(), link, message))
+                self.received.append(BridgeMessage(time.monotonic(), link, message))
                 await self._answer(socket, topics, message)
         except Exception:
             pass
@@ -152,10 +152,10 @@ class FakeRobot(Noting):
     def velocities(self):
         """What was published on ``/cmd_vel``: (time, forward speed)."""
         found = []
-        for told in self.of("publish", "/cmd_vel"):
-            message = told.message["msg"]
+        for seen in self.of("publish", "/cmd_vel"):
+            message = seen.message["msg"]
             twist = message.get("twist", message)
-            found.append((told.at, twist["linear"]["x"]))
+            found.append((seen.at, twist["linear"]["x"]))
         return found
 
     @property

@@ -11,7 +11,7 @@ import time
 import warnings
 from dataclasses import dataclass, field
 
-from bridge_notes import Noting, Told
+from bridge_notes import BridgeMessage, Noting
 
 from webmap.gate.lanes.lane import Lane
 from webmap.gate.lanes.sockets import SocketHandlers
@@ -54,11 +54,11 @@ class NotingBridge(Noting, WitnessBridge):
     """The witness's rosbridge, which also notes what it was told."""
 
     def __init__(self):
-        self.told = []
+        self.received = []
         super().__init__(self._note)
 
     def _note(self, link, message):
-        self.told.append(Told(time.monotonic(), link, message))
+        self.received.append(BridgeMessage(time.monotonic(), link, message))
 
     @property
     def url(self):

@@ -42,7 +42,7 @@ def die_after(lines: int) -> None:
 
 def keep(folder: Path, by: str | None, lines: int) -> tuple[bool, bool]:
     """Keep or end a STOP in a child; returns whether it was acknowledged, and lived."""
-    heard, said = os.pipe()
+    received, said = os.pipe()
     child = os.fork()
     if not child:
         die_after(lines)
@@ -52,8 +52,8 @@ def keep(folder: Path, by: str | None, lines: int) -> tuple[bool, bool]:
         os._exit(0)
     os.close(said)
     _, status = os.waitpid(child, 0)
-    acknowledged = os.read(heard, 8) == b"ack"
-    os.close(heard)
+    acknowledged = os.read(received, 8) == b"ack"
+    os.close(received)
     return acknowledged, os.WIFEXITED(status)
 
 

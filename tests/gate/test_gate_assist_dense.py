@@ -36,7 +36,7 @@ def dense(ranges, *, low=-math.pi, span=math.tau, **more):
     )
 
 
-def heard(sweep):
+def received(sweep):
     """What the gate makes of a scan that a bridge sends."""
     numbers = cbor2.CBORTag(85, array("f", sweep.ranges).tobytes())
     fields = ("angle_min", "angle_increment", "range_min", "range_max")
@@ -109,7 +109,7 @@ class TestFold:
 
     def test_a_scan_of_which_most_is_unknown_is_so_whatever_its_few_hits(self):
         ranges = [5.0 if ray % 10 == 0 else math.nan for ray in range(16_000)]
-        assert "unknown" in assist(SPEC, heard(dense(ranges)), AHEAD, 0.1).why
+        assert "unknown" in assist(SPEC, received(dense(ranges)), AHEAD, 0.1).why
 
     def test_what_is_behind_the_robot_s_own_body_is_seen(self):
         ranges = [0.15, 0.19, 0.25, 0.6] * 1000
@@ -131,7 +131,7 @@ class TestFold:
 
 class TestRefused:
     def test_a_scan_of_too_many_beams_is_none_and_the_robot_says_so(self):
-        sweep = heard(dense(array("f", [5.0]) * (LIMIT + 1)))
+        sweep = received(dense(array("f", [5.0]) * (LIMIT + 1)))
         assert len(sweep.ranges) == 0
         verdict = assist(SPEC, sweep, AHEAD, 0.1)
         assert verdict.scale == 0.0
@@ -143,7 +143,7 @@ class TestRefused:
         assert "more than" in folded(dense(array("f", [5.0]) * (LIMIT + 1))).refused
 
     def test_many_beams_that_go_round_and_round_are_no_scan(self):
-        sweep = heard(dense([5.0] * 16_000, span=3 * math.tau))
+        sweep = received(dense([5.0] * 16_000, span=3 * math.tau))
         assert assist(SPEC, sweep, AHEAD, 0.1).why == (
             "scan assist: the 16000 beams of the scan cover more than two turns"
         )
@@ -158,7 +158,7 @@ class TestVerdict:
                 toward = math.cos(-math.pi + ray * step)
                 ranges.append((0.3 + gap) / toward if toward > 0.1 else math.inf)
             sweep = dense(array("f", ranges))
-            through_the_lane = heard(sweep)
+            through_the_lane = received(sweep)
             assert len(through_the_lane.ranges) <= MOST
             found = assist(SPEC, through_the_lane, AHEAD, 0.1)
             assert found == assist(SPEC, folded(sweep), AHEAD, 0.1)
@@ -171,7 +171,7 @@ class TestVerdict:
             ranges = array("f", [math.inf]) * 16_000
             at = math.atan2(y, 0.8)
             ranges[round((at + math.pi) / math.tau * 16_000)] = math.hypot(0.8, y)
-            verdict = assist(SPEC, heard(dense(ranges)), AHEAD, 0.1)
+            verdict = assist(SPEC, received(dense(ranges)), AHEAD, 0.1)
             assert 0 < verdict.scale < 0.7, y
 
     @given(

@@ -48,11 +48,11 @@ def ranges_seen(bridge):
 
     with connect(bridge, max_size=None) as link:
         link.send(subscribe("/base_scan", "t").decode())
-        heard = None
-        while heard is None:
+        received = None
+        while received is None:
             frame = link.recv(timeout=10)
-            heard = parse_scan(frame if isinstance(frame, bytes) else b"", 0.0)
-    return [reach for reach in heard[1].ranges if math.isfinite(reach)]
+            received = parse_scan(frame if isinstance(frame, bytes) else b"", 0.0)
+    return [reach for reach in received[1].ranges if math.isfinite(reach)]
 
 
 @pytest.mark.serial  # turns for a set time; a program that is kept waiting loses it

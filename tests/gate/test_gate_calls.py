@@ -20,7 +20,7 @@ async def test_a_call_is_answered_on_a_socket_that_ends_with_it(caplog):
         made.call(request("b"), "b", "/e_stop")
         await made.settle()
         assert {t.message["id"] for t in bridge.of("call_service")} == {"a", "b"}
-        assert len({t.link for t in bridge.told}) == 2
+        assert len({t.link for t in bridge.received}) == 2
         await until(lambda: not bridge.links, "the end of both sockets")
         await made.settle()  # there is nothing to wait for
     assert caplog.records == []

@@ -20,9 +20,9 @@ JITTER = 0.15
 
 @pytest.fixture
 def reports(client):
-    heard = []
-    removal = client.on_report(heard.append)
-    yield heard
+    seen = []
+    removal = client.on_report(seen.append)
+    yield seen
     removal.remove()
 
 
@@ -52,13 +52,13 @@ class TestPages:
         page.drive_off(fake)
         page.x = 0.0
         eventually(lambda: page.robot()["state"] == "held", "standstill")
-        told = [t for t in fake.told if t.topic == "/cmd_vel"]
-        assert [t.op for t in told[:2]] == ["subscribe", "advertise"]
-        advertised = told[1].message
+        received = [t for t in fake.received if t.topic == "/cmd_vel"]
+        assert [t.op for t in received[:2]] == ["subscribe", "advertise"]
+        advertised = received[1].message
         assert (advertised["queue_size"], advertised["latch"]) == (1, False)
-        assert len({t.link for t in told}) == 1
-        velocity_link = told[0].link
-        others = {t.topic for t in fake.told if t.link == velocity_link}
+        assert len({t.link for t in received}) == 1
+        velocity_link = received[0].link
+        others = {t.topic for t in fake.received if t.link == velocity_link}
         assert others == {"/cmd_vel"}, "velocity shares its socket with nothing"
 
     @pytest.mark.serial
@@ -229,19 +229,19 @@ class TestGoals:
                     time.sleep(0.05)
                 return fake.of("publish", "/move_base/goal")
 
-            told = eventually(sent, "the goal")[0]
-            heard = {t.topic: t for t in fake.of("subscribe")}
-            assert heard["/move_base/result"].at < told.at, "no word is missed"
-            id = told.message["msg"]["goal_id"]["id"]
+            received = eventually(sent, "the goal")[0]
+            seen = {t.topic: t for t in fake.of("subscribe")}
+            assert seen["/move_base/result"].at < received.at, "no word is missed"
+            id = received.message["msg"]["goal_id"]["id"]
             status = {"goal_id": {"id": id}, "status": 1, "text": ""}
             word = {"op": "publish", "topic": "/move_base/status"}
-            fake.send(told.link, {**word, "msg": {"status_list": [status]}})
+            fake.send(received.link, {**word, "msg": {"status_list": [status]}})
             eventually(lambda: goal_of("under way"), "that it is under way")
             page.say(op="cancel", robot="r1")
             eventually(lambda: fake.of("publish", "/move_base/cancel"), "the cancel")
             end = {**word, "topic": "/move_base/result"}
             end["msg"] = {"status": {**status, "status": 2}, "result": {}}
-            fake.send(told.link, end)
+            fake.send(received.link, end)
             eventually(lambda: goal_of("cancelled"), "its end")
             eventually(
                 lambda: fake.of("unsubscribe", "/move_base/status"),
@@ -392,7 +392,7 @@ class TestLinks:
         self, page, fake
     ):
         page.drive_off(fake)
-        links = {t.link for t in fake.told}
+        links = {t.link for t in fake.received}
         fake.cut_all()
 
         def again():
@@ -541,10 +541,10 @@ class TestStopStands:
         page.x = 1.0
         page.say(op="take", robot="r1")
 
-        def told():
+        def received():
             return [r["why"] for r in page.of("refused") if r["what"] == "take"]
 
-        assert "reset it first" in eventually(told, "a refusal")[-1]
+        assert "reset it first" in eventually(received, "a refusal")[-1]
         eventually(lambda: first_zero_after(fake, at), "zeros that go on")
         page.say(op="reset", robot="r1")
         eventually(lambda: page.robot().get("armable"), "a robot to be had")
@@ -554,23 +554,23 @@ class TestStopStands:
 
     def test_it_is_there_again_for_another_display(self, client, robot_spec):
         client.declare(robot_spec)
-        heard = []
-        client.on_report(heard.append)
+        seen = []
+        client.on_report(seen.append)
         client.stop_robot(None)
 
         def latched():
-            return [r for r in of(heard, protocol.RobotReport) if r.latched]
+            return [r for r in of(seen, protocol.RobotReport) if r.latched]
 
         eventually(latched, "the word that STOP stands")
         client.stop()
-        heard.clear()
+        seen.clear()
         client.start()
         eventually(latched, "the STOP of before")
 
         def reset():
             # The new gate may be told the STOP once more, which makes it a newer one.
             client.reset("r1", latched()[-1].stop.id)
-            return not of(heard, protocol.RobotReport)[-1].latched
+            return not of(seen, protocol.RobotReport)[-1].latched
 
         eventually(reset, "the reset")
 

@@ -92,8 +92,8 @@ async def test_what_another_says_on_the_topic_is_told_and_proves_nothing(monkeyp
         noting.events.clear()
         foreign = {"linear": {"x": 3.0, "y": 0.0}, "angular": {"z": 0.0}}
         await bridge.publish("/cmd_vel", foreign)
-        told = [EchoReceived(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
-        await until(lambda: noting.events == told, "what was said, and only that")
+        received = [EchoReceived(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
+        await until(lambda: noting.events == received, "what was said, and only that")
 
 
 @in_loop
@@ -101,14 +101,16 @@ async def test_others_are_heard_before_anybody_listens_fifty_times_a_second_at_m
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
         await until(lambda: bridge.of("advertise"), "what it says at first")
-        first = [told for told in bridge.told if told.topic == "/cmd_vel"]
+        first = [
+            received for received in bridge.received if received.topic == "/cmd_vel"
+        ]
         # A bridge of ROS 2 chooses how it listens by who publishes, itself too.
-        assert [told.op for told in first] == ["subscribe", "advertise"]
+        assert [received.op for received in first] == ["subscribe", "advertise"]
         assert first[0].message["throttle_rate"] == ECHO
         foreign = {"linear": {"x": 3.0, "y": 0.0}, "angular": {"z": 0.0}}
         await bridge.publish("/cmd_vel", foreign)
-        told = [EchoReceived(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
-        await until(lambda: noting.of(EchoReceived) == told, "what was said")
+        received = [EchoReceived(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
+        await until(lambda: noting.of(EchoReceived) == received, "what was said")
         assert lane.lane.ping_period == IDLE_PING
         lane.listen("/cmd_vel")
         lane.ignore("/cmd_vel")
@@ -172,15 +174,15 @@ async def test_of_two_robots_on_a_topic_the_type_that_is_known_counts(stated_fir
         for type, assumed in both if stated_first else both[::-1]:
             lane.attach("/base", type, assumed)
         assert lane.write("/base", ZERO)
-        (told,) = await until(lambda: bridge.of("publish", "/base"), "the zero")
-        assert "twist" in told.message["msg"]
+        (received,) = await until(lambda: bridge.of("publish", "/base"), "the zero")
+        assert "twist" in received.message["msg"]
         lane.detach("/base", STAMPED, False)
         assert lane.write("/base", ZERO)
         await until(lambda: len(bridge.of("publish", "/base")) == 2, "the other zero")
         assert "linear" in bridge.of("publish", "/base")[1].message["msg"]
         said = [
             (t.op, t.message["type"] if t.op == "advertise" else "")
-            for t in bridge.told
+            for t in bridge.received
             if t.topic == "/base" and t.op in ("advertise", "unadvertise")
         ]
         alone = ("advertise", "geometry_msgs/Twist")

@@ -281,8 +281,8 @@ class TestFreshness:
     def test_hands_that_send_but_hear_nothing_are_stopped_like_silent_ones(
         self, driving
     ):
-        heard = driving.tick
-        driving.run(0.5, lambda: driving.drive(x=1.0, tick=heard))
+        seen = driving.tick
+        driving.run(0.5, lambda: driving.drive(x=1.0, tick=seen))
         zero = next(w for w in driving.since(self.at) if w.twist == ZERO)
         # 200 ms from the last command that told of a new tick, which is the first.
         assert zero.at - self.at <= 0.2 + 2 * 0.01 + 1e-9
@@ -698,8 +698,8 @@ class TestReports:
             bench.drive(x=1.0)
 
         bench.run(1.0, each)
-        told = bench.of(protocol.RobotReport)[before:]
-        assert 8 <= len(told) <= 11
+        received = bench.of(protocol.RobotReport)[before:]
+        assert 8 <= len(received) <= 11
         bench.run(0.2)
         assert bench.report().measured is None or bench.report().measured[0] == 0.19
 

@@ -120,11 +120,11 @@ def test_what_nests_too_deeply_on_the_pipe_is_logged_and_left_out(caplog):
 
 @in_loop
 async def test_a_link_that_brings_such_goes_on_and_says_so_once(caplog):
-    heard = Received()
+    received = Received()
 
     def hear(data):
         rosbridge.parse(data)
-        heard.texts.append(data)
+        received.texts.append(data)
 
     async def talk(link):
         deep = b'{"op":"x","a":' + b"[" * 1000
@@ -133,9 +133,9 @@ async def test_a_link_that_brings_such_goes_on_and_says_so_once(caplog):
         await link.reader.read()
 
     async with raw_bridge(talk) as url:
-        ears = SocketHandlers(hear, heard.pongs.append, heard.lost.append)
+        ears = SocketHandlers(hear, received.pongs.append, received.lost.append)
         link = await open_socket(url, ears, Budget())
-        await until(lambda: heard.texts == [b"{}"], "what came after it")
+        await until(lambda: received.texts == [b"{}"], "what came after it")
         await asyncio.sleep(0)
         assert link.is_open
         link.close()

@@ -19,17 +19,17 @@ def disk(tmp_path):
 
 
 def test_what_is_kept_is_told_in_order_and_recalled(disk, tmp_path):
-    told = []
+    received = []
 
     async def scenario():
-        disk.keep(SaveStop(KEY, 1, ANN, frozenset()), told.append)
-        disk.keep(SaveStopTest(KEY, 0.4), told.append)
-        assert told == []
+        disk.keep(SaveStop(KEY, 1, ANN, frozenset()), received.append)
+        disk.keep(SaveStopTest(KEY, 0.4), received.append)
+        assert received == []
         await disk.settle()
         await asyncio.sleep(0)
 
     asyncio.run(scenario())
-    latched, tested = told
+    latched, tested = received
     assert latched == StopSaved(KEY, 1, None)
     assert isinstance(tested, StopTestSaved)
     assert tested.record.seconds == 0.4
@@ -43,14 +43,14 @@ def test_with_nothing_under_way_it_is_settled_at_once(disk):
 
 
 def test_what_was_given_up_tells_nothing(disk):
-    told = []
+    received = []
 
     async def scenario():
-        disk.keep(SaveStop(KEY, 1, ANN, frozenset()), told.append)
+        disk.keep(SaveStop(KEY, 1, ANN, frozenset()), received.append)
         (work,) = disk._under_way
         work.cancel()
         await disk.settle()
         await asyncio.sleep(0)
 
     asyncio.run(scenario())
-    assert told == []
+    assert received == []

@@ -27,14 +27,14 @@ class FakeGateProcess:
 
     def __init__(self, hear, ended):
         self._hear, self._ended = hear, ended
-        self.told, self.killed, self.stopped = [], [], False
+        self.received, self.killed, self.stopped = [], [], False
         self.made.append(self)
 
     def start(self):
         pass
 
-    def send(self, *told):
-        self.told.extend(told)
+    def send(self, *received):
+        self.received.extend(received)
 
     def kill(self, why):
         self.killed.append(why)
@@ -50,7 +50,7 @@ class FakeGateProcess:
         self._ended(self)
 
     def of(self, type):
-        return [message for message in self.told if isinstance(message, type)]
+        return [message for message in self.received if isinstance(message, type)]
 
 
 @pytest.fixture
@@ -99,20 +99,22 @@ class TestQuickProgram:
 
     @pytest.fixture
     def road(self):
-        self.now, self.told = 100.0, []
-        road = ProgramCommands(self.told.append, threading.RLock(), lambda: self.now)
+        self.now, self.received = 100.0, []
+        road = ProgramCommands(
+            self.received.append, threading.RLock(), lambda: self.now
+        )
         road.on_tick(7)
         road.on_report(held())
         return road
 
     def speeds(self):
-        return [told.command.velocity[0] for told in self.told]
+        return [received.command.velocity[0] for received in self.received]
 
     def test_is_heard_every_10_ms(self, road):
         for _ in range(1000):
             road.twist("r1", Twist(0.2))
             self.now += 0.0001
-        assert len(self.told) == 10
+        assert len(self.received) == 10
 
     def test_gets_its_zero_through_at_once(self, road):
         for speed in (0.2, 0.3, 0.0, 0.0, 0.2, 0.0):
@@ -144,21 +146,21 @@ class TestProgram:
         gate.say(protocol.TakeReply(asked.request, "r1", 3, None))
         assert future.result(1) == 3
         client.twist("r1", Twist(0.5))
-        assert gate.told[-1] == protocol.FromProgram(
+        assert gate.received[-1] == protocol.FromProgram(
             commands.SetVelocity("r1", 3, 7, Twist(0.5).numbers)
         )
         client.move("r1", 1.0, 2.0, 0.5)
-        assert gate.told[-1] == protocol.FromProgram(
+        assert gate.received[-1] == protocol.FromProgram(
             commands.Goal("r1", 3, 0, 7, 1.0, 2.0, 0.5)
         )
         client.locate("r1", 1.0, 2.0, 0.5)
-        assert gate.told[-1] == protocol.FromProgram(
+        assert gate.received[-1] == protocol.FromProgram(
             commands.Locate("r1", 3, 0, 7, 1.0, 2.0, 0.5)
         )
         client.cancel("r1")
-        assert gate.told[-1] == protocol.FromProgram(commands.Cancel("r1"))
+        assert gate.received[-1] == protocol.FromProgram(commands.Cancel("r1"))
         client.release("r1")
-        assert gate.told[-1] == protocol.FromProgram(commands.Release("r1"))
+        assert gate.received[-1] == protocol.FromProgram(commands.Release("r1"))
         with pytest.raises(NoLease):
             client.twist("r1", Twist(0.5))
 
@@ -242,7 +244,7 @@ class TestPages:
         page.receive(b"x" * 5000)
         assert [len(m.text) for m in gate.of(protocol.FromPage)] == [14, 2048]
         page.set_speeds(0.5, 1.0)
-        assert gate.told[-1] == protocol.Speeds(page.id, 0.5, 1.0)
+        assert gate.received[-1] == protocol.Speeds(page.id, 0.5, 1.0)
         page.close()
         page.close()
         assert gate.of(protocol.Disconnect) == [protocol.Disconnect(page.id)]
@@ -332,12 +334,12 @@ class TestLife:
     ):
         client.stop_robot("r1")
         client.reset("r1", "s1")
-        assert gate.told[-1] == protocol.FromProgram(commands.Reset("r1", "s1"))
+        assert gate.received[-1] == protocol.FromProgram(commands.Reset("r1", "s1"))
         assert list(client._pending_stops) == [(None, "r1")]
 
     def test_the_nodes_of_other_programs_are_told(self, client, gate):
         client.name_writers("r1", ("/teleop",))
-        assert gate.told[-1] == protocol.WriterNodes("r1", ("/teleop",))
+        assert gate.received[-1] == protocol.WriterNodes("r1", ("/teleop",))
 
     def test_a_gate_that_says_nothing_is_killed(self, client, gate, monkeypatch):
         monkeypatch.setattr(supervisor, "HUNG", 2)

@@ -140,8 +140,8 @@ def test_everybody_who_looks_at_a_page_is_told_why_the_gate_does_not_start(broke
     runtime.start()
     try:
         runtime.call(runtime.watch, Viewer())
-        told = eventually(lambda: Viewer.notices, "a notice")
+        received = eventually(lambda: Viewer.notices, "a notice")
     finally:
         runtime.stop()
-    assert told[0].startswith("The gate does not start: ModuleNotFoundError: ")
-    assert "no robot can be driven" in told[0]
+    assert received[0].startswith("The gate does not start: ModuleNotFoundError: ")
+    assert "no robot can be driven" in received[0]

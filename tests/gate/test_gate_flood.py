@@ -73,14 +73,14 @@ FLOODS = {
 @pytest.mark.parametrize("name", FLOODS)
 @in_loop
 async def test_a_flood_is_held_to_its_budget_and_then_dropped(name):
-    heard = Received()
+    seen = Received()
     async with raw_bridge(flood(FLOODS[name])) as url:
-        link = await open_socket(url, heard.ears, Budget())
+        link = await open_socket(url, seen.ears, Budget())
         begun = time.monotonic()
-        await until(lambda: heard.lost, "the drop")
+        await until(lambda: seen.lost, "the drop")
         assert link.flooded
-        assert "the bridge sends too much" in heard.lost[0]
-        taken = len(heard.texts) + len(heard.pongs)
+        assert "the bridge sends too much" in seen.lost[0]
+        taken = len(seen.texts) + len(seen.pongs)
         most = 4000 * (1 + time.monotonic() - begun) + 100
         assert taken <= most
         await until(lambda: link._transport.is_closing(), "its end")
@@ -90,10 +90,10 @@ async def test_a_flood_is_held_to_its_budget_and_then_dropped(name):
 async def test_the_loop_goes_on_while_ten_links_are_flooded():
     from webmap.testing import Sentinel
 
-    heard = Received()
+    seen = Received()
     with Sentinel() as sentinel:
         async with raw_bridge(flood(FLOODS["tiny texts"])) as url:
-            links = [await open_socket(url, heard.ears, Budget()) for _ in range(10)]
+            links = [await open_socket(url, seen.ears, Budget()) for _ in range(10)]
             begun = time.monotonic()
             worst = await longest_wait(1.0)
             late = sentinel.worst(begun)
@@ -110,7 +110,7 @@ async def test_the_loop_goes_on_while_ten_links_are_flooded():
 async def test_a_message_of_frames_without_end_is_dropped_with_a_sentence(
     patient, piece
 ):
-    heard = Received()
+    seen = Received()
 
     async def talk(link):
         await link.accept(frame(TEXT, b"x", final=False))
@@ -120,30 +120,30 @@ async def test_a_message_of_frames_without_end_is_dropped_with_a_sentence(
             await asyncio.sleep(0)
 
     async with raw_bridge(talk) as url:
-        link = await open_socket(url, heard.ears, Budget())
-        await until(lambda: heard.lost, "the drop")
-    assert heard.lost == ["a message in more than 4096 frames"]
-    assert (heard.texts, link.flooded) == ([], True)
+        link = await open_socket(url, seen.ears, Budget())
+        await until(lambda: seen.lost, "the drop")
+    assert seen.lost == ["a message in more than 4096 frames"]
+    assert (seen.texts, link.flooded) == ([], True)
 
 
 @in_loop
 async def test_who_takes_no_answers_is_not_asked_for_more(patient):
-    heard = Received()
+    seen = Received()
     async with raw_bridge(flood(FLOODS["pings"], reads=False)) as url:
-        link = await open_socket(url, heard.ears, Budget())
+        link = await open_socket(url, seen.ears, Budget())
         sock = link._transport.get_extra_info("socket")
         sock.setsockopt(sockets.socket.SOL_SOCKET, sockets.socket.SO_SNDBUF, 4096)
         await until(lambda: link._choked, "a full buffer")
         await asyncio.sleep(0.3)
         assert link.unsent < 2 * sockets.MAX_WAITING
         assert link.is_behind
-        assert heard.lost == []
+        assert seen.lost == []
         link.abort("enough")
 
 
 @in_loop
 async def test_who_takes_the_answers_again_is_read_again():
-    heard, go_on = Received(), asyncio.Event()
+    seen, go_on = Received(), asyncio.Event()
 
     async def talk(link):
         await link.accept()
@@ -152,20 +152,20 @@ async def test_who_takes_the_answers_again_is_read_again():
         await link.reader.read()
 
     async with raw_bridge(talk) as url:
-        link = await open_socket(url, heard.ears, Budget())
+        link = await open_socket(url, seen.ears, Budget())
         link.pause_writing()  # as asyncio says that its buffer is full
         go_on.set()
         await until(lambda: link.is_behind, "a message")
         await asyncio.sleep(0.05)
-        assert heard.texts == []
+        assert seen.texts == []
         link.resume_writing()
-        await until(lambda: heard.texts == [b"meanwhile"], "the message")
+        await until(lambda: seen.texts == [b"meanwhile"], "the message")
         link.close()
 
 
 @in_loop
 async def test_bytes_one_by_one_are_a_message_all_the_same():
-    heard = Received()
+    seen = Received()
 
     async def talk(link):
         answer = await link.request()
@@ -176,8 +176,8 @@ async def test_bytes_one_by_one_are_a_message_all_the_same():
         await link.reader.read()
 
     async with raw_bridge(talk) as url:
-        link = await open_socket(url, heard.ears, Budget())
-        await until(lambda: heard.texts == [b"slowly" * 20], "the message")
+        link = await open_socket(url, seen.ears, Budget())
+        await until(lambda: seen.texts == [b"slowly" * 20], "the message")
         link.close()
 
 
@@ -199,26 +199,26 @@ async def test_headers_without_end_are_refused(header):
 
 @in_loop
 async def test_what_came_before_the_end_is_heard():
-    heard = Received()
+    seen = Received()
 
     async def talk(link):
         await link.accept(frame(TEXT, b"{}") * 2000)
         link.writer.close()
 
     async with raw_bridge(talk) as url:
-        await open_socket(url, heard.ears, Budget())
-        await until(lambda: heard.lost, "the end")
-    assert len(heard.texts) == 2000
+        await open_socket(url, seen.ears, Budget())
+        await until(lambda: seen.lost, "the end")
+    assert len(seen.texts) == 2000
 
 
 @in_loop
 async def test_what_nobody_can_deal_with_ends_the_link_with_a_sentence():
-    heard = Received()
+    seen = Received()
 
     def fail(data):
         raise RecursionError("maximum recursion depth exceeded")
 
-    ears = heard.ears
+    ears = seen.ears
     ears.text = fail
 
     async def talk(link):
@@ -227,9 +227,9 @@ async def test_what_nobody_can_deal_with_ends_the_link_with_a_sentence():
 
     async with raw_bridge(talk) as url:
         link = await open_socket(url, ears, Budget())
-        await until(lambda: heard.lost, "the drop")
+        await until(lambda: seen.lost, "the drop")
     assert link.flooded
-    assert heard.lost == [
+    assert seen.lost == [
         "invalid data from the bridge: "
         "RecursionError('maximum recursion depth exceeded')"
     ]
@@ -273,14 +273,14 @@ async def test_a_lane_that_is_cut_while_it_is_behind_counts_as_flooded(caplog):
 @in_loop
 async def test_zero_is_written_to_a_link_that_floods_as_long_as_it_is_open():
     """Reading from it ends; writing does not."""
-    heard, told = Received(), []
+    seen, received = Received(), []
 
     async def talk(link):
         await link.accept()
 
         async def note():
             while data := await link.reader.read(1 << 16):
-                told.append(data)
+                received.append(data)
 
         noting = asyncio.create_task(note())
         try:
@@ -292,25 +292,25 @@ async def test_zero_is_written_to_a_link_that_floods_as_long_as_it_is_open():
             noting.cancel()
 
     async with raw_bridge(talk) as url:
-        link = await open_socket(url, heard.ears, Budget())
+        link = await open_socket(url, seen.ears, Budget())
         await until(lambda: link.is_behind, "more than is taken")
-        told.clear()
+        received.clear()
         assert link.send(b"zero")
-        await until(lambda: told, "the zero")
+        await until(lambda: received, "the zero")
         link.abort("enough")
 
 
 @in_loop
 async def test_an_honest_link_beside_a_flood_is_heard_at_once():
-    flooded, heard = Received(), Received()
+    flooded, seen = Received(), Received()
     async with raw_bridge(flood(FLOODS["tiny texts"])) as url, noting_bridge() as good:
         bad = await open_socket(url, flooded.ears, Budget())
-        link = await open_socket(good.url, heard.ears, Budget())
+        link = await open_socket(good.url, seen.ears, Budget())
         waited = []
         for number in range(20):
             begun = time.monotonic()
             link.ping(number.to_bytes(8, "big"))
-            await until(lambda: len(heard.pongs) == number + 1, "the pong")  # noqa: B023
+            await until(lambda: len(seen.pongs) == number + 1, "the pong")  # noqa: B023
             waited.append(time.monotonic() - begun)
         assert sorted(waited)[10] < 0.1, waited
         bad.abort("enough")

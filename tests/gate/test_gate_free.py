@@ -84,9 +84,9 @@ def test_of_a_robot_that_somebody_has_the_gate_tells_alone(pages):
     connection, said = join(pages, 0.2, 0.2)
     pages.on_report(bench.report())
     assert cap_of(said) == (1.0, 1.5, ["limit of the robot"])
-    heard = len(said)
+    received = len(said)
     connection.set_speeds(0.1, 0.1)
-    assert len(said) == heard
+    assert len(said) == received
 
 
 def test_what_makes_no_sense_is_standstill():

@@ -42,11 +42,11 @@ async def test_what_is_held_is_said_whenever_the_lane_opens_and_taken_back_once(
             lane.hold("silent")
             await until(lambda: happened == ["up"], "the link")
             lane.hold("b", advertise("/b"))
-            await until(lambda: len(bridge.told) == 2, "both hellos")
+            await until(lambda: len(bridge.received) == 2, "both hellos")
             bridge.transport_of(1).abort()
             await until(lambda: happened == ["up", "down", "up"], "another link")
-            await until(lambda: len(bridge.told) == 4, "both hellos again")
-            assert [t.topic for t in bridge.told] == ["/a", "/b", "/a", "/b"]
+            await until(lambda: len(bridge.received) == 4, "both hellos again")
+            assert [t.topic for t in bridge.received] == ["/a", "/b", "/a", "/b"]
             lane.release_hold("a")
             lane.release_hold("b")
             lane.release_hold("silent")
@@ -54,7 +54,7 @@ async def test_what_is_held_is_said_whenever_the_lane_opens_and_taken_back_once(
             lane.release_hold("a")
             assert not lane.wanted
             await until(lambda: bridge.of("unadvertise", "/a"), "the goodbye")
-            assert len(bridge.told) == 5
+            assert len(bridge.received) == 5
 
 
 @in_loop
@@ -231,7 +231,7 @@ async def test_a_socket_that_is_handed_over_goes_on_and_the_lane_has_another():
             )
             assert happened == ["up", "down"]
             await until(lambda: happened == ["up", "down", "up"], "another")
-            await until(lambda: bridge.told, "the subscription")
+            await until(lambda: bridge.received, "the subscription")
             await bridge.publish("/t", {"data": 1})
             await until(lambda: texts, "what the first one is told")
             assert link.is_open

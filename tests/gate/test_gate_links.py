@@ -80,8 +80,8 @@ async def test_a_stamped_velocity_names_the_frame_of_the_newest_robot():
         await noting.up("control", "tasks")
         noting.do(actions.WriteTwist(key, ZERO, None, None))
         await until(lambda: bridge.of("publish", "/cmd_vel"), "the zero")
-        [told] = bridge.of("publish", "/cmd_vel")
-        assert told.message["msg"]["header"]["frame_id"] == "bob/base_link"
+        [received] = bridge.of("publish", "/cmd_vel")
+        assert received.message["msg"]["header"]["frame_id"] == "bob/base_link"
 
 
 @in_loop
@@ -110,8 +110,8 @@ async def test_a_velocity_that_was_decided_before_a_pause_is_dropped_and_no_zero
         zero = actions.WriteTwist(key, ZERO, 7, "a", now() - 0.001)
         assert noting.do(zero) == TwistWritten(key, ZERO, 7, "a", True)
         await until(lambda: bridge.of("publish", "/cmd_vel"), "the zero")
-        [told] = bridge.of("publish", "/cmd_vel")
-        assert told.message["msg"]["linear"]["x"] == 0.0
+        [received] = bridge.of("publish", "/cmd_vel")
+        assert received.message["msg"]["linear"]["x"] == 0.0
 
 
 @in_loop
@@ -294,8 +294,10 @@ async def test_in_the_end_zero_goes_to_all_that_may_be_driven_and_to_nothing_els
             noting.do(actions.Watch(still, True))
             noting.links.zero_all()
             await until(lambda: bridge.of("publish"), "the zero")
-            told = [(t.topic, t.message["msg"]["linear"]) for t in bridge.of("publish")]
-            assert told == [("/cmd_vel", {"x": 0.0, "y": 0.0, "z": 0.0})]
+            received = [
+                (t.topic, t.message["msg"]["linear"]) for t in bridge.of("publish")
+            ]
+            assert received == [("/cmd_vel", {"x": 0.0, "y": 0.0, "z": 0.0})]
             assert other.of("publish") == []
             noting.do(actions.Detach(still, "r1"))
 

@@ -238,8 +238,11 @@ class TestTypes:
         bench = Bench().begin(spec(), spec(id="r2"))
         for robot in ("r1", "r2"):
             bench.tell(spec(id=robot, twist_type=self.STAMPED))
-            told = bench.did(actions.Attach)[-1].spec
-            assert (told.twist_type, told.twist_type_assumed) == (self.STAMPED, False)
+            received = bench.did(actions.Attach)[-1].spec
+            assert (received.twist_type, received.twist_type_assumed) == (
+                self.STAMPED,
+                False,
+            )
 
     def test_who_drives_goes_on_when_the_assumed_type_proves_true(self):
         bench = Bench().begin(spec(twist_type_assumed=True))

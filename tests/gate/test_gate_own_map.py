@@ -40,16 +40,16 @@ def test_a_goal_of_a_robot_on_the_common_map_stays_as_it_is():
 
 @given(LENGTH, LENGTH, ANGLE, LENGTH, LENGTH, ANGLE)
 def test_its_own_map_laid_on_the_common_one_gives_the_goal_again(x, y, a, gx, gy, yaw):
-    told = in_own_map(robot(own_map=(x, y, a)), goal(gx, gy, yaw))
-    back = Pose(x, y, a) @ Pose(told.x, told.y, told.yaw)
+    received = in_own_map(robot(own_map=(x, y, a)), goal(gx, gy, yaw))
+    back = Pose(x, y, a) @ Pose(received.x, received.y, received.yaw)
     assert (back.x, back.y) == pytest.approx((gx, gy), abs=1e-6)
     assert math.cos(back.yaw - yaw) == pytest.approx(1.0)
 
 
 def test_a_pose_that_it_is_told_to_be_at_is_in_its_own_map_too():
     at = SendPose(KEY, "r1", 10.0, 3.0, QUARTER, "c1")
-    told = in_own_map(robot(own_map=(10.0, 0.0, QUARTER)), at)
-    assert (told.x, told.y, told.yaw) == pytest.approx((3.0, 0.0, 0.0))
+    received = in_own_map(robot(own_map=(10.0, 0.0, QUARTER)), at)
+    assert (received.x, received.y, received.yaw) == pytest.approx((3.0, 0.0, 0.0))
 
 
 def test_a_map_that_lies_nowhere_is_refused():
@@ -65,14 +65,16 @@ def test_a_page_s_goal_reaches_the_robot_in_its_own_map(client, fake, robot_spec
     page = Page(client)
     page.take()
 
-    def told(topic, op):
+    def received(topic, op):
         if not fake.of("publish", topic):
             page.goal(op=op)  # at 1, 2 on the common map, looking along its x
             time.sleep(0.05)
         return fake.of("publish", topic)
 
     for topic, op in (("/initialpose", "locate"), ("/goal", "goal")):
-        message = eventually(lambda t=topic, o=op: told(t, o), f"the {op}")[0].message
+        message = eventually(lambda t=topic, o=op: received(t, o), f"the {op}")[
+            0
+        ].message
         pose = message["msg"]["pose"]
         pose = pose.get("pose", pose)
         place, turn = pose["position"], pose["orientation"]

@@ -26,7 +26,7 @@ def shut(end):
     os.close(nothing)
 
 
-def heard(read):
+def received(read):
     return Unpacker(FromGate).feed(os.read(read, 1 << 16))
 
 
@@ -36,7 +36,7 @@ class TestOutbox:
         for number in range(3):
             box.put(Ready(number))
         box.close(5.0)
-        assert heard(pipe[0]) == [Ready(0), Ready(1), Ready(2)]
+        assert received(pipe[0]) == [Ready(0), Ready(1), Ready(2)]
 
     def test_what_newer_messages_replace_is_dropped_first(self, pipe, monkeypatch):
         monkeypatch.setattr(pipe_module, "FULL", -1)
@@ -44,7 +44,7 @@ class TestOutbox:
         box.put(Tick(1, {}))
         box.put(Ready(1))
         box.close(5.0)
-        assert heard(pipe[0]) == [Ready(1)]
+        assert received(pipe[0]) == [Ready(1)]
 
     def test_in_the_end_everything_is_dropped(self, pipe, monkeypatch):
         monkeypatch.setattr(pipe_module, "OVERFULL", -1)

@@ -62,10 +62,10 @@ def test_a_gate_that_can_hear_no_longer_is_told_to_end():
 
     class Loop:
         def __init__(self):
-            self.told = []
+            self.received = []
 
         def call_soon_threadsafe(self, tell, event):
-            self.told.append(event)
+            self.received.append(event)
             if isinstance(event, Heartbeat):
                 raise LookupError(event)
 
@@ -77,7 +77,7 @@ def test_a_gate_that_can_hear_no_longer_is_told_to_end():
     loop = Loop()
     with pytest.raises(LookupError):
         process._read(out, loop, Shell())
-    assert isinstance(loop.told[-1], Shutdown)
+    assert isinstance(loop.received[-1], Shutdown)
     os.close(out)
     os.close(into)
 

@@ -28,32 +28,34 @@ def garbage(gate, texts, at):
 
 
 def test_nine_bad_messages_in_an_instant_are_nine(gate):
-    told = garbage(gate, ['{"op":"drive"}'] * 9, 1.0)
-    told += counts(gate.step(1.01)) + counts(gate.step(1.5)) + counts(gate.step(2.1))
-    assert sum(count.count for count in told) == 9
-    assert {count.by for count in told} == {"Ann"}
-    assert told[-1].last.startswith("command: ")
+    received = garbage(gate, ['{"op":"drive"}'] * 9, 1.0)
+    received += (
+        counts(gate.step(1.01)) + counts(gate.step(1.5)) + counts(gate.step(2.1))
+    )
+    assert sum(count.count for count in received) == 9
+    assert {count.by for count in received} == {"Ann"}
+    assert received[-1].last.startswith("command: ")
 
 
 def test_somebody_who_sends_much_is_told_of_once_a_second(gate):
-    told = []
+    received = []
     for tick in range(200):
         now = 1.0 + tick / 100
-        told += garbage(gate, ["x"], now) if tick % 10 == 0 else []
-        told += counts(gate.step(now))
-    assert sum(count.count for count in told) >= 11
-    assert len(told) <= 3
+        received += garbage(gate, ["x"], now) if tick % 10 == 0 else []
+        received += counts(gate.step(now))
+    assert sum(count.count for count in received) >= 11
+    assert len(received) <= 3
 
 
 def test_what_was_not_told_yet_is_told_when_the_page_goes(gate):
-    told = garbage(gate, ["x"], 1.0) + counts(gate.step(1.0))
-    told += garbage(gate, ["y", "z"], 1.1)
-    told += counts(gate.handle(Disconnect("c1"), 1.2))
-    assert [count.count for count in told] == [1, 2]
+    received = garbage(gate, ["x"], 1.0) + counts(gate.step(1.0))
+    received += garbage(gate, ["y", "z"], 1.1)
+    received += counts(gate.handle(Disconnect("c1"), 1.2))
+    assert [count.count for count in received] == [1, 2]
     assert counts(gate.handle(Disconnect("c1"), 1.3)) == []
 
 
 def test_a_refused_wish_counts_too(gate):
     text = '{"op":"take","robot":"nobody"}'
-    told = garbage(gate, [text], 1.0) + counts(gate.step(1.0))
-    assert [count.last for count in told] == ["take: there is no robot 'nobody'"]
+    received = garbage(gate, [text], 1.0) + counts(gate.step(1.0))
+    assert [count.last for count in received] == ["take: there is no robot 'nobody'"]

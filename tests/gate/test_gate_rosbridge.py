@@ -81,24 +81,28 @@ def test_a_plain_velocity_has_no_header():
 
 
 def test_a_goal_goes_to_a_topic():
-    told = goal_by("topic", goal_frame="odom")
-    assert (told["op"], told["topic"]) == ("publish", "/goal")
-    assert told["msg"]["header"]["frame_id"] == "odom"
-    assert told["msg"]["pose"]["position"] == {"x": 1.0, "y": 2.0, "z": 0.0}
-    assert told["msg"]["pose"]["orientation"]["z"] == pytest.approx(1.0)
+    received = goal_by("topic", goal_frame="odom")
+    assert (received["op"], received["topic"]) == ("publish", "/goal")
+    assert received["msg"]["header"]["frame_id"] == "odom"
+    assert received["msg"]["pose"]["position"] == {"x": 1.0, "y": 2.0, "z": 0.0}
+    assert received["msg"]["pose"]["orientation"]["z"] == pytest.approx(1.0)
 
 
 def test_a_goal_goes_to_move_base():
-    told = goal_by("move_base", action="/move_base")
-    assert told["topic"] == "/move_base/goal"
-    assert told["msg"]["goal_id"]["id"] == "g1"
-    assert told["msg"]["goal"]["target_pose"]["header"]["frame_id"] == "map"
+    received = goal_by("move_base", action="/move_base")
+    assert received["topic"] == "/move_base/goal"
+    assert received["msg"]["goal_id"]["id"] == "g1"
+    assert received["msg"]["goal"]["target_pose"]["header"]["frame_id"] == "map"
 
 
 def test_a_goal_goes_to_an_action():
-    told = goal_by("navigate_to_pose", action="/go")
-    assert (told["op"], told["id"], told["action"]) == ("send_action_goal", "g1", "/go")
-    assert told["args"]["pose"]["header"]["stamp"] == {"sec": 0, "nanosec": 0}
+    received = goal_by("navigate_to_pose", action="/go")
+    assert (received["op"], received["id"], received["action"]) == (
+        "send_action_goal",
+        "g1",
+        "/go",
+    )
+    assert received["args"]["pose"]["header"]["stamp"] == {"sec": 0, "nanosec": 0}
 
 
 def test_everything_else_is_said():
@@ -149,8 +153,8 @@ def test_no_velocity_is_found_in_what_has_none(message):
 
 
 def test_a_bare_nan_is_read_and_is_no_velocity():
-    heard = rosbridge.parse(frame({"linear": {"x": math.nan}, "angular": {"z": 0.0}}))
-    assert (heard.topic, heard.twist) == ("/odom", None)
+    seen = rosbridge.parse(frame({"linear": {"x": math.nan}, "angular": {"z": 0.0}}))
+    assert (seen.topic, seen.twist) == ("/odom", None)
 
 
 @pytest.mark.parametrize(

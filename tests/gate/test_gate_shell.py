@@ -248,9 +248,9 @@ async def test_a_link_that_stalls_is_cut_and_on_the_next_zero_goes_first(tmp_pat
             bridge.transport_of(link).resume_reading()
 
         def on_the_next():
-            told = bridge.of("publish", "/cmd_vel")
+            received = bridge.of("publish", "/cmd_vel")
             return [
-                t.message["msg"]["linear"]["x"] for t in told if t.link not in links
+                t.message["msg"]["linear"]["x"] for t in received if t.link not in links
             ]
 
         await until(on_the_next, "a velocity on another link")

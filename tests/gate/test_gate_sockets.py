@@ -28,8 +28,8 @@ from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import Socket, open_socket
 
 
-async def opened(url, heard):
-    return await open_socket(url, heard.ears, Budget())
+async def opened(url, seen):
+    return await open_socket(url, seen.ears, Budget())
 
 
 async def forever(link):
@@ -41,23 +41,23 @@ async def forever(link):
 class TestOpen:
     @in_loop
     async def test_what_is_sent_arrives_and_the_answer_is_heard(self):
-        heard = Received()
+        seen = Received()
         async with noting_bridge() as bridge:
-            link = await opened(bridge.url, heard)
+            link = await opened(bridge.url, seen)
             assert link.is_open
             link.send(b'{"op": "call_service", "id": "7", "service": "/s"}')
-            await until(lambda: heard.texts, "the answer")
-            assert b'"id": "7"' in heard.texts[0]
+            await until(lambda: seen.texts, "the answer")
+            assert b'"id": "7"' in seen.texts[0]
             link.ping(b"12345678")
-            await until(lambda: heard.pongs == [b"12345678"], "the pong")
+            await until(lambda: seen.pongs == [b"12345678"], "the pong")
             link.close()
             await until(lambda: not bridge.links, "its end")
         assert not link.is_open
-        assert heard.lost == [], "what is closed on purpose is not lost"
+        assert seen.lost == [], "what is closed on purpose is not lost"
 
     @in_loop
     async def test_a_message_in_pieces_is_heard_once_and_whole(self):
-        heard = Received()
+        seen = Received()
 
         async def talk(link):
             await link.accept()
@@ -67,15 +67,15 @@ class TestOpen:
             await forever(link)
 
         async with raw_bridge(talk) as url:
-            link = await opened(url, heard)
-            await until(lambda: len(heard.texts) == 2, "both messages")
-            assert heard.texts == [b"one", b"two"]
-            assert heard.pongs == [b"between"]
+            link = await opened(url, seen)
+            await until(lambda: len(seen.texts) == 2, "both messages")
+            assert seen.texts == [b"one", b"two"]
+            assert seen.pongs == [b"between"]
             link.close()
 
     @in_loop
     async def test_a_ping_of_the_bridge_is_answered_and_heard_by_nobody(self):
-        heard, answers = Received(), []
+        seen, answers = Received(), []
 
         async def talk(link):
             await link.accept(frame(PING, b"there?"))
@@ -83,10 +83,10 @@ class TestOpen:
             await forever(link)
 
         async with raw_bridge(talk) as url:
-            link = await opened(url, heard)
+            link = await opened(url, seen)
             await until(lambda: answers, "the pong")
             assert answers[0][0] == 0x80 | PONG
-            assert (heard.texts, heard.pongs) == ([], [])
+            assert (seen.texts, seen.pongs) == ([], [])
             link.close()
 
     @in_loop
@@ -131,10 +131,10 @@ class TestOpen:
                 with pytest.raises(BridgeClosed, match="certificate"):
                     await opened(url, Received())
                 monkeypatch.setenv("SSL_CERT_FILE", cert)
-                heard = Received()
-                link = await opened(url, heard)
+                seen = Received()
+                link = await opened(url, seen)
                 link.send(b"hello")
-                await until(lambda: heard.lost, "the end of it")
+                await until(lambda: seen.lost, "the end of it")
                 assert not link.is_open
 
         in_loop(story)()
@@ -159,7 +159,7 @@ class TestRefused:
     )
     @in_loop
     async def test_what_speaks_no_websocket_is_refused_with_the_reason(self, answer):
-        heard = Received()
+        seen = Received()
 
         async def talk(link):
             await link.request()
@@ -168,12 +168,12 @@ class TestRefused:
 
         async with raw_bridge(talk) as url:
             with pytest.raises(BridgeClosed, match="no WebSocket at this address"):
-                await opened(url, heard)
-        assert heard.lost == [], "what was never open cannot be lost"
+                await opened(url, seen)
+        assert seen.lost == [], "what was never open cannot be lost"
 
     @in_loop
     async def test_a_bridge_that_hangs_up_before_the_handshake_is_refused(self):
-        heard = Received()
+        seen = Received()
 
         async def talk(link):
             await link.request()
@@ -181,15 +181,15 @@ class TestRefused:
 
         async with raw_bridge(talk) as url:
             with pytest.raises(BridgeClosed):
-                await opened(url, heard)
-        assert heard.lost == []
+                await opened(url, seen)
+        assert seen.lost == []
 
     @in_loop
     async def test_a_bridge_that_says_nothing_is_given_up_and_was_never_lost(
         self, monkeypatch
     ):
         monkeypatch.setattr(sockets, "CONNECT_TIMEOUT", 0.1)
-        heard, ended = Received(), []
+        seen, ended = Received(), []
 
         async def talk(link):
             await link.request()
@@ -200,13 +200,13 @@ class TestRefused:
 
         async with raw_bridge(talk) as url:
             with pytest.raises(BridgeClosed, match=r"no answer within 0\.1 s"):
-                await opened(url, heard)
+                await opened(url, seen)
             await until(lambda: ended == ["reset"], "the end of the attempt")
-        assert heard.lost == []
+        assert seen.lost == []
 
     @in_loop
     async def test_an_attempt_that_is_no_longer_wanted_leaves_nothing_behind(self):
-        heard, asked, ended = Received(), asyncio.Event(), []
+        seen, asked, ended = Received(), asyncio.Event(), []
 
         async def talk(link):
             await link.request()
@@ -217,29 +217,29 @@ class TestRefused:
                 ended.append("reset")
 
         async with raw_bridge(talk) as url:
-            attempt = asyncio.create_task(opened(url, heard))
+            attempt = asyncio.create_task(opened(url, seen))
             await asked.wait()
             attempt.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await attempt
             await until(lambda: ended == ["reset"], "the end of the attempt")
-        assert heard.lost == []
+        assert seen.lost == []
 
     @in_loop
     async def test_a_socket_that_never_connected_is_closed_without_a_word(self):
-        heard = Received()
-        link = Socket("ws://127.0.0.1:1", heard.ears, Budget())
+        seen = Received()
+        link = Socket("ws://127.0.0.1:1", seen.ears, Budget())
         assert link.unsent == 0
         link.close()
         assert not link.is_open
         link.connection_lost(None)
-        assert heard.lost == []
+        assert seen.lost == []
 
 
 class TestEnd:
     @in_loop
     async def test_of_a_socket_that_is_cut_what_was_not_sent_never_arrives(self):
-        heard, arrived, go_on = Received(), [], asyncio.Event()
+        seen, arrived, go_on = Received(), [], asyncio.Event()
 
         async def talk(link):
             await link.accept()
@@ -253,22 +253,22 @@ class TestEnd:
                 arrived.append("reset")
 
         async with raw_bridge(talk) as url:
-            link = await opened(url, heard)
+            link = await opened(url, seen)
             sent = 0
             while not link.unsent:
                 link.send(b"x" * (1 << 20))
                 sent += 1 << 20
             link.abort("no longer used")
-            assert heard.lost == ["no longer used"]
+            assert seen.lost == ["no longer used"]
             go_on.set()
             await until(lambda: "reset" in arrived, "the reset")
             assert sum(arrived[:-1]) < sent
             link.abort("again")
-        assert heard.lost == ["no longer used"], "it is lost once"
+        assert seen.lost == ["no longer used"], "it is lost once"
 
     @in_loop
     async def test_a_goodbye_is_said_and_what_comes_after_it_is_heard_by_nobody(self):
-        heard, goodbyes, go_on = Received(), [], asyncio.Event()
+        seen, goodbyes, go_on = Received(), [], asyncio.Event()
 
         async def talk(link):
             await link.accept()
@@ -276,18 +276,18 @@ class TestEnd:
             await go_on.wait()
 
         async with raw_bridge(talk) as url:
-            link = await opened(url, heard)
+            link = await opened(url, seen)
             link.close()
             link.data_received(frame(TEXT, b"late"))
             await until(lambda: goodbyes, "the goodbye")
             assert goodbyes[0][0] == 0x80 | CLOSE
             go_on.set()
             link.close()  # again, which is nothing
-        assert (heard.texts, heard.lost) == ([], [])
+        assert (seen.texts, seen.lost) == ([], [])
 
     @in_loop
     async def test_a_bridge_that_says_goodbye_is_lost(self):
-        heard = Received()
+        seen = Received()
 
         async def talk(link):
             await link.accept()
@@ -295,13 +295,13 @@ class TestEnd:
             await forever(link)
 
         async with raw_bridge(talk) as url:
-            await opened(url, heard)
-            await until(lambda: heard.lost, "the loss")
-            assert heard.lost == ["the bridge closed the connection"]
+            await opened(url, seen)
+            await until(lambda: seen.lost, "the loss")
+            assert seen.lost == ["the bridge closed the connection"]
 
     @in_loop
     async def test_a_bridge_that_only_stops_sending_is_lost(self):
-        heard = Received()
+        seen = Received()
 
         async def talk(link):
             await link.accept()
@@ -309,28 +309,26 @@ class TestEnd:
             await forever(link)
 
         async with raw_bridge(talk) as url:
-            await opened(url, heard)
-            await until(
-                lambda: heard.lost == ["the bridge closed the connection"], "it"
-            )
+            await opened(url, seen)
+            await until(lambda: seen.lost == ["the bridge closed the connection"], "it")
 
     @in_loop
     async def test_a_bridge_that_dies_is_lost_with_the_reason_of_the_system(self):
-        heard = Received()
+        seen = Received()
         async with noting_bridge() as bridge:
-            link = await opened(bridge.url, heard)
+            link = await opened(bridge.url, seen)
             link.send(b'{"op": "x"}')
-            await until(lambda: bridge.told, "the first word")
+            await until(lambda: bridge.received, "the first word")
             raw = bridge.transport_of(1).get_extra_info("socket")
             raw.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, sockets._LINGER)
             bridge.transport_of(1).abort()
-            await until(lambda: heard.lost, "the loss")
-            assert "reset" in heard.lost[0]
+            await until(lambda: seen.lost, "the loss")
+            assert "reset" in seen.lost[0]
 
     @in_loop
     async def test_a_message_that_is_too_long_ends_the_link(self, monkeypatch):
         monkeypatch.setattr(sockets, "MAX_FRAME", 100)
-        heard = Received()
+        seen = Received()
 
         async def talk(link):
             await link.accept()
@@ -338,6 +336,6 @@ class TestEnd:
             await forever(link)
 
         async with raw_bridge(talk) as url:
-            link = await opened(url, heard)
-            await until(lambda: heard.lost, "the loss")
-            assert (heard.texts, link.is_open) == ([], False)
+            link = await opened(url, seen)
+            await until(lambda: seen.lost, "the loss")
+            assert (seen.texts, link.is_open) == ([], False)

@@ -436,8 +436,8 @@ class TestConfirmation:
         assert seen.report().stop.confirmed is True
         seen.break_links()
         seen.run(0.2)
-        told = seen.report().stop
-        assert (told.confirmed, told.why) == (
+        received = seen.report().stop
+        assert (received.confirmed, received.why) == (
             False,
             f"it stopped, but since then: no connection to {URL}",
         )
@@ -513,10 +513,10 @@ class TestConfirmation:
         watch_it(seen, 0.1, 0.0)
         assert seen.report().stop.confirmed is None
 
-    @pytest.mark.parametrize("told", [[], [None]])
-    def test_odometry_that_does_not_come_confirms_nothing(self, seen, told):
+    @pytest.mark.parametrize("received", [[], [None]])
+    def test_odometry_that_does_not_come_confirms_nothing(self, seen, received):
         stop(seen)
-        for twist in told:
+        for twist in received:
             seen.tell(events.OdometryReceived(KEY, twist))
         seen.run(2.2)
         assert verdict(seen) == ("B", False, "no odometry")

@@ -169,7 +169,7 @@ class TestActionGoals:
             await noting.calls.settle()
             await until(lambda: bridge.of("call_service"), "the cancel")
             await until(lambda: len(bridge.of("send_action_goal")) == 2, "both")
-            assert len({t.link for t in bridge.told}) == 3
+            assert len({t.link for t in bridge.received}) == 3
             assert noting.of(GoalLost) == [], "a socket that was spent is not lost"
             assert all(down.spent for down in noting.of(LinkDown))
             bridge.unblock()
@@ -192,8 +192,8 @@ class TestActionGoals:
             await bridge.send(sent.link, result)
             await until(lambda: noting.of(GoalEnded), "its end")
             assert noting.of(GoalEnded) == [GoalEnded("r1", "g1", "reached")]
-            told = [word.left for word in noting.of(GoalProgress)]
-            assert told == [2.0], "thinned out"
+            received = [word.left for word in noting.of(GoalProgress)]
+            assert received == [2.0], "thinned out"
             await until(lambda: sent.link not in bridge.links, "the end of its socket")
             assert noting.of(GoalLost) == []
 
@@ -263,7 +263,7 @@ class TestMoveBase:
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             assert noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
             await until(lambda: bridge.of("publish", "/move_base/goal"), "the goal")
-            assert [t.op for t in bridge.told] == ["subscribe"] * 3 + ["publish"]
+            assert [t.op for t in bridge.received] == ["subscribe"] * 3 + ["publish"]
             await bridge.send(1, "rubbish")
             await bridge.send(1, self.word("status"))
             await until(lambda: noting.of(GoalProgress), "that it is under way")
@@ -279,7 +279,7 @@ class TestMoveBase:
             noting.tasks.lane.cut("no longer used")
             assert not noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
             await noting.up(2)
-            assert bridge.told == []
+            assert bridge.received == []
             assert noting.of(GoalLost) == []
 
     @in_loop

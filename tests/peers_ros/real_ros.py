@@ -142,8 +142,10 @@ class Ros:
 
     def twists(self):
         """Each velocity that reached the robot, in order."""
-        told = [json.loads(line) for line in list(self.graph.lines) if "twist" in line]
-        return [Twist(*each["twist"], each["at"], each["pose"]) for each in told]
+        received = [
+            json.loads(line) for line in list(self.graph.lines) if "twist" in line
+        ]
+        return [Twist(*each["twist"], each["at"], each["pose"]) for each in received]
 
     def end(self):
         for program in (self.bridge, self.graph):

@@ -16,29 +16,31 @@ from webmap.ros.bridge import BridgeStats
 
 
 @pytest.fixture
-def heard():
+def received():
     """A robot that was heard at 100 s."""
-    heard = Silence()
-    heard.record(100.0)
-    return heard
+    received = Silence()
+    received.record(100.0)
+    return received
 
 
-def test_a_silence_is_said_once_when_it_has_lasted(heard):
-    assert heard.look(100.0 + LIMIT - 0.1, linked=True) is None
-    assert heard.look(100.0 + LIMIT, linked=True) == LIMIT
+def test_a_silence_is_said_once_when_it_has_lasted(received):
+    assert received.look(100.0 + LIMIT - 0.1, linked=True) is None
+    assert received.look(100.0 + LIMIT, linked=True) == LIMIT
 
 
-def test_the_pose_after_a_silence_that_was_said_tells_how_long_it_was(heard):
-    assert heard.record(102.0) is None
-    heard.look(106.0, linked=True)
-    assert heard.record(114.0) == 12.0
-    assert heard.record(115.0) is None
+def test_the_pose_after_a_silence_that_was_said_tells_how_long_it_was(received):
+    assert received.record(102.0) is None
+    received.look(106.0, linked=True)
+    assert received.record(114.0) == 12.0
+    assert received.record(115.0) is None
 
 
-def test_while_the_link_is_away_nothing_is_said_and_then_poses_have_time_to_come(heard):
-    assert heard.look(110.0, linked=False) is None
-    assert heard.look(112.0, linked=True) is None
-    assert heard.look(113.0, linked=True) == 13.0
+def test_while_the_link_is_away_nothing_is_said_and_then_poses_have_time_to_come(
+    received,
+):
+    assert received.look(110.0, linked=False) is None
+    assert received.look(112.0, linked=True) is None
+    assert received.look(113.0, linked=True) == 13.0
 
 
 def test_a_robot_that_flickers_is_said_once_a_minute_at_most():
@@ -52,18 +54,18 @@ def test_a_robot_that_flickers_is_said_once_a_minute_at_most():
     assert again == [start + 5 for start in said]
 
 
-def test_a_silence_that_lasts_is_said_also_soon_after_another(heard):
-    heard.look(103.0, linked=True)
-    heard.record(104.0)
-    assert heard.look(110.0, linked=True) is None
-    assert heard.due == 103.0 + AGAIN
-    assert heard.look(103.0 + AGAIN, linked=True) == AGAIN - 1.0
+def test_a_silence_that_lasts_is_said_also_soon_after_another(received):
+    received.look(103.0, linked=True)
+    received.record(104.0)
+    assert received.look(110.0, linked=True) is None
+    assert received.due == 103.0 + AGAIN
+    assert received.look(103.0 + AGAIN, linked=True) == AGAIN - 1.0
 
 
-def test_a_topic_that_is_slow_on_purpose_has_longer(heard):
-    heard.limit = 25.0
-    assert heard.look(124.0, linked=True) is None
-    assert heard.look(125.0, linked=True) == 25.0
+def test_a_topic_that_is_slow_on_purpose_has_longer(received):
+    received.limit = 25.0
+    assert received.look(124.0, linked=True) is None
+    assert received.look(125.0, linked=True) == 25.0
 
 
 class Link:

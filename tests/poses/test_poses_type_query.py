@@ -89,7 +89,7 @@ async def settle():
 
 
 @pytest.fixture
-def told(monkeypatch):
+def received(monkeypatch):
     """Run what is done with a robot whose velocity topic nobody knows yet."""
     gate = Gate()
     monkeypatch.setattr(RobotMotion, "gate", gate)
@@ -111,17 +111,17 @@ def told(monkeypatch):
     return run
 
 
-def test_a_base_that_starts_after_the_link_is_open_is_declared_with_its_type(told):
+def test_a_base_that_starts_after_the_link_is_open_is_declared_with_its_type(received):
     async def scenario(robot, link, time):
         await time.passes()
         link.type = STAMPED
         await time.passes()
         assert robot.motion.spec().twist_type == STAMPED
 
-    assert told(scenario)[:3] == ["geometry_msgs/Twist", STAMPED, "forgotten"]
+    assert received(scenario)[:3] == ["geometry_msgs/Twist", STAMPED, "forgotten"]
 
 
-def test_until_it_is_known_the_type_is_said_to_be_assumed(told):
+def test_until_it_is_known_the_type_is_said_to_be_assumed(received):
     async def scenario(robot, link, time):
         assert robot.motion.spec().twist_type_assumed
         link.type = "geometry_msgs/Twist"
@@ -132,20 +132,20 @@ def test_until_it_is_known_the_type_is_said_to_be_assumed(told):
         robot.set_move_topic(link, "/goal")
         assert not robot.motion.spec().twist_type_assumed
 
-    told(scenario)
+    received(scenario)
 
 
-def test_it_is_asked_for_soon_at_first_and_then_rarely(told):
+def test_it_is_asked_for_soon_at_first_and_then_rarely(received):
     async def scenario(robot, link, time):
         for _ in range(FEW + 3):
             await time.passes()
         assert time.pauses[: FEW + 1] == [*[SOON] * FEW, LATER]
         assert time.pauses[-1] == LATER
 
-    told(scenario)
+    received(scenario)
 
 
-def test_a_rosapi_that_takes_long_to_answer_is_asked_more_rarely(told, monkeypatch):
+def test_a_rosapi_that_takes_long_to_answer_is_asked_more_rarely(received, monkeypatch):
     async def scenario(robot, link, time):
         clock = SimpleNamespace(monotonic=iter([0.0, 5.0]).__next__)
         with monkeypatch.context() as patch:
@@ -153,10 +153,10 @@ def test_a_rosapi_that_takes_long_to_answer_is_asked_more_rarely(told, monkeypat
             await time.passes()
         assert time.pauses[-1] == 5.0 * SHARE
 
-    told(scenario)
+    received(scenario)
 
 
-def test_what_is_known_is_asked_for_no_more(told):
+def test_what_is_known_is_asked_for_no_more(received):
     async def scenario(robot, link, time):
         link.type = STAMPED
         await time.passes()
@@ -164,7 +164,7 @@ def test_what_is_known_is_asked_for_no_more(told):
         await time.passes()
         assert (link.asked, len(time.pauses)) == (2, pauses)
 
-    told(scenario)
+    received(scenario)
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,9 @@ def test_what_is_known_is_asked_for_no_more(told):
         lambda robot, link: setattr(link, "state", "connecting"),
     ],
 )
-def test_nobody_asks_for_a_topic_that_is_gone_or_over_a_link_that_is_down(told, end):
+def test_nobody_asks_for_a_topic_that_is_gone_or_over_a_link_that_is_down(
+    received, end
+):
     async def scenario(robot, link, time):
         end(robot, link)
         asked = link.asked
@@ -184,10 +186,10 @@ def test_nobody_asks_for_a_topic_that_is_gone_or_over_a_link_that_is_down(told, 
         await time.passes()
         assert link.asked == asked
 
-    told(scenario)
+    received(scenario)
 
 
-def test_a_link_that_opens_anew_is_asked_at_once_and_once(told):
+def test_a_link_that_opens_anew_is_asked_at_once_and_once(received):
     async def scenario(robot, link, time):
         link.state = "connecting"
         await time.passes()
@@ -197,10 +199,10 @@ def test_a_link_that_opens_anew_is_asked_at_once_and_once(told):
         await time.passes()
         assert link.asked == 3
 
-    told(scenario)
+    received(scenario)
 
 
-def test_a_type_that_was_known_holds_while_the_base_is_away(told):
+def test_a_type_that_was_known_holds_while_the_base_is_away(received):
     async def scenario(robot, link, time):
         link.type = STAMPED
         await time.passes()
@@ -212,10 +214,10 @@ def test_a_type_that_was_known_holds_while_the_base_is_away(told):
         assert robot.motion.spec().twist_type == STAMPED
         assert link.asked == asked
 
-    told(scenario)
+    received(scenario)
 
 
-def test_an_answer_of_a_topic_that_was_set_anew_meanwhile_counts_no_more(told):
+def test_an_answer_of_a_topic_that_was_set_anew_meanwhile_counts_no_more(received):
     async def scenario(robot, link, time):
         late = asyncio.get_running_loop().create_future()
         link.topic_type = lambda topic: late
@@ -225,7 +227,7 @@ def test_an_answer_of_a_topic_that_was_set_anew_meanwhile_counts_no_more(told):
         await settle()
         assert robot.motion.spec().twist_type == "geometry_msgs/Twist"
 
-    told(scenario)
+    received(scenario)
 
 
 def test_a_rosapi_that_comes_up_after_rosbridge_is_asked_too(monkeypatch):

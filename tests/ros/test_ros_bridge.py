@@ -660,8 +660,8 @@ def test_a_silent_robot_over_a_live_link_is_not_dead(fast):
         reasons = []
         async with bridged() as (_, bridge):
             bridge.on_close(reasons.append)
-            heard = bridge.last_heard
-            await until(lambda: bridge.last_heard > heard + 0.6)
+            seen = bridge.last_heard
+            await until(lambda: bridge.last_heard > seen + 0.6)
             assert reasons == []
 
     run(scenario)
@@ -679,8 +679,8 @@ def test_a_callback_that_blocks_does_not_make_the_link_look_dead(fast, monkeypat
             for _ in range(2):
                 await server.publish("/a", {})
             await until(lambda: len(got) == 2)
-            heard = bridge.last_heard
-            await until(lambda: bridge.last_heard > heard)
+            seen = bridge.last_heard
+            await until(lambda: bridge.last_heard > seen)
             assert reasons == []
 
     run(scenario)

@@ -145,14 +145,14 @@ async def ros2(cells, *, limit=LIMIT, published=True):
 
 def test_a_map_too_large_for_cbor_comes_in_json_and_people_are_told(quick, caplog):
     async def scenario():
-        got, told = [], []
-        scope = Scope("page", lambda text, about: told.append((text, about)))
+        got, seen = [], []
+        scope = Scope("page", lambda text, about: seen.append((text, about)))
         async with ros2(cells=10_000) as (server, bridge, _):
             with scope.active():
                 listener = bridge.subscribe("/map", got.append, MAP)
             await until(lambda: got)
             assert got[0]["info"]["width"] == 10_000
-            ((text, about),) = told
+            ((text, about),) = seen
             assert about is listener
             assert text.startswith("/map is larger than the bridge sends in CBOR: set")
             assert "set max_message_size of rosbridge_websocket to " in text
@@ -171,8 +171,8 @@ def test_a_map_too_large_for_cbor_comes_in_json_and_people_are_told(quick, caplo
 
 def test_one_that_is_published_late_comes_in_cbor_again_and_nobody_is_told(quick):
     async def scenario():
-        got, told = [], []
-        scope = Scope("page", lambda text, about: told.append(text))
+        got, seen = [], []
+        scope = Scope("page", lambda text, about: seen.append(text))
         async with bridged(publishers={"publishers": ["/slam"]}) as (server, bridge):
             with scope.active():
                 bridge.subscribe("/map", got.append, MAP)
@@ -189,15 +189,15 @@ def test_one_that_is_published_late_comes_in_cbor_again_and_nobody_is_told(quick
             count = len(asked())
             await asyncio.sleep(0.6)
             assert len(asked()) == count, "it is not asked for again and again"
-            assert told == []
+            assert seen == []
 
     asyncio.run(scenario())
 
 
 def test_after_links_that_ended_nothing_more_is_asked_and_people_are_told(quick):
     async def scenario():
-        told = []
-        scope = Scope("page", lambda text, about: told.append(text))
+        seen = []
+        scope = Scope("page", lambda text, about: seen.append(text))
         async with bridged(publishers={"publishers": ["/map_server"]}) as both:
             server, bridge = both
             with scope.active():
@@ -206,9 +206,9 @@ def test_after_links_that_ended_nothing_more_is_asked_and_people_are_told(quick)
                 await server.wait_for("subscribe", number, compression="none")
                 server.drop()
                 await until(lambda n=number: bridge.stats.links > n)
-            await until(lambda: told)
-            assert "the connection ended before it came in JSON" in told[0]
-            assert "max_message_size" in told[0]
+            await until(lambda: seen)
+            assert "the connection ended before it came in JSON" in seen[0]
+            assert "max_message_size" in seen[0]
             assert len(server.ops("subscribe", compression="none")) == MOST_LOST
 
     asyncio.run(scenario())

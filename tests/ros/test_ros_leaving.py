@@ -45,14 +45,16 @@ async def by_asking_for_less(server, bridge, listeners):
 def test_the_data_lane_is_left_and_the_bridge_still_answers(leave):
     async def scenario():
         async with hanging_bridge("ros2", TYPES) as server:
-            bridge, heard = Bridge(server.url), set()
+            bridge, received = Bridge(server.url), set()
             listeners = [
-                bridge.subscribe(topic, lambda _, topic=topic: heard.add(topic), type)
+                bridge.subscribe(
+                    topic, lambda _, topic=topic: received.add(topic), type
+                )
                 for topic, type in TYPES.items()
             ]
             bridge.start(asyncio.get_running_loop())
             try:
-                await until(lambda: heard == TYPES.keys())
+                await until(lambda: received == TYPES.keys())
                 await leave(server, bridge, listeners)
                 assert await server.accepts_client()
             finally:

@@ -191,13 +191,15 @@ def test_fragments_are_counted_in_bytes_and_not_in_characters():
 def test_the_documented_limits_are_those_that_hold():
     page = Path(__file__).parents[2] / "docs/reference/limits.md"
     rows = [line.split("|")[1:-1] for line in page.read_text().splitlines()]
-    told = {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row}
+    received = {
+        row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row
+    }
     for name, limit in LIMITS.items():
-        (row,) = (cells for what, cells in told.items() if f"`{name}`" in what)
+        (row,) = (cells for what, cells in received.items() if f"`{name}`" in what)
         assert row == [str(limit.size // MIB), limit.why]
-    other = told["every other type, and a topic without a type"]
+    other = received["every other type, and a topic without a type"]
     assert other == [str(GENERAL.size // MIB), GENERAL.why]
     for field, (most, why) in limits.ITEMS.items():
-        (row,) = (cells for what, cells in told.items() if f"`{field}`" in what)
+        (row,) = (cells for what, cells in received.items() if f"`{field}`" in what)
         assert row == [f"{most:,}", why]
-    assert told["objects and lists in one message"][0] == f"{MAX_VALUES:,}"
+    assert received["objects and lists in one message"][0] == f"{MAX_VALUES:,}"

@@ -39,11 +39,11 @@ async def bridge(talk):
         server.close()
 
 
-def lane(url, heard, ended=None):
+def lane(url, seen, ended=None):
     return Lane(
         url,
-        opened=lambda: heard.append("open"),
-        received=heard.append,
+        opened=lambda: seen.append("open"),
+        received=seen.append,
         closed=(lambda why: None) if ended is None else ended.append,
         failed=lambda error: None,
     )
@@ -76,11 +76,11 @@ def test_a_flood_leaves_time_for_everything_else(piece):
                     await asyncio.sleep(0)
             reading.cancel()
 
-        heard, worst = [], 0.0
+        seen, worst = [], 0.0
         async with bridge(talk) as url:
-            link = lane(url, heard)
+            link = lane(url, seen)
             link.start(asyncio.get_running_loop())
-            await until(lambda: heard)
+            await until(lambda: seen)
             begun = time.monotonic()
             while time.monotonic() < begun + 1.0:
                 before = time.monotonic()
@@ -104,16 +104,16 @@ def test_what_came_before_the_end_is_received_and_in_order():
             writer.write_eof()
             await reader.read()
 
-        heard = []
+        seen = []
         async with bridge(talk) as url:
-            link = lane(url, heard)
+            link = lane(url, seen)
             link.start(asyncio.get_running_loop())
-            await until(lambda: len(heard) >= 3001)
+            await until(lambda: len(seen) >= 3001)
             await link.stop()
-        return heard
+        return seen
 
-    heard = asyncio.run(story())
-    assert heard[:3001] == ["open", *(b"%04d" % n for n in range(3000))]
+    seen = asyncio.run(story())
+    assert seen[:3001] == ["open", *(b"%04d" % n for n in range(3000))]
 
 
 def test_a_frame_of_many_mebibytes_is_received_whole():
@@ -125,13 +125,13 @@ def test_a_frame_of_many_mebibytes_is_received_whole():
             writer.write(b"\x82\x05after")
             await reader.read()
 
-        heard = []
+        seen = []
         async with bridge(talk) as url:
-            link = lane(url, heard)
+            link = lane(url, seen)
             link.start(asyncio.get_running_loop())
-            await until(lambda: len(heard) == 3)
+            await until(lambda: len(seen) == 3)
             await link.stop()
-        return heard
+        return seen
 
     assert asyncio.run(story()) == ["open", body, b"after"]
 
@@ -142,14 +142,14 @@ def test_a_message_of_too_many_fragments_ends_the_link():
             writer.write(b"\x82\x05first\x01\x01x" + b"\0\1x" * (MOST_FRAGMENTS + 100))
             await reader.read()
 
-        heard, why = [], []
+        seen, why = [], []
         async with bridge(talk) as url:
-            link = lane(url, heard, why)
+            link = lane(url, seen, why)
             link.start(asyncio.get_running_loop())
             await until(lambda: why)
             await link.stop()
-        return heard, why
+        return seen, why
 
-    heard, why = asyncio.run(story())
-    assert heard[:2] == ["open", b"first"]
+    seen, why = asyncio.run(story())
+    assert seen[:2] == ["open", b"first"]
     assert "too many fragments" in why[0]

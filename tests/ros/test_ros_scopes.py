@@ -44,13 +44,13 @@ def test_what_a_callback_goes_on_with_ends_with_its_subscription():
     async def scenario():
         by_hand, by_scope, scope = Work(), Work(), Scope("page")
         async with bridged() as (server, bridge):
-            heard = bridge.subscribe("/a", by_hand)
+            seen = bridge.subscribe("/a", by_hand)
             with scope.active():
                 bridge.subscribe("/a", by_scope)
             await server.wait_for("subscribe")
             await server.publish("/a", {"data": 1})
             await until(lambda: by_hand.began and by_scope.began)
-            heard.remove()
+            seen.remove()
             await until(lambda: by_hand.cancelled)
             assert not by_scope.cancelled
             scope.close()
@@ -77,12 +77,12 @@ def test_a_callback_that_ends_its_own_subscription_goes_on_to_its_end():
         done = []
 
         async def once(message):
-            heard.remove()
+            seen.remove()
             await asyncio.sleep(0)
             done.append(message["data"])
 
         async with bridged() as (server, bridge):
-            heard = bridge.subscribe("/a", once)
+            seen = bridge.subscribe("/a", once)
             await server.wait_for("subscribe")
             await server.publish("/a", {"data": 1})
             await until(lambda: done)
@@ -133,8 +133,8 @@ def test_a_bridge_that_never_began_does_not_begin_after_its_scope(lifecycle):
 
 def test_whoever_uses_a_bridge_that_ended_is_told_why(lifecycle, caplog):
     async def scenario():
-        server, page, told = FakeRosbridge(), Scope("page"), []
-        robot = Scope("robot", lambda text, about: told.append(text))
+        server, page, received = FakeRosbridge(), Scope("page"), []
+        robot = Scope("robot", lambda text, about: received.append(text))
         await server.start()
         lifecycle.begin(asyncio.get_running_loop())
         with page.active():
@@ -142,8 +142,8 @@ def test_whoever_uses_a_bridge_that_ended_is_told_why(lifecycle, caplog):
         with robot.active():
             bridge.subscribe("/odom", print)
         page.close()
-        await until(lambda: told)
-        assert "ended with the page or the module that made its bridge" in told[0]
+        await until(lambda: received)
+        assert "ended with the page or the module that made its bridge" in received[0]
         assert "/odom" in caplog.text
         for use in (
             lambda: bridge.subscribe("/scan", print),
@@ -165,8 +165,8 @@ def test_nobody_is_told_of_a_bridge_that_ends_together_with_its_users(
     lifecycle, caplog
 ):
     async def scenario():
-        server, page, told = FakeRosbridge(), Scope("page"), []
-        robot = Scope("robot", lambda text, about: told.append(text))
+        server, page, received = FakeRosbridge(), Scope("page"), []
+        robot = Scope("robot", lambda text, about: received.append(text))
         await server.start()
         lifecycle.begin(asyncio.get_running_loop())
         with page.active():
@@ -177,7 +177,7 @@ def test_nobody_is_told_of_a_bridge_that_ends_together_with_its_users(
         page.close()
         await until(lambda: bridge.state == "closed")
         await lifecycle.end()
-        assert told == []
+        assert received == []
         assert caplog.text == ""
         await server.stop()
 

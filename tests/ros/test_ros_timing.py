@@ -71,11 +71,11 @@ class TestLag:
         assert liveness.lag(2.6) == pytest.approx(0.01)
 
 
-def look(liveness, start, end, heard=lambda _now: -math.inf):
+def look(liveness, start, end, received=lambda _now: -math.inf):
     """Look four times a second; return when the link was found dead."""
     now = start
     while now <= end:
-        if liveness.is_dead(now, heard(now)):
+        if liveness.is_dead(now, received(now)):
             return now
         now += 0.25
     return None

@@ -252,7 +252,7 @@ class Bench:
         now = time.monotonic()
         recent = [
             velocity
-            for velocity in self.robot.log.told[-12:]
+            for velocity in self.robot.log.twists[-12:]
             if velocity.at > now - 0.4
         ]
         return (

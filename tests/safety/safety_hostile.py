@@ -135,7 +135,7 @@ def _drive(bench, seconds):
     pass_time(seconds)
     ended = time.monotonic()
     driven = [
-        velocity for velocity in bench.robot.log.told if begun <= velocity.at <= ended
+        velocity for velocity in bench.robot.log.twists if begun <= velocity.at <= ended
     ]
     ticks = bench.tab.evaluate(
         f"ticks.filter((t) => t > performance.now() - {seconds * 1000})"

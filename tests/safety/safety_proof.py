@@ -96,7 +96,7 @@ class ProvingBench(Bench):
             figures.append(figure)
             progress.add(figure["late"], figure["jitter"])
         pass_time(zeros + 0.2)
-        log = [velocity for velocity in self.robot.log.told if velocity.at >= begin]
+        log = [velocity for velocity in self.robot.log.twists if velocity.at >= begin]
         wrong = check_invariants(
             log,
             Bounds(
@@ -138,7 +138,7 @@ class ProvingBench(Bench):
                 self.drive_off()
             try:
                 before()
-                if not self.robot.log.told[-1].is_zero:
+                if not self.robot.log.twists[-1].is_zero:
                     return
             except AssertionError as error:
                 why = error

@@ -70,10 +70,10 @@ def sign(number):
     return (number > 0) - (number < 0)
 
 
-def ages(told, said):
+def ages(received, said):
     """Return how old each velocity is that is not zero, by the newest that says so."""
     found = []
-    for each in told:
+    for each in received:
         way = sign(each.twist.vx), sign(each.twist.wz)
         if way == (0, 0):
             continue
@@ -102,7 +102,7 @@ def driven(bench):
 
 
 def moves(bench):
-    return [told for told in bench.robot.log.told if not told.is_zero]
+    return [received for received in bench.robot.log.twists if not received.is_zero]
 
 
 def said_by(bench):
@@ -115,20 +115,20 @@ def said_by(bench):
 def test_no_command_is_older_than_the_limit_whatever_stalls_before_the_gate(
     driven, way
 ):
-    begin, since = len(driven.robot.log.told), time.monotonic()
+    begin, since = len(driven.robot.log.twists), time.monotonic()
     for seconds in (0.2, 0.5, 1.0, 3.0):
         stall(driven, way, seconds)
         before = len(moves(driven))
         wait_for(lambda b=before: len(moves(driven)) > b + 10, "motion after the stall")
-    found = ages(driven.robot.log.told[begin:], said_by(driven))
+    found = ages(driven.robot.log.twists[begin:], said_by(driven))
     assert len(found) > 40
     assert max(found) <= MAX_AGE + ON_THE_WAY + driven.sentinel.worst(since)
 
 
 def test_no_command_is_older_than_the_limit_behind_a_slow_and_fitful_link(driven):
-    begin, since = len(driven.robot.log.told), time.monotonic()
+    begin, since = len(driven.robot.log.twists), time.monotonic()
     driven.web_hop.shape(Shape(latency=0.03, jitter=0.12))
     pass_time(6.0)
-    found = ages(driven.robot.log.told[begin:], said_by(driven))
+    found = ages(driven.robot.log.twists[begin:], said_by(driven))
     assert found, "a link that is fit to drive by at times"
     assert max(found) <= MAX_AGE + ON_THE_WAY + driven.sentinel.worst(since)

@@ -149,12 +149,12 @@ def test_beside_three_that_flood_stop_leaves_the_gate_within_50_ms(
             begun = time.monotonic()
             pass_time(1.5)
             ended = time.monotonic()
-            told = [t for t in gate.robot.log.told if begun <= t.at <= ended]
+            received = [t for t in gate.robot.log.twists if begun <= t.at <= ended]
             ticks = [at for at in gate.hand.ticks if begun <= at <= ended]
             tick_gap = longest_gap(ticks, gate.sentinel)
-            velocity_gap = longest_gap([t.at for t in told], gate.sentinel)
+            velocity_gap = longest_gap([t.at for t in received], gate.sentinel)
             stopped, stolen = gate.stop()
-            zeros = sum(each.is_zero for each in told)
+            zeros = sum(each.is_zero for each in received)
             figures = {
                 "stop": stopped,
                 "stolen": stolen,

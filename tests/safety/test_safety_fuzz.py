@@ -47,8 +47,11 @@ def pickled():
 def moved(bench):
     """Return all that a robot was told since it was armed that may move it."""
     kinds = (actions.SendGoal, actions.SendPose)
-    told = [each for kind in kinds for each in bench.did(kind)]
-    return [*told, *(w for w in bench.did(actions.WriteTwist) if not w.twist.is_zero)]
+    received = [each for kind in kinds for each in bench.did(kind)]
+    return [
+        *received,
+        *(w for w in bench.did(actions.WriteTwist) if not w.twist.is_zero),
+    ]
 
 
 def filled(bench, text):
@@ -253,7 +256,7 @@ FROM_THE_PAGE = """(async () => {
 @pytest.mark.serial
 def test_nothing_of_the_corpus_moves_the_robot_through_all_processes(bench):
     bench.open_page()
-    before = len(bench.robot.log.told)
+    before = len(bench.robot.log.twists)
     # What is too long is not even read: the server closes the socket.
     short = [text for text in CORPUS if len(text) < 1000]
     script = FROM_THE_PAGE.replace("CORPUS", json.dumps(short), 1)
@@ -261,6 +264,6 @@ def test_nothing_of_the_corpus_moves_the_robot_through_all_processes(bench):
     assert result["taken"], "the page's own socket did not get the robot"
     assert result["alive"], "the page was shown the door, so the test shows little"
     assert result["refused"] > 0
-    assert [t for t in bench.robot.log.told[before:] if not t.is_zero] == []
+    assert [t for t in bench.robot.log.twists[before:] if not t.is_zero] == []
     bench.drive_off()
     bench.let_go()

@@ -205,12 +205,14 @@ def test_zero_is_not_held_up_by_a_goal_and_a_call_that_hang(folder):
         assert late < 0.1 + sentinel.stolen(stopped)
 
         def calls():
-            return {heard.message["service"] for heard in robot.log.of("call_service")}
+            return {
+                received.message["service"] for received in robot.log.of("call_service")
+            }
 
         wanted = {"/navigate_to_pose/_action/cancel_goal", "/e_stop"}
         wait_for(lambda: wanted <= calls(), "the cancel and the hook")
         (goal,) = robot.log.of("send_action_goal")
-        links = {heard.link for heard in robot.log.of("call_service")}
+        links = {received.link for received in robot.log.of("call_service")}
         assert goal.link not in links, "behind the goal a call would wait for its end"
 
 

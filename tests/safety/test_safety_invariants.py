@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
-from webmap.testing import Bounds, Quiet, Told, check_invariants
+from webmap.testing import Bounds, Quiet, ReceivedTwist, check_invariants
 
 
-def told(*pairs, start=100.0):
-    return [Told(start + at, Twist(vx)) for at, vx in pairs]
+def received(*pairs, start=100.0):
+    return [ReceivedTwist(start + at, Twist(vx)) for at, vx in pairs]
 
 
 def drive(seconds=1.0, vx=0.5, start=0.0, zeros=0.5):
@@ -27,31 +27,33 @@ def test_a_log_without_a_velocity_is_right():
 
 
 def test_driving_then_zeros_then_silence_is_right():
-    log = told(*drive(), *drive(start=5.0))
+    log = received(*drive(), *drive(start=5.0))
     assert check_invariants(log, Bounds(v_max=0.5, a_max=5.0)) == []
 
 
 def test_a_last_velocity_that_moves_is_found():
-    (found,) = check_invariants(told(*drive(zeros=0.0)))
+    (found,) = check_invariants(received(*drive(zeros=0.0)))
     assert found == "0.950 s: an activity ended with a velocity that is not zero"
 
 
 def test_a_first_activity_without_a_zero_is_found_behind_a_good_second_one():
-    found = check_invariants(told(*drive(zeros=0.0), *drive(start=5.0)))
+    found = check_invariants(received(*drive(zeros=0.0), *drive(start=5.0)))
     assert ["an activity ended" in words for words in found] == [True]
 
 
 def test_a_cut_link_excuses_a_missing_zero_if_the_next_velocity_is_one():
     cut = [(100.9, 102.0)]
     first = drive(zeros=0.0)
-    assert check_invariants(told(*first, (2.1, 0.0)), unreachable=cut) == []
-    (found,) = check_invariants(told(*first, (2.1, 0.5), (2.15, 0.0)), unreachable=cut)
+    assert check_invariants(received(*first, (2.1, 0.0)), unreachable=cut) == []
+    (found,) = check_invariants(
+        received(*first, (2.1, 0.5), (2.15, 0.0)), unreachable=cut
+    )
     assert found == "2.100 s: the first velocity after a cut is not zero"
 
 
 def test_a_link_may_deliver_late_what_it_had_taken_but_no_more_than_that():
     cut = [(100.9, 102.0)]
-    log = told(*drive(zeros=0.0), (2.1, 0.5), (2.1, 0.5), (2.1, 0.0))
+    log = received(*drive(zeros=0.0), (2.1, 0.5), (2.1, 0.5), (2.1, 0.0))
     assert check_invariants(log, Bounds(late=2), unreachable=cut) == []
     (found,) = check_invariants(log, Bounds(late=1), unreachable=cut)
     assert found == "2.100 s: 2 velocities after a cut come before the first zero"
@@ -59,43 +61,45 @@ def test_a_link_may_deliver_late_what_it_had_taken_but_no_more_than_that():
 
 @pytest.mark.parametrize("vx", [0.6, -0.6, math.nan, math.inf])
 def test_a_velocity_beyond_the_limit_is_found(vx):
-    found = check_invariants(told((0, vx), (0.05, 0)), Bounds(v_max=0.5))
+    found = check_invariants(received((0, vx), (0.05, 0)), Bounds(v_max=0.5))
     assert len(found) == 1
     assert "limit" in found[0] or "finite" in found[0]
 
 
 def test_a_turn_beyond_the_limit_is_found():
-    log = [Told(0.0, Twist(wz=1.0)), Told(0.05, Twist())]
+    log = [ReceivedTwist(0.0, Twist(wz=1.0)), ReceivedTwist(0.05, Twist())]
     assert "rad/s is above" in check_invariants(log, Bounds(w_max=0.9))[0]
 
 
 def test_motion_where_there_should_be_none_is_found_and_dated():
     quiet = Quiet(100.3, 100.8, "the browser was killed")
-    (found,) = check_invariants(told(*drive()), quiet=[quiet])
+    (found,) = check_invariants(received(*drive()), quiet=[quiet])
     assert found.startswith("0.350 s: 9 moving velocities came up to 0.450 s after")
     assert found.endswith("the browser was killed")
-    assert check_invariants(told(*drive()), quiet=[Quiet(101.0, 199.0, "")]) == []
+    assert check_invariants(received(*drive()), quiet=[Quiet(101.0, 199.0, "")]) == []
 
 
 def test_another_driver_without_a_zero_in_between_is_found():
-    log = told(*drive(seconds=1.0))
+    log = received(*drive(seconds=1.0))
     (found,) = check_invariants(log, handovers=[100.48])
     assert "without a zero in between" in found
-    assert check_invariants(told(*drive(), *drive(start=2.0)), handovers=[101.8]) == []
+    assert (
+        check_invariants(received(*drive(), *drive(start=2.0)), handovers=[101.8]) == []
+    )
 
 
 def test_zeros_without_end_are_found_once():
-    (found,) = check_invariants(told(*drive(zeros=3.0)))
+    (found,) = check_invariants(received(*drive(zeros=3.0)))
     assert found.startswith("1.650 s: zeros go on")
 
 
 def test_zeros_may_begin_anew_when_a_stop_was_pressed():
-    log = told(*drive(zeros=1.0))
+    log = received(*drive(zeros=1.0))
     assert check_invariants(log, causes=[101.45]) == []
 
 
 def test_a_speed_that_is_reached_too_quickly_is_found_and_braking_never():
-    log = told((0, 0.05), (0.05, 0.5), (0.1, 0.0))
+    log = received((0, 0.05), (0.05, 0.5), (0.1, 0.0))
     bounds = Bounds(a_max=1.0, slack=0.02)
     (found,) = check_invariants(log, bounds)
     assert "from 0.05 to 0.5 m/s" in found
@@ -110,10 +114,10 @@ def test_wherever_one_zero_run_is_taken_out_it_is_noticed(lengths, choice):
     for length in lengths:
         activities.append(drive(seconds=length, start=begin))
         begin += length + 5.0
-    assert check_invariants(told(*itertools.chain(*activities))) == []
+    assert check_invariants(received(*itertools.chain(*activities))) == []
     broken = choice % len(activities)
     activities[broken] = [(at, v) for at, v in activities[broken] if v]
-    assert check_invariants(told(*itertools.chain(*activities)))
+    assert check_invariants(received(*itertools.chain(*activities)))
 
 
 @given(
@@ -123,7 +127,7 @@ def test_what_comes_after_quiet_began_is_found_exactly_if_it_moves(steps):
     at, log = 0.0, []
     for gap, vx in steps:
         at += gap
-        log.append(Told(at, Twist(vx)))
+        log.append(ReceivedTwist(at, Twist(vx)))
     found = check_invariants(log, quiet=[Quiet(at / 2, math.inf, "here")])
     expected = any(t.at > at / 2 and not t.is_zero for t in log)
     assert any(words.endswith("here") for words in found) == expected

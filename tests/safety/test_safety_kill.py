@@ -210,7 +210,7 @@ def kill_one(steps, part, robot, state, sentinel):
     assert rest is not None
     still = killed_at + 0.3 + bad_luck
     wrong = check_invariants(
-        [told for told in robot.log.told if told.at >= begin],
+        [received for received in robot.log.twists if received.at >= begin],
         Bounds(1.0, 1.5, zeros=1e9),
         quiet=[Quiet(still, resumed_until, f"killed after step {steps}")],
         unreachable=[(killed_at - 0.5, killed_at + 10.0)],

@@ -89,13 +89,15 @@ def test_half_an_hour_of_everything_grows_nothing_and_delays_no_zero(bench):
                 SHOW[-1](f"soak: {(end - again + STOP_AGAIN) / 60:.0f} min to go")
             memory.look()
             pass_time(1.0)
-        wait_for(lambda: bench.robot.log.told[-1].at > end, "a zero")
-        told = [told for told in bench.robot.log.told if told.at >= begun]
+        wait_for(lambda: bench.robot.log.twists[-1].at > end, "a zero")
+        received = [
+            received for received in bench.robot.log.twists if received.at >= begun
+        ]
         alive = {name: process.pid for name, process in processes(bench).items()}
     part = (end - begun) / 4
     before, kept = memory.least(begun, begun + part), memory.least(end - part, end)
-    assert all(one.is_zero for one in told), "STOP stands"
-    gaps = [after.at - one.at for one, after in itertools.pairwise(told)]
+    assert all(one.is_zero for one in received), "STOP stands"
+    gaps = [after.at - one.at for one, after in itertools.pairwise(received)]
     late = sorted(max(0.0, gap - HELD_PERIOD - STEP) for gap in gaps)
     most, usual = late[-1], late[int(len(late) * 0.999)]
     jitter = bench.sentinel.worst(begun, end)

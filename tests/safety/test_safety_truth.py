@@ -99,9 +99,9 @@ def test_after_a_release_and_its_zeros_nothing_is_said_for_ten_seconds(bench):
     bench.drive_off()
     bench.let_go()
     pass_time(1.0)
-    said = len(bench.robot.log.told)
+    said = len(bench.robot.log.twists)
     pass_time(10.0)
-    assert bench.robot.log.told[said:] == []
+    assert bench.robot.log.twists[said:] == []
 
 
 def test_a_slow_link_slows_the_robot_down_and_the_page_says_so(bench):
@@ -116,7 +116,7 @@ def test_a_slow_link_slows_the_robot_down_and_the_page_says_so(bench):
     # The loop takes both ways at least; what it waits for a tick makes it slower.
     most = BLIND / (2 * EACH_WAY + DEADMAN + STOPS_WITHIN)
     now = time.monotonic()
-    late = [told.speed for told in bench.robot.log.moving_since(now - 0.3)]
+    late = [received.speed for received in bench.robot.log.moving_since(now - 0.3)]
     assert late
     assert max(late) <= most, (max(late), most)
     assert min(late) > 0.1, "a slow link is to slow it down, not to stop it"
@@ -130,7 +130,7 @@ def test_a_slow_link_slows_the_robot_down_and_the_page_says_so(bench):
 def test_a_link_slower_than_the_age_limit_moves_nothing(bench):
     bench.drive_off()
     bench.web_hop.shape(Shape(latency=0.2))
-    wait_for(lambda: bench.robot.log.told[-1].is_zero, "zero")
+    wait_for(lambda: bench.robot.log.twists[-1].is_zero, "zero")
     stopped = time.monotonic()
     pass_time(1.5)
     bench.repeat_press()

@@ -43,9 +43,9 @@ def link(robot):
 def test_what_it_is_told_stands_in_its_log_with_the_time(robot, link):
     before = time.monotonic()
     link.send(twist(0.5, 0.25))
-    told = eventually(lambda: robot.log.told, "a velocity")[0]
-    assert told.twist == Twist(0.5, 0.0, 0.25)
-    assert before <= told.at <= time.monotonic()
+    received = eventually(lambda: robot.log.twists, "a velocity")[0]
+    assert received.twist == Twist(0.5, 0.0, 0.25)
+    assert before <= received.at <= time.monotonic()
     assert robot.log.of("publish", "/cmd_vel")[0].link == 1
 
 
@@ -53,7 +53,7 @@ def test_it_moves_and_stops_by_itself_after_its_timeout(robot, link):
     link.send(twist(0.5))
     # It may stand again before this thread looks.
     eventually(lambda: any(m.twist.vx == 0.5 for m in robot.log.moved[:]), "moving")
-    told_at = robot.log.told[-1].at
+    told_at = robot.log.twists[-1].at
     rest = eventually(lambda: robot.log.standstill(told_at + 0.1), "standing still")
     assert rest - told_at >= 0.2
     assert robot.log.first_zero(0) is None
@@ -63,7 +63,7 @@ def test_a_bad_one_never_stops_by_itself():
     with WitnessRobot(timeout=None) as robot, connect(robot.url) as link:
         link.send(twist(0.5))
         eventually(lambda: robot.velocity.vx == 0.5, "moving")
-        told_at = robot.log.told[-1].at
+        told_at = robot.log.twists[-1].at
         eventually(lambda: robot.log.moved[-1].at > told_at + 0.7, "a while")
         assert robot.velocity.vx == 0.5
         link.send(twist(0.0))
@@ -73,7 +73,7 @@ def test_a_bad_one_never_stops_by_itself():
 def test_one_that_does_not_obey_notes_and_stands(robot, link):
     robot.obeys = False
     link.send(twist(0.5))
-    eventually(lambda: robot.log.told, "a velocity")
+    eventually(lambda: robot.log.twists, "a velocity")
     assert robot.velocity.is_zero
 
 
@@ -111,13 +111,13 @@ def test_a_service_that_hangs_holds_up_what_comes_behind_it(robot, link):
     link.send(twist(0.5))
     eventually(lambda: robot.log.of("call_service"), "the call")
     assert link.ping().wait(5), "pings are not answered while it hangs"
-    assert robot.log.told == []
+    assert robot.log.twists == []
     with connect(robot.url) as other:
         other.send(twist(0.25))
-        eventually(lambda: robot.log.told, "another socket's velocity")
+        eventually(lambda: robot.log.twists, "another socket's velocity")
     robot.unblock()
     assert json.loads(link.recv(timeout=5))["result"] is True
-    eventually(lambda: len(robot.log.told) == 2, "what had to wait")
+    eventually(lambda: len(robot.log.twists) == 2, "what had to wait")
 
 
 def test_a_goal_can_run_on_the_input_thread():
@@ -126,9 +126,9 @@ def test_a_goal_can_run_on_the_input_thread():
         link.send(twist(0.5))
         eventually(lambda: robot.log.of("send_action_goal"), "the goal")
         assert link.ping().wait(5), "pings are not answered while it runs"
-        assert robot.log.told == []
+        assert robot.log.twists == []
         robot.unblock()
-        eventually(lambda: robot.log.told, "what had to wait")
+        eventually(lambda: robot.log.twists, "what had to wait")
 
 
 def test_rosapi_tells_of_its_topics(robot, link):
@@ -149,15 +149,15 @@ def test_its_bridge_can_be_killed_and_comes_back_on_the_same_port(robot, link):
     assert robot.port == port
     with connect(robot.url) as again:
         again.send(twist(0.5))
-        eventually(lambda: robot.log.told, "a velocity")
+        eventually(lambda: robot.log.twists, "a velocity")
 
 
 def test_junk_is_passed_over(robot, link):
     for junk in ("{", "[]", "7", '{"op": "publish", "topic": "/cmd_vel", "msg": 7}'):
         link.send(junk)
     link.send(twist(0.5))
-    told = eventually(lambda: robot.log.moving_since(0)[1:], "the good one")
-    assert told[-1].twist.vx == 0.5
+    received = eventually(lambda: robot.log.moving_since(0)[1:], "the good one")
+    assert received[-1].twist.vx == 0.5
 
 
 def test_the_sentinel_notes_how_late_the_machine_is():

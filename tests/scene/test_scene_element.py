@@ -132,19 +132,19 @@ def test_an_age_is_not_negative(age):
 
 
 def test_an_event_reaches_every_handler_although_one_raises():
-    heard, errors = [], []
+    received, errors = [], []
     button = html.button("Go")
 
     def broken(event):
         raise RuntimeError("no")
 
     button.on("click", broken)
-    button.on("click", heard.append)
+    button.on("click", received.append)
     event = Event(kind="click", element=button)
     button.dispatch(event, errors.append)
-    assert heard == [event]
+    assert received == [event]
     assert [str(error) for error in errors] == ["no"]
-    assert button.handlers("click") == (broken, heard.append)
+    assert button.handlers("click") == (broken, received.append)
 
 
 def test_a_handler_runs_in_the_scope_it_was_added_in():

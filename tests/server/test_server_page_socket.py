@@ -114,17 +114,17 @@ def test_no_word_of_the_gate_is_lost_or_reordered(steps):
 
 class Guest:
     def __init__(self):
-        self.told = []
+        self.received = []
 
     def end(self, code, reason):
-        self.told.append(code)
+        self.received.append(code)
 
 
 def test_a_page_that_opens_again_replaces_its_own_socket():
     sockets, old, new = OpenSockets(1), Guest(), Guest()
     assert sockets.add(("v", "p"), old)
     assert sockets.add(("v", "p"), new)
-    assert (old.told, new.told) == ([REPLACED], [])
+    assert (old.received, new.received) == ([REPLACED], [])
     sockets.remove(("v", "p"), old)
     assert len(sockets) == 1
     sockets.remove(("v", "p"), new)

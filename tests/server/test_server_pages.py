@@ -257,7 +257,7 @@ def test_fifty_viewers_of_one_scan_cost_one_decode_and_one_drawing(loop, monkeyp
             webmap.Map(page.element("webmap_container")).add_robot(bob)
 
         def subscribed():
-            said = [heard.message for heard in there.log.heard]
+            said = [received.message for received in there.log.messages]
             return [m for m in said if (m["op"], m["topic"]) == ("subscribe", "/scan")]
 
         model = make_model(loop, build)

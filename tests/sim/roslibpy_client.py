@@ -82,38 +82,38 @@ def goal_status(ros, place):
 
 
 def main():
-    told = {}
+    received = {}
     ros = roslibpy.Ros(URL)
     ros.run(WAIT)
-    told["topics"] = ros.get_topics()
-    told["odom_type"] = ros.get_topic_type("/robot_0/odom")
-    told["odom_topics"] = ros.get_topics_for_type(ODOM)
-    told["services"] = ros.get_services()
-    told["stop_type"] = ros.get_service_type("/robot_0/stop")
-    told["nodes"] = ros.get_nodes()
-    told["details"] = ros.get_node_details("/robots")
+    received["topics"] = ros.get_topics()
+    received["odom_type"] = ros.get_topic_type("/robot_0/odom")
+    received["odom_topics"] = ros.get_topics_for_type(ODOM)
+    received["services"] = ros.get_services()
+    received["stop_type"] = ros.get_service_type("/robot_0/stop")
+    received["nodes"] = ros.get_nodes()
+    received["details"] = ros.get_node_details("/robots")
     if not ROS2:
         # It reads ROS 1's spelling of a time alone.
-        told["time"] = dict(ros.get_time())
+        received["time"] = dict(ros.get_time())
         # The real ROS 2 rosapi dies of this one.
-        told["twist"] = ros.get_message_details("geometry_msgs/Twist")
-        told["params"] = ros.get_params()
+        received["twist"] = ros.get_message_details("geometry_msgs/Twist")
+        received["params"] = ros.get_params()
     start = position(first(ros, "/robot_0/odom", ODOM))
     scan_type = type_name("sensor_msgs", "msg", "LaserScan")
     scan = first(ros, "/robot_0/base_scan", scan_type)
-    told["ranges"] = len(scan["ranges"])
+    received["ranges"] = len(scan["ranges"])
     grid = first(ros, "/map", type_name("nav_msgs", "msg", "OccupancyGrid"))
-    told["cells"] = len(grid["data"])
+    received["cells"] = len(grid["data"])
     place = drive(ros, start)
-    told["way"] = math.dist(place, start)
+    received["way"] = math.dist(place, start)
     stop = roslibpy.Service(
         ros, "/robot_0/stop", type_name("std_srvs", "srv", "Trigger")
     )
-    told["stop"] = dict(stop.call(roslibpy.ServiceRequest(), timeout=WAIT))
+    received["stop"] = dict(stop.call(roslibpy.ServiceRequest(), timeout=WAIT))
     if not ROS2:
-        told["goal"] = goal_status(ros, place)
+        received["goal"] = goal_status(ros, place)
     ros.close()
-    print(json.dumps(told, default=dict), flush=True)
+    print(json.dumps(received, default=dict), flush=True)
     ros.terminate()
 
 

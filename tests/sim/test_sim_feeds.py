@@ -22,7 +22,7 @@ LOCAL = {
 }
 
 
-def heard(bench, topic, seconds=1.2, **asked):
+def messages_of(bench, topic, seconds=1.2, **asked):
     """The messages of a topic from now on."""
     client = bench.client()
     client.send(op="subscribe", topic=topic, **asked)
@@ -62,7 +62,7 @@ def test_every_topic_has_a_type_of_its_dialect_and_speaks_when_heard(dialect):
         package, _, name = type.partition("/")
         known = bench.client().call("/rosapi/topic_type", {"topic": topic})
         assert known["values"]["type"] == f"{package}/{between}{name}"
-        assert heard(bench, topic), topic
+        assert messages_of(bench, topic), topic
 
 
 def names_of(fields, message):
@@ -72,8 +72,8 @@ def names_of(fields, message):
         if field.fields is not None:
             value = message[field.name]
             for each in value if field.is_array else [value]:
-                more, told = names_of(field.fields, each)
-                known, said = known + more, said + told
+                more, received = names_of(field.fields, each)
+                known, said = known + more, said + received
     return known, said
 
 
@@ -100,9 +100,9 @@ def test_what_a_robot_steers_to_is_told_from_its_base_while_it_follows_a_path(di
     (robot,), (navigator,) = bench.world.robots, bench.world.navigators
     robot.pose = Pose(2.0, 1.5, 0.4)
     topic = "/robot_0/lookahead_point"
-    assert heard(bench, topic) == [], "it goes nowhere"
+    assert messages_of(bench, topic) == [], "it goes nowhere"
     bench.world.send_goal(0, Goal(Pose(8.0, 1.5)))
-    said = heard(bench, topic)[-1]
+    said = messages_of(bench, topic)[-1]
     assert said["header"]["frame_id"] == "robot_0/base_link"
     at = robot.pose @ Pose(said["point"]["x"], said["point"]["y"])
     here, corner = (robot.pose.x, robot.pose.y), navigator.path[1]
@@ -111,7 +111,7 @@ def test_what_a_robot_steers_to_is_told_from_its_base_while_it_follows_a_path(di
     rest = math.dist(here, corner) - 1.5
     assert math.dist((at.x, at.y), corner) == pytest.approx(rest), "on the way there"
     bench.world.stop(0)
-    assert heard(bench, topic) == []
+    assert messages_of(bench, topic) == []
 
 
 def test_nothing_is_worked_out_that_nobody_wants(monkeypatch):
@@ -119,7 +119,7 @@ def test_nothing_is_worked_out_that_nobody_wants(monkeypatch):
     for name in ("window", "whole"):
         monkeypatch.setattr(Costs, name, lambda *_: pytest.fail("costs"))
     monkeypatch.setattr(Belief, "particles", lambda *_: pytest.fail("particles"))
-    heard(bench, "/robot_0/odom")
+    messages_of(bench, "/robot_0/odom")
     assert "costs" not in bench.node._feeds._costmaps.__dict__
 
 
@@ -148,7 +148,7 @@ def test_a_local_costmap_is_around_the_robot_and_grown_about_the_wall(dialect):
         bench.run(0.05)
     bench.run(1)
     assert robot.odometry != robot.pose, "the frame of odometry is not the map's"
-    grid = heard(bench, LOCAL[dialect])[0]
+    grid = messages_of(bench, LOCAL[dialect])[0]
     assert grid["header"]["frame_id"] == "robot_0/odom"
     cells, (x, y) = cells_of(grid), place_of(grid)
     assert cells.shape == (100, 100)
@@ -213,8 +213,8 @@ def test_while_a_robot_stands_only_what_changed_comes(dialect):
 
 def test_who_comes_later_gets_a_whole_costmap_too():
     bench = Bench(robots=1)
-    assert len(heard(bench, LOCAL["ros1"])) == 1
-    assert len(heard(bench, LOCAL["ros1"])) == 1
+    assert len(messages_of(bench, LOCAL["ros1"])) == 1
+    assert len(messages_of(bench, LOCAL["ros1"])) == 1
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -246,7 +246,7 @@ def test_a_whole_costmap_knows_the_others_and_what_is_unknown():
 @pytest.mark.parametrize("compression", ["none", "cbor"])
 def test_a_cloud_holds_walls_with_their_height_and_the_floor(dialect, compression):
     bench = Bench(dialect, robots=1)
-    cloud = heard(bench, "/robot_0/points", compression=compression)[0]
+    cloud = messages_of(bench, "/robot_0/points", compression=compression)[0]
     data = cloud["data"]
     if compression == "none":
         data = base64.b64decode(data, validate=True)
@@ -283,7 +283,7 @@ def test_a_footprint_is_the_base_in_the_frame_of_odometry(dialect):
         "costmap/costmap",
         "costmap/published_footprint" if dialect == "ros2" else "costmap/footprint",
     )
-    message = heard(bench, topic)[-1]
+    message = messages_of(bench, topic)[-1]
     assert message["header"]["frame_id"] == "robot_0/odom"
     points = message["polygon"]["points"]
     ways = [math.hypot(p["x"] - robot.pose.x, p["y"] - robot.pose.y) for p in points]
@@ -294,8 +294,8 @@ def test_a_footprint_is_the_base_in_the_frame_of_odometry(dialect):
 def test_particles_are_spread_as_the_covariance_says(dialect):
     bench = Bench(dialect, robots=1)
     robot = bench.world.robots[0]
-    cloud = heard(bench, "/robot_0/particlecloud")[0]
-    doubtful = heard(bench, "/robot_0/amcl_pose")[0]["pose"]
+    cloud = messages_of(bench, "/robot_0/particlecloud")[0]
+    doubtful = messages_of(bench, "/robot_0/amcl_pose")[0]["pose"]
     assert doubtful["pose"]["position"]["x"] == robot.pose.x
     spots = np.array([[p["position"][k] for k in "xy"] for p in cloud["poses"]])
     assert len(spots) == 150
@@ -325,12 +325,12 @@ def test_a_pose_that_a_person_gives_is_believed_and_mended_on_the_way():
         },
     }
     client.send(op="publish", topic="/robot_0/initialpose", msg=message)
-    said = heard(bench, "/robot_0/amcl_pose")[-1]["pose"]
+    said = messages_of(bench, "/robot_0/amcl_pose")[-1]["pose"]
     assert said["pose"]["position"]["x"] == pytest.approx(given.x)
     assert said["covariance"][0] == pytest.approx(0.25)
     bench.world.send_goal(0, Goal(Pose(8.5 if robot.pose.x < 5 else 1.5, 3.0)))
     bench.run(20)
-    said = heard(bench, "/robot_0/amcl_pose")[-1]["pose"]
+    said = messages_of(bench, "/robot_0/amcl_pose")[-1]["pose"]
     at = said["pose"]["position"]
     assert math.hypot(at["x"] - robot.pose.x, at["y"] - robot.pose.y) < 0.05
     assert said["covariance"][35] == pytest.approx(SURE[2] ** 2, rel=0.2)
@@ -356,16 +356,21 @@ def test_a_sonar_measures_the_wall_and_robots_in_its_cone():
     one, other = bench.world.robots
     one.pose = Pose(2.0, 3.0, math.pi)
     other.pose = Pose(6.0, 3.0)
-    (near, *_) = heard(bench, "/robot_0/sonar")
+    (near, *_) = messages_of(bench, "/robot_0/sonar")
     assert near["range"] == pytest.approx(2.0 - 0.25 - 0.05, abs=0.01)
     one.pose = Pose(4.0, 3.0, 0.0)
-    assert heard(bench, "/robot_0/sonar")[0]["range"] == pytest.approx(1.5, abs=0.01)
+    assert messages_of(bench, "/robot_0/sonar")[0]["range"] == pytest.approx(
+        1.5, abs=0.01
+    )
     other.pose = Pose(4.0, 1.0)
-    binary = heard(bench, "/robot_0/sonar", compression="cbor")
+    binary = messages_of(bench, "/robot_0/sonar", compression="cbor")
     assert binary[0]["range"] == math.inf, "nothing in reach"
-    assert heard(bench, "/robot_0/sonar")[0]["range"] is None, "as JSON has it"
+    assert messages_of(bench, "/robot_0/sonar")[0]["range"] is None, "as JSON has it"
     one.pose = Pose(0.29, 3.0, math.pi)
-    assert heard(bench, "/robot_0/sonar", compression="cbor")[0]["range"] == -math.inf
+    assert (
+        messages_of(bench, "/robot_0/sonar", compression="cbor")[0]["range"]
+        == -math.inf
+    )
 
 
 def test_a_fix_is_where_the_robot_is_on_the_globe():
@@ -374,7 +379,7 @@ def test_a_fix_is_where_the_robot_is_on_the_globe():
 
     bench = Bench(robots=1)
     robot = bench.world.robots[0]
-    fix = heard(bench, "/robot_0/fix")[0]
+    fix = messages_of(bench, "/robot_0/fix")[0]
     east, north = LocalPlane(*DATUM).from_globe(fix["latitude"], fix["longitude"])
     assert (east, north) == pytest.approx((robot.pose.x, robot.pose.y), abs=1e-3)
 
@@ -383,12 +388,12 @@ def test_markers_show_the_goal_and_who_is_seen():
     bench = Bench()
     one, other = bench.world.robots
     one.pose, other.pose = Pose(2, 3), Pose(5, 3)
-    marks = heard(bench, "/robot_0/markers")[-1]["markers"]
+    marks = messages_of(bench, "/robot_0/markers")[-1]["markers"]
     assert [mark["action"] for mark in marks if mark["ns"] == "goal"] == [2, 2]
     (seen,) = [mark for mark in marks if mark["ns"] == "seen"]
     assert seen["pose"]["position"]["x"] == 5
     bench.world.send_goal(0, Goal(Pose(8, 2, 1)))
-    arrow, text, _ = heard(bench, "/robot_0/markers")[-1]["markers"]
+    arrow, text, _ = messages_of(bench, "/robot_0/markers")[-1]["markers"]
     assert (arrow["pose"]["position"]["x"], arrow["action"]) == (8, 0)
     assert text["text"].endswith(" m")
 
@@ -399,7 +404,7 @@ def test_health_and_logs_tell_of_a_low_battery_and_of_a_goal(dialect):
     log = bench.client()
     log.send(op="subscribe", topic="/rosout")
     bench.world.robots[0].charge = 0.2
-    parts = heard(bench, "/diagnostics")[-1]["status"]
+    parts = messages_of(bench, "/diagnostics")[-1]["status"]
     levels = {part["name"]: part["level"] for part in parts}
     # Updaters of ROS 2 leave the namespace of their node out.
     space = "" if dialect == "ros2" else "robot_0/"
@@ -427,6 +432,6 @@ def test_health_and_logs_tell_of_a_low_battery_and_of_a_goal(dialect):
 @pytest.mark.parametrize("part", ["points", "markers", "sonar", "fix", "amcl_pose"])
 def test_what_is_said_can_be_sent_raw_too(dialect, part):
     bench = Bench(dialect, robots=1)
-    (message, *_) = heard(bench, f"/robot_0/{part}", compression="cbor-raw")
+    (message, *_) = messages_of(bench, f"/robot_0/{part}", compression="cbor-raw")
     frame = "map" if part in ("markers", "amcl_pose") else "robot_0/"
     assert frame.encode() in message["bytes"]

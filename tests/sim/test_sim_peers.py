@@ -28,26 +28,30 @@ def told_by(*command):
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_roslibpy_gets_what_it_expects(dialect):
     with running("--dialect", dialect) as url:
-        told = told_by(sys.executable, str(HERE / "roslibpy_client.py"), url, dialect)
+        received = told_by(
+            sys.executable, str(HERE / "roslibpy_client.py"), url, dialect
+        )
     ros2 = dialect == "ros2"
-    assert {"/map", "/robot_0/odom", "/robot_1/base_scan"} <= set(told["topics"])
-    assert told["odom_type"] == (
+    assert {"/map", "/robot_0/odom", "/robot_1/base_scan"} <= set(received["topics"])
+    assert received["odom_type"] == (
         "nav_msgs/msg/Odometry" if ros2 else "nav_msgs/Odometry"
     )
-    assert told["odom_topics"] == ["/robot_0/odom", "/robot_1/odom"]
-    assert {"/robot_0/stop", "/rosapi/topics"} <= set(told["services"])
-    assert told["stop_type"] == ("std_srvs/srv/Trigger" if ros2 else "std_srvs/Trigger")
-    assert "/robots" in told["nodes"]
-    assert "/robot_0/cmd_vel" in told["details"]["subscribing"]
-    assert told["ranges"] == 360
-    assert told["cells"] == 840 * 540
-    assert told["way"] > 0.3
-    assert told["stop"] == {"success": True, "message": "stopped"}
+    assert received["odom_topics"] == ["/robot_0/odom", "/robot_1/odom"]
+    assert {"/robot_0/stop", "/rosapi/topics"} <= set(received["services"])
+    assert received["stop_type"] == (
+        "std_srvs/srv/Trigger" if ros2 else "std_srvs/Trigger"
+    )
+    assert "/robots" in received["nodes"]
+    assert "/robot_0/cmd_vel" in received["details"]["subscribing"]
+    assert received["ranges"] == 360
+    assert received["cells"] == 840 * 540
+    assert received["way"] > 0.3
+    assert received["stop"] == {"success": True, "message": "stopped"}
     if not ros2:
-        assert told["time"]["secs"] > 1_600_000_000
-        assert told["twist"]["typedefs"][0]["fieldnames"] == ["linear", "angular"]
-        assert told["params"] == []
-        assert told["goal"] == 3
+        assert received["time"]["secs"] > 1_600_000_000
+        assert received["twist"]["typedefs"][0]["fieldnames"] == ["linear", "angular"]
+        assert received["params"] == []
+        assert received["goal"] == 3
 
 
 @pytest.mark.parametrize("package", ["roslib", "roslib2"])
@@ -57,27 +61,33 @@ def test_roslib_gets_what_it_expects(dialect, package):
     if node is None or not (ROOT / "node_modules" / package).is_dir():
         pytest.skip(f"needs node, and {package} from npm")
     with running("--dialect", dialect) as url:
-        told = told_by(node, str(HERE / "roslib_client.mjs"), url, dialect, package)
+        received = told_by(node, str(HERE / "roslib_client.mjs"), url, dialect, package)
     ros2 = dialect == "ros2"
     odometry = "nav_msgs/msg/Odometry" if ros2 else "nav_msgs/Odometry"
-    assert told["topics"]["/robot_0/odom"] == odometry
-    assert told["odomType"] == odometry
-    assert told["odomTopics"] == ["/robot_0/odom", "/robot_1/odom"]
-    assert told["stopType"] == ("std_srvs/srv/Trigger" if ros2 else "std_srvs/Trigger")
-    assert {"/robots", "/rosapi"} <= set(told["nodes"])
-    assert "/rosapi/topics" in told["services"]
+    assert received["topics"]["/robot_0/odom"] == odometry
+    assert received["odomType"] == odometry
+    assert received["odomTopics"] == ["/robot_0/odom", "/robot_1/odom"]
+    assert received["stopType"] == (
+        "std_srvs/srv/Trigger" if ros2 else "std_srvs/Trigger"
+    )
+    assert {"/robots", "/rosapi"} <= set(received["nodes"])
+    assert "/rosapi/topics" in received["services"]
     action = "/robot_0/navigate_to_pose" if ros2 else "/robot_0/move_base"
-    assert action in told["actionServers"]
-    assert set(told["ranges"].values()) == {360}
-    assert {"none", "cbor"} <= set(told["ranges"])
-    assert told["cells"] == told["size"][0] * told["size"][1] == 840 * 540
-    before, after = told["before"], told["after"]
+    assert action in received["actionServers"]
+    assert set(received["ranges"].values()) == {360}
+    assert {"none", "cbor"} <= set(received["ranges"])
+    assert received["cells"] == received["size"][0] * received["size"][1] == 840 * 540
+    before, after = received["before"], received["after"]
     assert math.hypot(after["x"] - before["x"], after["y"] - before["y"]) > 0.3
-    assert told["stop"] == {"success": True, "message": "stopped"}
-    assert "does not exist" in told["missing"]
-    assert told["served"] == {"success": True, "message": "from roslib"}
+    assert received["stop"] == {"success": True, "message": "stopped"}
+    assert "does not exist" in received["missing"]
+    assert received["served"] == {"success": True, "message": "from roslib"}
     if not ros2:
-        assert told["twist"][0] if isinstance(told["twist"], list) else told["twist"]
-        assert told["goal"] == 3
+        assert (
+            received["twist"][0]
+            if isinstance(received["twist"], list)
+            else received["twist"]
+        )
+        assert received["goal"] == 3
     elif package == "roslib2":
-        assert told["goal"]["error_code"] == 0
+        assert received["goal"]["error_code"] == 0

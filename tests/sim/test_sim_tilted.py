@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from simulated import Bench
-from test_sim_feeds import heard
+from test_sim_feeds import messages_of
 
 from webmap.base.geometry import Quaternion, Vector3
 from webmap.ros.tf import Transform
@@ -17,7 +17,7 @@ DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 
 def mounted(bench, name) -> Transform:
     """Where a sensor is on its robot, as ``/tf_static`` tells it."""
-    (message,) = heard(bench, "/tf_static", 0.1)
+    (message,) = messages_of(bench, "/tf_static", 0.1)
     for each in message["transforms"]:
         if each["child_frame_id"] == f"robot_0/{name}":
             assert each["header"]["frame_id"] == "robot_0/base_link"
@@ -45,7 +45,7 @@ def to_wall(points) -> np.ndarray:
 @DIALECTS
 def test_a_scan_upside_down_has_its_rays_the_other_way_about(dialect):
     bench = Bench(dialect, robots=1, tilted=True)
-    scan = heard(bench, "/robot_0/base_scan")[-1]
+    scan = messages_of(bench, "/robot_0/base_scan")[-1]
     assert mounted(bench, "base_laser").rotation == Quaternion(1.0, 0.0, 0.0, 0.0)
     turns = scan["angle_min"] + scan["angle_increment"] * np.arange(360)
     rays = [
@@ -61,7 +61,7 @@ def test_a_scan_upside_down_has_its_rays_the_other_way_about(dialect):
 
 def test_the_cloud_of_a_lidar_upside_down_has_the_floor_below():
     bench = Bench(robots=1, tilted=True)
-    cloud = heard(bench, "/robot_0/points", compression="cbor")[-1]
+    cloud = messages_of(bench, "/robot_0/points", compression="cbor")[-1]
     points = np.frombuffer(cloud["data"], POINT)
     there = on_map(bench, "base_laser", zip(*(points[a] for a in "xyz"), strict=True))
     assert there[:, 2].min() == pytest.approx(0.0, abs=1e-3)
@@ -70,7 +70,7 @@ def test_the_cloud_of_a_lidar_upside_down_has_the_floor_below():
 
 def test_the_cloud_of_a_depth_camera_is_in_its_optical_frame():
     bench = Bench(robots=1, tilted=True)
-    cloud = heard(bench, "/robot_0/camera/points", compression="cbor")[-1]
+    cloud = messages_of(bench, "/robot_0/camera/points", compression="cbor")[-1]
     assert cloud["header"]["frame_id"] == "robot_0/camera_optical"
     points = np.frombuffer(cloud["data"], DEPTH)
     assert points["z"].min() > 0.2, "z is forward"

@@ -182,9 +182,11 @@ def command(source, *arguments):
         source.show()
 
     def note(code=0):
-        told = [line for line in out.getvalue().splitlines() if not _LOG.match(line)]
-        told += [f"exit code {code}"] if code else []
-        text = source.names.text("\n".join(told))
+        received = [
+            line for line in out.getvalue().splitlines() if not _LOG.match(line)
+        ]
+        received += [f"exit code {code}"] if code else []
+        text = source.names.text("\n".join(received))
         if text:
             source.parts["said"] = text
 

@@ -6,20 +6,20 @@ network faults, :func:`check_invariants` reports violations in sentences, and a
 """
 
 from webmap.testing.invariants import Bounds, Quiet, check_invariants
-from webmap.testing.log import Heard, Moved, Told, WitnessLog
+from webmap.testing.log import ClientMessage, Moved, ReceivedTwist, WitnessLog
 from webmap.testing.proxy import FaultProxy, Shape
 from webmap.testing.sentinel import Sentinel
 from webmap.testing.witness import WitnessRobot
 
 __all__ = [
     "Bounds",
+    "ClientMessage",
     "FaultProxy",
-    "Heard",
     "Moved",
     "Quiet",
+    "ReceivedTwist",
     "Sentinel",
     "Shape",
-    "Told",
     "WitnessLog",
     "WitnessRobot",
     "check_invariants",

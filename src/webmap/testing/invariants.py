@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from webmap.testing.log import Told
+from webmap.testing.log import ReceivedTwist
 
 BREATH = 0.5
 """Seconds without a velocity that separate two activities."""
@@ -72,7 +72,7 @@ class Story:
 
 
 def check_invariants(
-    log: Sequence[Told],
+    log: Sequence[ReceivedTwist],
     bounds: Bounds | None = None,
     *,
     quiet: Sequence[Quiet] = (),
@@ -104,7 +104,9 @@ def check_invariants(
 Finding = tuple[float, str]
 
 
-def _limits(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+def _limits(
+    log: list[ReceivedTwist], bounds: Bounds, story: Story
+) -> Iterator[Finding]:
     """Every velocity is finite and within the limits."""
     for velocity in log:
         if not velocity.twist.is_finite:
@@ -125,7 +127,7 @@ def _limits(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
             )
 
 
-def _quiet(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+def _quiet(log: list[ReceivedTwist], bounds: Bounds, story: Story) -> Iterator[Finding]:
     """Nothing moves the robot in a quiet period."""
     for quiet in story.quiet:
         moving = [t for t in log if quiet.begin < t.at < quiet.end and not t.is_zero]
@@ -138,7 +140,9 @@ def _quiet(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
             )
 
 
-def _last_is_zero(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+def _last_is_zero(
+    log: list[ReceivedTwist], bounds: Bounds, story: Story
+) -> Iterator[Finding]:
     """The last velocity of every activity is zero.
 
     If the robot was unreachable then, the first velocity that reaches it later is
@@ -160,7 +164,9 @@ def _last_is_zero(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Fin
             yield late[0].at, f"{what} after a cut {is_not} zero"
 
 
-def _handovers(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+def _handovers(
+    log: list[ReceivedTwist], bounds: Bounds, story: Story
+) -> Iterator[Finding]:
     """There is a zero between two operators."""
     for at in story.handovers:
         before = [t for t in log if t.at <= at]
@@ -171,7 +177,9 @@ def _handovers(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Findin
             yield after[0].at, "another driver began without a zero in between"
 
 
-def _silence(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+def _silence(
+    log: list[ReceivedTwist], bounds: Bounds, story: Story
+) -> Iterator[Finding]:
     """Zeros end after a limited time, so that other programs can publish."""
     begun = -math.inf
     was_moving = True
@@ -188,7 +196,7 @@ def _silence(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]
             return
 
 
-def _ramp(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
+def _ramp(log: list[ReceivedTwist], bounds: Bounds, story: Story) -> Iterator[Finding]:
     """Speeding up is within the acceleration; slowing down is not limited."""
     if bounds.a_max is None:
         return
@@ -204,7 +212,7 @@ def _ramp(log: list[Told], bounds: Bounds, story: Story) -> Iterator[Finding]:
         before, at = velocity.speed, velocity.at
 
 
-RULES: tuple[Callable[[list[Told], Bounds, Story], Iterator[Finding]], ...] = (
+RULES: tuple[Callable[[list[ReceivedTwist], Bounds, Story], Iterator[Finding]], ...] = (
     _limits,
     _quiet,
     _last_is_zero,

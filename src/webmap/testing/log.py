@@ -9,7 +9,7 @@ from webmap.base.geometry import Twist
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class ClientMessage:
     """One message of a client."""
 
     at: float
@@ -32,7 +32,7 @@ class Heard:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class ReceivedTwist:
     """One velocity that the robot received."""
 
     at: float
@@ -64,25 +64,27 @@ class Moved:
 class WitnessLog:
     """All records of a witness, oldest first; may be read while it grows."""
 
-    heard: list[Heard] = field(default_factory=list)
-    told: list[Told] = field(default_factory=list)
+    messages: list[ClientMessage] = field(default_factory=list)
+    twists: list[ReceivedTwist] = field(default_factory=list)
     moved: list[Moved] = field(default_factory=list)
 
-    def of(self, op: str, topic: str | None = None) -> list[Heard]:
+    def of(self, op: str, topic: str | None = None) -> list[ClientMessage]:
         """Return the messages with an operation, and with a topic if given."""
         return [
             message
-            for message in list(self.heard)
+            for message in list(self.messages)
             if message.op == op and topic in (None, message.topic)
         ]
 
     def first_zero(self, since: float) -> float | None:
         """Return the time of the first zero after ``since``."""
-        return next((t.at for t in _from(self.told, since) if t.is_zero), None)
+        return next((t.at for t in _from(self.twists, since) if t.is_zero), None)
 
-    def moving_since(self, since: float, until: float = math.inf) -> list[Told]:
+    def moving_since(
+        self, since: float, until: float = math.inf
+    ) -> list[ReceivedTwist]:
         """Return the nonzero velocities of a period."""
-        return [t for t in _from(self.told, since) if t.at < until and not t.is_zero]
+        return [t for t in _from(self.twists, since) if t.at < until and not t.is_zero]
 
     def standstill(self, since: float, slow: float = 0.01) -> float | None:
         """Return when the wheels came to rest after ``since`` and stayed at rest.
@@ -101,7 +103,7 @@ class WitnessLog:
         return rest
 
 
-Record = TypeVar("Record", Told, Moved)
+Record = TypeVar("Record", ReceivedTwist, Moved)
 
 
 def _from(records: list[Record], since: float) -> list[Record]:

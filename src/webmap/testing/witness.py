@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 
 from webmap.base.geometry import Pose, Twist
 from webmap.sim.robot import BaseOptions, Robot
-from webmap.testing.log import Heard, Moved, Told, WitnessLog
+from webmap.testing.log import ClientMessage, Moved, ReceivedTwist, WitnessLog
 from webmap.testing.loop_thread import LoopThread
 
 OnMessage = Callable[[int, dict[str, Any]], None]
@@ -262,11 +262,11 @@ class WitnessRobot:
 
     def _on_message(self, link: int, message: dict[str, Any]) -> None:
         now = time.monotonic()
-        self.log.heard.append(Heard(now, link, message))
+        self.log.messages.append(ClientMessage(now, link, message))
         if message.get("op") != "publish" or message.get("topic") != self.TWIST_TOPIC:
             return
         twist = _twist(message.get("msg"))
-        self.log.told.append(Told(now, twist, link))
+        self.log.twists.append(ReceivedTwist(now, twist, link))
         if self.obeys:
             self._base.command(twist, now)
 

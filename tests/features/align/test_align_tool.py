@@ -20,10 +20,10 @@ NAME = "ws://test:9090 Bob"
 
 
 class Saying(Channel):
-    """Notes what browser parts are told."""
+    """Keeps the messages to the browser parts."""
 
     def send(self, instance, message):
-        self.__dict__.setdefault("told", []).append(message)
+        self.__dict__.setdefault("received", []).append(message)
 
 
 @pytest.fixture
@@ -51,8 +51,8 @@ def tool(map, robot, store):
 
 
 def answer(channel, key):
-    (said,) = [message[key] for message in channel.told if key in message]
-    channel.told.clear()
+    (said,) = [message[key] for message in channel.received if key in message]
+    channel.received.clear()
     return said
 
 
@@ -73,15 +73,19 @@ def test_the_page_is_told_what_there_is_to_align(tool, robot, channel, link):
     tool.map.add_robot(ann)
     align_bridge(link, 3.0, 0.0, 90.0)
     tool.on_message({"begin": robot.id})
-    told = answer(channel, "align")
-    assert (told["robot"], told["name"], told["whole"]) == (robot.id, "Bob", True)
-    assert told["together"] == [robot.id, ann.id]
-    assert told["own"] == told["common"] == (3.0, 0.0, 90.0)
-    assert told["mark"] == alignments.mark(link)
+    received = answer(channel, "align")
+    assert (received["robot"], received["name"], received["whole"]) == (
+        robot.id,
+        "Bob",
+        True,
+    )
+    assert received["together"] == [robot.id, ann.id]
+    assert received["own"] == received["common"] == (3.0, 0.0, 90.0)
+    assert received["mark"] == alignments.mark(link)
     ann.set_alignment(0.0, 0.0, 0.0)
     tool.on_message({"begin": ann.id})
-    told = answer(channel, "align")
-    assert (told["whole"], told["own"]) == (False, (0.0, 0.0, 0.0))
+    received = answer(channel, "align")
+    assert (received["whole"], received["own"]) == (False, (0.0, 0.0, 0.0))
     ann.destroy()
 
 

@@ -37,7 +37,7 @@ SCREEN = """([x, y]) => {
 @contextmanager
 def hearing_goals(url: str) -> Iterator[list[dict]]:
     """Hear the goals that the robot is sent, as the robot does."""
-    heard: list[dict] = []
+    received: list[dict] = []
     over = threading.Event()
 
     def listen() -> None:
@@ -46,14 +46,14 @@ def hearing_goals(url: str) -> Iterator[list[dict]]:
             link.send(json.dumps({"op": "subscribe", "topic": GOAL, "type": kind}))
             while not over.is_set():
                 try:
-                    heard.append(json.loads(link.recv(timeout=0.1))["msg"]["pose"])
+                    received.append(json.loads(link.recv(timeout=0.1))["msg"]["pose"])
                 except TimeoutError:
                     continue
 
     thread = threading.Thread(target=listen)
     thread.start()
     try:
-        yield heard
+        yield received
     finally:
         over.set()
         thread.join(10)

@@ -48,14 +48,14 @@ def test_pictures_are_asked_for_while_somebody_watches_and_once_for_all(link, ro
 @pytest.mark.parametrize("cbor", [False, True])
 def test_a_compressed_picture_is_shown_as_it_is(link, robot, cbor):
     camera = robot.add_module(Camera, link, TOPIC)
-    told = []
-    camera.watch(lambda: told.append(camera.url))
+    received = []
+    camera.watch(lambda: received.append(camera.url))
     data = a_jpeg()
     message = compressed(data)
     if cbor:
         message["data"] = data
     link.say(TOPIC, message, cbor=cbor)
-    assert told == [camera.url]
+    assert received == [camera.url]
     picture = pictures.get(camera.url.rpartition("/")[2])
     assert picture == (data, "image/jpeg", True)
     assert link.options[TOPIC]["throttle"] == 200

@@ -279,8 +279,8 @@ def test_a_press_on_a_label_sends_the_selected_robot_there(chromium, serve, brid
         expect(word).to_have_text("Goal sent to Äpfel <b>.")
         expect(tab.locator(".robot.selected")).to_have_count(1)
         deadline = time.monotonic() + 10
-        while not node.heard and time.monotonic() < deadline:
+        while not node.received and time.monotonic() < deadline:
             tab.wait_for_timeout(20)
-        ((_, message),) = node.heard
+        ((_, message),) = node.received
         position = message["pose"]["position"]
         assert (position["x"], position["y"]) == pytest.approx((3.0, 2.0))

@@ -122,9 +122,9 @@ def test_the_trail_of_a_robot_lies_behind_it(link, bob):
 @pytest.mark.parametrize("map_frame", [None, "map"])
 def test_a_robots_own_grids_and_markers_lie_as_it_is_aligned(map, link, bob, map_frame):
     map.add_robot(bob)
-    told = {"map_frame": map_frame}
-    bob.add_module("OnMaps", "OccupancyGrid", link, "/bob/costmap", **told)
-    bob.add_module("OnMaps", "Markers", link, "/bob/markers", **told)
+    received = {"map_frame": map_frame}
+    bob.add_module("OnMaps", "OccupancyGrid", link, "/bob/costmap", **received)
+    bob.add_module("OnMaps", "Markers", link, "/bob/markers", **received)
     map.add_module("OccupancyGrid", link, "/map")
     costmap, markers, common = (
         next(m.layer for m in map.modules if getattr(m, "layer", link).topic == topic)

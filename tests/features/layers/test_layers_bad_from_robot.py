@@ -352,9 +352,9 @@ def test_what_makes_no_sense_is_said_once_and_disturbs_nothing(map, channel, nam
         await scene.say_good(1, 2.0)
         after = await scene.say_good(0, 2.0)
         assert all(after[t] != mine[t] for t in GOOD), "all goes on, the link too"
-        for told in (scene.errors, scene.said):
-            found = [line for line in told if said in line]
-            assert len(found) == len(told) <= 1, "three times the same is said once"
+        for received in (scene.errors, scene.said):
+            found = [line for line in received if said in line]
+            assert len(found) == len(received) <= 1, "three times the same is said once"
         (line,) = scene.errors
         assert (topic or "sent ") in line, "people read where it came from"
         assert "Ann" not in line

@@ -22,7 +22,7 @@ def grid(cells, resolution=0.5, origin=None, *, ros2=False, **info) -> dict:
     """A message; ``cells`` has its lowest row first."""
     cells = np.asarray(cells, np.int8)
     height, width = cells.shape
-    told = {
+    received = {
         "map_load_time": header(ros2=ros2)["stamp"],
         "resolution": resolution,
         "width": width,
@@ -30,7 +30,11 @@ def grid(cells, resolution=0.5, origin=None, *, ros2=False, **info) -> dict:
         "origin": origin or pose(0, 0),
         **info,
     }
-    return {"header": header(ros2=ros2), "info": told, "data": cells.ravel().tolist()}
+    return {
+        "header": header(ros2=ros2),
+        "info": received,
+        "data": cells.ravel().tolist(),
+    }
 
 
 def update(x, y, cells) -> dict:

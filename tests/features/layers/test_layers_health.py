@@ -217,18 +217,18 @@ def test_there_is_an_end_to_the_number_of_parts(link, module, robot, monkeypatch
 
 
 def test_others_are_told_and_the_badge_goes_with_the_module(link, robot, module):
-    heard = []
+    received = []
 
     class Listener:
         def __init__(self, robot) -> None:
             pass
 
         def on_diagnostics_update(self, diagnostics):
-            heard.append(diagnostics.level)
+            received.append(diagnostics.level)
 
     robot.add_module(Listener)
     link.say("/diagnostics", array(status("a", 1)))
-    assert heard == ["warn"]
+    assert received == ["warn"]
     robot.remove_module(module)
     assert module.svg.parent is None
     assert link.listeners == {}

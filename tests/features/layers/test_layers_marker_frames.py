@@ -134,8 +134,8 @@ def test_who_wants_no_frames_gets_markers_as_they_come(map, link):
 def test_markers_of_one_of_many_robots_go_by_that_ones_frames(map, link):
     layer = map.add_module("Markers", link, "/markers", namespace="/r1").layer
     say(link, cube(1, "odom", locked=True))
-    told = transform("map", "odom", 4.0, 0.0, 0.0, 100.0)
-    link.say("/r1/tf", {"transforms": [told]})
+    received = transform("map", "odom", 4.0, 0.0, 0.0, 100.0)
+    link.say("/r1/tf", {"transforms": [received]})
     say(link, cube(1, "odom", locked=True))
     assert middle(layer, 1) == pytest.approx((5.0, 0.0))
 

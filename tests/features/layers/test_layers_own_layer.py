@@ -173,8 +173,8 @@ def test_nonsense_is_a_problem_that_is_logged_once_and_the_last_one_stays(
     assert to_root(module.text) == before
     (problem,) = robot.problems.values()
     assert said in problem
-    told = [each for each in caplog.records if said in each.getMessage()]
-    assert len(told) == 1
+    received = [each for each in caplog.records if said in each.getMessage()]
+    assert len(received) == 1
     link.say("/bob/temp", degrees(22))
     assert robot.problems == {}
 

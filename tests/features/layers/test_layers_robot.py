@@ -155,20 +155,20 @@ def test_a_percentage_that_none_can_be_is_said_until_one_comes_that_can(wrong):
     ("percentage", "charge"), [(0.5, 0.5), (None, None), (80.0, 0.8), (-1.0, None)]
 )
 def test_a_battery_that_does_not_know_its_charge_says_so(percentage, charge):
-    heard = []
+    received = []
 
     class Listener:
         def __init__(self, robot) -> None:
             pass
 
         def on_battery_update(self, battery):
-            heard.append(battery.charge)
+            received.append(battery.charge)
 
     link, robot = Link(), Robot("Bob")
     robot.add_module(Listener)
     robot.add_module("Battery", link, "/battery")
     say_percentages(link, percentage)
-    assert heard == [charge]
+    assert received == [charge]
 
 
 def test_plain_data_with_modules_makes_them():

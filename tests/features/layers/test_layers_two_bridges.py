@@ -42,7 +42,7 @@ def test_a_scan_of_one_bridge_is_drawn_where_the_poses_of_another_have_the_robot
         map.add_robot(robot)
 
         def subscribed(there: WitnessRobot) -> set[str]:
-            said = [heard.message for heard in there.log.heard]
+            said = [received.message for received in there.log.messages]
             return {m["topic"] for m in said if m["op"] == "subscribe"}
 
         for bridge in (by_odometry, by_scan):

@@ -118,19 +118,19 @@ def test_what_a_removed_path_complained_of_is_forgotten(link, robot):
 
 
 def test_a_path_tells_the_other_modules_of_its_robot(link, robot):
-    heard = []
+    received = []
 
     class Listener:
         def __init__(self, robot) -> None:
             pass
 
         def on_path_update(self, path):
-            heard.append(path.length)
+            received.append(path.length)
 
     robot.add_module(Listener)
     robot.add_module("Path", link, "/plan")
     link.say("/plan", path([(0, 0), (0, 3)]))
-    assert heard == [3.0]
+    assert received == [3.0]
 
 
 def test_a_trail_is_where_the_robot_was(link, robot):

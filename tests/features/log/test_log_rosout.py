@@ -73,19 +73,19 @@ def test_a_page_shows_the_newest_lines_as_text_until_it_ends(link, robot):
 
 
 def test_a_line_without_an_end_is_cut_and_others_are_told(link, robot):
-    heard = []
+    received = []
 
     class Listener:
         def __init__(self, robot) -> None:
             pass
 
         def on_rosout(self, line):
-            heard.append(len(line.text))
+            received.append(len(line.text))
 
     robot.add_module(Listener)
     robot.add_module("Rosout", link)
     link.say("/rosout", log("error", "x" * 1_000_000))
-    assert heard == [2000]
+    assert received == [2000]
 
 
 @pytest.mark.parametrize("options", [{"level": "loud"}, {"lines": 0}])

@@ -21,13 +21,13 @@ class LogLink:
 
     def subscribe(self, topic, callback, type=None, *, decode, queue_length):
         assert (topic, type) == ("/rosout", None)
-        heard = (callback, decode)
-        self.listeners.append(heard)
+        received = (callback, decode)
+        self.listeners.append(received)
         link = self
 
         class Subscription:
             def remove(self):
-                link.listeners.remove(heard)
+                link.listeners.remove(received)
 
         return Subscription()
 

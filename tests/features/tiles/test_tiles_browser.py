@@ -34,8 +34,8 @@ def tiles(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def url(tiles: Path) -> Iterator[str]:
-    told = {"PYTHONPATH": str(HERE), "TILES": str(tiles)}
-    with page_of(HERE / "scene_of_tiles.py", **told) as found:
+    received = {"PYTHONPATH": str(HERE), "TILES": str(tiles)}
+    with page_of(HERE / "scene_of_tiles.py", **received) as found:
         yield found
 
 

@@ -351,7 +351,7 @@ def test_one_that_turned_goes_on_turning():
 
 
 @pytest.mark.parametrize(
-    "told",
+    "received",
     [
         [(10.0, 0.0, 0.0)],  # once only
         [(10.0, 0.0, 0.0), (10.1, 3.0, 0.0)],  # it leapt
@@ -360,11 +360,11 @@ def test_one_that_turned_goes_on_turning():
         [(10.09, 2.99, 0.0), (10.1, 3.0, 0.0)],  # too close together to tell
     ],
 )
-def test_what_does_not_tell_how_it_goes_on_stays(told):
+def test_what_does_not_tell_how_it_goes_on_stays(received):
     buffer = Buffer()
-    for stamp, x, yaw in told:
+    for stamp, x, yaw in received:
         buffer.add("odom", "base", at(x, 0.0, yaw), stamp)
-    stamp, x, _ = told[-1]
+    stamp, x, _ = received[-1]
     assert place(buffer.lookup("odom", "base", stamp + 0.1, ahead=0.2)) == (x, 0.0)
 
 

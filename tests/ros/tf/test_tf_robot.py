@@ -33,9 +33,9 @@ class Link:
         return Removal(lambda: self.subscribed.remove(entry))
 
     def say(self, topic, message):
-        heard = [entry for entry in self.subscribed if entry[0] == topic]
-        assert heard, f"nobody listens to {topic}"
-        for _, callback, decode in heard:
+        received = [entry for entry in self.subscribed if entry[0] == topic]
+        assert received, f"nobody listens to {topic}"
+        for _, callback, decode in received:
             callback(msgspec.convert(message, decode, strict=False))
 
 

@@ -54,25 +54,25 @@ def test_many_messages_in_a_row_are_told_of_at_once_and_then_together(monkeypatc
 
     async def scenario() -> None:
         link = OpenLink()
-        told = []
-        held = frames_of(link).join(lambda: told.append(time.monotonic()))
+        received = []
+        held = frames_of(link).join(lambda: received.append(time.monotonic()))
         robot = Robot("Bob")
         robot.set_tf(link)
         await asyncio.sleep(0.0)
         link.say("/tf", moved(0.0, 10.0))
-        assert (len(told), robot.position.x) == (1, 0.0)
+        assert (len(received), robot.position.x) == (1, 0.0)
         for step in range(1, 11):
             link.say("/tf", moved(step, 10.0 + step / 100))
-        heard = time.monotonic()
-        assert len(told) == 1
-        await until(lambda: len(told) == 2)
+        seen = time.monotonic()
+        assert len(received) == 1
+        await until(lambda: len(received) == 2)
         assert robot.position.x == 10.0, "the newest"
-        assert told[1] - told[0] >= 0.29
-        assert robot.pose_stamp <= heard, "it is as old as it is"
+        assert received[1] - received[0] >= 0.29
+        assert robot.pose_stamp <= seen, "it is as old as it is"
         await asyncio.sleep(0.35)
-        assert len(told) == 2, "there was nothing more"
+        assert len(received) == 2, "there was nothing more"
         link.say("/tf", moved(11.0, 11.0))
-        assert (len(told), robot.position.x) == (3, 11.0), "not held back"
+        assert (len(received), robot.position.x) == (3, 11.0), "not held back"
         robot.destroy()
         held.remove()
 
@@ -88,8 +88,8 @@ def test_robots_of_frames_alone_are_shown_twenty_times_a_second(robots):
         fleet = [Robot(f"r{number}", base_link="base_link") for number in range(robots)]
         for robot in fleet:
             robot.set_tf(link)
-        told, taken = [], []
-        held = frames_of(link).join(lambda: told.append(1))
+        received, taken = [], []
+        held = frames_of(link).join(lambda: received.append(1))
         last, began = None, time.monotonic()
         for step in range(100):
             link.say("/tf", moved(step, 10.0 + step / 100))
@@ -97,8 +97,8 @@ def test_robots_of_frames_alone_are_shown_twenty_times_a_second(robots):
                 last = fleet[-1].position.x
                 taken.append(last)
             await asyncio.sleep(0.01)
-        assert len(told) <= 3 + (time.monotonic() - began) / PERIOD
-        assert len(taken) >= 0.8 * len(told)
+        assert len(received) <= 3 + (time.monotonic() - began) / PERIOD
+        assert len(taken) >= 0.8 * len(received)
         for robot in fleet:
             robot.destroy()
         held.remove()

@@ -223,9 +223,9 @@ def test_only_events_that_somebody_hears_come_through():
     mount = session.mount(Fragment(html.div(button, other)), under=0)
     assert session.receive(event(mount, button)) == []
     removal = button.on("click", print)
-    (heard,) = session.receive(event(mount, button))
-    assert isinstance(heard, ElementEvent)
-    assert session.element(mount, heard.element) is button
+    (seen,) = session.receive(event(mount, button))
+    assert isinstance(seen, ElementEvent)
+    assert session.element(mount, seen.element) is button
     assert session.receive(event(mount, other)) == []
     assert session.receive(event(mount + 1, button)) == []
     assert session.receive(event(mount, button, "keydown")) == []
@@ -253,13 +253,13 @@ def test_reported_operations_are_not_told_again():
     for x in (1.5, 2.5, 3.5):
         session.view(root.id, "translate", x, 0)
     session.frame(0.0)
-    (heard,) = session.receive(report(root, applied=2, a=42.25))
-    assert isinstance(heard, ViewReport)
+    (seen,) = session.receive(report(root, applied=2, a=42.25))
+    assert isinstance(seen, ViewReport)
     session.restart()
     again = session.frame(0.0)
     assert struct.pack("<d", 42.25) in again
-    told = [x for x in (1.5, 2.5, 3.5) if struct.pack("<dd", x, 0) in again]
-    assert told == [3.5]
+    received = [x for x in (1.5, 2.5, 3.5) if struct.pack("<dd", x, 0) in again]
+    assert received == [3.5]
 
 
 def test_operations_of_a_page_that_looks_away_are_bounded():
@@ -340,9 +340,9 @@ def test_a_page_that_was_loaded_again_is_told_what_is_not_mended():
     session.frame(0.0)
     session.restart()
     again = session.frame(0.0)
-    told = [number for number in range(200) if b"number %d." % number in again]
-    assert len(told) == PendingRecords.PROBLEMS_KEPT - 1
-    assert told == list(range(100, 199))
+    received = [number for number in range(200) if b"number %d." % number in again]
+    assert len(received) == PendingRecords.PROBLEMS_KEPT - 1
+    assert received == list(range(100, 199))
 
 
 def test_problems_for_a_page_that_looks_away_are_bounded_and_none_is_lost():
@@ -385,6 +385,6 @@ def test_a_page_that_was_loaded_again_is_told_the_newest_notices_again():
     session.frame(0.0)
     session.restart()
     again = session.frame(0.0)
-    told = [number for number in range(7) if b"number %d" % number in again]
-    assert told == [2, 3, 4, 5, 6]
+    received = [number for number in range(7) if b"number %d" % number in again]
+    assert received == [2, 3, 4, 5, 6]
     assert again.count(b"number 3") == 1
