@@ -3,7 +3,7 @@
 import re
 import time
 
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 READY = """async () => {
   const { page } = await import(document.querySelector("script[type=module]").src);
@@ -62,3 +62,46 @@ def send_away(page: Page) -> None:
         else:
             return
     raise AssertionError(page.locator("#card").inner_text())
+
+
+def select(page: Page, name: str) -> None:
+    page.locator("#robots .row", has_text=name).locator("button").first.click()
+    expect(page.locator("#card h2")).to_have_text(name)
+
+
+def title(page: Page):
+    return page.locator(".webmap-teleop-title")
+
+
+def shown_state(page: Page):
+    return page.locator("#card .state span:not(.old):visible").first
+
+
+def same_word(page: Page, word: str | re.Pattern, patience: float = 15.0) -> None:
+    """The bar, the card and the list have the same words for the selected robot."""
+    line = page.locator("#robots .row:has([aria-pressed=true]) .state span:visible")
+    for where in (title(page), shown_state(page), line.first):
+        expect(where).to_have_text(word, timeout=patience * 1000)
+
+
+COVERED = """(e, reach) => {
+  const box = e.getBoundingClientRect();
+  const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+  const [across, down] = [reach * box.width / 2, reach * box.height / 2];
+  return [[0, 0], [across, 0], [-across, 0], [0, down], [0, -down]]
+    .map(([dx, dy]) => document.elementFromPoint(x + dx, y + dy))
+    .filter((hit) => hit === null || !e.contains(hit))
+    .map((hit) => hit?.outerHTML.slice(0, 80) ?? "nothing");
+}"""
+"""What is hit in place of an element, at its middle and near its four edges."""
+
+
+def assert_free(what: Locator, reach: float = 0.9) -> None:
+    """See that nothing lies over a thing."""
+    expect(what).to_be_in_viewport(ratio=0.99)
+    for _ in range(20):  # what was opened just now may still be laid out
+        covered = what.evaluate(COVERED, reach)
+        if not covered:
+            return
+        what.page.wait_for_timeout(100)
+    raise AssertionError(covered)

@@ -10,7 +10,7 @@ function driveWith(report) {
   return { asked, robots, stopTest: (robot) => asked.push(robot) };
 }
 
-test("two deliberate presses test the stop of a robot", () => {
+test("two separate presses start the stop test of a robot", () => {
   const drive = driveWith({});
   const button = new StopTestButton(drive);
   assert.equal(button.state("r1", 0), "ready");
@@ -22,7 +22,7 @@ test("two deliberate presses test the stop of a robot", () => {
   assert.equal(button.state("r1", 600), "ready");
 });
 
-test("a double click tests nothing, nor does a press long after the first", () => {
+test("a double click and a press long after the first start no stop test", () => {
   const drive = driveWith({});
   const button = new StopTestButton(drive);
   button.press("r1", 0);
@@ -31,7 +31,7 @@ test("a double click tests nothing, nor does a press long after the first", () =
   assert.deepEqual(drive.asked, []);
 });
 
-test("a first press on one robot is none on another", () => {
+test("a press on another robot does not count as the second press", () => {
   const drive = driveWith({});
   drive.robots.set("r2", { robot: "r2", mine: true });
   const button = new StopTestButton(drive);
@@ -40,7 +40,7 @@ test("a first press on one robot is none on another", () => {
   assert.deepEqual(drive.asked, []);
 });
 
-test("a robot whose stop is stated, or was tested, is tested again", () => {
+test("a robot with a stated or tested command timeout can be tested again", () => {
   for (const known of [
     { stop_time: 0.25, stop_source: "stated" },
     { stop_time: 0.3, stop_source: "tested", test: { state: "done", text: "" } },
@@ -53,7 +53,7 @@ test("a robot whose stop is stated, or was tested, is tested again", () => {
   }
 });
 
-test("what this page does not hold it does not test", () => {
+test("a page without control of the robot starts no stop test", () => {
   const drive = driveWith({ mine: false });
   const button = new StopTestButton(drive);
   assert.equal(button.state("r1", 0), "take");
@@ -62,7 +62,7 @@ test("what this page does not hold it does not test", () => {
   assert.deepEqual(drive.asked, []);
 });
 
-test("a test that goes on is said, and a robot that nobody drives has no test", () => {
+test("a running stop test is shown, and an unknown robot has no stop test", () => {
   const drive = driveWith({ test: { state: "waiting", text: "" } });
   const button = new StopTestButton(drive);
   assert.equal(button.state("r1", 0), "running");

@@ -45,7 +45,7 @@ def open_all(page: Page, selector: str, *, on: bool = True) -> None:
     )
 
 
-def test_twelve_states_have_no_violation(open_console):
+def test_twelve_states_of_the_console_have_no_accessibility_violation(open_console):
     page = open_console()
     open_console.allowed.append(OF_AXE)
     looker = Looker(page)
@@ -93,7 +93,7 @@ def test_twelve_states_have_no_violation(open_console):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_phone_has_no_violation(open_console, scheme):
+def test_the_console_on_a_phone_has_no_accessibility_violation(open_console, scheme):
     page = open_console("phone", scheme)
     open_console.allowed.append(OF_AXE)
     looker = Looker(page)
@@ -106,7 +106,7 @@ def test_a_phone_has_no_violation(open_console, scheme):
     assert looker.found == []
 
 
-def test_the_accessible_name_of_a_robot_has_its_battery(open_console):
+def test_the_accessible_name_of_a_robot_contains_its_battery(open_console):
     page = open_console()
     line = page.get_by_role("button", name="Robot 1").first
     expect(line).to_have_accessible_name(re.compile(r"battery \d+ %"))

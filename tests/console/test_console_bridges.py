@@ -46,5 +46,5 @@ def test_a_bridge_is_open_late_connecting_or_lost(bridge, link, text):
         (["open", "late", "lost"], "2 of 3 bridges open, 1 late"),
     ],
 )
-def test_all_bridges_are_summed_up_in_a_few_words(links, text):
+def test_the_states_of_all_bridges_are_summarized_in_one_text(links, text):
     assert summary(links) == text

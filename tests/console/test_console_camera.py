@@ -153,7 +153,7 @@ def hold_w(page: Page) -> None:
     hold(page.keyboard, "w", lambda: sent(page).text_content() != "0.00")
 
 
-def test_a_camera_of_the_card_is_shown_large_and_goes_on(open_page, camera):
+def test_a_camera_of_the_card_opens_large_with_live_pictures(open_page, camera):
     page = open_page()
     panel = large(page)
     expect(panel.get_by_role("heading")).to_have_text("Bob: Front")
@@ -179,7 +179,9 @@ def test_a_camera_of_the_card_is_shown_large_and_goes_on(open_page, camera):
     expect(page.locator("#card .camera-small", has_text="Rear")).to_be_focused()
 
 
-def test_it_floats_within_the_map_and_its_place_and_camera_are_kept(open_page):
+def test_a_floating_camera_panel_stays_on_the_map_and_is_restored_by_a_reload(
+    open_page,
+):
     page = open_page()
     panel = large(page, "Rear")
     panel.get_by_role("button", name="Over the map").click()
@@ -213,7 +215,9 @@ def can_be_pressed(what) -> None:
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (390, 844), (844, 390), (320, 568)])
-def test_wherever_it_is_neither_stop_nor_the_stick_is_covered(open_page, size):
+def test_the_camera_panel_covers_neither_stop_nor_the_stick_at_any_place(
+    open_page, size
+):
     if size == (1280, 800):
         page = open_page()
         docks = ["Beside", "Above or below", "Over the map", "Over the map"]
@@ -261,7 +265,7 @@ def test_a_driven_robot_stops_when_its_camera_freezes(open_page, camera):
     page.keyboard.up("w")
 
 
-def test_many_viewers_are_one_pull(open_page, camera):
+def test_two_viewers_of_a_camera_share_one_stream(open_page, camera):
     def pulls():
         return len([asked for asked in camera.asked if "/stream" in asked])
 

@@ -62,7 +62,7 @@ def said(map):
     return map.page.channel.sent
 
 
-def test_the_page_hears_of_the_cameras_of_the_selected_robot(map, robot, panel, said):
+def test_the_page_receives_the_cameras_of_the_selected_robot(map, robot, panel, said):
     front = robot.add_module(Feed, "Front")
     map.set_selected(robot)
     assert said[-1]["cameras"] == [{"id": camera_number(front), "name": "Front"}]
@@ -71,7 +71,7 @@ def test_the_page_hears_of_the_cameras_of_the_selected_robot(map, robot, panel, 
     assert said[-1]["cameras"] == []
 
 
-def test_a_camera_that_comes_or_goes_later_is_told(map, robot, panel, said):
+def test_the_page_receives_cameras_added_or_removed_later(map, robot, panel, said):
     map.set_selected(robot)
     panel.poll()
     received = len(said)
@@ -85,7 +85,7 @@ def test_a_camera_that_comes_or_goes_later_is_told(map, robot, panel, said):
     assert said[-1]["cameras"] == []
 
 
-def test_pictures_are_sent_of_the_camera_that_is_looked_at(map, robot, panel, said):
+def test_pictures_are_sent_of_the_watched_camera(map, robot, panel, said):
     front, rear = robot.add_module(Feed, "Front"), robot.add_module(Feed, "Rear")
     map.set_selected(robot)
     panel.on_message({"op": "watch", "camera": camera_number(front)})
@@ -104,7 +104,7 @@ def test_pictures_are_sent_of_the_camera_that_is_looked_at(map, robot, panel, sa
     assert not rear.watched
 
 
-def test_a_page_gets_no_camera_that_it_was_not_told_of(map, robot, panel):
+def test_a_page_cannot_watch_a_camera_with_a_foreign_or_invalid_id(map, robot, panel):
     front = robot.add_module(Feed, "Front")
     elsewhere = Robot("Al")
     other = elsewhere.add_module(Feed, "Front")
@@ -119,7 +119,9 @@ def test_a_page_gets_no_camera_that_it_was_not_told_of(map, robot, panel):
     elsewhere.destroy()
 
 
-def test_nobody_is_watched_once_the_page_or_the_selection_is_gone(map, robot, panel):
+def test_a_camera_is_not_watched_after_deselection_or_removal_of_the_panel(
+    map, robot, panel
+):
     front = robot.add_module(Feed, "Front")
     for leave in (lambda: map.set_selected(None), lambda: map.remove_module(panel)):
         map.set_selected(robot)
@@ -129,7 +131,7 @@ def test_nobody_is_watched_once_the_page_or_the_selection_is_gone(map, robot, pa
         assert not front.watched
 
 
-def test_a_camera_that_comes_later_is_on_the_card_too(robot):
+def test_a_camera_added_later_is_also_on_the_card(robot):
     views = CameraViews()
     views.show(robot)
     assert len(views.element.children) == 0

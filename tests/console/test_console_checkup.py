@@ -17,7 +17,7 @@ async def until(condition):
             await asyncio.sleep(0.005)
 
 
-def test_however_many_ask_there_is_one_look_at_a_time():
+def test_only_one_check_of_a_bridge_runs_at_a_time():
     asked, go_on = [], asyncio.Event()
 
     async def observe(url, *, seconds, configured, progress):
@@ -48,7 +48,7 @@ def test_however_many_ask_there_is_one_look_at_a_time():
     asyncio.run(run())
 
 
-def test_a_check_that_fails_itself_is_said_and_can_be_made_again(caplog):
+def test_a_check_that_raises_is_shown_as_a_finding_and_can_be_repeated(caplog):
     async def observe(url, *, seconds, configured, progress):
         raise RuntimeError("broken")
 
@@ -72,19 +72,19 @@ def test_a_check_that_fails_itself_is_said_and_can_be_made_again(caplog):
         (["good", "wrong", "warning", "warning"], "1 wrong, 2 warnings, 1 good"),
     ],
 )
-def test_findings_are_counted_in_words(levels, words):
+def test_the_summary_counts_the_findings_of_each_level(levels, words):
     checkup = Checkup("ws://bob:9090")
     checkup.findings = [Finding(level, "bridge", "x") for level in levels]
     assert checkup.summary == words
 
 
-def test_viewers_of_one_bridge_share_its_check():
+def test_a_bridge_has_one_check_for_all_viewers():
     one, other = Bridge("ws://a:1"), Bridge("ws://a:1")
     assert checkup_of(one) is checkup_of(one)
     assert checkup_of(one) is not checkup_of(other)
 
 
-def test_the_robots_that_the_page_has_are_looked_at():
+def test_the_check_receives_the_robots_of_the_page():
     asked = []
 
     async def observe(url, *, seconds, configured, progress):
@@ -105,7 +105,7 @@ async def seen_at(url, **_):
     return Observed(url)
 
 
-def test_a_call_is_tried_when_somebody_asks_and_the_report_says_what_that_told():
+def test_a_slow_call_test_runs_only_on_request_and_its_result_is_reported():
     received = []
 
     async def tried(seen):
@@ -130,7 +130,7 @@ def test_a_call_is_tried_when_somebody_asks_and_the_report_says_what_that_told()
 
 
 @pytest.mark.parametrize("trouble", [None, "nothing listens there"])
-def test_no_call_is_tried_at_a_bridge_that_was_not_there(trouble):
+def test_no_slow_call_test_runs_at_an_unchecked_or_unreachable_bridge(trouble):
     async def observe(url, **_):
         return Observed(url, trouble=trouble)
 
@@ -150,7 +150,7 @@ def test_no_call_is_tried_at_a_bridge_that_was_not_there(trouble):
     asyncio.run(run())
 
 
-def test_what_a_robot_is_called_is_only_ever_text():
+def test_html_tags_in_the_name_of_a_robot_are_shown_as_text():
     name = "<b onclick=alert(1)>"
     heading, items = groups([Finding("warning", name, f"{name} is odd.", "Look.")])
     assert heading.text == name

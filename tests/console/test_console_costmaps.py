@@ -26,15 +26,15 @@ def named(*modules):
         ("/costmap", "costmap"),
     ],
 )
-def test_a_costmap_is_called_as_its_topic_ends_alike_for_all_robots(topic, name):
+def test_a_costmap_is_named_after_the_end_of_its_topic(topic, name):
     assert named(grid(topic)) == [name]
 
 
-def test_what_has_a_name_keeps_it_and_a_map_gets_none():
+def test_a_named_costmap_is_not_renamed_and_a_map_gets_no_name():
     said = grid("/costmap")
     said.layer.svg.set("data-layer", "/costmap (north)")
     assert named(said, grid("/map", "map")) == ["/costmap (north)", None]
 
 
-def test_modules_that_draw_nothing_are_passed_over():
+def test_modules_without_a_layer_are_ignored():
     CostmapNames(SimpleNamespace(modules=[object()])).poll()

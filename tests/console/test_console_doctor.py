@@ -19,7 +19,7 @@ def open_report(page):
     return page.locator(".doctor:popover-open")
 
 
-def test_a_bridge_is_checked_when_asked_and_each_finding_says_how_bad_it_is(
+def test_a_bridge_is_checked_on_request_and_each_finding_shows_its_level(
     open_console,
 ):
     page = open_console()
@@ -67,7 +67,9 @@ def test_a_bridge_is_checked_when_asked_and_each_finding_says_how_bad_it_is(
     assert other.evaluate("document.documentElement.scrollWidth") == 390
 
 
-def test_a_call_is_tried_from_the_report_and_what_that_told_stands_in_it(open_console):
+def test_the_slow_call_test_runs_from_the_report_and_its_result_is_shown_there(
+    open_console,
+):
     page = open_console()
     report = open_report(page)
     expect(report.locator(".status")).to_contain_text("Checked", timeout=20_000)
@@ -81,7 +83,7 @@ def test_a_call_is_tried_from_the_report_and_what_that_told_stands_in_it(open_co
     expect(question).to_be_hidden()
 
 
-def test_where_the_page_may_not_copy_the_text_is_shown_and_chosen(open_console):
+def test_without_clipboard_access_the_report_is_shown_as_selected_text(open_console):
     page = open_console()
     report = open_report(page)
     page.evaluate(
@@ -96,7 +98,7 @@ def test_where_the_page_may_not_copy_the_text_is_shown_and_chosen(open_console):
     assert "robot_0/cmd_vel" in chosen
 
 
-def test_a_bridge_that_is_away_is_checked_too(chromium):
+def test_an_unreachable_bridge_can_also_be_checked(chromium):
     robot = "Bob:/odom:/cmd_vel:"
     view = ("view", "ws://127.0.0.1:1", "--robot", robot, "--port", "0")
     with (

@@ -16,7 +16,7 @@ def robot_of(bridge, **parts):
     return make_robot(config, [bridge])
 
 
-def test_a_described_robot_has_what_its_topics_need(bridge):
+def test_a_configured_robot_has_the_modules_and_the_spec_of_its_topics(bridge):
     robot = robot_of(
         bridge,
         odometry="/odom",
@@ -41,7 +41,7 @@ def test_a_scan_is_drawn_under_the_robot_s_body(bridge):
     robot.destroy()
 
 
-def test_a_name_stays_upright_wherever_the_robot_looks(bridge):
+def test_the_name_label_stays_upright_at_any_heading_of_the_robot(bridge):
     robot = robot_of(bridge)
     robot.orientation = type(robot.orientation).from_yaw(1.0)
     robot.notify_modules("on_odometry_update")
@@ -50,7 +50,7 @@ def test_a_name_stays_upright_wherever_the_robot_looks(bridge):
     robot.destroy()
 
 
-def test_a_page_is_told_which_base_moves_sideways(bridge):
+def test_a_robot_with_a_holonomic_base_is_marked_for_the_page(bridge):
     robot = Robot("Bob")
     robot.set_twist_topic(bridge, "/cmd_vel", holonomic=True)
     assert "data-holonomic" in robot.svg.attributes

@@ -32,21 +32,21 @@ def draw(folder: Path, name: str = "floor.png", mode: str = "L") -> None:
     image.convert(mode).save(folder / name)
 
 
-def test_a_floor_knows_its_place_and_what_is_known_of_it(tmp_path):
+def test_a_floor_has_its_position_its_size_and_the_bounds_of_its_known_area(tmp_path):
     draw(tmp_path)
     floor = load_floor(write(tmp_path), tmp_path)
     assert (floor.x, floor.y, floor.width, floor.height) == (-2.0, -1.0, 4.0, 2.0)
     assert floor.bounds == (-1.0, -0.5, 2.0, 1.0)
 
 
-def test_the_image_s_upper_left_pixel_is_at_the_upper_left_in_the_world(tmp_path):
+def test_the_upper_left_pixel_of_the_image_is_at_the_upper_left_in_the_world(tmp_path):
     draw(tmp_path)
     floor = load_floor(write(tmp_path), tmp_path)
     # add_image places the image's box at x, y; the matrix turns it upright there.
     assert floor.matrix.apply(floor.x, floor.y) == pytest.approx((-2.0, 1.0))
 
 
-def test_a_turned_map_is_turned_about_its_origin(tmp_path):
+def test_a_map_with_a_yaw_is_rotated_about_its_origin(tmp_path):
     draw(tmp_path)
     yaw = math.pi / 2
     floor = load_floor(write(tmp_path, origin=[-2.0, -1.0, yaw]), tmp_path)
@@ -62,7 +62,7 @@ def colour(image: Image.Image, at: tuple[int, int]) -> str:
 
 
 @pytest.mark.parametrize("name", ["day", "night"])
-def test_wall_unknown_and_free_have_exactly_their_colours(tmp_path, name):
+def test_wall_unknown_and_free_pixels_have_exactly_their_colours(tmp_path, name):
     draw(tmp_path)
     floor = load_floor(write(tmp_path), tmp_path)
     painted = Image.open(getattr(floor, name)).convert("RGB")
@@ -70,7 +70,7 @@ def test_wall_unknown_and_free_have_exactly_their_colours(tmp_path, name):
     assert seen == list(COLOURS[name])
 
 
-def test_the_floor_s_colours_are_those_of_the_style_sheet():
+def test_the_colours_of_the_floor_are_equal_to_those_of_the_style_sheet():
     package = Path(console.__file__).parents[1]
     text = (package / "web/style/tokens.css").read_text("utf-8")
     for token, index in (("--map-void", 1), ("--map-floor", 2)):
@@ -81,7 +81,7 @@ def test_the_floor_s_colours_are_those_of_the_style_sheet():
 @pytest.mark.parametrize(
     ("form", "high"), [("png", 65535), ("pgm", 65535), ("pgm", 255)]
 )
-def test_sixteen_bits_a_pixel_are_the_same_picture(tmp_path, form, high):
+def test_an_image_with_16_bits_per_pixel_gives_the_same_picture(tmp_path, form, high):
     levels = np.array([[0, 205, 254]]) * high // 255
     name = f"floor.{form}"
     if form == "png":
@@ -95,7 +95,7 @@ def test_sixteen_bits_a_pixel_are_the_same_picture(tmp_path, form, high):
     assert [colour(painted, (x, 0)) for x in range(3)] == list(COLOURS["day"])
 
 
-def test_the_thresholds_and_the_mode_of_the_file_count(tmp_path):
+def test_the_thresholds_and_the_mode_of_the_yaml_file_are_applied(tmp_path):
     image = Image.new("L", (3, 1))
     image.putdata([0, 128, 254])
     image.save(tmp_path / "floor.png")
@@ -116,7 +116,7 @@ def test_the_thresholds_and_the_mode_of_the_file_count(tmp_path):
     assert drawn(mode="raw") == [free, unknown, unknown], "0 is free there, 128 none"
 
 
-def test_a_negated_image_is_drawn_the_other_way_round(tmp_path):
+def test_a_negated_image_is_drawn_inverted(tmp_path):
     Image.new("L", (4, 4), 255).save(tmp_path / "floor.png")
     floor = load_floor(write(tmp_path, negate=1), tmp_path)
     painted = Image.open(floor.day).convert("RGB")
@@ -133,7 +133,7 @@ def test_the_formats_of_map_saver_are_read(tmp_path, name, mode):
     ("mode", "light", "place"),
     [("scale", 0, 1), ("scale", 255, 1), ("trinary", 0, 0), ("trinary", 255, 1)],
 )
-def test_what_is_clear_in_an_image_is_what_map_server_takes_it_for(
+def test_transparent_pixels_are_read_as_map_server_reads_them(
     tmp_path, mode, light, place
 ):
     Image.new("RGBA", (4, 4), (*[light] * 3, 0)).save(tmp_path / "floor.png")
@@ -160,7 +160,9 @@ def test_what_is_clear_in_an_image_is_what_map_server_takes_it_for(
         ({"occupied_thresh": 0.1}, "free_thresh < occupied_thresh"),
     ],
 )
-def test_a_map_that_makes_no_sense_is_refused_in_words(tmp_path, changes, said):
+def test_a_map_with_an_invalid_value_is_refused_with_the_reason(
+    tmp_path, changes, said
+):
     draw(tmp_path)
     with pytest.raises(ConfigError, match=said):
         load_floor(write(tmp_path, **changes), tmp_path)
@@ -176,7 +178,7 @@ def test_a_map_that_makes_no_sense_is_refused_in_words(tmp_path, changes, said):
         (4, "resolution: 2"),
     ],
 )
-def test_what_is_wrong_in_the_yaml_is_named_with_its_own_line(tmp_path, line, wrong):
+def test_an_error_in_the_yaml_file_is_reported_with_its_line(tmp_path, line, wrong):
     draw(tmp_path)
     lines = ["image: floor.png", "resolution: 0.5", "origin: [0, 0, 0]", "negate: 0"]
     lines[line - 1] = wrong
@@ -188,25 +190,25 @@ def test_what_is_wrong_in_the_yaml_is_named_with_its_own_line(tmp_path, line, wr
 
 
 @pytest.mark.parametrize("text", ["", "- a\n- b", "{", "\x00", "a: &a [*a]"])
-def test_a_yaml_that_is_none_is_refused(tmp_path, text):
+def test_an_invalid_yaml_file_is_refused(tmp_path, text):
     file = tmp_path / "floor.yaml"
     file.write_text(text)
     with pytest.raises(ConfigError, match=r"floor\.yaml"):
         load_floor(file, tmp_path)
 
 
-def test_an_image_that_is_none_is_refused(tmp_path):
+def test_an_invalid_image_is_refused(tmp_path):
     (tmp_path / "floor.png").write_bytes(b"\x89PNG\r\n\x1a\n nothing")
     with pytest.raises(ConfigError, match=r"floor\.yaml: the image cannot be read"):
         load_floor(write(tmp_path), tmp_path)
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path):
+def test_a_missing_yaml_file_is_refused(tmp_path):
     with pytest.raises(ConfigError, match=r"none\.yaml"):
         load_floor(tmp_path / "none.yaml", tmp_path)
 
 
-def test_a_yaml_that_would_take_long_to_read_is_refused_soon(tmp_path):
+def test_a_yaml_file_above_the_size_limit_is_refused(tmp_path):
     draw(tmp_path)
     file = write(tmp_path)
     file.write_text(file.read_text() + "\n# " + "x" * MAX_YAML)
@@ -214,7 +216,7 @@ def test_a_yaml_that_would_take_long_to_read_is_refused_soon(tmp_path):
         load_floor(file, tmp_path)
 
 
-def test_mappings_that_are_merged_into_one_another_take_no_time_to_speak_of(tmp_path):
+def test_nested_merge_keys_of_a_yaml_file_are_read_within_three_seconds(tmp_path):
     draw(tmp_path)
     file = write(tmp_path)
     depth, many = 45, ", ".join(f"k{number}: 0" for number in range(1200))

@@ -22,7 +22,7 @@ gate's last ticks came late. Nobody reads a word and presses a key in that time.
 """
 
 
-def test_it_says_so_before_what_drives_and_stops_has_come(chromium, demo):
+def test_the_page_shows_preparing_input_until_teleop_is_loaded(chromium, demo):
     come = threading.Event()
     held: list[Route] = []
     context = chromium.new_context(viewport={"width": 1280, "height": 800})
@@ -53,7 +53,7 @@ def test_it_says_so_before_what_drives_and_stops_has_come(chromium, demo):
 
 
 @pytest.mark.serial  # a page that is kept waiting for a processor lets go
-def test_the_first_press_drives_as_soon_as_the_page_does_not_say_so(chromium, demo):
+def test_the_first_press_drives_when_preparing_input_is_no_longer_shown(chromium, demo):
     context = chromium.new_context(viewport={"width": 1280, "height": 800})
     page = context.new_page()
     page.goto(demo.url, wait_until="commit")

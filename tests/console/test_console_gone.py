@@ -58,7 +58,7 @@ def odometry(url: str, speed: float = 0.0) -> Iterator[None]:
             thread.join()
 
 
-def test_a_robot_that_is_gone_fades_and_can_be_removed_until_it_is_back(
+def test_a_gone_robot_fades_and_can_be_removed_until_its_poses_return(
     chromium, tmp_path
 ):
     file = tmp_path / "gone.py"
@@ -93,7 +93,7 @@ def test_a_robot_that_is_gone_fades_and_can_be_removed_until_it_is_back(
                 expect(drawn).not_to_have_attribute("data-state", "gone")
 
 
-def test_a_robot_that_moves_by_itself_is_not_called_free(chromium, tmp_path):
+def test_a_robot_that_moves_by_itself_is_not_shown_as_free(chromium, tmp_path):
     file = tmp_path / "moves.py"
     with simulator("--flat") as url, watched_tab(chromium, 1280, 800) as page:
         page.allowed = ["WebSocket", "ERR_CONNECTION"]  # when all of it ends

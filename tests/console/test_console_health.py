@@ -33,7 +33,7 @@ def said(health):
     return [(item.get("data-level"), item.text) for item in items]
 
 
-def test_what_is_not_well_is_listed_by_word_and_shape_the_worst_first(map):
+def test_parts_that_are_not_ok_are_listed_with_their_level_and_message(map):
     card = html.section()
     health = RobotHealth(map, card)
     assert health.element.get("hidden") is not None
@@ -64,7 +64,7 @@ def test_what_is_not_well_is_listed_by_word_and_shape_the_worst_first(map):
     assert not card.children
 
 
-def test_a_robot_without_diagnostics_has_no_health(map):
+def test_a_robot_without_diagnostics_shows_no_health(map):
     chosen(map, SimpleNamespace(parts=["of something else"]))
     health = RobotHealth(map, html.section())
     assert health.element.get("hidden") is not None
@@ -74,14 +74,14 @@ UNHEARD = ("note", "No data: no diagnostics of this robot received yet")
 
 
 @pytest.mark.parametrize("parts", [[], [("base: Motors", "ok", "fine", "nobody's")]])
-def test_of_a_robot_of_which_no_part_was_heard_nothing_is_said_to_be_well(map, parts):
+def test_a_robot_without_received_diagnostics_is_shown_as_no_data(map, parts):
     chosen(map, Diagnosing(*parts))
     health = RobotHealth(map, html.section())
     assert health.element.get("hidden") is None
     assert said(health) == [UNHEARD]
 
 
-def test_a_part_that_may_be_another_robots_is_listed_as_such_if_it_is_not_well(map):
+def test_a_bad_part_of_an_unknown_robot_is_listed_with_robot_unknown(map):
     nobodys = [
         ("base: Motors", "error", "hot", "nobody's"),
         ("base: Laser", "stale", "no data for 12 s", "nobody's"),
@@ -94,7 +94,7 @@ def test_a_part_that_may_be_another_robots_is_listed_as_such_if_it_is_not_well(m
     ]
 
 
-def test_very_many_parts_are_counted(map):
+def test_parts_above_the_limit_are_only_counted(map):
     parts = [(f"part {number}", "error", "bad") for number in range(MOST + 3)]
     chosen(map, Diagnosing(*parts))
     health = RobotHealth(map, html.section())

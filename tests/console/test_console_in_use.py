@@ -32,7 +32,7 @@ def only(found):
     return one
 
 
-def test_a_described_robot_uses_what_it_was_given(bridge):
+def test_a_configured_robot_uses_the_topics_of_its_configuration(bridge):
     cameras = ["/front/image_raw", "/rear/image_raw/compressed"]
     config = RobotConfig.from_dict(
         {
@@ -58,7 +58,7 @@ def test_a_described_robot_uses_what_it_was_given(bridge):
     assert "tf" not in bob.topics, "frames are told of as they are found"
 
 
-def test_what_is_drawn_with_a_robot_is_in_use_by_whatever_name_it_was_said(bridge):
+def test_topics_of_modules_are_in_use_with_positional_and_keyword_arguments(bridge):
     bob = Robot("Bob")
     bob.add_module("LaserScanner", bridge, "/front")
     bob.add_module("LaserScanner", topic="/rear", bridge=bridge)
@@ -72,7 +72,7 @@ def test_what_is_drawn_with_a_robot_is_in_use_by_whatever_name_it_was_said(bridg
     assert topics["costmap"] == (("/costs", ""),)
 
 
-def test_a_map_under_the_robots_is_every_robots_and_a_robots_own_is_not(bridge):
+def test_a_shared_map_is_used_by_all_robots_and_a_costmap_only_by_its_robot(bridge):
     bob, ann = Robot("Bob"), Robot("Ann")
     for robot in (bob, ann):
         robot.set_odometry_topic(bridge, "/odom")
@@ -88,7 +88,9 @@ def test_a_map_under_the_robots_is_every_robots_and_a_robots_own_is_not(bridge):
     assert anns["costmap"] == (("/ann/costs", ""),)
 
 
-def test_a_robot_of_two_bridges_is_at_each_with_what_it_uses_there(bridge, other):
+def test_a_robot_with_two_bridges_has_at_each_bridge_only_its_topics_there(
+    bridge, other
+):
     bob = Robot("Bob")
     bob.set_odometry_topic(other, "/odom", type="nav_msgs/Odometry")
     bob.set_twist_topic(bridge, "/cmd_vel", type="geometry_msgs/Twist")
@@ -99,13 +101,13 @@ def test_a_robot_of_two_bridges_is_at_each_with_what_it_uses_there(bridge, other
     assert there.topics["odometry"] == (("/odom", "nav_msgs/Odometry"),)
 
 
-def test_a_robot_of_another_bridge_is_none_of_this_one(bridge, other):
+def test_a_robot_of_another_bridge_is_not_listed_at_this_bridge(bridge, other):
     bob = Robot("Bob")
     bob.set_odometry_topic(other, "/odom")
     assert in_use([bob], bridge, [("OccupancyGrid", (bridge, "/map"), {})]) == []
 
 
-def test_a_robot_that_is_drawn_by_its_frames_is_followed_by_those(bridge):
+def test_a_robot_with_tf_uses_its_tf_topic_and_its_frames(bridge):
     bob = Robot("Bob")
     bob.set_tf(bridge, namespace="/bob", map_frame="site")
     configured = only(in_use([bob], bridge))
@@ -116,7 +118,7 @@ def test_a_robot_that_is_drawn_by_its_frames_is_followed_by_those(bridge):
     assert (robot.base_frame, configured.map_frame) == ("bob/base_link", "bob/site")
 
 
-def test_a_robot_that_nothing_places_is_not_placed_by_frames_it_does_not_use(bridge):
+def test_a_robot_without_a_source_of_poses_uses_no_tf_topic(bridge):
     bob = Robot("Bob")
     bob.set_twist_topic(bridge, "/cmd_vel", type="geometry_msgs/Twist")
     assert only(in_use([bob], bridge)).topics["tf"] == ()
@@ -187,9 +189,7 @@ def report_for(viewer, bridge):
     return map, report
 
 
-def test_the_report_is_about_the_robots_of_the_page_also_those_that_came_later(
-    bridge, checkup
-):
+def test_the_report_includes_robots_added_to_the_page_later(bridge, checkup):
     async def run():
         map, report = report_for(Viewer("v1", "Ann"), bridge)
         for name in ("Bob", "Eve"):
@@ -206,7 +206,7 @@ def test_the_report_is_about_the_robots_of_the_page_also_those_that_came_later(
 
 
 @pytest.mark.parametrize(("role", "may"), [("operator", True), ("viewer", False)])
-def test_only_an_operator_may_have_a_call_tried(bridge, checkup, role, may):
+def test_only_an_operator_can_run_the_slow_call_test(bridge, checkup, role, may):
     async def run():
         map, report = report_for(Viewer("v1", "Ann", role), bridge)
         press(report, "Check again")
@@ -221,7 +221,7 @@ def test_only_an_operator_may_have_a_call_tried(bridge, checkup, role, may):
     assert ("tried" in checkup.asked) is may
 
 
-def test_a_call_is_not_tried_before_what_it_does_was_said(bridge, checkup):
+def test_the_slow_call_test_asks_for_confirmation_and_can_be_cancelled(bridge, checkup):
     async def run():
         map, report = report_for(Viewer("v1", "Ann"), bridge)
         press(report, "Check again")

@@ -67,7 +67,7 @@ def assert_no_robot_was_told_anything(page: Page) -> None:
     assert {key for data in received for key in data} <= {"found", "open"}, received
 
 
-def test_a_layout_is_saved_and_loaded_and_the_last_view_is_there_again(
+def test_a_layout_is_saved_reset_and_loaded_and_the_last_view_is_restored(
     open_console, tmp_path
 ):
     page = open_console()

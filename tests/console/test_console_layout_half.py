@@ -47,14 +47,14 @@ def layout(map: Map, frame: Frame) -> Layout:
     return map.add_module(Layout, of="hall")
 
 
-def test_a_page_that_knows_its_last_view_is_not_shown_another(map, frame, layout):
+def test_a_page_with_a_last_view_gets_no_other_view(map, frame, layout):
     before = map.world.tf
     layout.on_message({"own": True})
     frame.place()
     assert map.world.tf == before
 
 
-def test_the_page_hears_back_behind_what_was_said_of_the_view(map, frame, layout):
+def test_the_answer_to_the_page_is_sent_after_the_view_operations(map, frame, layout):
     map.page.channel.frame(0.0)
     frame.place()
     layout.on_message({"own": True})
@@ -62,7 +62,7 @@ def test_the_page_hears_back_behind_what_was_said_of_the_view(map, frame, layout
     assert said.index(struct.pack("<d", -MARGIN)) < said.index(b'{"own":true}')
 
 
-def test_as_it_was_found_the_page_shows_the_robots_again(map, frame, layout):
+def test_a_reset_layout_shows_the_robots_again(map, frame, layout):
     layout.on_message({"own": True})
     before = map.world.tf
     layout.on_message({"found": True})
@@ -72,7 +72,7 @@ def test_as_it_was_found_the_page_shows_the_robots_again(map, frame, layout):
 @pytest.mark.parametrize(
     "message", [{}, {"own": 1}, {"found": "yes"}, {"goal": [1, 2]}, {"select": "Bob"}]
 )
-def test_a_layout_says_nothing_else_to_the_display(map, robot, frame, layout, message):
+def test_any_other_message_of_a_layout_is_ignored(map, robot, frame, layout, message):
     before = map.world.tf
     received = []
     layout.browser_part.send = received.append

@@ -45,7 +45,7 @@ def map():
 @pytest.mark.parametrize(
     "factory", [Follow, GoalTool, PointerReadout, ScaleBar, StopButton]
 )
-def test_a_module_names_files_that_are_there(map, factory):
+def test_the_script_and_the_style_file_of_a_module_exist(map, factory):
     map.add_module(factory)
     _, _, script, _, style = map.page.channel.attached[0]
     assert (PACKAGE / script).is_file()
@@ -62,12 +62,12 @@ def test_a_module_names_files_that_are_there(map, factory):
         (GoalTool, {"key": ""}),
     ],
 )
-def test_an_option_that_makes_no_sense_is_refused(map, factory, options):
+def test_an_invalid_option_of_a_module_is_refused(map, factory, options):
     with pytest.raises(ValueError, match=factory.__name__):
         map.add_module(factory, **options)
 
 
-def test_a_goal_that_the_page_sent_fires_a_trigger(map):
+def test_a_goal_and_a_cancel_of_the_page_fire_triggers(map):
     robot = Robot("Bob")
     map.add_robot(robot)
     tool, hearing = map.add_module(GoalTool), map.add_module(Hearing)
@@ -88,7 +88,7 @@ def test_a_goal_that_the_page_sent_fires_a_trigger(map):
         {"cancel": "r999"},
     ],
 )
-def test_nonsense_of_a_page_fires_nothing(map, message):
+def test_an_invalid_message_of_a_page_fires_no_trigger(map, message):
     tool, hearing = map.add_module(GoalTool), map.add_module(Hearing)
     tool.on_message(message)
     assert hearing.received == []

@@ -25,14 +25,14 @@ def words(robot) -> str:
     return f"{shown._bound.text}|{shown._how.text}|{shown._test.text}"
 
 
-def test_the_bound_is_the_robot_s_timeout_and_its_braking_from_the_speed_in_force():
+def test_the_bound_is_the_command_timeout_plus_the_braking_time():
     assert bound(0.25, "stated", 0.2, 0.5) == (
         "stops within 0.65 s",
         " 0.25 s command timeout (stated) + 0.40 s of braking from 0.20 m/s",
     )
 
 
-def test_it_is_that_of_the_page_s_own_limit_where_the_robot_allows_more():
+def test_the_bound_uses_a_lower_speed_limit_of_the_page():
     assert words(report()).startswith("stops within 2.25 s|")
 
 
@@ -45,19 +45,19 @@ def test_the_result_of_a_stop_test_is_shown_with_its_date():
     ("source", "text"),
     [(None, NOBODY_KNOWS), ("tested", "The base does not stop.")],
 )
-def test_a_robot_without_a_bound_is_said_to_have_none(source, text):
+def test_a_robot_without_a_command_timeout_is_shown_without_a_bound(source, text):
     said = words(report(stop_time=None, stop_source=source, stop_date="2026-11-21"))
     assert said.startswith(f"{text}|")
 
 
-def test_a_test_that_failed_says_why():
+def test_a_failed_stop_test_is_shown_with_its_reason():
     failed = SimpleNamespace(state="failed", text="the robot did not move within 1.5 s")
     assert words(report(test=failed)).endswith(
         "|Stop test: The robot did not move within 1.5 s."
     )
 
 
-def test_a_robot_that_is_only_watched_has_no_such_line():
+def test_a_view_only_robot_has_no_bound_on_the_card():
     shown = OwnStop(1.0)
     shown.show(SimpleNamespace(report=None))
     assert shown.elements[0].get("hidden") is not None

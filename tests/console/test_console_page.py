@@ -86,7 +86,7 @@ def lines(page: Page) -> list[str]:
     ]
 
 
-def test_every_robot_has_a_line_and_its_place_on_the_map(bridge, robots):
+def test_every_robot_is_in_the_list_and_on_the_map(bridge, robots):
     def scenario(page: Page) -> None:
         assert lines(page) == ["Bob", "Ann"]
         assert page.maps[0].robots == robots
@@ -106,7 +106,9 @@ def test_a_closed_page_leaves_nothing_on_the_robots(bridge, robots):
     assert all(robot.maps == [] for robot in robots)
 
 
-def test_the_card_follows_the_selection_and_lets_go_of_the_one_before(bridge, robots):
+def test_the_card_shows_the_selected_robot_and_releases_the_previous_one(
+    bridge, robots
+):
     def scenario(page: Page) -> None:
         card, map = page.element("card"), page.maps[0]
         assert card.get("hidden") is not None
@@ -120,7 +122,7 @@ def test_the_card_follows_the_selection_and_lets_go_of_the_one_before(bridge, ro
     on_a_page(scenario, bridge, robots)
 
 
-def test_a_battery_is_shown_in_the_line_and_on_the_card(bridge, robots):
+def test_the_battery_of_a_robot_is_shown_in_the_list_and_on_the_card(bridge, robots):
     def scenario(page: Page) -> None:
         page.maps[0].set_selected(robots[0])
         battery = next(m for m in robots[0].modules if hasattr(m, "charge"))
@@ -132,7 +134,7 @@ def test_a_battery_is_shown_in_the_line_and_on_the_card(bridge, robots):
     on_a_page(scenario, bridge, robots)
 
 
-def test_without_a_floor_the_view_waits_for_the_robots(bridge, robots):
+def test_without_a_floor_the_view_is_set_when_the_robots_have_poses(bridge, robots):
     def scenario(page: Page) -> None:
         map = page.maps[0]
         frame = next(m for m in map.modules if type(m).__name__ == "Frame")
@@ -155,12 +157,12 @@ def test_the_console_becomes_the_page_at_the_root(bridge, monkeypatch):
     assert entry.html.name == "console.html"
 
 
-def test_a_floor_that_is_not_there_is_said_before_anything_is_served(bridge, tmp_path):
+def test_a_missing_floor_file_is_refused_when_the_console_is_opened(bridge, tmp_path):
     with pytest.raises(ConfigError, match=r"none\.yaml"):
         open_console([bridge], [], floor=tmp_path / "none.yaml")
 
 
-def test_a_camera_is_asked_for_pictures_while_its_robot_is_selected(bridge, robots):
+def test_a_camera_is_watched_only_while_its_robot_is_selected(bridge, robots):
     camera = robots[0].add_module("Camera", bridge, "/camera/compressed")
 
     def scenario(page: Page) -> None:
@@ -176,7 +178,7 @@ def test_a_camera_is_asked_for_pictures_while_its_robot_is_selected(bridge, robo
     assert not camera.watched
 
 
-def test_a_robot_that_is_gone_is_removed_until_it_is_heard_of_again(
+def test_a_gone_robot_can_be_removed_until_its_poses_return(
     bridge, robots, monkeypatch
 ):
     silent = {"Bob": 31.0, "Ann": 0.1}

@@ -19,7 +19,7 @@ SEND = """async ([path, texts]) => {
 }"""
 
 
-def test_refused_messages_are_counted_with_who_sent_them_and_why(open_console):
+def test_refused_messages_are_counted_and_shown_with_the_last_reason(open_console):
     page = open_console()
     refused = page.locator("#refused")
     expect(refused.locator("summary")).to_be_hidden()

@@ -158,7 +158,7 @@ def in_one_state_each(page: Page, look: Callable[[str], None]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(300)
-def test_both_stops_are_hit_and_do_not_move_in_every_state(open_console):
+def test_both_stop_buttons_can_be_pressed_and_do_not_move_in_every_state(open_console):
     page = open_console()
     walk = Walk(page)
     walk.look("no robot selected")
@@ -185,7 +185,9 @@ def test_both_stops_are_hit_and_do_not_move_in_every_state(open_console):
 
 
 @pytest.mark.parametrize("size", [(390, 844), (1024, 600), (1440, 900)])
-def test_the_alarm_s_own_stop_is_at_the_same_place_and_stops(open_console, size):
+def test_the_stop_buttons_of_the_alarm_are_at_the_same_places_and_send_stop(
+    open_console, size
+):
     page = open_console()
     page.set_viewport_size({"width": size[0], "height": size[1]})
     places = {

@@ -29,7 +29,7 @@ from webmap.core.robot_state import STATE_TEXTS
         (math.inf, "\N{EN DASH}"),
     ],
 )
-def test_numbers_are_written_as_people_read_them(value, text):
+def test_numbers_have_two_decimals_and_a_dash_if_they_are_not_finite(value, text):
     assert number(value) == text
 
 
@@ -40,22 +40,22 @@ def test_a_heading_is_in_whole_degrees_below_360(degrees, text):
     assert heading(math.radians(degrees)) == text
 
 
-def test_driving_backwards_is_a_speed_below_zero():
+def test_driving_backwards_is_shown_as_a_negative_speed():
     assert linear((-0.5, 0.0, 0.0)) == "\N{MINUS SIGN}0.50"
     assert linear((0.3, 0.4, 0.0)) == "0.50"
 
 
-def test_a_cap_names_both_speeds():
+def test_a_speed_limit_is_shown_with_both_speeds():
     assert cap(0.3, 0.6) == "0.30 m/s, 0.60 rad/s"
 
 
-def test_words_of_the_gate_become_a_sentence():
+def test_a_text_of_the_gate_becomes_a_sentence():
     assert sentence("no link") == "No link."
     assert sentence("No link.") == "No link."
     assert sentence("") == ""
 
 
-def test_a_name_at_the_beginning_of_a_sentence_keeps_its_small_letter():
+def test_a_lower_case_name_at_the_start_of_a_sentence_is_not_capitalized():
     assert sentence("ws://a:9090 is lost") == "ws://a:9090 is lost."
     assert sentence("robot_0 is free") == "robot_0 is free."
     assert sentence("zero sent, still moving") == "Zero sent, still moving."
@@ -65,12 +65,12 @@ def test_every_state_of_a_robot_has_a_look():
     assert set(LOOKS) == {name for name in STATE_TEXTS if not name.endswith("_by_you")}
 
 
-def test_states_that_can_be_beside_each_other_in_a_list_never_share_a_shape():
+def test_states_shown_together_in_a_list_have_different_shapes():
     states = ["free", "held", "driven", "stopping", "stopped", "navigating"]
     assert len({LOOKS[state][0] for state in states}) == len(states)
 
 
-def test_another_program_makes_every_look_bad():
+def test_another_program_makes_the_look_bad_except_in_the_state_other():
     report = SimpleNamespace(other_writer="another program")
     one = SimpleNamespace(state=SimpleNamespace(name="held"), report=report)
     assert look_of(one) == ("state-held", "bad")
@@ -81,11 +81,11 @@ def test_another_program_makes_every_look_bad():
 @pytest.mark.parametrize(
     ("charge", "tone"), [(0.5, ""), (0.2, ""), (0.15, "warn"), (0.05, "bad")]
 )
-def test_a_low_battery_is_more_than_a_number(charge, tone):
+def test_a_low_battery_has_a_warning_tone(charge, tone):
     assert battery_tone(charge) == tone
 
 
-def test_a_charge_that_is_not_known_is_not_shown():
+def test_an_unknown_charge_is_not_shown():
     mark = BatteryMark()
     mark.show(0.84)
     assert mark.element.text == "battery 84 %"
@@ -104,5 +104,5 @@ def test_a_charge_that_is_not_known_is_not_shown():
         ([], "0 bridges open"),
     ],
 )
-def test_bridges_are_summed_up(links, text):
+def test_the_states_of_the_bridges_are_summarized(links, text):
     assert summary(links) == text

@@ -1,12 +1,18 @@
 """The words of the console are true, and the same everywhere."""
 
 import re
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from console_ready import send_away, wait_until_ready
-from playwright.sync_api import Page, expect
+from console_ready import (
+    same_word,
+    select,
+    send_away,
+    shown_state,
+    title,
+    wait_until_ready,
+)
+from playwright.sync_api import expect
 
 from real_browser import end_stops, hold, watched_tab
 from webmap_process import simulator, webmap
@@ -27,47 +33,10 @@ HAS_GONE = f"""([x, y, far]) => {{
   return Math.hypot(e - x, f - y) > far;
 }}"""
 
-BLOCKED = "Not moving: blocked?"
-MINUS = re.compile("\N{MINUS SIGN}")
 
-
-def select(page: Page, name: str) -> None:
-    page.locator("#robots .row", has_text=name).locator("button").first.click()
-    expect(page.locator("#card h2")).to_have_text(name)
-
-
-def title(page: Page):
-    return page.locator(".webmap-teleop-title")
-
-
-def shown_state(page: Page):
-    return page.locator("#card .state span:not(.old):visible").first
-
-
-def same_word(page: Page, word: str | re.Pattern, patience: float = 15.0) -> None:
-    """The bar, the card and the list have the same words for the selected robot."""
-    line = page.locator("#robots .row:has([aria-pressed=true]) .state span:visible")
-    for where in (title(page), shown_state(page), line.first):
-        expect(where).to_have_text(word, timeout=patience * 1000)
-
-
-@pytest.mark.serial  # a page that is kept waiting for a processor lets go
-def test_the_bar_the_card_and_the_list_have_the_same_words(open_console):
-    page = open_console()
-    select(page, "Robot 1")
-    same_word(page, "Free")
-    page.get_by_role("button", name="Take control of Robot 1").click()
-    same_word(page, "You have control")
-    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
-    same_word(page, "You are driving")
-    page.keyboard.up("a")
-    same_word(page, "You have control")
-    back = page.get_by_role("button", name="Release control", exact=True)
-    back.evaluate("e => e.click()")  # it moves while the words beside it change
-    same_word(page, "Free")
-
-
-def test_a_robot_with_a_goal_navigates_and_one_s_own_cancel_is_named(open_console):
+def test_a_robot_with_a_goal_is_navigating_and_its_cancel_names_the_operator(
+    open_console,
+):
     page = open_console()
     select(page, "Robot 2")
     send_away(page)
@@ -79,7 +48,7 @@ def test_a_robot_with_a_goal_navigates_and_one_s_own_cancel_is_named(open_consol
     same_word(page, "You have control")
 
 
-def test_the_card_of_the_selected_robot_is_there_after_a_reload(open_console):
+def test_the_card_of_the_selected_robot_is_shown_after_a_reload(open_console):
     page = open_console()
     select(page, "Robot 3")
     page.reload()
@@ -91,7 +60,7 @@ def test_the_card_of_the_selected_robot_is_there_after_a_reload(open_console):
     select(page, "Robot 3")
 
 
-def test_a_robot_that_is_chosen_in_the_list_comes_to_where_nothing_covers_it(
+def test_the_view_uncovers_a_robot_that_is_selected_in_the_list(
     open_console,
 ):
     page = open_console()
@@ -121,7 +90,7 @@ def test_a_robot_that_is_chosen_in_the_list_comes_to_where_nothing_covers_it(
     )
 
 
-def test_no_jump_is_reported_after_one_s_own_set_pose(chromium):
+def test_set_pose_on_the_page_does_not_report_a_jump_of_the_pose(chromium):
     # The demo draws robots by their odometry, which no initial pose changes.
     view = ("--stops-within", "0.25", "--port", "0", "--no-browser")
     with (
@@ -157,7 +126,7 @@ def test_no_jump_is_reported_after_one_s_own_set_pose(chromium):
         (".webmap-export-go", ".webmap-export-menu:not([hidden])"),
     ],
 )
-def test_escape_closes_a_menu_and_stops_nothing(open_console, opener, open_):
+def test_escape_closes_a_menu_and_sends_no_stop(open_console, opener, open_):
     page = open_console()
     select(page, "Robot 1")
     page.locator(opener).first.click()
@@ -168,7 +137,7 @@ def test_escape_closes_a_menu_and_stops_nothing(open_console, opener, open_):
     expect(shown_state(page)).to_have_text("Free")
 
 
-def test_escape_is_stop_while_this_page_drives_whatever_is_open(open_console):
+def test_escape_sends_stop_while_this_page_drives_even_with_an_open_menu(open_console):
     page = open_console()
     select(page, "Robot 7")
     page.locator(".webmap-layers summary").click()
@@ -180,7 +149,7 @@ def test_escape_is_stop_while_this_page_drives_whatever_is_open(open_console):
     expect(shown_state(page)).to_have_text("Free")
 
 
-def test_escape_is_stop_while_this_page_holds_the_robot_that_goes_somewhere(
+def test_escape_sends_stop_while_a_robot_of_this_page_navigates(
     open_console,
 ):
     page = open_console()
@@ -192,7 +161,7 @@ def test_escape_is_stop_while_this_page_holds_the_robot_that_goes_somewhere(
     end_stops(page.locator(".webmap-teleop .webmap-reset"))
 
 
-def test_the_space_bar_is_stop_again_after_escape_closed_a_menu(open_console):
+def test_the_space_bar_sends_stop_after_escape_closed_a_menu(open_console):
     page = open_console()
     select(page, "Robot 1")
     page.locator(".webmap-layers summary").click()
@@ -203,7 +172,7 @@ def test_the_space_bar_is_stop_again_after_escape_closed_a_menu(open_console):
     end_stops(page.locator(".webmap-teleop .webmap-reset"))
 
 
-def test_the_search_leaves_the_robots_whose_name_has_it(open_console):
+def test_the_search_shows_only_robots_whose_name_contains_the_text(open_console):
     page = open_console()
     page.keyboard.press("/")
     page.keyboard.type("robot 7")
@@ -212,7 +181,9 @@ def test_the_search_leaves_the_robots_whose_name_has_it(open_console):
     expect(row).to_be_visible()
 
 
-def test_enter_selects_the_only_hit_and_a_search_in_vain_says_so(open_console):
+def test_enter_selects_the_only_hit_and_a_search_without_hits_shows_a_message(
+    open_console,
+):
     page = open_console()
     search = page.locator("#search")
     search.fill("robot")
@@ -236,7 +207,7 @@ def test_the_log_of_the_demo_is_not_empty(open_console):
     expect(page.locator(".webmap-rosout")).to_contain_text("ready, the battery is at")
 
 
-def test_there_is_one_figure_of_latency_and_it_is_explained(open_console):
+def test_the_round_trip_is_the_only_latency_shown_and_has_an_explanation(open_console):
     page = open_console()
     select(page, "Robot 1")
     expect(page.locator("#link")).to_have_text("Connected", use_inner_text=True)
@@ -246,34 +217,7 @@ def test_there_is_one_figure_of_latency_and_it_is_explained(open_console):
     )
 
 
-@pytest.mark.serial  # a page that is kept waiting for a processor lets go
-def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):
-    page = open_console()
-    select(page, "Robot 9")
-    words = title(page)
-    for _ in range(8):  # a page that is too busy lets go
-        hold(
-            page.keyboard,
-            "w",
-            lambda: words.text_content() in ("You are driving", BLOCKED),
-        )
-        while words.text_content() == "You are driving":
-            page.wait_for_timeout(100)
-        with suppress(AssertionError):
-            same_word(page, BLOCKED, patience=2.0)
-            break
-        page.keyboard.up("w")
-    else:
-        raise AssertionError(f"never shown as blocked: {words.text_content()}")
-    detail = page.locator(".webmap-teleop-detail")
-    expect(detail).to_have_text(re.compile(r"^Sent: \d\.\d\d m/s.*Measured: 0\.00 m/s"))
-    page.keyboard.up("w")
-    hold(page.keyboard, "s", lambda: "-" in MINUS.sub("-", detail.text_content()))
-    page.keyboard.up("s")
-    page.get_by_role("button", name="Release control", exact=True).click()
-
-
-def test_an_exported_picture_has_no_handle_of_a_tool(open_console, tmp_path):
+def test_an_exported_picture_contains_no_handles_of_tools(open_console, tmp_path):
     page = open_console()
     page.locator(".webmap-export-go").first.click()
     with page.expect_download() as download:
@@ -295,7 +239,7 @@ def test_an_exported_picture_has_no_handle_of_a_tool(open_console, tmp_path):
     assert there == []
 
 
-def test_robots_of_one_name_on_two_bridges_of_one_host_have_the_port(chromium):
+def test_robots_of_the_same_name_on_two_bridges_of_one_host_show_the_port(chromium):
     with (
         simulator("--flat") as one,
         simulator("--flat") as other,
@@ -308,3 +252,22 @@ def test_robots_of_one_name_on_two_bridges_of_one_host_have_the_port(chromium):
         for host in hosts:
             row = page.locator("#robots .row", has_text=f"robot ({host})")
             expect(row).to_have_count(1)
+
+
+FOCUSED = """() => {
+  const e = document.activeElement;
+  return e.id || e.dataset.act || e.getAttribute("class") || e.tagName;
+}"""
+
+
+def test_the_tab_key_reaches_the_main_controls(open_console):
+    page = open_console()
+    select(page, "Robot 0")
+    reached = set()
+    page.evaluate("document.activeElement.blur()")
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate(FOCUSED))
+    wanted = {"help-open", "zoom-in", "show-all", "search", "follow", "send", "cancel"}
+    assert wanted <= reached
+    assert any("webmap-stop-all" in name for name in reached)

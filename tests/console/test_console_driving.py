@@ -1,0 +1,96 @@
+"""Driving in the console: the state, the stop test, and a robot that is blocked."""
+
+import re
+from contextlib import suppress
+
+import pytest
+from console_ready import assert_free, same_word, select, title
+from playwright.sync_api import expect
+
+from real_browser import hold
+
+# A page or a robot that waits for a processor stops.
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
+
+BLOCKED = "Not moving: blocked?"
+MINUS = re.compile("\N{MINUS SIGN}")
+
+
+def test_the_bar_the_card_and_the_list_show_the_same_state(open_console):
+    page = open_console()
+    select(page, "Robot 1")
+    same_word(page, "Free")
+    page.get_by_role("button", name="Take control of Robot 1").click()
+    same_word(page, "You have control")
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
+    same_word(page, "You are driving")
+    page.keyboard.up("a")
+    same_word(page, "You have control")
+    back = page.get_by_role("button", name="Release control", exact=True)
+    back.evaluate("e => e.click()")  # it moves while the words beside it change
+    same_word(page, "Free")
+
+
+def test_the_card_runs_a_stop_test_of_a_robot_with_a_stated_command_timeout(
+    open_console,
+):
+    page = open_console()
+    page.locator("#robots .row", has_text="Robot 2").locator("button").first.click()
+    test = page.locator("[data-act=stop-test]")
+    expect(test).to_have_text(re.compile("Stop test: take control"))
+    expect(test).to_be_disabled()
+    bound = page.locator("#card .own-stop")
+    expect(bound).to_contain_text(re.compile(r"stops within \d\.\d\d s"))
+    expect(bound).to_contain_text("(stated)")
+    page.get_by_role("button", name="Take control of Robot 2").click()
+    # With a camera above them the figures would lie below the edge of the card.
+    expect(page.get_by_role("img", name="Camera of Robot 2")).to_be_visible()
+    page.wait_for_function(
+        "document.querySelector('.cameras img').naturalWidth === 320"
+    )
+    figures = page.locator("#card .speeds")
+    assert page.locator("#card").evaluate("e => e.scrollHeight > e.clientHeight + 40")
+    assert_free(figures)
+    tested = re.compile(r"\(tested \d{4}-\d\d-\d\d\)")
+    for _ in range(8):
+        for words in ("Run stop test", "Robot will move slowly: press again"):
+            button = page.get_by_role("button", name=words, exact=True)
+            page.wait_for_timeout(450)
+            button.click()
+        expect(test).not_to_have_attribute("data-test", "asking")
+        page.wait_for_timeout(300)
+        expect(test).to_have_attribute("data-test", "ready")
+        # On a busy machine a late command ends it, which the card says.
+        ended = page.locator("#card .test", has_text="Stop test: ")
+        expect(ended.or_(bound.filter(has_text=tested)).first).to_be_attached()
+        if tested.search(bound.inner_text()):
+            break
+    expect(bound).to_contain_text(tested)
+    expect(page.get_by_role("button", name="Run stop test", exact=True)).to_be_enabled()
+    page.get_by_role("button", name="Release control", exact=True).last.click()
+
+
+def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):
+    page = open_console()
+    select(page, "Robot 2")
+    words = title(page)
+    for _ in range(8):  # a page that is too busy lets go
+        hold(
+            page.keyboard,
+            "w",
+            lambda: words.text_content() in ("You are driving", BLOCKED),
+        )
+        while words.text_content() == "You are driving":
+            page.wait_for_timeout(100)
+        with suppress(AssertionError):
+            same_word(page, BLOCKED, patience=2.0)
+            break
+        page.keyboard.up("w")
+    else:
+        raise AssertionError(f"never shown as blocked: {words.text_content()}")
+    detail = page.locator(".webmap-teleop-detail")
+    expect(detail).to_have_text(re.compile(r"^Sent: \d\.\d\d m/s.*Measured: 0\.00 m/s"))
+    page.keyboard.up("w")
+    hold(page.keyboard, "s", lambda: "-" in MINUS.sub("-", detail.text_content()))
+    page.keyboard.up("s")
+    page.get_by_role("button", name="Release control", exact=True).click()
