@@ -93,7 +93,7 @@ def test_a_replay_imports_nothing_from_the_working_folder(bag, hostile):
         assert url.startswith("ws://")
 
 
-def test_every_python_of_the_package_is_started_in_one_place():
+def test_only_one_module_of_the_package_uses_sys_executable():
     places = [
         file.relative_to(SOURCE).as_posix()
         for file in SOURCE.rglob("*.py")
@@ -104,7 +104,7 @@ def test_every_python_of_the_package_is_started_in_one_place():
     assert places == ["base/children.py"]
 
 
-def test_a_script_imports_modules_beside_it_and_children_do_not(tmp_path):
+def test_a_script_imports_modules_of_its_folder_but_its_children_do_not(tmp_path):
     (tmp_path / "own.py").write_text("WORD = 'mine'\n")
     script = tmp_path / "first.py"
     script.write_text(
@@ -135,7 +135,7 @@ replay.main()
 """
 
 
-def test_a_replay_that_hangs_in_a_file_ends_when_its_parent_does():
+def test_a_hanging_replay_ends_with_its_parent():
     with subprocess.Popen(
         [sys.executable, "-P", "-c", HANGS],
         stdin=subprocess.PIPE,
@@ -165,7 +165,7 @@ asyncio.run(main())
 
 
 @pytest.mark.parametrize("parent", ["decoder", "play"])
-def test_the_children_of_a_parent_that_is_killed_end(parent, bag):
+def test_the_children_of_a_killed_parent_end(parent, bag):
     command = [sys.executable, "-P", "-c", PARENT]
     if parent == "play":
         command = python_command(
@@ -183,7 +183,7 @@ def test_the_children_of_a_parent_that_is_killed_end(parent, bag):
     assert all(map(gone, children))
 
 
-def test_a_process_hears_of_data_before_its_parent_ends() -> None:
+def test_a_child_is_notified_of_input_before_its_parent_ends() -> None:
     program = (
         "from webmap.base.children import end_with_parent; import time\n"
         "end_with_parent(lambda: None, lambda: print('data', flush=True), 0.0)\n"

@@ -21,7 +21,7 @@ def close(pose: Pose, other: Pose) -> bool:
 
 
 @given(ANGLES)
-def test_a_normal_angle_is_the_same_direction_between_minus_pi_and_pi(angle):
+def test_a_normalised_angle_keeps_its_direction_between_minus_pi_and_pi(angle):
     normal = normalize_angle(angle)
     assert -math.pi <= normal <= math.pi
     assert math.cos(normal) == pytest.approx(math.cos(angle), abs=1e-9)
@@ -39,24 +39,24 @@ def test_a_pose_and_its_inverse_undo_each_other(pose):
 
 
 @given(POSES, POSES, POSES)
-def test_poses_can_be_put_together_in_any_grouping(a, b, c):
+def test_pose_composition_is_associative(a, b, c):
     left, right = (a @ b) @ c, a @ (b @ c)
     assert math.isclose(left.x, right.x, abs_tol=1e-5)
     assert math.isclose(left.y, right.y, abs_tol=1e-5)
 
 
-def test_a_metre_forward_of_a_robot_that_looks_north():
+def test_one_metre_forward_of_a_robot_facing_north_is_one_metre_north():
     assert close(Pose(1, 2, math.pi / 2) @ Pose(1, 0, 0), Pose(1, 3, math.pi / 2))
 
 
 @given(st.floats(-math.pi, math.pi))
-def test_a_yaw_survives_its_quaternion(yaw):
+def test_a_yaw_survives_the_conversion_to_a_quaternion(yaw):
     again = Quaternion.from_yaw(yaw).yaw
     assert normalize_angle(again - yaw) == pytest.approx(0, abs=1e-9)
 
 
 @given(st.floats(-3, 3), st.floats(0.1, 10))
-def test_a_quaternion_that_is_not_of_norm_one_has_the_same_yaw(yaw, factor):
+def test_scaling_a_quaternion_does_not_change_its_yaw(yaw, factor):
     q = Quaternion.from_yaw(yaw)
     scaled = Quaternion(q.x * factor, q.y * factor, q.z * factor, q.w * factor)
     assert scaled.yaw == pytest.approx(yaw)
@@ -67,7 +67,7 @@ def test_a_quaternion_of_zeros_has_the_norm_zero():
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_a_twist_knows_whether_it_is_finite(bad):
+def test_is_finite_detects_nan_and_infinity_in_a_twist(bad):
     assert Twist(1, 2, 3).is_finite
     assert not Twist(bad, 0, 0).is_finite
     assert not Twist(0, 0, bad).is_finite
@@ -89,17 +89,17 @@ MAPS = st.builds(
 
 
 @given(MAPS, NUMBERS, NUMBERS)
-def test_a_map_of_the_plane_and_its_inverse_undo_each_other(tf, x, y):
+def test_an_affine_map_and_its_inverse_undo_each_other(tf, x, y):
     assert tf.inverse.apply(*tf.apply(x, y)) == pytest.approx((x, y), abs=1e-3)
 
 
 @given(MAPS, MAPS, st.floats(-10, 10), st.floats(-10, 10))
-def test_two_maps_in_turn_are_one(first, second, x, y):
+def test_a_product_of_affine_maps_applies_both_in_turn(first, second, x, y):
     together = (second @ first).apply(x, y)
     assert together == pytest.approx(second.apply(*first.apply(x, y)), rel=1e-6)
 
 
-def test_a_map_that_flattens_has_no_inverse():
+def test_a_singular_affine_map_has_no_inverse():
     with pytest.raises(ValueError, match="flattens"):
         _ = Affine(0, 0, 0, 0).inverse
 

@@ -40,7 +40,7 @@ def written():
 
 
 @pytest.mark.parametrize("name", LOGGERS)
-def test_text_from_outside_is_one_harmless_line_for_any_handler(written, name):
+def test_outside_text_is_logged_as_one_escaped_line_by_any_handler(written, name):
     logging.getLogger(name).warning("%s says: %s", "bridge", EVIL)
     assert written.getvalue() == (
         f"WARNING {name}: bridge says: bad\\n2026-01-01 ERROR webmap.gate: forged"
@@ -48,13 +48,13 @@ def test_text_from_outside_is_one_harmless_line_for_any_handler(written, name):
     )
 
 
-def test_a_text_of_megabytes_is_cut(written):
+def test_a_very_long_log_text_is_cut(written):
     logging.getLogger("webmap.ros").warning("%s: %s", "bridge", "x" * (1 << 24))
     assert len(written.getvalue()) < LONGEST + 100
     assert written.getvalue().endswith("...\n")
 
 
-def test_the_text_of_an_exception_forges_no_line_of_the_log(written):
+def test_the_text_of_an_exception_cannot_forge_a_log_line(written):
     try:
         raise ValueError(EVIL + "\nINFO webmap: " + "y" * 10_000)
     except ValueError:
@@ -77,7 +77,7 @@ def test_a_traceback_of_many_lines_is_cut(written):
     assert "lines are left out" in lines[1 + MOST_LINES // 2]
 
 
-def test_what_one_bridge_logs_without_end_is_cut_and_what_another_logs_is_not(written):
+def test_the_log_limit_of_one_bridge_does_not_affect_another_bridge(written):
     log = logging.getLogger("webmap.ros")
     for name in (*["hostile"] * 1000, "good"):
         log.warning("%s says: %s", name, "hello")
@@ -87,14 +87,14 @@ def test_what_one_bridge_logs_without_end_is_cut_and_what_another_logs_is_not(wr
     assert good == "WARNING webmap.ros: good says: hello"
 
 
-def test_a_source_may_be_named_where_the_text_is_one_argument(written):
+def test_the_source_of_a_log_record_may_be_given_in_extra(written):
     log = logging.getLogger("webmap.ros")
     for name in (*["hostile"] * 1000, "good"):
         log.warning("%s", f"{name} is away", extra={"source": name})
     assert len(written.getvalue().splitlines()) == BURST + 1
 
 
-def test_a_record_that_cannot_be_worded_is_logged_and_raises_nothing(written):
+def test_a_record_that_cannot_be_formatted_is_logged_without_an_error(written):
     class Wicked:
         def __str__(self):
             raise RuntimeError("no words")
@@ -106,7 +106,7 @@ def test_a_record_that_cannot_be_worded_is_logged_and_raises_nothing(written):
     )
 
 
-def test_a_source_gets_one_line_in_a_while_with_how_many_were_left_out():
+def test_a_limited_source_logs_one_line_per_pause_with_the_omitted_count():
     now = [100.0]
     budgets = Budgets(lambda: now[0])
     notes = [budgets.note(("here",), "a") for _ in range(BURST + 7)]
@@ -121,7 +121,7 @@ def test_a_source_gets_one_line_in_a_while_with_how_many_were_left_out():
     assert budgets.note(("here",), "a") == ""
 
 
-def test_invented_names_do_not_fill_the_memory_and_old_ones_are_forgotten():
+def test_the_number_of_log_sources_is_limited_and_old_sources_are_forgotten():
     now = [100.0]
     budgets = Budgets(lambda: now[0])
     for number in range(MOST_SOURCES + 500):
@@ -145,7 +145,7 @@ def test_every_logger_of_the_package_is_guarded():
     assert named == {repr(name) for name in LOGGERS}
 
 
-def test_a_process_of_webmap_guards_what_other_libraries_log():
+def test_a_webmap_process_also_escapes_the_logs_of_other_libraries():
     program = (
         "import logging, webmap.base.logs\n"
         "webmap.base.logs.set_up_logging(format='%(message)s')\n"
@@ -159,7 +159,7 @@ def test_a_process_of_webmap_guards_what_other_libraries_log():
 
 
 @given(st.text(), st.integers(10, 60))
-def test_a_text_is_printable_of_limited_length_and_stays_as_it_is(text, longest):
+def test_one_line_is_printable_limited_and_idempotent(text, longest):
     shown = one_line(text, longest)
     assert shown.isprintable()
     assert len(shown) <= longest
@@ -168,5 +168,5 @@ def test_a_text_is_printable_of_limited_length_and_stays_as_it_is(text, longest)
         assert shown == text
 
 
-def test_line_breaks_of_our_own_are_kept_where_they_are_wanted():
+def test_lines_of_keeps_line_breaks_and_escapes_other_control_characters():
     assert lines_of("a\n\x1bb\r") == "a\n\\x1bb\\r"

@@ -30,6 +30,6 @@ def left_behind(*, returning: bool) -> int:
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="glibc's own habit")
-def test_a_map_that_went_leaves_nothing_behind():
+def test_the_memory_of_a_deleted_map_is_returned_to_the_system():
     assert left_behind(returning=False) > 15 << 20, "the habit is there to be ended"
     assert left_behind(returning=True) < 2 << 20

@@ -11,13 +11,13 @@ from webmap.base.lined_yaml import LinedYaml
 from webmap.base.plain_files import read_file, refuse_special, resolved, write_file
 
 
-def test_a_file_is_read_and_so_is_one_behind_a_link(tmp_path):
+def test_a_file_is_read_through_a_symbolic_link(tmp_path):
     (tmp_path / "a").write_bytes(b"abc")
     (tmp_path / "b").symlink_to("a")
     assert read_file(tmp_path / "b", 3) == b"abc"
 
 
-def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+def test_a_pipe_is_refused_without_waiting(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(ConfigError, match="pipe: expected a file, got a pipe"):
         read_file(tmp_path / "pipe", 10)
@@ -42,7 +42,7 @@ def test_a_file_that_is_too_large_is_refused(tmp_path):
         read_file(tmp_path / "a", 1 << 20)
 
 
-def test_a_file_is_written_into_a_folder_that_is_made_for_it(tmp_path):
+def test_writing_a_file_creates_its_folder(tmp_path):
     file = tmp_path / "new" / "a.json"
     write_file(file, b"one")
     write_file(file, b"two")
@@ -50,7 +50,7 @@ def test_a_file_is_written_into_a_folder_that_is_made_for_it(tmp_path):
     assert list(file.parent.iterdir()) == [file]
 
 
-def test_two_who_write_a_file_at_once_do_not_get_in_each_others_way(
+def test_two_simultaneous_writes_of_a_file_do_not_disturb_each_other(
     tmp_path, monkeypatch
 ):
     file = tmp_path / "a.json"
@@ -68,7 +68,7 @@ def test_two_who_write_a_file_at_once_do_not_get_in_each_others_way(
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_a_disk_that_takes_nothing_leaves_the_file_as_it_was(tmp_path, monkeypatch):
+def test_a_failed_write_on_a_full_disk_keeps_the_old_file(tmp_path, monkeypatch):
     file = tmp_path / "a.json"
     write_file(file, b"before")
 
@@ -82,7 +82,7 @@ def test_a_disk_that_takes_nothing_leaves_the_file_as_it_was(tmp_path, monkeypat
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_yaml_knows_on_which_line_something_stands(tmp_path):
+def test_yaml_errors_name_the_line_of_the_value(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text("# places\nlabels:\n  - name: A\n    x: 1\n  - {x: 2}\n")
     said = LinedYaml(file)
@@ -104,7 +104,7 @@ def test_yaml_knows_on_which_line_something_stands(tmp_path):
         ("[" * 5000, ":1: this is not YAML: values are nested more than 50 deep"),
     ],
 )
-def test_what_is_no_such_yaml_is_refused_with_its_line(tmp_path, text, said):
+def test_invalid_yaml_is_refused_with_its_line(tmp_path, text, said):
     file = tmp_path / "a.yaml"
     file.write_text(text)
     with pytest.raises(ConfigError) as error:
@@ -112,26 +112,26 @@ def test_what_is_no_such_yaml_is_refused_with_its_line(tmp_path, text, said):
     assert str(error.value).startswith(f"{file}{said}")
 
 
-def test_what_a_file_holds_does_not_steer_a_terminal(tmp_path):
+def test_control_characters_are_escaped_in_yaml_errors(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text("a: 1\n")
     assert str(LinedYaml(file).wrong(("a",), "\x1b[2J")) == f"{file}:1: \\x1b[2J"
 
 
-def test_links_in_a_circle_are_refused_with_a_sentence(tmp_path):
+def test_circular_symbolic_links_are_refused_with_a_clear_error(tmp_path):
     (tmp_path / "a").symlink_to("b")
     (tmp_path / "b").symlink_to("a")
     with pytest.raises((ConfigError, OSError), match="symbolic links"):
         read_file(resolved(tmp_path / "a"), 10)
 
 
-def test_a_path_with_a_nul_is_refused_with_a_sentence(tmp_path):
+def test_a_path_with_a_null_character_is_refused_with_a_clear_error(tmp_path):
     for look in (resolved, lambda path: read_file(path, 10)):
         with pytest.raises(ConfigError, match="is no path: expected a text without"):
             look(tmp_path / "a\0b")
 
 
-def test_what_has_no_end_is_refused_and_files_and_folders_are_not(tmp_path):
+def test_pipes_and_devices_are_refused_but_folders_are_accepted(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "zero").symlink_to("/dev/zero")
     for name, kind in (("pipe", "a pipe"), ("zero", "a device")):
@@ -153,14 +153,14 @@ def test_what_has_no_end_is_refused_and_files_and_folders_are_not(tmp_path):
         ("#" * (1 << 18) + "#", "larger than 256 KiB"),
     ],
 )
-def test_yaml_that_would_take_long_is_refused(tmp_path, text, words):
+def test_too_large_or_too_complex_yaml_is_refused(tmp_path, text, words):
     file = tmp_path / "a.yaml"
     file.write_text(text)
     with pytest.raises(ConfigError, match=words):
         LinedYaml(file)
 
 
-def test_a_text_of_many_digits_is_no_number_where_texts_are_read(tmp_path):
+def test_a_long_digit_text_is_accepted_if_values_are_read_as_texts(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text("a: " + "1" * 200)
     assert LinedYaml(file, texts=True).data == {"a": "1" * 200}

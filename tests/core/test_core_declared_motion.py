@@ -34,7 +34,7 @@ def ways():
 @pytest.mark.parametrize(
     ("setter", "args", "options", "topic", "carried"), list(ways())
 )
-def test_what_the_gate_writes_for_a_robot_no_button_does(
+def test_a_button_cannot_publish_to_a_topic_that_only_the_gate_publishes(
     setter, args, options, topic, carried
 ):
     bridge = webmap.Bridge(HALL)
@@ -52,7 +52,7 @@ def test_what_the_gate_writes_for_a_robot_no_button_does(
     assert declared_motion(spec, HALL) is None, "the robot is gone"
 
 
-def test_a_button_that_would_say_where_a_robot_is_is_refused_when_it_is_made():
+def test_adding_a_button_that_publishes_an_initial_pose_is_refused():
     bridge = webmap.Bridge(HALL)
     robot = webmap.Robot("Bob")
     try:

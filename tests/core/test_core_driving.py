@@ -28,19 +28,19 @@ def received():
 
 
 @pytest.mark.parametrize("epoch", ["epoch", "epoch of goals alone"])
-def test_a_program_that_takes_a_robot_gets_the_epoch_of_its_lease(received, epoch):
+def test_a_program_that_takes_control_gets_the_epoch_of_its_lease(received, epoch):
     assert received[epoch] > 0
 
 
-def test_each_velocity_that_the_gate_wrote_is_told_as_it_was_written(received):
+def test_on_send_twist_receives_the_velocity_that_the_gate_sent(received):
     assert [0.1, 0.5] in received["twists"]
 
 
-def test_a_goal_is_told_on_the_common_map_as_the_program_gave_it(received):
+def test_on_send_move_receives_the_goal_in_the_common_map(received):
     assert received["said"] == pytest.approx(received["asked"])
 
 
-def test_the_robot_hears_the_goal_in_its_own_map_and_frame(received):
+def test_the_robot_receives_the_goal_in_its_own_map_and_frame(received):
     # Its map lies 10 m along x, turned by 90 degrees.
     x, y = received["asked"]
     assert received["heard"] == pytest.approx([y, 10.0 - x])
@@ -48,5 +48,5 @@ def test_the_robot_hears_the_goal_in_its_own_map_and_frame(received):
 
 
 @pytest.mark.parametrize("command", ["twist", "move"])
-def test_a_program_that_let_go_may_not_move_the_robot(received, command):
+def test_a_program_that_released_control_cannot_move_the_robot(received, command):
     assert received[f"{command} afterwards"] == "NoLease"

@@ -26,7 +26,9 @@ def test_a_module_is_constructed_with_its_owner_and_the_arguments(namespace):
     assert owner.modules == [module]
 
 
-def test_an_unknown_name_lists_what_there_is_and_the_nearest(namespace):
+def test_an_unknown_module_name_is_refused_with_the_known_and_the_nearest_name(
+    namespace,
+):
     namespace.register(dict, name="Horn")
     namespace.register(list, name="Lamp")
     with pytest.raises(ModuleNotFound, match=r"'Hron'.*mean 'Horn'.*Horn, Lamp"):
@@ -44,13 +46,13 @@ def test_the_built_in_modules_are_found_by_name():
     assert view_control is webmap.modules.map.MapViewControl
 
 
-def test_a_name_is_taken_only_once(namespace):
+def test_a_module_name_can_be_registered_only_once(namespace):
     namespace.register(dict, name="Horn")
     with pytest.raises(ValueError, match="already registered as builtins"):
         namespace.register(list, name="Horn")
 
 
-def test_removing_a_module_destroys_it_and_releases_what_it_made(namespace):
+def test_removing_a_module_destroys_the_module_and_removes_its_listeners(namespace):
     gone = []
 
     class Tidy:
@@ -68,7 +70,7 @@ def test_removing_a_module_destroys_it_and_releases_what_it_made(namespace):
         owner.remove_module(module)
 
 
-def test_a_module_whose_constructor_raises_leaves_nothing(namespace):
+def test_a_module_whose_constructor_raises_leaves_nothing_behind(namespace):
     gone = []
 
     def broken(owner):
@@ -82,7 +84,7 @@ def test_a_module_whose_constructor_raises_leaves_nothing(namespace):
     assert gone == ["listener"]
 
 
-def test_a_module_that_raises_does_not_keep_the_others_from_hearing(namespace):
+def test_an_exception_in_one_module_does_not_affect_other_modules(namespace):
     seen, reported = [], []
 
     class Bad:
@@ -129,7 +131,7 @@ class Slow:
         self.received.append((n, 10 // n, current_scope()))
 
 
-def test_a_trigger_that_is_a_coroutine_goes_on_beside_the_others(namespace):
+def test_coroutine_triggers_of_several_modules_run_concurrently(namespace):
     async def scenario():
         owner = Reporting(namespace)
         slow, slower = owner.add_module(Slow), owner.add_module(Slow)
@@ -151,7 +153,7 @@ def test_a_trigger_that_is_a_coroutine_goes_on_beside_the_others(namespace):
     asyncio.run(scenario())
 
 
-def test_a_coroutine_that_still_waits_ends_with_its_module(namespace):
+def test_a_waiting_coroutine_trigger_is_cancelled_with_its_module(namespace):
     async def scenario():
         owner = Reporting(namespace)
         slow = owner.add_module(Slow)
@@ -166,7 +168,7 @@ def test_a_coroutine_that_still_waits_ends_with_its_module(namespace):
     asyncio.run(scenario())
 
 
-def test_a_coroutine_that_removes_its_own_module_goes_on_to_its_end(namespace):
+def test_a_coroutine_trigger_that_removes_its_own_module_runs_to_its_end(namespace):
     class Once:
         def __init__(self, owner):
             self.owner, self.done = owner, False
@@ -187,7 +189,7 @@ def test_a_coroutine_that_removes_its_own_module_goes_on_to_its_end(namespace):
     asyncio.run(scenario())
 
 
-def test_a_coroutine_whose_module_ends_before_it_begins_is_no_trouble(namespace):
+def test_removing_a_module_before_its_coroutine_trigger_starts_is_no_error(namespace):
     async def scenario():
         owner = Reporting(namespace)
         slow = owner.add_module(Slow)
@@ -200,7 +202,7 @@ def test_a_coroutine_whose_module_ends_before_it_begins_is_no_trouble(namespace)
     asyncio.run(scenario())
 
 
-def test_an_owner_that_has_ended_takes_no_module(container):
+def test_a_module_cannot_be_added_to_a_destroyed_robot_or_map(container):
     made = []
     for owner in (Robot("Bob"), Map(container, 100, 100)):
         owner.destroy()
@@ -209,7 +211,7 @@ def test_an_owner_that_has_ended_takes_no_module(container):
     assert made == []
 
 
-def test_a_coroutine_that_raises_later_is_reported_as_any_module(namespace):
+def test_an_exception_in_a_coroutine_trigger_is_reported(namespace):
     async def scenario():
         owner = Reporting(namespace)
         owner.add_module(Slow).go.set()
@@ -223,7 +225,7 @@ def test_a_coroutine_that_raises_later_is_reported_as_any_module(namespace):
     asyncio.run(scenario())
 
 
-def test_a_coroutine_that_nothing_would_run_is_said(namespace):
+def test_a_coroutine_trigger_without_an_event_loop_is_reported(namespace):
     owner = Reporting(namespace)
     owner.add_module(Slow)
     owner.notify_modules("on_ring", 1)
@@ -233,7 +235,7 @@ def test_a_coroutine_that_nothing_would_run_is_said(namespace):
     ]
 
 
-def test_what_a_module_made_reports_to_its_owner_until_it_is_mended(namespace):
+def test_a_problem_of_a_module_is_a_problem_of_its_robot_until_mended(namespace):
     class Sensor:
         def __init__(self, robot) -> None:
             self.scope = current_scope()
@@ -254,7 +256,7 @@ def test_what_a_module_made_reports_to_its_owner_until_it_is_mended(namespace):
     assert not robot.problems
 
 
-def test_modules_may_fire_triggers_of_their_own():
+def test_a_module_can_fire_its_own_triggers():
     seen = []
 
     class Bumper:
@@ -277,7 +279,7 @@ def test_modules_may_fire_triggers_of_their_own():
     assert seen == ["left"]
 
 
-def test_a_subclass_may_have_a_namespace_of_its_own(namespace):
+def test_a_subclass_can_have_its_own_namespace(namespace):
     namespace.register(lambda owner: "a wheel", name="Wheel")
 
     class Cart(Robot):

@@ -24,12 +24,12 @@ def received():
     return json.loads(done.stdout)
 
 
-def test_without_a_limit_the_whole_velocity_is_refused(received):
+def test_a_velocity_with_an_axis_without_a_limit_is_refused_as_a_whole(received):
     assert "got z = 0.3 m/s, but no limit of the robot" in received["without a limit"]
     assert received["moved without a limit"] == 0
 
 
-def test_the_robot_gets_all_six_numbers_within_its_limits(received):
+def test_the_robot_receives_all_six_velocity_components_within_its_limits(received):
     assert received["twists"]
     for x, y, turn, z, rx, ry in received["twists"]:
         # 0.9 m/s upward is too fast, so all of the linear part is slower. How much
@@ -40,7 +40,7 @@ def test_the_robot_gets_all_six_numbers_within_its_limits(received):
     assert received["wrong"] == []
 
 
-def test_a_stop_of_a_robot_that_climbs_on_is_not_confirmed(received):
+def test_the_stop_of_a_robot_that_still_climbs_is_not_confirmed(received):
     confirmed, why = received["a robot that climbs on"]
     assert confirmed is False
     assert why.startswith("still moving at 0.")
@@ -48,5 +48,5 @@ def test_a_stop_of_a_robot_that_climbs_on_is_not_confirmed(received):
     assert received["last"] == [0.0] * 6
 
 
-def test_the_stop_is_confirmed_when_it_climbs_no_more(received):
+def test_the_stop_is_confirmed_when_the_robot_no_longer_climbs(received):
     assert received["standing"] == [0.0] * 6

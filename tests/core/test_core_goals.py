@@ -31,7 +31,7 @@ def spec_of(set_up):
     return checked(spec)
 
 
-def test_the_gate_is_told_of_an_action_and_of_the_topic_beside_it():
+def test_the_spec_for_the_gate_contains_the_action_and_the_goal_topic():
     def set_up(robot):
         robot.set_move_topic(Link(), "/goal_pose", action="/navigate_to_pose")
 
@@ -41,7 +41,7 @@ def test_the_gate_is_told_of_an_action_and_of_the_topic_beside_it():
     assert spec.pose_topic is None
 
 
-def test_a_robot_may_have_an_action_alone():
+def test_a_robot_can_have_an_action_without_a_goal_topic():
     def set_up(robot):
         robot.set_move_topic(Link(), action="/move_base", action_type=MOVE_BASE)
 
@@ -50,18 +50,18 @@ def test_a_robot_may_have_an_action_alone():
     assert spec.goal_type == "geometry_msgs/PoseStamped"
 
 
-def test_a_robot_may_have_an_initial_pose_alone():
+def test_a_robot_can_have_an_initial_pose_topic_without_goals():
     spec = spec_of(lambda robot: robot.set_initial_pose_topic(Link()))
     assert (spec.pose_topic, spec.pose_covariance) == ("/initialpose", SURE)
     assert spec.pose_type == "geometry_msgs/PoseWithCovarianceStamped"
 
 
-def test_a_robot_without_goals_is_told_its_place_in_the_map_that_is_said():
+def test_the_initial_pose_of_a_robot_without_goals_uses_its_own_frame_option():
     spec = spec_of(lambda robot: robot.set_initial_pose_topic(Link(), frame="tb1/map"))
     assert spec.goal_frame == "tb1/map"
 
 
-def test_the_initial_pose_is_spelled_and_framed_as_the_goals_are():
+def test_the_initial_pose_uses_the_type_spelling_and_the_frame_of_the_goals():
     def set_up(robot):
         robot.set_move_topic(link, action="/navigate_to_pose", frame="hall")
         robot.set_initial_pose_topic(link, "/here", covariance=[1, 2, 3], frame="x")
@@ -72,7 +72,7 @@ def test_the_initial_pose_is_spelled_and_framed_as_the_goals_are():
     assert (spec.goal_frame, spec.pose_covariance) == ("hall", (1, 2, 3))
 
 
-def test_what_the_gate_writes_is_protected_on_the_bridge():
+def test_the_topics_of_goals_and_the_initial_pose_are_protected_on_the_bridge():
     def set_up(robot):
         robot.set_move_topic(link, "/goal", action="/move_base", action_type=MOVE_BASE)
         robot.set_initial_pose_topic(link)
@@ -87,7 +87,7 @@ def test_what_the_gate_writes_is_protected_on_the_bridge():
     }
 
 
-def test_goals_that_go_nowhere_are_refused():
+def test_set_move_topic_without_a_topic_or_an_action_is_refused():
     with pytest.raises(ConfigError, match="neither is given"):
         Robot("Bob").set_move_topic(Link())
 
@@ -104,7 +104,7 @@ def test_goals_that_go_nowhere_are_refused():
         ({"cancel_topic": "can cel"}, '"can cel", expected the name of a topic, such'),
     ],
 )
-def test_goals_that_cannot_be_meant_are_refused(options, said):
+def test_invalid_options_of_set_move_topic_are_refused(options, said):
     robot = Robot("Bob")
     with pytest.raises(ConfigError) as error:
         robot.set_move_topic(Link(), "/goal", **options)
@@ -113,14 +113,14 @@ def test_goals_that_cannot_be_meant_are_refused(options, said):
 
 
 @pytest.mark.parametrize("policy", ["continue", "cancel"])
-def test_what_becomes_of_a_goal_is_told_to_the_gate(policy):
+def test_the_spec_for_the_gate_contains_on_operator_loss(policy):
     def set_up(robot):
         robot.set_move_topic(Link(), "/goal", on_operator_loss=policy)
 
     assert spec_of(set_up).on_operator_loss == policy
 
 
-def test_a_typing_error_in_plain_data_does_not_let_a_goal_go_on():
+def test_an_invalid_on_operator_loss_in_plain_data_is_refused():
     move = {"bridge": "ws://robot:9090", "topic": "/goal", "on_operator_loss": "cancle"}
     with pytest.raises(ConfigError, match='"cancle", expected "continue" or "cancel"'):
         Robot.from_dict({"name": "Bob", "move": move})
@@ -129,12 +129,12 @@ def test_a_typing_error_in_plain_data_does_not_let_a_goal_go_on():
 @pytest.mark.parametrize(
     "covariance", [(1, 2), (1, 2, -3), (1, 2, float("nan")), (1, 2, "3"), "abc"]
 )
-def test_a_covariance_that_is_none_is_refused(covariance):
+def test_an_invalid_covariance_is_refused(covariance):
     with pytest.raises(ConfigError, match="three numbers from 0 on"):
         Robot("Bob").set_initial_pose_topic(Link(), covariance=covariance)
 
 
-def test_goals_and_initial_pose_go_to_one_bridge():
+def test_goals_and_the_initial_pose_must_use_the_same_bridge():
     one, other = Link(), Link("ws://other:9090")
     robot = Robot("Bob")
     robot.set_move_topic(one, "/goal")
@@ -147,7 +147,7 @@ def test_goals_and_initial_pose_go_to_one_bridge():
     assert robot.motion.bridge("move") is one
 
 
-def test_goals_and_initial_pose_are_plain_data_and_back():
+def test_goals_and_the_initial_pose_are_restored_from_plain_data():
     link = Link()
     robot = Robot("Bob")
     robot.set_move_topic(link, action="/navigate_to_pose")

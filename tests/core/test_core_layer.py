@@ -40,7 +40,7 @@ class ShowCircles:
         map.add_layer(self.layer)
 
 
-def test_fifty_maps_of_one_topic_cost_one_subscription_and_one_drawing(page):
+def test_fifty_maps_of_one_topic_share_one_subscription_and_one_drawing(page):
     link = Link()
     maps = [Map(page.element(f"m{i}"), 100, 100) for i in range(50)]
     modules = [map.add_module(ShowCircles, link, "/circles") for map in maps]
@@ -54,7 +54,7 @@ def test_fifty_maps_of_one_topic_cost_one_subscription_and_one_drawing(page):
     assert Layer._shared == {}
 
 
-def test_other_options_are_another_layer(page, container):
+def test_different_options_make_a_different_layer(page, container):
     link = Link()
     map = Map(container, 100, 100)
     red = map.add_module(ShowCircles, link, "/circles")
@@ -64,7 +64,7 @@ def test_other_options_are_another_layer(page, container):
     assert link.listeners == []
 
 
-def test_the_end_of_a_page_gives_its_layers_back(page, container, channel):
+def test_closing_a_page_releases_its_layers(page, container, channel):
     link = Link()
     Map(container, 100, 100).add_module(ShowCircles, link, "/circles")
     page.close()
@@ -72,7 +72,7 @@ def test_the_end_of_a_page_gives_its_layers_back(page, container, channel):
     assert channel.mounted == {}
 
 
-def test_a_layer_that_comes_too_late_for_its_map_is_given_back(page, container):
+def test_a_layer_added_to_a_destroyed_map_is_refused_and_released(page, container):
     link = Link()
     map = Map(container, 100, 100)
     map.destroy()

@@ -29,11 +29,11 @@ def completed(function, html: Path | None = None) -> tuple[list[str], float]:
     return asyncio.run(run())
 
 
-def test_a_map_gets_a_grid_pan_and_zoom_and_a_view():
+def test_a_map_on_a_made_page_gets_a_grid_a_view_control_and_a_view():
     assert completed(lambda map: None) == (["MetreGrid", "MouseViewControl"], 20.0)
 
 
-def test_a_view_and_a_module_of_the_program_are_kept():
+def test_a_view_and_a_module_set_by_the_program_are_kept():
     def function(map: Map) -> None:
         map.add_module("MouseViewControl")
         map.scale(50)
@@ -42,7 +42,7 @@ def test_a_view_and_a_module_of_the_program_are_kept():
 
 
 @pytest.mark.parametrize("scale", [1.0, 30.0])
-def test_a_page_of_the_program_s_own_html_is_left_alone(scale):
+def test_a_page_with_html_of_the_program_is_not_changed(scale):
     def function(map: Map) -> None:
         if scale != 1.0:
             map.scale(scale)

@@ -14,20 +14,20 @@ from webmap.core.view import Rect, apply_operation, initial_view
 POINTS = st.floats(-2000, 2000)
 
 
-def test_a_new_map_has_the_origin_in_the_middle_at_a_pixel_to_the_metre(container):
+def test_a_new_map_has_the_origin_in_its_centre_and_one_pixel_per_metre(container):
     map = Map(container, 700, 500)
     assert (map.canvas_width, map.canvas_height) == (700, 500)
     assert map.world.tf.apply(0, 0) == (350, 250)
     assert map.world.tf.apply(1, 1) == (351, 249), "y is up in the world"
 
 
-def test_a_map_without_a_size_has_that_of_its_container(container):
+def test_a_map_without_a_size_has_the_size_of_its_container(container):
     map = Map(container)
     assert (map.canvas_width, map.canvas_height) == (700, 500)
     assert (map.get_bounding_rect().width, map.get_bounding_rect().height) == (700, 500)
 
 
-def test_the_tutorials_view_shows_the_whole_background(container):
+def test_the_view_of_the_tutorial_shows_the_whole_background(container):
     map = Map(container, 700, 500)
     map.scale(500 / 58.7, map.canvas_width * 0.5, map.canvas_height * 0.5)
     left, top = map.world.tf.apply(-29.35, 29.35)
@@ -42,14 +42,14 @@ def test_the_tutorials_view_shows_the_whole_background(container):
     x=POINTS,
     y=POINTS,
 )
-def test_the_point_stays_where_it_is(operation, amount, x, y):
+def test_the_fixed_point_of_scale_and_rotate_stays_in_place(operation, amount, x, y):
     before = initial_view(700, 500)
     after = apply_operation(before, Rect(0, 0, 700, 500), operation, (amount, x, y))
     world = before.inverse.apply(x, y)
     assert after.apply(*world) == pytest.approx((x, y), abs=1e-6)
 
 
-def test_a_positive_rotation_is_counter_clockwise_as_it_is_seen(container):
+def test_a_positive_rotation_is_counter_clockwise_on_the_screen(container):
     map = Map(container, 200, 200)
     map.rotate(90)
     x, y = map.world.tf.apply(1, 0)
@@ -62,20 +62,20 @@ def test_translate_moves_by_pixels(container):
     assert map.world.tf.apply(0, 0) == (110, 95)
 
 
-def test_operations_go_to_the_browser_in_order(container, channel):
+def test_view_operations_are_sent_to_the_browser_in_order(container, channel):
     map = Map(container, 200, 200)
     map.scale(2)
     map.translate(1, 2)
     assert channel.calls == [("scale", 2, 100, 100), ("translate", 1, 2)]
 
 
-def test_a_robot_in_sight_is_followed_where_it_is(container, channel):
+def test_a_visible_robot_is_followed_without_moving_the_view(container, channel):
     map, robot = Map(container, 200, 100), Robot("Bob")
     map.follow(robot)
     assert channel.calls == [("follow", robot.svg.id)]
 
 
-def test_a_robot_out_of_sight_is_followed_in_the_middle(container, channel):
+def test_a_robot_outside_the_view_is_centred_and_followed(container, channel):
     map, robot = Map(container, 200, 100), Robot("Bob")
     robot.position = Vector3(150.0, 20.0)
     map.follow(robot)
@@ -102,7 +102,7 @@ class Witness:
         self.received.append(("select", selected and selected.name))
 
 
-def test_triggers_fire_for_robots_that_come_go_and_are_selected(container):
+def test_triggers_fire_for_added_removed_and_selected_robots(container):
     map = Map(container, 700, 500)
     witness = map.add_module(Witness)
     bob = Robot("Bob")
@@ -121,7 +121,7 @@ def test_triggers_fire_for_robots_that_come_go_and_are_selected(container):
     assert map.selected is None
 
 
-def test_the_class_selected_is_put_on_the_mount_and_not_on_the_robot(
+def test_the_class_selected_is_set_on_the_mount_and_not_on_the_robot(
     container, channel
 ):
     map = Map(container, 700, 500)
@@ -132,7 +132,7 @@ def test_the_class_selected_is_put_on_the_mount_and_not_on_the_robot(
     assert "selected" not in bob.svg.classes
 
 
-def test_a_robot_on_two_maps_is_selected_while_any_map_has_it_selected(page):
+def test_a_robot_on_two_maps_is_selected_while_selected_on_one_map(page):
     one, two = Map(page.element("a"), 10, 10), Map(page.element("b"), 10, 10)
     bob = Robot("Bob")
     changes: list[bool] = []
@@ -163,7 +163,7 @@ def test_a_robot_of_another_map_cannot_be_selected(container):
         map.set_selected(Robot("Bob"))
 
 
-def test_an_image_stands_upright_in_the_world(container, tmp_path):
+def test_an_image_is_added_with_a_published_url_and_can_be_removed(container, tmp_path):
     (tmp_path / "floor.png").write_bytes(b"png")
     map = Map(container, 700, 500)
     image = map.add_image("floor.png", -2.0, 1.0, 4.0, 3.0)
@@ -173,40 +173,44 @@ def test_an_image_stands_upright_in_the_world(container, tmp_path):
     assert image not in map.images.children
 
 
-def test_an_image_that_does_not_exist_is_said_on_the_page(container, channel):
+def test_a_missing_image_is_shown_as_an_error_on_the_page(container, channel):
     map = Map(container, 700, 500)
     map.add_image("nowhere.png", 0, 0, 1, 1)
     assert len(channel.errors) == 1
     assert "nowhere.png" in channel.errors[0]
 
 
-def test_an_image_outside_the_pages_folder_is_not_shown(container, channel, publisher):
+def test_an_image_outside_the_folder_of_the_page_is_not_shown(
+    container, channel, publisher
+):
     map = Map(container, 700, 500)
     map.add_image("../../etc/passwd", 0, 0, 1, 1)
     assert "outside" in channel.errors[0]
     assert publisher.images == []
 
 
-def test_a_container_that_is_on_no_page_is_refused():
+def test_a_container_that_is_not_on_a_page_is_refused():
     with pytest.raises(ConfigError, match=r"page\.element"):
         Map(svg.g())
 
 
-def test_no_map_is_made_on_a_page_that_was_closed(page, container):
+def test_a_map_on_a_closed_page_is_refused(page, container):
     page.close()
     with pytest.raises(ConfigError, match="page '/' of Ann was closed"):
         Map(container, 700, 500)
     assert page.maps == []
 
 
-def test_a_map_knows_where_its_browser_has_it(container):
+def test_a_map_knows_its_position_in_the_browser(container):
     map = Map(container, 700, 500)
     map.on_view_report(map.world.tf, Rect(12.0, 34.0, 700.0, 500.0))
     place = map.get_bounding_rect()
     assert (place.left, place.top) == (12.0, 34.0)
 
 
-def test_a_browser_part_sends_to_its_module_and_ends_with_it(container, channel):
+def test_a_browser_part_exchanges_messages_with_its_module_until_its_removal(
+    container, channel
+):
     map = Map(container, 700, 500)
     got = []
 
@@ -228,7 +232,7 @@ def test_a_browser_part_sends_to_its_module_and_ends_with_it(container, channel)
     assert [call[0] for call in channel.calls] == ["attach", "send", "detach"]
 
 
-def test_the_end_of_a_page_leaves_nothing_behind(page, channel, publisher, tmp_path):
+def test_a_closed_page_leaves_nothing_behind(page, channel, publisher, tmp_path):
     (tmp_path / "floor.png").write_bytes(b"png")
     bob = Robot("Bob")
     map = Map(page.element("webmap_container"), 700, 500)
@@ -252,14 +256,14 @@ def test_the_end_of_a_page_leaves_nothing_behind(page, channel, publisher, tmp_p
     bob.destroy()
 
 
-def test_teleop_refuses_speeds_that_are_none(container):
+def test_teleop_refuses_invalid_speeds(container):
     map = Map(container, 700, 500)
     for speed in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(ValueError, match="speed"):
             map.add_module("Teleop", speed, 1.0)
 
 
-def test_the_speeds_of_a_page_are_those_of_the_map_that_the_hands_are_at(page):
+def test_the_speeds_of_a_page_are_those_of_its_active_map(page):
     slow = Map(page.element("a"), 10, 10).add_module("Teleop", 0.2, 0.4)
     fast = Map(page.element("b"), 10, 10).add_module("Teleop", 1.0, 1.5)
     assert page.speeds == (0.2, 0.4), "nobody knows yet, so the least"

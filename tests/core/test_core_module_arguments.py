@@ -88,20 +88,20 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("annotation", "value"), ACCEPTED, ids=named)
-def test_a_value_of_its_kind_passes(annotation, value):
+def test_a_value_of_the_annotated_type_is_accepted(annotation, value):
     check_arguments(made(annotation), [value], {})
     check_arguments(made(annotation), [], {"it": value})
 
 
 @pytest.mark.parametrize(("annotation", "value", "expected"), REFUSED, ids=named)
-def test_a_value_of_another_kind_is_refused(annotation, value, expected):
+def test_a_value_of_another_type_is_refused(annotation, value, expected):
     with pytest.raises(WrongArguments) as error:
         check_arguments(made(annotation), [], {"it": value})
     (wrong,) = error.value.wrong
     assert (wrong.path, wrong.text) == (("options", "it"), expected)
 
 
-def test_the_way_leads_into_lists_and_tables():
+def test_the_path_of_a_wrong_value_leads_into_lists_and_tables():
     kind = list[Mapping[str, tuple[int, int]]]
     with pytest.raises(WrongArguments) as error:
         check_arguments(made(kind), [[{}, {"a": [1, "2"]}]], {}, first=1)
@@ -110,7 +110,7 @@ def test_the_way_leads_into_lists_and_tables():
     assert "it[1]['a'][1]: expected a whole number, got '2'" in str(error.value)
 
 
-def test_what_a_module_passes_on_is_checked_too():
+def test_variable_positional_and_keyword_arguments_are_also_checked():
     def factory(owner, *many: int, **named: str): ...
 
     check_arguments(factory, [1, 2], {"a": "b"})
@@ -118,7 +118,7 @@ def test_what_a_module_passes_on_is_checked_too():
         check_arguments(factory, [1, "2"], {"a": 3})
 
 
-def test_more_arguments_than_there_are_and_fewer_are_named():
+def test_missing_unknown_and_extra_arguments_are_refused():
     def factory(owner, one, *, two=0): ...
 
     with pytest.raises(WrongArguments, match=r"missing .* 'one'; it takes \(one, two"):
@@ -133,7 +133,7 @@ def test_more_arguments_than_there_are_and_fewer_are_named():
     assert error.value.wrong[0].path == ("options", "one")
 
 
-def test_the_owner_is_no_argument_even_of_what_takes_any_name():
+def test_owner_is_refused_as_a_keyword_even_with_variable_keyword_arguments():
     def factory(owner, one=0, **others): ...
 
     said = r'no argument "owner"; .* takes \(one, \*\*others\)'
@@ -141,17 +141,17 @@ def test_the_owner_is_no_argument_even_of_what_takes_any_name():
         check_arguments(factory, [1], {"owner": 2})
 
 
-def test_a_name_that_only_a_place_has_is_free_for_what_is_passed_on():
+def test_a_positional_only_name_is_free_for_variable_keyword_arguments():
     def factory(owner, one, /, **others): ...
 
     check_arguments(factory, [1], {"owner": 2, "one": 3})
 
 
-def test_what_has_no_signature_speaks_for_itself():
+def test_arguments_of_a_factory_without_a_signature_are_not_checked():
     check_arguments(dict, [1], {"a": 2})
 
 
-def test_a_program_hears_it_before_the_module_is_made():
+def test_a_wrong_argument_is_refused_before_the_module_is_made():
     made = []
 
     class Lamp:

@@ -68,7 +68,9 @@ def hear(robot, *reports):
     asyncio.run(scenario())
 
 
-def test_its_nodes_are_named_but_for_those_of_bridges(robot, gate):
+def test_the_publishing_nodes_are_sent_to_the_gate_without_those_of_bridges(
+    robot, gate
+):
     asked = driven(robot, [NODES, []])
     hear(robot, NOTHING)
     assert asked == []
@@ -79,19 +81,23 @@ def test_its_nodes_are_named_but_for_those_of_bridges(robot, gate):
     assert gate.named[1:] == [(robot.id, ())]
 
 
-def test_it_is_asked_again_while_it_goes_on(robot, gate, monkeypatch):
+def test_rosapi_is_asked_again_while_another_program_publishes(
+    robot, gate, monkeypatch
+):
     monkeypatch.setattr(motion, "ASK_WRITERS", 0.0)
     asked = driven(robot, [NODES, NODES])
     hear(robot, SAID, SAID)
     assert len(asked) == 2
 
 
-def test_a_rosapi_that_does_not_answer_names_nobody(robot, gate):
+def test_no_nodes_are_sent_to_the_gate_when_rosapi_does_not_answer(robot, gate):
     asked = driven(robot, [None])
     hear(robot, SAID)
     assert (len(asked), gate.named) == (1, [])
 
 
-def test_a_robot_without_velocity_is_not_asked_about(robot, gate):
+def test_no_nodes_are_sent_to_the_gate_for_a_robot_without_a_velocity_topic(
+    robot, gate
+):
     hear(robot, SAID)
     assert gate.named == []

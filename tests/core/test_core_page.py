@@ -42,7 +42,7 @@ class Work:
 # Asynchronous handlers.
 
 
-def test_what_a_handler_goes_on_with_ends_with_the_page(page):
+def test_async_handlers_are_cancelled_when_the_page_is_closed(page):
     async def scenario():
         owners, viewers = Work(), Work()
         button = html.button()
@@ -61,7 +61,7 @@ def test_what_a_handler_goes_on_with_ends_with_the_page(page):
     asyncio.run(scenario())
 
 
-def test_a_page_that_closes_before_a_handler_could_begin_is_no_trouble(page):
+def test_an_async_handler_does_not_start_after_the_page_is_closed(page):
     async def scenario():
         work = Work()
         page.listen(page.mount, page.element("bar"), "click", work)
@@ -73,7 +73,7 @@ def test_a_page_that_closes_before_a_handler_could_begin_is_no_trouble(page):
     asyncio.run(scenario())
 
 
-def test_a_handler_of_a_module_ends_with_the_module(page, container):
+def test_an_async_handler_of_a_module_is_cancelled_with_the_module(page, container):
     async def scenario():
         work = Work()
 
@@ -93,7 +93,7 @@ def test_a_handler_of_a_module_ends_with_the_module(page, container):
     asyncio.run(scenario())
 
 
-def test_a_handler_that_takes_itself_away_goes_on_to_its_end(page):
+def test_an_async_handler_that_removes_itself_runs_to_its_end(page):
     async def scenario():
         done, own = [], Scope("own")
 
@@ -114,7 +114,7 @@ def test_a_handler_that_takes_itself_away_goes_on_to_its_end(page):
 
 
 @pytest.mark.parametrize("own", [True, False])
-def test_what_an_async_handler_raises_is_said_on_the_page(page, channel, own):
+def test_an_exception_in_an_async_handler_is_shown_on_the_page(page, channel, own):
     async def scenario():
         async def fail(event):
             await asyncio.sleep(0)
@@ -132,7 +132,7 @@ def test_what_an_async_handler_raises_is_said_on_the_page(page, channel, own):
     asyncio.run(scenario())
 
 
-def test_a_press_goes_on_when_its_button_is_shown_no_more(page, monkeypatch):
+def test_a_running_button_call_continues_when_the_page_is_closed(page, monkeypatch):
     async def scenario():
         answer = asyncio.Event()
 
@@ -162,7 +162,9 @@ def test_a_press_goes_on_when_its_button_is_shown_no_more(page, monkeypatch):
 # What the browser is asked.
 
 
-def test_the_browser_prevents_and_stops_what_any_handler_wants_so(page, channel):
+def test_prevent_and_stop_of_any_handler_apply_to_the_event_in_the_browser(
+    page, channel
+):
     bar = page.element("bar")
     key = (page.mount, bar.id, "click")
     first = page.listen(page.mount, bar, "click", print)
@@ -186,7 +188,7 @@ def test_a_click_on_the_map_itself_can_be_prevented(page, container, channel):
     assert flags == (True, False)
 
 
-def test_what_the_browser_refuses_to_listen_to_is_not_kept(page, channel, monkeypatch):
+def test_a_refused_listener_is_not_kept(page, channel, monkeypatch):
     def refuse(*key, prevent, stop):
         raise ValueError("no such event")
 
@@ -199,14 +201,14 @@ def test_what_the_browser_refuses_to_listen_to_is_not_kept(page, channel, monkey
 # What is left.
 
 
-def test_a_handler_leaves_nothing_in_its_scope_once_it_is_removed(page):
+def test_a_removed_handler_leaves_nothing_in_its_scope(page):
     scope = Scope("module")
     with scope.active():
         page.listen(page.mount, page.element("bar"), "click", print).remove()
     assert len(scope) == 0
 
 
-def test_handlers_of_a_robot_that_comes_and_goes_leave_nothing_behind(page, container):
+def test_handlers_of_an_added_and_removed_robot_leave_nothing_behind(page, container):
     bob = Robot("Bob")
     with page.scope.active():
         map = Map(container, 700, 500)
@@ -219,7 +221,7 @@ def test_handlers_of_a_robot_that_comes_and_goes_leave_nothing_behind(page, cont
     bob.destroy()
 
 
-def test_a_page_that_closed_is_in_the_scope_of_no_module(page, container):
+def test_a_closed_page_leaves_no_handlers_in_the_scope_of_a_module(page, container):
     scope = Scope("a robot's module")
     bar = page.element("bar")
     with scope.active():
@@ -228,7 +230,7 @@ def test_a_page_that_closed_is_in_the_scope_of_no_module(page, container):
     assert len(scope) == 0
 
 
-def test_a_robot_from_plain_data_takes_the_bridges_that_it_made_along(page, caplog):
+def test_bridges_made_by_a_robot_from_plain_data_end_with_its_page(page, caplog):
     url = "ws://a-robot-of-one-page:9090"
     data = {
         "name": "Bob",
@@ -247,7 +249,7 @@ def test_a_robot_from_plain_data_takes_the_bridges_that_it_made_along(page, capl
     assert len(page.scope) == 0
 
 
-def test_an_image_that_was_removed_can_be_loaded_no_more(container, publisher, page):
+def test_a_removed_image_is_no_longer_published(container, publisher, page):
     page.entry.folder.joinpath("floor.png").write_bytes(b"png")
     map = Map(container, 700, 500)
     before = len(page.scope)
@@ -261,7 +263,9 @@ def test_an_image_that_was_removed_can_be_loaded_no_more(container, publisher, p
     map.remove_image(svg.image())
 
 
-def test_the_images_of_a_map_go_with_it(container, publisher, page):
+def test_the_images_of_a_destroyed_map_are_no_longer_published(
+    container, publisher, page
+):
     page.entry.folder.joinpath("floor.png").write_bytes(b"png")
     map = Map(container, 700, 500)
     map.add_image("floor.png", 0, 0, 1, 1)

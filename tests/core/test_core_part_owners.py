@@ -31,22 +31,22 @@ def owners(*namespaces: str) -> PartOwners:
         ("", "unknown"),
     ],
 )
-def test_a_part_is_the_innermost_robots_whose_namespace_it_begins_with(name, owner):
+def test_a_part_belongs_to_the_robot_with_the_longest_matching_namespace(name, owner):
     assert owners("a", "b", "a/b").owner(name, "a") == owner
 
 
-def test_what_no_namespace_is_in_front_of_is_not_the_robots_that_has_none():
+def test_a_part_without_a_namespace_does_not_belong_to_a_robot_without_one():
     found = owners("", "a")
     assert found.owner("base: Motors", "") == "unknown"
     assert found.owner("a/base: Motors", "") == "another"
 
 
-def test_robots_of_the_same_namespace_are_one():
+def test_robots_of_the_same_namespace_count_as_one():
     """Each page may make a robot of its own for the same one."""
     assert owners("a", "a").owner("base: Motors", "a") == "own"
 
 
-def test_who_leaves_counts_no_more_also_with_its_scope():
+def test_a_robot_does_not_count_after_its_scope_is_closed():
     found, scope = owners("a"), Scope("robot")
     with scope.active():
         found.join("b")

@@ -54,7 +54,7 @@ def robot():
 
 
 @pytest.mark.parametrize("through", [through_json, through_toml])
-def test_a_robot_with_modules_goes_through_a_file_and_comes_back(robot, through):
+def test_a_robot_with_modules_is_restored_from_json_and_toml(robot, through):
     data = robot.to_dict()
     again = Robot.from_dict(through(data), {"ws://robot:9090": robot.feed.bridge})
     assert through(again.to_dict()) == through(data)
@@ -63,19 +63,19 @@ def test_a_robot_with_modules_goes_through_a_file_and_comes_back(robot, through)
 
 
 @pytest.mark.parametrize("through", [through_json, through_toml])
-def test_all_dots_of_a_scan_are_all_dots_again(robot, through):
+def test_a_scanner_without_max_dots_is_restored_from_json_and_toml(robot, through):
     again = Robot.from_dict(through(robot.to_dict()))
     assert again.modules[0].max_dots is None
     again.destroy()
 
 
 @pytest.mark.parametrize("data", [[1], "Bob", None, 5])
-def test_what_is_no_table_is_no_robot(data):
+def test_plain_data_that_are_not_a_table_are_refused(data):
     with pytest.raises(ConfigError, match="plain data is a table such as"):
         Robot.from_dict(data)
 
 
-def test_a_robot_whose_plain_data_is_refused_is_not_there():
+def test_refused_plain_data_leave_no_robot_behind():
     before = set(robot_motions)
     twist = {"bridge": "ws://robot:9090", "topic": "/cmd_vel"}
     for wrong in ({"modules": [{"name": "Horn"}]}, {"twist": {**twist, "v_max": -1}}):
@@ -84,7 +84,7 @@ def test_a_robot_whose_plain_data_is_refused_is_not_there():
     assert robot_motions == before
 
 
-def test_a_module_that_no_file_can_hold_is_said():
+def test_a_module_argument_that_is_not_plain_data_is_refused():
     namespace = Namespace("lamp")
     namespace.register(lambda robot, bulb: bulb, name="Lamp")
     robot = Robot("Bob", namespace=namespace)

@@ -56,7 +56,7 @@ def nan_at(number: int) -> str:
     return f"/plan: got {at} as point {number} of {number + 20}"
 
 
-def test_a_text_whose_numbers_change_is_said_once_and_its_newest_stands(
+def test_a_problem_with_changing_numbers_is_sent_once_and_keeps_its_newest_text(
     problems, channel, lines, clock
 ):
     for number in range(100):
@@ -80,7 +80,7 @@ def test_a_text_whose_numbers_change_is_said_once_and_its_newest_stands(
         ("robot_1/odom", "robot_12/odom"),
     ],
 )
-def test_words_are_the_same_whatever_their_numbers(one, other):
+def test_texts_that_differ_only_in_numbers_count_as_the_same(one, other):
     assert without_numbers(one) == without_numbers(other)
 
 
@@ -92,11 +92,11 @@ def test_words_are_the_same_whatever_their_numbers(one, other):
         ("information", "formation"),
     ],
 )
-def test_other_words_are_other_words(one, other):
+def test_texts_that_differ_in_words_count_as_different(one, other):
     assert without_numbers(one) != without_numbers(other)
 
 
-def test_other_words_take_the_place_of_those_before(problems, channel, lines):
+def test_a_text_with_other_words_replaces_the_previous_text(problems, channel, lines):
     problems.set("tf", "no frame 'map'")
     problems.set("tf", "two trees")
     assert lines.all == ["Bob: no frame 'map'", "Bob: two trees"]
@@ -105,7 +105,7 @@ def test_other_words_take_the_place_of_those_before(problems, channel, lines):
     assert number == again
 
 
-def test_what_is_mended_is_taken_back_once(problems, channel):
+def test_a_mended_problem_is_removed_from_the_page_once(problems, channel):
     problems.set("plan", nan_at(1))
     number = received(channel)[0][2]
     problems.clear("plan")
@@ -115,7 +115,7 @@ def test_what_is_mended_is_taken_back_once(problems, channel):
     assert problems.current == {}
 
 
-def test_what_comes_and_goes_is_logged_once_a_minute(problems, channel, lines, clock):
+def test_a_recurring_problem_is_logged_once_a_minute(problems, channel, lines, clock):
     for number in range(1250):
         problems.set("plan", nan_at(number))
         clock.now += 0.1
@@ -125,7 +125,7 @@ def test_what_comes_and_goes_is_logged_once_a_minute(problems, channel, lines, c
     assert len({call[-1] for call in received(channel)}) == 1
 
 
-def test_two_wordings_in_turns_are_logged_once_a_minute_each(problems, lines, clock):
+def test_two_alternating_texts_are_each_logged_once_a_minute(problems, lines, clock):
     for _ in range(290):
         for text in ("no frame 'map'", "two trees"):
             problems.set("tf", text)
@@ -133,7 +133,7 @@ def test_two_wordings_in_turns_are_logged_once_a_minute_each(problems, lines, cl
     assert len(lines.all) == 2
 
 
-def test_words_that_are_never_the_same_do_not_flood_the_log(problems, lines, clock):
+def test_texts_that_always_differ_do_not_flood_the_log(problems, lines, clock):
     for number in range(500):
         problems.set("tf", "no frame " + "ab"[number % 2] * (number + 1))
         clock.now += 0.1
@@ -144,7 +144,7 @@ def test_words_that_are_never_the_same_do_not_flood_the_log(problems, lines, clo
 
 
 @pytest.mark.parametrize(("good_for", "same"), [(59.0, True), (61.0, False)])
-def test_what_fails_again_is_the_same_trouble_unless_it_was_good_for_a_minute(
+def test_a_problem_that_returns_within_a_minute_is_the_same_problem(
     problems, channel, clock, good_for, same
 ):
     problems.set("plan", nan_at(1))
@@ -156,7 +156,7 @@ def test_what_fails_again_is_the_same_trouble_unless_it_was_good_for_a_minute(
     assert (first[2] == second[2]) is same
 
 
-def test_what_was_mended_long_ago_is_forgotten(problems, clock):
+def test_problems_mended_long_ago_are_forgotten(problems, clock):
     for number in range(1000):
         problems.set(object(), "it broke")
         about = next(iter(problems.current))
@@ -165,7 +165,7 @@ def test_what_was_mended_long_ago_is_forgotten(problems, clock):
     assert len(problems._recurring) <= 61
 
 
-def test_a_map_that_comes_later_shows_the_newest_text(problems, channel, page):
+def test_a_map_added_later_shows_the_newest_text(problems, channel, page):
     problems.set("plan", nan_at(1))
     problems.set("plan", nan_at(2))
     number = received(channel)[0][2]
@@ -173,7 +173,7 @@ def test_a_map_that_comes_later_shows_the_newest_text(problems, channel, page):
     assert received(channel)[1:] == [("error", "Bob: " + nan_at(2), number)]
 
 
-def test_what_stands_is_told_once_to_a_page_with_two_maps_and_leaves_with_the_last(
+def test_a_page_with_two_maps_gets_a_problem_once_until_its_last_map_leaves(
     problems, channel, page
 ):
     problems.join(Map(page.element("other"), 100, 100))
@@ -187,7 +187,7 @@ def test_what_stands_is_told_once_to_a_page_with_two_maps_and_leaves_with_the_la
     assert received(channel)[1:] == [("mended", number)]
 
 
-def test_a_robot_that_leaves_its_map_takes_its_problems_along(container, channel):
+def test_removing_a_robot_from_its_map_removes_its_problems(container, channel):
     robot, map = Robot("Bob"), Map(container, 100, 100)
     map.add_robot(robot)
     robot.set_problem("odometry", "no pose")
@@ -197,7 +197,7 @@ def test_a_robot_that_leaves_its_map_takes_its_problems_along(container, channel
     robot.destroy()
 
 
-def test_a_page_that_is_closed_is_told_nothing(problems, channel, page):
+def test_a_closed_page_gets_no_problems(problems, channel, page):
     problems.set("plan", nan_at(1))
     page.closed = True
     problems.set("tf", "two trees")
@@ -207,7 +207,7 @@ def test_a_page_that_is_closed_is_told_nothing(problems, channel, page):
     page.closed = False
 
 
-def test_of_an_endless_sentence_the_beginning_is_shown(problems, lines):
+def test_a_very_long_text_is_shortened(problems, lines):
     problems.set("it", "x" * 100_000)
     (current,) = problems.current.values()
     assert current == "x" * 1000 + "..."

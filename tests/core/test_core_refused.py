@@ -7,7 +7,7 @@ from webmap.core.refused import MOST, Refusals
 AT = datetime(2026, 11, 21, 17, 0, tzinfo=UTC)
 
 
-def test_everybody_has_one_line_the_last_first():
+def test_each_sender_has_one_line_and_the_newest_is_first():
     refusals = Refusals()
     refusals.note("Ann", 3, "drive: too old", AT)
     refusals.note("Ben", 1, "command: no JSON", AT)
@@ -19,7 +19,7 @@ def test_everybody_has_one_line_the_last_first():
     assert refusals.total == 6
 
 
-def test_many_people_are_counted_and_a_part_of_them_remembered():
+def test_all_refusals_are_counted_and_only_the_newest_senders_are_kept():
     refusals = Refusals()
     for number in range(MOST + 7):
         refusals.note(f"viewer {number}", 1, "command: no JSON", AT)

@@ -87,7 +87,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("known", ["rosapi knows the type", "only the shape tells"])
 @pytest.mark.parametrize("type_name", SHAPES)
-def test_a_robot_follows_each_type_of_pose(type_name, known):
+def test_a_robot_takes_its_pose_from_each_pose_type(type_name, known):
     async def scenario():
         link = Link(odom=type_name) if known.startswith("rosapi") else Link()
         robot = Robot("Bob")
@@ -107,7 +107,7 @@ def test_a_robot_follows_each_type_of_pose(type_name, known):
     asyncio.run(scenario())
 
 
-def test_a_ros_2_type_name_is_the_same_type():
+def test_a_ros_2_type_name_is_decoded_as_the_same_type():
     async def scenario():
         link = Link(odom="nav_msgs/msg/Odometry")
         robot = Robot("Bob")
@@ -125,7 +125,7 @@ def told_of_odometry(robot: Robot) -> tuple[str | None, str | None]:
 
 
 @pytest.mark.parametrize("type", [None, "nav_msgs/Odometry"])
-def test_the_gate_is_told_of_odometry_that_was_never_heard(type):
+def test_the_gate_gets_an_odometry_topic_before_its_first_message(type):
     async def scenario():
         link = Link()
         robot = Robot("Bob")
@@ -140,7 +140,7 @@ def test_the_gate_is_told_of_odometry_that_was_never_heard(type):
     asyncio.run(scenario())
 
 
-def test_poses_without_a_velocity_are_no_odometry_for_the_gate():
+def test_a_pose_topic_without_velocity_is_not_given_to_the_gate_as_odometry():
     async def scenario():
         link = Link(pose="geometry_msgs/PoseStamped")
         robot = Robot("Bob")
@@ -154,7 +154,7 @@ def test_poses_without_a_velocity_are_no_odometry_for_the_gate():
     asyncio.run(scenario())
 
 
-def test_a_topic_that_tells_no_pose_is_no_odometry_for_the_gate():
+def test_a_topic_without_a_pose_is_not_given_to_the_gate_as_odometry():
     async def scenario():
         known, unknown = Link(odom="std_msgs/String"), Link()
         for link in (known, unknown):
@@ -169,7 +169,7 @@ def test_a_topic_that_tells_no_pose_is_no_odometry_for_the_gate():
     asyncio.run(scenario())
 
 
-def test_a_topic_that_is_refused_is_no_odometry_for_the_gate():
+def test_a_refused_topic_is_not_given_to_the_gate_as_odometry():
     robot = Robot("Bob")
     robot.set_move_topic(Link(), "/goal")
     with pytest.raises(ConfigError):
@@ -178,7 +178,7 @@ def test_a_topic_that_is_refused_is_no_odometry_for_the_gate():
     robot.destroy()
 
 
-def test_poses_that_come_only_while_a_robot_moves_are_known_by_rosapi_before(
+def test_rosapi_gives_the_type_of_a_pose_topic_before_its_first_message(
     monkeypatch,
 ):
     monkeypatch.setattr(type_query, "SOON", 0.01)
@@ -201,7 +201,7 @@ def test_poses_that_come_only_while_a_robot_moves_are_known_by_rosapi_before(
     asyncio.run(asyncio.wait_for(scenario(), 20))
 
 
-def test_odometry_whose_poses_cannot_be_used_shows_the_gate_motion_all_the_same():
+def test_odometry_with_invalid_poses_is_still_given_to_the_gate():
     async def scenario():
         link = Link(odom="nav_msgs/Odometry")
         robot = Robot("Bob")
@@ -218,7 +218,7 @@ def test_odometry_whose_poses_cannot_be_used_shows_the_gate_motion_all_the_same(
     asyncio.run(scenario())
 
 
-def test_a_topic_of_another_type_is_a_clear_error():
+def test_an_odometry_topic_of_a_wrong_type_is_reported_as_a_problem():
     async def scenario():
         link = Link(odom="std_msgs/String")
         robot = Robot("Bob")
@@ -231,7 +231,7 @@ def test_a_topic_of_another_type_is_a_clear_error():
     asyncio.run(scenario())
 
 
-def test_a_message_of_another_shape_is_a_clear_error():
+def test_an_odometry_message_without_a_pose_is_reported_as_a_problem():
     async def scenario():
         link = Link()
         robot = Robot("Bob")
@@ -246,12 +246,12 @@ def test_a_message_of_another_shape_is_a_clear_error():
     asyncio.run(scenario())
 
 
-def test_a_type_without_a_pose_is_refused_at_once():
+def test_an_odometry_type_without_a_pose_is_refused_at_once():
     with pytest.raises(ConfigError, match="one of the types nav_msgs/Odometry"):
         Robot("Bob").set_odometry_topic(Link(), "/odom", type="std_msgs/String")
 
 
-def test_a_robot_has_the_orientation_that_its_odometry_says():
+def test_a_robot_has_the_orientation_of_its_odometry():
     link = Link()
     robot = Robot("Bob")
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
@@ -261,7 +261,7 @@ def test_a_robot_has_the_orientation_that_its_odometry_says():
     assert (o.x, o.y, o.z, o.w) == (0.5, -0.5, 0.5, 0.5)
 
 
-def test_a_robot_whose_odometry_is_unsubscribed_stays_where_it_was_last():
+def test_a_robot_keeps_its_last_position_after_unsubscribing_odometry():
     link = Link()
     robot = Robot("Bob")
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
@@ -273,7 +273,7 @@ def test_a_robot_whose_odometry_is_unsubscribed_stays_where_it_was_last():
     robot.unsubscribe_odometry_topic()
 
 
-def test_odometry_update_fires_only_when_something_changed():
+def test_on_odometry_update_fires_only_when_the_pose_changes():
     seen = []
 
     class Listener:
@@ -294,7 +294,7 @@ def test_odometry_update_fires_only_when_something_changed():
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, 1e300])
-def test_a_pose_that_is_no_pose_is_ignored_and_said(bad):
+def test_an_invalid_pose_is_ignored_and_reported_as_a_problem(bad):
     link = Link()
     robot = Robot("Bob")
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
@@ -308,7 +308,7 @@ def test_a_pose_that_is_no_pose_is_ignored_and_said(bad):
     assert not robot.problems
 
 
-def test_a_robot_that_was_never_placed_is_marked_so():
+def test_a_robot_without_a_pose_has_the_class_unplaced():
     link = Link()
     robot = Robot("Bob")
     assert "unplaced" in robot.svg.classes
@@ -319,7 +319,7 @@ def test_a_robot_that_was_never_placed_is_marked_so():
     assert robot.pose_age < 10
 
 
-def test_the_group_of_a_robot_names_it_and_holds_its_model():
+def test_the_svg_group_of_a_robot_contains_its_name_its_id_and_its_model():
     model = svg.circle(r=0.2)
     robot = Robot("<Bob>", model)
     assert robot.svg.get("data-name") == "<Bob>"
@@ -329,7 +329,7 @@ def test_the_group_of_a_robot_names_it_and_holds_its_model():
     assert robot.svg.children[0].text == "<Bob>"
 
 
-def test_nothing_moves_before_the_start():
+def test_a_velocity_before_the_start_of_webmap_is_refused():
     robot = Robot("Bob")
     robot.set_twist_topic(Link(), "/cmd_vel")
     with pytest.raises(MotionError, match="cannot be moved before"):
@@ -348,12 +348,12 @@ def test_velocity_and_goal_topics_are_protected_on_the_bridge():
     assert set(link.protected) == {"/cmd_vel", "/goal", "/cancel"}
 
 
-def test_a_velocity_topic_of_another_type_is_refused():
+def test_a_velocity_topic_of_a_wrong_type_is_refused():
     with pytest.raises(ConfigError, match="one of the types geometry_msgs/Twist"):
         Robot("Bob").set_twist_topic(Link(), "/cmd_vel", type="std_msgs/String")
 
 
-def test_what_the_gate_is_told_of_a_robot():
+def test_the_spec_for_the_gate_contains_the_topics_and_limits_of_a_robot():
     async def scenario():
         link = Link(cmd_vel="geometry_msgs/msg/TwistStamped")
         robot = Robot("Bob")
@@ -372,7 +372,7 @@ def test_what_the_gate_is_told_of_a_robot():
     asyncio.run(scenario())
 
 
-def test_triggers_tell_what_the_gate_wrote():
+def test_send_triggers_receive_the_messages_that_the_gate_published():
     seen = []
 
     class Listener:
@@ -394,7 +394,7 @@ def test_triggers_tell_what_the_gate_wrote():
     assert seen == [{"linear": linear, "angular": angular}, 2]
 
 
-def test_a_robot_made_for_a_page_ends_with_it():
+def test_a_robot_made_for_a_page_is_closed_with_the_page():
     link = Link()
     scope = Scope()
     with scope.active():
@@ -405,7 +405,7 @@ def test_a_robot_made_for_a_page_ends_with_it():
     assert link.subscribed == []
 
 
-def test_a_topic_set_for_a_shared_robot_outlives_the_page_that_set_it():
+def test_a_topic_set_for_a_shared_robot_is_kept_after_its_page_is_closed():
     link = Link()
     robot = Robot("Bob")
     with Scope().active() as scope:
@@ -414,7 +414,7 @@ def test_a_topic_set_for_a_shared_robot_outlives_the_page_that_set_it():
     assert len(link.subscribed) == 1
 
 
-def test_a_robot_is_plain_data_and_back():
+def test_a_robot_is_restored_from_plain_data():
     link = Link()
 
     async def scenario():
@@ -452,12 +452,12 @@ def test_a_robot_is_plain_data_and_back():
         ({"name": "Bob", "model": {"r": 1}}, "with a tag"),
     ],
 )
-def test_plain_data_that_is_wrong_is_named(data, said):
+def test_invalid_plain_data_of_a_robot_are_refused_with_the_reason(data, said):
     with pytest.raises(ConfigError, match=said):
         Robot.from_dict(data)
 
 
-def test_scan_assist_is_told_to_the_gate_and_off_without_a_word():
+def test_scan_assist_is_in_the_spec_for_the_gate_only_while_set():
     link = Link()
     robot = Robot("Bob")
     robot.set_twist_topic(link, "/cmd_vel", type="geometry_msgs/Twist")
@@ -473,7 +473,7 @@ def test_scan_assist_is_told_to_the_gate_and_off_without_a_word():
     assert robot.motion.spec().assist is None
 
 
-def test_a_robot_is_called_the_same_whatever_robots_there_are_besides():
+def test_the_id_of_a_robot_does_not_depend_on_other_robots():
     program = "import sys, webmap; print(*(webmap.Robot(n).id for n in sys.argv[1:]))"
 
     def ids(*names):
@@ -486,6 +486,6 @@ def test_a_robot_is_called_the_same_whatever_robots_there_are_besides():
     assert len(set(after.values())) == 3
 
 
-def test_two_robots_of_one_name_are_two():
+def test_two_robots_of_the_same_name_have_different_ids():
     one, other = Robot("Twin"), Robot("Twin")
     assert one.id != other.id

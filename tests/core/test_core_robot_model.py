@@ -8,12 +8,12 @@ from webmap.core.page import Page
 
 
 @pytest.mark.parametrize("model", ["circle", 5, lambda: None])
-def test_what_is_no_element_is_no_model(model):
+def test_a_model_that_is_not_an_element_is_refused(model):
     with pytest.raises(ConfigError, match="robot 'Bob': a model is an element"):
         Robot("Bob", model)
 
 
-def test_the_model_of_one_robot_is_not_taken_for_another():
+def test_the_model_of_one_robot_cannot_be_used_for_another():
     circle = svg.circle(r=0.2)
     ann = Robot("Ann", circle)
     with pytest.raises(ConfigError, match=r"'Bob': .* is that of the robot 'Ann'"):
@@ -22,7 +22,7 @@ def test_the_model_of_one_robot_is_not_taken_for_another():
     ann.destroy()
 
 
-def test_the_model_of_a_robot_that_is_gone_may_be_used_again():
+def test_the_model_of_a_destroyed_robot_can_be_used_again():
     circle = svg.circle(r=0.2)
     Robot("Ann", circle).destroy()
     bob = Robot("Bob", circle)
@@ -51,7 +51,7 @@ def shown(page, robot):
     return map
 
 
-def test_the_image_of_a_model_is_a_file_of_the_folder_of_the_page(page, picture):
+def test_an_image_of_a_model_is_published_from_the_folder_of_the_page(page, picture):
     bob = Robot("Bob", svg.g(picture))
     assert picture.get("href") == "robot.png"
     shown(page, bob)
@@ -59,7 +59,7 @@ def test_the_image_of_a_model_is_a_file_of_the_folder_of_the_page(page, picture)
     bob.destroy()
 
 
-def test_the_image_of_a_shared_robot_outlives_the_page_that_showed_it_first(
+def test_the_image_of_a_shared_robot_is_published_until_its_last_page_is_closed(
     page, other_page, picture, publisher
 ):
     bob = Robot("Bob", picture)
@@ -74,7 +74,7 @@ def test_the_image_of_a_shared_robot_outlives_the_page_that_showed_it_first(
     bob.destroy()
 
 
-def test_an_image_that_came_later_is_there_for_the_next_page(
+def test_an_image_added_to_a_model_later_is_published_for_the_next_page(
     page, other_page, picture, publisher
 ):
     bob = Robot("Bob", svg.g())
@@ -88,7 +88,7 @@ def test_an_image_that_came_later_is_there_for_the_next_page(
 @pytest.mark.parametrize(
     "href", ["/static/robot.png", "nowhere.png", "../robot.png", "#part"]
 )
-def test_what_is_no_file_of_the_folder_is_left_to_the_browser(page, publisher, href):
+def test_an_href_that_is_not_a_file_of_the_folder_is_not_changed(page, publisher, href):
     image = svg.image(href=href)
     bob = Robot("Bob", image)
     shown(page, bob)
@@ -97,7 +97,7 @@ def test_what_is_no_file_of_the_folder_is_left_to_the_browser(page, publisher, h
     bob.destroy()
 
 
-def test_another_image_that_a_program_sets_meanwhile_stays(page, picture):
+def test_an_href_set_by_a_program_is_kept_when_the_page_is_closed(page, picture):
     bob = Robot("Bob", picture)
     shown(page, bob)
     picture.set(href="/static/other.png")
@@ -106,7 +106,7 @@ def test_another_image_that_a_program_sets_meanwhile_stays(page, picture):
     bob.destroy()
 
 
-def test_plain_data_name_the_file_also_while_a_page_shows_it(page, picture):
+def test_plain_data_contain_the_file_name_while_a_page_shows_the_image(page, picture):
     bob = Robot("Bob", svg.g(picture))
     before = bob.to_dict()
     shown(page, bob)

@@ -32,7 +32,7 @@ def robot(doing="free", *, seen=None, age=0.1, silent=0.1, over=None, **changes)
     )
 
 
-def test_every_state_of_the_gate_has_words_and_a_look():
+def test_every_state_of_the_gate_has_a_text_and_a_look():
     for doing in get_args(Activity):
         found = state_of(robot(doing, holder=ANN))
         assert found.name == doing
@@ -55,12 +55,12 @@ def test_every_state_of_the_gate_has_words_and_a_look():
         ("stopped", "STOP active", "STOP active"),
     ],
 )
-def test_the_words_name_who_holds_the_robot(doing, text, mine):
+def test_the_text_of_a_state_names_the_operator(doing, text, mine):
     found = state_of(robot(doing, holder=ANN))
     assert (found.text, found.mine) == (text, mine)
 
 
-def test_somebody_without_a_name_has_the_name_of_the_connection():
+def test_an_operator_without_a_name_is_named_after_the_connection():
     holder = SimpleNamespace(connection="c7", name="")
     assert state_of(robot("driven", holder=holder)).text == "c7 is driving"
 
@@ -83,17 +83,17 @@ def test_somebody_without_a_name_has_the_name_of_the_connection():
         ({"seen": MOVES, "over": 3.0}, "Moving, not by WebMap"),
     ],
 )
-def test_the_display_sees_motion_that_the_gate_does_not_look_at(changes, text):
+def test_the_display_shows_motion_that_the_gate_does_not_measure(changes, text):
     assert state_of(robot(**changes)).text.startswith(text)
 
 
-def test_a_robot_that_the_gate_does_not_know_is_only_watched():
+def test_a_robot_unknown_to_the_gate_is_view_only():
     assert state_of(robot(None)).text == "View only"
     assert state_of(robot(None, seen=MOVES)).text == "View only"
 
 
 @pytest.mark.parametrize("doing", [None, "free", "barred", "down"])
-def test_a_bridge_that_is_lost_has_words_of_its_own(doing):
+def test_a_connecting_or_lost_bridge_has_its_own_text(doing):
     one = robot(doing)
     one.bridge.state = "connecting"
     assert state_of(one).text == "Connecting"
@@ -101,7 +101,7 @@ def test_a_bridge_that_is_lost_has_words_of_its_own(doing):
     assert state_of(one).text == "No connection to the bridge"
 
 
-def test_a_robot_whose_poses_ceased_is_gone_since_then():
+def test_a_robot_without_new_poses_is_gone_since_its_last_pose():
     one = robot(silent=31.0)
     then = datetime.now() - timedelta(seconds=31)
     assert state_of(one).text in {
@@ -111,7 +111,7 @@ def test_a_robot_whose_poses_ceased_is_gone_since_then():
     assert state_of(robot(None, silent=31.0)).name == "gone"
 
 
-def test_a_robot_that_sends_poses_seldom_or_only_in_motion_is_not_gone():
+def test_a_robot_that_sends_poses_rarely_or_only_in_motion_is_not_gone():
     assert state_of(robot(silent=None)).text == "Free"
     one = robot(silent=100.0)
     assert state_of(one._replace(period=60.0)).text == "Free"
@@ -125,5 +125,5 @@ def test_a_robot_of_a_recording_that_ended_is_not_gone():
 
 
 @pytest.mark.parametrize("doing", ["held", "driven", "stopping", "stopped"])
-def test_a_robot_that_somebody_has_or_stopped_is_not_gone(doing):
+def test_a_robot_with_an_operator_or_an_active_stop_is_not_gone(doing):
     assert state_of(robot(doing, holder=ANN, silent=31.0)).name == doing

@@ -43,7 +43,7 @@ def gate(monkeypatch):
     return gate
 
 
-def test_a_robot_that_the_gate_refuses_does_not_keep_the_others_from_starting(
+def test_a_robot_refused_by_the_gate_does_not_prevent_the_start_of_the_others(
     gate, monkeypatch, caplog
 ):
     bridge = Bridge("ws://robot:9090")

@@ -38,14 +38,14 @@ def rows():
                 yield pytest.param(section, cells[0], new, id=f"{section}: {new}")
 
 
-def test_the_table_has_every_name_of_the_reports_reference():
+def test_the_table_contains_every_name_of_the_2012_report():
     named = " ".join(f"{old} " for _, old, _ in (row.values for row in rows()))
     for name in NAMES.split():
         assert re.search(rf"\b{re.escape(name)}\b", named), name
 
 
 @pytest.mark.parametrize(("section", "old", "new"), list(rows()))
-def test_each_name_is_there_with_the_arguments_it_says(section, old, new):
+def test_each_new_name_of_the_table_exists_with_its_arguments(section, old, new):
     if new.startswith("class ") or new == "constructor(*args)":
         return  # Python's own
     if new == "the same":
@@ -108,12 +108,12 @@ def check_trigger(section, name, arguments):
     assert call[1].count(",") == count
 
 
-def test_generated_identifiers_are_webmap_and_a_number_and_unique():
+def test_generated_ids_are_unique_and_consist_of_webmap_and_a_number():
     made = {webmap.generate_id() for _ in range(1000)}
     assert len(made) == 1000
     assert all(re.fullmatch(r"WebMap-\d+", name) for name in made)
 
 
-def test_the_namespaces_of_the_documents():
+def test_the_svg_and_xlink_namespaces_have_their_standard_urls():
     assert webmap.svg_ns == "http://www.w3.org/2000/svg"
     assert webmap.xlink_ns == "http://www.w3.org/1999/xlink"

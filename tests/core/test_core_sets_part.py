@@ -36,7 +36,7 @@ def robot():
         ({"vmax": 1.0}, 'there is no argument "vmax"; did you mean "v_max"?'),
     ],
 )
-def test_what_is_said_of_a_base_is_of_its_kind(robot, bridge, options, said):
+def test_a_wrong_option_of_set_twist_topic_is_refused(robot, bridge, options, said):
     with pytest.raises(ConfigError) as error:
         robot.set_twist_topic(bridge, "/cmd_vel", **options)
     assert str(error.value).startswith("robot 'Bob': ")
@@ -57,7 +57,7 @@ def test_what_is_said_of_a_base_is_of_its_kind(robot, bridge, options, said):
         ),
     ],
 )
-def test_what_is_said_of_goals_is_of_its_kind(robot, bridge, options, said):
+def test_a_wrong_option_of_set_move_topic_is_refused(robot, bridge, options, said):
     with pytest.raises(ConfigError) as error:
         robot.set_move_topic(bridge, "/goal", **options)
     assert said in str(error.value)
@@ -75,7 +75,7 @@ def test_what_is_said_of_goals_is_of_its_kind(robot, bridge, options, said):
     ],
     ids=["twist", "move", "odometry", "tf", "initial pose"],
 )
-def test_an_address_is_no_bridge(robot, say):
+def test_a_url_in_place_of_a_bridge_is_refused(robot, say):
     with pytest.raises(ConfigError, match="bridge: expected a Bridge, got 'ws://rob"):
         say(robot)
 
@@ -97,14 +97,16 @@ def test_an_address_is_no_bridge(robot, say):
         ),
     ],
 )
-def test_odometry_that_cannot_be_meant_is_refused(robot, bridge, arguments, said):
+def test_invalid_arguments_of_set_odometry_topic_are_refused(
+    robot, bridge, arguments, said
+):
     with pytest.raises(ConfigError) as error:
         robot.set_odometry_topic(bridge, *arguments)
     assert said in str(error.value)
     assert robot.feed is None
 
 
-def test_a_scanner_of_no_size_is_refused_in_words(robot):
+def test_a_stop_distance_of_a_wrong_type_is_refused(robot):
     with pytest.raises(
         ConfigError, match='stop_distance: got the text "1", expected a num'
     ):

@@ -76,7 +76,7 @@ def drivable(robot, **options):
     return robot
 
 
-def test_a_robot_is_stopped_and_its_stop_is_reset(robot, gate):
+def test_stop_and_reset_stop_are_sent_to_the_gate(robot, gate):
     drivable(robot)
     robot.stop()
     stop = StopReport("Ann", True, "", "s1")
@@ -90,7 +90,7 @@ def test_a_robot_is_stopped_and_its_stop_is_reset(robot, gate):
     assert gate.asked == [("stop", robot.motion.id), reset]
 
 
-def test_a_program_resets_no_stop_that_it_was_not_told_of(robot, gate):
+def test_reset_stop_is_refused_without_a_stop_in_the_report(robot, gate):
     drivable(robot)
     robot.stop()
     for report in (None, SimpleNamespace(stop=None)):
@@ -100,7 +100,7 @@ def test_a_program_resets_no_stop_that_it_was_not_told_of(robot, gate):
     assert gate.asked == [("stop", robot.motion.id)]
 
 
-def test_a_lease_waits_for_the_word_of_a_gate_that_was_started_anew(robot, gate):
+def test_acquire_lease_waits_for_the_first_report_of_a_restarted_gate(robot, gate):
     free = SimpleNamespace(
         armable=True,
         latched=False,
@@ -126,7 +126,7 @@ def test_a_lease_waits_for_the_word_of_a_gate_that_was_started_anew(robot, gate)
     assert gate.asked == [("take", robot.motion.id)]
 
 
-def test_what_stop_says_is_the_gates_alone_to_write(robot):
+def test_a_program_cannot_publish_to_the_topic_of_a_stop_hook(robot):
     bridge = Bridge("ws://robot:9090")
     robot.set_twist_topic(bridge, "/cmd_vel", stop_hooks=[LOCK, E_STOP])
     for said in (True, False):
@@ -141,19 +141,21 @@ def test_what_stop_says_is_the_gates_alone_to_write(robot):
 
 
 @pytest.mark.parametrize("ask", [Robot.stop, Robot.reset_stop])
-def test_nothing_is_stopped_or_reset_before_webmap_is_started(robot, ask):
+def test_stop_and_reset_stop_are_refused_before_webmap_is_started(robot, ask):
     with pytest.raises(MotionError, match=r"before webmap\.start"):
         ask(drivable(robot))
 
 
 @pytest.mark.parametrize("ask", [Robot.stop, Robot.reset_stop])
-def test_what_cannot_move_is_neither_stopped_nor_reset(robot, gate, ask):
+def test_stop_and_reset_stop_are_refused_for_a_robot_without_motion_topics(
+    robot, gate, ask
+):
     with pytest.raises(MotionError, match="no twist topic and no move topic"):
         ask(robot)
     assert gate.asked == []
 
 
-def test_stop_hooks_and_scan_assist_are_plain_data_and_back(robot):
+def test_stop_hooks_and_scan_assist_are_restored_from_plain_data(robot):
     drivable(robot, stop_hooks=[LOCK, E_STOP])
     corners = [(0.3, 0.2), (-0.3, 0), (0.3, -0.2)]
     robot.set_scan_assist("/scan", corners, angle=30, upside_down=True, frame="/l")
@@ -174,7 +176,7 @@ def test_stop_hooks_and_scan_assist_are_plain_data_and_back(robot):
 
 
 @pytest.mark.parametrize("size", [np.float32(0.25), np.array([[1, 0], [0, 1], [0, 0]])])
-def test_numbers_of_numpy_are_numbers_that_the_gate_can_be_told(robot, size):
+def test_numpy_numbers_of_scan_assist_can_be_sent_to_the_gate(robot, size):
     far = np.float64(0.5)
     drivable(robot).set_scan_assist("/scan", size, x=far, stop_distance=far, brake=far)
     pipe.pack(checked(robot.motion.spec()))
@@ -188,21 +190,21 @@ def test_a_footprint_that_is_neither_radius_nor_corners_is_refused(robot, size):
         drivable(robot).set_scan_assist("/scan", size)
 
 
-def test_a_robot_without_them_says_nothing_of_them(robot):
+def test_unset_stop_hooks_and_scan_assist_are_not_in_plain_data(robot):
     drivable(robot)
     assert "scan_assist" not in robot.to_dict()
     assert "stop_hooks" not in robot.to_dict()["twist"]
 
 
 @pytest.mark.parametrize("radius", [0, -0.3, math.nan, math.inf, True, np.float64(-1)])
-def test_a_radius_that_is_not_above_zero_is_refused(robot, radius):
+def test_a_radius_that_is_not_a_positive_number_is_refused(robot, radius):
     with pytest.raises(
         ConfigError, match=r"footprint: got the .* radius in metres, above 0"
     ):
         robot.set_scan_assist("/scan", radius)
 
 
-def test_an_outline_that_crosses_itself_is_refused_and_the_one_before_stays(robot):
+def test_a_footprint_that_crosses_itself_is_refused_and_the_old_one_is_kept(robot):
     corners = [(0.3, 0.2), (-0.3, -0.2), (0.3, -0.2), (-0.3, 0.2)]
     robot.set_scan_assist("/scan", 0.3)
     before = robot.motion.config.scan_assist
@@ -211,7 +213,7 @@ def test_an_outline_that_crosses_itself_is_refused_and_the_one_before_stays(robo
     assert robot.motion.config.scan_assist == before
 
 
-def test_a_radius_becomes_corners_that_come_back_as_they_are(robot):
+def test_a_footprint_given_as_a_radius_is_restored_from_plain_data(robot):
     drivable(robot).set_scan_assist("/scan", 0.25, blind="creep", creep=0.05, x=0.1)
     data = robot.to_dict()
     again = Robot.from_dict(data, {Link.url: Link()})
@@ -247,14 +249,14 @@ def test_a_radius_becomes_corners_that_come_back_as_they_are(robot):
         ([{"topic": "cmd_vel"}], "/cmd_vel is the velocity topic"),
     ],
 )
-def test_a_stop_hook_that_cannot_be_meant_is_refused_at_once(robot, hooks, said):
+def test_an_invalid_stop_hook_is_refused_and_the_old_one_is_kept(robot, hooks, said):
     drivable(robot, stop_hooks=[LOCK])
     with pytest.raises(ConfigError, match=f"robot 'Bob': .*{said}"):
         drivable(robot, stop_hooks=hooks)
     assert robot.motion.spec().stop_hooks == (LOCK,)
 
 
-def test_names_of_stop_hooks_are_resolved_at_once(robot):
+def test_relative_names_of_stop_hooks_are_resolved_at_once(robot):
     drivable(robot, stop_hooks=[{"topic": "lock"}, {"service": "e_stop/"}])
     assert robot.to_dict()["twist"]["stop_hooks"] == [LOCK, E_STOP]
 
@@ -268,14 +270,12 @@ def test_names_of_stop_hooks_are_resolved_at_once(robot):
         ({"topic": "/scan", "footprint": 0.2, "brakes": 1}, "brakes"),
     ],
 )
-def test_plain_scan_assist_that_is_wrong_is_named(data, said):
+def test_invalid_plain_data_of_scan_assist_are_refused_with_the_key(data, said):
     with pytest.raises(ConfigError, match=said):
         Robot.from_dict({"name": "Bob", "scan_assist": data})
 
 
-def test_a_robot_that_is_destroyed_is_never_declared_as_one_with_goals_alone(
-    robot, gate
-):
+def test_closing_the_motion_of_a_robot_declares_no_spec_to_the_gate(robot, gate):
     drivable(robot).set_move_topic(robot.motion.bridge("twist"), "/goal")
     gate.spec = None
     robot.motion.close()

@@ -39,7 +39,9 @@ def robot():
         ("z_max", 0.0005, "0.0005, expected a number from 0.001 on"),
     ],
 )
-def test_what_a_base_cannot_be_is_refused(robot, name, value, expected):
+def test_an_invalid_limit_or_command_timeout_of_a_base_is_refused(
+    robot, name, value, expected
+):
     bridge = Bridge("ws://robot:9090")
     with pytest.raises(ConfigError) as error:
         robot.set_twist_topic(bridge, "/cmd_vel", **{name: value})
@@ -50,7 +52,7 @@ def test_what_a_base_cannot_be_is_refused(robot, name, value, expected):
     assert robot.motion.spec() is None
 
 
-def test_a_base_that_is_told_wrongly_stays_as_it_was(robot):
+def test_a_refused_set_twist_topic_keeps_the_previous_topic_and_limits(robot):
     bridge = Bridge("ws://robot:9090")
     robot.set_twist_topic(bridge, "/cmd_vel", v_max=0.5)
     with pytest.raises(ConfigError):
@@ -86,7 +88,7 @@ def gate(robot, monkeypatch):
 @pytest.mark.parametrize(
     ("axis", "unit"), [("z", "m/s"), ("rx", "rad/s"), ("ry", "rad/s")]
 )
-def test_an_axis_without_a_limit_is_refused_and_not_dropped(robot, gate, axis, unit):
+def test_a_velocity_with_an_axis_without_a_limit_is_refused(robot, gate, axis, unit):
     robot.set_twist_topic(Bridge("ws://robot:9090"), "/cmd_vel", v_max=0.5)
     with pytest.raises(MotionError) as error:
         robot.twist(0.1, **{axis: 0.25})
@@ -97,7 +99,9 @@ def test_an_axis_without_a_limit_is_refused_and_not_dropped(robot, gate, axis, u
     assert gate.twists == []
 
 
-def test_all_six_numbers_go_to_the_gate_for_a_robot_with_limits(robot, gate):
+def test_all_six_velocity_components_of_a_robot_with_limits_are_sent_to_the_gate(
+    robot, gate
+):
     limits = {"z_max": 0.5, "rx_max": 0.2, "ry_max": 0.1}
     robot.set_twist_topic(Bridge("ws://robot:9090"), "/cmd_vel", **limits)
     robot.twist(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)

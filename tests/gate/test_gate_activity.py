@@ -34,20 +34,20 @@ def drive_off(bench):
     assert run(bench, 0.3, 0.5, x=0.5) == "driven"
 
 
-def test_a_robot_is_free_or_cannot_be_driven(bench):
+def test_a_free_robot_without_a_link_is_reported_as_down(bench):
     assert run(bench, 0.2) == "free"
     bench.break_links()
     bench.run(0.1)
     assert bench.report().doing == "down"
 
 
-def test_a_robot_that_another_webmap_has_cannot_be_driven():
+def test_a_robot_locked_by_another_webmap_is_reported_as_barred():
     bench = Bench(lock_held=False).begin(spec())
     bench.run(0.1)
     assert bench.report().doing == "barred"
 
 
-def test_it_is_held_driven_and_stopped(bench):
+def test_the_reported_activity_follows_control_driving_and_stop(bench):
     bench.take("a")
     assert bench.report().doing == "barred_held", "before there is odometry"
     assert run(bench, 0.4, x=0.0) == "held"
@@ -61,7 +61,7 @@ def test_it_is_held_driven_and_stopped(bench):
     assert run(bench, 0.2, 0.3) == "unconfirmed", "it moves again"
 
 
-def test_after_it_was_driven_it_may_still_move(bench):
+def test_motion_after_driving_is_settling_and_after_standstill_is_moving(bench):
     drive_off(bench)
     assert run(bench, 0.6, 0.2, x=0.0) == "settling"
     assert run(bench, 0.6, 0.0, x=0.0) == "held"
@@ -77,7 +77,7 @@ def test_a_driven_robot_that_does_not_move_for_a_second_is_blocked(bench):
     assert run(bench, 0.6, 0.0, x=0.0) == "held"
 
 
-def test_without_odometry_nothing_shows_that_a_robot_is_blocked(bench):
+def test_a_robot_without_odometry_is_not_reported_as_blocked(bench):
     drive_off(bench)
     assert run(bench, 1.2, 0.0, x=0.5) == "blocked"
     bench.run(0.9, lambda: bench.drive(x=0.5))
@@ -86,14 +86,14 @@ def test_without_odometry_nothing_shows_that_a_robot_is_blocked(bench):
     assert bench.report().doing != "blocked"
 
 
-def test_it_is_handed_over(bench):
+def test_a_granted_request_for_control_is_reported_as_changing(bench):
     drive_off(bench)
     bench.say("b", op="ask", robot="r1")
     bench.say("a", op="grant", robot="r1")
     assert run(bench, 0.1, 0.4) == "changing"
 
 
-def test_another_program_drives_a_robot_that_nobody_drives(bench):
+def test_a_free_robot_that_another_program_drives_is_reported_as_other(bench):
     bench.run(EXPECTED_FOR)
     bench.run(0.5, lambda: bench.tell(events.EchoReceived(KEY, OTHERS)))
     assert bench.report().doing == "other"
@@ -102,7 +102,7 @@ def test_another_program_drives_a_robot_that_nobody_drives(bench):
 
 
 @pytest.mark.parametrize("released", [False, True])
-def test_a_robot_with_a_goal_navigates_until_it_has_come_to_rest(bench, released):
+def test_a_robot_with_a_goal_is_navigating_until_the_goal_ends(bench, released):
     bench.take("a")
     run(bench, 0.3, x=0.0)
     bench.goal("a")
@@ -120,7 +120,7 @@ def test_a_robot_with_a_goal_navigates_until_it_has_come_to_rest(bench, released
         assert run(bench, 0.6, 0.3) == "moving"
 
 
-def test_a_goal_on_a_plain_topic_counts_while_the_robot_moves():
+def test_a_robot_with_a_goal_on_a_topic_is_navigating_only_while_moving():
     bench = Bench().begin(spec(odometry_topic="/odom"))
     bench.take("a")
     run(bench, 0.3, x=0.0)

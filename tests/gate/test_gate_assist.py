@@ -38,26 +38,26 @@ def wall(distance, facing=0.0):
 NOTHING = sweep_of(lambda bearing: math.inf)
 
 
-def test_nothing_in_the_way_lets_everything_through():
+def test_a_scan_without_obstacles_does_not_reduce_the_velocity():
     assert assist(SPEC, NOTHING, Twist(1.0, 0.0, 0.3), 0.1).scale == 1.0
 
 
-def test_standing_still_is_always_allowed():
+def test_a_zero_velocity_is_allowed_without_a_scan():
     assert assist(SPEC, None, Twist(0.0, 0.0, 0.0), 0.1).scale == 1.0
 
 
-def test_a_wall_is_measured_from_the_edge_of_the_robot():
+def test_the_distance_to_a_wall_is_measured_from_the_footprint():
     points = points_of(SPEC, sweep_of(wall(2.3)))
     assert free_way(BOX, points, Twist(1.0, 0.0, 0.0)) == pytest.approx(2.0)
     assert free_way(BOX, points, Twist(-1.0, 0.0, 0.0)) == math.inf
 
 
-def test_a_point_beside_a_straight_way_is_passed():
+def test_a_point_beside_a_straight_path_is_no_obstacle():
     assert free_way(BOX, [(2.0, 0.21)], Twist(1.0, 0.0, 0.0)) == math.inf
     assert free_way(BOX, [(2.0, 0.19)], Twist(1.0, 0.0, 0.0)) == pytest.approx(1.7)
 
 
-def test_a_point_that_an_arc_meets_is_met_though_it_lies_aside():
+def test_only_a_point_on_the_curved_path_is_an_obstacle():
     ahead, aside = (0.0, 2.0), (2.0, 0.0)
     turning = Twist(1.0, 0.0, 1.0)  # on a circle of 1 m about (0, 1)
     met = free_way(BOX, [ahead], turning)
@@ -65,13 +65,13 @@ def test_a_point_that_an_arc_meets_is_met_though_it_lies_aside():
     assert free_way(BOX, [aside], turning) == math.inf
 
 
-def test_turning_on_the_spot_minds_the_corners():
+def test_a_turn_on_the_spot_respects_the_corners_of_the_footprint():
     outer = math.hypot(0.3, 0.2)
     assert free_way(BOX, [(0.0, outer - 0.01)], Twist(0.0, 0.0, 1.0)) < math.pi / 2
     assert free_way(BOX, [(0.0, outer + 0.01)], Twist(0.0, 0.0, 1.0)) == math.inf
 
 
-def test_the_nearer_the_wall_the_slower_and_at_last_not_at_all():
+def test_a_nearer_wall_reduces_the_velocity_further_down_to_zero():
     scales = [
         assist(SPEC, sweep_of(wall(0.3 + gap)), Twist(1.0, 0.0, 0.0), 0.1).scale
         for gap in (0.1, 0.3, 0.6, 1.0, 3.0)
@@ -81,24 +81,24 @@ def test_the_nearer_the_wall_the_slower_and_at_last_not_at_all():
     assert scales[-1] == 1.0
 
 
-def test_away_from_a_wall_that_is_too_near_is_allowed():
+def test_a_robot_too_near_to_a_wall_may_only_drive_away():
     near = sweep_of(wall(0.35))
     assert assist(SPEC, near, Twist(0.5, 0.0, 0.0), 0.1).scale == 0.0
     assert assist(SPEC, near, Twist(-0.5, 0.0, 0.0), 0.1).scale == 1.0
 
 
 @pytest.mark.parametrize("stated", [math.nan, 0.0, 0.1, -1.0])
-def test_a_reach_that_is_stated_wrongly_makes_no_wall_vanish(stated):
+def test_a_wrong_range_max_does_not_hide_a_wall(stated):
     near = msgspec.structs.replace(sweep_of(wall(0.35)), range_max=stated)
     assert assist(SPEC, near, Twist(0.5, 0.0, 0.0), 0.1).scale == 0.0
 
 
-def test_the_robot_s_own_body_is_not_in_its_way():
+def test_points_on_the_robot_itself_are_no_obstacle():
     body = sweep_of(lambda bearing: 0.15 if abs(bearing) < 0.3 else math.inf)
     assert assist(SPEC, body, Twist(1.0, 0.0, 0.0), 0.1).scale == 1.0
 
 
-def test_a_scanner_that_hangs_head_down_minds_the_side_that_it_sees():
+def test_an_upside_down_scanner_swaps_left_and_right():
     """A wall to the robot's left: a scanner upside down finds it at its right."""
     left = sweep_of(lambda b: 0.45 if 0.3 < b < 2.0 else math.inf)
     right = sweep_of(lambda b: 0.45 if 0.3 < -b < 2.0 else math.inf)
@@ -112,7 +112,7 @@ def test_a_scanner_that_hangs_head_down_minds_the_side_that_it_sees():
     assert assist(hanging, left, to_the_left, 0.1).scale == 1.0
 
 
-def test_too_near_to_measure_is_an_obstacle():
+def test_a_range_of_minus_infinity_is_an_obstacle():
     spec = AssistSpec(topic="/scan", footprint=BOX, sensor=(0.3, 0.0, 0.0))
     near = sweep_of(lambda bearing: -math.inf if abs(bearing) < 0.5 else math.inf)
     assert assist(spec, near, Twist(0.2, 0.0, 0.0), 0.1).scale == 0.0
@@ -133,7 +133,7 @@ def test_too_near_to_measure_is_an_obstacle():
         (Scan(2.0, 0.01, 0.1, 8.0, [1.0] * 10, 0.0), "does not cover the direction"),
     ],
 )
-def test_a_blind_robot_stops_or_creeps_as_configured(sweep, said):
+def test_a_robot_without_a_usable_scan_stops_or_creeps_as_configured(sweep, said):
     wanted = Twist(0.5, 0.0, 0.0)
     stop = assist(SPEC, sweep, wanted, 0.1)
     assert stop.scale == 0.0
@@ -143,7 +143,7 @@ def test_a_blind_robot_stops_or_creeps_as_configured(sweep, said):
     assert assist(creeping, sweep, Twist(0.05, 0.0, 0.0), 0.1).scale == 1.0
 
 
-def test_a_lidar_that_does_not_look_behind_lets_nobody_back():
+def test_a_scan_of_the_front_prevents_driving_backwards():
     front = Scan(-1.5, 0.01, 0.05, 8.0, [math.inf] * 300, 0.0)
     assert assist(SPEC, front, Twist(0.5, 0.0, 0.0), 0.1).scale == 1.0
     assert assist(SPEC, front, Twist(-0.5, 0.0, 0.0), 0.1).scale == 0.0
@@ -155,7 +155,7 @@ def test_a_lidar_that_does_not_look_behind_lets_nobody_back():
     facing=st.floats(-0.9, 0.9),
     turn=st.floats(-1.0, 1.0),
 )
-def test_a_robot_that_is_assisted_never_touches_a_wall(distance, speed, facing, turn):
+def test_a_robot_with_scan_assist_never_touches_a_wall(distance, speed, facing, turn):
     # The worst that is assumed: it keeps its speed for the whole reaction, then brakes.
     gap_at_start = distance - max(
         x * math.cos(facing) + y * math.sin(facing) for x, y in BOX
@@ -183,29 +183,29 @@ def test_a_robot_that_is_assisted_never_touches_a_wall(distance, speed, facing, 
 
 
 @given(st.floats(-2, 2), st.floats(-2, 2))
-def test_inside_is_inside_the_box(x, y):
+def test_inside_is_true_only_for_points_in_the_box(x, y):
     if abs(abs(x) - 0.3) > 1e-9 and abs(abs(y) - 0.2) > 1e-9:
         assert inside(BOX, (x, y)) == (abs(x) < 0.3 and abs(y) < 0.2)
 
 
 @given(st.floats(0.05, 2.0), st.floats(0, math.tau))
-def test_a_polygon_around_a_disc_holds_all_of_it(radius, angle):
+def test_the_polygon_around_a_disc_contains_the_disc(radius, angle):
     edge = (0.999 * radius * math.cos(angle), 0.999 * radius * math.sin(angle))
     assert inside(polygon_around(radius), edge)
 
 
-def test_an_edge_along_the_motion_is_never_crossed_by_it():
+def test_a_point_in_line_with_the_side_of_the_robot_is_an_obstacle():
     assert free_way(BOX, [(2.0, 0.2)], Twist(1.0, 0.0, 0.0)) == pytest.approx(1.7)
 
 
-def test_a_point_on_an_edge_is_met_now_and_not_after_a_whole_turn():
+def test_the_free_way_to_a_point_on_the_footprint_edge_is_zero():
     on_edge = [(0.3, y / 100) for y in range(-19, 20)]
     for point in on_edge:
         met = free_way(BOX, [point], Twist(0.5, 0.0, 0.5))
         assert met == pytest.approx(0, abs=1e-6)
 
 
-def test_turning_on_the_spot_looks_at_the_whole_scan():
+def test_a_turn_on_the_spot_needs_a_scan_of_all_directions():
     blind = sweep_of(lambda bearing: math.nan if abs(bearing) > 1 else math.inf)
     assert assist(SPEC, blind, Twist(0.0, 0.0, 0.5), 0.1).scale == 0.0
     assert assist(SPEC, blind, Twist(0.3, 0.0, 0.0), 0.1).scale == 1.0

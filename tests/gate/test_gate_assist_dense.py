@@ -57,13 +57,13 @@ def hit(reach, sweep):
 
 class TestFold:
     @pytest.mark.parametrize("count", [1, 719, 720])
-    def test_a_scan_of_few_beams_stays_as_it_is(self, count):
+    def test_a_scan_of_at_most_720_beams_is_not_folded(self, count):
         sweep = dense([1.0] * count)
         assert folded(sweep) is sweep
 
     @given(st.integers(721, LIMIT))
     @settings(max_examples=20, deadline=None)
-    def test_there_are_never_more_than_720_beams(self, count):
+    def test_a_folded_scan_has_at_most_720_beams(self, count):
         fold = folded(dense(array("f", [2.0]) * count))
         assert MOST / 2 <= len(fold.ranges) <= MOST
         assert len(points_of(SPEC, fold)) <= MOST
@@ -71,7 +71,9 @@ class TestFold:
 
     @given(PROFILES, COUNTS, st.integers(0, 99), st.sampled_from([1.0, -1.0]))
     @settings(max_examples=40, deadline=None)
-    def test_no_hit_is_lost_nor_pushed_away(self, profile, count, seed, way):
+    def test_folding_keeps_every_hit_at_its_distance_or_nearer(
+        self, profile, count, seed, way
+    ):
         """Each lies between two beams that say at least as near, or on one."""
         sweep = dense(spread(profile, count, seed), span=way * math.tau)
         fold = folded(sweep)
@@ -86,7 +88,7 @@ class TestFold:
 
     @given(PROFILES, COUNTS, st.integers(0, 99))
     @settings(max_examples=40, deadline=None)
-    def test_no_hit_is_made_up(self, profile, count, seed):
+    def test_folding_adds_no_hits(self, profile, count, seed):
         """What a beam of the fold says, some beam less than a step aside said."""
         sweep = dense(spread(profile, count, seed))
         fold = folded(sweep)
@@ -96,7 +98,7 @@ class TestFold:
             hits = [r for r in beside if hit(r, sweep)]
             assert reach == min(hits) if hits else not hit(reach, sweep)
 
-    def test_most_unknown_is_unknown_unless_it_has_a_hit(self):
+    def test_a_folded_beam_without_a_hit_is_unknown_if_most_of_its_beams_are(self):
         nan, inf = math.nan, math.inf
         groups = [[nan, nan, inf], [inf, inf, nan], [nan, nan, 2.0], [-inf, nan, 1.0]]
         ranges = [r for group in groups for r in group] + [inf] * 1800
@@ -107,11 +109,11 @@ class TestFold:
         assert fold.ranges[1:6] == [inf, 2.0, -inf, 1.0, inf]
         assert fold.fold.known[:4] == [1, 2, 1, 2]
 
-    def test_a_scan_of_which_most_is_unknown_is_so_whatever_its_few_hits(self):
+    def test_a_mostly_unknown_scan_with_few_hits_is_unknown(self):
         ranges = [5.0 if ray % 10 == 0 else math.nan for ray in range(16_000)]
         assert "unknown" in assist(SPEC, received(dense(ranges)), AHEAD, 0.1).why
 
-    def test_what_is_behind_the_robot_s_own_body_is_seen(self):
+    def test_folding_keeps_obstacles_behind_points_on_the_robot_itself(self):
         ranges = [0.15, 0.19, 0.25, 0.6] * 1000
         fold = folded(dense(ranges))
         assert set(fold.ranges) <= {0.15, 0.19}
@@ -121,7 +123,7 @@ class TestFold:
         corner = math.sqrt(0.6**2 - 0.2**2) - 0.3
         assert free_way(BOX, points, AHEAD) == pytest.approx(corner, abs=0.01)
 
-    def test_the_fold_looks_no_farther_aside_than_the_scan(self):
+    def test_a_folded_scan_covers_no_wider_angle_than_the_scan(self):
         narrow = math.radians(20)
         sweep = dense([math.inf] * 1000, low=-narrow, span=2 * narrow)
         assert "only a part of the path" in assist(SPEC, folded(sweep), AHEAD, 0.1).why
@@ -130,7 +132,7 @@ class TestFold:
 
 
 class TestRefused:
-    def test_a_scan_of_too_many_beams_is_none_and_the_robot_says_so(self):
+    def test_a_scan_of_too_many_beams_stops_the_robot_with_a_reason(self):
         sweep = received(dense(array("f", [5.0]) * (LIMIT + 1)))
         assert len(sweep.ranges) == 0
         verdict = assist(SPEC, sweep, AHEAD, 0.1)
@@ -139,10 +141,10 @@ class TestRefused:
             "scan assist: the scan has 100001 beams, more than 100000"
         )
 
-    def test_one_that_was_not_refused_before_is_refused_by_the_fold(self):
+    def test_folding_refuses_a_scan_of_too_many_beams(self):
         assert "more than" in folded(dense(array("f", [5.0]) * (LIMIT + 1))).refused
 
-    def test_many_beams_that_go_round_and_round_are_no_scan(self):
+    def test_a_dense_scan_that_covers_more_than_two_turns_is_refused(self):
         sweep = received(dense([5.0] * 16_000, span=3 * math.tau))
         assert assist(SPEC, sweep, AHEAD, 0.1).why == (
             "scan assist: the 16000 beams of the scan cover more than two turns"
@@ -150,7 +152,7 @@ class TestRefused:
 
 
 class TestVerdict:
-    def test_a_scan_of_16000_beams_gives_the_verdict_of_its_fold(self):
+    def test_a_scan_of_16000_beams_gives_the_verdict_of_the_folded_scan(self):
         for gap in (0.1, 0.3, 0.6, 0.8, 1.0, 3.0):
             step = math.tau / 16_000
             ranges = []
@@ -165,7 +167,7 @@ class TestVerdict:
             whole = assist(SPEC, sweep, AHEAD, 0.1)
             assert found.scale == pytest.approx(whole.scale, abs=0.02)
 
-    def test_a_thin_leg_in_the_way_is_braked_for_wherever_it_stands(self):
+    def test_a_thin_obstacle_anywhere_in_the_path_reduces_the_velocity(self):
         for aside in range(-19, 20):
             y = aside / 100
             ranges = array("f", [math.inf]) * 16_000
@@ -185,7 +187,7 @@ class TestVerdict:
         brake=st.floats(0.1, 5.0),
     )
     @settings(max_examples=40, deadline=None)
-    def test_what_is_passed_over_as_too_far_changes_no_verdict(
+    def test_leaving_out_distant_points_changes_no_verdict(
         self, profile, count, seed, footprint, sensor, twist, stop, brake
     ):
         spec = AssistSpec(
@@ -207,7 +209,7 @@ class TestVerdict:
         allowed = math.sqrt(2 * brake * room) if room > 0 else 0.0
         assert found.scale == min(1.0, allowed / speed)
 
-    def test_points_that_cannot_matter_are_not_handed_on(self):
+    def test_points_beyond_the_given_distance_from_the_robot_are_left_out(self):
         ranges = [0.5, 1.6, 20.0, math.inf] * 100
         sweep = dense(ranges)
         assert len(points_of(SPEC, sweep)) == 300

@@ -56,7 +56,7 @@ def ranges_seen(bridge):
 
 
 @pytest.mark.serial  # turns for a set time; a program that is kept waiting loses it
-def test_a_robot_that_is_driven_at_a_wall_comes_to_stand_before_it(gate, bridge):
+def test_scan_assist_stops_a_robot_that_is_driven_towards_a_wall(gate, bridge):
     newest = {}
     reports = gate.on_report(
         lambda report: isinstance(report, RobotReport) and newest.update(report=report)

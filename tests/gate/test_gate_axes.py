@@ -55,7 +55,9 @@ class TestWithoutALimit:
             (Twist(0.1, wy=0.5), "ry", "rad/s"),
         ],
     )
-    def test_a_velocity_is_refused_as_a_whole(self, wanted, name, unit):
+    def test_a_velocity_on_an_axis_without_a_limit_is_refused_as_a_whole(
+        self, wanted, name, unit
+    ):
         bench = begin(spec())
         twist(bench, wanted)
         bench.run(0.1)
@@ -65,7 +67,7 @@ class TestWithoutALimit:
             f"state {name}_max with its twist topic"
         )
 
-    def test_the_one_that_holds_goes_on_for_200_ms_at_most(self):
+    def test_refused_velocities_do_not_prolong_the_previous_velocity(self):
         bench = begin(spec())
         twist(bench, Twist(0.1))
         at = bench.now
@@ -74,19 +76,19 @@ class TestWithoutALimit:
         assert moving == []
         assert bench.written[-1].twist == ZERO
 
-    def test_one_name_of_a_machine_that_states_none_refuses_for_all(self):
+    def test_an_alias_without_a_limit_refuses_the_axis_for_the_whole_machine(self):
         bench = begin(spec(**FLYING), spec(id="r2", name="Bob again"))
         twist(bench, Twist(vz=0.1))
         bench.run(0.1)
         assert bench.attempts == []
         assert "no limit of the robot is known for z" in bench.refusals(PROGRAM)[-1].why
 
-    def test_the_limits_of_another_machine_do_not_count(self):
+    def test_the_limits_of_another_machine_do_not_apply(self):
         bench = begin(spec(), spec(id="r2", twist_topic="/other", **FLYING))
         twist(bench, Twist(vz=0.1))
         assert bench.attempts == []
 
-    def test_the_last_wall_lets_nothing_of_it_through(self):
+    def test_fit_zeroes_all_translation_or_rotation_if_one_axis_has_no_limit(self):
         speed = Speed(1.0, 1.0, ())
         assert fit(Twist(0.5, vz=0.1), speed, holonomic=True) == ZERO
         assert fit(Twist(0.5, wx=0.1, wz=0.2), speed, holonomic=True) == Twist(0.5)
@@ -94,7 +96,7 @@ class TestWithoutALimit:
 
     @pytest.mark.parametrize("field", ["z_max", "rx_max", "ry_max"])
     @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
-    def test_a_limit_that_cannot_be_meant_is_refused(self, field, value):
+    def test_a_limit_that_is_not_positive_and_finite_is_refused(self, field, value):
         with pytest.raises(ConfigError, match=f"{field} is {value}, expected a number"):
             checked(spec(**{field: value}))
 
@@ -107,7 +109,7 @@ class TestWithoutALimit:
 
 
 class TestWithLimits:
-    def test_all_six_numbers_are_written_and_told(self):
+    def test_all_six_components_of_a_velocity_are_sent_and_reported(self):
         bench = begin()
         twist(bench, EVERYTHING)
         assert bench.written[-1].twist == EVERYTHING
@@ -117,23 +119,23 @@ class TestWithLimits:
         bench.run(0.15)
         assert bench.report().sent == EVERYTHING.numbers
 
-    def test_numbers_that_are_not_finite_are_refused(self):
+    def test_a_velocity_that_is_not_finite_is_refused(self):
         bench = begin()
         twist(bench, Twist(0.1, vz=math.nan))
         assert bench.attempts == []
         assert "finite" in bench.refusals(PROGRAM)[-1].why
 
-    def test_what_is_too_fast_keeps_its_direction(self):
+    def test_a_velocity_above_the_limits_is_scaled_and_keeps_its_direction(self):
         bench = begin()
         twist(bench, Twist(0.5, vz=-1.0, wx=0.1, wy=0.2))
         assert bench.written[-1].twist == Twist(0.25, vz=-0.5, wx=0.05, wy=0.1)
 
-    def test_the_least_limit_of_all_names_holds(self):
+    def test_the_lowest_limit_of_all_aliases_applies(self):
         bench = begin(spec(**FLYING), spec(id="r2", **{**FLYING, "z_max": 0.2}))
         twist(bench, Twist(vz=0.5))
         assert bench.written[-1].twist == Twist(vz=0.2)
 
-    def test_every_reason_to_be_slow_holds_for_a_climb_too(self):
+    def test_the_speed_limit_for_missing_settings_also_limits_a_climb(self):
         bench = begin(stops_within=None, z_max=2.0)
         twist(bench, Twist(vz=2.0))
         assert bench.written[-1].twist == Twist(vz=0.3)
@@ -141,7 +143,7 @@ class TestWithLimits:
         twist(bench, Twist(vz=2.0))
         assert bench.written[-1].twist == Twist(vz=0.3)
 
-    def test_without_another_it_is_zero_in_all_axes(self):
+    def test_without_new_commands_zero_is_sent_on_all_axes(self):
         bench = begin()
         twist(bench, EVERYTHING)
         at = bench.now
@@ -149,7 +151,7 @@ class TestWithLimits:
         assert bench.since(at)
         assert {w.twist for w in bench.since(at)} == {ZERO}
 
-    def test_stop_is_zero_in_all_axes(self):
+    def test_stop_sends_zero_on_all_axes(self):
         bench = begin()
         twist(bench, EVERYTHING)
         at = bench.now
@@ -160,7 +162,7 @@ class TestWithLimits:
 
     @given(st.builds(Twist, *[number] * 6), st.builds(Axes, *[limit] * 3), limit, limit)
     @example(Twist(vy=2.0, vz=1e-308), Axes(), 1.0, 0.0)
-    def test_nothing_exceeds_a_limit(self, wanted, axes, v, w):
+    def test_fit_never_exceeds_a_limit_or_reverses_an_axis(self, wanted, axes, v, w):
         found = fit(wanted, Speed(v, w, ()), holonomic=True, axes=axes)
         assert found.is_finite
         assert found.speed <= v * (1 + 1e-9) + 1e-300
@@ -171,7 +173,7 @@ class TestWithLimits:
         pairs = zip(found.numbers, wanted.numbers, strict=True)
         assert all(mine * its >= 0 for mine, its in pairs)
 
-    def test_a_climb_is_ramped_like_any_speed(self):
+    def test_a_climb_is_ramped_like_any_other_motion(self):
         assert ramp(ZERO, Twist(vz=1.0), 2.0, 0.05).vz == pytest.approx(0.1)
         aslant = ramp(ZERO, Twist(1.0, vz=1.0), 2.0, 0.05)
         assert aslant.speed == pytest.approx(0.1)
@@ -179,13 +181,13 @@ class TestWithLimits:
         assert ramp(Twist(vz=1.0), Twist(vz=0.2), 2.0, 0.05) == Twist(vz=0.2)
         assert ramp(ZERO, EVERYTHING, 100.0, 0.1) == EVERYTHING
 
-    def test_scan_assist_slows_down_all_of_it(self):
+    def test_scan_assist_reduces_the_velocity_on_all_axes(self):
         assist = AssistSpec(topic="/scan", footprint=BOX, blind="creep", creep=0.05)
         bench = begin(assist=assist)
         twist(bench, Twist(0.1, vz=0.4, wx=0.02))
         assert bench.written[-1].twist == Twist(0.05, vz=0.2, wx=0.01)
 
-    def test_scan_assist_looks_at_the_plane_alone(self):
+    def test_scan_assist_does_not_limit_a_purely_vertical_velocity(self):
         assist = AssistSpec(topic="/scan", footprint=BOX)
         bench = begin(assist=assist)
         ranges = [0.4] * 72
@@ -211,7 +213,7 @@ class TestStanding:
             (Twist(wy=-0.3), "still turning at 0.30 rad/s"),
         ],
     )
-    def test_a_stop_is_not_confirmed_while_it_moves_along_any_axis(
+    def test_a_stop_is_not_confirmed_while_the_robot_moves_along_any_axis(
         self, bench, seen, words
     ):
         bench.say("b", op="stop", robot="r1")
@@ -223,21 +225,21 @@ class TestStanding:
         measure(bench, 0.6, ZERO)
         assert bench.report().stop.confirmed is True
 
-    def test_a_robot_without_limits_stands_whatever_its_other_axes_say(self):
+    def test_odometry_of_an_axis_without_a_limit_does_not_prevent_standstill(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
         bench.say("b", op="stop", robot="r1")
         measure(bench, 0.6, Twist(vz=0.3, wx=math.nan, wy=0.4))
         assert bench.report().stop.confirmed is True
         assert bench.report().measured == ZERO.numbers
 
-    def test_an_axis_that_odometry_tells_no_number_for_confirms_nothing(self, bench):
+    def test_odometry_with_nan_on_an_axis_with_a_limit_confirms_no_stop(self, bench):
         bench.say("b", op="stop", robot="r1")
         measure(bench, 2.2, Twist(vz=math.nan))
         stop = bench.report().stop
         assert (stop.confirmed, stop.why) == (False, "no odometry")
         assert bench.report().measured is None
 
-    def test_it_is_handed_over_when_it_climbs_no_more(self, bench):
+    def test_control_is_handed_over_only_after_the_climb_has_ended(self, bench):
         bench.take("a")
         measure(bench, 0.3, ZERO)
         bench.say("b", op="ask", robot="r1")
@@ -247,7 +249,7 @@ class TestStanding:
         measure(bench, 0.6, ZERO)
         assert bench.report().holder.connection == "b"
 
-    def test_a_stop_test_does_not_begin_while_it_climbs(self, bench):
+    def test_a_stop_test_does_not_start_while_the_robot_climbs(self, bench):
         bench.take("a")
 
         def each():
@@ -258,7 +260,7 @@ class TestStanding:
         bench.say("a", op="stop-test", robot="r1")
         assert bench.refusals("a")[-1].why == "the robot is already moving"
 
-    def test_a_stop_test_waits_until_it_climbs_no_more(self, bench):
+    def test_a_stop_test_fails_if_the_robot_still_climbs_after_3_s(self, bench):
         bench.take("a")
         seen = [ZERO]
 

@@ -26,7 +26,7 @@ def send(budget, seconds, rate, *, size=100, work=0.00005, begin=1000.0, kept=0)
 
 
 class TestBudget:
-    def test_an_odometry_of_a_kilohertz_and_dense_scans_are_taken_for_ever(self):
+    def test_odometry_at_1_khz_and_dense_scans_stay_within_the_budget(self):
         budget = Budget()
         for each in range(60_000):
             now = 1000 + each / 1000
@@ -36,13 +36,13 @@ class TestBudget:
             assert budget.wait(now) == 0
             assert budget.flood(now) is None
 
-    def test_ten_of_the_longest_messages_a_second_are_taken_for_ever(self):
+    def test_ten_messages_of_maximum_size_a_second_stay_within_the_budget(self):
         budget = Budget()
         for each in range(300):
             budget.spend(18, 1 << 20, 0.012, 1000 + each / 10)
             assert budget.wait(1000 + each / 10) == 0
 
-    def test_what_a_stall_of_3_s_kept_back_is_taken_at_once(self):
+    def test_the_backlog_of_a_3_s_stall_is_read_without_a_pause(self):
         budget = Budget()
         for _ in range(3000):
             assert budget.wait(1000.0) == 0
@@ -53,7 +53,7 @@ class TestBudget:
         [(1, 4, 0.000004), (1, 1 << 20, 0.001), (1, 100, 0.05)],
         ids=["many frames", "many bytes", "much work"],
     )
-    def test_of_what_sends_too_much_no_more_than_the_rate_is_taken(
+    def test_a_link_over_budget_is_read_at_no_more_than_the_budgeted_rate(
         self, frames, size, work
     ):
         budget, taken, now = Budget(), 0, 1000.0
@@ -65,14 +65,14 @@ class TestBudget:
         most = min(limits.FRAMES, limits.BYTES / size, limits.WORK / work)
         assert taken <= 1 + most * (10 + limits.BURST)
 
-    def test_it_waits_for_a_while_and_not_frame_by_frame(self):
+    def test_reading_from_a_link_over_budget_pauses_for_a_fixed_time(self):
         budget = Budget()
         while budget.wait(1000.0) == 0:
             budget.spend(100, 400, 0.0004, 1000.0)
         assert budget.wait(1000.0) == pytest.approx(limits.PAUSE)
         assert budget.wait(1000.0 + limits.PAUSE + 0.001) == 0
 
-    def test_one_that_keeps_on_is_dropped_after_its_burst_and_a_second(self):
+    def test_a_link_that_stays_over_budget_is_dropped_after_about_a_second(self):
         budget = Budget()
         dropped = send(budget, 60, 20_000, size=4, work=0.000004)
         assert dropped == pytest.approx(limits.PATIENCE + 0.2, abs=0.2)
@@ -80,16 +80,16 @@ class TestBudget:
         assert "frames" in why
         assert "at most 4000 frames, 16777216 bytes and 0.25 s of work a second" in why
 
-    def test_who_is_dropped_and_comes_back_has_not_been_forgiven(self):
+    def test_a_link_that_floods_again_after_a_drop_is_dropped_at_least_as_soon(self):
         budget = Budget()
         first = send(budget, 60, 20_000, begin=1000.0)
         again = send(budget, 60, 20_000, begin=1000.0 + first + 0.5)
         assert again <= first
 
-    def test_one_burst_too_many_is_no_flood(self):
+    def test_a_single_burst_over_budget_is_no_flood(self):
         assert send(Budget(), 60, 1000, kept=5000) is None
 
-    def test_one_that_is_behind_all_the_time_is_dropped_however_little_is_taken(self):
+    def test_a_link_that_is_always_behind_is_dropped_after_2_s_at_any_rate(self):
         budget = Budget()
         for each in range(20):
             budget.spend(1, 100, 0.0001, 1000 + each / 10)
@@ -99,7 +99,7 @@ class TestBudget:
             1002.1
         )
 
-    def test_one_that_catches_up_now_and_then_is_not(self):
+    def test_a_link_that_sometimes_catches_up_is_not_dropped(self):
         budget = Budget()
         for each in range(100):
             budget.note(1000 + each / 10, behind=each % 15 != 0)
@@ -107,32 +107,32 @@ class TestBudget:
 
 
 class TestAttempts:
-    def test_each_that_fails_waits_twice_as_long_up_to_3_s(self):
+    def test_the_wait_doubles_after_each_failed_attempt_up_to_3_s(self):
         attempts = Attempts()
         assert [attempts.failed() for _ in range(7)] == [
             0.1, 0.2, 0.4, 0.8, 1.6, 3.0, 3.0,
         ]  # fmt: skip
 
-    def test_that_the_handshake_succeeds_makes_no_wait_shorter(self):
+    def test_a_short_connection_does_not_reset_the_wait(self):
         attempts = Attempts()
         lasted = waits.STEADY - 0.01
         waited = [attempts.ended(lasted, flooded=False) for _ in range(3)]
         assert waited == [0.1, 0.2, 0.4]
 
-    def test_after_a_link_that_lasted_the_next_attempt_comes_soon(self):
+    def test_a_lasting_connection_resets_the_wait(self):
         attempts = Attempts()
         attempts.failed()
         attempts.failed()
         assert attempts.ended(waits.STEADY, flooded=False) == waits.FIRST_WAIT
 
-    def test_after_each_flood_it_waits_twice_as_long_up_to_a_minute(self):
+    def test_the_wait_doubles_after_each_flood_up_to_a_minute(self):
         attempts = Attempts()
         waited = [attempts.ended(3.0, flooded=True) for _ in range(8)]
         assert waited == [1, 2, 4, 8, 16, 32, 60, 60]
         attempts.ended(waits.TAME, flooded=False)
         assert attempts.ended(3.0, flooded=True) == 1
 
-    def test_a_trouble_is_news_once_until_a_link_has_lasted(self):
+    def test_an_error_is_new_only_once_until_a_connection_has_lasted(self):
         attempts = Attempts()
         assert attempts.is_new("refused")
         assert not attempts.is_new("refused")
@@ -141,7 +141,7 @@ class TestAttempts:
         attempts.ended(waits.STEADY, flooded=False)
         assert attempts.is_new("refused")
 
-    def test_a_bridge_that_always_names_another_trouble_does_not_fill_the_log(self):
+    def test_a_bridge_with_many_different_errors_does_not_fill_the_log(self):
         attempts = Attempts()
         news = sum(attempts.is_new(f"trouble {n}") for n in range(1000))
         assert news == waits.MOST_TROUBLES

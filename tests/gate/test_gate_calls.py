@@ -13,7 +13,7 @@ def request(id, service="/e_stop"):
 
 
 @in_loop
-async def test_a_call_is_answered_on_a_socket_that_ends_with_it(caplog):
+async def test_each_call_has_its_own_socket_that_closes_after_the_answer(caplog):
     async with noting_bridge() as bridge:
         made = Calls(bridge.url)
         made.call(request("a"), "a", "/e_stop")
@@ -27,7 +27,7 @@ async def test_a_call_is_answered_on_a_socket_that_ends_with_it(caplog):
 
 
 @in_loop
-async def test_a_call_that_hangs_holds_no_other_up_and_is_given_up(monkeypatch, caplog):
+async def test_a_hanging_call_blocks_no_other_call_and_times_out(monkeypatch, caplog):
     monkeypatch.setattr(tasks, "CALL_TIMEOUT", 1.0)
     async with noting_bridge() as bridge:
         bridge.answers_services = False
@@ -47,7 +47,7 @@ async def test_a_call_that_hangs_holds_no_other_up_and_is_given_up(monkeypatch, 
 
 
 @in_loop
-async def test_only_the_answer_to_the_call_ends_it():
+async def test_only_the_answer_with_the_id_of_the_call_ends_the_call():
     async with noting_bridge() as bridge:
         bridge.answers_services = False
         made = Calls(bridge.url)
@@ -63,7 +63,7 @@ async def test_only_the_answer_to_the_call_ends_it():
 
 
 @in_loop
-async def test_a_call_that_finds_no_bridge_is_said_to_have_failed(caplog):
+async def test_a_call_without_a_connection_is_logged_as_failed(caplog):
     async def talk(link):
         await link.request()
         link.say(b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\n\r\n")
@@ -77,7 +77,7 @@ async def test_a_call_that_finds_no_bridge_is_said_to_have_failed(caplog):
 
 
 @in_loop
-async def test_a_call_whose_link_is_lost_is_waited_for_no_longer(caplog):
+async def test_a_call_ends_with_a_log_entry_when_its_connection_is_lost(caplog):
     async with noting_bridge() as bridge:
         bridge.answers_services = False
         made = Calls(bridge.url)
@@ -90,7 +90,7 @@ async def test_a_call_whose_link_is_lost_is_waited_for_no_longer(caplog):
 
 
 @in_loop
-async def test_calls_that_are_given_up_take_their_sockets_with_them(caplog):
+async def test_closing_the_calls_closes_their_sockets_without_a_log_entry(caplog):
     async with noting_bridge() as bridge:
         bridge.answers_services = False
         made = Calls(bridge.url)

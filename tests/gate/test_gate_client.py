@@ -35,7 +35,9 @@ def first_zero_after(fake, at):
 
 
 class TestPages:
-    def test_a_page_takes_and_drives_and_sees_what_comes_of_it(self, page, fake):
+    def test_a_page_takes_control_drives_and_receives_reports_of_the_motion(
+        self, page, fake
+    ):
         page.drive_off(fake)
         assert page.of("hello")[0]["connection"] == page.connection.id
         eventually(lambda: page.robot()["echoed"] == [0.25, 0, 0, 0, 0, 0], "the echo")
@@ -48,7 +50,9 @@ class TestPages:
         assert (report["v"], report["w"], report["link"]) == (0.25, 1.5, "up")
         assert report["why"] == ["limit of the robot"]
 
-    def test_the_robot_is_told_in_the_right_order_and_form(self, page, fake):
+    def test_velocities_have_their_own_socket_that_subscribes_then_advertises(
+        self, page, fake
+    ):
         page.drive_off(fake)
         page.x = 0.0
         eventually(lambda: page.robot()["state"] == "held", "standstill")
@@ -62,7 +66,9 @@ class TestPages:
         assert others == {"/cmd_vel"}, "velocity shares its socket with nothing"
 
     @pytest.mark.serial
-    def test_release_is_zeros_and_then_silence(self, page, fake):
+    def test_released_inputs_send_zeros_for_half_a_second_and_then_nothing(
+        self, page, fake
+    ):
         page.drive_off(fake)
         page.x = 0.0
         eventually(lambda: fake.last_speed == 0, "a zero")
@@ -75,7 +81,9 @@ class TestPages:
         assert fake.velocities[-1][0] == zeros[-1]
 
     @pytest.mark.serial
-    def test_a_hand_that_vanishes_is_zero_within_250_ms(self, page, fake):
+    def test_zero_is_sent_within_250_ms_when_a_page_sends_no_more_commands(
+        self, page, fake
+    ):
         page.drive_off(fake)
         page.x = None
         at = time.monotonic()
@@ -83,7 +91,7 @@ class TestPages:
         assert zero - fake.moving[-1][0] <= 0.25 + JITTER
 
     @pytest.mark.serial
-    def test_a_page_that_closes_is_a_zero_at_once(self, page, fake):
+    def test_closing_the_page_sends_zero_at_once(self, page, fake):
         page.drive_off(fake)
         at = time.monotonic()
         page.connection.close()
@@ -91,7 +99,9 @@ class TestPages:
         assert zero - at <= 0.1 + JITTER
 
     @pytest.mark.serial
-    def test_stop_by_a_viewer_is_a_zero_at_once(self, page, client, fake):
+    def test_stop_by_a_viewer_sends_zero_at_once_and_blocks_motion(
+        self, page, client, fake
+    ):
         viewer = Page(client, "Vic", "viewer")
         page.drive_off(fake)
         at = time.monotonic()
@@ -107,7 +117,9 @@ class TestPages:
         assert len(fake.moving) == moves
         viewer.end()
 
-    def test_of_two_pages_one_drives_and_both_see_who(self, page, client, fake):
+    def test_only_one_of_two_pages_drives_and_both_see_the_operator(
+        self, page, client, fake
+    ):
         other = Page(client, "Ben")
         page.drive_off(fake)
         eventually(lambda: other.robot().get("state") == "driving", "the report")
@@ -118,7 +130,9 @@ class TestPages:
         assert refused[0]["why"] == "Ann has control"
         other.end()
 
-    def test_garbage_moves_nothing_and_much_of_it_ends_the_connection(self, page, fake):
+    def test_invalid_commands_move_nothing_and_many_close_the_connection(
+        self, page, fake
+    ):
         page.take()
         for rubbish in ("", "{", "\ud800", "x" * 5000, '{"op":NaN}', b"\xff\x00"):
             page.connection.receive(rubbish)
@@ -128,12 +142,14 @@ class TestPages:
         eventually(lambda: page.closed, "the wish to close the page")
         assert fake.velocities == []
 
-    def test_the_pages_speeds_count(self, page, fake):
+    def test_the_speed_limit_of_the_page_applies(self, page, fake):
         page.connection.set_speeds(0.125, 0.5)
         page.drive_off(fake)
         assert fake.last_speed == 0.125
 
-    def test_a_page_that_comes_later_hears_of_every_robot(self, page, client):
+    def test_a_page_that_connects_later_receives_reports_of_existing_robots(
+        self, page, client
+    ):
         eventually(lambda: page.robot(), "the first report")
         late = Page(client, "Late")
         eventually(lambda: late.robot(), "the report")
@@ -143,11 +159,13 @@ class TestPages:
         client.forget("r1")
         late.end()
 
-    def test_a_role_that_is_not_there_is_refused(self, client):
+    def test_an_unknown_role_is_refused(self, client):
         with pytest.raises(ConfigError, match="boss"):
             client.connect("Ann", "boss", print, print)
 
-    def test_a_callback_that_fails_harms_nobody(self, page, client, fake, caplog):
+    def test_a_failing_callback_is_logged_and_does_not_affect_other_pages(
+        self, page, client, fake, caplog
+    ):
         def fail(text):
             raise RuntimeError("broken page")
 
@@ -160,7 +178,7 @@ class TestPages:
 
 
 class TestGoals:
-    def test_a_goal_goes_to_its_topic_and_is_told(self, page, fake, reports):
+    def test_a_goal_is_published_on_its_topic_and_reported(self, page, fake, reports):
         page.take()
         eventually(lambda: self._goes(page, fake, 1), "the goal")
         pose = fake.of("publish", "/goal")[0].message["msg"]
@@ -171,7 +189,7 @@ class TestGoals:
         eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
         assert fake.of("publish", "/cancel")[0].message["msg"] == {}
 
-    def test_an_actions_goals_hang_and_can_be_cancelled_all_the_same(
+    def test_action_goals_without_an_answer_can_still_be_cancelled(
         self, client, robot_spec
     ):
         with FakeRobot(answers_services=False) as fake:
@@ -205,7 +223,9 @@ class TestGoals:
             eventually(lambda: second.link not in fake._sockets, "its socket's end")
             page.end()
 
-    def test_move_base_says_on_its_topics_how_a_goal_goes(self, client, robot_spec):
+    def test_the_topics_of_move_base_report_the_progress_of_a_goal(
+        self, client, robot_spec
+    ):
         with FakeRobot() as fake:
             client.declare(
                 msgspec.structs.replace(
@@ -257,7 +277,7 @@ class TestGoals:
             }
             page.end()
 
-    def test_an_action_says_how_its_goal_goes_until_its_link_is_lost(
+    def test_an_action_reports_its_goal_until_the_connection_is_lost(
         self, client, robot_spec
     ):
         with FakeRobot() as fake:
@@ -305,7 +325,7 @@ class TestProgram:
         return eventually(attempt, "the lease")
 
     @pytest.mark.serial
-    def test_python_drives_within_the_limits_and_is_told(
+    def test_a_program_drives_within_the_limits_and_receives_reports(
         self, client, robot_spec, fake, reports
     ):
         client.declare(robot_spec)
@@ -324,7 +344,7 @@ class TestProgram:
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - fake.moving[-1][0] <= 0.25 + JITTER
 
-    def test_python_sends_goals_and_cancels_them(self, client, robot_spec, fake):
+    def test_a_program_sends_and_cancels_goals(self, client, robot_spec, fake):
         client.declare(robot_spec)
         self.take(client)
 
@@ -340,23 +360,23 @@ class TestProgram:
         with pytest.raises(NoLease):
             client.move("r1", 1.0, 2.0, 0.5)
 
-    def test_without_the_lease_python_is_refused_at_once(self, client, robot_spec):
+    def test_a_program_without_the_lease_is_refused_at_once(self, client, robot_spec):
         client.declare(robot_spec)
         with pytest.raises(NoLease, match="'r1'"):
             client.twist("r1", Twist(0.1))
 
-    def test_numbers_that_are_none_are_refused_at_once(self, client):
+    def test_numbers_that_are_not_finite_are_refused_at_once(self, client):
         with pytest.raises(MotionError):
             client.twist("r1", Twist(float("nan")))
         with pytest.raises(MotionError):
             client.move("r1", 0.0, float("inf"), 0.0)
 
-    def test_a_robot_that_is_driven_is_not_to_be_had(self, client, page, fake):
+    def test_a_program_cannot_take_control_of_a_driven_robot(self, client, page, fake):
         page.drive_off(fake)
         with pytest.raises(NoLease, match="Ann has control"):
             client.take("r1").result(5)
 
-    def test_an_operator_takes_over_and_python_is_refused_from_then_on(
+    def test_a_program_is_refused_after_an_operator_has_taken_control(
         self, client, page, fake
     ):
         self.take(client)
@@ -373,7 +393,7 @@ class TestProgram:
         eventually(refused, "a refusal")
         assert fake.moving == []
 
-    def test_stop_from_python_stops_a_page(self, client, page, fake):
+    def test_stop_by_a_program_stops_a_robot_driven_by_a_page(self, client, page, fake):
         page.drive_off(fake)
         at = time.monotonic()
         client.stop_robot(None)
@@ -388,9 +408,7 @@ class TestProgram:
 
 
 class TestLinks:
-    def test_after_a_broken_link_zero_comes_first_and_the_key_must_be_released(
-        self, page, fake
-    ):
+    def test_a_new_link_starts_with_zero_and_requires_released_inputs(self, page, fake):
         page.drive_off(fake)
         links = {t.link for t in fake.received}
         fake.cut_all()
@@ -409,7 +427,7 @@ class TestLinks:
         page.x = 1.0
         eventually(lambda: len(fake.moving) > moves, "motion")
 
-    def test_after_a_stall_what_comes_late_is_little_and_ends_with_zero(
+    def test_after_a_stall_few_late_velocities_arrive_and_the_last_is_zero(
         self, page, fake
     ):
         page.drive_off(fake)
@@ -424,7 +442,7 @@ class TestLinks:
         assert len([vx for vx in late if vx]) <= 9
         assert late[-1] == 0
 
-    def test_a_robot_that_falls_silent_is_stopped(self, page, fake):
+    def test_a_robot_whose_odometry_ends_is_stopped_with_a_reason(self, page, fake):
         page.drive_off(fake)
         fake.sends_odometry = False
         eventually(lambda: fake.last_speed == 0, "a zero", 3.0)
@@ -434,7 +452,7 @@ class TestLinks:
 
 
 class TestLife:
-    def test_a_gate_that_dies_is_started_anew_and_knows_everything_but_leases(
+    def test_a_killed_gate_is_restarted_and_restores_everything_but_leases(
         self, client, page, fake, reports
     ):
         page.drive_off(fake)
@@ -451,7 +469,9 @@ class TestLife:
         eventually(lambda: fake.last_speed == 0, "a zero")
         page.drive_off(fake)
 
-    def test_a_request_to_a_gate_that_dies_is_answered(self, client, robot_spec):
+    def test_a_pending_request_to_a_killed_gate_is_answered_with_an_error(
+        self, client, robot_spec
+    ):
         client.declare(robot_spec)
         eventually(lambda: client.ready, "a gate")
         os.kill(client.pid, signal.SIGSTOP)
@@ -461,7 +481,9 @@ class TestLife:
             future.result(10)
 
     @pytest.mark.serial
-    def test_its_end_stops_robots_within_half_a_second(self, client, page, fake):
+    def test_ending_the_gate_sends_zero_to_a_driven_robot_within_100_ms(
+        self, client, page, fake
+    ):
         page.drive_off(fake)
         at = time.monotonic()
         client.stop()
@@ -472,7 +494,9 @@ class TestLife:
         assert fake.moving[-1][0] < zero
 
     @pytest.mark.serial
-    def test_a_display_whose_heart_stops_is_a_zero(self, client, page, fake):
+    def test_a_missing_heartbeat_of_the_display_sends_zero_within_300_ms(
+        self, client, page, fake
+    ):
         page.drive_off(fake)
         client._supervisor.end_heartbeat()  # and nothing else
         at = time.monotonic()
@@ -484,7 +508,7 @@ class TestLife:
 
     @pytest.mark.serial
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-    def test_a_signal_is_zero_and_then_the_end(
+    def test_a_signal_to_the_gate_sends_zero_and_ends_the_gate(
         self, client, page, fake, number, reports
     ):
         page.drive_off(fake)
@@ -494,7 +518,7 @@ class TestLife:
         assert zero - at < 0.05 + JITTER
         eventually(lambda: of(reports, protocol.GateDown), "its end")
 
-    def test_a_second_gate_on_this_computer_shows_but_does_not_drive(
+    def test_a_second_gate_on_this_computer_shows_the_robot_but_cannot_drive(
         self, client, page, robot_spec
     ):
         page.take()
@@ -510,12 +534,12 @@ class TestLife:
         other.end()
         second.stop()
 
-    def test_what_cannot_be_meant_is_refused_before_the_gate_hears_of_it(self, client):
+    def test_declaring_an_invalid_robot_raises_a_config_error(self, client):
         spec = protocol.RobotSpec(id="r1", name="Bob", bridge_url="ws://x", v_max=-1.0)
         with pytest.raises(ConfigError):
             client.declare(spec)
 
-    def test_starting_twice_is_one_gate(self, client):
+    def test_starting_the_client_twice_starts_one_gate(self, client):
         eventually(lambda: client.ready, "a gate")
         pid = client.pid
         client.start()
@@ -528,7 +552,7 @@ class TestLife:
 
 
 class TestStopStands:
-    def test_it_is_there_again_after_the_gate_was_killed(self, page, client, fake):
+    def test_a_stop_stays_active_after_the_gate_was_killed(self, page, client, fake):
         page.drive_off(fake)
         client.stop_robot("r1")
         eventually(lambda: page.robot().get("latched"), "the word that STOP stands")
@@ -552,7 +576,9 @@ class TestStopStands:
         page.x = 0.0
         page.drive_off(fake)
 
-    def test_it_is_there_again_for_another_display(self, client, robot_spec):
+    def test_a_stop_stays_active_after_the_client_was_restarted(
+        self, client, robot_spec
+    ):
         client.declare(robot_spec)
         seen = []
         client.on_report(seen.append)
@@ -574,7 +600,9 @@ class TestStopStands:
 
         eventually(reset, "the reset")
 
-    def test_it_is_confirmed_by_odometry_or_it_is_not(self, page, client, fake):
+    def test_a_stop_is_confirmed_only_when_odometry_shows_standstill(
+        self, page, client, fake
+    ):
         page.drive_off(fake)
         client.stop_robot("r1")
 
@@ -586,7 +614,7 @@ class TestStopStands:
         fake.at_rest = True
         eventually(confirmed, "the word that it stands")
 
-    def test_it_is_there_again_for_a_robot_that_was_forgotten(
+    def test_a_stop_stays_active_for_a_robot_that_is_removed_and_declared_again(
         self, page, client, robot_spec, fake
     ):
         page.drive_off(fake)
@@ -604,10 +632,12 @@ class TestStopStands:
         eventually(lambda: (page.robot()["stop"] or {}).get("confirmed"), "standstill")
         assert client.pid == pid
 
-    def test_a_gate_that_does_not_run_resets_nothing(self):
+    def test_a_reset_without_a_running_gate_raises_no_error(self):
         GateClient().reset("r1", "s1")
 
-    def test_hooks_are_said_and_taken_back(self, client, robot_spec, fake):
+    def test_stop_hooks_run_on_stop_and_reset_clears_the_topic_hook(
+        self, client, robot_spec, fake
+    ):
         hooks = (
             {"topic": "/lock", "type": "std_msgs/Bool"},
             {"service": "/e_stop", "type": "std_srvs/Trigger"},
@@ -635,7 +665,7 @@ class TestStopStands:
 
 
 class TestHands:
-    def test_a_robot_goes_from_page_to_page_at_standstill(self, page, client, fake):
+    def test_control_changes_from_page_to_page_at_standstill(self, page, client, fake):
         other = Page(client, "Ben")
         page.drive_off(fake)
         other.say(op="ask", robot="r1")
@@ -648,7 +678,9 @@ class TestHands:
         eventually(lambda: other.robot().get("mine"), "the lease")
         other.end()
 
-    def test_a_base_that_stops_by_itself_is_found(self, client, robot_spec, fake):
+    def test_a_stop_test_measures_the_command_timeout_and_keeps_the_result(
+        self, client, robot_spec, fake
+    ):
         spec = msgspec.structs.replace(robot_spec, stops_within=None)
         client.declare(spec)
         page = Page(client)

@@ -60,16 +60,16 @@ def without(fields, name):
         (GOAL, Goal("r1", 3, 18, 813, 1.0, 2.0, 0.5)),
     ],
 )
-def test_every_command_is_understood(fields, command):
+def test_valid_commands_are_parsed(fields, command):
     assert parse(text(fields)) == command
 
 
-def test_released_inputs_are_neutral_also_as_negative_zeros():
+def test_zero_and_negative_zero_inputs_are_neutral():
     assert parse(text(DRIVE, x=-0.0, turn=0)).neutral
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "turn"])
-def test_an_axis_that_no_base_would_move_by_is_released(axis):
+def test_an_input_below_one_thousandth_is_neutral(axis):
     released = {"x": 0, "y": 0, "turn": 0}
     for least in (5e-324, -5e-324, 0.0009, -0.0009):
         assert parse(text(DRIVE, **{**released, axis: least})).neutral
@@ -77,14 +77,14 @@ def test_an_axis_that_no_base_would_move_by_is_released(axis):
         assert not parse(text(DRIVE, **{**released, axis: moves})).neutral
 
 
-def test_axes_beyond_full_are_clamped_and_flagged():
+def test_inputs_beyond_full_scale_are_clamped_and_flagged():
     drive = parse(text(DRIVE, x=10, y=-1e300, turn=1.0))
     assert (drive.x, drive.y, drive.turn) == (1.0, -1.0, 1.0)
     assert drive.clamped
     assert not parse(text(DRIVE)).clamped
 
 
-def test_a_goals_heading_is_normalised():
+def test_the_heading_of_a_goal_is_normalised():
     assert parse(text(GOAL, yaw=7)).yaw == pytest.approx(7 - 2 * 3.14159265, abs=1e-6)
 
 
@@ -148,7 +148,7 @@ RAW = json.dumps(DRIVE)
         *(text(without(GOAL, name)) for name in GOAL),
     ],
 )
-def test_anything_else_is_refused_whole_in_words(data):
+def test_any_other_data_is_refused_with_a_short_printable_reason(data):
     with pytest.raises(Refusal) as refused:
         parse(data)
     assert refused.value.garbage
@@ -158,7 +158,7 @@ def test_anything_else_is_refused_whole_in_words(data):
 
 
 @given(st.binary(max_size=1100))
-def test_no_bytes_do_anything_but_be_refused_or_understood(data):
+def test_any_bytes_are_parsed_or_refused(data):
     with contextlib.suppress(Refusal):
         parse(data)
 
@@ -175,9 +175,7 @@ fields = st.sampled_from([*DRIVE, "yaw", "extra"])
 
 
 @given(st.dictionaries(fields, json_values, max_size=4), st.sets(fields, max_size=1))
-def test_a_command_with_anything_in_its_fields_moves_only_by_finite_numbers(
-    changes, missing
-):
+def test_a_drive_command_with_random_fields_is_refused_or_in_range(changes, missing):
     command = {**DRIVE, **changes}
     for name in missing:
         command.pop(name, None)

@@ -42,7 +42,7 @@ def velocities(bridge):
 
 
 @in_loop
-async def test_an_echo_says_what_the_robot_was_told_and_not_that_the_link_lives(
+async def test_an_echo_reports_the_sent_velocity_but_proves_no_live_link(
     monkeypatch,
 ):
     monkeypatch.setattr(control, "IDLE_PING", 60.0)
@@ -60,7 +60,7 @@ async def test_an_echo_says_what_the_robot_was_told_and_not_that_the_link_lives(
 
 
 @in_loop
-async def test_an_answer_tells_when_it_was_asked_for_and_not_when_it_came():
+async def test_a_ping_answer_carries_the_time_of_the_ping_not_of_the_answer():
     go_on = asyncio.Event()
 
     async def talk(link):
@@ -81,7 +81,9 @@ async def test_an_answer_tells_when_it_was_asked_for_and_not_when_it_came():
 
 
 @in_loop
-async def test_what_another_says_on_the_topic_is_told_and_proves_nothing(monkeypatch):
+async def test_a_velocity_of_another_program_is_reported_but_proves_no_live_link(
+    monkeypatch,
+):
     monkeypatch.setattr(control, "IDLE_PING", 60.0)
     monkeypatch.setattr(control, "BUSY_PING", 60.0)
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
@@ -97,7 +99,7 @@ async def test_what_another_says_on_the_topic_is_told_and_proves_nothing(monkeyp
 
 
 @in_loop
-async def test_others_are_heard_before_anybody_listens_fifty_times_a_second_at_most():
+async def test_echoes_are_received_from_the_start_with_a_throttled_subscription():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
         await until(lambda: bridge.of("advertise"), "what it says at first")
@@ -120,7 +122,7 @@ async def test_others_are_heard_before_anybody_listens_fifty_times_a_second_at_m
 
 
 @in_loop
-async def test_what_is_no_velocity_of_its_own_machines_is_passed_over():
+async def test_messages_that_are_no_velocity_for_a_machine_of_the_lane_are_ignored():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
         lane.listen("/cmd_vel")
@@ -142,7 +144,7 @@ async def test_what_is_no_velocity_of_its_own_machines_is_passed_over():
 
 
 @in_loop
-async def test_pings_are_more_frequent_while_somebody_listens():
+async def test_pings_are_more_frequent_while_the_lane_listens_to_a_topic():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
         assert lane.lane.ping_period == IDLE_PING
@@ -167,7 +169,7 @@ STAMPED = "geometry_msgs/msg/TwistStamped"
 
 @in_loop
 @pytest.mark.parametrize("stated_first", [True, False])
-async def test_of_two_robots_on_a_topic_the_type_that_is_known_counts(stated_first):
+async def test_a_known_type_replaces_an_assumed_type_of_the_same_topic(stated_first):
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
         both = [(STAMPED, False), ("geometry_msgs/Twist", True)]
@@ -191,7 +193,7 @@ async def test_of_two_robots_on_a_topic_the_type_that_is_known_counts(stated_fir
 
 
 @in_loop
-async def test_where_no_robot_is_any_more_nothing_is_written():
+async def test_no_velocity_is_written_to_a_detached_topic():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
         lane.attach("/base", STAMPED)
@@ -203,7 +205,7 @@ async def test_where_no_robot_is_any_more_nothing_is_written():
 
 
 @in_loop
-async def test_few_velocities_may_lie_on_the_way_and_zero_always_goes():
+async def test_the_number_of_unanswered_velocities_is_limited_except_for_zero():
     async def talk(link):
         await link.accept()
         link.writer.transport.pause_reading()
@@ -216,7 +218,7 @@ async def test_few_velocities_may_lie_on_the_way_and_zero_always_goes():
 
 
 @in_loop
-async def test_an_answer_to_a_ping_makes_room_and_a_new_link_begins_anew():
+async def test_a_ping_answer_or_a_new_link_allows_further_velocities():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
         while lane.write("/cmd_vel", SLOW):

@@ -18,7 +18,7 @@ def bench():
 
 
 class TestTaking:
-    def test_a_free_robot_is_held_by_who_takes_it(self, bench):
+    def test_taking_a_free_robot_gives_control_and_an_epoch(self, bench):
         assert bench.report().state == "free"
         epoch = bench.take("a")
         report = bench.report()
@@ -27,20 +27,22 @@ class TestTaking:
         assert report.holder == protocol.Holder("a", "A")
         assert not report.armed
 
-    def test_taking_it_twice_changes_nothing(self, bench):
+    def test_taking_control_twice_keeps_the_epoch(self, bench):
         assert bench.take("a") == bench.take("a")
 
-    def test_another_does_not_get_it(self, bench):
+    def test_a_second_operator_cannot_take_control(self, bench):
         bench.take("a")
         assert bench.take("b") is None
         assert bench.refusals("b")[-1].why == "A has control"
 
-    def test_a_viewer_does_not_get_it(self, bench):
+    def test_a_viewer_cannot_take_control(self, bench):
         bench.join("v", "viewer")
         assert bench.take("v") is None
         assert "viewers" in bench.refusals("v")[-1].why
 
-    def test_after_release_another_gets_it_under_a_new_epoch(self, bench):
+    def test_after_release_another_operator_takes_control_with_a_higher_epoch(
+        self, bench
+    ):
         first = bench.take("a")
         bench.say("b", op="release", robot="r1")  # not b's to give
         assert bench.state == "held"
@@ -48,7 +50,7 @@ class TestTaking:
         assert bench.state == "free"
         assert bench.take("b") > first
 
-    def test_a_robot_that_is_not_there_is_refused_by_name(self, bench):
+    def test_taking_an_unknown_robot_is_refused_with_its_id(self, bench):
         bench.say("a", op="take", robot="r9")
         assert "'r9'" in bench.refusals()[-1].why
 
@@ -59,7 +61,7 @@ class TestTaking:
             (Bench(beating=False), "the display process does not respond"),
         ],
     )
-    def test_a_robot_that_cannot_be_driven_says_why(self, bench, why):
+    def test_a_robot_that_cannot_be_driven_reports_the_reason(self, bench, why):
         bench.begin()
         report = bench.report()
         assert not report.armable
@@ -67,45 +69,47 @@ class TestTaking:
         assert bench.take() is None
         assert bench.refusals()[-1].why == why
 
-    def test_without_a_link_nobody_gets_it(self, bench):
+    def test_control_cannot_be_taken_without_a_link(self, bench):
         bench.break_links()
         assert bench.report().link == "down"
         assert bench.take() is None
         assert URL in bench.refusals()[-1].why
 
-    def test_the_lease_ends_with_its_connection(self, bench):
+    def test_the_lease_ends_when_its_connection_closes(self, bench):
         bench.take("a")
         bench.tell(protocol.Disconnect("a"))
         assert bench.state == "free"
         assert bench.take("b")
 
-    def test_a_connection_that_opens_again_holds_nothing(self, bench):
+    def test_a_connection_that_reopens_does_not_keep_the_lease(self, bench):
         bench.take("a")
         bench.join("a")
         assert bench.state == "free"
 
 
 class TestDriving:
-    def test_nothing_moves_before_200_ms_of_released_inputs(self, bench):
+    def test_nothing_moves_until_all_inputs_were_released(self, bench):
         bench.take()
         bench.hold(0.5, x=1.0)
         assert bench.written == []
         assert bench.refusals()[-1].why == "release all inputs first"
 
-    def test_idle_hands_write_nothing(self, bench):
+    def test_neutral_inputs_send_no_velocity(self, bench):
         bench.take()
         bench.hold(2.0)
         assert bench.written == []
         assert bench.report().armed
 
-    def test_a_press_drives_at_the_speed_in_force(self, bench):
+    def test_an_input_drives_at_its_share_of_the_speed_limit(self, bench):
         bench.drive_off(x=0.5)
         assert bench.state == "driving"
         assert {w.twist for w in bench.written} == {Twist(0.5, 0.0, 0.0)}
         bench.hold(0.2, x=-1.0, turn=0.5)
         assert bench.written[-1].twist == Twist(-1.0, 0.0, 0.75)
 
-    def test_release_is_zero_at_once_then_zeros_for_500_ms_then_silence(self, bench):
+    def test_released_inputs_send_zeros_at_once_for_500_ms_and_then_nothing(
+        self, bench
+    ):
         bench.drive_off()
         bench.drive(x=0)
         at = bench.now
@@ -118,14 +122,14 @@ class TestDriving:
         assert zeros[-1].at < at + 0.5
         assert bench.state == "held"
 
-    def test_after_release_a_new_press_drives_at_once(self, bench):
+    def test_after_released_inputs_a_new_input_drives_at_once(self, bench):
         bench.drive_off()
         bench.drive(x=0)
         bench.run(0.05)
         bench.drive(x=1.0)
         assert bench.written[-1].twist == Twist(1.0)
 
-    def test_zero_leaves_200_ms_after_the_last_command(self, bench):
+    def test_zero_is_sent_200_ms_after_the_last_command(self, bench):
         bench.drive_off()
         last = bench.now
         bench.drive(x=1.0)
@@ -133,7 +137,9 @@ class TestDriving:
         first = next(w for w in bench.since(last) if w.twist == ZERO)
         assert 0.2 <= first.at - last <= 0.2101
 
-    def test_after_the_dead_man_a_key_that_is_still_held_moves_nothing(self, bench):
+    def test_after_the_dead_man_timeout_a_held_key_moves_nothing_until_released(
+        self, bench
+    ):
         bench.drive_off()
         bench.run(0.5)
         at = bench.now
@@ -143,7 +149,7 @@ class TestDriving:
         bench.hold(0.1, x=1.0)
         assert bench.moving_since(at) != []
 
-    def test_idle_hands_that_fall_silent_must_be_seen_again(self, bench):
+    def test_a_silent_page_must_send_neutral_inputs_again_before_driving(self, bench):
         bench.take()
         bench.hold(0.3)
         bench.run(0.3)
@@ -151,14 +157,14 @@ class TestDriving:
         bench.hold(0.3, x=1.0)
         assert bench.written == []
 
-    def test_commands_are_not_repeated_by_the_gate(self, bench):
+    def test_the_gate_does_not_repeat_a_command(self, bench):
         bench.take()
         bench.hold(0.3)
         bench.drive(x=1.0)
         bench.run(0.15)
         assert len(bench.written) == 1
 
-    def test_many_commands_at_once_become_the_newest_one(self, bench):
+    def test_many_commands_at_once_are_reduced_to_the_newest(self, bench):
         bench.drive_off()
         at = bench.now
         bench.run(0.05)
@@ -169,18 +175,18 @@ class TestDriving:
         assert len(written) == 2
         assert written[-1].twist.vx == 0.4
 
-    def test_more_than_full_speed_is_full_speed(self, bench):
+    def test_an_input_beyond_full_scale_drives_at_the_speed_limit(self, bench):
         bench.drive_off(x=100)
         bench.drive(x=100)
         assert bench.written[-1].twist == Twist(1.0)
 
-    def test_a_base_that_is_not_holonomic_never_goes_sideways(self, bench):
+    def test_a_base_that_is_not_holonomic_gets_no_sideways_velocity(self, bench):
         bench.drive_off()
         bench.drive(y=1.0, x=0.0, turn=0.0)
         bench.run(0.05)
         assert bench.written[-1].twist.vy == 0
 
-    def test_a_holonomic_base_goes_sideways_within_the_limit(self):
+    def test_a_holonomic_base_drives_sideways_within_the_speed_limit(self):
         bench = Bench().begin(spec(holonomic=True))
         bench.drive_off()
         bench.run(0.05)
@@ -189,7 +195,7 @@ class TestDriving:
         assert twist.vx == pytest.approx(2**-0.5)
         assert twist.vy == pytest.approx(2**-0.5)
 
-    def test_the_pages_own_limit_counts_also_while_driving(self, bench):
+    def test_the_speed_limit_of_the_page_also_applies_while_driving(self, bench):
         bench.tell(protocol.Speeds("a", 0.5, 9.0))
         bench.drive_off()
         assert bench.written[-1].twist.vx == 0.5
@@ -201,7 +207,7 @@ class TestDriving:
         bench.tell(protocol.Speeds("b", 0.1, 0.1))
         assert bench.report().v == 0.2
 
-    def test_a_lower_limit_counts_for_what_waits_to_be_written(self, bench):
+    def test_a_lower_speed_limit_also_applies_to_a_waiting_command(self, bench):
         bench.drive_off()
         bench.run(0.05)
         bench.drive(x=0.9)
@@ -210,7 +216,7 @@ class TestDriving:
         bench.run(0.05)
         assert bench.written[-1].twist.vx == 0.3
 
-    def test_speeding_up_is_ramped_and_stopping_is_not(self):
+    def test_acceleration_is_ramped_and_stopping_is_not(self):
         bench = Bench().begin(spec(a_max=0.5))
         bench.drive_off()
         speeds = [w.twist.vx for w in bench.written]
@@ -237,13 +243,15 @@ class TestFreshness:
     @pytest.mark.parametrize(
         ("tick", "why"), [(-7, "over 300 ms"), (-4000, "another session")]
     )
-    def test_an_old_tick_is_refused_and_zero_goes_at_once(self, driving, x, tick, why):
+    def test_a_command_with_an_old_tick_is_refused_and_zero_is_sent_at_once(
+        self, driving, x, tick, why
+    ):
         driving.drive(x=x, tick=driving.tick + tick)
         assert [w.twist for w in driving.since(self.at - 0.001)] == [ZERO]
         assert why in driving.refusals()[-1].why
         assert driving.report().holder.connection == "a"
 
-    def test_after_an_old_tick_hands_must_be_seen_to_be_off(self, driving):
+    def test_after_an_old_tick_inputs_must_be_released_before_driving(self, driving):
         driving.drive(x=0.5, tick=driving.tick - 7)
         driving.hold(1.0, x=1.0)
         assert driving.moving_since(self.at) == []
@@ -251,7 +259,7 @@ class TestFreshness:
         driving.hold(0.1, x=1.0)
         assert driving.moving_since(self.at)
 
-    def test_a_process_that_is_stopped_says_zero_first_when_it_goes_on(self, driving):
+    def test_a_gate_that_was_paused_sends_zero_before_anything_else(self, driving):
         driving.held_up = 1.5  # just between what it decides and what it writes
         driving.drive(x=1.0)
         driving.held_up = 0.0
@@ -261,7 +269,9 @@ class TestFreshness:
         assert driving.moving_since(self.at) == []
 
     @pytest.mark.parametrize("stale", [{}, {"tick": 1}])
-    def test_no_stranger_stops_it_by_being_late(self, driving, stale):
+    def test_a_command_without_the_current_lease_does_not_stop_a_driven_robot(
+        self, driving, stale
+    ):
         old = driving.report().epoch - 1
         driving.drive("b", x=0.5, **stale)
         driving.drive("a", x=0.5, epoch=old, **stale)
@@ -273,14 +283,12 @@ class TestFreshness:
         assert driving.since(self.at) == []
         assert driving.state == "driving"
 
-    def test_a_goal_that_comes_late_stops_it_as_well(self, driving):
+    def test_a_goal_with_an_old_tick_stops_the_robot_and_is_not_sent(self, driving):
         driving.goal(tick=driving.tick - 7)
         assert driving.written[-1].twist == ZERO
         assert driving.did(actions.SendGoal) == []
 
-    def test_hands_that_send_but_hear_nothing_are_stopped_like_silent_ones(
-        self, driving
-    ):
+    def test_a_page_that_sends_commands_but_receives_no_ticks_is_stopped(self, driving):
         seen = driving.tick
         driving.run(0.5, lambda: driving.drive(x=1.0, tick=seen))
         zero = next(w for w in driving.since(self.at) if w.twist == ZERO)
@@ -288,31 +296,31 @@ class TestFreshness:
         assert zero.at - self.at <= 0.2 + 2 * 0.01 + 1e-9
         assert driving.moving_since(zero.at) == []
 
-    def test_a_seq_that_does_not_grow_is_refused(self, driving):
+    def test_a_command_whose_seq_does_not_increase_is_refused(self, driving):
         driving.drive(x=0.5, seq=driving.seq)
         self.refused(driving, "seq")
 
-    def test_another_epoch_is_refused(self, driving):
+    def test_a_command_with_another_epoch_is_refused(self, driving):
         driving.drive(x=0.5, epoch=driving.report().epoch - 1)
         self.refused(driving, "epoch")
 
-    def test_another_connection_is_refused(self, driving):
+    def test_a_command_of_another_connection_is_refused(self, driving):
         driving.drive("b", x=0.5)
         assert driving.since(self.at) == []
         assert driving.refusals("b")[-1].why == "A has control"
 
-    def test_a_driver_without_a_lease_is_refused(self, bench):
+    def test_a_command_without_a_lease_is_refused(self, bench):
         bench.drive(x=0.5)
         assert "take control first" in bench.refusals()[-1].why
 
-    def test_what_is_refused_does_not_feed_the_dead_man(self, bench):
+    def test_a_refused_command_does_not_restart_the_dead_man_timeout(self, bench):
         bench.drive_off()
         last = bench.now
         bench.run(0.4, lambda: bench.drive(x=1.0, tick=1))
         first = next(w for w in bench.since(last) if w.twist == ZERO)
         assert first.at - last <= 0.21
 
-    def test_a_backlog_after_a_stall_moves_nothing(self, bench):
+    def test_a_backlog_of_commands_after_a_stall_moves_nothing(self, bench):
         bench.drive_off()
         stale = []
         bench.run(3.0, lambda: stale.append(bench.tick))
@@ -322,7 +330,7 @@ class TestFreshness:
         bench.run(0.3)
         assert bench.moving_since(at) == []
 
-    def test_the_newest_accepted_seq_is_acknowledged(self, bench):
+    def test_a_tick_acknowledges_the_newest_accepted_seq(self, bench):
         bench.take()
         bench.hold(0.3)
         bench.drive(tick=1)  # refused
@@ -333,7 +341,7 @@ class TestFreshness:
 
 
 class TestGarbage:
-    def test_among_good_commands_it_is_as_if_it_were_not_there(self, bench):
+    def test_invalid_commands_do_not_restart_the_dead_man_timeout(self, bench):
         bench.drive_off()
         last = bench.now
 
@@ -345,7 +353,7 @@ class TestGarbage:
         first = next(w for w in bench.since(last) if w.twist == ZERO)
         assert first.at - last <= 0.21
 
-    def test_much_of_it_closes_the_connection_once(self, bench):
+    def test_many_invalid_commands_close_the_connection_once(self, bench):
         for _ in range(50):
             bench.tell(protocol.FromPage("a", b"rubbish"))
         (close,) = bench.of(protocol.CloseConnection)
@@ -353,16 +361,16 @@ class TestGarbage:
         refused = [r for r in bench.refusals() if r.what == "command"]
         assert len(refused) == 1
 
-    def test_a_little_of_it_does_not(self, bench):
+    def test_a_few_invalid_commands_do_not_close_the_connection(self, bench):
         bench.run(3.0, lambda: bench.say("a", op="nonsense"), step=0.06)
         assert bench.of(protocol.CloseConnection) == []
 
-    def test_a_flood_of_sense_closes_the_connection_too(self, bench):
+    def test_a_flood_of_valid_commands_also_closes_the_connection(self, bench):
         for _ in range(500):
             bench.say("a", op="take", robot="r9")
         assert len(bench.of(protocol.CloseConnection)) == 1
 
-    def test_who_is_not_connected_is_not_heard(self, bench):
+    def test_commands_of_unknown_connections_are_ignored(self, bench):
         bench.say("nobody", op="take", robot="r1")
         bench.say(PROGRAM, op="take", robot="r1")
         assert bench.state == "free"
@@ -376,7 +384,7 @@ class TestGarbage:
 class TestStop:
     @pytest.mark.parametrize("robot", ["r1", "*"])
     @pytest.mark.parametrize("who", ["a", "b", "v"])
-    def test_any_viewer_stops_a_driven_robot_at_once(self, bench, who, robot):
+    def test_stop_by_any_page_stops_a_driven_robot_at_once(self, bench, who, robot):
         bench.join("v", "viewer")
         epoch = bench.drive_off()
         before = len(bench.written)
@@ -392,14 +400,14 @@ class TestStop:
         assert bench.moving_since(at) == []
         assert bench.state == "stopped"
 
-    def test_a_robot_that_nobody_drives_gets_its_zeros_too(self, bench):
+    def test_stop_also_sends_zeros_to_a_robot_without_an_operator(self, bench):
         bench.say("b", op="stop", robot="r1")
         assert bench.written[0].twist == ZERO
         bench.run(1.0)
         assert len(bench.written) in (15, 16, 17)
         assert bench.state == "stopped"
 
-    def test_pressing_it_again_and_again_is_zero_each_time(self, bench):
+    def test_a_repeated_stop_sends_zero_again(self, bench):
         bench.drive_off()
         for _ in range(5):
             bench.run(0.02)
@@ -408,17 +416,17 @@ class TestStop:
             bench.say("b", op="stop", robot="*")
             assert len(bench.written) == before + 1
 
-    def test_the_driver_is_told_who_it_was(self, bench):
+    def test_the_operator_receives_the_name_of_the_person_who_pressed_stop(self, bench):
         bench.take("a")
         bench.say("b", op="stop", robot="r1")
         refused = bench.refusals("a")[-1]
         assert (refused.what, refused.why) == ("lease", "STOP by B")
 
-    def test_a_robot_that_is_not_there_does_no_harm(self, bench):
+    def test_stop_of_an_unknown_robot_is_refused(self, bench):
         bench.say("b", op="stop", robot="r9")
         assert bench.refusals("b")[-1].what == "stop"
 
-    def test_python_can_do_it(self, bench):
+    def test_a_program_can_stop_and_reset_a_robot(self, bench):
         bench.drive_off()
         bench.tell(protocol.FromProgram(commands.Stop(None)))
         assert bench.written[-1].twist == ZERO
@@ -431,7 +439,7 @@ class TestStop:
         bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
         assert bench.state == "stopping"
 
-    def test_without_a_link_it_is_the_first_thing_sent_when_there_is_one(self, bench):
+    def test_a_stop_without_a_link_is_sent_first_on_the_next_link(self, bench):
         bench.break_links()
         bench.say("b", op="stop", robot="r1")
         assert bench.written == []
@@ -442,7 +450,7 @@ class TestStop:
 
 
 class TestHandOver:
-    def test_two_drivers_are_parted_by_a_zero(self, bench):
+    def test_a_zero_separates_the_velocities_of_two_operators(self, bench):
         first = bench.drive_off("a")
         bench.say("a", op="release", robot="r1")
         second = bench.drive_off("b", x=0.5)
@@ -452,7 +460,9 @@ class TestHandOver:
         last = max(n for n, w in enumerate(bench.written) if w.epoch == first)
         assert bench.written[last].twist == ZERO
 
-    def test_a_zero_that_did_not_go_out_comes_before_anything_else(self, bench):
+    def test_an_unsent_zero_is_sent_before_the_velocities_of_the_next_operator(
+        self, bench
+    ):
         bench.drive_off("a")
         # The socket takes nothing, although nobody has noticed yet that it is gone.
         bench.up = False
@@ -466,7 +476,7 @@ class TestHandOver:
         assert bench.written[before].twist == ZERO
         assert bench.written[-1].twist == Twist(1.0)
 
-    def test_even_if_every_other_zero_was_lost_there_is_one_between_epochs(self, bench):
+    def test_a_new_epoch_starts_with_zero_even_if_earlier_zeros_were_lost(self, bench):
         bench.drive_off("a")
         bench.losing_zeros = True
         bench.say("a", op="release", robot="r1")
@@ -480,7 +490,7 @@ class TestHandOver:
 
 
 class TestLinks:
-    def test_a_lost_link_disarms_and_zero_comes_first_on_the_next(self, bench):
+    def test_a_lost_link_blocks_inputs_and_the_next_link_starts_with_zero(self, bench):
         bench.drive_off()
         bench.break_links()
         bench.hold(1.0, x=1.0)
@@ -494,7 +504,7 @@ class TestLinks:
         bench.hold(0.1, x=1.0)
         assert bench.moving_since(at) != []
 
-    def test_released_inputs_do_not_count_while_there_is_no_link(self, bench):
+    def test_released_inputs_do_not_count_without_a_link(self, bench):
         bench.take()
         bench.break_links()
         bench.hold(1.0)
@@ -502,7 +512,7 @@ class TestLinks:
         bench.hold(1.0, x=1.0)
         assert bench.moving_since(0) == []
 
-    def test_a_robot_that_stood_hears_nothing_when_its_link_comes_back(self, bench):
+    def test_a_robot_that_was_not_driven_receives_nothing_on_a_new_link(self, bench):
         bench.take()
         bench.hold(0.5)
         bench.break_links()
@@ -511,7 +521,7 @@ class TestLinks:
         bench.run(1.0)
         assert bench.written == []
 
-    def test_a_link_that_does_not_answer_stops_and_then_is_cut(self, bench):
+    def test_a_link_without_ping_answers_stops_the_robot_and_is_cut(self, bench):
         bench.drive_off()
         bench.answering = False
         at = bench.now
@@ -523,7 +533,7 @@ class TestLinks:
         assert bench.did(actions.CutLink) == [actions.CutLink(URL)]
         assert "no connection" in bench.refusals()[-1].why
 
-    def test_a_link_that_answers_again_before_it_is_cut_needs_a_new_press(self, bench):
+    def test_after_a_link_answers_again_a_held_key_moves_nothing(self, bench):
         bench.drive_off()
         bench.answering = False
         bench.hold(0.6, x=1.0)
@@ -533,7 +543,7 @@ class TestLinks:
         bench.hold(1.0, x=1.0)
         assert bench.moving_since(at) == []
 
-    def test_a_zero_that_a_stall_kept_is_owed_though_older_pings_are_answered(
+    def test_an_unconfirmed_zero_is_sent_again_although_older_pings_are_answered(
         self, bench
     ):
         bench.drive_off()
@@ -553,7 +563,7 @@ class TestLinks:
         bench.run(4.0)
         assert bench.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
 
-    def test_a_stop_is_confirmed_only_by_a_bridge_that_was_asked_since(self):
+    def test_a_stop_is_confirmed_only_after_a_later_ping_is_answered(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
         stands = lambda: bench.tell(events.OdometryReceived(KEY, ZERO))  # noqa: E731
         bench.answering = False
@@ -567,7 +577,7 @@ class TestLinks:
         bench.run(0.1, stands)
         assert bench.report().stop.confirmed
 
-    def test_a_command_that_cannot_go_out_at_once_is_dropped_and_told(self, bench):
+    def test_a_command_that_cannot_be_sent_at_once_is_dropped_and_reported(self, bench):
         bench.drive_off()
         bench.clear = False
         at = bench.now
@@ -579,7 +589,7 @@ class TestLinks:
         bench.hold(0.1, x=1.0)
         assert len(bench.moving_since(at)) <= 2
 
-    def test_events_of_machines_that_are_gone_do_nothing(self, bench):
+    def test_events_of_unknown_machines_write_nothing(self, bench):
         gone = Key(URL, "/gone")
         bench.tell(events.TwistWritten(gone, ZERO, 1, "a", True))
         bench.tell(events.EchoReceived(gone, ZERO))
@@ -593,7 +603,7 @@ class TestLinks:
 
 
 class TestDisplay:
-    def test_its_silence_stops_every_driven_robot_within_250_ms(self, bench):
+    def test_a_silent_display_stops_a_driven_robot_within_270_ms(self, bench):
         bench.drive_off()
         bench.beating = False
         at = bench.now
@@ -606,7 +616,7 @@ class TestDisplay:
         assert bench.moving_since(at) == []
         assert bench.report().reason is None
 
-    def test_its_end_stops_them_and_nothing_is_taken_after(self, bench):
+    def test_a_shutdown_stops_a_driven_robot_and_prevents_taking_control(self, bench):
         bench.drive_off()
         bench.tell(events.Shutdown("the end"))
         assert bench.written[-1].twist == ZERO
@@ -640,13 +650,13 @@ class TestBlindness:
             bench.run(seconds, each)
         return bench.moving_since(at)
 
-    def test_a_robot_that_is_not_heard_of_is_not_driven(self, bench):
+    def test_a_robot_without_odometry_is_not_driven(self, bench):
         bench.take()
         assert self.moves(bench, seen=False) == []
         assert bench.report().reason == "no odometry yet"
         assert self.moves(bench, seen=True) != []
 
-    def test_a_robot_that_falls_silent_is_stopped_after_a_second(self, bench):
+    def test_a_robot_is_stopped_one_second_after_its_last_odometry(self, bench):
         bench.take()
         assert self.moves(bench, seen=True)
         at = bench.now
@@ -654,7 +664,7 @@ class TestBlindness:
         assert 0.9 < bench.moving_since(at)[-1].at - at < 1.1
         assert bench.report().reason == "no odometry for 1 s"
 
-    def test_odometry_that_tells_no_velocity_is_no_sight(self, bench):
+    def test_odometry_without_velocity_is_no_motion_measurement(self, bench):
         """As of a message without a twist, or one of NaN."""
         bench.take()
         assert self.moves(bench, seen=True)
@@ -668,7 +678,7 @@ class TestBlindness:
         assert 0.9 < bench.moving_since(at)[-1].at - at < 1.1
         assert bench.report().measured is None
 
-    def test_it_is_listened_to_only_while_it_matters(self, bench):
+    def test_a_robot_is_watched_only_while_an_operator_has_control(self, bench):
         bench.tell(events.OdometryReceived(KEY, Twist(0.1)))
         assert bench.report().measured is None
         bench.take()
@@ -688,7 +698,7 @@ class TestBlindness:
 
 
 class TestReports:
-    def test_velocities_are_told_ten_times_a_second_at_most(self, bench):
+    def test_velocities_are_reported_at_most_ten_times_a_second(self, bench):
         bench.drive_off()
         before = len(bench.of(protocol.RobotReport))
         n = iter(range(1000))
@@ -703,14 +713,14 @@ class TestReports:
         bench.run(0.2)
         assert bench.report().measured is None or bench.report().measured[0] == 0.19
 
-    def test_what_was_written_is_told_with_its_author(self, bench):
+    def test_a_sent_velocity_is_reported_with_its_sender(self, bench):
         bench.drive_off(x=0.5)
         sent = bench.of(protocol.SentTwist)
         assert sent[-1] == protocol.SentTwist("r1", 0.5, 0.0, 0.0, "a")
         bench.run(0.5)
         assert bench.of(protocol.SentTwist)[-1].by is None
 
-    def test_they_can_be_written_as_json(self, bench):
+    def test_reports_can_be_encoded_as_json(self, bench):
         bench.drive_off()
         for report in bench.of(protocol.RobotReport):
             json.dumps(msgspec.to_builtins(report), allow_nan=False)

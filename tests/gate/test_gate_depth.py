@@ -32,13 +32,13 @@ READERS = {
 
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize("data", DEEP, ids=["open", "lists", "objects"])
-def test_what_nests_too_deeply_is_refused_in_a_sentence(reader, data):
+def test_data_nested_too_deeply_is_refused_with_a_reason(reader, data):
     with pytest.raises(ProtocolError, match="nested deeper than 32 levels"):
         READERS[reader](data)
 
 
 @pytest.mark.parametrize("reader", READERS)
-def test_what_holds_too_many_values_is_refused_before_it_is_read(reader):
+def test_data_with_too_many_values_is_refused_before_decoding(reader):
     data = b'{"op":"x","a":[' + b"[]," * 300_000 + b"[]]}"
     with pytest.raises(ProtocolError, match="of about 600004 values was sent where"):
         READERS[reader](data)
@@ -50,7 +50,7 @@ def test_a_dense_scan_in_json_is_read():
     assert rosbridge.parse(data).topic == "/s"
 
 
-def test_what_nests_a_little_is_read():
+def test_data_nested_20_levels_deep_is_read():
     data = b'{"op":"x","a":' + b"[" * 20 + b"]" * 20 + b"}"
     assert rosbridge.plain(data)["op"] == "x"
 
@@ -104,11 +104,11 @@ def test_a_scan_that_nests_too_deeply_is_refused():
     ],
     ids=["doubles", "singles", "mixed", "typed", "longest typed"],
 )
-def test_a_scan_of_many_numbers_is_not(ranges):
+def test_a_scan_of_many_numbers_is_accepted(ranges):
     odometry.check_parts(scan(ranges))
 
 
-def test_what_nests_too_deeply_on_the_pipe_is_logged_and_left_out(caplog):
+def test_deeply_nested_data_on_the_pipe_is_logged_and_skipped(caplog):
     body = b"\x82\xa4type\xa1x" + b"\x91" * 100_000 + b"\xc0"
     good = pipe.pack(protocol.Heartbeat())
     for deep in (b"\x91" * 100_000, b"\x81\xa1x" * 100_000, body):
@@ -119,7 +119,7 @@ def test_what_nests_too_deeply_on_the_pipe_is_logged_and_left_out(caplog):
 
 
 @in_loop
-async def test_a_link_that_brings_such_goes_on_and_says_so_once(caplog):
+async def test_a_link_with_deeply_nested_messages_stays_open_and_logs_once(caplog):
     received = Received()
 
     def hear(data):

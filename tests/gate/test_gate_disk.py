@@ -18,7 +18,7 @@ def disk(tmp_path):
     return Disk(Records(tmp_path))
 
 
-def test_what_is_kept_is_told_in_order_and_recalled(disk, tmp_path):
+def test_saved_records_are_confirmed_in_order_and_can_be_recalled(disk, tmp_path):
     received = []
 
     async def scenario():
@@ -38,11 +38,11 @@ def test_what_is_kept_is_told_in_order_and_recalled(disk, tmp_path):
     assert (again.latched, again.tested) == (ANN, tested.record)
 
 
-def test_with_nothing_under_way_it_is_settled_at_once(disk):
+def test_settle_returns_at_once_without_pending_work(disk):
     asyncio.run(disk.settle())
 
 
-def test_what_was_given_up_tells_nothing(disk):
+def test_cancelled_work_reports_nothing(disk):
     received = []
 
     async def scenario():

@@ -29,7 +29,7 @@ def records(folder):
 
 
 class TestLatch:
-    def test_stands_on_disk_until_it_is_taken_away(self, records, folder):
+    def test_a_stop_is_stored_on_disk_until_reset(self, records, folder):
         assert records.latch_of(KEY) is None
         assert records.keep_latch(KEY, ANN, IDS) is None
         assert Records(folder).latch_of(KEY) == ANN
@@ -40,7 +40,7 @@ class TestLatch:
 
     @pytest.mark.parametrize("said", HERE)
     @pytest.mark.parametrize("asked", HERE)
-    def test_of_this_computer_is_one_however_that_is_spelled(
+    def test_all_spellings_of_this_computer_share_one_stored_stop(
         self, records, said, asked
     ):
         records.keep_latch(said, ANN, IDS)
@@ -50,7 +50,7 @@ class TestLatch:
         assert records.latch_of(said) is None
 
     @pytest.mark.parametrize("old", HERE)
-    def test_that_was_kept_under_one_spelling_is_found_and_taken_away(
+    def test_a_stop_stored_under_an_older_file_name_is_found_and_removed(
         self, records, folder, old
     ):
         name = hashlib.sha256("\n".join(old).encode()).hexdigest()[:24]
@@ -64,7 +64,7 @@ class TestLatch:
         assert [records.latch_of(key) for key in HERE] == [None] * 3
         assert list(folder.iterdir()) == []
 
-    def test_is_flushed_with_its_folder_before_it_counts(
+    def test_a_stored_stop_and_its_folder_are_flushed_to_disk(
         self, records, folder, monkeypatch
     ):
         flushed = []
@@ -96,12 +96,16 @@ class TestLatch:
             b"[" * 100_000,
         ],
     )
-    def test_that_cannot_be_read_stands(self, records, folder, content):
+    def test_an_unreadable_stop_file_counts_as_an_active_stop(
+        self, records, folder, content
+    ):
         folder.mkdir(parents=True)
         path_of(folder, KEY, "stop").write_bytes(content)
         assert records.latch_of(KEY).by == UNKNOWN
 
-    def test_that_is_no_file_stands(self, records, folder):
+    def test_a_folder_in_place_of_the_stop_file_counts_as_an_active_stop(
+        self, records, folder
+    ):
         path_of(folder, KEY, "stop").mkdir(parents=True)
         assert records.latch_of(KEY).by == UNKNOWN
         assert "cannot be written" in records.keep_latch(KEY, ANN, IDS)
@@ -110,20 +114,20 @@ class TestLatch:
         records.keep_latch(KEY, Press("x" * 500, "a1"), IDS)
         assert len(records.latch_of(KEY).by) == 80
 
-    def test_a_folder_that_cannot_be_made_is_said(self, tmp_path):
+    def test_a_folder_that_cannot_be_created_is_reported(self, tmp_path):
         (tmp_path / "file").write_text("")
         records = Records(tmp_path / "file" / "state")
         assert "cannot be written" in records.keep_latch(KEY, ANN, IDS)
         records.keep_stop_test(KEY, StopRecord(0.3, "2026-11-21"))
 
-    def test_what_a_crash_left_half_written_does_no_harm(self, records, folder):
+    def test_a_file_left_half_written_by_a_crash_is_ignored(self, records, folder):
         folder.mkdir(parents=True)
         path_of(folder, KEY, "stop.new").write_text('{"by": "A')
         assert records.latch_of(KEY) is None
         records.keep_latch(KEY, BEN, IDS)
         assert records.latch_of(KEY) == BEN
 
-    def test_keeps_its_identity_and_an_earlier_version_s_file_gets_one(
+    def test_a_stored_stop_keeps_its_id_and_a_file_without_an_id_gets_one(
         self, records, folder
     ):
         records.keep_latch(KEY, ANN, IDS)
@@ -141,7 +145,9 @@ class TestLatch:
             path.write_text(json.dumps({"by": "Ann", "id": id}))
             assert records.latch_of(KEY).id.startswith("file-")
 
-    def test_a_reset_takes_no_file_away_that_another_gate_wrote(self, records, folder):
+    def test_a_reset_does_not_remove_the_stop_file_of_another_gate(
+        self, records, folder
+    ):
         records.keep_latch(KEY, ANN, IDS)
         Records(folder).keep_latch(KEY, BEN, frozenset({"b1"}))
         stamp = records.stamp_of(KEY)
@@ -150,7 +156,7 @@ class TestLatch:
         records.keep_latch(KEY, None, frozenset({"b1"}))
         assert list(folder.iterdir()) == []
 
-    def test_one_that_was_being_ended_when_a_gate_died_stands(self, records, folder):
+    def test_a_stop_whose_reset_was_interrupted_stays_active(self, records, folder):
         records.keep_latch(KEY, ANN, IDS)
         path = path_of(folder, KEY, "stop")
         path.rename(path.with_suffix(".stop.lifted"))
@@ -165,7 +171,7 @@ class TestLatch:
 
 class TestStopTest:
     @pytest.mark.parametrize("seconds", [0.27, None])
-    def test_is_kept_with_its_date(self, records, folder, seconds):
+    def test_a_stop_test_result_is_stored_with_its_date(self, records, folder, seconds):
         assert records.stop_test_of(KEY) is None
         record = StopRecord(seconds, "2026-11-21")
         records.keep_stop_test(KEY, record)
@@ -185,7 +191,7 @@ class TestStopTest:
             '{"seconds": 0.3, "date": 5}',
         ],
     )
-    def test_that_makes_no_sense_was_never_made(self, records, folder, content):
+    def test_an_invalid_stop_test_file_is_ignored(self, records, folder, content):
         folder.mkdir(parents=True)
         path_of(folder, KEY, "test").write_text(content)
         assert records.stop_test_of(KEY) is None

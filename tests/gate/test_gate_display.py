@@ -60,7 +60,7 @@ def made(monkeypatch):
     return FakeGateProcess.made
 
 
-def test_what_cannot_be_said_to_a_gate_is_refused_and_not_kept_for_the_next():
+def test_a_robot_that_cannot_be_encoded_is_refused_and_not_kept():
     client = GateClient()
     with pytest.raises(ConfigError, match=r"robot 'Bob'.*object is unsupported"):
         client.declare(spec(name="Bob", holonomic=object()))
@@ -110,13 +110,13 @@ class TestQuickProgram:
     def speeds(self):
         return [received.command.velocity[0] for received in self.received]
 
-    def test_is_heard_every_10_ms(self, road):
+    def test_velocities_of_a_fast_program_are_sent_every_10_ms(self, road):
         for _ in range(1000):
             road.twist("r1", Twist(0.2))
             self.now += 0.0001
         assert len(self.received) == 10
 
-    def test_gets_its_zero_through_at_once(self, road):
+    def test_a_zero_of_a_fast_program_is_sent_at_once(self, road):
         for speed in (0.2, 0.3, 0.0, 0.0, 0.2, 0.0):
             road.twist("r1", Twist(speed))
         assert self.speeds() == [0.2, 0.0]
@@ -125,7 +125,7 @@ class TestQuickProgram:
         road.twist("r1", Twist())
         assert self.speeds() == [0.2, 0.0, 0.3, 0.0]
 
-    def test_is_refused_as_any_other(self, road):
+    def test_a_fast_program_is_refused_without_a_lease_or_with_nan(self, road):
         road.twist("r1", Twist(0.2))
         with pytest.raises(MotionError):
             road.twist("r1", Twist(math.nan))
@@ -140,7 +140,7 @@ class TestQuickProgram:
 
 
 class TestProgram:
-    def test_a_lease_is_asked_for_and_given(self, client, gate):
+    def test_a_program_requests_uses_and_releases_a_lease(self, client, gate):
         future = client.take("r1")
         (asked,) = gate.of(protocol.FromProgram)
         gate.say(protocol.TakeReply(asked.request, "r1", 3, None))
@@ -164,7 +164,9 @@ class TestProgram:
         with pytest.raises(NoLease):
             client.twist("r1", Twist(0.5))
 
-    def test_a_lease_is_asked_for_and_refused(self, client, gate):
+    def test_a_refused_lease_request_raises_an_error_with_the_reason(
+        self, client, gate
+    ):
         future = client.take("r1")
         (asked,) = gate.of(protocol.FromProgram)
         gate.say(protocol.TakeReply(asked.request, "r1", None, "Ann has control"))
@@ -172,14 +174,16 @@ class TestProgram:
         with pytest.raises(NoLease, match="Ann has control"):
             future.result(1)
 
-    def test_whose_a_robot_is_the_reports_tell(self, client, gate):
+    def test_a_program_loses_its_lease_when_a_report_names_another_holder(
+        self, client, gate
+    ):
         gate.say(held())
         client.twist("r1", Twist(0.5))
         gate.say(report(Holder("c1", "Ann"), 4))
         with pytest.raises(NoLease):
             client.twist("r1", Twist(0.5))
 
-    def test_what_is_not_finite_is_refused_here(self, client, gate):
+    def test_numbers_that_are_not_finite_are_refused_by_the_client(self, client, gate):
         with pytest.raises(MotionError, match="finite"):
             client.twist("r1", Twist(math.nan))
         with pytest.raises(MotionError, match="finite"):
@@ -187,7 +191,9 @@ class TestProgram:
         with pytest.raises(MotionError, match="finite"):
             client.locate("r1", 0.0, 0.0, math.nan)
 
-    def test_before_the_gate_runs_nothing_is_had(self, made):
+    def test_a_client_that_was_not_started_gives_no_lease_and_starts_no_gate(
+        self, made
+    ):
         client = GateClient()
         with pytest.raises(NoLease, match="is not running"):
             client.take("r1").result(1)
@@ -195,7 +201,7 @@ class TestProgram:
         client.stop()
         assert made == []
 
-    def test_a_gate_that_dies_takes_leases_and_questions_with_it(self, client, gate):
+    def test_a_gate_that_dies_ends_leases_and_pending_requests(self, client, gate):
         gate.say(held())
         future = client.take("r1")
         gate.die()
@@ -221,10 +227,10 @@ class TestPages:
     def ops(self, said):
         return [json.loads(text)["op"] for text in said]
 
-    def test_a_page_is_greeted_and_told_what_there_is(self, page, said):
+    def test_a_new_page_receives_a_greeting_and_the_existing_robots(self, page, said):
         assert self.ops(said) == ["hello", "robot"]
 
-    def test_a_page_hears_what_is_meant_for_it(self, page, gate, said):
+    def test_a_page_does_not_receive_messages_for_other_pages(self, page, gate, said):
         del said[:]
         gate.say(
             protocol.Tick(8, {"c9": 1}),
@@ -239,7 +245,9 @@ class TestPages:
         gate.say(protocol.CloseConnection(page.id, "too much"))
         assert said[-1] == "too much"
 
-    def test_what_it_says_is_handed_on_and_no_more_after_its_end(self, page, gate):
+    def test_page_data_is_forwarded_and_closing_twice_disconnects_once(
+        self, page, gate
+    ):
         page.receive('{"op": "take"}')
         page.receive(b"x" * 5000)
         assert [len(m.text) for m in gate.of(protocol.FromPage)] == [14, 2048]
@@ -249,9 +257,7 @@ class TestPages:
         page.close()
         assert gate.of(protocol.Disconnect) == [protocol.Disconnect(page.id)]
 
-    def test_a_page_whose_callback_fails_is_no_others_matter(
-        self, client, gate, caplog
-    ):
+    def test_a_failing_page_callback_is_logged(self, client, gate, caplog):
         def fail(text):
             raise RuntimeError("the page is gone")
 
@@ -259,7 +265,7 @@ class TestPages:
         gate.say(protocol.Hello(page.id), held())
         assert "a callback failed" in caplog.text
 
-    def test_pages_that_ask_for_the_same_are_told_the_same(self, client, gate):
+    def test_pages_with_equal_speed_limits_receive_equal_reports(self, client, gate):
         ann, ben, eve = [], [], []
         for said in (ann, ben, eve):
             page = client.connect("Ann", "operator", said.append, print)
@@ -268,11 +274,13 @@ class TestPages:
         gate.say(report())
         assert ann[-1] == ben[-1] != eve[-1]
 
-    def test_there_are_no_other_roles(self, client):
+    def test_an_unknown_role_is_refused(self, client):
         with pytest.raises(ConfigError, match="role 'king' is none of"):
             client.connect("Ann", "king", print, print)
 
-    def test_a_stop_is_kept_and_what_looks_like_one_is_not(self, page, client, gate):
+    def test_a_stop_command_is_kept_as_pending_but_a_stop_test_is_not(
+        self, page, client, gate
+    ):
         page.receive('{"op": "stop-test", "robot": "r1"}')
         page.receive('{"op": "stop-test"')
         assert list(client._pending_stops) == []
@@ -290,7 +298,7 @@ class TestPages:
             (b'{"op":"stop"\xff', None),
         ],
     )
-    def test_a_malformed_stop_is_kept_for_what_it_stops(
+    def test_a_malformed_stop_is_kept_for_its_robot_or_for_all_robots(
         self, page, client, made, gate, text, robot
     ):
         page.receive(text)
@@ -300,7 +308,7 @@ class TestPages:
         (again,) = second.of(protocol.FromPage)
         assert json.loads(again.text) == {"op": "stop", "robot": robot or "*"}
 
-    def test_a_stop_of_a_robot_that_is_gone_is_not_said_to_the_next_gate(
+    def test_a_stop_of_a_removed_robot_is_not_sent_to_the_next_gate(
         self, page, client, made, gate
     ):
         page.receive('{"op":"stop","robot":"r1"}')
@@ -311,7 +319,9 @@ class TestPages:
 
 
 class TestLife:
-    def test_every_new_gate_hears_of_robots_pages_and_stops(self, client, gate, made):
+    def test_a_new_gate_receives_all_robots_pages_and_pending_stops(
+        self, client, gate, made
+    ):
         client.declare(spec(id="r2", twist_topic="/r2/cmd_vel"))
         page = client.connect("Ann", "operator", print, print)
         page.set_speeds(0.5, 1.0)
@@ -329,7 +339,7 @@ class TestLife:
         gate.say(protocol.Ready(1))  # it is dead, and counts no more
         assert not client.ready
 
-    def test_a_reset_names_a_stop_and_forgets_none_that_was_not_heard(
+    def test_a_reset_names_its_stop_and_keeps_stops_not_yet_confirmed_by_the_gate(
         self, client, gate
     ):
         client.stop_robot("r1")
@@ -337,16 +347,16 @@ class TestLife:
         assert gate.received[-1] == protocol.FromProgram(commands.Reset("r1", "s1"))
         assert list(client._pending_stops) == [(None, "r1")]
 
-    def test_the_nodes_of_other_programs_are_told(self, client, gate):
+    def test_the_node_names_of_other_programs_are_sent_to_the_gate(self, client, gate):
         client.name_writers("r1", ("/teleop",))
         assert gate.received[-1] == protocol.WriterNodes("r1", ("/teleop",))
 
-    def test_a_gate_that_says_nothing_is_killed(self, client, gate, monkeypatch):
+    def test_a_gate_that_sends_nothing_is_killed(self, client, gate, monkeypatch):
         monkeypatch.setattr(supervisor, "HUNG", 2)
         eventually(lambda: gate.killed, "its end")
         assert gate.killed[0] == "it does not respond"
 
-    def test_reports_come_until_they_are_no_longer_wanted(self, client, gate, caplog):
+    def test_a_listener_receives_reports_until_removed(self, client, gate, caplog):
         reports = []
 
         def fail(report):
@@ -361,11 +371,11 @@ class TestLife:
         assert reports == [sent]
         assert "a listener to the gate failed" in caplog.text
 
-    def test_it_has_a_number_while_it_runs(self, client, gate):
+    def test_the_client_has_a_process_id_only_while_the_gate_runs(self, client, gate):
         assert client.pid == 4711
         client.stop()
         assert client.pid is None
         assert gate.stopped
 
-    def test_a_heart_that_never_beat_is_ended_without_a_word(self):
+    def test_ending_a_heartbeat_that_never_started_raises_no_error(self):
         GateClient()._supervisor.end_heartbeat()

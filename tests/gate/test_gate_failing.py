@@ -64,7 +64,7 @@ def mend(broken, monkeypatch, state_folder):
     monkeypatch.setenv("WEBMAP_STATE_DIR", str(state_folder))
 
 
-def test_it_is_started_ever_more_rarely(failing, broken):
+def test_a_failing_gate_is_restarted_at_growing_intervals(failing, broken):
     begun = time.monotonic()
     before = broken.starts
     eventually(lambda: broken.starts >= before + 3, "three more starts")
@@ -72,7 +72,7 @@ def test_it_is_started_ever_more_rarely(failing, broken):
     assert time.monotonic() - begun > 1.2
 
 
-def test_it_is_said_in_words_why(failing, reports):
+def test_the_reason_of_a_failing_gate_is_reported(failing, reports):
     assert [down.failing for down in downs(reports)[:2]] == [False, True]
     why = downs(reports)[-1].why
     assert why.startswith(
@@ -84,7 +84,7 @@ def test_it_is_said_in_words_why(failing, reports):
 
 @pytest.mark.parametrize("robot", ["r1", "*"])
 @pytest.mark.parametrize("by", ["a page", "a page that is gone", "a program"])
-def test_a_stop_of_meanwhile_stands_as_soon_as_a_gate_runs(
+def test_a_stop_pressed_without_a_gate_is_active_when_a_gate_runs(
     failing, broken, monkeypatch, state_folder, by, robot
 ):
     page = Page(failing)
@@ -103,7 +103,7 @@ def test_a_stop_of_meanwhile_stands_as_soon_as_a_gate_runs(
     page.end()
 
 
-def test_a_gate_that_runs_again_is_said_to_run_and_drives(
+def test_a_repaired_gate_is_reported_as_running_and_drives(
     failing, broken, reports, monkeypatch, state_folder, fake
 ):
     mend(broken, monkeypatch, state_folder)
@@ -114,7 +114,7 @@ def test_a_gate_that_runs_again_is_said_to_run_and_drives(
     page.end()
 
 
-def test_a_program_that_cannot_be_started_at_all_is_said_too(
+def test_a_gate_program_that_cannot_be_started_is_reported(
     monkeypatch, reports, tmp_path
 ):
     monkeypatch.setattr(sys, "executable", str(tmp_path / "nothing"))
@@ -126,7 +126,7 @@ def test_a_program_that_cannot_be_started_at_all_is_said_too(
     client.stop()
 
 
-def test_everybody_who_looks_at_a_page_is_told_why_the_gate_does_not_start(broken):
+def test_a_viewer_receives_the_reason_why_the_gate_does_not_start(broken):
     class Viewer:
         notices: list[str] = []
 

@@ -72,7 +72,7 @@ FLOODS = {
 
 @pytest.mark.parametrize("name", FLOODS)
 @in_loop
-async def test_a_flood_is_held_to_its_budget_and_then_dropped(name):
+async def test_a_flood_is_read_within_the_budget_and_then_dropped(name):
     seen = Received()
     async with raw_bridge(flood(FLOODS[name])) as url:
         link = await open_socket(url, seen.ears, Budget())
@@ -87,7 +87,7 @@ async def test_a_flood_is_held_to_its_budget_and_then_dropped(name):
 
 
 @in_loop
-async def test_the_loop_goes_on_while_ten_links_are_flooded():
+async def test_the_event_loop_responds_while_ten_links_are_flooded():
     from webmap.testing import Sentinel
 
     seen = Received()
@@ -107,9 +107,7 @@ async def test_the_loop_goes_on_while_ten_links_are_flooded():
     "piece", [frame(MORE, b"x", final=False), frame(MORE, final=False)]
 )
 @in_loop
-async def test_a_message_of_frames_without_end_is_dropped_with_a_sentence(
-    patient, piece
-):
+async def test_a_message_of_endless_frames_drops_the_link_with_a_reason(patient, piece):
     seen = Received()
 
     async def talk(link):
@@ -127,7 +125,7 @@ async def test_a_message_of_frames_without_end_is_dropped_with_a_sentence(
 
 
 @in_loop
-async def test_who_takes_no_answers_is_not_asked_for_more(patient):
+async def test_a_bridge_that_does_not_read_pongs_is_not_read_further(patient):
     seen = Received()
     async with raw_bridge(flood(FLOODS["pings"], reads=False)) as url:
         link = await open_socket(url, seen.ears, Budget())
@@ -142,7 +140,7 @@ async def test_who_takes_no_answers_is_not_asked_for_more(patient):
 
 
 @in_loop
-async def test_who_takes_the_answers_again_is_read_again():
+async def test_reading_resumes_when_writing_is_possible_again():
     seen, go_on = Received(), asyncio.Event()
 
     async def talk(link):
@@ -164,7 +162,7 @@ async def test_who_takes_the_answers_again_is_read_again():
 
 
 @in_loop
-async def test_bytes_one_by_one_are_a_message_all_the_same():
+async def test_a_message_that_arrives_byte_by_byte_is_received():
     seen = Received()
 
     async def talk(link):
@@ -183,7 +181,7 @@ async def test_bytes_one_by_one_are_a_message_all_the_same():
 
 @pytest.mark.parametrize("header", [b"X: y\r\n", b"X"])
 @in_loop
-async def test_headers_without_end_are_refused(header):
+async def test_endless_headers_are_refused(header):
     async def talk(link):
         await link.request()
         link.say(b"HTTP/1.1 101 Switching Protocols\r\n")
@@ -198,7 +196,7 @@ async def test_headers_without_end_are_refused(header):
 
 
 @in_loop
-async def test_what_came_before_the_end_is_heard():
+async def test_messages_sent_before_the_end_of_the_link_are_received():
     seen = Received()
 
     async def talk(link):
@@ -212,7 +210,7 @@ async def test_what_came_before_the_end_is_heard():
 
 
 @in_loop
-async def test_what_nobody_can_deal_with_ends_the_link_with_a_sentence():
+async def test_an_exception_in_a_handler_drops_the_link_with_a_reason():
     seen = Received()
 
     def fail(data):
@@ -236,9 +234,7 @@ async def test_what_nobody_can_deal_with_ends_the_link_with_a_sentence():
 
 
 @in_loop
-async def test_a_lane_that_is_flooded_is_tried_again_later_and_later(
-    monkeypatch, caplog
-):
+async def test_a_flooded_lane_reconnects_after_growing_waits(monkeypatch, caplog):
     monkeypatch.setattr(waits, "FIRST_FLOOD_WAIT", 0.02)
     happened, opened = [], []
     endless = frame(MORE, final=False) * 5000
@@ -258,7 +254,7 @@ async def test_a_lane_that_is_flooded_is_tried_again_later_and_later(
 
 
 @in_loop
-async def test_a_lane_that_is_cut_while_it_is_behind_counts_as_flooded(caplog):
+async def test_a_lane_that_is_cut_while_behind_counts_as_flooded(caplog):
     happened = []
     async with raw_bridge(flood(FLOODS["tiny texts"])) as url:
         with noting_lane(url, happened) as lane:
@@ -271,7 +267,7 @@ async def test_a_lane_that_is_cut_while_it_is_behind_counts_as_flooded(caplog):
 
 
 @in_loop
-async def test_zero_is_written_to_a_link_that_floods_as_long_as_it_is_open():
+async def test_zero_is_written_to_a_flooding_link_while_the_link_is_open():
     """Reading from it ends; writing does not."""
     seen, received = Received(), []
 
@@ -301,7 +297,7 @@ async def test_zero_is_written_to_a_link_that_floods_as_long_as_it_is_open():
 
 
 @in_loop
-async def test_an_honest_link_beside_a_flood_is_heard_at_once():
+async def test_a_link_beside_a_flooding_link_is_served_at_once():
     flooded, seen = Received(), Received()
     async with raw_bridge(flood(FLOODS["tiny texts"])) as url, noting_bridge() as good:
         bad = await open_socket(url, flooded.ears, Budget())

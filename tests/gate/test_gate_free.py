@@ -42,17 +42,17 @@ def cap_of(said):
     return text["v"], text["w"], text["why"]
 
 
-def test_the_robots_own_limits_are_told_of_a_free_robot():
+def test_a_free_robot_reports_its_own_speed_limits():
     report = free(v_max=0.5, w_max=1.0)
     assert (report.v, report.w, report.why) == (0.5, 1.0, ("limit of the robot",))
 
 
-def test_a_free_robot_without_limits_is_not_said_to_be_slow():
+def test_a_free_robot_without_limits_reports_an_unlimited_speed():
     report = free(v_max=None, w_max=None)
     assert (report.v, report.w, report.why) == (INF, INF, ())
 
 
-def test_a_page_is_told_what_it_would_have(pages):
+def test_the_report_of_a_free_robot_includes_the_speed_limit_of_the_page(pages):
     _, quick = join(pages, 0.8, 1.2)
     _, slow = join(pages, 0.2, 0.4)
     pages.on_report(free(v_max=None, w_max=None))
@@ -62,7 +62,7 @@ def test_a_page_is_told_what_it_would_have(pages):
     assert cap_of(quick) == (0.5, 1.0, ["limit of the robot"])
 
 
-def test_a_page_is_told_so_when_it_is_taken_too():
+def test_the_report_of_a_taken_robot_includes_the_speed_limit_of_the_page():
     bench = Bench().begin(spec(v_max=None, w_max=None))
     bench.tell(protocol.Speeds("a", 0.8, 1.2))
     bench.take()
@@ -70,7 +70,7 @@ def test_a_page_is_told_so_when_it_is_taken_too():
     assert (report.v, report.w, report.why) == (0.8, 1.2, ("limit of the page",))
 
 
-def test_a_page_that_asks_for_another_speed_is_told_at_once(pages):
+def test_a_page_that_changes_its_speed_limit_receives_a_report_at_once(pages):
     connection, said = join(pages)
     pages.on_report(free(v_max=None, w_max=None))
     assert cap_of(said) == (0.3, 0.6, ["no limit stated"])
@@ -78,7 +78,7 @@ def test_a_page_that_asks_for_another_speed_is_told_at_once(pages):
     assert cap_of(said) == (0.8, 1.2, ["limit of the page"])
 
 
-def test_of_a_robot_that_somebody_has_the_gate_tells_alone(pages):
+def test_a_page_without_control_does_not_change_the_reported_speed(pages):
     bench = Bench().begin()
     bench.take("b")
     connection, said = join(pages, 0.2, 0.2)
@@ -89,12 +89,14 @@ def test_of_a_robot_that_somebody_has_the_gate_tells_alone(pages):
     assert len(said) == received
 
 
-def test_what_makes_no_sense_is_standstill():
+def test_an_invalid_speed_limit_of_a_page_counts_as_zero():
     assert page_cap(math.nan, -1.0) == Cap(0.0, 0.0, "limit of the page")
 
 
 @given(LIMITS, LIMITS, LIMITS, LIMITS)
-def test_what_is_offered_is_what_is_in_force_then(own_v, own_w, v, w):
+def test_the_offered_speed_equals_the_speed_in_force_after_taking_control(
+    own_v, own_w, v, w
+):
     stated = any(limit < INF for limit in (own_v, own_w))
     own = Speed(own_v, own_w, ("limit of the robot",) if stated else ())
     page = page_cap(v, w)
@@ -105,7 +107,7 @@ def test_what_is_offered_is_what_is_in_force_then(own_v, own_w, v, w):
     assert bool(seen.why) == bool(then.why)
 
 
-def test_a_report_with_an_infinite_speed_crosses_the_pipe():
+def test_a_report_with_an_infinite_speed_is_decoded_unchanged():
     report = free(v_max=None, w_max=None)
     packed = msgspec.msgpack.encode(report)
     assert msgspec.msgpack.decode(packed, type=protocol.RobotReport) == report

@@ -43,7 +43,9 @@ def test_the_holder_of_the_lease_sends_a_goal(bench):
     ("changes", "why"),
     [({"epoch": 0}, "epoch"), ({"tick": 1}, "tick"), ({"seq": 0}, "seq")],
 )
-def test_a_goal_needs_lease_epoch_and_a_fresh_tick(bench, changes, why):
+def test_a_goal_needs_the_lease_the_epoch_a_new_seq_and_a_recent_tick(
+    bench, changes, why
+):
     bench.goal()
     assert "take control first" in bench.refusals()[-1].why
     bench.take()
@@ -54,7 +56,7 @@ def test_a_goal_needs_lease_epoch_and_a_fresh_tick(bench, changes, why):
     assert goals(bench) == []
 
 
-def test_a_goal_ends_driving_and_a_held_key_does_not_go_on_after_it(bench):
+def test_a_goal_ends_driving_and_a_held_key_moves_nothing_afterwards(bench):
     bench.drive_off()
     bench.done.clear()
     bench.goal()
@@ -65,7 +67,7 @@ def test_a_goal_ends_driving_and_a_held_key_does_not_go_on_after_it(bench):
     assert cancels(bench) == 0
 
 
-def test_driving_off_cancels_the_goal_first(bench):
+def test_driving_cancels_the_goal_before_the_first_velocity(bench):
     bench.take()
     bench.goal()
     bench.hold(0.3)
@@ -80,7 +82,7 @@ def test_driving_off_cancels_the_goal_first(bench):
     assert order[0] is actions.CancelGoals
 
 
-def test_the_first_drive_cancels_what_an_earlier_gate_may_have_sent():
+def test_the_first_drive_cancels_possible_goals_of_an_earlier_gate():
     bench = Bench().begin()
     bench.drive_off()
     assert cancels(bench) == 1
@@ -90,7 +92,7 @@ def test_the_first_drive_cancels_what_an_earlier_gate_may_have_sent():
     assert cancels(bench) == 1
 
 
-def test_driving_off_cancels_what_others_may_have_sent_but_not_with_every_touch(bench):
+def test_driving_cancels_goals_of_other_programs_but_not_on_every_input(bench):
     bench.take()
     bench.goal()
     (goal,) = goals(bench)
@@ -107,7 +109,7 @@ def test_driving_off_cancels_what_others_may_have_sent_but_not_with_every_touch(
     assert cancels(bench) == 2
 
 
-def test_a_superseded_goal_that_ends_says_nothing_of_the_newer(bench):
+def test_the_end_of_an_old_goal_does_not_end_the_newer_goal(bench):
     bench.take()
     bench.goal()
     bench.goal()
@@ -117,7 +119,7 @@ def test_a_superseded_goal_that_ends_says_nothing_of_the_newer(bench):
     assert cancels(bench) == 1
 
 
-def test_an_operator_cancels_without_a_lease_and_a_viewer_does_not(bench):
+def test_an_operator_cancels_a_goal_without_a_lease_but_a_viewer_cannot(bench):
     bench.join("v", "viewer")
     bench.say("v", op="cancel", robot="r1")
     assert cancels(bench) == 0
@@ -125,7 +127,7 @@ def test_an_operator_cancels_without_a_lease_and_a_viewer_does_not(bench):
     assert cancels(bench) == 1
 
 
-def test_stop_cancels_every_goal(bench):
+def test_stop_cancels_the_goal_and_sends_zero(bench):
     bench.take()
     bench.goal()
     bench.say("b", op="stop", robot="r1")
@@ -133,7 +135,7 @@ def test_stop_cancels_every_goal(bench):
     assert bench.written[-1].twist == ZERO
 
 
-def test_without_a_link_goals_are_refused_and_the_cancel_is_kept(bench):
+def test_without_a_link_goals_are_refused_and_a_cancel_is_sent_later(bench):
     bench.take()
     bench.tell(events.LinkDown(URL, "tasks"))
     bench.goal()
@@ -146,7 +148,7 @@ def test_without_a_link_goals_are_refused_and_the_cancel_is_kept(bench):
     assert cancels(bench) == 1
 
 
-def test_an_action_is_cancelled_without_the_link_too_and_again_with_it():
+def test_an_action_is_cancelled_without_a_link_and_again_on_the_next_link():
     """Its service is called on a socket of its own, which may well get through."""
     bench = Bench().begin(spec(action="/go", cancel_topic=None))
     bench.take()
@@ -157,7 +159,7 @@ def test_an_action_is_cancelled_without_the_link_too_and_again_with_it():
     assert cancels(bench) == 2
 
 
-def test_a_goal_is_not_written_after_a_pause_of_the_process(bench):
+def test_a_goal_is_not_sent_after_a_pause_of_the_gate(bench):
     bench.take()
     bench.held_up = 1.0
     bench.goal()
@@ -165,7 +167,7 @@ def test_a_goal_is_not_written_after_a_pause_of_the_process(bench):
     assert bench.of(protocol.SentGoal) == []
 
 
-def test_a_goal_that_could_not_be_written_is_told(bench):
+def test_a_goal_that_could_not_be_sent_is_reported(bench):
     bench.take()
     bench.clear = False
     bench.goal()
@@ -175,7 +177,7 @@ def test_a_goal_that_could_not_be_written_is_told(bench):
     bench.tell(events.GoalWritten("r1", "g", 0, 0, 0, "a", False))
 
 
-def test_a_robot_without_ways_for_goals_says_so():
+def test_a_robot_without_a_goal_topic_or_action_refuses_goals():
     bench = Bench().begin(spec(goal_topic=None, cancel_topic=None))
     bench.take()
     bench.goal()
@@ -198,7 +200,7 @@ def test_a_goal_is_refused_while_the_display_is_silent(bench):
 
 @pytest.mark.parametrize("loss", ["connection", "display", "end"])
 @pytest.mark.parametrize("policy", ["continue", "cancel"])
-def test_when_its_sender_is_lost_a_goal_does_what_was_set(loss, policy):
+def test_the_loss_of_the_sender_cancels_a_goal_only_if_configured(loss, policy):
     bench = Bench().begin(spec(on_operator_loss=policy))
     bench.take()
     bench.goal()
@@ -214,7 +216,7 @@ def test_when_its_sender_is_lost_a_goal_does_what_was_set(loss, policy):
     assert cancels(bench) == (1 if policy == "cancel" else 0)
 
 
-def test_one_that_cannot_be_cancelled_goes_on_whatever_is_set():
+def test_a_goal_without_a_cancel_topic_is_not_cancelled_on_operator_loss():
     only = spec(on_operator_loss="cancel", cancel_topic=None)
     bench = Bench().begin(only)
     bench.take()
@@ -224,7 +226,7 @@ def test_one_that_cannot_be_cancelled_goes_on_whatever_is_set():
 
 
 @pytest.mark.parametrize("policy", ["continue", "cancel"])
-def test_when_its_robot_is_removed_a_goal_does_what_was_set(policy):
+def test_removing_the_robot_cancels_a_goal_only_if_configured(policy):
     bench = Bench().begin(spec(on_operator_loss=policy))
     bench.take()
     bench.goal()
@@ -260,7 +262,9 @@ class TestElsewhere:
             ({"action": "/go"}, {"action": "/go", "action_type": MOVE_BASE_TYPE}),
         ],
     )
-    def test_it_is_called_off_where_it_went_before_that_changes(self, before, after):
+    def test_a_goal_is_cancelled_before_the_goal_or_cancel_settings_change(
+        self, before, after
+    ):
         bench = self.declare(before, after)
         kept = (actions.CancelGoals, actions.Attach)
         order = [type(a) for a in bench.done if isinstance(a, kept)]
@@ -277,23 +281,25 @@ class TestElsewhere:
             {"on_operator_loss": "cancel"},
         ],
     )
-    def test_it_goes_on_where_it_can_be_called_off_afterwards_as_well(self, after):
+    def test_a_goal_continues_if_the_new_settings_can_still_cancel_the_goal(
+        self, after
+    ):
         bench = self.declare({}, after)
         assert cancels(bench) == 0
         assert bench.report().goal.state == "sent"
         bench.say("b", op="stop", robot="r1")
         assert cancels(bench) == 1
 
-    def test_it_is_called_off_too_when_the_robot_goes_by_another_key(self):
+    def test_a_goal_is_also_cancelled_if_the_robot_becomes_another_machine(self):
         bench = self.declare({}, {"twist_topic": "/other", "cancel_topic": None})
         assert cancels(bench) == 1
 
-    def test_one_that_cannot_be_called_off_is_said_to_be_out_of_sight(self):
+    def test_a_goal_without_a_cancel_topic_reports_the_change_of_the_goal_topic(self):
         bench = self.declare({"cancel_topic": None}, {"goal_topic": "/other"})
         assert cancels(bench) == 0
         assert bench.report().goal.why == ELSEWHERE
 
-    def test_one_that_has_ended_is_left_as_it_is(self):
+    def test_a_goal_that_has_ended_is_not_changed_by_new_settings(self):
         bench = Bench().begin(spec(action="/go"))
         bench.take()
         bench.goal()
@@ -302,7 +308,7 @@ class TestElsewhere:
         assert cancels(bench) == 0
         assert bench.report().goal.state == "reached"
 
-    def test_a_cancel_that_was_owed_there_is_not_said_elsewhere(self):
+    def test_a_pending_cancel_is_not_sent_to_a_new_cancel_topic(self):
         bench = Bench().begin()
         bench.tell(events.LinkDown(URL, "tasks"))
         bench.say("a", op="cancel", robot="r1")
@@ -325,14 +331,14 @@ class TestWay:
             ({"goal_topic": None}, None),
         ],
     )
-    def test_goals_go_the_way_that_the_robot_has(self, changes, way):
+    def test_a_goal_is_sent_by_the_topic_or_action_of_the_robot(self, changes, way):
         bench = Bench().begin(spec(**changes))
         assert bench.report().method == way
         bench.take()
         bench.goal()
         assert [goal.method for goal in goals(bench)] == [way][: way is not None]
 
-    def test_a_bridge_without_actions_gets_the_next_goal_on_the_topic(self):
+    def test_after_a_bridge_without_actions_the_next_goal_uses_the_topic(self):
         bench = Bench().begin(spec(action="/go"))
         bench.take()
         bench.goal()
@@ -348,7 +354,7 @@ class TestWay:
         bench.goal()
         assert goals(bench)[-1].method == "topic"
 
-    def test_without_a_topic_it_stays_with_the_action(self):
+    def test_without_a_goal_topic_goals_still_use_the_action(self):
         bench = Bench().begin(spec(action="/go", goal_topic=None))
         bench.take()
         bench.goal()
@@ -379,7 +385,7 @@ class TestHowItGoes:
         bench.tell(events.GoalEnded("r1", goals(bench)[-1].id, *how))
         return bench.report().goal
 
-    def test_a_goal_is_sent_accepted_under_way_and_reached(self, bench):
+    def test_a_goal_is_reported_as_sent_accepted_under_way_and_reached(self, bench):
         goal = bench.report().goal
         assert (goal.x, goal.y, goal.yaw, goal.by) == (1.0, 2.0, 0.5, "a")
         assert (goal.state, goal.left) == ("sent", None)
@@ -392,7 +398,7 @@ class TestHowItGoes:
         goal = self.end(bench, "reached", "")
         assert (goal.state, goal.why) == ("reached", "")
 
-    def test_numbers_that_flow_are_told_ten_times_a_second_at_most(self, bench):
+    def test_goal_progress_is_reported_about_ten_times_a_second_at_most(self, bench):
         self.tell(bench, active=True, left=9.0)
         before = len(bench.of(protocol.RobotReport))
         id = goals(bench)[-1].id
@@ -403,23 +409,23 @@ class TestHowItGoes:
         bench.run(1.0, say)
         assert len(bench.of(protocol.RobotReport)) - before <= 11
 
-    def test_a_failure_has_its_reason(self, bench):
+    def test_a_failed_goal_reports_the_reason_and_stays_failed(self, bench):
         goal = self.end(bench, "failed", "no path to the goal")
         assert (goal.state, goal.why) == ("failed", "no path to the goal")
         assert self.end(bench, "reached", "").state == "failed", "it ends once"
         assert self.tell(bench, active=True).state == "failed"
 
-    def test_a_failure_without_a_reason_says_that(self, bench):
+    def test_a_failed_goal_without_a_reason_reports_the_missing_reason(self, bench):
         assert self.end(bench, "failed", "").why == "the robot gave no reason"
 
-    def test_a_cancel_is_under_way_until_the_robot_says_so(self, bench):
+    def test_a_goal_is_cancelling_until_the_robot_confirms_the_cancel(self, bench):
         bench.say("b", op="cancel", robot="r1")
         assert bench.report().goal.state == "cancelling"
         goal = self.tell(bench, active=True, left=1.0)
         assert (goal.state, goal.left) == ("cancelling", 1.0)
         assert self.end(bench, "cancelled", "canceled").state == "cancelled"
 
-    def test_a_goal_that_its_cancel_overtook_is_cancelled_again(self, bench):
+    def test_a_goal_still_active_after_its_cancel_is_cancelled_again(self, bench):
         """They go by different sockets, and what is not there yet is not cancelled."""
         self.tell(bench, active=False)
         assert cancels(bench) == 0
@@ -432,27 +438,27 @@ class TestHowItGoes:
         self.tell(bench, active=True)
         assert cancels(bench) == 3
 
-    def test_a_goal_that_goes_on_under_a_stop_is_cancelled_whichever_it_is(self, bench):
+    def test_any_goal_that_is_active_during_a_stop_is_cancelled(self, bench):
         bench.say("b", op="stop", robot="r1")
         before = cancels(bench)
         bench.tell(events.GoalProgress("r1", "an earlier one", active=True))
         assert cancels(bench) == before + 1
 
-    def test_a_goal_that_cannot_be_cancelled_is_not(self):
+    def test_an_active_goal_without_a_cancel_topic_is_not_cancelled_during_a_stop(self):
         bench = Bench().begin(spec(cancel_topic=None))
         bench.say("b", op="stop", robot="r1")
         bench.tell(events.GoalProgress("r1", "g", active=True))
         assert cancels(bench) == 0
 
-    def test_a_goal_that_was_reached_before_the_cancel_came_was_reached(self, bench):
+    def test_a_goal_reached_before_the_cancel_is_reported_as_reached(self, bench):
         bench.say("b", op="cancel", robot="r1")
         assert self.end(bench, "reached").state == "reached"
 
-    def test_a_goal_that_somebody_else_cancelled_says_so(self, bench):
+    def test_a_goal_cancelled_by_another_program_reports_the_cause(self, bench):
         goal = self.end(bench, "cancelled", "")
         assert goal.why == "by the robot, or by another program"
 
-    def test_a_goal_that_a_person_cancelled_names_them(self, bench):
+    def test_a_goal_cancelled_by_an_operator_names_the_operator(self, bench):
         bench.say("b", op="cancel", robot="r1")
         goal = self.end(bench, "cancelled", "canceled")
         assert (goal.state, goal.why) == ("cancelled", "by B")
@@ -467,12 +473,14 @@ class TestHowItGoes:
             ),
         ],
     )
-    def test_a_cancelled_goal_says_who_did_it(self, bench, act, why):
+    def test_a_goal_cancelled_by_stop_or_driving_reports_the_cause(
+        self, bench, act, why
+    ):
         act(bench)
         assert bench.report().goal.why == why
         assert self.end(bench, "cancelled", "canceled").why == why
 
-    def test_a_goal_that_nobody_tells_of_any_more_is_unknown_until_it_is(self, bench):
+    def test_a_lost_goal_is_unknown_until_new_progress_arrives(self, bench):
         id = goals(bench)[-1].id
         bench.tell(events.GoalLost("r1", id, "no link"))
         assert bench.report().goal.state == "unknown"
@@ -482,7 +490,7 @@ class TestHowItGoes:
         bench.tell(events.GoalLost("r1", id, "no link"))
         assert bench.report().goal.state == "reached"
 
-    def test_a_cancel_that_went_to_a_dead_link_is_said_again_on_the_next(self, bench):
+    def test_a_cancel_sent_to_a_dead_link_is_sent_again_on_the_next_link(self, bench):
         """The link looked open for some seconds, and so the cancel looked written."""
         id = goals(bench)[-1].id
         bench.tell(protocol.Disconnect("a"))
@@ -501,7 +509,7 @@ class TestHowItGoes:
         bench.tell(events.GoalProgress("r1", id, active=True))
         assert cancels(bench) == 2, "it goes on, and so it is told again"
 
-    def test_one_that_is_called_off_and_out_of_sight_is_called_off_again(self, bench):
+    def test_a_lost_goal_that_is_being_cancelled_is_cancelled_again(self, bench):
         """Its socket is lost, and that of the next goals and cancels is not."""
         bench.say("b", op="cancel", robot="r1")
         bench.tell(events.GoalLost("r1", goals(bench)[-1].id, "given up"))
@@ -511,7 +519,9 @@ class TestHowItGoes:
         assert cancels(bench) == 2
 
     @pytest.mark.parametrize("answer", [True, False])
-    def test_a_cancel_that_was_answered_is_not_said_again(self, bench, answer):
+    def test_a_cancel_is_sent_again_on_a_new_link_only_without_an_answer(
+        self, bench, answer
+    ):
         bench.say("b", op="cancel", robot="r1")
         if answer:
             self.end(bench, "cancelled")
@@ -519,14 +529,14 @@ class TestHowItGoes:
         bench.connect_links()
         assert cancels(bench) == (1 if answer else 2)
 
-    def test_a_new_link_sends_no_goal_again(self, bench):
+    def test_a_new_link_does_not_send_the_goal_again(self, bench):
         bench.break_links()
         bench.run(0.5)
         bench.connect_links()
         bench.run(1.0)
         assert len(goals(bench)) == 1
 
-    def test_a_cancel_that_waits_for_a_link_is_not_taken_for_done(self):
+    def test_a_goal_is_cancelling_while_its_cancel_waits_for_a_link(self):
         bench = Bench().begin()
         bench.take()
         bench.goal()
@@ -538,7 +548,7 @@ class TestHowItGoes:
         assert bench.report().goal.state == "cancelled"
 
     @pytest.mark.parametrize("late", [False, True])
-    def test_a_cancel_without_an_answer_is_said_again_after_a_link_lost_soon(
+    def test_an_unanswered_cancel_is_sent_again_only_if_the_link_is_lost_soon(
         self, late
     ):
         bench = Bench().begin()
@@ -552,7 +562,7 @@ class TestHowItGoes:
         assert bench.report().goal.state == "cancelled"
         assert cancels(bench) == (1 if late else 2)
 
-    def test_a_goal_that_was_sent_since_is_not_cancelled_by_that(self):
+    def test_a_lost_link_does_not_repeat_a_cancel_older_than_the_goal(self):
         bench = Bench().begin()
         bench.say("a", op="cancel", robot="r1")
         bench.take()
@@ -561,14 +571,14 @@ class TestHowItGoes:
         bench.connect_links()
         assert cancels(bench) == 1
 
-    def test_a_link_that_was_spent_on_a_goal_is_not_lost(self):
+    def test_a_link_handed_over_to_a_goal_does_not_repeat_a_cancel(self):
         bench = Bench().begin()
         bench.say("a", op="cancel", robot="r1")
         bench.tell(events.LinkDown(URL, "tasks", spent=True))
         bench.tell(events.LinkUp(URL, "tasks"))
         assert cancels(bench) == 1
 
-    def test_words_about_other_goals_and_other_robots_change_nothing(self, bench):
+    def test_events_of_other_goals_and_other_robots_change_nothing(self, bench):
         before = bench.report()
         for word in (
             events.GoalProgress("r1", "x", active=True),
@@ -594,7 +604,7 @@ class TestWhereItIs:
     def why(self, bench, who="a"):
         return bench.refusals(who)[-1].why
 
-    def test_who_has_the_robot_tells_it_where_it_is(self, bench):
+    def test_the_operator_in_control_sets_the_pose_of_the_robot(self, bench):
         assert bench.report().locates
         bench.take()
         bench.hold(0.1)
@@ -616,7 +626,9 @@ class TestWhereItIs:
         ("changes", "why"),
         [({"epoch": 0}, "epoch"), ({"tick": 1}, "tick"), ({"seq": 0}, "seq")],
     )
-    def test_it_needs_lease_epoch_and_a_fresh_tick(self, bench, changes, why):
+    def test_setting_the_pose_needs_lease_epoch_new_seq_and_recent_tick(
+        self, bench, changes, why
+    ):
         assert self.locate(bench) == []
         assert "take control first" in self.why(bench)
         bench.take()
@@ -625,7 +637,7 @@ class TestWhereItIs:
         assert why in self.why(bench)
         assert self.locate(bench, "b") == []
 
-    def test_it_is_refused_while_the_robot_follows_a_goal(self, bench):
+    def test_setting_the_pose_is_refused_while_the_robot_navigates(self, bench):
         bench.take()
         bench.goal()
         assert self.locate(bench) == []
@@ -633,7 +645,9 @@ class TestWhereItIs:
         bench.say("a", op="cancel", robot="r1")
         assert len(self.locate(bench)) == 1
 
-    def test_it_is_refused_while_the_robot_is_driven_and_while_it_stops(self, bench):
+    def test_setting_the_pose_is_refused_while_the_robot_is_driven_or_stopping(
+        self, bench
+    ):
         bench.drive_off()
         assert self.locate(bench) == []
         bench.drive()
@@ -642,7 +656,7 @@ class TestWhereItIs:
         bench.hold(1.0)
         assert len(self.locate(bench)) == 1
 
-    def test_it_is_refused_while_stop_stands_and_without_a_link(self, bench):
+    def test_setting_the_pose_is_refused_during_a_stop_and_without_a_link(self, bench):
         bench.take()
         bench.tell(events.LinkDown(URL, "tasks"))
         assert self.locate(bench) == []
@@ -651,26 +665,26 @@ class TestWhereItIs:
         bench.say("a", op="stop", robot="r1")
         assert self.locate(bench) == []
 
-    def test_it_is_refused_while_the_display_is_silent(self, bench):
+    def test_setting_the_pose_is_refused_while_the_display_is_silent(self, bench):
         bench.take()
         bench.beating = False
         bench.run(0.3)
         assert self.locate(bench) == []
 
-    def test_a_robot_without_a_topic_for_it_says_so(self):
+    def test_setting_the_pose_is_refused_without_a_pose_topic(self):
         bench = Bench().begin()
         bench.take()
         assert not bench.report().locates
         assert self.locate(bench) == []
         assert "no topic for the initial pose" in self.why(bench)
 
-    def test_a_goal_without_an_end_does_not_forbid_it_for_ever(self):
+    def test_a_goal_without_progress_reports_does_not_block_setting_the_pose(self):
         bench = Bench().begin(spec(pose_topic="/initialpose", cancel_topic=None))
         bench.take()
         bench.goal()
         assert len(self.locate(bench)) == 1
 
-    def test_a_program_with_the_lease_tells_it_too(self, bench):
+    def test_only_a_program_with_the_lease_sets_the_pose(self, bench):
         received = commands.Locate("r1", 0, 0, bench.tick, 1.0, 2.0, 0.5)
         bench.tell(protocol.FromProgram(received))
         assert bench.did(actions.SendPose) == []
@@ -689,12 +703,12 @@ class TestWhereItIs:
             ({"action": "/go", "action_type": "a/Fib"}, "NavigateToPose or"),
         ],
     )
-    def test_a_robot_that_cannot_be_meant_is_refused(self, changes, what):
+    def test_invalid_pose_and_action_settings_are_refused(self, changes, what):
         with pytest.raises(ConfigError, match=what):
             checked(spec(**{"pose_topic": "/initialpose", **changes}))
 
 
-def test_an_action_that_drives_by_itself_on_a_dead_link_is_refused():
+def test_the_assisted_teleop_action_is_refused():
     """AssistedTeleop repeats the last velocity, however old it is."""
     for type in ("nav2_msgs/AssistedTeleop", "nav2_msgs/action/AssistedTeleop"):
         with pytest.raises(ConfigError, match="AssistedTeleop"):
@@ -706,7 +720,9 @@ class TestGoalsOnly:
     def bench(self):
         return Bench().begin(spec(twist_topic=None, action="/go", goal_topic=None))
 
-    def test_a_robot_that_takes_goals_only_is_held_for_goals(self, bench):
+    def test_a_robot_without_a_velocity_topic_accepts_goals_but_no_velocities(
+        self, bench
+    ):
         assert bench.take()
         assert bench.report().link == "up"
         bench.goal()
@@ -716,18 +732,20 @@ class TestGoalsOnly:
         assert bench.written == []
         assert bench.refusals()[-1].why == "the robot has no velocity topic"
 
-    def test_stop_cancels_and_writes_no_velocity(self, bench):
+    def test_stop_of_a_goals_only_robot_cancels_goals_and_sends_no_velocity(
+        self, bench
+    ):
         bench.say("b", op="stop", robot="*")
         bench.run(0.5)
         assert cancels(bench) == 1
         assert bench.written == bench.dropped == []
 
-    def test_it_needs_its_own_link(self, bench):
+    def test_a_goals_only_robot_cannot_be_taken_without_its_link(self, bench):
         bench.tell(events.LinkDown(URL, "tasks"))
         assert bench.take() is None
         assert bench.report().link == "down"
 
-    def test_one_that_takes_nothing_cannot_be_had(self):
+    def test_a_robot_without_velocity_and_goal_topics_cannot_be_taken(self):
         bench = Bench().begin(spec(twist_topic=None, goal_topic=None))
         assert bench.take() is None
         assert "no velocity topic and no goal topic" in bench.report().reason

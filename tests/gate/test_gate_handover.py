@@ -42,7 +42,7 @@ def moving(bench, seconds, speed, turn=0.0):
 
 
 class TestAsking:
-    def test_the_holder_sees_who_asks_and_drives_on(self, bench):
+    def test_the_operator_sees_a_request_for_control_and_keeps_driving(self, bench):
         ask(bench)
         assert bench.report().asker == protocol.AskerReport("b", "B", 10.0)
         bench.hold(1.0, x=1.0)
@@ -50,14 +50,16 @@ class TestAsking:
         assert bench.state == "driving"
         assert bench.written[-1].twist != ZERO
 
-    def test_the_time_that_is_left_is_told_ten_times_a_second_at_most(self, bench):
+    def test_the_time_left_to_answer_is_reported_about_ten_times_a_second_at_most(
+        self, bench
+    ):
         bench.run(2.0)
         ask(bench)
         before = len(bench.of(protocol.RobotReport))
         bench.hold(1.0)
         assert len(bench.of(protocol.RobotReport)) - before <= 14
 
-    def test_who_does_not_answer_for_ten_seconds_has_granted_it(self, bench):
+    def test_a_request_without_an_answer_is_granted_after_ten_seconds(self, bench):
         ask(bench)
         bench.hold(9.9, x=1.0)
         assert holder(bench) == "a"
@@ -67,7 +69,7 @@ class TestAsking:
         bench.run(1.1)
         assert holder(bench) == "b"
 
-    def test_denied_it_stays_where_it_is(self, bench):
+    def test_a_denied_request_leaves_control_with_the_operator(self, bench):
         ask(bench)
         bench.say("a", op="deny", robot="r1")
         assert bench.report().asker is None
@@ -76,19 +78,19 @@ class TestAsking:
         bench.hold(12.0, x=1.0)
         assert holder(bench) == "a"
 
-    def test_asking_twice_does_not_win_time(self, bench):
+    def test_a_repeated_request_does_not_restart_the_countdown(self, bench):
         ask(bench)
         bench.hold(5.0)
         ask(bench)
         assert bench.report().asker.left == pytest.approx(5.0, abs=0.2)
 
-    def test_one_asks_at_a_time(self, bench):
+    def test_only_one_operator_can_request_control_at_a_time(self, bench):
         bench.join("c")
         ask(bench)
         ask(bench, "c")
         assert bench.refusals("c")[-1].why == "B has already requested control"
 
-    def test_the_question_can_be_taken_back(self, bench):
+    def test_a_request_for_control_can_be_withdrawn(self, bench):
         ask(bench)
         bench.say("b", op="release", robot="r1")
         assert bench.report().asker is None
@@ -96,7 +98,7 @@ class TestAsking:
         assert holder(bench) == "a"
 
     @pytest.mark.parametrize("loss", ["page", "stop", "declared"])
-    def test_it_ends_with_its_reason(self, bench, loss):
+    def test_a_request_ends_on_page_loss_stop_or_new_declaration(self, bench, loss):
         ask(bench)
         match loss:
             case "page":
@@ -111,7 +113,7 @@ class TestAsking:
         assert holder(bench) != "b"
 
     @pytest.mark.parametrize("going", ["release", "lost"])
-    def test_a_holder_who_goes_leaves_it_to_who_asks(self, bench, going):
+    def test_control_goes_to_the_requester_when_the_operator_leaves(self, bench, going):
         ask(bench)
         if going == "release":
             bench.say("a", op="release", robot="r1")
@@ -121,7 +123,7 @@ class TestAsking:
         bench.run(1.1)
         assert holder(bench) == "b"
 
-    def test_what_makes_no_sense_is_refused(self, bench):
+    def test_invalid_requests_and_answers_are_refused(self, bench):
         bench.join("v", "viewer")
         ask(bench, "v")
         assert "operator" in bench.refusals("v")[-1].why
@@ -141,7 +143,7 @@ class TestAsking:
         ask(bench)
         assert "STOP by A is active" in bench.refusals("b")[-1].why
 
-    def test_an_asker_without_a_name_is_called_by_its_connection(self, bench):
+    def test_a_requester_without_a_name_is_named_by_its_connection(self, bench):
         bench.tell(protocol.Connect("c9", "", "operator"))
         ask(bench, "c9")
         ask(bench, "b")
@@ -149,7 +151,9 @@ class TestAsking:
 
 
 class TestChanging:
-    def test_zero_comes_first_and_the_new_driver_starts_disarmed(self, bench):
+    def test_a_hand_over_sends_zero_and_the_new_operator_must_release_inputs(
+        self, bench
+    ):
         ask(bench)
         bench.run(0.05)
         before, first = len(bench.written), bench.report().epoch
@@ -171,7 +175,7 @@ class TestChanging:
         bench.hold(0.1, "b", x=1.0)
         assert bench.moving_since(at)[0].epoch == report.epoch
 
-    def test_without_odometry_a_second_after_zero_is_standstill(self, bench):
+    def test_without_odometry_a_hand_over_ends_one_second_after_zero(self, bench):
         ask(bench)
         grant(bench)
         bench.run(0.95)
@@ -180,7 +184,7 @@ class TestChanging:
         bench.run(0.1)
         assert holder(bench) == "b"
 
-    def test_it_waits_while_the_robot_moves_on(self, seen):
+    def test_a_hand_over_waits_while_the_robot_moves(self, seen):
         ask(seen)
         grant(seen)
         moving(seen, 5.0, 0.3)
@@ -191,7 +195,7 @@ class TestChanging:
         moving(seen, 0.4, 0.01)
         assert holder(seen) == "b"
 
-    def test_it_waits_a_second_after_odometry_fell_silent(self, seen):
+    def test_a_hand_over_waits_one_second_after_the_last_odometry(self, seen):
         ask(seen)
         grant(seen)
         moving(seen, 2.0, 0.3)
@@ -200,14 +204,14 @@ class TestChanging:
         seen.run(0.2)
         assert holder(seen) == "b"
 
-    def test_a_goal_is_cancelled_for_what_follows_one_does_not_stand(self, seen):
+    def test_a_hand_over_cancels_the_goal(self, seen):
         seen.goal()
         ask(seen)
         cancels = len(seen.did(actions.CancelGoals))
         grant(seen)
         assert len(seen.did(actions.CancelGoals)) == cancels + 1
 
-    def test_others_do_not_get_between(self, bench):
+    def test_others_cannot_take_or_request_control_during_a_hand_over(self, bench):
         bench.join("c")
         ask(bench)
         grant(bench)
@@ -222,7 +226,9 @@ class TestChanging:
         assert bench.of(protocol.TakeReply)[-1].epoch is None
 
     @pytest.mark.parametrize("going", ["release", "lost"])
-    def test_an_heir_who_goes_leaves_it_free(self, bench, going):
+    def test_the_robot_is_free_if_the_new_operator_leaves_during_a_hand_over(
+        self, bench, going
+    ):
         ask(bench)
         grant(bench)
         if going == "release":
@@ -233,7 +239,7 @@ class TestChanging:
         assert bench.report().state == "free"
         assert not bench.report().changing
 
-    def test_stop_ends_it(self, bench):
+    def test_stop_ends_a_hand_over(self, bench):
         ask(bench)
         grant(bench)
         bench.say("a", op="stop", robot="r1")
@@ -242,7 +248,7 @@ class TestChanging:
         assert bench.refusals("b")[-1].why == "STOP by A"
         assert "STOP" in bench.report().reason
 
-    def test_a_link_that_breaks_ends_it_and_says_so(self, bench):
+    def test_a_broken_link_ends_a_hand_over_with_a_reason(self, bench):
         ask(bench)
         grant(bench)
         bench.break_links()
@@ -250,7 +256,7 @@ class TestChanging:
         assert "no connection" in bench.refusals("b")[-1].why
         assert not bench.report().changing
 
-    def test_a_robot_that_takes_goals_only_changes_hands_too(self):
+    def test_a_robot_without_a_velocity_topic_can_be_handed_over(self):
         bench = Bench().begin(spec(twist_topic=None))
         bench.take("a")
         ask(bench)
@@ -259,7 +265,7 @@ class TestChanging:
         assert holder(bench) == "b"
         assert bench.did(actions.WriteTwist) == []
 
-    def test_the_limit_of_the_new_page_counts(self, bench):
+    def test_the_speed_limit_of_the_new_page_applies_after_a_hand_over(self, bench):
         ask(bench)
         grant(bench)
         bench.tell(protocol.Speeds("b", 0.2, 0.2))

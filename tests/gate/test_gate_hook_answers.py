@@ -47,7 +47,7 @@ class TestAnswer:
             ({"op": "status", "level": "error", "msg": "what?"}, "refused (what?)"),
         ],
     )
-    def test_tells_whether_the_call_failed_and_why(self, fields, why):
+    def test_the_answer_shows_whether_the_call_failed_and_why(self, fields, why):
         assert answer_to(response(**fields), "a") == (why,)
 
     @pytest.mark.parametrize(
@@ -62,10 +62,10 @@ class TestAnswer:
             response(op="status", level="warning", msg="slow"),
         ],
     )
-    def test_is_nothing_else(self, data):
+    def test_other_messages_are_no_answer_to_the_call(self, data):
         assert answer_to(data, "a") is None
 
-    def test_of_any_length_is_told_in_a_line_that_can_be_shown(self):
+    def test_a_long_answer_is_reduced_to_a_short_printable_line(self):
         said = "no\n\x1b[31m\ud800 way " + "x" * 10**6
         (why,) = answer_to(response(result=False, values=said), "a")
         assert why.isprintable()
@@ -75,7 +75,7 @@ class TestAnswer:
 
 class TestCall:
     @in_loop
-    async def test_that_is_refused_says_so(self, caplog):
+    async def test_a_refused_call_is_reported_and_logged(self, caplog):
         async with noting_bridge() as bridge:
             bridge.answers_services = False
             ended, made = [], Calls(bridge.url)
@@ -91,7 +91,7 @@ class TestCall:
         assert caplog.records[0].levelname == "WARNING"
 
     @in_loop
-    async def test_over_a_link_that_is_closed_as_it_opens_says_so(self):
+    async def test_a_call_over_a_link_that_closes_at_once_reports_no_connection(self):
         async def talk(link):
             await link.accept(frame(0x8))
 
@@ -132,7 +132,7 @@ class Activity:
 
 class TestLinks:
     @in_loop
-    async def test_tell_how_every_hook_ended(self, monkeypatch):
+    async def test_the_links_report_the_result_of_every_stop_hook(self, monkeypatch):
         monkeypatch.setattr(tasks, "CALL_TIMEOUT", 0.5)
         async with noting_bridge() as bridge, Activity(bridge.url) as doing:
             doing.run(LOCK, 1)
@@ -149,7 +149,7 @@ class TestLinks:
             bridge.unblock()
 
     @in_loop
-    async def test_tell_that_a_flag_had_no_link_to_go_over(self, caplog):
+    async def test_a_topic_hook_without_a_link_is_reported_as_not_sent(self, caplog):
         async with noting_bridge() as bridge, Activity(bridge.url) as doing:
             doing.links._tasks[bridge.url].lane.cut("no longer used")
             doing.run(LOCK, 1)
@@ -180,7 +180,7 @@ def end(bench, hook, why=None, robot="r1", since=-1):
 
 
 class TestReport:
-    def test_says_which_hook_failed_until_it_succeeds(self, bench):
+    def test_the_report_names_a_failed_hook_until_the_hook_succeeds(self, bench):
         stop(bench)
         assert bench.report().hooks == ()
         end(bench, LOCK)
@@ -191,7 +191,7 @@ class TestReport:
         end(bench, E_STOP)
         assert bench.report().hooks == ()
 
-    def test_tells_a_topic_from_a_service_of_the_same_name(self):
+    def test_the_report_distinguishes_a_topic_hook_from_a_service_hook(self):
         lock = {"service": "/lock", "type": "std_srvs/Trigger"}
         bench = Bench().begin(spec(stop_hooks=(lock, LOCK)))
         stop(bench)
@@ -199,14 +199,14 @@ class TestReport:
         end(bench, LOCK)
         assert bench.report().hooks == ("stop hook /lock: refused",)
 
-    def test_says_no_more_of_it_after_a_reset(self, bench):
+    def test_the_report_omits_failed_hooks_after_a_reset(self, bench):
         stop(bench)
         end(bench, E_STOP, REFUSED)
         reset(bench)
         end(bench, LOCK)
         assert bench.report().hooks == ()
 
-    def test_takes_no_answer_for_that_to_what_was_said_later(self, bench):
+    def test_an_answer_to_an_earlier_run_of_a_hook_is_ignored(self, bench):
         stop(bench)
         stop(bench)
         end(bench, E_STOP, REFUSED, since=0)
@@ -215,7 +215,9 @@ class TestReport:
         end(bench, E_STOP, REFUSED)
         assert bench.report().hooks == ()
 
-    def test_says_that_there_is_no_link_until_the_hooks_are_said(self, bench):
+    def test_the_report_lists_hooks_without_a_link_until_the_hooks_have_run(
+        self, bench
+    ):
         bench.tell(events.LinkDown(URL, "tasks"))
         stop(bench)
         why = "not sent yet: no connection"
@@ -229,7 +231,7 @@ class TestReport:
         end(bench, E_STOP)
         assert bench.report().hooks == ()
 
-    def test_says_that_a_reset_did_not_arrive_until_it_does(self, bench):
+    def test_the_report_names_a_failed_hook_reset_until_the_reset_succeeds(self, bench):
         stop(bench)
         bench.break_links()
         reset(bench)
@@ -244,7 +246,7 @@ class TestReport:
         assert bench.report().hooks == ()
         assert [run.stopped for run in bench.did(actions.RunHook)][2:] == [False] * 2
 
-    def test_says_it_of_the_machine_under_each_of_its_names(self):
+    def test_a_failed_hook_is_reported_for_every_alias_of_the_machine(self):
         hooks = (E_STOP,)
         bench = Bench().begin(spec(stop_hooks=hooks), spec(id="r2", stop_hooks=hooks))
         stop(bench)
@@ -253,14 +255,14 @@ class TestReport:
         for robot in ("r1", "r2"):
             assert bench.report(robot).hooks == (f"stop hook /e_stop: {REFUSED}",)
 
-    def test_reaches_the_page(self, bench):
+    def test_a_failed_hook_is_sent_to_the_page(self, bench):
         stop(bench)
         end(bench, E_STOP, REFUSED)
         text = pages.robot_text(bench.report(), mine=False, page=Cap(1.0, 1.0, ""))
         assert json.loads(text)["hooks"] == [f"stop hook /e_stop: {REFUSED}"]
 
 
-def test_a_hook_that_failed_is_said_again_when_there_is_a_new_link(bench):
+def test_a_failed_hook_stays_reported_on_a_new_link_until_the_hook_succeeds(bench):
     stop(bench)
     end(bench, E_STOP, REFUSED)
     bench.tell(events.LinkDown(URL, "tasks"))
@@ -270,7 +272,7 @@ def test_a_hook_that_failed_is_said_again_when_there_is_a_new_link(bench):
     assert bench.report().hooks == ()
 
 
-def test_a_stop_that_was_reset_elsewhere_is_not_said_to_the_robot_any_more(bench):
+def test_stop_hooks_do_not_run_for_a_stop_that_was_reset_elsewhere(bench):
     bench.tell(events.LinkDown(URL, "tasks"))
     stop(bench)
     bench.tell(events.LockState(KEY, held=False, why="it has", elsewhere=True))
@@ -281,7 +283,7 @@ def test_a_stop_that_was_reset_elsewhere_is_not_said_to_the_robot_any_more(bench
 
 
 class TestDeclaredAnew:
-    def test_a_robot_is_still_owed_its_reset(self, bench):
+    def test_a_robot_that_is_declared_again_still_gets_its_hook_reset(self, bench):
         stop(bench)
         bench.tell(events.LinkDown(URL, "tasks"))
         reset(bench)
@@ -290,7 +292,7 @@ class TestDeclaredAnew:
         bench.tell(events.LinkUp(URL, "tasks"))
         assert bench.did(actions.RunHook)[-1].stopped is False
 
-    def test_with_other_hooks_it_is_told_by_those(self, bench):
+    def test_a_robot_declared_with_other_hooks_runs_the_new_hooks(self, bench):
         stop(bench)
         end(bench, E_STOP, REFUSED)
         bench.tell(spec(stop_hooks=(LOCK,)))
@@ -298,7 +300,7 @@ class TestDeclaredAnew:
         assert bench.did(actions.RunHook)[-1].hook == LOCK
 
 
-def test_an_answer_may_come_when_the_robot_is_forgotten(bench):
+def test_a_hook_answer_for_a_removed_robot_sends_no_report(bench):
     stop(bench)
     bench.tell(protocol.Forget("r1"))
     said = len(bench.of(protocol.RobotReport))

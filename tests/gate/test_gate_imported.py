@@ -27,7 +27,7 @@ print(*(name for name in sys.modules if name.startswith("webmap.")))
 """
 
 
-def test_the_branches_of_all_that_it_imports_are_counted() -> None:
+def test_coverage_counts_every_module_that_the_gate_imports() -> None:
     done = subprocess.run(
         [sys.executable, "-c", LOADED], capture_output=True, text=True, check=True
     )
@@ -38,11 +38,11 @@ def test_the_branches_of_all_that_it_imports_are_counted() -> None:
     assert counted == (ours - folders) | {"webmap.gate"}
 
 
-def test_a_pose_is_a_transform_too() -> None:
+def test_a_pose_converts_to_a_transform() -> None:
     assert Affine.of_pose(Pose(1.0, 2.0, 0.0)).values == (1.0, 0.0, 0.0, 1.0, 1.0, 2.0)
 
 
-def test_a_traceback_that_cannot_be_shown_loses_no_line_of_the_log() -> None:
+def test_a_log_record_whose_traceback_cannot_be_shown_is_still_logged() -> None:
     class Odd(Exception):
         def __str__(self) -> str:
             raise KeyError
@@ -53,7 +53,7 @@ def test_a_traceback_that_cannot_be_shown_loses_no_line_of_the_log() -> None:
     assert record.exc_text == "  the traceback cannot be shown"
 
 
-def test_a_scope_closes_also_when_a_removal_raises(
+def test_a_scope_closes_even_if_a_removal_raises(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     removed = []
@@ -67,7 +67,7 @@ def test_a_scope_closes_also_when_a_removal_raises(
     assert "scope 'Bob': a removal failed" in caplog.text
 
 
-def test_a_task_is_cancelled_from_a_thread_without_a_loop() -> None:
+def test_a_future_is_cancelled_from_a_thread_without_a_running_loop() -> None:
     loop = asyncio.new_event_loop()
     future = loop.create_future()
     break_off(future)
@@ -75,14 +75,14 @@ def test_a_task_is_cancelled_from_a_thread_without_a_loop() -> None:
     loop.close()
 
 
-def test_arrays_show_their_length_and_hold_no_other_types() -> None:
+def test_arrays_show_their_length_and_refuse_other_types() -> None:
     assert repr(Floats.from_wire([1.0, 2.0])) == "<Floats of 2>"
     with pytest.raises(NotImplementedError, match="a message cannot hold"):
         dec_hook(set, [])
 
 
 @pytest.mark.parametrize(("inside", "type"), [('"\\ud800"', list), ("NaN", int)])
-def test_json_that_is_not_strict_may_not_be_deep_either(
+def test_non_strict_json_is_also_refused_if_nested_too_deeply(
     inside: str, type: object
 ) -> None:
     text = "[" * (MAX_DEPTH + 1) + inside + "]" * (MAX_DEPTH + 1)
@@ -90,7 +90,7 @@ def test_json_that_is_not_strict_may_not_be_deep_either(
         decode_json(text.encode(), type)
 
 
-def test_what_is_within_its_limits_passes() -> None:
+def test_data_within_the_limits_passes() -> None:
     check_size(GENERAL.size, GENERAL, None)
     check_items("points", 1)
 
@@ -102,12 +102,14 @@ def test_what_is_within_its_limits_passes() -> None:
         (b"\xa1\x61a\x5b\x7f\xff\xff\xff\xff\xff\xff\xff", "CBOR"),
     ],
 )
-def test_cbor_that_is_no_map_is_refused(frame: bytes, why: str) -> None:
+def test_invalid_cbor_and_cbor_without_a_map_are_refused(
+    frame: bytes, why: str
+) -> None:
     with pytest.raises(ProtocolError, match=why):
         cbor.decode(frame)
 
 
-def test_operations_are_json_or_an_error() -> None:
+def test_rosbridge_operations_are_encoded_as_json_or_raise_an_error() -> None:
     assert msgspec.json.decode(ops.status("info", "ready")) == {
         "op": "status",
         "level": "info",

@@ -42,16 +42,16 @@ def under_way(bench, lag):
 
 
 class TestDriving:
-    def test_what_is_late_by_less_than_a_second_is_sight(self, bench):
+    def test_odometry_less_than_one_second_late_allows_driving(self, bench):
         assert under_way(bench, lag=0.9)
 
-    def test_what_is_later_than_that_is_none_and_is_said_so(self, bench):
+    def test_odometry_more_than_one_second_late_prevents_driving_with_a_reason(
+        self, bench
+    ):
         assert not under_way(bench, lag=1.1)
         assert bench.report().reason == "odometry is more than 1 s late"
 
-    def test_a_robot_whose_odometry_lags_is_stopped_though_it_goes_on_coming(
-        self, bench
-    ):
+    def test_a_robot_is_stopped_when_its_odometry_falls_one_second_behind(self, bench):
         assert under_way(bench, lag=0.0)
         at = bench.now
 
@@ -62,7 +62,7 @@ class TestDriving:
         bench.run(2.0, each)
         assert 0.9 < bench.moving_since(at)[-1].at - at < 1.1
 
-    def test_a_moment_that_is_yet_to_come_makes_nothing_younger(self, bench):
+    def test_a_send_time_in_the_future_does_not_make_odometry_newer(self, bench):
         assert under_way(bench, lag=-5.0)
         at = bench.now
         bench.hold(2.0, x=1.0)
@@ -70,7 +70,7 @@ class TestDriving:
 
 
 class TestStandstill:
-    def test_what_was_said_before_stop_confirms_nothing(self, bench):
+    def test_odometry_sent_before_a_stop_does_not_confirm_the_stop(self, bench):
         bench.say("b", op="stop", robot="r1")
         at = bench.now
         bench.run(1.0, lambda: bench.tell(OdometryReceived(KEY, STANDING, at - 0.01)))
@@ -78,14 +78,14 @@ class TestStandstill:
         lagging(bench, 0.5, 0.1, STANDING)
         assert bench.report().stop.confirmed is True
 
-    def test_motion_takes_it_back_however_late_it_comes(self, bench):
+    def test_motion_in_late_odometry_revokes_the_confirmation_of_a_stop(self, bench):
         bench.say("b", op="stop", robot="r1")
         lagging(bench, 0.6, 0.1, STANDING)
         assert bench.report().stop.confirmed is True
         lagging(bench, 0.2, 5.0, CREEPING)
         assert bench.report().stop.confirmed is not True
 
-    def test_what_was_said_before_the_zero_hands_nothing_over(self, bench):
+    def test_odometry_sent_before_the_zero_does_not_complete_a_hand_over(self, bench):
         bench.take("a")
         lagging(bench, 0.3, 0.0, STANDING)
         bench.say("b", op="ask", robot="r1")
@@ -114,7 +114,7 @@ SCAN = {
 
 
 @in_loop
-async def test_behind_a_narrow_link_nothing_is_taken_for_younger_than_it_is():
+async def test_a_slow_link_does_not_make_odometry_and_scans_look_newer():
     events = []
 
     def of(type):

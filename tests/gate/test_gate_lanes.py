@@ -33,7 +33,7 @@ async def forever(link):
 
 
 @in_loop
-async def test_what_is_held_is_said_whenever_the_lane_opens_and_taken_back_once():
+async def test_held_topics_are_advertised_on_every_link_and_unadvertised_once():
     happened = []
     async with noting_bridge() as bridge:
         with noting_lane(bridge.url, happened) as lane:
@@ -58,7 +58,7 @@ async def test_what_is_held_is_said_whenever_the_lane_opens_and_taken_back_once(
 
 
 @in_loop
-async def test_what_must_not_wait_is_dropped_when_something_waits_before_it():
+async def test_a_velocity_is_dropped_while_earlier_data_waits_in_the_socket():
     happened = []
 
     async def talk(link):
@@ -77,9 +77,7 @@ async def test_what_must_not_wait_is_dropped_when_something_waits_before_it():
 
 
 @in_loop
-async def test_a_link_whose_pings_are_not_answered_is_cut_and_made_anew(
-    monkeypatch, caplog
-):
+async def test_a_link_without_ping_answers_is_cut_and_opened_again(monkeypatch, caplog):
     monkeypatch.setattr(lanes, "DEAD", 0.1)
     happened = []
 
@@ -95,7 +93,7 @@ async def test_a_link_whose_pings_are_not_answered_is_cut_and_made_anew(
 
 
 @in_loop
-async def test_only_an_answer_to_a_ping_of_ours_proves_that_the_link_lives():
+async def test_only_the_answer_to_an_own_ping_proves_that_the_link_is_alive():
     pings, pongs, go_on = [], [], asyncio.Event()
     unasked = [(0).to_bytes(8, "big"), (99).to_bytes(8, "big"), b"", b"nonsense, long"]
 
@@ -122,7 +120,7 @@ async def test_only_an_answer_to_a_ping_of_ours_proves_that_the_link_lives():
 
 
 @in_loop
-async def test_a_lane_in_a_hurry_pings_at_once_and_then_more_often():
+async def test_a_shorter_ping_period_sends_a_ping_at_once():
     pings = []
     async with noting_bridge() as bridge:
         with noting_lane(bridge.url, [], pinged=pings.append) as lane:
@@ -136,7 +134,7 @@ async def test_a_lane_in_a_hurry_pings_at_once_and_then_more_often():
 
 
 @in_loop
-async def test_a_lane_that_is_cut_while_there_is_no_link_goes_on_trying(
+async def test_a_lane_that_is_cut_without_a_link_continues_to_reconnect(
     monkeypatch, caplog
 ):
     monkeypatch.setattr(waits, "FIRST_WAIT", 0.01)
@@ -155,7 +153,7 @@ async def test_a_lane_that_is_cut_while_there_is_no_link_goes_on_trying(
 
 
 @in_loop
-async def test_that_there_is_no_link_is_said_once_for_each_reason(monkeypatch, caplog):
+async def test_each_reason_for_a_failed_connection_is_logged_once(monkeypatch, caplog):
     monkeypatch.setattr(waits, "FIRST_WAIT", 0.01)
     monkeypatch.setattr(waits, "LONGEST_WAIT", 0.01)
     attempts = []
@@ -176,7 +174,7 @@ async def test_that_there_is_no_link_is_said_once_for_each_reason(monkeypatch, c
 
 
 @in_loop
-async def test_a_bridge_that_takes_links_and_closes_them_at_once_is_not_run_at():
+async def test_a_lane_waits_before_reconnecting_to_a_bridge_that_closes_at_once():
     times, happened = [], []
 
     async def talk(link):
@@ -192,7 +190,7 @@ async def test_a_bridge_that_takes_links_and_closes_them_at_once_is_not_run_at()
 
 
 @in_loop
-async def test_a_socket_that_closes_behind_a_stall_is_cut_before_the_next_one():
+async def test_a_stalled_socket_is_cut_before_the_lane_opens_a_new_socket():
     """What waits in it would arrive beside what is said on the next."""
     links, happened = [], []
 
@@ -220,7 +218,7 @@ async def test_a_socket_that_closes_behind_a_stall_is_cut_before_the_next_one():
 
 
 @in_loop
-async def test_a_socket_that_is_handed_over_goes_on_and_the_lane_has_another():
+async def test_a_socket_that_is_handed_over_stays_open_and_the_lane_reconnects():
     happened, texts = [], []
     async with noting_bridge() as bridge:
         with noting_lane(bridge.url, happened) as lane:
@@ -241,7 +239,7 @@ async def test_a_socket_that_is_handed_over_goes_on_and_the_lane_has_another():
 
 
 @in_loop
-async def test_a_lane_is_closed_for_good_with_or_without_a_link():
+async def test_a_closed_lane_stays_closed_with_or_without_a_link():
     happened = []
     async with noting_bridge() as bridge:
         with noting_lane(bridge.url, happened) as lane:

@@ -9,7 +9,7 @@ from webmap.base.errors import NoLease
 from webmap.base.geometry import Twist
 
 
-def test_a_program_that_is_quick_leaves_six_velocities_on_a_stalled_link(
+def test_a_fast_program_leaves_only_a_few_velocities_on_a_stalled_link(
     client, robot_spec, fake
 ):
     client.declare(robot_spec)

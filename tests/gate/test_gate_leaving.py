@@ -87,7 +87,9 @@ async def by_unsubscribing(bridge, lane, unsubscribe):
 )
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 @in_loop
-async def test_each_lane_is_left_and_the_bridge_still_answers(lane_of, leave, dialect):
+async def test_the_bridge_accepts_clients_after_a_lane_disconnects_or_unsubscribes(
+    lane_of, leave, dialect
+):
     async with hanging_bridge(dialect, TYPES) as bridge:
         lane, unsubscribe = await lane_of(bridge.url, [])
         try:

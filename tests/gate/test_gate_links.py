@@ -54,7 +54,7 @@ class Noting:
 
 
 @in_loop
-async def test_a_robot_has_the_links_that_it_needs_and_only_as_long_as_it_needs_them():
+async def test_links_are_open_only_while_a_robot_needs_them():
     async with noting_bridge() as bridge, Noting() as noting:
         robot = spec(bridge_url=bridge.url, odometry_topic="/odom")
         key = noting.attach(robot)
@@ -72,7 +72,7 @@ async def test_a_robot_has_the_links_that_it_needs_and_only_as_long_as_it_needs_
 
 
 @in_loop
-async def test_a_stamped_velocity_names_the_frame_of_the_newest_robot():
+async def test_a_stamped_velocity_uses_the_frame_of_the_newest_robot():
     async with noting_bridge() as bridge, Noting() as noting:
         stamped = {"bridge_url": bridge.url, "twist_type": "geometry_msgs/TwistStamped"}
         key = noting.attach(spec(**stamped, base_frame="base_link"))
@@ -85,7 +85,7 @@ async def test_a_stamped_velocity_names_the_frame_of_the_newest_robot():
 
 
 @in_loop
-async def test_a_velocity_goes_out_now_or_is_said_to_be_dropped():
+async def test_a_velocity_is_sent_at_once_or_reported_as_dropped():
     async with noting_bridge() as bridge, Noting() as noting:
         key = Key(bridge.url, "/cmd_vel")
         write = actions.WriteTwist(key, SLOW, 7, "a")
@@ -100,7 +100,7 @@ async def test_a_velocity_goes_out_now_or_is_said_to_be_dropped():
 
 
 @in_loop
-async def test_a_velocity_that_was_decided_before_a_pause_is_dropped_and_no_zero_is():
+async def test_a_velocity_after_its_deadline_is_dropped_but_a_zero_is_sent():
     async with noting_bridge() as bridge, Noting() as noting:
         key = Key(bridge.url, "/cmd_vel")
         noting.attach(spec(bridge_url=bridge.url))
@@ -115,7 +115,7 @@ async def test_a_velocity_that_was_decided_before_a_pause_is_dropped_and_no_zero
 
 
 @in_loop
-async def test_a_goal_that_was_decided_before_a_pause_is_dropped():
+async def test_a_goal_after_its_deadline_is_dropped():
     async with noting_bridge() as bridge, Noting() as noting:
         key = noting.attach(spec(bridge_url=bridge.url, goal_topic="/goal"))
         await noting.up("control", "tasks")
@@ -128,7 +128,7 @@ async def test_a_goal_that_was_decided_before_a_pause_is_dropped():
 
 
 @in_loop
-async def test_bridges_of_odometry_and_goals_may_be_others_than_that_of_velocity():
+async def test_odometry_and_goals_may_use_other_bridges_than_velocity():
     async with (
         noting_bridge() as a,
         noting_bridge() as b,
@@ -161,7 +161,7 @@ async def test_bridges_of_odometry_and_goals_may_be_others_than_that_of_velocity
 
 
 @in_loop
-async def test_of_two_robots_on_one_machine_the_other_stays_watched():
+async def test_removing_one_robot_of_a_machine_keeps_the_other_robot_watched():
     async with noting_bridge() as bridge, Noting() as noting:
         first = spec(bridge_url=bridge.url, odometry_topic="/odom")
         second = spec(bridge_url=bridge.url, odometry_topic="/odom2", id="r2")
@@ -185,7 +185,7 @@ async def test_of_two_robots_on_one_machine_the_other_stays_watched():
 
 
 @in_loop
-async def test_a_robot_that_is_declared_anew_is_watched_on_and_its_goal_followed():
+async def test_a_new_declaration_ends_only_the_subscriptions_of_a_changed_action():
     async with noting_bridge() as bridge, Noting() as noting:
         robot = spec(
             bridge_url=bridge.url,
@@ -212,7 +212,7 @@ def _fields(robot):
 
 
 @in_loop
-async def test_goals_poses_and_cancels_go_where_the_robot_takes_them():
+async def test_goals_poses_and_cancels_are_sent_to_the_topics_of_the_robot():
     async with noting_bridge() as bridge, Noting() as noting:
         robot = spec(bridge_url=bridge.url, pose_topic="/initialpose")
         key = noting.attach(robot)
@@ -230,7 +230,7 @@ async def test_goals_poses_and_cancels_go_where_the_robot_takes_them():
 
 
 @in_loop
-async def test_a_cancel_gets_through_though_its_link_is_wanted_no_longer():
+async def test_a_cancel_is_still_sent_when_the_goals_move_to_another_bridge():
     """By topic and by service: the goals go elsewhere in the same breath."""
     async with noting_bridge() as old, noting_bridge() as new, Noting() as noting:
         robot = spec(bridge_url=new.url, goal_url=old.url, action="/go")
@@ -247,7 +247,7 @@ async def test_a_cancel_gets_through_though_its_link_is_wanted_no_longer():
 
 
 @in_loop
-async def test_of_each_link_that_is_wanted_no_longer_it_is_told_that_it_is_down():
+async def test_every_link_that_is_no_longer_needed_is_reported_as_down():
     async with noting_bridge() as bridge, Noting() as noting:
         key = noting.attach(spec(bridge_url=bridge.url, odometry_topic="/odom"))
         await noting.up("control", "odometry", "tasks")
@@ -257,7 +257,7 @@ async def test_of_each_link_that_is_wanted_no_longer_it_is_told_that_it_is_down(
 
 
 @in_loop
-async def test_what_stays_when_a_robot_is_declared_anew_is_not_announced_again():
+async def test_a_new_declaration_does_not_advertise_unchanged_topics_again():
     async with noting_bridge() as bridge, Noting() as noting:
         robot = spec(bridge_url=bridge.url)
         noting.attach(robot)
@@ -269,7 +269,7 @@ async def test_what_stays_when_a_robot_is_declared_anew_is_not_announced_again()
 
 
 @in_loop
-async def test_a_link_that_carries_nothing_is_cut_and_one_that_is_not_there_is_not():
+async def test_cut_link_cuts_and_reopens_an_existing_link_only():
     async with noting_bridge() as bridge, Noting() as noting:
         noting.do(actions.CutLink(bridge.url))
         assert noting.events == []
@@ -281,7 +281,7 @@ async def test_a_link_that_carries_nothing_is_cut_and_one_that_is_not_there_is_n
 
 
 @in_loop
-async def test_in_the_end_zero_goes_to_all_that_may_be_driven_and_to_nothing_else():
+async def test_zero_all_sends_zero_only_to_watched_machines_with_a_velocity_topic():
     async with noting_bridge() as bridge, Noting() as noting:
         watched = noting.attach(spec(bridge_url=bridge.url))
         noting.attach(spec(bridge_url=bridge.url, twist_topic="/idle", id="r2"))
@@ -303,7 +303,7 @@ async def test_in_the_end_zero_goes_to_all_that_may_be_driven_and_to_nothing_els
 
 
 @in_loop
-async def test_the_end_of_the_gate_is_the_end_of_every_link():
+async def test_closing_the_links_closes_every_socket_without_a_link_down_event():
     async with noting_bridge() as bridge:
         async with Noting() as noting:
             noting.attach(spec(bridge_url=bridge.url, odometry_topic="/odom"))
@@ -314,7 +314,7 @@ async def test_the_end_of_the_gate_is_the_end_of_every_link():
 
 
 @in_loop
-async def test_what_is_not_for_the_links_is_left_to_others():
+async def test_the_links_ignore_actions_for_other_parts():
     async with Noting() as noting:
         assert noting.do(actions.Unlock(Key("ws://x", "/cmd_vel"))) is None
         assert noting.events == []

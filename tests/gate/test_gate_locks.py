@@ -26,7 +26,7 @@ def locks(folder):
     locks.release(KEY)
 
 
-def test_a_machine_belongs_to_who_came_first(locks, folder):
+def test_the_first_gate_has_the_lock_of_a_machine_until_release(locks, folder):
     assert locks.acquire(KEY).held
     other = Locks(folder).acquire(KEY)
     assert (other.held, other.elsewhere) == (False, True)
@@ -37,7 +37,7 @@ def test_a_machine_belongs_to_who_came_first(locks, folder):
     second.release(KEY)
 
 
-def test_a_machine_of_this_computer_is_had_once_however_that_is_spelled(locks):
+def test_all_spellings_of_this_computer_share_one_lock(locks):
     one, two = (Key(f"ws://{h}:9090", "/cmd_vel") for h in ("127.0.0.1", "[::1]"))
     locks.acquire(KEY)
     assert locks.acquire(one).held
@@ -53,14 +53,14 @@ def test_a_machine_of_this_computer_is_had_once_however_that_is_spelled(locks):
     locks.release(two)
 
 
-def test_what_is_let_go_twice_or_never_was_had_is_no_matter(locks):
+def test_releasing_or_marking_a_lock_without_owning_the_lock_does_nothing(locks):
     locks.release(KEY)
     locks.mark(KEY, driven=True)
     assert locks.acquire(KEY).driven is False
 
 
 @pytest.mark.parametrize("driven", [True, False])
-def test_whether_it_was_being_driven_outlives_its_gate(locks, folder, driven):
+def test_the_driven_mark_is_kept_after_the_lock_is_released(locks, folder, driven):
     assert locks.acquire(KEY).driven is False
     locks.mark(KEY, driven)
     locks.release(KEY)
@@ -69,13 +69,13 @@ def test_whether_it_was_being_driven_outlives_its_gate(locks, folder, driven):
     assert text[1:] == " ws://robot:9090 /cmd_vel\n"
 
 
-def test_a_file_that_says_nothing_clear_means_that_it_was(locks, folder):
+def test_a_lock_file_with_invalid_content_means_driven(locks, folder):
     folder.mkdir(parents=True)
     path_of(folder, KEY, "lock").write_bytes(b"?")
     assert locks.acquire(KEY).driven is True
 
 
-def test_a_file_that_cannot_be_read_means_that_it_was(locks, monkeypatch):
+def test_an_unreadable_lock_file_means_driven(locks, monkeypatch):
     def fail(*_):
         raise OSError("broken")
 
@@ -84,7 +84,9 @@ def test_a_file_that_cannot_be_read_means_that_it_was(locks, monkeypatch):
         assert locks.acquire(KEY).driven is True
 
 
-def test_files_of_machines_that_rest_are_removed_and_no_others(locks, folder):
+def test_tidy_removes_only_lock_files_of_machines_neither_driven_nor_locked(
+    locks, folder
+):
     resting, driven, held = (Key(f"ws://robot:{n}", "/cmd_vel") for n in range(3))
     before = Locks(folder)
     for key in (resting, driven, held):
@@ -100,7 +102,7 @@ def test_files_of_machines_that_rest_are_removed_and_no_others(locks, folder):
     before.release(held)
 
 
-def test_a_file_that_cannot_be_removed_is_left(locks, folder, monkeypatch):
+def test_a_lock_file_that_cannot_be_removed_is_left(locks, folder, monkeypatch):
     locks.acquire(KEY)
     locks.release(KEY)
 
@@ -113,7 +115,7 @@ def test_a_file_that_cannot_be_removed_is_left(locks, folder, monkeypatch):
 
 
 @pytest.mark.parametrize("made_anew", [True, False])
-def test_a_file_that_is_removed_before_it_is_locked_is_no_lock(
+def test_a_lock_file_removed_before_locking_does_not_count_as_the_lock(
     locks, folder, monkeypatch, made_anew
 ):
     """Between opening and locking, as if another gate tidied up then."""
@@ -133,7 +135,9 @@ def test_a_file_that_is_removed_before_it_is_locked_is_no_lock(
     assert not Locks(folder).acquire(KEY).held
 
 
-def test_a_full_disk_stands_in_the_way_of_nothing(locks, monkeypatch, caplog):
+def test_a_full_disk_is_only_logged_when_a_machine_is_marked_as_driven(
+    locks, monkeypatch, caplog
+):
     locks.acquire(KEY)
 
     def fail(*_):
@@ -145,7 +149,7 @@ def test_a_full_disk_stands_in_the_way_of_nothing(locks, monkeypatch, caplog):
     assert "No space left on device" in caplog.text
 
 
-def test_a_folder_that_cannot_be_written_to_is_said(tmp_path):
+def test_a_lock_in_a_folder_that_is_not_writable_reports_the_reason(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
     state = Locks(blocked).acquire(KEY)
@@ -153,7 +157,7 @@ def test_a_folder_that_cannot_be_written_to_is_said(tmp_path):
     assert "cannot be written to" in state.why
 
 
-def test_the_folder_is_named_or_where_the_system_keeps_such_things(monkeypatch):
+def test_the_state_folder_comes_from_the_environment_or_the_system_default(monkeypatch):
     monkeypatch.setenv("WEBMAP_STATE_DIR", "/some/where")
     assert state_folder() == Path("/some/where")
     monkeypatch.delenv("WEBMAP_STATE_DIR")
@@ -161,11 +165,13 @@ def test_the_folder_is_named_or_where_the_system_keeps_such_things(monkeypatch):
     assert os.environ.get("WEBMAP_STATE_DIR") is None
 
 
-def test_the_clock_only_grows():
+def test_the_clock_never_goes_backwards():
     assert now() <= now()
 
 
-def test_a_file_that_was_made_anew_while_it_is_tidied_stays(tmp_path, monkeypatch):
+def test_tidy_keeps_a_lock_file_that_another_gate_has_just_locked(
+    tmp_path, monkeypatch
+):
     first = Locks(tmp_path)
     first.acquire(KEY)
     first.release(KEY)

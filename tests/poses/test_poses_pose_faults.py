@@ -35,7 +35,7 @@ def fussy(monkeypatch):
     return Fussy
 
 
-def test_a_failure_to_draw_anew_leaves_the_drawing_in_place_and_is_cleared(
+def test_a_failed_redraw_keeps_the_old_drawing_and_its_problem_is_cleared(
     fussy, monkeypatch
 ):
     async def script(stage):
@@ -89,7 +89,7 @@ def test_a_failure_to_draw_anew_leaves_the_drawing_in_place_and_is_cleared(
     play(script, monkeypatch)
 
 
-def test_a_jump_is_no_problem_of_a_robot_whose_source_a_listener_ends(monkeypatch):
+def test_no_jump_is_reported_after_a_listener_removed_the_pose_source(monkeypatch):
     class Ends:
         def __init__(self, robot):
             self.robot = robot

@@ -38,14 +38,14 @@ def at(x):
     return Transform(Vector3(x))
 
 
-def test_a_pose_is_taken_to_the_map_and_nothing_is_wrong(pipeline, frames):
+def test_a_pose_is_transformed_into_the_map_frame_without_problems(pipeline, frames):
     frames.buffer.add("map", "odom", at(10.0), 5.0)
     step = pipeline.step(reading(1.0, 5.0), frames, 100.0)
     assert step.pose == reading(11.0, 5.0, "map")
     assert (dict(step.problems), step.look_again) == ({}, None)
 
 
-def test_an_alignment_takes_it_on_to_the_common_map(pipeline, frames):
+def test_an_alignment_moves_a_pose_to_the_common_map(pipeline, frames):
     frames.buffer.add("map", "odom", at(10.0), 5.0)
     pipeline.alignment = Pose(0.0, 3.0, math.pi / 2)
     place = pipeline.step(reading(1.0, 5.0), frames, 100.0).pose.position
@@ -53,7 +53,7 @@ def test_an_alignment_takes_it_on_to_the_common_map(pipeline, frames):
     assert pipeline.newest == reading(11.0, 5.0, "map")
 
 
-def test_problems_are_the_same_object_until_one_of_them_changes(pipeline, frames):
+def test_problems_stay_the_same_object_until_a_problem_changes(pipeline, frames):
     steps = [
         pipeline.step(reading(0.0, 5.0 + n / 10), frames, 100.0 + n / 10)
         for n in range(12)
@@ -65,7 +65,7 @@ def test_problems_are_the_same_object_until_one_of_them_changes(pipeline, frames
     assert pipeline.step(reading(0.0, 6.2), frames, 101.2).problems is later
 
 
-def test_trouble_that_has_not_lasted_asks_for_another_look(pipeline, frames):
+def test_a_new_problem_is_checked_again_before_the_report(pipeline, frames):
     frames.complete_from = 103.0
     assert pipeline.step(reading(0.0, 5.0), frames, 100.0).look_again == 103.0
     step = pipeline.step(None, frames, 103.0)
@@ -74,14 +74,14 @@ def test_trouble_that_has_not_lasted_asks_for_another_look(pipeline, frames):
     assert step.problems.keys() == {"tf"}
 
 
-def test_without_a_topic_the_frames_have_the_base(pipeline, frames):
+def test_without_a_topic_the_pose_comes_from_the_base_frame(pipeline, frames):
     pipeline.restart(None)
     frames.buffer.add("map", "base_link", at(3.0), 5.0)
     assert pipeline.step(None, frames, 100.0).pose == reading(3.0, 5.0, "map")
     assert pipeline.step(None, frames, 100.1).pose is None, "that is no news"
 
 
-def test_where_the_robot_was_is_forgotten_when_poses_come_from_elsewhere(pipeline):
+def test_a_restart_of_the_pipeline_clears_the_pose_history(pipeline):
     pipeline.placing = None
     for n in range(3):
         pipeline.step(reading(n, 5.0 + n / 10), None, 100.0 + n / 10)
@@ -92,7 +92,7 @@ def test_where_the_robot_was_is_forgotten_when_poses_come_from_elsewhere(pipelin
         pipeline.at(5.15)
 
 
-def test_a_robot_is_told_of_problems_when_they_change_and_only_then(monkeypatch):
+def test_the_problems_of_a_robot_are_set_only_when_they_change(monkeypatch):
     class Link:
         url = name = "test"
         state, lag = "open", 0.0

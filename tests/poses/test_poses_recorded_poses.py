@@ -195,13 +195,13 @@ def compare(name, lines):
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
-def test_a_script_is_drawn_as_recorded(name, monkeypatch):
+def test_a_scripted_scenario_matches_its_recording(name, monkeypatch):
     robots = ("Ann", "Bob") if SCRIPTS[name] is aligned_and_shared else ("Bob",)
     compare(name, play(SCRIPTS[name], monkeypatch, *robots))
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_whatever_comes_is_drawn_as_recorded(seed, monkeypatch):
+def test_a_random_scenario_matches_its_recording(seed, monkeypatch):
     async def script(stage):
         await Chance(stage, seed).go(120)
 

@@ -23,19 +23,19 @@ def received():
     return received
 
 
-def test_a_silence_is_said_once_when_it_has_lasted(received):
+def test_a_silence_is_reported_after_the_limit(received):
     assert received.look(100.0 + LIMIT - 0.1, linked=True) is None
     assert received.look(100.0 + LIMIT, linked=True) == LIMIT
 
 
-def test_the_pose_after_a_silence_that_was_said_tells_how_long_it_was(received):
+def test_the_first_pose_after_a_reported_silence_gives_the_length_of_silence(received):
     assert received.record(102.0) is None
     received.look(106.0, linked=True)
     assert received.record(114.0) == 12.0
     assert received.record(115.0) is None
 
 
-def test_while_the_link_is_away_nothing_is_said_and_then_poses_have_time_to_come(
+def test_no_silence_is_reported_during_a_link_loss_and_shortly_after(
     received,
 ):
     assert received.look(110.0, linked=False) is None
@@ -43,7 +43,7 @@ def test_while_the_link_is_away_nothing_is_said_and_then_poses_have_time_to_come
     assert received.look(113.0, linked=True) == 13.0
 
 
-def test_a_robot_that_flickers_is_said_once_a_minute_at_most():
+def test_repeated_silences_are_reported_at_most_once_per_minute():
     flickering, said, again = Silence(), [], []
     for start in range(0, 600, 5):
         if flickering.record(float(start)) is not None:
@@ -54,7 +54,7 @@ def test_a_robot_that_flickers_is_said_once_a_minute_at_most():
     assert again == [start + 5 for start in said]
 
 
-def test_a_silence_that_lasts_is_said_also_soon_after_another(received):
+def test_a_second_lasting_silence_is_reported_one_minute_after_the_first(received):
     received.look(103.0, linked=True)
     received.record(104.0)
     assert received.look(110.0, linked=True) is None
@@ -62,7 +62,7 @@ def test_a_silence_that_lasts_is_said_also_soon_after_another(received):
     assert received.look(103.0 + AGAIN, linked=True) == AGAIN - 1.0
 
 
-def test_a_topic_that_is_slow_on_purpose_has_longer(received):
+def test_the_silence_limit_can_be_longer_for_a_slow_topic(received):
     received.limit = 25.0
     assert received.look(124.0, linked=True) is None
     assert received.look(125.0, linked=True) == 25.0
@@ -138,9 +138,7 @@ def follow(robot, link, topic="/odom", type="nav_msgs/Odometry"):
     robot.set_odometry_topic(link, topic, throttle=0, type=type)
 
 
-def test_a_robot_whose_odometry_ceases_has_a_line_in_the_log_and_one_when_it_is_back(
-    robots, link, log
-):
+def test_the_end_and_the_return_of_odometry_are_each_logged_once(robots, link, log):
     async def scenario() -> None:
         follow(robots[1], link)
         link.say("/odom", ODOM)
@@ -156,7 +154,7 @@ def test_a_robot_whose_odometry_ceases_has_a_line_in_the_log_and_one_when_it_is_
     ]
 
 
-def test_a_process_that_stood_still_blames_no_robot(robots, link, log, monkeypatch):
+def test_a_blocked_process_reports_no_robot_as_silent(robots, link, log, monkeypatch):
     monkeypatch.setattr(silence, "LATE", 0.1)
 
     async def scenario() -> None:
@@ -171,7 +169,7 @@ def test_a_process_that_stood_still_blames_no_robot(robots, link, log, monkeypat
     assert log.messages == []
 
 
-def test_a_robot_that_is_gone_or_is_heard_elsewhere_now_is_not_called_silent(
+def test_a_destroyed_robot_or_a_replaced_topic_is_not_reported_as_silent(
     robots, link, log
 ):
     ann, bob = robots
@@ -190,7 +188,7 @@ def test_a_robot_that_is_gone_or_is_heard_elsewhere_now_is_not_called_silent(
     assert line.startswith("Ann: no pose")
 
 
-def test_a_pose_that_comes_only_while_a_robot_moves_is_not_missed(robots, link, log):
+def test_an_amcl_pose_topic_is_not_reported_as_silent(robots, link, log):
     ann, bob = robots
 
     async def scenario() -> None:
@@ -206,7 +204,9 @@ def test_a_pose_that_comes_only_while_a_robot_moves_is_not_missed(robots, link, 
     assert line.startswith("Ann: no pose")
 
 
-def test_a_robot_that_is_found_by_its_frames_alone_is_missed_too(robots, link, log):
+def test_a_robot_without_odometry_is_reported_when_its_frames_fall_silent(
+    robots, link, log
+):
     bob = robots[1]
     transform = {
         "header": HEADER,

@@ -111,7 +111,7 @@ def received(monkeypatch):
     return run
 
 
-def test_a_base_that_starts_after_the_link_is_open_is_declared_with_its_type(received):
+def test_a_velocity_type_found_later_is_declared_to_the_gate(received):
     async def scenario(robot, link, time):
         await time.passes()
         link.type = STAMPED
@@ -121,7 +121,7 @@ def test_a_base_that_starts_after_the_link_is_open_is_declared_with_its_type(rec
     assert received(scenario)[:3] == ["geometry_msgs/Twist", STAMPED, "forgotten"]
 
 
-def test_until_it_is_known_the_type_is_said_to_be_assumed(received):
+def test_an_unknown_velocity_type_is_marked_as_assumed(received):
     async def scenario(robot, link, time):
         assert robot.motion.spec().twist_type_assumed
         link.type = "geometry_msgs/Twist"
@@ -135,7 +135,7 @@ def test_until_it_is_known_the_type_is_said_to_be_assumed(received):
     received(scenario)
 
 
-def test_it_is_asked_for_soon_at_first_and_then_rarely(received):
+def test_the_type_is_requested_often_at_first_and_then_rarely(received):
     async def scenario(robot, link, time):
         for _ in range(FEW + 3):
             await time.passes()
@@ -145,7 +145,7 @@ def test_it_is_asked_for_soon_at_first_and_then_rarely(received):
     received(scenario)
 
 
-def test_a_rosapi_that_takes_long_to_answer_is_asked_more_rarely(received, monkeypatch):
+def test_a_slow_rosapi_is_asked_less_often(received, monkeypatch):
     async def scenario(robot, link, time):
         clock = SimpleNamespace(monotonic=iter([0.0, 5.0]).__next__)
         with monkeypatch.context() as patch:
@@ -156,7 +156,7 @@ def test_a_rosapi_that_takes_long_to_answer_is_asked_more_rarely(received, monke
     received(scenario)
 
 
-def test_what_is_known_is_asked_for_no_more(received):
+def test_a_known_type_is_not_requested_again(received):
     async def scenario(robot, link, time):
         link.type = STAMPED
         await time.passes()
@@ -176,7 +176,7 @@ def test_what_is_known_is_asked_for_no_more(received):
         lambda robot, link: setattr(link, "state", "connecting"),
     ],
 )
-def test_nobody_asks_for_a_topic_that_is_gone_or_over_a_link_that_is_down(
+def test_no_type_is_requested_for_a_removed_or_typed_topic_or_on_a_closed_link(
     received, end
 ):
     async def scenario(robot, link, time):
@@ -189,7 +189,7 @@ def test_nobody_asks_for_a_topic_that_is_gone_or_over_a_link_that_is_down(
     received(scenario)
 
 
-def test_a_link_that_opens_anew_is_asked_at_once_and_once(received):
+def test_a_reopened_link_triggers_one_immediate_type_request(received):
     async def scenario(robot, link, time):
         link.state = "connecting"
         await time.passes()
@@ -202,7 +202,7 @@ def test_a_link_that_opens_anew_is_asked_at_once_and_once(received):
     received(scenario)
 
 
-def test_a_type_that_was_known_holds_while_the_base_is_away(received):
+def test_a_known_type_is_kept_while_the_base_is_away(received):
     async def scenario(robot, link, time):
         link.type = STAMPED
         await time.passes()
@@ -217,7 +217,7 @@ def test_a_type_that_was_known_holds_while_the_base_is_away(received):
     received(scenario)
 
 
-def test_an_answer_of_a_topic_that_was_set_anew_meanwhile_counts_no_more(received):
+def test_a_late_type_answer_for_a_replaced_topic_is_ignored(received):
     async def scenario(robot, link, time):
         late = asyncio.get_running_loop().create_future()
         link.topic_type = lambda topic: late
@@ -230,7 +230,7 @@ def test_an_answer_of_a_topic_that_was_set_anew_meanwhile_counts_no_more(receive
     received(scenario)
 
 
-def test_a_rosapi_that_comes_up_after_rosbridge_is_asked_too(monkeypatch):
+def test_a_rosapi_that_starts_after_rosbridge_is_asked_for_the_type(monkeypatch):
     monkeypatch.setattr("webmap.poses.type_query.SOON", 0.05)
 
     async def scenario():

@@ -47,7 +47,7 @@ def test_a_wrong_address_is_refused_at_once():
         Bridge("localhost:9090")
 
 
-def test_before_the_start_everything_is_only_recorded():
+def test_before_its_start_a_bridge_stores_subscriptions_and_refuses_publishing():
     bridge = Bridge("WS://LocalHost:9/")
     bridge.subscribe("/a", print)
     assert bridge.url == "ws://localhost:9"
@@ -73,7 +73,7 @@ def test_a_message_reaches_its_listener_as_a_plain_mapping():
     run(scenario)
 
 
-def test_the_typed_message_has_the_fields_that_were_asked_for():
+def test_a_message_is_decoded_to_the_requested_type():
     async def scenario():
         got = []
         async with bridged() as (server, bridge):
@@ -95,7 +95,7 @@ def test_the_typed_message_has_the_fields_that_were_asked_for():
 
 
 @pytest.mark.parametrize("type", ["sensor_msgs/LaserScan", "sensor_msgs/msg/LaserScan"])
-def test_scans_are_asked_for_in_cbor_under_the_name_every_bridge_knows(type):
+def test_scans_are_subscribed_in_cbor_with_the_ros1_type_name(type):
     async def scenario():
         got = []
         async with bridged() as (server, bridge):
@@ -113,7 +113,7 @@ def test_scans_are_asked_for_in_cbor_under_the_name_every_bridge_knows(type):
     run(scenario)
 
 
-def test_two_listeners_share_one_subscription_and_one_decode():
+def test_two_listeners_share_one_subscription_and_one_decoded_message():
     async def scenario():
         one, two, plain = [], [], []
         async with bridged() as (server, bridge):
@@ -130,7 +130,7 @@ def test_two_listeners_share_one_subscription_and_one_decode():
     run(scenario)
 
 
-def test_ending_one_subscription_never_silences_another():
+def test_removing_one_listener_does_not_silence_another_listener():
     async def scenario():
         one, two = [], []
         async with bridged() as (server, bridge):
@@ -150,7 +150,7 @@ def test_ending_one_subscription_never_silences_another():
     run(scenario)
 
 
-def test_the_wire_has_the_lowest_throttle_of_its_listeners():
+def test_the_subscription_uses_the_lowest_throttle_of_its_listeners():
     async def scenario():
         async with bridged() as (server, bridge):
             bridge.subscribe("/chatter", print, throttle=500)
@@ -168,7 +168,7 @@ def test_the_wire_has_the_lowest_throttle_of_its_listeners():
     run(scenario)
 
 
-def test_each_listener_has_its_own_throttle_and_gets_the_newest_in_the_end():
+def test_each_listener_has_its_own_throttle_and_receives_the_last_message():
     async def scenario():
         every, some = [], []
         async with bridged() as (server, bridge):
@@ -184,7 +184,7 @@ def test_each_listener_has_its_own_throttle_and_gets_the_newest_in_the_end():
     run(scenario)
 
 
-def test_a_topic_that_nobody_wants_is_ignored():
+def test_a_message_on_an_unsubscribed_topic_is_ignored():
     async def scenario():
         got = []
         async with bridged() as (server, bridge):
@@ -197,7 +197,7 @@ def test_a_topic_that_nobody_wants_is_ignored():
     run(scenario)
 
 
-def test_a_listener_that_joins_late_gets_the_message_that_comes_only_once():
+def test_a_late_listener_receives_the_last_map():
     async def scenario():
         early, late = [], []
         async with bridged() as (server, bridge):
@@ -213,7 +213,7 @@ def test_a_listener_that_joins_late_gets_the_message_that_comes_only_once():
     run(scenario)
 
 
-def test_a_callback_that_raises_is_reported_and_harms_nobody(caplog):
+def test_a_raising_callback_is_reported_and_other_callbacks_still_run(caplog):
     async def scenario():
         errors, got = [], []
 
@@ -254,7 +254,7 @@ def test_a_callback_may_be_a_coroutine_function():
     run(scenario)
 
 
-def test_what_a_callback_makes_belongs_to_the_scope_it_was_added_in():
+def test_a_subscription_made_in_a_callback_belongs_to_the_callback_scope():
     async def scenario():
         scope = Scope("page")
         async with bridged() as (server, bridge):
@@ -272,7 +272,7 @@ def test_what_a_callback_makes_belongs_to_the_scope_it_was_added_in():
     run(scenario)
 
 
-def test_listeners_to_the_link_end_with_their_scope():
+def test_link_callbacks_are_removed_with_their_scope():
     bridge = Bridge("ws://localhost:9")
     scope = Scope()
     with scope.active():
@@ -284,7 +284,7 @@ def test_listeners_to_the_link_end_with_their_scope():
     assert len(bridge._on_open) == len(bridge._on_error) == 0
 
 
-def test_a_message_of_another_type_is_told_once_with_both_types():
+def test_a_message_of_the_wrong_type_is_reported_once_with_both_types():
     async def scenario():
         errors, got = [], []
         async with bridged(topic_type={"type": "std_msgs/Bool"}) as (server, bridge):
@@ -315,7 +315,7 @@ class Shown:
         self.standing[about] = text
 
 
-def test_messages_that_make_no_sense_are_said_until_they_make_sense_again():
+def test_undecodable_messages_are_a_problem_until_a_message_decodes_again():
     async def scenario():
         errors, got, plain, shown = [], [], [], Shown()
         async with bridged(topic_type={"type": "std_msgs/Bool"}) as (server, bridge):
@@ -343,7 +343,7 @@ def test_messages_that_make_no_sense_are_said_until_they_make_sense_again():
     run(scenario)
 
 
-def test_what_nobody_who_listens_wants_any_more_is_taken_back():
+def test_a_decoding_problem_is_cleared_with_the_last_listener_of_that_type():
     async def scenario():
         got, shown, other = [], Shown(), Scope("other")
         async with bridged(topic_type={"type": "std_msgs/Bool"}) as (server, bridge):
@@ -359,7 +359,7 @@ def test_what_nobody_who_listens_wants_any_more_is_taken_back():
     run(scenario)
 
 
-def test_what_was_wrong_on_a_link_is_taken_back_on_the_next(fast):
+def test_a_lost_link_clears_a_decoding_problem_until_the_next_wrong_message(fast):
     async def scenario():
         shown = Shown()
         async with bridged(topic_type={"type": "std_msgs/Bool"}) as (server, bridge):
@@ -376,7 +376,7 @@ def test_what_was_wrong_on_a_link_is_taken_back_on_the_next(fast):
     run(scenario)
 
 
-def test_silence_that_was_explained_is_taken_back_by_what_comes(monkeypatch):
+def test_the_problem_of_a_silent_topic_is_cleared_by_its_next_message(monkeypatch):
     monkeypatch.setattr("webmap.ros.topic_faults.SILENCE", 0.02)
 
     async def scenario():
@@ -393,7 +393,7 @@ def test_silence_that_was_explained_is_taken_back_by_what_comes(monkeypatch):
     run(scenario)
 
 
-def test_silence_under_a_wrong_type_is_explained(monkeypatch):
+def test_a_topic_that_is_silent_because_of_a_wrong_type_is_reported(monkeypatch):
     monkeypatch.setattr("webmap.ros.topic_faults.SILENCE", 0.02)
 
     async def scenario():
@@ -408,7 +408,7 @@ def test_silence_under_a_wrong_type_is_explained(monkeypatch):
     run(scenario)
 
 
-def test_two_types_for_one_topic_are_refused():
+def test_two_types_or_encodings_for_one_topic_are_refused():
     bridge = Bridge("ws://localhost:9")
     bridge.subscribe("/a", print, "std_msgs/String")
     bridge.subscribe("/a", print, "std_msgs/msg/String")
@@ -421,7 +421,7 @@ def test_two_types_for_one_topic_are_refused():
 @pytest.mark.parametrize(
     "wrong", [{"throttle": -1}, {"throttle": 0.5}, {"decode": dict}, {"type": "x"}]
 )
-def test_arguments_that_make_no_sense_are_refused(wrong):
+def test_invalid_subscribe_arguments_are_refused(wrong):
     bridge = Bridge("ws://localhost:9")
     with pytest.raises(ConfigError):
         bridge.subscribe("/a", print, **wrong)
@@ -429,7 +429,7 @@ def test_arguments_that_make_no_sense_are_refused(wrong):
         bridge.subscribe("/a", "no function")
 
 
-def test_garbage_is_reported_once_and_the_link_goes_on():
+def test_garbage_is_reported_once_and_the_link_stays_open():
     async def scenario():
         errors, got = [], []
         async with bridged() as (server, bridge):
@@ -446,7 +446,7 @@ def test_garbage_is_reported_once_and_the_link_goes_on():
     run(scenario)
 
 
-def test_a_status_of_the_bridge_is_reported():
+def test_an_error_status_of_the_bridge_is_reported():
     async def scenario():
         errors = []
         async with bridged() as (server, bridge):
@@ -476,7 +476,7 @@ def test_statuses_of_a_hostile_bridge_do_not_forge_or_flood_the_log(caplog):
     assert all(one.isprintable() and len(one) < 1200 for one in said)
 
 
-def test_publishing_advertises_first_and_once():
+def test_publishing_advertises_the_topic_once_before_the_first_message():
     async def scenario():
         async with bridged() as (server, bridge):
             bridge.publish("/a", {"data": "1"}, "std_msgs/msg/String")
@@ -509,7 +509,7 @@ def test_publishing_advertises_first_and_once():
         " geometry_msgs/msg/TwistStamped",
     ],
 )
-def test_velocity_is_refused_whether_the_link_is_open_or_not(type):
+def test_publishing_a_velocity_is_refused_on_open_and_closed_links(type):
     async def scenario():
         async with bridged() as (server, bridge):
             with pytest.raises(MotionRefused, match="gate"):
@@ -523,7 +523,7 @@ def test_velocity_is_refused_whether_the_link_is_open_or_not(type):
         Bridge("ws://localhost:9").publish("/anything", {}, type)
 
 
-def test_a_topic_whose_type_is_known_to_be_a_velocity_is_refused_under_any_name():
+def test_publishing_to_a_known_velocity_topic_is_refused_for_any_stated_type():
     async def scenario():
         async with bridged(topic_type={"type": "geometry_msgs/Twist"}) as (_, bridge):
             assert await bridge.topic_type("/cmd_vel") == "geometry_msgs/Twist"
@@ -534,7 +534,7 @@ def test_a_topic_whose_type_is_known_to_be_a_velocity_is_refused_under_any_name(
     run(scenario)
 
 
-def test_a_protected_topic_is_refused_and_taken_back():
+def test_a_protected_topic_is_unadvertised_and_refuses_publishing():
     async def scenario():
         async with bridged() as (server, bridge):
             bridge.publish("/goal", {}, "geometry_msgs/PoseStamped")
@@ -548,7 +548,7 @@ def test_a_protected_topic_is_refused_and_taken_back():
     run(scenario)
 
 
-def test_a_topic_is_refused_with_what_it_carries_and_what_to_use_instead():
+def test_the_refusal_of_a_protected_topic_names_its_content_and_the_alternative():
     async def scenario():
         async with bridged() as (_, bridge):
             for topic, carries, instead in (
@@ -567,7 +567,7 @@ def test_a_topic_is_refused_with_what_it_carries_and_what_to_use_instead():
     run(scenario)
 
 
-def test_a_topic_is_protected_on_every_bridge_of_the_address():
+def test_a_topic_is_protected_on_every_bridge_with_the_same_address():
     one, other = Bridge("ws://one.test:9"), Bridge("ws://ONE.test:9/")
     elsewhere = Bridge("ws://other.test:9")
     one.protect("/goal")
@@ -578,7 +578,7 @@ def test_a_topic_is_protected_on_every_bridge_of_the_address():
         elsewhere.publish("/goal", {}, "geometry_msgs/PoseStamped")
 
 
-def test_publishing_while_closed_raises_and_nothing_is_sent_later(fast):
+def test_publishing_on_a_closed_link_raises_and_sends_nothing_later(fast):
     async def scenario():
         async with bridged() as (server, bridge):
             await server.stop()
@@ -594,7 +594,7 @@ def test_publishing_while_closed_raises_and_nothing_is_sent_later(fast):
     run(scenario)
 
 
-def test_after_a_lost_link_everything_is_asked_for_again(fast):
+def test_after_a_reconnect_topics_are_advertised_and_subscribed_again(fast):
     async def scenario():
         opened, closed, got = [], [], []
         async with bridged() as (server, bridge):
@@ -619,7 +619,7 @@ def test_after_a_lost_link_everything_is_asked_for_again(fast):
     run(scenario)
 
 
-def test_a_bridge_that_is_not_there_is_reported_and_tried_again(fast):
+def test_an_unreachable_bridge_is_reported_and_retried(fast):
     async def scenario():
         server = FakeRosbridge()
         await server.start()
@@ -640,7 +640,7 @@ def test_a_bridge_that_is_not_there_is_reported_and_tried_again(fast):
     run(scenario)
 
 
-def test_a_link_that_does_not_answer_pings_is_dead(fast):
+def test_a_link_without_answers_to_pings_is_closed_and_reopened(fast):
     async def scenario():
         reasons = []
         async with bridged() as (server, bridge):
@@ -655,7 +655,7 @@ def test_a_link_that_does_not_answer_pings_is_dead(fast):
     run(scenario)
 
 
-def test_a_silent_robot_over_a_live_link_is_not_dead(fast):
+def test_a_link_without_data_stays_open_while_pings_are_answered(fast):
     async def scenario():
         reasons = []
         async with bridged() as (_, bridge):
@@ -667,7 +667,7 @@ def test_a_silent_robot_over_a_live_link_is_not_dead(fast):
     run(scenario)
 
 
-def test_a_callback_that_blocks_does_not_make_the_link_look_dead(fast, monkeypatch):
+def test_a_blocking_callback_does_not_close_the_link(fast, monkeypatch):
     monkeypatch.setattr("webmap.ros.rosbridge.connection.LOOK_PERIOD", 0.05)
 
     async def scenario():
@@ -686,7 +686,7 @@ def test_a_callback_that_blocks_does_not_make_the_link_look_dead(fast, monkeypat
     run(scenario)
 
 
-def test_a_link_that_takes_nothing_refuses_more_instead_of_piling_it_up():
+def test_publishing_is_refused_when_the_bridge_stops_reading():
     async def scenario():
         async with bridged() as (server, bridge):
             server.links[0].transport.pause_reading()
@@ -707,7 +707,7 @@ def test_a_link_that_takes_nothing_refuses_more_instead_of_piling_it_up():
     run(scenario)
 
 
-def test_a_service_answers_on_a_socket_of_its_own():
+def test_service_calls_use_a_separate_socket():
     async def scenario():
         async with bridged(get_time={"time": {"sec": 5}}) as (server, bridge):
             assert len(server.links) == 1
@@ -722,7 +722,7 @@ def test_a_service_answers_on_a_socket_of_its_own():
     run(scenario)
 
 
-def test_a_service_that_never_answers_holds_up_neither_data_nor_other_calls():
+def test_an_unanswered_service_call_blocks_neither_data_nor_other_calls():
     async def scenario():
         got = []
         async with bridged(get_time={"t": 1}) as (server, bridge):
@@ -744,7 +744,7 @@ def test_a_service_that_never_answers_holds_up_neither_data_nor_other_calls():
     run(scenario)
 
 
-def test_a_call_whose_link_ends_fails_at_once():
+def test_a_service_call_fails_at_once_when_its_link_ends():
     async def scenario():
         async with bridged() as (server, bridge):
             server.answer["/hangs"] = None
@@ -759,7 +759,7 @@ def test_a_call_whose_link_ends_fails_at_once():
     run(scenario)
 
 
-def test_a_call_to_a_bridge_that_is_not_there_fails():
+def test_a_service_call_to_an_unreachable_bridge_fails():
     async def scenario():
         server = FakeRosbridge()
         await server.start()
@@ -770,7 +770,7 @@ def test_a_call_to_a_bridge_that_is_not_there_fails():
     run(scenario)
 
 
-def test_stopping_ends_calls_under_way():
+def test_stopping_a_bridge_fails_its_pending_service_calls():
     async def scenario():
         async with bridged() as (server, bridge):
             server.answer["/hangs"] = None
@@ -784,7 +784,7 @@ def test_stopping_ends_calls_under_way():
     run(scenario)
 
 
-def test_types_are_asked_of_rosapi_and_remembered_for_the_link(fast):
+def test_topic_types_are_requested_from_rosapi_and_cached_per_link(fast):
     async def scenario():
         async with bridged(topic_type={"type": "nav_msgs/Odometry"}) as (
             server,
@@ -806,7 +806,7 @@ def test_types_are_asked_of_rosapi_and_remembered_for_the_link(fast):
 
 
 @pytest.mark.parametrize("folder", ["ros1", "ros2", "rs"])
-def test_topics_are_told_from_captured_answers(folder):
+def test_topics_are_parsed_from_captured_rosapi_responses(folder):
     (path,) = list(
         (CAPTURED / folder).glob("service_response_rosapi_topics.[ur]*.json")
     )
@@ -827,7 +827,7 @@ def test_topics_are_told_from_captured_answers(folder):
     "answer",
     ["no such service", {"action_servers": 5}, {"action_servers": ["/go/follow_path"]}],
 )
-def test_of_hidden_topics_only_those_of_known_actions_are_told(answer):
+def test_hidden_topics_are_listed_only_for_known_actions(answer):
     """ROS 2's rosapi lists none of an action's topics, but it names the servers."""
     listed = {"topics": ["/a"], "types": ["std_msgs/msg/Bool"]}
 
@@ -847,7 +847,7 @@ def test_of_hidden_topics_only_those_of_known_actions_are_told(answer):
     run(scenario)
 
 
-def test_a_call_from_the_bridge_is_declined():
+def test_a_service_call_from_the_bridge_is_declined():
     async def scenario():
         async with bridged() as (server, _):
             call = {"op": "call_service", "service": "/x", "id": "1", "args": {}}
@@ -895,7 +895,7 @@ def test_a_stopped_bridge_can_start_again():
     run(scenario)
 
 
-def test_a_thousand_listeners_leave_nothing_behind():
+def test_a_thousand_removed_listeners_leave_no_topics_and_no_tasks():
     async def scenario():
         async with bridged() as (server, bridge):
             tasks = len(asyncio.all_tasks())

@@ -50,7 +50,7 @@ def of_catalogue(definition):
 @pytest.mark.parametrize(
     ("release", "least"), [("ROS1_NOETIC", 70), ("ROS2_HUMBLE", 70), ("ROS2_JAZZY", 70)]
 )
-def test_every_definition_is_as_rosbags_has_it(release, least):
+def test_every_shipped_definition_matches_rosbags(release, least):
     store, known = get_typestore(Stores[release]), shipped(ros2="ROS2" in release)
     newer = NEWER if release == "ROS2_JAZZY" else {}
     compared = 0
@@ -69,7 +69,7 @@ def test_every_definition_is_as_rosbags_has_it(release, least):
 
 
 @pytest.mark.parametrize("ros2", [False, True])
-def test_every_type_of_the_catalogue_can_be_read_whole(ros2):
+def test_every_type_of_the_catalogue_has_a_complete_definition(ros2):
     known = shipped(ros2=ros2)
     for name in known:
         assert known.definition(name).name == name
@@ -82,7 +82,7 @@ def test_a_type_is_found_in_either_spelling():
     assert request.name == "std_srvs/SetBoolRequest"
 
 
-def test_only_headers_of_ros1_are_numbered():
+def test_only_ros1_headers_have_a_sequence_number():
     names = [
         [
             field.name
@@ -105,7 +105,7 @@ def test_an_action_has_the_messages_of_its_dialect():
     assert [field.name for field in feedback.fields] == ["left"]
 
 
-def test_many_types_are_read_from_one_text_as_bags_hold_it():
+def test_a_bag_definition_text_with_several_types_is_split():
     rule = "=" * 80
     text = f"Joint[<=3] joints\nwstring<=5 name\n{rule}\nMSG: my_msgs/Joint\ntime at"
     texts = split_texts(text, "my_msgs/Arm", ros2=True)
@@ -115,18 +115,18 @@ def test_many_types_are_read_from_one_text_as_bags_hold_it():
     assert (name.type, name.longest) == ("string", 5)
 
 
-def test_texts_from_elsewhere_count_more_than_the_shipped_ones():
+def test_given_definitions_override_shipped_definitions():
     mine = Definitions({"std_msgs/Bool": "uint8 data"}, ros2=True)
     assert mine.definition("std_msgs/msg/Bool").fields[0].type == "uint8"
     assert shipped(ros2=True).definition("std_msgs/Bool").fields[0].type == "bool"
 
 
-def test_a_type_that_holds_itself_is_refused():
+def test_a_type_that_contains_itself_is_refused():
     texts = {"my_msgs/A": "B b", "my_msgs/B": "A[] a"}
     with pytest.raises(ConfigError, match="nested too deep: in my_msgs/A, my_msgs/B"):
         Definitions(texts, ros2=True).definition("my_msgs/A")
 
 
-def test_a_part_that_nobody_knows_is_named():
+def test_an_unknown_field_type_is_named_in_the_error():
     with pytest.raises(UnknownType, match="fields of my_msgs/B are not known"):
         Definitions({"my_msgs/A": "B b"}, ros2=True).definition("my_msgs/A")

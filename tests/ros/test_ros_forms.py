@@ -26,7 +26,7 @@ def fields(text: str, **others: str):
 
 
 @pytest.mark.parametrize("ros2", [False, True])
-def test_every_shipped_definition_is_whole_and_its_defaults_fit_it(ros2):
+def test_the_default_message_of_every_shipped_definition_is_valid(ros2):
     known = shipped(ros2=ros2)
     assert len(list(known)) > 100
     for type in known:
@@ -37,17 +37,17 @@ def test_every_shipped_definition_is_whole_and_its_defaults_fit_it(ros2):
         assert set(entries) == {way for way, _ in leaves(form)}
 
 
-def test_nobody_fills_in_the_number_of_a_header():
+def test_a_form_has_no_field_for_the_sequence_number_of_a_header():
     assert [way for way, _ in leaves(fields_of("nav_msgs/Path"))] == [
         "header.stamp", "header.frame_id", "poses",
     ]  # fmt: skip
 
 
-def test_a_type_is_known_in_both_dialects():
+def test_a_type_is_known_in_the_spelling_of_both_dialects():
     assert fields_of("std_msgs/Bool") == fields_of("std_msgs/msg/Bool")
 
 
-def test_what_is_left_out_has_the_default_of_the_definition():
+def test_omitted_fields_get_the_default_of_the_definition():
     form = fields("geometry_msgs/Quaternion q\nint8 n -3\nstring s 'none'\nbool b true",
                   geometry_msgs__Quaternion="float64 x 0\nfloat64 w 1")  # fmt: skip
     assert initial(form, {"q": {"x": 0.5}}) == {
@@ -55,7 +55,7 @@ def test_what_is_left_out_has_the_default_of_the_definition():
     }  # fmt: skip
 
 
-def test_entries_become_the_message():
+def test_form_entries_are_converted_to_the_message():
     form = fields(
         "uint8 n\nfloat32 f\nbool b\nstring s\nfloat64[3] v\nint16[] list\ntime t\n"
         "In inner\nIn[] more",
@@ -101,7 +101,9 @@ def test_entries_become_the_message():
         ("string n", "x" * 10_001, "n: at most 10000 characters"),
     ],
 )  # fmt: skip
-def test_an_entry_that_does_not_fit_names_its_field(definition, entry, words):
+def test_an_invalid_entry_raises_an_error_that_names_the_field(
+    definition, entry, words
+):
     form = fields(definition, std_msgs__Bool="bool data")
     with pytest.raises(Misfit) as error:
         filled_in(form, {"n": entry})
@@ -109,12 +111,12 @@ def test_an_entry_that_does_not_fit_names_its_field(definition, entry, words):
 
 
 @pytest.mark.parametrize("given", [{"n": True}, {"n": None}, {"n": math.nan}, [1], "x"])
-def test_plain_data_is_checked_as_strictly(given):
+def test_plain_data_is_checked_as_strictly_as_form_entries(given):
     with pytest.raises(Misfit):
         checked(fields("int32 n"), given)
 
 
-def test_constants_are_names_for_the_values_of_their_field():
+def test_constants_are_assigned_to_the_field_whose_values_they_name():
     battery = {field.name: field for field in fields_of("sensor_msgs/BatteryState")}
     assert battery["power_supply_health"].constants["POWER_SUPPLY_HEALTH_DEAD"] == 3
     assert len(battery["power_supply_status"].constants) == 5
@@ -125,7 +127,7 @@ def test_constants_are_names_for_the_values_of_their_field():
     assert list(level.constants) == ["OK", "WARN", "ERROR", "STALE"]
 
 
-def test_comments_and_text_constants_are_read_as_ros_reads_them():
+def test_comments_and_string_constants_are_parsed_as_in_ros():
     form = fields("# what it is\nstring A=x # y\nstring mode  # of them\nint8 B=0x10")
     (mode,) = form
     assert mode.constants == {"A": "x # y"}
@@ -141,11 +143,11 @@ def test_comments_and_text_constants_are_read_as_ros_reads_them():
         ("std_msgs/No no", "the fields of std_msgs/No are not known here"),
     ],
 )
-def test_a_definition_that_makes_no_sense_is_refused(text, words):
+def test_an_invalid_definition_is_refused(text, words):
     with pytest.raises(ConfigError, match=words):
         fields(text)
 
 
-def test_a_type_that_is_not_shipped_says_so():
+def test_a_type_without_a_shipped_definition_raises_unknown_type():
     with pytest.raises(UnknownType, match="my_msgs/Dock are not known"):
         fields_of("my_msgs/srv/Dock")

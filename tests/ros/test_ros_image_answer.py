@@ -25,12 +25,12 @@ def fed(answer, data: bytes, size: int) -> list[bytes]:
 
 
 @given(size=st.integers(1, len(STREAM)))
-def test_a_stream_gives_its_pictures_however_it_is_cut(size):
+def test_a_stream_gives_the_same_pictures_for_any_chunk_size(size):
     assert fed(Answer(), STREAM, size) == [ONE, TWO]
 
 
 @given(size=st.integers(1, 700))
-def test_pictures_without_a_stated_length_end_at_the_boundary(size):
+def test_pictures_without_a_content_length_end_at_the_boundary(size):
     body = b"".join(
         b"--x\nContent-Type: image/jpeg\n\n" + picture + b"\r\n"
         for picture in (ONE, TWO)
@@ -38,12 +38,12 @@ def test_pictures_without_a_stated_length_end_at_the_boundary(size):
     assert fed(Multipart("x"), body + b"--x\n", size) == [ONE, TWO]
 
 
-def test_the_dashes_before_a_boundary_may_stand_in_its_name_too():
+def test_the_boundary_name_may_include_the_leading_dashes():
     body = b"--here\r\nContent-Length: %d\r\n\r\n%s\r\n--here" % (len(ONE), ONE)
     assert Multipart('"--here"').feed(body) == [ONE]
 
 
-def test_a_single_picture_needs_no_stated_length():
+def test_a_single_picture_needs_no_content_length():
     answer = Answer()
     head = b"HTTP/1.1 200 OK\nContent-Type: image/jpeg\n\n"
     assert answer.feed(head + ONE[:50]) == []
@@ -51,7 +51,7 @@ def test_a_single_picture_needs_no_stated_length():
     assert answer.end() == [ONE]
 
 
-def test_a_single_picture_of_stated_length_is_there_before_the_end():
+def test_a_single_picture_with_a_content_length_needs_no_end_of_stream():
     head = b"HTTP/1.1 200 OK\r\nContent-Type: image/png\r\nContent-Length: 5\r\n\r\n"
     assert Answer().feed(head + b"12345rest") == [b"12345"]
 
@@ -81,12 +81,12 @@ def answer_of(status="200 OK", kind="image/jpeg", more="", body=b"") -> bytes:
         (answer_of(body=b"\xff" * (MAX_BYTES + 1)), "more than"),
     ],
 )
-def test_what_no_camera_answers_is_refused_in_words(data, said):
+def test_an_invalid_camera_response_is_refused_with_a_reason(data, said):
     with pytest.raises(ProtocolError, match=said):
         Answer().feed(data)
 
 
-def test_an_answer_that_ends_too_early_is_refused():
+def test_a_camera_response_that_ends_too_early_is_refused():
     with pytest.raises(ProtocolError, match="without an answer"):
         Answer().end()
     answer = Answer()
@@ -106,19 +106,19 @@ def test_an_answer_that_ends_too_early_is_refused():
         (b"--x\r\n\r\n" + b"\xff" * (MAX_BYTES + 1), "more than"),
     ],
 )
-def test_a_stream_that_is_none_is_refused_before_it_fills_the_memory(body, said):
+def test_an_invalid_stream_is_refused_before_filling_the_memory(body, said):
     with pytest.raises(ProtocolError, match=said):
         fed(Multipart("x"), body, 65536)
 
 
 @given(data=st.binary(max_size=2000))
-def test_no_bytes_do_more_than_be_refused(data):
+def test_any_bytes_give_pictures_or_a_protocol_error(data):
     for parser in (Answer(), Multipart("x")):
         with contextlib.suppress(ProtocolError):
             assert all(parser.feed(data))
 
 
-def test_an_address_says_what_to_ask_for_and_hides_what_is_secret():
+def test_an_address_gives_the_request_and_a_shown_form_without_secrets():
     address = parse_address("http://ann:p%40ss@cam.local:8080/stream?topic=/a&key=s3")
     assert (address.host, address.port, address.tls) == ("cam.local", 8080, False)
     request = address.request.decode()
@@ -150,12 +150,12 @@ def test_an_address_says_what_to_ask_for_and_hides_what_is_secret():
         None,
     ],
 )
-def test_what_is_no_address_of_a_camera_is_refused_with_an_example(text):
+def test_an_invalid_camera_address_is_refused_with_an_example(text):
     with pytest.raises(ConfigError, match=r"http://robot\.local:8080/stream"):
         parse_address(text)
 
 
-def test_a_refused_address_does_not_tell_its_password():
+def test_the_error_for_a_refused_address_does_not_contain_its_password():
     with pytest.raises(ConfigError) as refused:
         parse_address("rtsp://ann:secret@cam/stream")
     assert "secret" not in str(refused.value)

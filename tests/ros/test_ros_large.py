@@ -40,7 +40,7 @@ class TestDecision:
             "sensor_msgs/CompressedImage",
         ],
     )
-    def test_what_is_replaced_by_the_next_is_asked_for_once(self, type):
+    def test_a_silent_map_image_or_point_cloud_is_requested_in_json_once(self, type):
         in_json = InJson()
         assert in_json.silent(type, "cbor") == "ask"
         assert in_json.on
@@ -61,12 +61,12 @@ class TestDecision:
             ("sensor_msgs/LaserScan", "cbor"),
         ],
     )
-    def test_nothing_else_is_asked_for_in_json(self, type, compression):
+    def test_no_other_type_or_compression_is_requested_in_json(self, type, compression):
         in_json = InJson()
         assert in_json.silent(type, compression) is None
         assert not in_json.on
 
-    def test_what_was_only_late_comes_in_cbor_again(self):
+    def test_a_late_small_message_switches_back_to_cbor(self):
         in_json = InJson()
         in_json.silent(MAP, "cbor")
         assert in_json.received(in_parts=False) is False
@@ -75,7 +75,7 @@ class TestDecision:
         in_json.begin()
         assert in_json.silent(MAP, "cbor") == "ask", "on a new link it may be large"
 
-    def test_a_link_that_ends_by_it_is_not_ended_for_ever(self):
+    def test_json_is_given_up_after_several_lost_links(self):
         in_json = InJson()
         for _ in range(MOST_LOST):
             assert in_json.silent(MAP, "cbor") == "ask"
@@ -97,15 +97,15 @@ class TestSilence:
                     return now
         return None
 
-    def test_one_that_is_published_is_not_sent_after_ten_seconds(self):
+    def test_a_published_topic_counts_as_unsent_after_ten_silent_seconds(self):
         assert self.looks(lambda _: True) == IN_CBOR == 10
 
-    def test_the_time_begins_when_it_is_published(self):
+    def test_the_silence_is_counted_from_the_first_publisher(self):
         at = self.looks(lambda now: now >= 20)
         assert 30 <= at <= 40
 
     @pytest.mark.parametrize("published", [False, None])
-    def test_one_that_nobody_publishes_is_never_not_sent(self, published):
+    def test_a_topic_without_a_known_publisher_never_counts_as_unsent(self, published):
         assert self.looks(lambda _: published) is None
 
 
@@ -143,7 +143,7 @@ async def ros2(cells, *, limit=LIMIT, published=True):
         await server.stop()
 
 
-def test_a_map_too_large_for_cbor_comes_in_json_and_people_are_told(quick, caplog):
+def test_a_map_too_large_for_cbor_is_received_in_json_and_reported(quick, caplog):
     async def scenario():
         got, seen = [], []
         scope = Scope("page", lambda text, about: seen.append((text, about)))
@@ -169,7 +169,7 @@ def test_a_map_too_large_for_cbor_comes_in_json_and_people_are_told(quick, caplo
     asyncio.run(scenario())
 
 
-def test_one_that_is_published_late_comes_in_cbor_again_and_nobody_is_told(quick):
+def test_a_map_published_late_returns_to_cbor_without_a_report(quick):
     async def scenario():
         got, seen = [], []
         scope = Scope("page", lambda text, about: seen.append(text))
@@ -194,7 +194,7 @@ def test_one_that_is_published_late_comes_in_cbor_again_and_nobody_is_told(quick
     asyncio.run(scenario())
 
 
-def test_after_links_that_ended_nothing_more_is_asked_and_people_are_told(quick):
+def test_after_several_lost_links_json_requests_end_and_this_is_reported(quick):
     async def scenario():
         seen = []
         scope = Scope("page", lambda text, about: seen.append(text))
@@ -214,7 +214,7 @@ def test_after_links_that_ended_nothing_more_is_asked_and_people_are_told(quick)
     asyncio.run(scenario())
 
 
-def test_a_message_in_parts_is_known_as_one(quick):
+def test_a_fragmented_message_is_marked_as_received_in_parts(quick):
     async def scenario():
         got = []
         async with bridged() as (server, bridge):
@@ -231,7 +231,7 @@ def test_a_message_in_parts_is_known_as_one(quick):
     asyncio.run(scenario())
 
 
-def test_a_bridge_may_be_busy_with_a_map_for_a_while_and_with_nothing_else(monkeypatch):
+def test_a_bridge_counts_as_busy_only_while_the_first_map_is_pending(monkeypatch):
     async def scenario():
         async with bridged() as (server, bridge):
             busy = bridge._link.lane._busy

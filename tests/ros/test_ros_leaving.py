@@ -42,7 +42,7 @@ async def by_asking_for_less(server, bridge, listeners):
 @pytest.mark.parametrize(
     "leave", [by_stopping, by_a_reset, by_unsubscribing, by_asking_for_less]
 )
-def test_the_data_lane_is_left_and_the_bridge_still_answers(leave):
+def test_the_bridge_accepts_clients_after_the_display_leaves_the_data_lane(leave):
     async def scenario():
         async with hanging_bridge("ros2", TYPES) as server:
             bridge, received = Bridge(server.url), set()
@@ -63,7 +63,7 @@ def test_the_data_lane_is_left_and_the_bridge_still_answers(leave):
     asyncio.run(scenario())
 
 
-def test_the_calls_lane_is_left_and_the_bridge_still_answers():
+def test_the_bridge_accepts_clients_after_a_reset_of_the_calls_lane():
     async def scenario():
         async with hanging_bridge("ros2", TYPES) as server:
             bridge = Bridge(server.url)
@@ -92,7 +92,7 @@ def test_the_calls_lane_is_left_and_the_bridge_still_answers():
         ("std_msgs/String", None),
     ],
 )
-def test_what_takes_long_to_encode_is_asked_for_in_cbor(type, compression):
+def test_types_that_are_slow_to_encode_are_subscribed_in_cbor(type, compression):
     async def scenario():
         async with bridged() as (server, bridge):
             bridge.subscribe("/a", print, type)

@@ -45,11 +45,11 @@ MIB = 1 << 20
         ("sensor_msgs/msg/CompressedImage", 8),
     ],
 )
-def test_the_limit_hangs_on_the_type_in_either_dialect(type, mib):
+def test_the_size_limit_depends_on_the_type_in_both_dialects(type, mib):
     assert limit_of(type).size == mib * MIB
 
 
-def test_no_type_may_have_more_than_a_link_takes():
+def test_type_limits_are_between_the_general_limit_and_the_frame_limit():
     assert all(limit.size <= limits.MAX_FRAME for limit in LIMITS.values())
     assert all(limit.size > GENERAL.size for limit in LIMITS.values())
 
@@ -58,7 +58,7 @@ def publish(text, topic="/t"):
     return f'{{"op":"publish","topic":"{topic}","msg":{text}}}'.encode()
 
 
-def test_a_message_that_is_too_large_is_said_to_who_subscribed_and_logged_once(caplog):
+def test_a_too_large_message_is_reported_to_its_subscriber_and_logged_once(caplog):
     text = json.dumps({"data": "x" * (5 * MIB)})
 
     async def scenario():
@@ -86,7 +86,7 @@ def test_a_message_that_is_too_large_is_said_to_who_subscribed_and_logged_once(c
     assert len(lines) == 1
 
 
-def test_objects_and_lists_are_counted_and_texts_are_not():
+def test_the_value_limit_counts_objects_and_lists_but_not_texts():
     check_count(publish('{"a":[' + "[]," * (MAX_VALUES - 10) + "1]}"))
     check_count(publish('{"a":"' + r"{[\"{\\" * MAX_VALUES + '"}'))
     check_count(publish('{"a":[' + "1," * MAX_VALUES * 3 + "1]}"))
@@ -95,7 +95,7 @@ def test_objects_and_lists_are_counted_and_texts_are_not():
             check_count(publish(many))
 
 
-def test_items_of_cbor_are_counted_whatever_they_are():
+def test_all_items_of_a_cbor_message_are_counted():
     op = {"op": "publish", "topic": "/t"}
     check_count(cbor2.dumps({**op, "msg": {"data": b"\x80" * 5 * MIB, "n": [1.5, -7]}}))
     check_count(cbor2.dumps({**op, "msg": cbor2.CBORTag(72, b"\x80" * 5 * MIB)}))
@@ -118,7 +118,7 @@ def test_items_of_cbor_are_counted_whatever_they_are():
     ],
     ids=["json", "cbor"],
 )
-def test_the_worker_builds_nothing_of_what_it_refuses(make):
+def test_the_worker_refuses_too_many_values_before_building_them(make):
     frame = make()
     asked = worker.Request(len(frame), "/t", worker.view_name(Publish))
     tracemalloc.start()
@@ -141,7 +141,7 @@ def transforms(count):
     return publish('{"transforms":[' + text + "]}")
 
 
-def test_a_list_that_nobody_can_use_as_a_whole_is_refused():
+def test_a_message_with_too_many_transforms_is_refused():
     frame = transforms(10_001)
     view = worker.view_name(TFMessage)
     asked = worker.Request(len(frame), "/t", worker.view_name(Publish), view)
@@ -150,14 +150,14 @@ def test_a_list_that_nobody_can_use_as_a_whole_is_refused():
 
 
 @pytest.mark.parametrize("start", ['{"a":[', '{"msg":{"data":['])
-def test_a_large_frame_that_is_no_plain_message_is_refused_unread(start):
+def test_a_large_frame_that_does_not_start_as_a_message_is_refused(start):
     frame = start + "[]," * (MAX_OTHER // 3) + "[]]"
     event = Protocol().receive(frame + ',"topic":"/t","op":"publish"}', 0.0)
     assert isinstance(event, Malformed)
     assert "4.0 MiB that does not begin as a message on a topic" in event.reason
 
 
-def test_an_answer_of_very_many_values_is_refused():
+def test_a_service_response_with_too_many_values_is_refused():
     frame = '{"op":"service_response","values":[' + "[]," * MAX_VALUES + "1]}"
     event = Protocol().receive(frame, 0.0)
     assert isinstance(event, Malformed)
@@ -168,7 +168,7 @@ def test_an_answer_of_very_many_values_is_refused():
     assert len(Protocol().receive(quick, 0.0).values) == MAX_NUMBERS + 1
 
 
-def test_a_message_in_fragments_may_be_as_large_as_one_in_one_piece():
+def test_a_fragmented_message_may_be_as_large_as_an_unfragmented_one():
     text = publish(json.dumps({"data": "é" * 3 * MIB})).decode()
     pieces = [text[at : at + MIB] for at in range(0, len(text), MIB)]
     protocol = Protocol()
@@ -179,7 +179,7 @@ def test_a_message_in_fragments_may_be_as_large_as_one_in_one_piece():
     assert event.decode()["data"] == "é" * 3 * MIB
 
 
-def test_fragments_are_counted_in_bytes_and_not_in_characters():
+def test_the_size_of_fragments_is_counted_in_bytes_not_characters():
     part = {"op": "fragment", "id": "1", "total": 50, "data": "\U0001f600" * (MIB // 2)}
     protocol, events = Protocol(), []
     for number in range(40):
@@ -188,7 +188,7 @@ def test_fragments_are_counted_in_bytes_and_not_in_characters():
     assert any(isinstance(event, Malformed) for event in events)
 
 
-def test_the_documented_limits_are_those_that_hold():
+def test_the_documented_limits_match_the_code():
     page = Path(__file__).parents[2] / "docs/reference/limits.md"
     rows = [line.split("|")[1:-1] for line in page.read_text().splitlines()]
     received = {

@@ -29,7 +29,7 @@ SIMULATED = "the place or the speed of a simulated robot"
         ("no type", None),
     ],
 )
-def test_a_type_tells_what_it_moves(type, moved):
+def test_motion_is_recognised_by_the_type(type, moved):
     assert moved_by_type(type) == moved
 
 
@@ -59,7 +59,7 @@ def test_a_type_tells_what_it_moves(type, moved):
         ("/goal_checker/reset", None),
     ],
 )
-def test_a_name_tells_what_it_moves(name, moved):
+def test_motion_is_recognised_by_the_name(name, moved):
     assert moved_by_name(name) == moved
 
 
@@ -76,5 +76,7 @@ def test_a_name_tells_what_it_moves(name, moved):
         ("/wheels/commands", "no type", None),
     ],
 )
-def test_numbers_move_by_their_name_and_their_type_together(name, type, moved):
+def test_number_topics_are_recognised_as_motion_by_name_and_type_together(
+    name, type, moved
+):
     assert moved_by_both(name, type) == moved

@@ -19,20 +19,20 @@ from webmap.ros import names
         ("/_hidden/0", "/_hidden/0"),
     ],
 )
-def test_topics_have_one_spelling(given_name, resolved):
+def test_topic_names_are_normalised(given_name, resolved):
     assert names.normalise_topic(given_name) == resolved
 
 
 @pytest.mark.parametrize(
     "bad", ["", "/", "/a b", "/a\nb", "/ä", "/a-b", "a" * 300, None]
 )
-def test_what_is_no_topic_is_refused(bad):
+def test_an_invalid_topic_name_is_refused(bad):
     assert not names.is_topic(bad)
     with pytest.raises(ConfigError):
         names.normalise_topic(bad)
 
 
-def test_types_of_both_dialects_are_the_same():
+def test_ros1_and_ros2_spellings_of_a_type_are_equal():
     assert names.same_type("nav_msgs/Odometry", "nav_msgs/msg/Odometry")
     assert not names.same_type("nav_msgs/Odometry", "nav_msgs/Path")
     assert not names.same_type("", "")
@@ -44,7 +44,7 @@ def test_types_of_both_dialects_are_the_same():
 @pytest.mark.parametrize(
     "bad", ["", "Odometry", "a/b/C", "a/msg/", "a//B", "1/B", None]
 )
-def test_what_is_no_type_is_refused(bad):
+def test_an_invalid_type_name_is_refused(bad):
     with pytest.raises(ConfigError, match="nav_msgs/Odometry"):
         names.split_type(bad)
 
@@ -60,7 +60,7 @@ def test_what_is_no_type_is_refused(bad):
         ("ws://robot/ros?x=1", "ws://robot/ros?x=1"),
     ],
 )
-def test_addresses_have_one_spelling(url, normal):
+def test_bridge_addresses_are_normalised(url, normal):
     assert names.normalise_url(url) == normal
     assert names.normalise_url(normal) == normal
 
@@ -84,7 +84,7 @@ def test_addresses_have_one_spelling(url, normal):
         9090,
     ],
 )
-def test_what_is_no_address_is_refused(bad):
+def test_an_invalid_address_is_refused_without_its_password_in_the_error(bad):
     with pytest.raises(
         ConfigError, match=r"expected one such as|no user name|did you mean"
     ) as caught:
@@ -93,23 +93,21 @@ def test_what_is_no_address_is_refused(bad):
 
 
 @given(st.text())
-def test_any_text_is_a_name_or_refused(text):
+def test_any_text_is_normalised_or_refused(text):
     for function in (names.normalise_topic, names.split_type, names.normalise_url):
         with contextlib.suppress(ConfigError):
             function(text)
 
 
 @pytest.mark.parametrize("bare", ["robot:9090", "10.0.0.7:9090", "[::1]:9090", "robot"])
-def test_an_address_without_its_scheme_is_told_what_it_may_have_meant(bare):
+def test_an_address_without_a_scheme_is_refused_with_a_suggestion(bare):
     with pytest.raises(ConfigError, match=re.escape(f"did you mean 'ws://{bare}'?")):
         names.normalise_url(bare)
 
 
 @pytest.mark.parametrize("host", ["localhost", "127.0.0.1", "[::1]"])
 @pytest.mark.parametrize("rest", ["", ":9090", ":9090/ros?a=1"])
-def test_this_computer_has_three_spellings_and_the_first_is_the_same_for_all(
-    host, rest
-):
+def test_every_address_of_this_computer_gives_the_same_three_spellings(host, rest):
     assert names.spellings_of(f"ws://{host}{rest}") == [
         f"ws://localhost{rest}",
         f"ws://127.0.0.1{rest}",
@@ -120,5 +118,5 @@ def test_this_computer_has_three_spellings_and_the_first_is_the_same_for_all(
 @pytest.mark.parametrize(
     "url", ["ws://robot:9090", "wss://10.0.0.7", "ws://[fe80::1]:9"]
 )
-def test_another_computer_has_one_spelling(url):
+def test_the_address_of_another_computer_has_one_spelling(url):
     assert names.spellings_of(url) == [url]

@@ -43,7 +43,7 @@ async def decoded(message, *types):
 
 
 @pytest.mark.parametrize("view", [None, OccupancyGridMsg, Grid])
-def test_a_large_message_decodes_elsewhere_as_it_would_here(view):
+def test_the_worker_decodes_a_large_message_to_the_same_value(view):
     async def scenario():
         here, there = Publish("/map", MAP), Publish("/map", MAP)
         await decoded(there, view)
@@ -54,7 +54,7 @@ def test_a_large_message_decodes_elsewhere_as_it_would_here(view):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="nice is what POSIX calls it")
-def test_what_decodes_large_messages_leaves_the_processor_to_what_is_urgent():
+def test_the_decoding_worker_runs_at_low_priority():
     async def scenario():
         aside, done = Offload(), asyncio.Event()
         aside.decode(large(), frozenset({None}), lambda _: done.set())
@@ -66,7 +66,7 @@ def test_what_decodes_large_messages_leaves_the_processor_to_what_is_urgent():
     run(scenario)
 
 
-def test_a_large_message_of_another_type_says_the_same_elsewhere():
+def test_the_worker_reports_the_missing_field_of_a_wrong_type():
     async def scenario():
         message = Publish("/map", MAP)
         await decoded(message, LaserScanMsg)
@@ -77,7 +77,7 @@ def test_a_large_message_of_another_type_says_the_same_elsewhere():
 
 
 @pytest.mark.parametrize("view", [None, LaserScanMsg])
-def test_typed_arrays_survive_the_way_through_the_worker(view, monkeypatch):
+def test_typed_arrays_survive_the_transfer_through_the_worker(view, monkeypatch):
     monkeypatch.setattr(offload, "LARGE", 1000)
     frame = (CAPTURED / "ros1/cbor_scan_inf_nan.bin").read_bytes()
 
@@ -92,7 +92,7 @@ def test_typed_arrays_survive_the_way_through_the_worker(view, monkeypatch):
     run(scenario)
 
 
-def test_a_large_frame_that_is_broken_is_an_error_and_the_worker_lives():
+def test_a_broken_large_frame_is_an_error_and_the_worker_keeps_running():
     async def scenario():
         aside, done = Offload(), []
         broken, good = Publish("/map", MAP[:-100]), large()
@@ -112,7 +112,7 @@ def test_a_large_frame_that_is_broken_is_an_error_and_the_worker_lives():
     run(scenario)
 
 
-def test_a_worker_that_dies_costs_one_message():
+def test_a_killed_worker_is_replaced_for_the_next_message():
     async def scenario():
         aside, done = Offload(), asyncio.Event()
         first = large()
@@ -130,7 +130,7 @@ def test_a_worker_that_dies_costs_one_message():
     run(scenario)
 
 
-def test_what_waits_is_replaced_by_what_is_newer_and_order_is_kept():
+def test_a_newer_message_replaces_a_waiting_one_and_the_order_is_kept():
     async def scenario():
         aside, got = Offload(), []
         small = Publish("/a", b'{"op":"publish","topic":"/a","msg":{"data":"last"}}')
@@ -149,7 +149,7 @@ def test_what_waits_is_replaced_by_what_is_newer_and_order_is_kept():
     run(scenario)
 
 
-def test_two_that_wait_for_one_message_both_get_it():
+def test_two_callbacks_for_one_message_are_both_called():
     async def scenario():
         aside, got = Offload(), []
         message = large()
@@ -163,7 +163,7 @@ def test_two_that_wait_for_one_message_both_get_it():
     run(scenario)
 
 
-def test_a_bridge_hands_over_a_large_map_and_ends_the_worker(caplog):
+def test_a_bridge_decodes_a_large_map_in_a_worker_and_ends_the_worker(caplog):
     async def scenario():
         got = []
         async with bridged() as (server, bridge):
@@ -179,7 +179,7 @@ def test_a_bridge_hands_over_a_large_map_and_ends_the_worker(caplog):
     assert "lost" not in caplog.text
 
 
-def test_stopping_in_the_middle_leaves_nothing():
+def test_stopping_during_decoding_ends_the_shared_worker():
     async def scenario():
         aside = Offload()
         aside.decode(large(), frozenset([None]), print)
@@ -189,13 +189,13 @@ def test_stopping_in_the_middle_leaves_nothing():
     run(scenario)
 
 
-def test_only_types_of_webmap_are_named_to_the_worker():
+def test_only_webmap_types_have_a_view_name_for_the_worker():
     assert worker.view_name(OccupancyGridMsg) == "webmap.ros.messages:OccupancyGridMsg"
     assert worker.view_name(Grid) is None
     assert worker.view_name(None) is None
 
 
-def test_the_worker_answers_any_frame():
+def test_the_worker_answers_a_broken_frame_with_an_error():
     for frame in (b"", b"{", b"\xa1\xff", b"[" * 10000):
         reply, parts = worker.answer(worker.Request(len(frame), "/a"), frame)
         assert reply.error

@@ -80,7 +80,7 @@ LONG = {
 
 
 @pytest.mark.parametrize("view", LONG, ids=lambda view: view.__name__)
-def test_all_of_a_long_message_comes_in_order(view):
+def test_a_long_message_is_decoded_completely_and_in_order(view):
     field, topic, frame = LONG[view]
     assert len(frame) > offload.LARGE
 
@@ -105,7 +105,7 @@ def test_all_of_a_long_message_comes_in_order(view):
 
 
 @pytest.mark.parametrize("view", LONG, ids=lambda view: view.__name__)
-def test_no_step_of_a_long_message_holds_the_processor(view):
+def test_no_decoding_step_of_a_long_message_blocks_the_event_loop(view):
     """The steps of all tasks of this thread, by its own processor time.
 
     A processor that others use too is slower, so the best of three rounds counts: a
@@ -140,7 +140,7 @@ def test_no_step_of_a_long_message_holds_the_processor(view):
     run(scenario)
 
 
-def test_a_newer_message_ends_the_parts_of_an_older_one():
+def test_a_newer_message_cancels_the_remaining_parts_of_an_older_one():
     async def scenario():
         aside, got = Offload(), []
 
@@ -160,7 +160,7 @@ def test_a_newer_message_ends_the_parts_of_an_older_one():
     run(scenario)
 
 
-def test_a_path_that_comes_quicker_than_it_is_decoded_is_still_shown():
+def test_a_path_published_faster_than_decoding_is_still_delivered():
     async def scenario():
         aside, got = Offload(), []
 
@@ -178,7 +178,7 @@ def test_a_path_that_comes_quicker_than_it_is_decoded_is_still_shown():
     run(scenario)
 
 
-def test_of_static_frames_which_are_told_once_nothing_is_dropped():
+def test_no_static_transform_is_dropped_when_newer_messages_arrive():
     async def scenario():
         aside, got = Offload(), []
         for count in (5000, 3, 4000):
@@ -191,7 +191,7 @@ def test_of_static_frames_which_are_told_once_nothing_is_dropped():
     run(scenario)
 
 
-def test_a_robot_with_many_large_messages_leaves_another_its_turn():
+def test_many_large_messages_of_one_bridge_do_not_delay_another_bridge():
     """Many topics of one bridge wait, and then one message of another bridge comes."""
 
     async def scenario():
@@ -215,7 +215,7 @@ def test_a_robot_with_many_large_messages_leaves_another_its_turn():
     run(scenario)
 
 
-def test_after_a_long_message_its_bridge_rests_for_as_long(monkeypatch):
+def test_after_its_pause_a_bridge_decodes_only_the_newest_message(monkeypatch):
     async def scenario():
         aside, got = Offload(), []
         take(aside, Publish("/plan", poses(3000)), PathMsg, got)
@@ -233,7 +233,7 @@ def test_after_a_long_message_its_bridge_rests_for_as_long(monkeypatch):
     run(scenario)
 
 
-def test_a_large_map_comes_in_pieces_that_nobody_notices():
+def test_decoding_a_large_map_does_not_block_the_event_loop():
     side = 4000
     op = {"op": "publish", "topic": "/map"}
     origin = {
@@ -265,7 +265,7 @@ def test_a_large_map_comes_in_pieces_that_nobody_notices():
 
 
 @pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="Linux alone tells")
-def test_the_worker_may_use_so_much_memory_and_no_more():
+def test_the_memory_of_the_worker_is_limited():
     async def scenario():
         aside, got = Offload(), []
         take(aside, Publish("/t", transforms(3000)), TFMessage, got)
@@ -278,7 +278,7 @@ def test_the_worker_may_use_so_much_memory_and_no_more():
     run(scenario)
 
 
-def test_a_message_that_takes_too_much_memory_is_an_error(monkeypatch):
+def test_the_worker_reports_a_message_that_needs_too_much_memory(monkeypatch):
     def decode(self, view):
         raise MemoryError
 

@@ -10,7 +10,7 @@ def said(frame):
     return json.loads(frame)
 
 
-def test_a_subscription_always_has_an_identifier():
+def test_a_subscription_has_an_id_a_throttle_rate_and_a_queue_length():
     assert said(
         ops.subscribe("/scan", id="WebMap-1", type="sensor_msgs/LaserScan")
     ) == {
@@ -26,7 +26,7 @@ def test_a_subscription_always_has_an_identifier():
 @pytest.mark.parametrize("compression", [None, "none", "png", "cbor", "cbor-raw"])
 @pytest.mark.parametrize("queue_length", [0, 1, 100])
 @pytest.mark.parametrize("throttle", [0, 1, 250])
-def test_no_subscription_can_hang_a_bridge_or_drops_a_burst(
+def test_no_subscription_can_hang_a_bridge_or_drop_a_burst(
     throttle, queue_length, compression
 ):
     frame = said(
@@ -44,7 +44,7 @@ def test_no_subscription_can_hang_a_bridge_or_drops_a_burst(
         assert frame["queue_length"] >= 10
 
 
-def test_unsubscribing_names_the_subscription():
+def test_an_unsubscribe_request_contains_the_subscription_id():
     assert said(ops.unsubscribe("/scan", id="WebMap-1")) == {
         "op": "unsubscribe",
         "id": "WebMap-1",
@@ -52,7 +52,7 @@ def test_unsubscribing_names_the_subscription():
     }
 
 
-def test_advertising_keeps_nothing_for_late_listeners():
+def test_advertised_topics_are_not_latched():
     frame = said(ops.advertise("/cmd_vel", "geometry_msgs/Twist", id="WebMap-2"))
     assert frame["queue_size"] == 1
     assert frame["latch"] is False
@@ -63,14 +63,14 @@ def test_a_call_without_arguments_sends_an_empty_mapping():
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
-def test_numbers_that_are_none_never_leave(number):
+def test_nan_and_infinity_are_never_sent(number):
     with pytest.raises(ValueError, match=r"JSON|nan|inf"):
         ops.publish("/cmd_vel", {"linear": {"x": number}})
     with pytest.raises(ValueError, match=r"JSON|nan|inf"):
         ops.call_service("/set", {"value": [number]}, id="WebMap-4")
 
 
-def test_what_json_does_not_know_is_refused():
+def test_values_without_a_json_form_are_refused():
     with pytest.raises(TypeError):
         ops.publish("/a", {"x": object()})
     loop = []

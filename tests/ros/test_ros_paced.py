@@ -65,7 +65,7 @@ async def until(check):
     ],
     ids=["tiny texts", "pings", "pongs", "frames of one byte"],
 )
-def test_a_flood_leaves_time_for_everything_else(piece):
+def test_a_flood_of_frames_does_not_block_the_event_loop(piece):
     async def story():
         async def talk(reader, writer):
             reading = asyncio.create_task(reader.read())
@@ -95,7 +95,7 @@ def test_a_flood_leaves_time_for_everything_else(piece):
     assert worst < 0.1 + late, (worst, late)
 
 
-def test_what_came_before_the_end_is_received_and_in_order():
+def test_frames_sent_before_the_connection_ends_are_received_in_order():
     async def story():
         async def talk(reader, writer):
             frames = (b"\x82\x04%04d" % n for n in range(3000))
@@ -136,7 +136,7 @@ def test_a_frame_of_many_mebibytes_is_received_whole():
     assert asyncio.run(story()) == ["open", body, b"after"]
 
 
-def test_a_message_of_too_many_fragments_ends_the_link():
+def test_a_message_with_too_many_fragments_closes_the_link():
     async def story():
         async def talk(reader, writer):
             writer.write(b"\x82\x05first\x01\x01x" + b"\0\1x" * (MOST_FRAGMENTS + 100))

@@ -37,7 +37,7 @@ def test_each_frame_is_a_piece():
     assert cut([b"".join(frames)]) == frames
 
 
-def test_a_long_frame_is_cut_and_what_follows_it_is_not_part_of_the_last_piece():
+def test_a_long_frame_is_cut_and_the_next_frame_starts_a_new_piece():
     long = frame(200_000)
     pieces = cut([long + frame(0) * 3])
     assert b"".join(pieces[:-3]) == long
@@ -46,7 +46,7 @@ def test_a_long_frame_is_cut_and_what_follows_it_is_not_part_of_the_last_piece()
 
 
 @given(st.lists(st.sampled_from([0, 1, 125, 126, 127, 70_000]), max_size=5), st.data())
-def test_wherever_the_network_cuts_no_piece_holds_the_ends_of_two_frames(lengths, data):
+def test_no_piece_contains_the_ends_of_two_frames_for_any_chunk_sizes(lengths, data):
     stream = b"".join(map(frame, lengths))
     ends = {0}
     for length in lengths:
@@ -88,7 +88,7 @@ def taken(chunks):
 
 
 @given(st.data())
-def test_a_long_frame_is_taken_as_fragments_of_the_same_message(data):
+def test_a_long_frame_is_split_into_fragments_of_one_message(data):
     long = bytes(data.draw(st.integers(65_530, 200_000)))
     stream = b"\x01\x01x" + b"\x80\x7f" + len(long).to_bytes(8, "big") + long + frame(3)
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
@@ -101,14 +101,14 @@ def test_a_long_frame_is_taken_as_fragments_of_the_same_message(data):
     assert frames[-1] == (0x81, b"xxx")
 
 
-def test_a_frame_that_is_too_long_or_masked_is_left_to_be_refused_by_its_head():
+def test_the_head_of_a_too_long_or_masked_frame_is_passed_on_unchanged():
     too_long = b"\x82\x7f" + (MAX_FRAME + 1).to_bytes(8, "big")
     masked = b"\x82\xff" + (100_000).to_bytes(8, "big")
     for head in (too_long, masked):
         assert Pieces().take(bytearray(head + b"data"), shaken=True)[:10] == head
 
 
-def test_before_the_handshake_has_ended_each_line_is_a_piece():
+def test_during_the_handshake_each_line_is_a_piece():
     cutting = Pieces()
     assert cutting.next(bytearray(b"HTTP/1.1 101 OK\r\nX: y\r\n"), shaken=False) == 17
     assert cutting.next(bytearray(b"no end"), shaken=False) == 6
@@ -129,7 +129,7 @@ class Greedy:
         return 0.0 if self.times else None
 
 
-def test_links_take_turns_and_the_loop_has_half_of_the_time():
+def test_links_take_turns_and_the_event_loop_runs_between_them():
     async def story():
         noted, others = [], []
         for name in "abc":
@@ -147,7 +147,7 @@ def test_links_take_turns_and_the_loop_has_half_of_the_time():
     assert max(steps) <= 5, "the loop goes on after a few turns"
 
 
-def test_who_wants_to_wait_has_its_turn_later():
+def test_a_link_that_asks_for_a_delay_gets_its_next_turn_after_the_delay():
     async def story():
         noted, ended = [], asyncio.Event()
 

@@ -43,7 +43,7 @@ def read(path):
 
 
 @pytest.mark.parametrize("path", files("publish_*.json", "cbor*.bin"))
-def test_every_captured_message_is_told_from_its_head_and_decodes(path):
+def test_every_captured_message_decodes_and_its_head_names_the_topic(path):
     frame = path.read_bytes()
     event = Protocol().receive(frame, 0.0)
     if isinstance(event, Status):
@@ -56,7 +56,7 @@ def test_every_captured_message_is_told_from_its_head_and_decodes(path):
 
 
 @pytest.mark.parametrize("path", files("publish_odom_nan*", "cbor_odom_nan*"))
-def test_odometry_decodes_whatever_its_covariance_holds(path):
+def test_odometry_with_nan_in_its_covariance_decodes(path):
     odom = read(path).decode(messages.OdometryMsg)
     assert math.isfinite(odom.place.planar.x)
     assert odom.velocity.is_finite
@@ -76,7 +76,7 @@ def test_captured_odometry_decodes(path):
 
 
 @pytest.mark.parametrize("path", files("publish_scan*.json", "cbor_scan*.bin"))
-def test_captured_scans_keep_what_the_link_can_carry(path):
+def test_captured_scans_keep_nan_and_in_cbor_also_infinity(path):
     import numpy as np
 
     scan = read(path).decode(messages.LaserScanMsg)
@@ -93,7 +93,7 @@ def test_captured_scans_keep_what_the_link_can_carry(path):
 
 
 @pytest.mark.parametrize("path", files("publish_battery*.json", "cbor_battery*.bin"))
-def test_captured_batteries_decode(path):
+def test_captured_battery_states_decode(path):
     battery = read(path).decode(messages.BatteryStateMsg)
     assert 0.5 < battery.percentage <= 1
     assert battery.voltage == pytest.approx(24, abs=1)
@@ -124,7 +124,7 @@ def test_captured_transforms_decode(path):
 
 
 @pytest.mark.parametrize("path", files("png_*.json"))
-def test_captured_png_holds_the_message_it_hides(path):
+def test_a_captured_png_decodes_to_its_message(path):
     event = read(path)
     assert isinstance(event, Publish)
     message = event.decode()
@@ -136,7 +136,7 @@ def test_captured_png_holds_the_message_it_hides(path):
 
 
 @pytest.mark.parametrize("path", files("cborraw_*.bin"))
-def test_captured_cbor_raw_is_left_raw(path):
+def test_captured_raw_cbor_keeps_its_bytes_undecoded(path):
     message = read(path).decode()
     assert set(message) == {"secs", "nsecs", "bytes"}
     assert isinstance(message["bytes"], bytes)
@@ -145,14 +145,14 @@ def test_captured_cbor_raw_is_left_raw(path):
 
 
 @pytest.mark.parametrize("path", files("service_response_*.json"))
-def test_every_captured_answer_is_an_answer(path):
+def test_every_captured_service_response_is_recognised(path):
     event = read(path)
     assert isinstance(event, ServiceResponse)
     assert isinstance(event.values, dict if event.result else str)
 
 
 @pytest.mark.parametrize("path", files("call_service_*.json"))
-def test_a_captured_call_to_the_client_is_told(path):
+def test_a_captured_service_call_to_the_client_is_recognised(path):
     event = read(path)
     assert isinstance(event, CallService)
     assert event.service == "/client_srv"
@@ -160,7 +160,7 @@ def test_a_captured_call_to_the_client_is_told(path):
 
 
 @pytest.mark.parametrize("path", files("status_*.json", servers=["rs"]))
-def test_every_captured_status_is_told(path):
+def test_every_captured_status_is_recognised(path):
     event = read(path)
     assert isinstance(event, Status)
     assert event.level == "error"
@@ -179,7 +179,7 @@ def whole(lines, **bounds):
 
 @pytest.mark.parametrize("path", files("fragments_map*.jsonl"))
 @pytest.mark.parametrize("order", ["as sent", "reversed"])
-def test_captured_fragments_of_a_map_make_the_map(path, order):
+def test_captured_fragments_of_a_map_are_joined_in_any_order(path, order):
     lines = fragment_lines(path)
     events = whole(lines if order == "as sent" else lines[::-1])
     assert len(events) == 1
@@ -188,20 +188,20 @@ def test_captured_fragments_of_a_map_make_the_map(path, order):
 
 
 @pytest.mark.parametrize("path", files("fragments_odom*.jsonl"))
-def test_captured_fragments_of_odometry_make_two_messages(path):
+def test_captured_fragments_of_odometry_are_joined_to_two_messages(path):
     events = whole(fragment_lines(path))
     assert [event.topic for event in events] == ["/robot_0/odom"] * 2
     assert all(event.decode(messages.OdometryMsg).frame_id for event in events)
 
 
 @pytest.mark.parametrize("path", files("service_response_fragmented*.jsonl"))
-def test_a_captured_answer_in_fragments_is_an_answer(path):
+def test_a_captured_service_response_in_fragments_is_joined(path):
     events = whole(fragment_lines(path))
     assert [type(event) for event in events] == [ServiceResponse]
 
 
 @pytest.mark.parametrize("path", files("png_fragments_map*.jsonl"))
-def test_captured_fragments_of_a_png_make_the_map_where_so_many_are_allowed(path):
+def test_captured_fragments_of_a_png_are_joined_if_the_limit_allows_them(path):
     events = whole(fragment_lines(path), max_count=256)
     assert len(events) == 1
     assert events[0].topic == "/map"
@@ -214,7 +214,7 @@ def test_more_fragments_than_allowed_are_refused():
     assert all("at most 64" in event.reason for event in events)
 
 
-def test_topics_may_interleave_under_one_id():
+def test_fragments_of_two_topics_may_interleave_under_one_id():
     one = fragment_lines(CAPTURED / "ros1/fragments_map.ujson.jsonl")
     two = fragment_lines(CAPTURED / "ros1/fragments_odom.ujson.jsonl")[:3]
     mixed = [line for pair in zip(one, two, strict=False) for line in pair] + one[3:]
@@ -222,7 +222,7 @@ def test_topics_may_interleave_under_one_id():
     assert [event.topic for event in events] == ["/robot_0/odom", "/map"]
 
 
-def test_two_messages_of_one_length_that_interleave_are_not_mixed_up():
+def test_interleaved_messages_with_equal_fragment_counts_are_refused():
     lines = fragment_lines(CAPTURED / "ros1/fragments_odom.ujson.jsonl")
     one, two = lines[:3], lines[3:]
     events = whole([one[0], two[0], one[1], two[1], one[2], two[2], *one])
@@ -230,7 +230,7 @@ def test_two_messages_of_one_length_that_interleave_are_not_mixed_up():
     assert "interleave" in events[0].reason
 
 
-def test_a_fragment_that_waits_too_long_is_forgotten():
+def test_fragments_of_an_incomplete_message_expire():
     lines = fragment_lines(CAPTURED / "ros1/fragments_odom.ujson.jsonl")
     protocol = Protocol()
     assert protocol.receive(lines[0], 0.0) is None
@@ -238,7 +238,7 @@ def test_a_fragment_that_waits_too_long_is_forgotten():
     assert protocol.receive(lines[2], 61.1) is None
 
 
-def test_fragments_that_wait_are_bounded():
+def test_the_size_of_waiting_fragments_is_limited():
     fragments = Fragments(max_bytes=1000)
     protocol = Protocol(fragments)
     piece = {"op": "fragment", "data": "x" * 300, "num": 0, "total": 5}
@@ -264,13 +264,13 @@ def test_fragments_that_wait_are_bounded():
         {"num": 0.5},
     ],
 )
-def test_a_fragment_that_makes_no_sense_is_malformed(change):
+def test_a_fragment_with_invalid_fields_is_malformed(change):
     fragment = {"op": "fragment", "id": 0, "data": "{}", "num": 0, "total": 5}
     event = Protocol().receive(json.dumps({**fragment, **change}), 0.0)
     assert isinstance(event, Malformed)
 
 
-def test_wrappings_within_wrappings_are_refused():
+def test_a_fragment_inside_a_fragment_is_refused():
     inner = json.dumps({"op": "fragment", "id": 0, "data": "{", "num": 0, "total": 2})
     outer = {"op": "fragment", "id": 1, "data": inner, "num": 0, "total": 1}
     event = Protocol().receive(json.dumps(outer), 0.0)
@@ -278,7 +278,7 @@ def test_wrappings_within_wrappings_are_refused():
 
 
 @pytest.mark.parametrize("path", files("publish_odom*.json", "cbor_*.bin", "p*scan*"))
-def test_no_beginning_of_a_captured_frame_raises_anything_undeclared(path):
+def test_truncated_captured_frames_raise_only_protocol_errors(path):
     frame = path.read_bytes()
     for size in [*range(0, 200), *range(200, len(frame), 997)]:
         try_all(frame[:size])
@@ -310,7 +310,7 @@ operations = st.fixed_dictionaries(
 
 @given(st.binary(max_size=200))
 @settings(max_examples=300, deadline=None)
-def test_any_bytes_give_an_event_or_malformed(frame):
+def test_any_bytes_give_a_valid_or_a_malformed_event(frame):
     try_all(frame)
 
 
@@ -323,7 +323,7 @@ def test_any_bytes_after_a_good_head_give_a_value_or_a_protocol_error(tail):
 
 @given(operations)
 @settings(max_examples=300, deadline=None)
-def test_any_operation_gives_an_event_or_malformed(operation):
+def test_any_operation_gives_a_valid_or_a_malformed_event(operation):
     import cbor2
 
     try_all(json.dumps(operation).encode())
@@ -332,7 +332,7 @@ def test_any_operation_gives_an_event_or_malformed(operation):
 
 @given(st.data())
 @settings(max_examples=200, deadline=None)
-def test_a_captured_message_with_one_byte_changed_never_surprises(data):
+def test_a_captured_message_with_a_changed_byte_raises_only_protocol_errors(data):
     path = data.draw(st.sampled_from([p.values[0] for p in files("cbor_[bo]*.bin")]))
     frame = bytearray(path.read_bytes())
     frame[data.draw(st.integers(0, len(frame) - 1))] = data.draw(st.integers(0, 255))
@@ -366,14 +366,14 @@ def test_a_captured_message_with_one_byte_changed_never_surprises(data):
         b'{"op":"publish","topic":"/a","msg":{}}{"op":"x"}'[:20],
     ],
 )
-def test_garbage_is_malformed_and_says_why(frame):
+def test_garbage_is_malformed_with_a_reason(frame):
     event = Protocol().receive(frame, 0.0)
     assert isinstance(event, Malformed)
     assert event.reason
     assert event.size == len(frame)
 
 
-def test_a_png_that_claims_to_be_huge_is_refused_before_it_is_unpacked():
+def test_a_png_with_a_huge_declared_size_is_refused_before_decompression():
     import base64
 
     head = b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR" + (2**31 - 1).to_bytes(4, "big") * 2
@@ -383,16 +383,16 @@ def test_a_png_that_claims_to_be_huge_is_refused_before_it_is_unpacked():
     assert "too large" in event.reason
 
 
-def test_an_unknown_operation_is_told_and_harmless():
+def test_an_unknown_operation_is_reported_as_unknown():
     assert Protocol().receive(b'{"op":"dance"}', 0.0) == Unknown("dance")
 
 
-def test_text_and_bytes_mean_the_same():
+def test_text_and_binary_frames_give_the_same_event():
     text = '{"op":"status","level":"info","msg":"hé"}'
     assert Protocol().receive(text, 0) == Protocol().receive(text.encode(), 0)
 
 
-def test_a_frame_whose_topic_changes_after_its_head_is_not_believed():
+def test_a_frame_with_two_different_topics_is_refused_when_decoded():
     frame = b'{"op":"publish","topic":"/a","msg":{"x":1},"topic":"/b"}'
     event = Protocol().receive(frame, 0.0)
     assert event.topic == "/a"
@@ -400,7 +400,7 @@ def test_a_frame_whose_topic_changes_after_its_head_is_not_believed():
         event.decode()
 
 
-def test_fields_in_any_order_are_understood():
+def test_the_fields_of_a_frame_may_come_in_any_order():
     frame = b'{"msg":{"data":"x"},"topic":"\\u002fa","op":"publish"}'
     event = Protocol().receive(frame, 0.0)
     assert event.topic == "/a"
@@ -414,7 +414,7 @@ def test_a_message_is_decoded_once_for_each_type():
     assert event.decode(messages.OdometryMsg) is first
 
 
-def test_a_plain_message_that_is_nested_too_deeply_is_refused():
+def test_a_message_nested_too_deeply_is_refused():
     deep = b'{"a":' * 40 + b"1" + b"}" * 40
     event = Protocol().receive(b'{"op":"publish","topic":"/a","msg":' + deep + b"}", 0)
     with pytest.raises(ProtocolError, match="nested"):
@@ -422,7 +422,7 @@ def test_a_plain_message_that_is_nested_too_deeply_is_refused():
 
 
 @pytest.mark.parametrize("token", ["NaN", "Infinity", "-Infinity"])
-def test_bare_tokens_that_are_no_json_are_understood(token):
+def test_bare_nan_and_infinity_tokens_are_accepted(token):
     frame = '{"op":"publish","topic":"/b","msg":{"percentage":%s,"voltage":1.5}}'
     event = Protocol().receive(frame % token, 0.0)
     battery = event.decode(messages.BatteryStateMsg)
@@ -430,14 +430,14 @@ def test_bare_tokens_that_are_no_json_are_understood(token):
     assert battery.voltage == 1.5
 
 
-def test_null_is_nan_where_a_number_is_wanted():
+def test_null_in_a_number_field_becomes_nan():
     frame = b'{"op":"publish","topic":"/b","msg":{"percentage":null,"voltage":null}}'
     battery = Protocol().receive(frame, 0.0).decode(messages.BatteryStateMsg)
     assert math.isnan(battery.percentage)
     assert math.isnan(battery.voltage)
 
 
-def test_a_users_own_type_with_plain_lists_takes_typed_arrays_too():
+def test_a_custom_type_with_a_plain_list_accepts_typed_arrays():
     class Scan(msgspec.Struct):
         ranges: list[float]
 
@@ -447,7 +447,7 @@ def test_a_users_own_type_with_plain_lists_takes_typed_arrays_too():
         assert math.isnan(scan.ranges[0])
 
 
-def test_a_message_of_another_type_says_what_is_missing():
+def test_decoding_as_the_wrong_type_names_the_missing_field():
     event = read(CAPTURED / "ros1/publish_odom.ujson.json")
     with pytest.raises(ProtocolError, match="angle_min"):
         event.decode(messages.LaserScanMsg)
@@ -475,7 +475,7 @@ def attempt(event, view):
     ],
 )
 @pytest.mark.parametrize("depth", [40, 900])
-def test_what_is_nested_too_deeply_is_malformed(head, depth):
+def test_an_operation_nested_too_deeply_is_malformed(head, depth):
     event = Protocol().receive(head + b"[" * depth + b"]" * depth + b"}", 0.0)
     assert isinstance(event, Malformed)
     assert "nested" in event.reason or "recursion" in event.reason

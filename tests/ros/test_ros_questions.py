@@ -33,7 +33,7 @@ def asked(question, **answers):
         (lambda bridge: bridge.time(), 7.5),
     ],
 )
-def test_a_question_has_its_answer_and_none_where_nobody_answers(question, expected):
+def test_a_query_returns_the_answer_of_rosapi_or_none(question, expected):
     answers = {name: {name: nodes} for name, nodes in NODES.items()}
     answers["service_type"] = {"type": "std_srvs/Trigger"}
     answers["topic_type"] = {"type": "std_msgs/Bool"}
@@ -59,7 +59,7 @@ def test_a_parameter_is_set_and_read_back():
     ("encoding", "compression"),
     [("text", "none"), ("binary", "cbor"), ("raw", "cbor-raw")],
 )
-def test_an_encoding_is_asked_for_in_the_words_of_the_bridge(encoding, compression):
+def test_an_encoding_is_subscribed_under_its_rosbridge_name(encoding, compression):
     async def scenario():
         async with bridged() as (server, bridge):
             bridge.subscribe("/a", print, encoding=encoding)
@@ -69,13 +69,13 @@ def test_an_encoding_is_asked_for_in_the_words_of_the_bridge(encoding, compressi
     asyncio.run(scenario())
 
 
-def test_an_encoding_that_does_not_exist_is_refused():
+def test_an_unknown_encoding_is_refused():
     bridge = Bridge("ws://127.0.0.1:1")
     with pytest.raises(ConfigError, match="text, binary, raw, got 'cbor'"):
         bridge.subscribe("/a", print, encoding="cbor")
 
 
-def test_a_temporary_bridge_is_open_within_its_block_only():
+def test_a_temporary_bridge_is_open_only_inside_its_with_block():
     async def scenario():
         server = FakeRosbridge()
         await server.start()
@@ -93,7 +93,7 @@ def test_a_temporary_bridge_is_open_within_its_block_only():
     asyncio.run(scenario())
 
 
-def test_a_temporary_bridge_that_cannot_be_reached_says_why():
+def test_opening_an_unreachable_temporary_bridge_raises_the_reason():
     async def scenario():
         async with TemporaryBridge("ws://127.0.0.1:1") as bridge:
             with pytest.raises(BridgeClosed) as raised:

@@ -31,14 +31,14 @@ def looks(answers, until):
     return asked, renewed
 
 
-def test_a_topic_is_asked_for_anew_once_somebody_publishes_it():
+def test_a_silent_topic_is_subscribed_again_when_a_publisher_appears():
     asked, renewed = looks(lambda now: now >= 20, 25)
     assert asked[0] == FIRST
     (at,) = renewed
     assert 20 <= at <= 20 + LONGEST
 
 
-def test_one_that_is_published_and_stays_silent_is_asked_for_now_and_then():
+def test_a_silent_topic_with_a_publisher_is_subscribed_again_periodically():
     _, renewed = looks(lambda _now: True, 300)
     assert renewed[0] == FIRST
     gaps = [b - a for a, b in pairwise(renewed)]
@@ -46,13 +46,13 @@ def test_one_that_is_published_and_stays_silent_is_asked_for_now_and_then():
     assert all(AGAIN <= gap <= AGAIN + LONGEST for gap in gaps)
 
 
-def test_one_that_nobody_publishes_is_left_alone():
+def test_a_topic_without_a_publisher_is_not_subscribed_again():
     asked, renewed = looks(lambda _now: False, 300)
     assert renewed == []
     assert len(asked) < 300 / LONGEST + 4
 
 
-def test_where_nobody_can_tell_it_is_asked_for_now_and_then():
+def test_a_topic_with_unknown_publishers_is_subscribed_again_periodically():
     _, renewed = looks(lambda _now: None, 300)
     assert 300 / (AGAIN + LONGEST) - 1 <= len(renewed) <= 300 / AGAIN
 
@@ -64,7 +64,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(wire_subscription, "LONGEST", 0.05)
 
 
-def test_the_old_subscription_is_given_up_before_the_new_one_is_asked_for(quick):
+def test_the_old_subscription_ends_before_the_new_one_begins(quick):
     async def scenario():
         got = []
         async with bridged(publishers={"publishers": []}) as (server, bridge):
@@ -89,7 +89,9 @@ def test_the_old_subscription_is_given_up_before_the_new_one_is_asked_for(quick)
     asyncio.run(scenario())
 
 
-def test_a_bridge_without_rosapi_is_not_troubled(quick, monkeypatch):
+def test_a_bridge_without_rosapi_is_asked_for_publishers_only_a_few_times(
+    quick, monkeypatch
+):
     monkeypatch.setattr(wire_subscription, "AGAIN", 0.3)
 
     async def scenario():

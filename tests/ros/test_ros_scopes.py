@@ -40,7 +40,7 @@ class Work:
             raise
 
 
-def test_what_a_callback_goes_on_with_ends_with_its_subscription():
+def test_a_running_async_callback_is_cancelled_with_its_subscription():
     async def scenario():
         by_hand, by_scope, scope = Work(), Work(), Scope("page")
         async with bridged() as (server, bridge):
@@ -59,7 +59,7 @@ def test_what_a_callback_goes_on_with_ends_with_its_subscription():
     run(scenario)
 
 
-def test_what_goes_on_for_an_occasion_ends_with_the_removal():
+def test_removing_a_callback_cancels_its_running_coroutine():
     async def scenario():
         work = Work()
         callbacks = Callbacks("on_close", lambda error: None)
@@ -72,7 +72,7 @@ def test_what_goes_on_for_an_occasion_ends_with_the_removal():
     run(scenario)
 
 
-def test_a_callback_that_ends_its_own_subscription_goes_on_to_its_end():
+def test_a_callback_that_removes_its_own_subscription_runs_to_completion():
     async def scenario():
         done = []
 
@@ -91,7 +91,7 @@ def test_a_callback_that_ends_its_own_subscription_goes_on_to_its_end():
     run(scenario)
 
 
-def test_a_bridge_ends_with_the_scope_that_it_was_made_in(lifecycle):
+def test_a_bridge_closes_with_the_scope_that_created_the_bridge(lifecycle):
     async def scenario():
         server, page, got = FakeRosbridge(), Scope("page"), []
         await server.start()
@@ -112,12 +112,12 @@ def test_a_bridge_ends_with_the_scope_that_it_was_made_in(lifecycle):
     run(scenario)
 
 
-def test_a_bridge_that_was_made_for_nobody_stays(lifecycle):
+def test_a_bridge_created_outside_a_scope_stays_in_the_lifecycle(lifecycle):
     bridge = Bridge("ws://robot:9090")
     assert list(lifecycle._services) == [bridge]
 
 
-def test_a_bridge_that_never_began_does_not_begin_after_its_scope(lifecycle):
+def test_a_bridge_whose_scope_was_closed_does_not_start(lifecycle):
     page = Scope("page")
     with page.active():
         bridge = Bridge("ws://robot:9090")
@@ -131,7 +131,7 @@ def test_a_bridge_that_never_began_does_not_begin_after_its_scope(lifecycle):
     run(scenario)
 
 
-def test_whoever_uses_a_bridge_that_ended_is_told_why(lifecycle, caplog):
+def test_using_a_bridge_whose_scope_closed_raises_the_reason(lifecycle, caplog):
     async def scenario():
         server, page, received = FakeRosbridge(), Scope("page"), []
         robot = Scope("robot", lambda text, about: received.append(text))
@@ -161,7 +161,7 @@ def test_whoever_uses_a_bridge_that_ended_is_told_why(lifecycle, caplog):
     run(scenario)
 
 
-def test_nobody_is_told_of_a_bridge_that_ends_together_with_its_users(
+def test_no_error_is_reported_for_a_bridge_that_closes_with_its_users(
     lifecycle, caplog
 ):
     async def scenario():

@@ -25,7 +25,7 @@ from webmap.ros.rosbridge.protocol import Protocol
         (rb'["\\ud800", "\ud800"]', ["\\ud800", "�"]),
     ],
 )
-def test_half_a_pair_is_replaced_and_nothing_else(text, value):
+def test_only_lone_surrogates_are_replaced(text, value):
     decoded = decode_json(text, Any)
     if value is None:
         assert decoded[0] == "a�"
@@ -35,12 +35,12 @@ def test_half_a_pair_is_replaced_and_nothing_else(text, value):
 
 
 @pytest.mark.parametrize("text", [rb'"\ud800', rb'{"a": \ud800}', rb"[" * 9999])
-def test_what_is_no_json_stays_unreadable(text):
+def test_invalid_json_is_still_refused(text):
     with pytest.raises(ProtocolError):
         decode_json(text, Any)
 
 
-def test_a_topic_with_half_a_pair_does_not_hide_the_others():
+def test_a_topic_with_a_lone_surrogate_does_not_hide_other_topics():
     async def scenario():
         names = {"topics": ["/odom", "/bad\udc80"], "types": ["nav_msgs/Odometry", "x"]}
         async with bridged(topics=names) as (_, bridge):
@@ -51,14 +51,14 @@ def test_a_topic_with_half_a_pair_does_not_hide_the_others():
     asyncio.run(scenario())
 
 
-def test_a_message_with_half_a_pair_is_read():
+def test_a_message_with_a_lone_surrogate_is_decoded():
     event = Protocol().receive(
         rb'{"op": "publish", "topic": "/a", "msg": {"data": "x\ud800"}}', 0.0
     )
     assert event.decode() == {"data": "x�"}
 
 
-def test_an_answer_that_cannot_be_read_is_not_called_none():
+def test_an_unreadable_service_response_is_not_reported_as_missing():
     async def scenario():
         async with bridged(topics=None) as (server, bridge):
             call = asyncio.create_task(

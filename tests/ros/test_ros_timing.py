@@ -9,14 +9,14 @@ from webmap.ros.rosbridge.connection import Liveness
 from webmap.ros.subscriptions import Throttle
 
 
-def test_delays_grow_and_end_at_ten_seconds():
+def test_reconnection_delays_double_up_to_ten_seconds():
     backoff = Backoff(jitter=lambda: 1.0)
     assert [backoff.next() for _ in range(7)] == [0.5, 1, 2, 4, 8, 10, 10]
     backoff = Backoff(jitter=lambda: 0.0)
     assert [backoff.next() for _ in range(3)] == [0.25, 0.5, 1]
 
 
-def test_a_link_that_held_starts_the_growth_anew():
+def test_a_long_lasting_link_resets_the_reconnection_delay():
     backoff = Backoff(jitter=lambda: 1.0)
     for _ in range(5):
         backoff.next()
@@ -24,7 +24,7 @@ def test_a_link_that_held_starts_the_growth_anew():
     assert backoff.next(lasted=60) == 0.5
 
 
-def test_a_ping_is_due_after_each_answer_and_only_then():
+def test_the_next_ping_is_due_only_half_a_second_after_the_last_answer():
     liveness = Liveness(0.0)
     assert not liveness.is_ping_due(0.4)
     assert liveness.is_ping_due(0.5)
@@ -35,7 +35,7 @@ def test_a_ping_is_due_after_each_answer_and_only_then():
     assert liveness.is_ping_due(1.1)
 
 
-def test_after_an_answer_that_took_long_the_next_ping_is_due_at_once():
+def test_after_a_slow_answer_the_next_ping_is_due_at_once():
     liveness = Liveness(0.0)
     liveness.pinged(0.5)
     assert not liveness.is_ping_due(2.0)
@@ -44,17 +44,17 @@ def test_after_an_answer_that_took_long_the_next_ping_is_due_at_once():
 
 
 class TestLag:
-    def test_before_the_first_answer_nothing_is_said(self):
+    def test_the_lag_is_zero_before_the_first_ping(self):
         assert Liveness(0.0).lag(0.4) == 0.0
 
-    def test_it_is_what_the_last_answer_took_however_long_ago_that_was(self):
+    def test_the_lag_is_the_round_trip_of_the_last_ping(self):
         liveness = Liveness(0.0)
         liveness.pinged(0.5)
         liveness.ponged(0.7)
         assert liveness.lag(0.7) == pytest.approx(0.2)
         assert liveness.lag(1.2) == pytest.approx(0.2)
 
-    def test_it_grows_while_an_answer_is_waited_for(self):
+    def test_the_lag_grows_while_a_ping_is_unanswered(self):
         liveness = Liveness(0.0)
         liveness.pinged(0.5)
         liveness.ponged(0.7)
@@ -62,7 +62,7 @@ class TestLag:
         assert liveness.lag(1.3) == pytest.approx(0.2)
         assert liveness.lag(2.2) == pytest.approx(1.0)
 
-    def test_a_link_that_is_quick_again_is_not_called_slow(self):
+    def test_the_lag_falls_when_a_slow_link_is_fast_again(self):
         liveness = Liveness(0.0)
         liveness.pinged(0.5)
         liveness.ponged(2.5)
@@ -87,7 +87,7 @@ def test_a_link_is_dead_three_seconds_after_an_unanswered_ping():
     assert look(liveness, 0.0, 10.0) == pytest.approx(3.25)
 
 
-def test_a_link_on_which_a_large_message_comes_is_not_dead():
+def test_incoming_bytes_keep_a_link_without_ping_answer_alive_for_a_minute():
     liveness = Liveness(0.0)
     liveness.pinged(0.0)
     assert look(liveness, 0.0, 20.0, lambda now: now - 1.0) is None
@@ -99,7 +99,7 @@ def test_a_link_on_which_a_large_message_comes_is_not_dead():
     assert look(liveness, 0.0, 99.0, lambda now: now) == pytest.approx(60.25)
 
 
-def test_a_bridge_that_is_known_to_be_busy_is_given_time():
+def test_a_busy_bridge_has_one_minute_to_answer_a_ping():
     liveness = Liveness(0.0)
     liveness.pinged(0.0)
     looks = [n / 4 for n in range(1, 400)]
@@ -115,20 +115,20 @@ def test_an_answered_ping_keeps_the_link_alive():
     assert look(liveness, 3.0, 60.0) is None
 
 
-def test_a_process_that_stood_still_judges_only_at_the_next_look():
+def test_a_late_check_declares_no_link_dead_but_the_next_check_does():
     liveness = Liveness(0.0)
     liveness.pinged(0.1)
     assert not liveness.is_dead(20.0)
     assert liveness.is_dead(20.25)
 
 
-def test_without_a_period_everything_passes():
+def test_a_throttle_without_a_period_passes_every_message():
     throttle = Throttle(0.0)
     assert [throttle.offer(n, 0.0) for n in range(1, 4)] == [1, 2, 3]
     assert throttle.due is None
 
 
-def test_the_newest_of_what_was_held_comes_when_its_time_has_come():
+def test_a_throttle_delivers_only_the_newest_held_message_when_due():
     throttle = Throttle(0.1)
     assert throttle.offer("a", 1.0) == "a"
     assert throttle.offer("b", 1.01) is None
@@ -143,7 +143,7 @@ def test_the_newest_of_what_was_held_comes_when_its_time_has_come():
     assert throttle.due is None
 
 
-def test_a_topic_of_just_this_rate_passes_whole_though_it_jitters():
+def test_a_jittering_topic_at_the_throttle_rate_passes_almost_completely():
     throttle = Throttle(0.1)
     jitter = [0.0, -0.004, 0.003, -0.002, 0.004, -0.003]
     times = [0.1 * n + jitter[n % 6] for n in range(60)]
@@ -152,7 +152,7 @@ def test_a_topic_of_just_this_rate_passes_whole_though_it_jitters():
 
 
 @given(st.lists(st.floats(0.001, 0.5), min_size=50, max_size=200), st.floats(0.02, 0.5))
-def test_the_mean_rate_is_never_above_what_was_asked(gaps, period):
+def test_the_mean_rate_never_exceeds_the_throttle_rate(gaps, period):
     throttle, now, passed = Throttle(period), 0.0, 0
     for gap in gaps:
         now += gap

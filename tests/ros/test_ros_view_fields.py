@@ -93,7 +93,7 @@ def test_there_are_views_to_compare():
 
 @pytest.mark.parametrize("ros2", [False, True], ids=["ros1", "ros2"])
 @pytest.mark.parametrize("view", sorted(VIEWS))
-def test_a_view_has_only_fields_of_its_types_and_they_fit(view, ros2):
+def test_every_field_of_a_view_exists_in_its_types_and_fits(view, ros2):
     struct, names = VIEWS[view]
     definitions = [shipped(ros2=ros2).definition(name).fields for name in names]
     every = [field for fields in definitions for field in fields]
@@ -101,7 +101,7 @@ def test_a_view_has_only_fields_of_its_types_and_they_fit(view, ros2):
         assert misfits(struct, fields, every) == [], name
 
 
-def test_a_view_with_a_wrong_field_is_found():
+def test_a_view_with_wrong_fields_is_detected():
     class Wrong(msgspec.Struct):
         frame: str = ""
         stamp: int = 0

@@ -34,7 +34,7 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("type", sorted(SHAPES))
-def test_the_shape_of_a_message_tells_where_the_robot_is(type):
+def test_the_odometry_view_is_chosen_by_the_shape_of_the_message(type):
     view = odometry_view_by_shape(SHAPES[type])
     assert view is ODOMETRY_VIEWS[type]
     assert view is odometry_view(type.replace("/", "/msg/"))
@@ -47,19 +47,19 @@ def test_the_shape_of_a_message_tells_where_the_robot_is(type):
 
 
 @pytest.mark.parametrize("path", sorted(CAPTURED.glob("*/publish_[bst]*.json")))
-def test_captured_messages_that_say_nothing_of_a_place_are_told(path):
+def test_a_captured_message_without_a_pose_is_refused_as_odometry(path):
     message = json.loads(path.read_text()).get("msg")
     if isinstance(message, dict):
         with pytest.raises(ProtocolError, match="nav_msgs/Odometry"):
             odometry_view_by_shape(message)
 
 
-def test_types_without_a_place_are_refused():
+def test_types_without_a_pose_are_refused_as_odometry():
     with pytest.raises(ConfigError, match="nav_msgs/Odometry"):
         odometry_view("sensor_msgs/LaserScan")
 
 
-def test_stamps_of_both_dialects_are_seconds():
+def test_stamps_of_both_dialects_convert_to_seconds():
     assert messages.Time(secs=5, nsecs=500_000_000).seconds == 5.5
     assert messages.Time(sec=5, nanosec=500_000_000).seconds == 5.5
 
@@ -74,24 +74,24 @@ def test_stamps_of_both_dialects_are_seconds():
         (array("f", [1.5]).tobytes(), [1.5]),
     ],
 )
-def test_arrays_of_every_kind_are_numbers(value, numbers):
+def test_every_wire_form_of_an_array_converts_to_numbers(value, numbers):
     assert Floats.from_wire(value).array().tolist() == numbers
 
 
-def test_null_among_numbers_is_nan():
+def test_null_in_a_number_array_becomes_nan():
     values = Floats.from_wire([None, 2.0]).array()
     assert math.isnan(values[0])
     assert values[1] == 2
 
 
 @pytest.mark.parametrize("bad", [["1"], "12", {}, 5, [[1]], b"abc", [10**400]])
-def test_what_is_no_array_of_numbers_is_refused(bad):
+def test_a_value_other_than_a_number_array_is_refused(bad):
     with pytest.raises(ValueError, match="expected an array of numbers"):
         Floats.from_wire(bad)
 
 
 @pytest.mark.parametrize("bad", [[200], [-129], [None], [0.5]])
-def test_cells_that_do_not_fit_are_refused(bad):
+def test_cells_that_are_not_int8_values_are_refused(bad):
     with pytest.raises(ValueError, match="expected an array of numbers"):
         Int8s.from_wire(bad)
 
@@ -103,7 +103,7 @@ def test_typed_arrays_of_both_byte_orders_are_read(tag, code):
     assert typed_array(tag, struct.pack(code, 1.5)).tolist() == [1.5]
 
 
-def test_a_typed_array_that_was_cut_is_refused():
+def test_a_truncated_or_non_binary_typed_array_is_refused():
     with pytest.raises(ValueError, match="multiple"):
         typed_array(85, b"abc")
     with pytest.raises(ValueError, match="not bytes"):
@@ -113,13 +113,13 @@ def test_a_typed_array_that_was_cut_is_refused():
 @pytest.mark.parametrize(
     ("width", "height"), [(2, 2), (-1, -3), (2**31, 2**31), (0, 1)]
 )
-def test_a_grid_whose_size_is_not_its_length_is_refused(width, height):
+def test_a_grid_whose_size_does_not_match_its_data_is_refused(width, height):
     info = {"resolution": 0.05, "width": width, "height": height, "origin": PLACE}
     grid = convert({"info": info, "data": [0, 100, -1]}, messages.OccupancyGridMsg)
     with pytest.raises(ProtocolError, match="grid"):
         _ = grid.cells
 
 
-def test_missing_coordinates_are_an_error_and_no_robot_at_the_origin():
+def test_a_pose_with_missing_coordinates_is_an_error():
     with pytest.raises(ProtocolError):
         convert({"position": {}, "orientation": {}}, messages.PoseMsg)

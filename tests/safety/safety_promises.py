@@ -50,19 +50,19 @@ PROMISES = (
         3,
         "a page that may lose its inputs releases them",
         "another tab .*|the tab is .*|an alert .*|the page (is frozen|opens .*)",
-        "test_doubt_is_neutral_within_50_ms_and_nothing_resumes",
+        "test_an_input_block_is_neutral_within_50_ms_and_a_held_key_does_not_resume",
     ),
     Promise(
         4,
         "one operator at a time",
         "",
-        "test_of_two_pages_one_drives_and_both_see_who",
+        "test_only_one_of_two_pages_drives_and_both_see_the_operator",
     ),
     Promise(
         5,
         "control changes only at standstill",
         "",
-        "test_a_robot_goes_from_page_to_page_at_standstill",
+        "test_control_changes_from_page_to_page_at_standstill",
     ),
     Promise(
         6,
@@ -134,7 +134,7 @@ PROMISES = (
         17,
         "scan assist stops before obstacles",
         "",
-        "test_a_robot_that_is_assisted_never_touches_a_wall",
+        "test_a_robot_with_scan_assist_never_touches_a_wall",
     ),
     Promise(
         18,
@@ -164,7 +164,7 @@ PROMISES = (
         20,
         "zeros end, then nothing is sent",
         "",
-        "test_release_is_zero_at_once_then_zeros_for_500_ms_then_silence",
+        "test_released_inputs_send_zeros_at_once_for_500_ms_and_then_nothing",
     ),
 )
 

@@ -6,7 +6,7 @@ from webmap.scene.bound import Document
 from webmap.scene.node import Changed, Fragment
 
 
-def test_the_same_id_gives_the_same_element():
+def test_binding_the_same_id_twice_gives_the_same_element():
     document = Document()
     Fragment(document)
     log = document.bind("log")
@@ -15,7 +15,7 @@ def test_the_same_id_gives_the_same_element():
     assert document.bind("other") is not log
 
 
-def test_setting_text_drops_what_the_page_had():
+def test_setting_the_text_clears_the_content_of_the_page_element():
     document = Document()
     fragment = Fragment(document)
     label = document.bind("label")
@@ -25,7 +25,7 @@ def test_setting_text_drops_what_the_page_had():
     assert label.text == "Bob"
 
 
-def test_lines_can_be_put_on_top():
+def test_prepend_adds_text_at_the_beginning():
     log = Document().bind("log")
     log.prepend("first line").prepend("second line")
     assert log.text == "second linefirst line"
@@ -44,12 +44,12 @@ def test_a_bound_element_has_classes_attributes_and_events():
 
 
 @pytest.mark.parametrize("html_id", ["", "two words", None])
-def test_an_id_is_a_word(html_id):
+def test_an_id_must_be_a_single_word(html_id):
     with pytest.raises(SceneError, match="word"):
         Document().bind(html_id)
 
 
-def test_the_document_holds_bound_elements_only():
+def test_the_document_accepts_only_bound_elements():
     document = Document()
     with pytest.raises(SceneError, match=r"page\.element"):
         document.append(html.p())
@@ -59,7 +59,7 @@ def test_the_document_holds_bound_elements_only():
         document.set(title="x")
 
 
-def test_a_map_is_put_into_a_bound_element():
+def test_an_svg_element_can_be_appended_to_a_bound_element():
     container = Document().bind("container")
     container.append(svg.svg())
     assert container.children[0].tag == "svg"

@@ -12,7 +12,7 @@ from webmap.scene.element import Event
 from webmap.scene.node import Fragment, Text
 
 
-def test_keywords_are_attributes():
+def test_keyword_arguments_become_attributes():
     circle = svg.circle(r=0.2, class_="a b", stroke_width=2, viewBox=None)
     assert circle.get("r") == "0.2"
     assert circle.get("stroke-width") == circle.get("stroke_width") == "2"
@@ -21,14 +21,14 @@ def test_keywords_are_attributes():
     assert circle.get("viewBox") is None
 
 
-def test_odd_names_are_set_one_by_one():
+def test_attributes_with_hyphens_are_set_by_name():
     g = svg.g().set("data-name", "Bob").set("aria-label", "Robot Bob")
     assert g.get("data-name") == "Bob"
     assert g.get("aria_label") == "Robot Bob"
     assert g.unset("data-name").get("data-name") is None
 
 
-def test_classes_come_and_go():
+def test_classes_are_added_removed_and_toggled():
     g = svg.g(class_="robot")
     g.classes.add("fast", "red")
     g.classes.remove("fast", "never-there")
@@ -40,7 +40,7 @@ def test_classes_come_and_go():
         g.classes.add("")
 
 
-def test_text_replaces_what_was_there():
+def test_setting_the_text_replaces_all_children():
     p = html.p("Hello ", html.strong("you"))
     assert p.text == "Hello you"
     p.text = "<b>bye</b>"
@@ -48,7 +48,7 @@ def test_text_replaces_what_was_there():
     assert [type(node) for node in p.children] == [Text]
 
 
-def test_a_new_text_reuses_the_node():
+def test_setting_the_text_again_reuses_the_text_node():
     p = html.p(text="1")
     node = p.children[0]
     p.text = "2"
@@ -67,7 +67,7 @@ def test_children_are_kept_in_order():
     assert c.parent is parent
 
 
-def test_a_child_leaves_its_old_parent():
+def test_a_child_appended_to_a_new_parent_leaves_its_old_parent():
     child = svg.g()
     old, new = svg.g(child), svg.g()
     new.append(child)
@@ -75,7 +75,7 @@ def test_a_child_leaves_its_old_parent():
     assert child.parent is new
 
 
-def test_an_element_cannot_be_in_itself():
+def test_an_element_cannot_contain_itself():
     inner = svg.g()
     outer = svg.g(inner)
     with pytest.raises(SceneError, match="itself"):
@@ -84,7 +84,7 @@ def test_an_element_cannot_be_in_itself():
         inner.append(inner)
 
 
-def test_the_root_of_a_fragment_is_mounted_and_not_appended():
+def test_the_root_of_a_fragment_cannot_be_appended_or_reused():
     root = svg.g()
     Fragment(root)
     with pytest.raises(SceneError, match="mount"):
@@ -93,13 +93,13 @@ def test_the_root_of_a_fragment_is_mounted_and_not_appended():
         Fragment(root)
 
 
-def test_what_is_no_element_is_no_child():
+def test_only_elements_and_text_can_be_children():
     with pytest.raises(SceneError, match="element or text"):
         svg.g().append(5)
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
-def test_a_pose_is_finite(number):
+def test_a_pose_or_matrix_must_be_finite(number):
     g = svg.g()
     for pose in ((number, 0, 0), (0, number, 0), (0, 0, number)):
         with pytest.raises(SceneError, match="finite"):
@@ -108,12 +108,12 @@ def test_a_pose_is_finite(number):
         g.set_matrix(Affine(a=number))
 
 
-def test_html_has_no_pose():
+def test_an_html_element_cannot_have_a_pose():
     with pytest.raises(SceneError, match="not SVG"):
         html.p().set_pose(1, 2, 3)
 
 
-def test_dots_are_whole_points_of_a_path():
+def test_dots_need_a_path_whole_points_and_a_unit():
     svg.path().set_dots(b"\0\0\0\0", 0.001)
     with pytest.raises(SceneError, match="not a path"):
         svg.circle().set_dots(b"", 0.001)
@@ -124,14 +124,14 @@ def test_dots_are_whole_points_of_a_path():
 
 
 @pytest.mark.parametrize("age", [-1, math.nan])
-def test_an_age_is_not_negative(age):
+def test_an_age_and_its_limit_must_not_be_negative_or_nan(age):
     with pytest.raises(SceneError, match="age"):
         svg.g().set_age(age)
     with pytest.raises(SceneError, match="limit"):
         svg.g().set_age(0, limit=age)
 
 
-def test_an_event_reaches_every_handler_although_one_raises():
+def test_an_event_reaches_every_handler_even_if_one_raises():
     received, errors = [], []
     button = html.button("Go")
 
@@ -147,7 +147,7 @@ def test_an_event_reaches_every_handler_although_one_raises():
     assert button.handlers("click") == (broken, received.append)
 
 
-def test_a_handler_runs_in_the_scope_it_was_added_in():
+def test_a_handler_runs_in_the_scope_of_its_registration():
     scope, seen = Scope("page"), []
     button = html.button()
     with scope.active():
@@ -158,7 +158,7 @@ def test_a_handler_runs_in_the_scope_it_was_added_in():
     assert seen == [scope, None]
 
 
-def test_what_a_coroutine_function_returns_is_handed_on():
+def test_the_coroutine_of_an_async_handler_is_passed_on():
     async def handler(event):
         return event.kind
 
@@ -170,7 +170,7 @@ def test_what_a_coroutine_function_returns_is_handed_on():
         spawned[0].send(None)
 
 
-def test_a_scope_ends_its_handlers():
+def test_closing_a_scope_removes_its_handlers():
     scope = Scope()
     button = html.button()
     with scope.active():
@@ -201,7 +201,7 @@ def test_a_removed_element_leaves_nothing_in_its_scope():
     assert left() is None
 
 
-def test_removing_twice_does_nothing():
+def test_removing_an_element_twice_is_harmless():
     child = svg.g()
     parent = svg.g(child)
     child.remove()

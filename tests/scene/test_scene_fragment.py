@@ -5,12 +5,12 @@ from webmap.scene import html, svg
 from webmap.scene.node import Added, Changed, Fragment, Removed, Text
 
 
-def test_nothing_changed_since_now():
+def test_there_are_no_changes_since_the_current_revision():
     fragment = Fragment(svg.g())
     assert fragment.changes_since(fragment.revision) == []
 
 
-def test_the_newest_value_wins():
+def test_only_the_newest_value_of_each_attribute_is_a_change():
     root = svg.g()
     fragment = Fragment(root)
     for x in range(100):
@@ -36,14 +36,14 @@ def test_an_equal_value_is_no_change():
     assert fragment.revision == before
 
 
-def test_a_tick_of_a_checkbox_is_sent_again_since_a_hand_may_have_changed_it():
+def test_setting_checked_to_the_same_value_is_a_change():
     box = html.input(type="checkbox", checked=True)
     fragment = Fragment(box)
     box.set(checked=True)
     assert fragment.changes_since(0) == [Changed(box, "checked")]
 
 
-def test_a_new_element_comes_whole():
+def test_a_new_element_is_added_as_a_whole():
     root = svg.g(svg.rect())
     fragment = Fragment(root)
     since = fragment.revision
@@ -54,7 +54,7 @@ def test_a_new_element_comes_whole():
     assert fragment.changes_since(since) == [Added(child, root.children[0])]
 
 
-def test_new_siblings_come_from_left_to_right():
+def test_new_siblings_are_added_from_left_to_right():
     old = svg.g()
     root = svg.g(old)
     fragment = Fragment(root)
@@ -63,7 +63,7 @@ def test_new_siblings_come_from_left_to_right():
     assert fragment.changes_since(0) == [Added(a, None), Added(b, a), Added(c, old)]
 
 
-def test_what_nobody_was_told_of_needs_no_removal():
+def test_an_element_removed_before_sending_causes_no_change():
     root = svg.g()
     fragment = Fragment(root)
     for _ in range(10_000):
@@ -77,7 +77,7 @@ def test_what_nobody_was_told_of_needs_no_removal():
     assert not fragment._added
 
 
-def test_the_log_is_bounded_and_says_when_it_forgot():
+def test_the_removal_log_is_limited_and_reports_missing_entries():
     root = svg.g()
     fragment = Fragment(root)
     start = fragment.revision
@@ -91,7 +91,7 @@ def test_the_log_is_bounded_and_says_when_it_forgot():
     assert fragment.changes_since(fragment.revision) == []
 
 
-def test_a_moved_element_goes_and_comes():
+def test_a_moved_element_is_removed_and_added_again():
     child = svg.g()
     left, right = svg.g(child), svg.g()
     fragment = Fragment(svg.g(left, right))
@@ -100,7 +100,7 @@ def test_a_moved_element_goes_and_comes():
     assert fragment.changes_since(0) == [Removed(child.id), Added(child, None)]
 
 
-def test_nodes_are_found_by_id_while_they_are_in():
+def test_nodes_are_found_by_id_only_while_they_are_in_the_fragment():
     child = svg.g("text")
     root = svg.g(child)
     fragment = Fragment(root)
@@ -111,7 +111,7 @@ def test_nodes_are_found_by_id_while_they_are_in():
     assert len(fragment) == 1
 
 
-def test_listening_is_a_change():
+def test_adding_or_removing_an_event_handler_is_a_change():
     root = svg.g()
     fragment = Fragment(root)
     removal = root.on("click", print)
@@ -185,7 +185,7 @@ steps = st.lists(
 
 
 @given(steps)
-def test_viewers_that_look_now_and_then_see_the_same_tree(steps):
+def test_viewers_that_update_at_different_times_see_the_same_tree(steps):
     fragment = Fragment(svg.g())
     mirrors = [Mirror(fragment), Mirror(fragment)]
     for step, a, b, c in steps:

@@ -87,19 +87,19 @@ ORIGINS = [
 
 @pytest.mark.parametrize(("origin", "expected"), ORIGINS)
 @pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
-def test_only_the_very_origin_may_open_sockets_and_change_things(
+def test_only_the_exact_origin_can_open_sockets_and_send_post_requests(
     access, origin, expected, opening
 ):
     assert status(access, origin=origin, **opening) == expected
 
 
 @pytest.mark.parametrize("method", ["GET", "HEAD", "OPTIONS"])
-def test_reading_needs_no_origin(access, method):
+def test_get_head_and_options_need_no_origin(access, method):
     assert status(access, method=method) is None
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE", "FOO", "get"])
-def test_every_other_method_needs_one(access, method):
+def test_every_other_method_needs_an_origin(access, method):
     assert status(access, method=method) == 403
 
 
@@ -118,14 +118,14 @@ def test_every_other_method_needs_one(access, method):
         ("localhost", "https://localhost", "ws", 403),
     ],
 )
-def test_the_origin_follows_scheme_host_and_port(
+def test_the_allowed_origin_follows_the_scheme_the_host_and_the_port(
     access, host, origin, scheme, expected
 ):
     got = status(access, host=[host], origin=[origin], scheme=scheme, type="websocket")
     assert got == expected
 
 
-def test_an_origin_that_was_named_may_open_sockets():
+def test_a_configured_origin_can_open_sockets():
     origin = checked_origin("https://Robots.example.com:443")
     access = AccessControl(Settings(token=TOKEN, origins=frozenset({origin})))
     good, bad = "https://robots.example.com", "https://x.robots.example.com"
@@ -136,7 +136,7 @@ def test_an_origin_that_was_named_may_open_sockets():
 @pytest.mark.parametrize(
     "text", ["", "robots", "ftp://robots", "https://", "https://r/", "https://u@r"]
 )
-def test_what_is_no_origin_cannot_be_named(text):
+def test_an_invalid_origin_in_the_configuration_is_refused(text):
     with pytest.raises(ConfigError, match="an origin is"):
         checked_origin(text)
 
@@ -173,12 +173,12 @@ HOSTS = [
 
 @pytest.mark.parametrize(("host", "expected"), HOSTS)
 @pytest.mark.parametrize("type", ["http", "websocket"])
-def test_only_known_hosts_are_answered(access, host, expected, type):
+def test_only_requests_to_known_hosts_are_answered(access, host, expected, type):
     origin = [f"http://{host[0].lower()}"] if host else []
     assert status(access, host=host, origin=origin, type=type) == expected
 
 
-def test_the_address_that_is_listened_on_is_a_host_and_so_are_the_extra_names():
+def test_the_listening_address_and_the_extra_names_are_known_hosts():
     hosts = Hosts.of_binding("192.168.1.5", ["Robots.example.com", "fd00::1"])
     assert hosts.allow("192.168.1.5:8000")
     assert hosts.allow("robots.example.com")
@@ -187,7 +187,7 @@ def test_the_address_that_is_listened_on_is_a_host_and_so_are_the_extra_names():
     assert not hosts.allow("192.168.1.6")
 
 
-def test_a_server_on_all_addresses_answers_to_any_address_but_not_to_any_name():
+def test_a_server_on_all_addresses_accepts_any_ip_address_but_not_any_name():
     hosts = Hosts.of_binding("0.0.0.0")
     assert hosts.allow("192.168.1.5:8000")
     assert hosts.allow("[fe80::1]")
@@ -195,7 +195,7 @@ def test_a_server_on_all_addresses_answers_to_any_address_but_not_to_any_name():
 
 
 @pytest.mark.parametrize("name", ["", "a b", "http://a", "a:80", "a/b"])
-def test_what_is_no_host_cannot_be_named(name):
+def test_an_invalid_extra_host_name_is_refused(name):
     with pytest.raises(ConfigError, match="a host is"):
         Hosts.of_binding("127.0.0.1", [name])
 
@@ -215,7 +215,7 @@ def offer(access, token, **kwargs):
     return access.identify(RequestHead.of(scope(query=f"token={token}", **kwargs)), 0.0)
 
 
-def test_the_token_is_exchanged_for_a_code_and_that_for_cookie_and_key(access):
+def test_the_token_is_exchanged_for_a_code_and_the_code_for_cookie_and_key(access):
     query = f"a=1&token={TOKEN}&b=%2F"
     to = access.identify(RequestHead.of(scope(path="/lab", query=query)), 0.0)
     assert isinstance(to, Redirect)
@@ -230,7 +230,7 @@ def test_the_token_is_exchanged_for_a_code_and_that_for_cookie_and_key(access):
     assert got.key not in got.cookie
 
 
-def test_a_code_is_good_once_and_for_two_minutes(access):
+def test_a_code_works_once_and_for_two_minutes(access):
     query = f"webmap_code={access.codes.issue(0.0)}"
     assert isinstance(
         access.identify(RequestHead.of(scope(query=query)), 119.9), SignedIn
@@ -251,18 +251,18 @@ def test_the_key_opens_sockets_and_the_cookie_does_not(access, opening):
     assert access.identify(RequestHead.of(scope(cookie=cookie)), 0.0) == got.viewer
 
 
-def test_the_key_reads_no_page(access):
+def test_the_key_cannot_read_a_page(access):
     got = sign_in(access)
     assert access.identify(RequestHead.of(scope(keys=[got.key])), 0.0).status == 401
 
 
-def test_the_cookie_is_bound_to_prefix_and_port_and_to_tls(access):
+def test_the_cookie_is_bound_to_the_prefix_the_port_and_tls(access):
     got = sign_in(access, host=["localhost"], scheme="https", root="/robots", path="/x")
     assert got.cookie.startswith("webmap_443=")
     assert got.cookie.endswith("; Path=/robots/; HttpOnly; SameSite=Strict; Secure")
 
 
-def test_the_cookie_tells_who_it_is(access):
+def test_the_cookie_identifies_the_viewer(access):
     cookie = cookie_of(sign_in(access))
     got = access.identify(RequestHead.of(scope(cookie=[f"a=b; {cookie}; c=d"])), 0.0)
     assert isinstance(got, Viewer)
@@ -271,7 +271,7 @@ def test_the_cookie_tells_who_it_is(access):
     assert again == got
 
 
-def test_a_cookie_of_another_path_before_ours_does_no_harm(access):
+def test_an_old_cookie_of_another_path_before_the_valid_one_is_ignored(access):
     cookie = cookie_of(sign_in(access))
     cookies = [f"webmap_8080=old; {cookie}"]
     assert isinstance(
@@ -288,24 +288,26 @@ def test_two_browsers_are_two_viewers(access):
 
 
 @pytest.mark.parametrize("cookie", [[], ["webmap_8080="], ["webmap_8080=a.b"], ["="]])
-def test_without_a_cookie_nobody_comes_in(access, cookie):
+def test_a_request_without_a_valid_cookie_is_refused(access, cookie):
     got = access.identify(RequestHead.of(scope(cookie=cookie)), 0.0)
     assert isinstance(got, Refusal)
     assert got.status == 401
 
 
-def test_the_token_itself_is_no_cookie(access):
+def test_the_token_is_not_a_valid_cookie(access):
     got = access.identify(RequestHead.of(scope(cookie=[f"webmap_8080={TOKEN}"])), 0.0)
     assert got.status == 401
 
 
 @pytest.mark.parametrize("opening", [{"type": "websocket"}, {"method": "POST"}])
-def test_a_token_opens_no_socket_and_changes_nothing(access, opening):
+def test_a_token_or_a_code_in_the_url_cannot_open_a_socket_or_sign_in_a_post(
+    access, opening
+):
     assert offer(access, TOKEN, **opening).status == 401
     assert sign_in(access, **opening).status == 401
 
 
-def test_wrong_tokens_make_wrong_ones_wait_and_the_right_one_always_works(access):
+def test_wrong_tokens_delay_only_further_wrong_tokens(access):
     for _ in range(10):
         assert offer(access, "wrong").status == 401
     got = offer(access, "wrong")
@@ -315,7 +317,7 @@ def test_wrong_tokens_make_wrong_ones_wait_and_the_right_one_always_works(access
     assert offer(access, "wrong").status == 429
 
 
-def test_who_has_signed_in_is_not_kept_out_by_the_wall(access):
+def test_wrong_tokens_do_not_delay_a_signed_in_viewer(access):
     cookie = cookie_of(sign_in(access))
     for _ in range(20):
         access.identify(RequestHead.of(scope(query="token=wrong")), 0.0)
@@ -324,7 +326,7 @@ def test_who_has_signed_in_is_not_kept_out_by_the_wall(access):
     )
 
 
-def test_an_old_link_in_a_browser_that_has_signed_in_counts_for_nothing(access):
+def test_a_wrong_token_of_a_signed_in_browser_does_not_count_as_a_failure(access):
     cookie = cookie_of(sign_in(access))
     for _ in range(20):
         request = RequestHead.of(
@@ -348,13 +350,13 @@ def test_the_redirect_stays_on_this_origin(access, path, expected):
     assert location.partition("?webmap_code=")[0] == expected
 
 
-def test_refusals_never_repeat_what_was_sent(access):
+def test_a_refusal_does_not_repeat_the_wrong_token(access):
     secret = "wrong-but-nearly-right"
     got = access.identify(RequestHead.of(scope(query=f"token={secret}")), 0.0)
     assert secret not in got.text
 
 
-def test_the_token_is_taken_out_of_what_servers_log():
+def test_tokens_and_codes_are_removed_from_the_logged_query():
     one = scope(query=f"a=1&token={TOKEN}&token=x&webmap_code=y")
     redact(one)
     assert one["query_string"] == b"a=1&token=...&token=...&webmap_code=..."

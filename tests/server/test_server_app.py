@@ -84,7 +84,7 @@ def test_every_socket_needs_a_sign_in_and_the_origin_before_the_upgrade(
         assert refused(client, url, {"origin": "http://127.0.0.1:9000"}) == 403
 
 
-def test_every_answer_has_every_header(app, client, stranger):
+def test_every_answer_has_all_security_headers(app, client, stranger):
     answers = [client.get(path) for path in every_path(app)]
     answers += [client.post("/", headers=ORIGIN), client.post("/")]
     answers += [stranger.get("/"), stranger.get("/", headers={"host": "evil.com"})]
@@ -105,7 +105,9 @@ def test_every_answer_has_every_header(app, client, stranger):
         assert "server" not in headers
 
 
-def test_a_failing_page_gets_the_headers_too(app, rooms, make_client):
+def test_the_answer_of_a_failing_page_has_the_content_security_policy(
+    app, rooms, make_client
+):
     class Broken:
         @property
         def pages(self):
@@ -120,7 +122,7 @@ def test_a_failing_page_gets_the_headers_too(app, rooms, make_client):
     assert "broken" not in answer.text
 
 
-def test_a_browser_is_asked_to_sign_in_and_other_programs_are_told(stranger):
+def test_a_browser_gets_a_sign_in_form_and_other_programs_get_plain_text(stranger):
     page = stranger.get("/", headers={"accept": "text/html,*/*"})
     assert page.status_code == 401
     assert '<input name="token"' in page.text
@@ -128,7 +130,9 @@ def test_a_browser_is_asked_to_sign_in_and_other_programs_are_told(stranger):
     assert stranger.get("/").headers["content-type"].startswith("text/plain")
 
 
-def test_signing_in_leads_to_the_page_and_leaves_no_token_behind(stranger, caplog):
+def test_signing_in_opens_the_page_and_the_token_is_in_no_answer_and_no_log(
+    stranger, caplog
+):
     with caplog.at_level(logging.DEBUG):
         answer = stranger.get(f"/lab/?token={TOKEN}")
         location = answer.headers["location"]
@@ -154,12 +158,12 @@ def test_a_made_page_is_served(client):
     assert 'src="/_webmap/web/page.js"' in answer.text
 
 
-def test_a_missing_or_additional_slash_leads_to_the_page(client, with_page):
+def test_a_missing_or_additional_slash_redirects_to_the_page(client, with_page):
     assert client.get("/lab").headers["location"] == "/lab/"
     assert client.get("/own/page/").headers["location"] == "/own/page"
 
 
-def test_the_users_own_page_is_served_with_the_files_beside_it(with_page):
+def test_an_html_page_of_the_user_is_served_with_the_files_of_its_folder(with_page):
     page = with_page.get("/own/page")
     assert "Grüße" in page.text
     assert 'src="/_webmap/web/page.js"' in page.text
@@ -175,12 +179,12 @@ def test_the_users_own_page_is_served_with_the_files_beside_it(with_page):
         assert with_page.get(path).status_code == 404
 
 
-def test_a_made_page_serves_nothing_beside_it(rooms, folder, client):
+def test_a_made_page_serves_no_files_of_its_folder(rooms, folder, client):
     rooms.site.pages["/"] = FakePage("/", None, folder)
     assert client.get("/style.css").status_code == 404
 
 
-def test_an_html_file_that_cannot_be_read_is_said_without_its_path(
+def test_an_unreadable_html_file_is_an_error_that_does_not_show_its_folder(
     with_page, folder, caplog
 ):
     (folder / "index.html").write_bytes(b"\xff\xfe\xfa")
@@ -190,7 +194,7 @@ def test_an_html_file_that_cannot_be_read_is_said_without_its_path(
     assert "index.html" in caplog.text
 
 
-def test_what_the_policy_will_block_is_logged_once(with_page, folder, caplog):
+def test_content_blocked_by_the_policy_is_logged_once(with_page, folder, caplog):
     (folder / "index.html").write_text("<head></head>\n<script>x()</script>")
     for _ in range(3):
         with_page.get("/own/page")
@@ -205,14 +209,16 @@ def test_what_the_policy_will_block_is_logged_once(with_page, folder, caplog):
         ("/_webmap/web/drive.js", "text/javascript; charset=utf-8"),
     ],
 )
-def test_the_packages_own_files_are_served_with_their_type(client, path, media_type):
+def test_files_of_the_package_are_served_with_their_media_type(
+    client, path, media_type
+):
     answer = client.get(path)
     assert answer.status_code == 200
     assert answer.headers["content-type"] == media_type
     assert answer.headers["cache-control"] == "no-cache"
 
 
-def test_a_file_that_the_browser_has_is_not_sent_again(client):
+def test_a_file_in_the_cache_of_the_browser_is_not_sent_again(client):
     tag = client.get("/_webmap/icon.svg").headers["etag"]
     again = client.get("/_webmap/icon.svg", headers={"if-none-match": tag})
     assert (again.status_code, again.content) == (304, b"")
@@ -240,13 +246,13 @@ def test_head_is_answered_like_get_without_the_body(client):
         "/nothing",
     ],
 )
-def test_everything_else_is_not_there(client, path):
+def test_every_other_path_is_not_found(client, path):
     answer = client.get(path)
     assert answer.status_code == 404
     assert answer.text.startswith("404 Not Found\n\nThere is nothing")
 
 
-def test_what_was_published_is_served(app, client, folder):
+def test_published_files_and_images_are_served(app, client, folder):
     sheet = client.get(app.published.publish_file(folder / "style.css"))
     assert (sheet.text, sheet.headers["cache-control"]) == ("a{}", "no-cache")
     url = app.published.publish_image(PNG, "image/png")
@@ -259,20 +265,20 @@ def test_what_was_published_is_served(app, client, folder):
     assert client.get(url).status_code == 404
 
 
-def test_what_a_camera_saw_is_kept_by_no_browser(client):
+def test_camera_pictures_are_not_stored_by_the_browser(client):
     url = pictures.publish(PNG + b"seen", "image/png", fleeting=True)
     assert client.get(url).headers["cache-control"] == "no-store"
     pictures.withdraw(url)
     assert client.get(url).status_code == 404
 
 
-def test_a_published_file_may_have_any_name(app, client, folder):
+def test_a_published_file_can_have_any_name(app, client, folder):
     odd = folder / "50% of #1 ü?.css"
     odd.write_text("odd{}")
     assert client.get(app.published.publish_file(odd)).text == "odd{}"
 
 
-def test_wrong_tokens_make_wrong_ones_wait_and_the_right_one_works_at_once(stranger):
+def test_wrong_tokens_delay_only_further_wrong_tokens(stranger):
     for _ in range(10):
         assert stranger.get("/?token=wrong").status_code == 401
     answer = stranger.get("/?token=wrong")
@@ -283,7 +289,7 @@ def test_wrong_tokens_make_wrong_ones_wait_and_the_right_one_works_at_once(stran
     assert key_in(page.text)
 
 
-def test_a_code_signs_one_browser_in_once(app, make_client):
+def test_a_sign_in_code_works_once_and_for_one_browser(app, make_client):
     first, second = make_client(app), make_client(app)
     address = f"/lab/?a=1&webmap_code={app.new_code()}"
     page = first.get(address)
@@ -299,14 +305,14 @@ def test_a_code_signs_one_browser_in_once(app, make_client):
     assert first.get(address).headers["location"] == "/lab/?a=1"
 
 
-def test_only_the_page_that_signs_in_is_handed_the_key(client, with_page):
+def test_only_the_page_of_the_sign_in_contains_the_key(client, with_page):
     assert "webmap-key" not in client.get("/lab/").text
     assert "webmap-key" not in with_page.get("/own/page").text
     own = with_page.get(f"/own/page?token={TOKEN}", follow_redirects=True)
     assert own.text.index(key_in(own.text)) < own.text.index("</head>")
 
 
-def test_a_browser_that_has_lost_its_key_gets_the_same_one_again(client):
+def test_a_signed_in_browser_gets_the_same_key_with_the_token(client):
     key = client.headers["webmap-key"]
     page = client.get(f"/?token={TOKEN}", follow_redirects=True)
     assert key_in(page.text) == key
@@ -314,7 +320,7 @@ def test_a_browser_that_has_lost_its_key_gets_the_same_one_again(client):
 
 
 @pytest.mark.parametrize("name", ["scene", "drive"])
-def test_the_cookie_opens_no_socket(app, client, make_client, name, rooms):
+def test_the_cookie_cannot_open_a_socket(app, client, make_client, name, rooms):
     """Another server on this host receives the cookie: cookies know no ports."""
     key = client.headers.pop("webmap-key")
     url = socket_url(name, id="p")
@@ -328,7 +334,7 @@ def test_the_cookie_opens_no_socket(app, client, make_client, name, rooms):
     assert len(rooms.model.scenes) + len(rooms.gate.connections) == 1
 
 
-def test_a_page_learns_why_its_socket_was_refused(client):
+def test_a_page_can_ask_why_its_socket_was_refused(client):
     ask = "/_webmap/key"
     assert client.post(ask, headers=ORIGIN).status_code == 204
     assert client.post(ask).status_code == 403
@@ -338,7 +344,7 @@ def test_a_page_learns_why_its_socket_was_refused(client):
     assert "Open the address that WebMap printed" in answer.text
 
 
-def test_what_a_stranger_sends_writes_no_lines_of_its_own_into_the_log(
+def test_a_request_without_sign_in_cannot_add_its_own_lines_to_the_log(
     stranger, caplog
 ):
     stranger.get("/a%0Aroot: all is well", headers={"host": "evil.com"})
@@ -371,7 +377,7 @@ def test_the_application_works_under_a_prefix(app, rooms, make_client, with_page
 
 
 @pytest.mark.parametrize("is_async", [False, True])
-def test_a_host_application_can_tell_who_somebody_is(rooms, make_client, is_async):
+def test_a_host_application_can_authenticate_viewers(rooms, make_client, is_async):
     def tell(scope):
         known = any(name == b"x-user" for name, _ in scope["headers"])
         return Viewer("1", "Ada", "viewer") if known else None
@@ -394,7 +400,7 @@ def test_a_host_application_can_tell_who_somebody_is(rooms, make_client, is_asyn
     assert (connection.name, connection.role) == ("Ada", "viewer")
 
 
-def test_the_lifespan_is_the_hosts_own(rooms, make_client):
+def test_the_application_uses_the_lifespan_of_its_host(rooms, make_client):
     from contextlib import asynccontextmanager
 
     events = []
@@ -411,6 +417,6 @@ def test_the_lifespan_is_the_hosts_own(rooms, make_client):
     assert events == ["start", "stop"]
 
 
-def test_a_weak_token_stops_the_start(rooms):
+def test_a_weak_token_is_refused_at_the_start(rooms):
     with pytest.raises(ValueError, match="43"):
         WebApp(rooms.site, rooms.model, rooms.gate, Settings(token="weak"))

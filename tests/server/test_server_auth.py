@@ -8,7 +8,7 @@ from webmap.server.auth import Attempts, Codes, Token, new_token
 SECRET = "s" * 43
 
 
-def test_a_new_token_is_different_each_time_and_taken():
+def test_each_new_token_is_different_and_valid():
     first, second = new_token(), new_token()
     assert first != second
     assert Token(first).matches(first)
@@ -25,15 +25,15 @@ def test_a_weak_or_unsafe_token_is_refused_without_being_repeated(secret):
 
 
 @given(st.text())
-def test_no_other_text_is_the_token(text):
+def test_only_the_exact_token_matches(text):
     assert Token(SECRET).matches(text) == (text == SECRET)
 
 
-def test_a_lone_surrogate_is_not_the_token():
+def test_a_lone_surrogate_does_not_match_the_token():
     assert not Token(SECRET).matches("\ud800")
 
 
-def test_a_cookie_proves_its_session_and_does_not_hold_the_token():
+def test_a_cookie_identifies_its_session_and_does_not_contain_the_token():
     token = Token(SECRET)
     cookie = token.issue()
     assert token.session(cookie) == cookie.partition(".")[0]
@@ -41,20 +41,20 @@ def test_a_cookie_proves_its_session_and_does_not_hold_the_token():
     assert token.issue() != cookie
 
 
-def test_a_server_that_starts_again_with_the_same_token_knows_its_viewers():
+def test_a_cookie_is_valid_after_a_restart_with_the_same_token():
     assert Token(SECRET).session(Token(SECRET).issue()) is not None
 
 
-def test_a_cookie_of_another_token_proves_nothing():
+def test_a_cookie_of_another_token_is_invalid():
     assert Token(new_token()).session(Token(SECRET).issue()) is None
 
 
 @given(st.text())
-def test_no_text_is_a_cookie(text):
+def test_a_random_text_is_not_a_valid_cookie(text):
     assert Token(SECRET).session(text) is None
 
 
-def test_the_cookie_does_not_give_the_key_away_and_is_none():
+def test_a_cookie_is_not_a_valid_key_and_a_key_is_not_a_valid_cookie():
     token = Token(SECRET)
     cookie = token.issue()
     session = token.session(cookie)
@@ -66,7 +66,7 @@ def test_the_cookie_does_not_give_the_key_away_and_is_none():
     assert Token(SECRET).key(session) == key
 
 
-def test_a_code_is_used_up_and_the_oldest_is_forgotten_first():
+def test_a_code_works_once_and_the_oldest_code_is_removed_at_the_limit():
     codes = Codes(life=10.0, limit=2)
     first, second, third = (codes.issue(0.0) for _ in range(3))
     assert not codes.use(first, 0.0)
@@ -76,7 +76,7 @@ def test_a_code_is_used_up_and_the_oldest_is_forgotten_first():
     assert not codes.use("", 0.0)
 
 
-def test_every_changed_character_spoils_a_cookie():
+def test_a_cookie_with_any_changed_character_is_invalid():
     token = Token(SECRET)
     cookie = token.issue()
     for at in range(len(cookie)):
@@ -95,14 +95,14 @@ def test_ten_failures_in_a_minute_make_an_address_wait():
     assert attempts.wait("a", 60.0) == 0
 
 
-def test_old_failures_do_not_add_up():
+def test_old_failures_are_not_counted():
     attempts = Attempts()
     for attempt in range(100):
         attempts.failed("a", attempt * 7.0)
         assert attempts.wait("a", attempt * 7.0) == 0
 
 
-def test_addresses_that_failed_are_forgotten_from_the_oldest_on():
+def test_the_address_with_the_oldest_failure_is_forgotten_first():
     attempts = Attempts(limit=1, addresses=2)
     for address in ("a", "b", "c"):
         attempts.failed(address, 0.0)

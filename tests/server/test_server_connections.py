@@ -110,7 +110,9 @@ def rest_of(link):
     return bytes(got)
 
 
-def test_600_idle_strangers_keep_nobody_out_who_has_signed_in(server, gate, open_raw):
+def test_600_idle_connections_without_sign_in_do_not_block_a_signed_in_viewer(
+    server, gate, open_raw
+):
     browser = server.sign_in()
     said = ["", HEAD, HEAD + "Cookie: webmap_1=x\r\n"]
     links = [open_raw(said[n % 3]) for n in range(600)]
@@ -133,7 +135,7 @@ def test_600_idle_strangers_keep_nobody_out_who_has_signed_in(server, gate, open
     assert is_open(links[-1])
 
 
-def test_the_sockets_of_pages_and_their_requests_are_not_pushed_out(
+def test_connections_of_a_signed_in_viewer_are_not_closed_at_the_limit(
     server, gate, open_raw
 ):
     browser = server.sign_in()
@@ -157,9 +159,7 @@ def test_the_sockets_of_pages_and_their_requests_are_not_pushed_out(
     asyncio.run(scenario())
 
 
-def test_an_operator_reads_that_there_are_too_many_strangers_once(
-    server, open_raw, caplog
-):
+def test_too_many_connections_without_sign_in_are_logged_once(server, open_raw, caplog):
     links = [open_raw() for _ in range(STRANGERS + 50)]
     wait_for(lambda: sum(map(is_open, links)) == STRANGERS)
     assert caplog.text.count("too many connections wait") == 1
@@ -176,12 +176,12 @@ def test_an_operator_reads_that_there_are_too_many_strangers_once(
         "Upgrade: websocket\r\n",
     ],
 )
-def test_who_does_not_get_to_the_point_is_turned_away(short, open_raw, said):
+def test_a_connection_that_sends_no_complete_request_is_closed(short, open_raw, said):
     link = open_raw(said)
     assert ends_though_bytes_come(link, b"x" if said else b"")
 
 
-def test_a_request_that_is_never_ended_after_a_good_one_is_turned_away(
+def test_an_endless_request_after_a_valid_one_closes_the_connection(
     short, server, open_raw
 ):
     cookie = server.sign_in().cookie
@@ -191,7 +191,7 @@ def test_a_request_that_is_never_ended_after_a_good_one_is_turned_away(
     assert ends_though_bytes_come(link, b"GET / HTTP/1.1\r\nX: ")
 
 
-def test_a_large_answer_over_a_slow_link_may_take_its_time(short, server, open_raw):
+def test_a_large_answer_over_a_slow_link_is_sent_completely(short, server, open_raw):
     cookie = server.sign_in().cookie
     host = f"Host: 127.0.0.1:{server.port}\r\n"
     link = open_raw(
@@ -201,7 +201,7 @@ def test_a_large_answer_over_a_slow_link_may_take_its_time(short, server, open_r
     assert len(rest_of(link)) > 20_000_000
 
 
-def test_a_stranger_has_one_request_for_each_connection(open_raw):
+def test_a_connection_without_sign_in_gets_only_one_answer(open_raw):
     link = open_raw("GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 3)
     answer = rest_of(link)
     assert answer.count(b"HTTP/1.1 401") == 1
@@ -216,7 +216,9 @@ UPGRADE = (
 
 
 @pytest.mark.parametrize(("host", "status"), [("127.0.0.1", 401), ("evil.com", 421)])
-def test_a_refused_socket_is_no_error_of_ours(server, open_raw, caplog, host, status):
+def test_a_refused_socket_is_not_logged_as_an_error(
+    server, open_raw, caplog, host, status
+):
     link = open_raw(UPGRADE.replace("Host: 127.0.0.1", f"Host: {host}"))
     assert rest_of(link).startswith(f"HTTP/1.1 {status}".encode())
     open_raw("").close()
@@ -238,7 +240,7 @@ class GivenUp:
         raise RuntimeError("Unexpected ASGI message 'websocket.close', after sending")
 
 
-def test_what_is_sent_to_a_page_that_has_gone_leaves_no_traceback(caplog):
+def test_sending_to_a_closed_page_logs_no_traceback(caplog):
     async def scenario():
         line = PageSocket(
             GivenUp(), "drive", BatchedCallsByLoop().of_this_loop(), DRIVE, DriveQueue()

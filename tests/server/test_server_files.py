@@ -76,22 +76,22 @@ def test_a_file_of_the_folder_is_read(folder, name, media_type):
         "\ud800.css",
     ],
 )
-def test_nothing_else_is_read(folder, name):
+def test_every_other_name_is_refused(folder, name):
     with pytest.raises(NoSuchFile):
         read_below(folder, name)
 
 
-def test_a_folder_that_is_not_there_has_no_files(tmp_path):
+def test_a_missing_folder_has_no_files(tmp_path):
     with pytest.raises(NoSuchFile):
         read_below(tmp_path / "gone", "style.css")
 
 
-def test_a_link_that_was_put_in_place_of_a_file_is_not_followed(folder):
+def test_a_symbolic_link_in_place_of_a_file_is_not_followed(folder):
     with pytest.raises(NoSuchFile):
         read_file(folder / "out.css")
 
 
-def test_a_file_that_changes_has_another_tag(folder):
+def test_a_changed_file_has_another_tag(folder):
     before = read_below(folder, "style.css").tag
     (folder / "style.css").write_text("a{color:red}")
     assert read_below(folder, "style.css").tag != before
@@ -107,7 +107,7 @@ def test_a_published_file_is_read_again_each_time(folder):
     assert published.publish_file(folder / "style.css") == url
 
 
-def test_neighbours_have_one_folder_in_their_urls_and_only_published_ones_are_served(
+def test_files_of_one_folder_share_a_url_folder_and_only_published_ones_are_served(
     folder,
 ):
     published = Published()
@@ -122,19 +122,19 @@ def test_neighbours_have_one_folder_in_their_urls_and_only_published_ones_are_se
 
 
 @pytest.mark.parametrize("name", ["nothing.js", "main.py", "dir.css", "pipe.css"])
-def test_what_cannot_be_published_is_said_at_once(folder, name):
+def test_a_file_that_cannot_be_published_is_refused_at_once(folder, name):
     with pytest.raises(ConfigError, match=name.partition(".")[0]):
         Published().publish_file(folder / name)
 
 
-def test_the_same_image_has_the_same_url_and_another_one_another():
+def test_equal_images_have_the_same_url_and_different_images_different_urls():
     published = Published()
     first = published.publish_image(PNG, "image/png")
     assert published.publish_image(PNG, "image/png") == first
     assert published.publish_image(PNG + b"x", "image/png") != first
 
 
-def test_an_image_is_served_until_it_was_withdrawn_as_often_as_published():
+def test_an_image_is_served_until_withdrawn_as_often_as_published():
     published = Published()
     url = published.publish_image(PNG, "image/png")
     published.publish_image(PNG, "image/png")
@@ -147,17 +147,17 @@ def test_an_image_is_served_until_it_was_withdrawn_as_often_as_published():
     published.withdraw_image(url)
 
 
-def test_an_image_file_tells_its_type_by_its_suffix(folder):
+def test_the_type_of_an_image_file_is_taken_from_its_suffix(folder):
     url = Published().publish_image(folder / "images" / "robot.png")
     assert url == Published().publish_image(PNG, "image/png")
 
 
 @pytest.mark.parametrize("media_type", [None, "", "text/html", "image/x-unknown"])
-def test_only_images_are_images(media_type):
+def test_a_media_type_that_is_not_an_image_is_refused(media_type):
     with pytest.raises(ConfigError, match="an image is one of"):
         Published().publish_image(PNG, media_type)
 
 
-def test_an_image_that_does_not_exist_is_named(tmp_path):
+def test_a_missing_image_is_named_in_the_error(tmp_path):
     with pytest.raises(ConfigError, match=r"plan\.png"):
         Published().publish_image(tmp_path / "plan.png")

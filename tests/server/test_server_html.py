@@ -7,7 +7,7 @@ SCRIPT = '<script type="module" src="/_webmap/web/page.js"></script>'
 ICON = '<link rel="icon" href="/_webmap/icon.svg" type="image/svg+xml">'
 
 
-def test_a_made_page_has_one_container_and_its_title_is_only_text():
+def test_a_made_page_has_one_container_and_an_escaped_title():
     text = make_page("A <b>", base_of(""))
     assert '<div id="webmap_container"></div>' in text
     assert "<title>A &lt;b&gt;</title>" in text
@@ -15,17 +15,17 @@ def test_a_made_page_has_one_container_and_its_title_is_only_text():
     assert prepare_page(text, base_of("")).blocked == []
 
 
-def test_a_keyboard_on_the_screen_makes_a_made_page_lower_and_covers_nothing():
+def test_a_made_page_is_resized_by_an_on_screen_keyboard():
     assert "interactive-widget=resizes-content" in make_page("A", base_of(""))
 
 
-def test_the_base_follows_the_prefix():
+def test_the_base_url_contains_the_prefix():
     assert base_of("") == "/_webmap/"
     assert base_of("/robots/") == "/robots/_webmap/"
     assert base_of('/a "b"') == "/a%20%22b%22/_webmap/"
 
 
-def test_the_users_own_sheets_come_after_ours_and_the_script_comes_last():
+def test_style_sheets_of_the_user_come_after_webmap_css_and_before_the_script():
     text = '<html><head><link rel="stylesheet" href="a.css"></head><body></body></html>'
     assert prepare_page(text, base_of("")).text == (
         f'<html><head>{SHEET}<link rel="stylesheet" href="a.css">{SCRIPT}{ICON}</head>'
@@ -51,11 +51,13 @@ def test_the_users_own_sheets_come_after_ours_and_the_script_comes_last():
         ),
     ],
 )
-def test_pages_of_every_shape_get_what_they_need(text, expected):
+def test_html_of_every_form_gets_the_style_sheet_the_script_and_the_icon(
+    text, expected
+):
     assert prepare_page(text, base_of("")).text == expected
 
 
-def test_what_a_page_loads_by_itself_is_not_loaded_twice():
+def test_files_that_the_html_already_loads_are_not_added_again():
     text = (
         '<head><link rel="stylesheet" href="_webmap/web/webmap.css">'
         '<link rel="shortcut icon" href="me.png">'
@@ -64,7 +66,7 @@ def test_what_a_page_loads_by_itself_is_not_loaded_twice():
     assert prepare_page(text, base_of("")).text == text
 
 
-def test_what_the_policy_blocks_is_named_with_its_line():
+def test_content_blocked_by_the_policy_is_named_with_its_line():
     page = prepare_page(
         "<head>\n<style>a{}</style>\n<script>x()</script>\n"
         '<script type="application/json">{}</script>\n'

@@ -11,7 +11,7 @@ from webmap.base.errors import ConfigError
 from webmap.server import open_pages as host_module
 
 
-def test_a_page_function_that_goes_on_for_ever_ends_with_its_page(loop, monkeypatch):
+def test_an_endless_page_function_is_cancelled_with_its_page(loop, monkeypatch):
     monkeypatch.setattr(host_module, "KEPT_FOR", 0.0)
     began, ended = [], []
 
@@ -36,7 +36,9 @@ def test_a_page_function_that_goes_on_for_ever_ends_with_its_page(loop, monkeypa
     wait_for(lambda: loop.wait(others()) == before)
 
 
-def test_a_page_function_that_fails_as_it_ends_is_no_failure(loop, monkeypatch, caplog):
+def test_an_exception_in_a_cancelled_page_function_is_not_logged_as_a_failure(
+    loop, monkeypatch, caplog
+):
     monkeypatch.setattr(host_module, "KEPT_FOR", 0.0)
     began, said = [], []
 
@@ -60,7 +62,7 @@ def test_a_page_function_that_fails_as_it_ends_is_no_failure(loop, monkeypatch, 
     assert "the page function failed" not in caplog.text
 
 
-def test_past_the_limit_the_page_that_was_lost_first_gives_way(loop):
+def test_at_the_page_limit_the_page_that_was_lost_first_is_removed(loop):
     model = make_model(loop, lambda page: None, max_pages=3)
 
     def opened():
@@ -79,7 +81,7 @@ def test_past_the_limit_the_page_that_was_lost_first_gives_way(loop):
     loop.call(lambda: model.close() or True)
 
 
-def test_pages_that_come_under_ever_new_names_are_bounded(loop):
+def test_the_number_of_lost_pages_with_new_ids_is_limited(loop):
     built, closed, hosts = [], [], weakref.WeakSet()
 
     def build(page):

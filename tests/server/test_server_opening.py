@@ -50,7 +50,7 @@ def file_of(arguments):
     return Path(unquote(parts.path))
 
 
-def test_a_browser_is_given_a_file_that_only_its_owner_reads(browser, home):
+def test_the_browser_opens_a_file_that_only_its_owner_can_read(browser, home):
     with opening.opened(URL, "the-code"):
         file = file_of(browser())
         assert file.parent == home
@@ -60,7 +60,7 @@ def test_a_browser_is_given_a_file_that_only_its_owner_reads(browser, home):
     assert list(home.iterdir()) == []
 
 
-def test_the_file_is_removed_when_its_code_is_too_old(browser, home, monkeypatch):
+def test_the_file_is_removed_when_its_code_expires(browser, home, monkeypatch):
     monkeypatch.setattr(opening, "CODE_LIFE_S", 0.0)
     gone = threading.Event()
     monkeypatch.setattr(Path, "unlink", lambda *_, **__: gone.set())
@@ -68,14 +68,14 @@ def test_the_file_is_removed_when_its_code_is_too_old(browser, home, monkeypatch
         assert gone.wait(10)
 
 
-def test_without_a_home_that_can_be_written_the_file_lies_elsewhere(browser, home):
+def test_without_a_writable_home_the_file_is_in_the_temporary_folder(browser, home):
     home.rmdir()
     (home.parent / "tmp").mkdir()
     with opening.opened(URL, "the-code"):
         assert file_of(browser()).parent == home.parent / "tmp"
 
 
-def test_where_no_file_can_be_written_the_printed_address_remains(home, caplog):
+def test_without_a_writable_folder_the_log_refers_to_the_printed_address(home, caplog):
     home.rmdir()
     with opening.opened(URL, "the-code"):
         assert "open the printed address yourself" in caplog.text

@@ -26,7 +26,7 @@ from webmap.server.page_socket import (
 TICK = '{"op":"tick","tick":%d,"ack":-1}'
 
 
-def test_messages_up_to_the_bound_pass_and_larger_ones_do_not():
+def test_messages_up_to_the_size_limit_are_accepted_and_larger_ones_refused():
     for bounds in (SCENE, DRIVE):
         allowance = Allowance(bounds, 0.0)
         assert allowance.spend("x" * bounds.max_bytes, 0.0) is None
@@ -40,7 +40,7 @@ def test_size_is_counted_in_bytes_not_in_characters():
     assert Allowance(bounds, 0.0).spend("\ud800", 0.0) is None
 
 
-def test_sixty_commands_a_second_pass_for_ever_and_more_do_not():
+def test_sixty_messages_per_second_are_always_accepted_and_more_are_refused():
     allowance = Allowance(DRIVE, 0.0)
     assert all(allowance.spend("x", n / 60) is None for n in range(6000))
     hasty = Allowance(DRIVE, 0.0)
@@ -49,7 +49,7 @@ def test_sixty_commands_a_second_pass_for_ever_and_more_do_not():
     assert refused
 
 
-def test_what_a_stalled_link_held_back_may_come_at_once():
+def test_a_burst_of_120_messages_after_a_stalled_link_is_accepted():
     allowance = Allowance(DRIVE, 0.0)
     assert all(allowance.spend("x", 6.0) is None for _ in range(120))
     assert allowance.spend("x", 6.0) is not None
@@ -62,7 +62,7 @@ def test_frames_keep_their_order():
     assert [queue.pop(), queue.pop(), queue.pop()] == [b"a", b"b", None]
 
 
-def test_frames_that_nobody_reads_do_not_pile_up():
+def test_a_full_frame_queue_accepts_no_frame():
     queue = FrameQueue()
     assert all(queue.put(b"x") for _ in range(FRAMES))
     assert not queue.put(b"x")
@@ -70,7 +70,7 @@ def test_frames_that_nobody_reads_do_not_pile_up():
     assert queue.put(b"x")
 
 
-def test_a_frame_of_any_size_may_wait_alone_but_not_behind_another():
+def test_a_frame_above_the_size_limit_is_accepted_only_by_an_empty_queue():
     queue = FrameQueue()
     assert queue.put(bytes(2 * FRAME_BYTES))
     assert not queue.put(b"x")
@@ -79,7 +79,7 @@ def test_a_frame_of_any_size_may_wait_alone_but_not_behind_another():
     assert not queue.put(bytes(FRAME_BYTES))
 
 
-def test_the_newest_tick_goes_first_and_alone():
+def test_the_newest_tick_is_sent_first_and_replaces_older_ticks():
     queue = DriveQueue()
     for item in ("robot 1", TICK % 1, "robot 2", TICK % 2):
         assert queue.put(item)
@@ -87,7 +87,7 @@ def test_the_newest_tick_goes_first_and_alone():
     assert sent == [TICK % 2, "robot 1", "robot 2", None]
 
 
-def test_ticks_always_find_room():
+def test_a_full_drive_queue_accepts_a_tick():
     queue = DriveQueue()
     while queue.put("robot"):
         pass
@@ -97,7 +97,7 @@ def test_ticks_always_find_room():
 
 
 @given(st.lists(st.one_of(st.integers(0, 99), st.none()), max_size=200))
-def test_no_word_of_the_gate_is_lost_or_reordered(steps):
+def test_no_robot_message_of_the_gate_is_lost_or_reordered(steps):
     queue, put, popped = DriveQueue(), [], []
     for step in steps:
         if step is None:
@@ -120,7 +120,7 @@ class Guest:
         self.received.append(code)
 
 
-def test_a_page_that_opens_again_replaces_its_own_socket():
+def test_a_page_that_reconnects_replaces_its_own_socket():
     sockets, old, new = OpenSockets(1), Guest(), Guest()
     assert sockets.add(("v", "p"), old)
     assert sockets.add(("v", "p"), new)
@@ -131,7 +131,7 @@ def test_a_page_that_opens_again_replaces_its_own_socket():
     assert len(sockets) == 0
 
 
-def test_there_are_so_many_sockets_and_no_more():
+def test_a_socket_above_the_limit_is_refused():
     sockets, first, second = OpenSockets(1), Guest(), Guest()
     assert sockets.add(("v", "p"), first)
     assert not sockets.add(("w", "p"), second)
@@ -140,7 +140,7 @@ def test_there_are_so_many_sockets_and_no_more():
     assert sockets.add(("w", "p"), second)
 
 
-def test_calls_keep_order_over_threads_and_wakes_the_loop_once():
+def test_batched_calls_from_another_thread_run_in_order():
     async def scenario():
         seen = []
         calls = BatchedCallsByLoop().of_this_loop()
@@ -157,7 +157,7 @@ def test_calls_keep_order_over_threads_and_wakes_the_loop_once():
     assert asyncio.run(scenario()) == list(range(1000))
 
 
-def test_a_call_that_fails_does_not_stop_the_next(caplog):
+def test_a_batched_call_that_raises_does_not_stop_the_next(caplog):
     async def scenario():
         seen = []
         calls = BatchedCallsByLoop().of_this_loop()
@@ -171,7 +171,7 @@ def test_a_call_that_fails_does_not_stop_the_next(caplog):
     assert "ZeroDivisionError" in caplog.text
 
 
-def test_a_call_into_a_loop_that_has_ended_does_nothing_and_keeps_nothing():
+def test_a_batched_call_into_a_closed_loop_is_dropped():
     loop = asyncio.new_event_loop()
     calls = BatchedCalls(loop)
     loop.close()
@@ -180,7 +180,7 @@ def test_a_call_into_a_loop_that_has_ended_does_nothing_and_keeps_nothing():
     assert not calls._calls
 
 
-def test_each_loop_has_one_hop():
+def test_each_event_loop_has_its_own_batched_calls():
     hops = BatchedCallsByLoop()
 
     async def same():
@@ -190,6 +190,6 @@ def test_each_loop_has_one_hop():
     assert asyncio.run(same()) is not asyncio.run(same())
 
 
-def test_reasons_fit_into_a_close_frame():
+def test_close_reasons_are_shortened_to_fit_into_a_close_frame():
     assert short("short") == "short"
     assert len(short("€" * 100).encode()) <= 123

@@ -15,7 +15,7 @@ from webmap.server import open_pages as host_module
 from webmap.testing.witness import WitnessRobot
 
 
-def test_the_page_function_knows_the_container_and_a_frame_comes(loop):
+def test_the_page_function_gets_the_container_size_and_a_frame_is_sent(loop):
     seen = []
 
     def build(page):
@@ -29,7 +29,7 @@ def test_the_page_function_knows_the_container_and_a_frame_comes(loop):
     loop.call(lambda: model.close() or True)
 
 
-def test_an_async_page_function_may_wait(loop):
+def test_a_page_function_can_be_async(loop):
     import asyncio
 
     done = []
@@ -45,7 +45,7 @@ def test_an_async_page_function_may_wait(loop):
     loop.call(lambda: model.close() or True)
 
 
-def test_an_exception_shows_on_that_page_and_the_others_go_on(loop):
+def test_an_exception_in_a_page_function_is_shown_only_on_its_page(loop):
     def build(page):
         if page.viewer.name == "Bob":
             raise RuntimeError("no robot today")
@@ -63,7 +63,7 @@ def test_an_exception_shows_on_that_page_and_the_others_go_on(loop):
 @pytest.mark.parametrize(
     "garbage", ["", "{", "[]", '{"op": "hello"}', '{"op": "fly"}', "x" * 20_000]
 )
-def test_garbage_from_a_page_is_refused_and_the_page_goes_on(loop, garbage):
+def test_an_invalid_message_of_a_page_does_not_close_the_page(loop, garbage):
     model = make_model(loop, lambda page: None)
     handle, socket = open_page(model)
     handle.receive(garbage)
@@ -73,7 +73,7 @@ def test_garbage_from_a_page_is_refused_and_the_page_goes_on(loop, garbage):
     loop.call(lambda: model.close() or True)
 
 
-def test_the_map_is_kept_for_a_viewer_who_comes_back(loop):
+def test_the_map_is_kept_for_a_viewer_who_reconnects(loop):
     made = []
 
     def build(page):
@@ -100,7 +100,7 @@ def test_another_viewer_does_not_get_the_page_of_the_first(loop):
     loop.call(lambda: model.close() or True)
 
 
-def test_a_viewer_who_stays_away_loses_the_map(loop, monkeypatch):
+def test_the_page_of_a_viewer_who_does_not_reconnect_is_closed(loop, monkeypatch):
     monkeypatch.setattr(host_module, "KEPT_FOR", 0.01)
     ended = []
 
@@ -191,7 +191,7 @@ def test_a_thousand_pages_opened_and_closed_leave_nothing_behind(loop, monkeypat
     loop.call(lambda: bob.destroy() or True)
 
 
-def test_fifty_viewers_of_one_grid_cost_one_decode_and_one_encoding(loop):
+def test_fifty_viewers_of_one_grid_share_one_decoding_and_one_encoding(loop):
     link = Link()
     layers = []
 
@@ -246,7 +246,9 @@ def counted(monkeypatch, owner, name):
     return calls
 
 
-def test_fifty_viewers_of_one_scan_cost_one_decode_and_one_drawing(loop, monkeypatch):
+def test_fifty_viewers_of_one_scan_share_one_decoding_and_one_drawing(
+    loop, monkeypatch
+):
     decoded = counted(monkeypatch, Publish, "_decode")
     drawn = counted(monkeypatch, LaserScanner, "draw")
     with WitnessRobot() as there:

@@ -52,7 +52,9 @@ def process():
 
 @pytest.mark.serial
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_it_cleanly_and_soon_with_sockets_open(process, number):
+def test_a_signal_ends_the_server_within_two_seconds_even_with_open_sockets(
+    process, number
+):
     line = process.stdout.readline()
     assert line.startswith("WebMap is ready at http://127.0.0.1:")
     assert line.endswith(f"/?token={TOKEN}\n")
@@ -95,7 +97,7 @@ def test_the_ready_line_is_printed_at_once(capsys):
     assert capsys.readouterr().out == "WebMap is ready at http://127.0.0.1:1/\n"
 
 
-def test_a_port_in_use_is_one_clear_sentence():
+def test_a_port_in_use_is_refused_with_a_clear_message():
     with listen("127.0.0.1", 0) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(ConfigError, match=f"port {port} on 127.0.0.1 is in use"):
@@ -103,13 +105,13 @@ def test_a_port_in_use_is_one_clear_sentence():
 
 
 @pytest.mark.parametrize("port", [-1, 65536])
-def test_what_is_no_port_is_refused(port):
+def test_an_invalid_port_is_refused(port):
     with pytest.raises(ConfigError, match="from 0 to 65535"):
         listen("127.0.0.1", port)
 
 
 @pytest.mark.parametrize("host", ["no such host", "a" * 300, "192.0.2.1"])
-def test_what_is_no_address_of_this_machine_is_refused(host):
+def test_a_host_that_is_not_an_address_of_this_machine_is_refused(host):
     with pytest.raises(ConfigError, match=r"host|address"):
         listen(host, 0)
 
@@ -117,18 +119,18 @@ def test_what_is_no_address_of_this_machine_is_refused(host):
 @pytest.mark.parametrize(
     "host", ["", "0.0.0.0", "::", "192.168.1.5", "robots.example.com", "127.0.0.1.x"]
 )
-def test_other_machines_are_served_only_when_that_was_said(host):
+def test_serving_other_machines_needs_the_insecure_lan_option(host):
     with pytest.raises(ConfigError, match="insecure"):
         serve(app(), host=host, port=0)
     check_exposure(host, insecure_lan=True)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1", "127.9.9.9"])
-def test_this_machine_alone_needs_no_word(host):
+def test_serving_only_this_machine_needs_no_option(host):
     check_exposure(host, insecure_lan=False)
 
 
-def test_the_url_is_one_that_a_browser_here_can_open():
+def test_the_url_can_be_opened_by_a_browser_on_this_machine():
     with listen("0.0.0.0", 0) as listener:
         port = listener.getsockname()[1]
         assert url_of(listener, "0.0.0.0") == f"http://127.0.0.1:{port}/"
@@ -153,7 +155,7 @@ def serve_in_thread(application, **options):
     return errors
 
 
-def test_an_application_that_does_not_start_is_an_error_and_no_ready_line(caplog):
+def test_an_application_that_cannot_start_is_an_error_and_is_not_announced(caplog):
     @contextlib.asynccontextmanager
     async def life(_):
         raise RuntimeError("no gate")
@@ -166,7 +168,7 @@ def test_an_application_that_does_not_start_is_an_error_and_no_ready_line(caplog
     assert "no gate" in caplog.text
 
 
-def test_where_a_host_tells_who_somebody_is_the_url_has_no_token():
+def test_the_url_has_no_token_if_a_host_application_authenticates_viewers():
     def stop(url):
         urls.append(url)
         raise BrokenPipeError

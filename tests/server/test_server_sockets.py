@@ -79,7 +79,7 @@ async def reason_of(socket):
     return socket.close_code, socket.close_reason
 
 
-def test_a_scene_carries_both_ways_and_tells_the_model_once_that_it_closed(
+def test_a_scene_socket_carries_messages_both_ways_and_reports_its_close_once(
     rooms, open_socket
 ):
     async def scenario():
@@ -106,7 +106,9 @@ def test_a_scene_carries_both_ways_and_tells_the_model_once_that_it_closed(
     assert scene.times_closed == 1
 
 
-def test_a_drive_carries_both_ways_and_its_end_reaches_the_gate(rooms, open_socket):
+def test_a_drive_socket_carries_messages_both_ways_and_reports_its_close(
+    rooms, open_socket
+):
     async def scenario():
         async with open_socket("drive?id=p1") as socket:
             await socket.send('{"op":"take","robot":"r1"}')
@@ -128,7 +130,9 @@ def test_a_drive_carries_both_ways_and_its_end_reaches_the_gate(rooms, open_sock
     ]
 
 
-def test_a_page_drives_at_no_speed_before_its_own_limit_is_known(rooms, open_socket):
+def test_a_page_has_a_speed_limit_of_zero_before_its_own_limit_is_known(
+    rooms, open_socket
+):
     async def scenario():
         async with open_socket("drive?id=p1"), open_socket("drive"):
             await asyncio.to_thread(wait_for, lambda: len(rooms.gate.connections) == 2)
@@ -140,7 +144,7 @@ def test_a_page_drives_at_no_speed_before_its_own_limit_is_known(rooms, open_soc
     wait_for(lambda: len(rooms.model.drives) == 4)
 
 
-def test_a_drive_without_an_id_is_a_page_of_its_own(rooms, open_socket):
+def test_a_drive_socket_without_an_id_counts_as_its_own_page(rooms, open_socket):
     said = [["x"], ["x"]]
 
     async def scenario():
@@ -155,7 +159,7 @@ def test_a_drive_without_an_id_is_a_page_of_its_own(rooms, open_socket):
     assert len({page_id for _, page_id, _ in rooms.model.drives}) == 2
 
 
-def test_the_gate_can_end_a_drive_and_say_why(rooms, open_socket):
+def test_the_gate_can_close_a_drive_socket_with_a_reason(rooms, open_socket):
     async def scenario():
         async with open_socket("drive?id=p") as socket:
             await socket.send("rubbish")
@@ -166,7 +170,7 @@ def test_the_gate_can_end_a_drive_and_say_why(rooms, open_socket):
     assert asyncio.run(scenario()) == (1008, "20 bad messages in a second")
 
 
-def test_the_model_can_end_a_scene_and_say_why(rooms, open_socket):
+def test_the_model_can_close_a_scene_socket_with_a_reason(rooms, open_socket):
     async def scenario():
         async with open_socket("scene?id=p") as socket:
             await asyncio.to_thread(wait_for, lambda: rooms.model.scenes)
@@ -195,7 +199,7 @@ def test_the_model_can_end_a_scene_and_say_why(rooms, open_socket):
         ("drive?id=p", b"binary", "got a binary message, expected text"),
     ],
 )
-def test_what_is_too_large_or_binary_ends_the_socket(
+def test_a_too_large_or_binary_message_closes_the_socket(
     rooms, open_socket, name, message, reason
 ):
     async def scenario():
@@ -209,7 +213,9 @@ def test_what_is_too_large_or_binary_ends_the_socket(
     assert not any(s.received for s in (*rooms.model.scenes, *rooms.gate.connections))
 
 
-def test_a_message_far_above_the_bound_is_not_even_read(rooms, open_socket):
+def test_a_message_far_above_the_size_limit_closes_the_socket_with_code_1009(
+    rooms, open_socket
+):
     async def scenario():
         async with open_socket("scene?id=p") as socket:
             await socket.send("x" * 1_000_000)
@@ -226,7 +232,7 @@ STOPS = {
 
 
 @pytest.mark.parametrize("message", STOPS.values(), ids=STOPS)
-def test_a_stop_that_ends_the_socket_reaches_the_gate_first(
+def test_an_invalid_stop_reaches_the_gate_before_the_socket_is_closed(
     rooms, open_socket, message
 ):
     async def scenario():
@@ -240,7 +246,7 @@ def test_a_stop_that_ends_the_socket_reaches_the_gate_first(
     assert rooms.model.refusals
 
 
-def test_a_stop_in_text_that_is_not_utf_8_reaches_the_gate_first(
+def test_a_stop_in_invalid_utf_8_reaches_the_gate_before_the_socket_is_closed(
     rooms, open_socket, caplog
 ):
     async def scenario(*frames):
@@ -259,7 +265,9 @@ def test_a_stop_in_text_that_is_not_utf_8_reaches_the_gate_first(
     assert "Traceback" not in caplog.text
 
 
-def test_a_stop_behind_what_ends_the_socket_reaches_the_gate(rooms, open_socket):
+def test_a_stop_after_a_message_that_closes_the_socket_reaches_the_gate(
+    rooms, open_socket
+):
     stop, drive = '{"op":"stop","robot":"r1"}', '{"op":"drive"}'
 
     async def scenario():
@@ -274,7 +282,7 @@ def test_a_stop_behind_what_ends_the_socket_reaches_the_gate(rooms, open_socket)
     assert connection.received == [stop]
 
 
-def test_a_stop_in_a_flood_reaches_the_gate(rooms, open_socket):
+def test_a_stop_in_a_flood_of_messages_reaches_the_gate(rooms, open_socket):
     stop = '{"op":"stop","robot":"*"}'
 
     async def scenario():
@@ -290,7 +298,9 @@ def test_a_stop_in_a_flood_reaches_the_gate(rooms, open_socket):
 
 
 @pytest.mark.parametrize(("name", "rate"), [("scene?id=p", 120), ("drive?id=p", 60)])
-def test_a_page_that_floods_is_closed(rooms, open_socket, name, rate):
+def test_a_socket_with_too_many_messages_per_second_is_closed(
+    rooms, open_socket, name, rate
+):
     async def scenario():
         async with open_socket(name) as socket:
             with contextlib.suppress(ConnectionClosed):
@@ -311,7 +321,9 @@ def test_a_page_that_floods_is_closed(rooms, open_socket, name, rate):
         (f"drive?id={'x' * 65}", "id must be"),
     ],
 )
-def test_a_socket_for_no_page_is_closed_with_a_reason(rooms, open_socket, name, reason):
+def test_a_socket_with_an_unknown_page_or_an_invalid_id_is_closed_with_a_reason(
+    rooms, open_socket, name, reason
+):
     async def scenario():
         async with open_socket(name) as socket:
             return await reason_of(socket)
@@ -323,7 +335,7 @@ def test_a_socket_for_no_page_is_closed_with_a_reason(rooms, open_socket, name, 
 
 
 @pytest.mark.parametrize("name", ["scene?id=p", "drive?id=p"])
-def test_a_page_that_opens_again_replaces_its_lost_socket(rooms, open_socket, name):
+def test_a_page_that_reconnects_replaces_its_lost_socket(rooms, open_socket, name):
     async def scenario():
         async with open_socket(name) as old:
             await old.send("old")
@@ -339,7 +351,7 @@ def test_a_page_that_opens_again_replaces_its_lost_socket(rooms, open_socket, na
     asyncio.run(scenario())
 
 
-def test_two_viewers_may_call_their_pages_the_same(rooms, server, open_socket):
+def test_two_viewers_can_use_the_same_page_id(rooms, server, open_socket):
     other = server.sign_in()
 
     async def scenario():
@@ -358,7 +370,7 @@ def test_two_viewers_may_call_their_pages_the_same(rooms, server, open_socket):
 
 
 @pytest.mark.parametrize("name", ["scene", "drive"])
-def test_there_are_so_many_pages_and_no_more(rooms, open_socket, name):
+def test_a_page_above_the_limit_is_refused(rooms, open_socket, name):
     async def scenario():
         async with contextlib.AsyncExitStack() as stack:
             for number in range(4):
@@ -371,7 +383,7 @@ def test_there_are_so_many_pages_and_no_more(rooms, open_socket, name):
     assert "too many open pages" in reason
 
 
-def test_a_page_that_stops_reading_is_closed_and_holds_nothing(rooms, open_socket):
+def test_a_page_that_stops_reading_is_closed(rooms, open_socket):
     async def scenario():
         async with open_socket("scene?id=p", max_queue=1) as socket:
             await asyncio.to_thread(wait_for, lambda: rooms.model.scenes)
@@ -388,7 +400,7 @@ def test_a_page_that_stops_reading_is_closed_and_holds_nothing(rooms, open_socke
     assert rooms.model.scenes[0].times_closed == 1
 
 
-def test_a_slow_scene_holds_no_tick_up(rooms, open_socket):
+def test_a_slow_scene_socket_does_not_delay_ticks(rooms, open_socket):
     async def scenario():
         async with (
             open_socket("scene?id=p", max_queue=1) as slow,
@@ -407,7 +419,7 @@ def test_a_slow_scene_holds_no_tick_up(rooms, open_socket):
     asyncio.run(scenario())
 
 
-def test_a_browser_that_vanishes_is_missed(rooms, open_socket):
+def test_an_aborted_connection_of_a_browser_is_closed_at_the_gate(rooms, open_socket):
     async def scenario():
         async with open_socket("drive?id=p") as socket:
             await asyncio.to_thread(wait_for, lambda: rooms.gate.connections)
@@ -419,7 +431,7 @@ def test_a_browser_that_vanishes_is_missed(rooms, open_socket):
     asyncio.run(scenario())
 
 
-def test_a_model_that_fails_costs_one_page_only(
+def test_an_exception_in_the_model_or_the_gate_closes_only_its_socket(
     rooms, open_socket, caplog, monkeypatch
 ):
     def fail(*args):
@@ -480,7 +492,7 @@ def test_a_refused_socket_is_never_upgraded(rooms, server, name, origin, key, st
     assert rooms.gate.connections == []
 
 
-def test_the_token_is_in_no_log_of_the_server(rooms, server, caplog):
+def test_the_token_is_in_no_log_and_no_answer_of_the_server(rooms, server, caplog):
     with (
         caplog.at_level(logging.DEBUG),
         sockets.create_connection(("127.0.0.1", server.port)) as raw,

@@ -10,25 +10,25 @@ HERE = ""
 THERE, ELSEWHERE = "192.0.2.1", "192.0.2.2"
 
 
-def test_a_newcomer_is_let_in_and_the_oldest_goes():
+def test_a_new_connection_replaces_the_oldest_one_at_the_limit():
     waiting = Waiting(2, 2)
     assert [waiting.add(n, HERE) for n in range(4)] == [None, None, 0, 1]
     assert len(waiting) == 2
 
 
-def test_one_address_pushes_its_own_connections_out():
+def test_an_address_at_its_limit_replaces_only_its_own_connections():
     waiting = Waiting(100, 2)
     waiting.add("other", ELSEWHERE)
     assert [waiting.add(n, THERE) for n in range(4)] == [None, None, 0, 1]
     assert len(waiting) == 3
 
 
-def test_this_machine_has_no_limit_of_its_own_as_a_proxy_brings_everybody():
+def test_connections_from_this_machine_have_no_limit_per_address():
     waiting = Waiting(100, 2)
     assert {waiting.add(n, HERE) for n in range(100)} == {None}
 
 
-def test_the_address_with_the_most_connections_gives_way():
+def test_the_address_with_the_most_connections_loses_its_oldest_one():
     waiting = Waiting(4, 4)
     waiting.add("one", THERE)
     for number in range(3):
@@ -37,7 +37,7 @@ def test_the_address_with_the_most_connections_gives_way():
     assert waiting.add("three", HERE) == 1
 
 
-def test_who_waits_no_more_takes_no_place():
+def test_a_removed_connection_frees_its_place():
     waiting = Waiting(2, 1)
     assert waiting.add("a", THERE) is None
     waiting.remove("a", THERE)
@@ -46,7 +46,7 @@ def test_who_waits_no_more_takes_no_place():
 
 
 @given(st.lists(st.tuples(st.booleans(), st.sampled_from([HERE, THERE, ELSEWHERE]))))
-def test_there_are_never_more_than_the_limits_and_none_is_lost(steps):
+def test_the_limits_are_never_exceeded_and_no_connection_is_lost(steps):
     waiting, inside = Waiting(5, 3), {}
     for number, (comes, address) in enumerate(steps):
         if comes:
@@ -79,5 +79,7 @@ def test_there_are_never_more_than_the_limits_and_none_is_lost(steps):
         ("fe80::1%eth0", "fe80::/64"),
     ],
 )
-def test_what_counts_as_one_address(address, origin):
+def test_addresses_of_this_machine_and_of_one_ipv6_network_count_as_one(
+    address, origin
+):
     assert origin_of(address) == origin

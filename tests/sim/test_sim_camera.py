@@ -37,13 +37,13 @@ def wall_rows(view):
     return int((np.abs(middle[:, 2] - middle[:, 0] - 12) < 8).sum())
 
 
-def test_a_wall_that_is_nearer_is_taller(room):
+def test_a_nearer_wall_is_taller_in_the_picture(room):
     far, near = (room.view(Pose(x, 2.0, 0.0)) for x in (1.0, 4.0))
     assert far.shape == (HEIGHT, WIDTH, 3)
     assert wall_rows(near) > wall_rows(far) + 15
 
 
-def test_what_is_to_the_left_is_on_the_left(room):
+def test_a_robot_on_the_left_appears_on_the_left_of_the_picture(room):
     alone = room.view(Pose(1.0, 2.0, 0.0)).astype(int)
     seen = room.view(Pose(1.0, 2.0, 0.0), [(3.0, 2.8, 0.25)]).astype(int)
     columns = np.nonzero(np.abs(seen - alone).sum(axis=(0, 2)))[0]
@@ -51,7 +51,7 @@ def test_what_is_to_the_left_is_on_the_left(room):
     assert columns.max() < WIDTH // 2
 
 
-def test_what_is_behind_a_wall_or_behind_the_robot_is_not_seen(room):
+def test_robots_behind_a_wall_or_behind_the_camera_are_not_visible(room):
     alone = room.view(Pose(1.0, 2.0, 0.0))
     hidden = [(9.0, 2.0, 0.25), (0.5, 2.0, 0.25)]
     assert np.array_equal(room.view(Pose(1.0, 2.0, 0.0), hidden), alone)

@@ -44,7 +44,7 @@ def arrays(value):
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 @pytest.mark.parametrize("name", ["odom", "map", "tf", "tf_static", "amcl_pose"])
-def test_json_is_written_as_the_real_server_wrote_it(dialect, name):
+def test_json_frames_match_those_of_the_real_server(dialect, name):
     text = frame_file(dialect, f"publish_{name}.json").read_text()
     operation = json.loads(text)
     made = encoder(dialect)
@@ -55,7 +55,7 @@ def test_json_is_written_as_the_real_server_wrote_it(dialect, name):
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 @pytest.mark.parametrize("name", ["scan_inf_nan", "map", "tf"])
-def test_cbor_is_written_as_the_real_server_wrote_it(dialect, name):
+def test_cbor_frames_match_those_of_the_real_server(dialect, name):
     frame = frame_file(dialect, f"cbor_{name}.bin").read_bytes()
     operation = cbor2.loads(frame)
     publication = Publication(
@@ -77,7 +77,7 @@ def test_a_scan_in_json_has_null_for_nan_and_infinity(dialect):
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_ros_serialisation_has_the_lengths_and_numbers_of_the_real_one(dialect):
+def test_raw_serialisation_has_the_length_and_numbers_of_the_real_server(dialect):
     raw = frame_file(dialect, "cborraw_odom.bin").read_bytes()
     real = cbor2.loads(raw)["msg"]["bytes"]
     schema = Schema(Dialect(dialect))
@@ -90,7 +90,7 @@ def test_ros_serialisation_has_the_lengths_and_numbers_of_the_real_one(dialect):
     assert b"robot_0/odom" in made
 
 
-def test_the_bare_token_nan_is_in_fixed_arrays_only_and_only_if_asked_for():
+def test_a_real_server_writes_bare_nan_in_a_covariance_and_a_polite_one_null():
     path = CAPTURED / "ros2" / "publish_odom_nan_covariance.ujson.json"
     captured = path.read_text()
     real = encoder("ros2")
@@ -104,7 +104,7 @@ def test_the_bare_token_nan_is_in_fixed_arrays_only_and_only_if_asked_for():
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_odometry_comes_in_cbor_only_from_a_polite_server(dialect):
+def test_only_a_polite_server_encodes_odometry_in_cbor(dialect):
     schema = Schema(Dialect(dialect))
     message = schema.conform(TYPES["odom"], {})
     real = Publication("/odom", TYPES["odom"], message, 0.0)
@@ -114,7 +114,7 @@ def test_odometry_comes_in_cbor_only_from_a_polite_server(dialect):
     assert cbor2.loads(frame)["msg"]["pose"]["covariance"] == [0.0] * 36
 
 
-def test_png_holds_the_text_in_its_pixels():
+def test_a_png_frame_contains_the_message_text_in_its_pixels():
     text = frame_file("ros1", "publish_odom.json").read_text()
     operation = json.loads(text)
     made = encoder("ros1")
@@ -138,14 +138,14 @@ def test_ros2_never_sends_png():
     assert publication.form("png", made) is None
 
 
-def test_fragments_are_cut_as_the_real_server_cut_them():
+def test_fragments_match_those_of_the_real_server():
     lines = frame_file("ros1", "fragments_odom.jsonl").read_text().splitlines()
     fragments = [json.loads(line) for line in lines[:3]]
     whole = "".join(fragment["data"] for fragment in fragments)
     assert encoder("ros1").fragments(whole, 300) == lines[:3]
 
 
-def test_polite_fragments_have_a_whole_total():
+def test_fragments_of_a_polite_server_have_an_integer_total():
     frames = encoder("ros1", POLITE).fragments("x" * 700, 300, "call:7")
     decoded = [json.loads(frame) for frame in frames]
     assert [f["total"] for f in decoded] == [3, 3, 3]
@@ -153,7 +153,7 @@ def test_polite_fragments_have_a_whole_total():
     assert {f["id"] for f in decoded} == {"call:7"}
 
 
-def test_a_form_is_made_once():
+def test_each_encoding_of_a_publication_is_made_once():
     made = encoder("ros1")
     publication = Publication("/x", "std_msgs/String", {"data": "x"}, 0.0)
     assert publication.form("none", made) is publication.form("none", made)

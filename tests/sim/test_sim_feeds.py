@@ -41,7 +41,7 @@ def place_of(message):
 
 
 @DIALECTS
-def test_every_topic_has_a_type_of_its_dialect_and_speaks_when_heard(dialect):
+def test_every_topic_has_the_type_of_its_dialect_and_publishes_to_subscribers(dialect):
     bench = Bench(dialect)
     between = "msg/" if dialect == "ros2" else ""
     above = "" if dialect == "ros2" else "move_base/"
@@ -95,7 +95,7 @@ def test_every_message_has_the_fields_of_its_definition_in_their_order(dialect):
 
 
 @DIALECTS
-def test_what_a_robot_steers_to_is_told_from_its_base_while_it_follows_a_path(dialect):
+def test_the_lookahead_point_is_published_in_the_base_frame_during_a_goal(dialect):
     bench = Bench(dialect, robots=1, plan=room(boxes=[(4.5, 0, 5.5, 4)]))
     (robot,), (navigator,) = bench.world.robots, bench.world.navigators
     robot.pose = Pose(2.0, 1.5, 0.4)
@@ -114,7 +114,7 @@ def test_what_a_robot_steers_to_is_told_from_its_base_while_it_follows_a_path(di
     assert messages_of(bench, topic) == []
 
 
-def test_nothing_is_worked_out_that_nobody_wants(monkeypatch):
+def test_topics_without_subscribers_are_not_computed(monkeypatch):
     bench = Bench()
     for name in ("window", "whole"):
         monkeypatch.setattr(Costs, name, lambda *_: pytest.fail("costs"))
@@ -123,7 +123,7 @@ def test_nothing_is_worked_out_that_nobody_wants(monkeypatch):
     assert "costs" not in bench.node._feeds._costmaps.__dict__
 
 
-def test_without_extras_there_are_none(monkeypatch):
+def test_without_extras_the_extra_topics_are_missing(monkeypatch):
     from webmap.ros.rosbridge.server.graph import Graph
     from webmap.ros.rosbridge.server.quirks import parse_quirks
     from webmap.sim.node import RobotsNode
@@ -140,7 +140,7 @@ def test_without_extras_there_are_none(monkeypatch):
 
 
 @DIALECTS
-def test_a_local_costmap_is_around_the_robot_and_grown_about_the_wall(dialect):
+def test_a_local_costmap_is_centred_on_the_robot_and_inflates_walls(dialect):
     bench = Bench(dialect, robots=1, drift=0.2)
     robot = bench.world.robots[0]
     for _ in range(20):
@@ -175,7 +175,7 @@ def test_a_local_costmap_is_around_the_robot_and_grown_about_the_wall(dialect):
 
 
 @DIALECTS
-def test_while_a_robot_stands_only_what_changed_comes(dialect):
+def test_the_costmap_of_a_standing_robot_is_sent_as_updates(dialect):
     bench = Bench(dialect)
     one, other = bench.world.robots
     one.pose = one.odometry = Pose(3, 3)
@@ -211,14 +211,14 @@ def test_while_a_robot_stands_only_what_changed_comes(dialect):
     assert cells[row, column] == 100
 
 
-def test_who_comes_later_gets_a_whole_costmap_too():
+def test_a_late_subscriber_receives_a_whole_costmap():
     bench = Bench(robots=1)
     assert len(messages_of(bench, LOCAL["ros1"])) == 1
     assert len(messages_of(bench, LOCAL["ros1"])) == 1
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_distances_are_those_of_a_search_through_all_cells(seed):
+def test_costmap_distances_match_an_exhaustive_search(seed):
     solid = np.random.default_rng(seed).random((20, 30)) < 0.02
     found = distances(solid, 7)
     rows, columns = np.nonzero(solid)
@@ -231,7 +231,7 @@ def test_distances_are_those_of_a_search_through_all_cells(seed):
                 assert found[row, column] >= 7
 
 
-def test_a_whole_costmap_knows_the_others_and_what_is_unknown():
+def test_a_whole_costmap_contains_other_robots_and_unknown_cells():
     plan = room(4, 3)
     plan.occupancy[-20:, -20:] = UNKNOWN
     costs = Costs(Obstacles(plan), 0.25)
@@ -244,7 +244,7 @@ def test_a_whole_costmap_knows_the_others_and_what_is_unknown():
 
 @DIALECTS
 @pytest.mark.parametrize("compression", ["none", "cbor"])
-def test_a_cloud_holds_walls_with_their_height_and_the_floor(dialect, compression):
+def test_a_point_cloud_contains_the_walls_and_the_floor(dialect, compression):
     bench = Bench(dialect, robots=1)
     cloud = messages_of(bench, "/robot_0/points", compression=compression)[0]
     data = cloud["data"]
@@ -266,7 +266,7 @@ def test_a_cloud_holds_walls_with_their_height_and_the_floor(dialect, compressio
     assert abs(points["z"][floor] + 0.2).max() < 1e-3
 
 
-def test_a_ring_that_looks_over_a_robot_sees_the_wall_behind():
+def test_a_lidar_ring_above_another_robot_hits_the_wall_behind_the_robot():
     whole, walls = np.full(8, 2.0, np.float32), np.full(8, 5.0, np.float32)
     points = cloud_points(whole, walls)
     reach = np.hypot(points["x"], points["y"])
@@ -276,7 +276,7 @@ def test_a_ring_that_looks_over_a_robot_sees_the_wall_behind():
 
 
 @DIALECTS
-def test_a_footprint_is_the_base_in_the_frame_of_odometry(dialect):
+def test_the_footprint_outlines_the_base_in_the_odometry_frame(dialect):
     bench = Bench(dialect, robots=1)
     robot = bench.world.robots[0]
     topic = LOCAL[dialect].replace(
@@ -291,7 +291,7 @@ def test_a_footprint_is_the_base_in_the_frame_of_odometry(dialect):
 
 
 @DIALECTS
-def test_particles_are_spread_as_the_covariance_says(dialect):
+def test_the_spread_of_particles_matches_the_covariance(dialect):
     bench = Bench(dialect, robots=1)
     robot = bench.world.robots[0]
     cloud = messages_of(bench, "/robot_0/particlecloud")[0]
@@ -305,7 +305,7 @@ def test_particles_are_spread_as_the_covariance_says(dialect):
     assert covariance[5, 5] == pytest.approx(SURE[2] ** 2)
 
 
-def test_a_pose_that_a_person_gives_is_believed_and_mended_on_the_way():
+def test_an_initial_pose_is_accepted_and_corrected_while_driving():
     bench = Bench(robots=1)
     robot = bench.world.robots[0]
     client = bench.client()
@@ -344,7 +344,7 @@ def test_a_pose_that_a_person_gives_is_believed_and_mended_on_the_way():
         {"pose": {"pose": {"position": {"x": math.inf}}}},
     ],
 )
-def test_a_pose_from_nowhere_is_not_believed(wrong):
+def test_an_invalid_initial_pose_is_ignored(wrong):
     bench = Bench(robots=1, quirks="real")
     client = bench.client()
     client.send(op="publish", topic="/robot_0/initialpose", msg=wrong)
@@ -373,7 +373,7 @@ def test_a_sonar_measures_the_wall_and_robots_in_its_cone():
     )
 
 
-def test_a_fix_is_where_the_robot_is_on_the_globe():
+def test_a_gps_fix_matches_the_pose_of_the_robot():
     from webmap.base.local_plane import LocalPlane
     from webmap.sim.feeds.localization import DATUM
 
@@ -384,7 +384,7 @@ def test_a_fix_is_where_the_robot_is_on_the_globe():
     assert (east, north) == pytest.approx((robot.pose.x, robot.pose.y), abs=1e-3)
 
 
-def test_markers_show_the_goal_and_who_is_seen():
+def test_markers_show_the_goal_and_the_visible_robots():
     bench = Bench()
     one, other = bench.world.robots
     one.pose, other.pose = Pose(2, 3), Pose(5, 3)
@@ -399,7 +399,7 @@ def test_markers_show_the_goal_and_who_is_seen():
 
 
 @DIALECTS
-def test_health_and_logs_tell_of_a_low_battery_and_of_a_goal(dialect):
+def test_diagnostics_and_logs_report_a_low_battery_and_a_goal(dialect):
     bench = Bench(dialect, robots=1)
     log = bench.client()
     log.send(op="subscribe", topic="/rosout")
@@ -430,7 +430,7 @@ def test_health_and_logs_tell_of_a_low_battery_and_of_a_goal(dialect):
 
 @DIALECTS
 @pytest.mark.parametrize("part", ["points", "markers", "sonar", "fix", "amcl_pose"])
-def test_what_is_said_can_be_sent_raw_too(dialect, part):
+def test_extra_topics_can_be_sent_as_raw_cbor(dialect, part):
     bench = Bench(dialect, robots=1)
     (message, *_) = messages_of(bench, f"/robot_0/{part}", compression="cbor-raw")
     frame = "map" if part in ("markers", "amcl_pose") else "robot_0/"

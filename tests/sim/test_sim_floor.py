@@ -9,7 +9,7 @@ from webmap.sim.maps import FLOOR
 TOOL = Path(__file__).parents[2] / "tools" / "draw_floor.py"
 
 
-def test_the_shipped_floor_is_what_the_tool_draws():
+def test_the_shipped_floor_matches_the_output_of_the_drawing_tool():
     tool = runpy.run_path(str(TOOL))
     assert FLOOR.read_text() == tool["YAML"]
     with Image.open(FLOOR.with_name("floor.png")) as shipped:

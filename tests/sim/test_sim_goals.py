@@ -41,7 +41,7 @@ class TestTopic:
             ("ros2", "goal_pose"),
         ],
     )
-    def test_a_pose_sends_the_robot_there(self, dialect, name):
+    def test_a_published_pose_drives_the_robot_to_the_goal(self, dialect, name):
         made = bench(dialect)
         client = made.client()
         client.send(op="publish", topic=f"/robot_0/{name}", msg=pose_stamped(7, 1.5))
@@ -62,7 +62,7 @@ class TestTopic:
         made.run(15)
         assert client.operations("publish")[-1]["msg"]["poses"] == []
 
-    def test_a_goal_in_the_odometrys_frame_is_understood(self):
+    def test_a_goal_in_the_odometry_frame_is_accepted(self):
         made = bench("ros1")
         made.world.robots[0].odometry = Pose(0, 0)
         goal = pose_stamped(3, 0, "robot_0/odom")
@@ -72,7 +72,7 @@ class TestTopic:
         made.run(15)
         assert math.dist(where(made), (5, 1.5)) < 0.15
 
-    def test_a_goal_in_an_unknown_frame_or_nowhere_moves_nothing(self):
+    def test_a_goal_in_an_unknown_frame_or_with_nan_moves_no_robot(self):
         made = bench("ros1", "real")
         client = made.client()
         topic = "/robot_0/move_base_simple/goal"
@@ -103,7 +103,7 @@ class TestActionlib:
             for m in client.operations("publish", "/robot_0/move_base/result")
         ]
 
-    def test_a_goal_is_followed_and_its_result_told(self):
+    def test_a_goal_is_reached_and_its_result_is_reported(self):
         made = bench("ros1")
         client = made.client()
         client.send(op="subscribe", topic="/robot_0/move_base/result")
@@ -112,7 +112,7 @@ class TestActionlib:
         assert self.results(client) == [("g1", 3)]
         assert math.dist(where(made), (7, 1.5)) < 0.15
 
-    def test_status_and_feedback_say_how_it_goes(self):
+    def test_status_and_feedback_report_the_progress_of_a_goal(self):
         made = bench("ros1")
         client = made.client()
         for part in ("status", "feedback"):
@@ -128,7 +128,7 @@ class TestActionlib:
         assert base["x"] > 2.0
 
     @pytest.mark.parametrize("identifier", ["g1", ""])
-    def test_any_client_may_cancel_by_topic(self, identifier):
+    def test_any_client_may_cancel_a_goal_by_topic(self, identifier):
         made = bench("ros1")
         client, other = made.client(), made.client()
         client.send(op="subscribe", topic="/robot_0/move_base/result")
@@ -139,7 +139,7 @@ class TestActionlib:
         made.run(1)
         assert made.world.robots[0].twist.is_zero
 
-    def test_cancelling_another_goal_changes_nothing(self):
+    def test_cancelling_another_goal_does_not_stop_the_robot(self):
         made = bench("ros1")
         client = made.client()
         self.send(client, 7, 1.5, "g1")
@@ -147,7 +147,7 @@ class TestActionlib:
         made.run(2)
         assert made.world.robots[0].twist.vx > 0.2
 
-    def test_an_empty_cancel_ends_a_goal_of_the_simple_topic_too(self):
+    def test_a_cancel_without_an_id_stops_a_goal_of_the_simple_topic(self):
         made = bench("ros1")
         client = made.client()
         goal = pose_stamped(7, 1.5)
@@ -157,7 +157,7 @@ class TestActionlib:
         made.run(1)
         assert made.world.robots[0].twist.is_zero
 
-    def test_a_new_goal_preempts_the_one_before(self):
+    def test_a_new_goal_preempts_the_previous_goal(self):
         made = bench("ros1")
         client = made.client()
         client.send(op="subscribe", topic="/robot_0/move_base/result")
@@ -166,7 +166,7 @@ class TestActionlib:
         made.run(15)
         assert self.results(client) == [("g1", 2), ("g2", 3)]
 
-    def test_a_goal_in_a_wall_is_aborted_and_one_in_no_frame_rejected(self):
+    def test_a_goal_in_a_wall_is_aborted_and_in_an_unknown_frame_rejected(self):
         made = bench("ros1")
         client = made.client()
         client.send(op="subscribe", topic="/robot_0/move_base/result")
@@ -192,7 +192,7 @@ class TestAction:
             **more,
         )
 
-    def test_a_goal_is_followed_and_its_result_told(self):
+    def test_a_goal_is_reached_and_its_result_is_reported(self):
         made = bench("ros2")
         client = made.client()
         self.send(client, 7, 1.5, feedback=True)
@@ -206,14 +206,14 @@ class TestAction:
         assert left[1] > left[-1] >= 0
         assert math.dist(where(made), (7, 1.5)) < 0.15
 
-    def test_without_being_asked_there_is_no_feedback(self):
+    def test_a_goal_without_a_feedback_request_gets_no_feedback(self):
         made = bench("ros2")
         client = made.client()
         self.send(client, 7, 1.5)
         made.run(3)
         assert client.operations() == []
 
-    def test_the_sender_may_cancel(self):
+    def test_the_sender_may_cancel_its_goal(self):
         made = bench("ros2")
         client = made.client()
         self.send(client, 7, 1.5)
@@ -221,7 +221,7 @@ class TestAction:
         client.send(op="cancel_action_goal", action=ACTION, id="goal:1")
         assert client.operations("action_result")[0]["status"] == CANCELED
 
-    def test_another_socket_cannot_cancel_by_the_goals_id(self):
+    def test_another_socket_cannot_cancel_a_goal_by_its_id(self):
         made = bench("ros2")
         client, other = made.client(), made.client()
         self.send(client, 7, 1.5)
@@ -231,7 +231,7 @@ class TestAction:
         assert client.operations() == []
         assert made.world.robots[0].twist.vx > 0.2
 
-    def test_another_socket_cancels_by_the_service(self):
+    def test_another_socket_may_cancel_a_goal_by_the_cancel_service(self):
         made = bench("ros2", "real")
         client, other = made.client(), made.client()
         self.send(client, 7, 1.5)
@@ -244,7 +244,7 @@ class TestAction:
         made.run(1)
         assert made.world.robots[0].twist.is_zero
 
-    def test_the_service_ends_a_goal_of_the_topic_too(self):
+    def test_the_cancel_service_stops_a_goal_sent_by_topic(self):
         made = bench("ros2")
         client = made.client()
         client.send(op="publish", topic="/robot_0/goal_pose", msg=pose_stamped(7, 1.5))
@@ -274,7 +274,7 @@ class TestAction:
         made.run(15)
         assert client.operations("action_result")[0]["status"] == SUCCEEDED
 
-    def test_the_goal_goes_on_when_its_sender_goes(self):
+    def test_a_goal_continues_after_its_sender_disconnects(self):
         made = bench("ros2")
         client = made.client()
         self.send(client, 7, 1.5)
@@ -282,7 +282,7 @@ class TestAction:
         made.run(15)
         assert math.dist(where(made), (7, 1.5)) < 0.15
 
-    def test_a_goal_that_makes_no_sense_is_answered(self):
+    def test_an_unreachable_goal_and_an_unknown_action_get_an_error_result(self):
         made = bench("ros2")
         client = made.client()
         self.send(client, 0.0, 0.0, "wall")

@@ -68,7 +68,7 @@ async def leave_by_unsubscribing(client):
         ("real,-spinning_queue", 0, 1, False),
     ],
 )
-def test_a_bridge_hangs_when_a_client_leaves_a_queue_without_throttle(
+def test_a_bridge_hangs_only_if_a_client_leaves_a_queue_without_throttle(
     quirks, throttle, queue, hangs, leave
 ):
     async def scenario():
@@ -97,7 +97,9 @@ def test_a_bridge_hangs_when_a_client_leaves_a_queue_without_throttle(
 
 
 @pytest.mark.parametrize("compression", ["cbor", "cbor-raw"])
-def test_cbor_above_the_limit_is_logged_and_never_sent(compression, caplog):
+def test_a_cbor_message_above_the_size_limit_is_logged_and_not_sent(
+    compression, caplog
+):
     bench = Bench("ros2", "real", plan=room())
     small = bench.client()
     small.send(op="subscribe", topic="/map", compression=compression)
@@ -110,7 +112,7 @@ def test_cbor_above_the_limit_is_logged_and_never_sent(compression, caplog):
     assert "above max_message_size (1000)" in caplog.text
 
 
-def test_json_above_the_limit_comes_in_parts_that_nobody_asked_for():
+def test_a_json_message_above_the_size_limit_is_sent_in_fragments():
     bench = Bench("ros2", "real", plan=room())
     bench.encoder.max_message_size = 10_000
     client = bench.client()

@@ -41,7 +41,7 @@ def test_the_transforms_lead_from_the_map_to_the_true_pose(drift):
     assert (moved > 0.001) == (drift > 0)
 
 
-def test_the_scanners_place_is_latched():
+def test_the_static_transform_of_the_scanner_is_latched():
     bench = Bench()
     bench.run(1)
     client = bench.client()
@@ -50,7 +50,7 @@ def test_the_scanners_place_is_latched():
     assert found["robot_1/base_link", "robot_1/base_laser"] == Pose()
 
 
-def test_without_drift_odometry_is_the_pose_on_the_map():
+def test_without_drift_odometry_equals_the_pose_on_the_map():
     bench = Bench("ros2")
     client = bench.client()
     client.send(op="subscribe", topic="/robot_1/odom")
@@ -61,7 +61,7 @@ def test_without_drift_odometry_is_the_pose_on_the_map():
     assert (at.x, at.y, at.yaw) == pytest.approx((robot.x, robot.y, robot.yaw))
 
 
-def test_a_scan_says_where_its_rays_point():
+def test_a_scan_message_contains_its_angles_and_its_frame():
     bench = Bench()
     client = bench.client()
     client.send(op="subscribe", topic="/robot_0/base_scan")
@@ -73,7 +73,7 @@ def test_a_scan_says_where_its_rays_point():
     assert scan["header"]["frame_id"] == "robot_0/base_laser"
 
 
-def test_importing_the_simulator_costs_little():
+def test_importing_the_simulator_loads_no_heavy_library():
     code = (
         "import sys, webmap.sim;"
         "sys.exit(any(m in sys.modules for m in ('numpy', 'PIL', 'websockets')))"

@@ -15,7 +15,7 @@ def drain(outbox):
     return found
 
 
-def test_what_waits_goes_out_in_order():
+def test_an_outbox_sends_its_entries_in_order():
     outbox = Outbox()
     outbox.publication(publication("/a", 1), 10)
     outbox.reply(["r"])
@@ -23,7 +23,7 @@ def test_what_waits_goes_out_in_order():
     assert drain(outbox) == [1, ["r"], 2]
 
 
-def test_beyond_its_depth_a_topic_keeps_the_newest():
+def test_a_full_topic_queue_keeps_the_newest_messages():
     outbox = Outbox()
     for number in range(10):
         outbox.publication(publication("/a", number), 2)
@@ -31,7 +31,7 @@ def test_beyond_its_depth_a_topic_keeps_the_newest():
     assert drain(outbox) == [8, 9]
 
 
-def test_a_full_topic_takes_nothing_from_another():
+def test_a_full_topic_queue_drops_no_messages_of_another_topic():
     outbox = Outbox()
     outbox.publication(publication("/b", 100), 1)
     for number in range(10):
@@ -41,7 +41,7 @@ def test_a_full_topic_takes_nothing_from_another():
     assert drain(outbox) == [101, 9, *([str(n)] for n in range(10))]
 
 
-def test_a_topic_that_is_forgotten_is_gone():
+def test_forgetting_a_topic_removes_its_waiting_messages():
     outbox = Outbox()
     outbox.publication(publication("/a", 1), 5)
     outbox.publication(publication("/b", 2), 5)
@@ -49,7 +49,7 @@ def test_a_topic_that_is_forgotten_is_gone():
     assert drain(outbox) == [2]
 
 
-def test_a_client_that_reads_nothing_costs_a_bounded_amount():
+def test_the_outbox_of_a_client_that_reads_nothing_is_limited():
     bench = Bench()
     client = bench.client()
     client.send(op="subscribe", topic="/robot_0/odom", queue_length=1)
@@ -62,7 +62,7 @@ def test_a_client_that_reads_nothing_costs_a_bounded_amount():
     assert bench.time - stamp["secs"] - stamp["nsecs"] * 1e-9 < 0.1
 
 
-def test_a_client_that_reads_no_answers_is_let_go():
+def test_too_many_unread_service_responses_overflow_a_session():
     bench = Bench()
     client = bench.client()
     call = '{"op":"call_service","service":"/rosapi/get_time"}'

@@ -26,7 +26,7 @@ def told_by(*command):
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_roslibpy_gets_what_it_expects(dialect):
+def test_roslibpy_works_with_the_simulator(dialect):
     with running("--dialect", dialect) as url:
         received = told_by(
             sys.executable, str(HERE / "roslibpy_client.py"), url, dialect
@@ -56,7 +56,7 @@ def test_roslibpy_gets_what_it_expects(dialect):
 
 @pytest.mark.parametrize("package", ["roslib", "roslib2"])
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_roslib_gets_what_it_expects(dialect, package):
+def test_roslib_works_with_the_simulator(dialect, package):
     node = shutil.which("node")
     if node is None or not (ROOT / "node_modules" / package).is_dir():
         pytest.skip(f"needs node, and {package} from npm")

@@ -99,19 +99,19 @@ def test_a_port_in_use_is_an_error():
         {"map": "/no/such/map.yaml"},
     ],
 )
-def test_options_that_make_no_sense_are_said(options):
+def test_invalid_simulator_options_are_refused(options):
     with pytest.raises(ConfigError):
         asyncio.run(run_simulator(**options))
 
 
-def test_quirks_are_named():
+def test_quirks_are_parsed_from_their_names():
     assert parse_quirks("polite", "ros2") == POLITE
     assert parse_quirks("real", "ros2") == REAL["ros2"]
     assert parse_quirks("polite, bare_nan", "ros1") == Quirks(bare_nan=True)
     assert not parse_quirks("real,-silent", "ros1").silent
 
 
-def test_the_reference_lists_every_quirk_and_who_has_it():
+def test_the_reference_lists_every_quirk_with_its_dialects():
     rows = re.findall(r"^\| `(\w+)` \| .+? \| (yes)? ?\| (yes)? ?\|$", REFERENCE, re.M)
     real = {
         name: (getattr(REAL["ros1"], name), getattr(REAL["ros2"], name))
@@ -136,7 +136,7 @@ def test_a_signal_ends_the_process_cleanly(number):
     assert "Traceback" not in err
 
 
-def test_the_process_may_end_with_its_standard_input():
+def test_with_until_eof_the_process_ends_with_its_standard_input():
     process = subprocess.Popen(
         [sys.executable, "-m", "webmap.sim", "--until-eof"],
         stdin=subprocess.PIPE,
@@ -148,7 +148,7 @@ def test_the_process_may_end_with_its_standard_input():
     assert process.returncode == 0
 
 
-def test_a_wrong_option_ends_the_process_with_a_sentence():
+def test_an_invalid_option_ends_the_process_with_a_one_line_error():
     for options in (["--map", "absent.yaml"], ["--robots", "0"]):
         done = subprocess.run(
             [sys.executable, "-m", "webmap.sim", *options],
@@ -161,7 +161,7 @@ def test_a_wrong_option_ends_the_process_with_a_sentence():
         assert done.stderr.count("\n") == 1
 
 
-def test_a_client_that_stops_reading_delays_nobody_and_stays_small():
+def test_a_stalled_client_delays_no_other_client_and_uses_little_memory():
     psutil = pytest.importorskip("psutil")
 
     async def scenario(url):
@@ -191,7 +191,7 @@ def test_a_client_that_stops_reading_delays_nobody_and_stays_small():
     assert grown < 40_000_000
 
 
-def test_many_clients_come_and_go_and_leave_nothing():
+def test_disconnected_clients_leave_no_sessions_and_no_subscriptions():
     async def scenario():
         schema = Schema(Dialect("ros1"))
         graph = Graph(schema)
@@ -218,7 +218,7 @@ def test_many_clients_come_and_go_and_leave_nothing():
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_the_player_sends_what_was_captured_byte_for_byte(dialect):
+def test_the_player_sends_captured_frames_byte_for_byte(dialect):
     async def scenario(url):
         async with connect(url, max_size=None) as client:
             await subscribe(client, "/robot_0/odom")
@@ -241,7 +241,7 @@ def test_the_player_sends_what_was_captured_byte_for_byte(dialect):
         asyncio.run(scenario(url))
 
 
-def test_the_player_answers_what_rosapi_was_asked():
+def test_the_player_answers_rosapi_calls():
     async def scenario(url):
         async with connect(url) as client:
             for name in ("robot_0", "robot_1"):
@@ -259,7 +259,7 @@ def test_the_player_answers_what_rosapi_was_asked():
         asyncio.run(scenario(url))
 
 
-def test_what_lies_beside_the_frames_is_passed_over(tmp_path):
+def test_the_player_ignores_other_files_beside_the_frames(tmp_path):
     (tmp_path / "INDEX.json").write_text('[{"file": "x"}]')
     (tmp_path / "broken.json").write_text("")
     (tmp_path / "nothing_came.bin").write_bytes(b"")
@@ -268,7 +268,7 @@ def test_what_lies_beside_the_frames_is_passed_over(tmp_path):
     assert load_recording(sorted(tmp_path.iterdir())).texts == {"/robot_0/odom": text}
 
 
-def test_the_player_needs_frames(tmp_path):
+def test_the_player_refuses_a_recording_without_publications(tmp_path):
     nothing = tmp_path / "nothing_came.bin"
     nothing.write_bytes(b"")
     done = subprocess.run(
@@ -282,7 +282,7 @@ def test_the_player_needs_frames(tmp_path):
     assert "no captured publications" in done.stderr
 
 
-def test_the_room_of_the_tests_is_closed():
+def test_the_room_helper_makes_a_closed_room():
     cells = room(2, 2).occupancy
     assert (cells[0] == 100).all()
     assert (cells[:, -1] == 100).all()

@@ -6,7 +6,7 @@ from simulated import alone, coast, drive
 from webmap.base.geometry import Pose, Twist
 
 
-def test_one_metre_a_second_for_one_second_makes_one_metre():
+def test_one_metre_per_second_for_one_second_drives_one_metre():
     robot = alone()
     now = drive(robot, Twist(vx=1.0), 1.0)
     drive(robot, Twist(), 1.0, now=now)
@@ -14,7 +14,7 @@ def test_one_metre_a_second_for_one_second_makes_one_metre():
     assert robot.twist.is_zero
 
 
-def test_it_turns_by_what_is_commanded():
+def test_a_robot_turns_by_the_commanded_angle():
     robot = alone()
     now = drive(robot, Twist(wz=1.0), 1.0)
     drive(robot, Twist(), 1.0, now=now)
@@ -30,7 +30,7 @@ def test_driving_and_turning_makes_a_circle():
     assert robot.pose.y == pytest.approx(4, abs=0.02)
 
 
-def test_it_never_speeds_up_faster_than_it_can():
+def test_a_robot_never_exceeds_its_acceleration():
     robot = alone(acceleration=2.0)
     now, before = 0.0, 0.0
     for _ in range(40):
@@ -40,13 +40,13 @@ def test_it_never_speeds_up_faster_than_it_can():
     assert robot.twist.vx == 1.0
 
 
-def test_it_never_goes_faster_than_it_can():
+def test_a_robot_never_exceeds_its_maximum_speeds():
     robot = alone(v_max=0.5, w_max=1.0)
     drive(robot, Twist(vx=-9.0, wz=9.0), 2.0)
     assert robot.twist == Twist(vx=-0.5, wz=1.0)
 
 
-def test_it_stops_by_itself_when_no_command_comes():
+def test_a_robot_stops_after_its_command_timeout():
     robot = alone(timeout=0.25)
     now = drive(robot, Twist(vx=1.0), 1.0)
     now = coast(robot, 0.2, now=now)
@@ -55,7 +55,7 @@ def test_it_stops_by_itself_when_no_command_comes():
     assert robot.twist.is_zero
 
 
-def test_a_bad_robot_goes_on_for_ever():
+def test_a_robot_without_a_command_timeout_never_stops():
     robot = alone(timeout=None)
     now = drive(robot, Twist(vx=1.0), 1.0)
     coast(robot, 10.0, now=now)
@@ -63,7 +63,7 @@ def test_a_bad_robot_goes_on_for_ever():
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_a_twist_that_is_no_number_is_refused_and_feeds_no_watchdog(bad):
+def test_a_non_finite_twist_is_refused_and_does_not_reset_the_command_timeout(bad):
     robot = alone()
     now = drive(robot, Twist(vx=1.0), 1.0)
     for _ in range(20):
@@ -72,13 +72,13 @@ def test_a_twist_that_is_no_number_is_refused_and_feeds_no_watchdog(bad):
     assert robot.twist.is_zero
 
 
-def test_a_careless_driver_runs_on_infinity():
+def test_a_robot_that_accepts_infinity_drives_at_its_maximum_speed():
     robot = alone(refuse_nan=False, v_max=1.2)
     drive(robot, Twist(vx=math.inf), 2.0)
     assert robot.twist.vx == 1.2
 
 
-def test_a_wall_stops_it_but_it_can_turn_and_leave():
+def test_a_robot_blocked_by_a_wall_can_turn_and_drive_away():
     robot = alone()
 
     def wall(x, y):
@@ -94,13 +94,13 @@ def test_a_wall_stops_it_but_it_can_turn_and_leave():
     assert robot.pose.x < 1.9
 
 
-def test_without_drift_odometry_is_the_pose():
+def test_without_drift_odometry_equals_the_pose():
     robot = alone(Pose(1, 2, 0.5))
     drive(robot, Twist(vx=1.0, wz=0.3), 3.0)
     assert robot.odometry == robot.pose
 
 
-def test_drift_grows_with_the_way():
+def test_drift_grows_with_the_driven_distance():
     robot = alone(drift=0.05)
     drive(robot, Twist(vx=1.0), 1.0)
     near = math.dist((robot.pose.x, robot.pose.y), (robot.odometry.x, robot.odometry.y))
@@ -110,13 +110,13 @@ def test_drift_grows_with_the_way():
     assert far > near
 
 
-def test_a_robot_that_stands_does_not_drift():
+def test_a_standing_robot_does_not_drift():
     robot = alone(drift=0.05)
     coast(robot, 60.0, now=0.0)
     assert robot.odometry == robot.pose
 
 
-def test_the_battery_drains_and_driving_drains_more():
+def test_driving_drains_the_battery_faster_than_standing():
     idle, busy = alone(), alone()
     full = idle.charge
     coast(idle, 60, now=0.0)

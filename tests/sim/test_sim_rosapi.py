@@ -22,7 +22,7 @@ def values(client, service, args=None):
     return response["values"]
 
 
-def test_topics_come_with_their_types(client, ros2):
+def test_topics_are_listed_with_their_types(client, ros2):
     for asked, odometry, twist in (
         (client, "nav_msgs/Odometry", "geometry_msgs/Twist"),
         (ros2, "nav_msgs/msg/Odometry", "geometry_msgs/msg/Twist"),
@@ -34,7 +34,7 @@ def test_topics_come_with_their_types(client, ros2):
         assert "/map" in types
 
 
-def test_hidden_names_are_not_listed_as_in_the_real_one(ros2):
+def test_hidden_topics_are_not_listed_as_in_the_real_rosapi(ros2):
     hidden = "/robot_0/navigate_to_pose/_action/feedback"
     type = "nav2_msgs/action/NavigateToPose_FeedbackMessage"
     assert not any("/_" in name for name in values(ros2, "topics")["topics"])
@@ -42,7 +42,7 @@ def test_hidden_names_are_not_listed_as_in_the_real_one(ros2):
     assert values(ros2, "topics_for_type", {"type": type}) == {"topics": []}
 
 
-def test_a_topic_has_a_type_and_an_unknown_one_an_empty_text(client):
+def test_topic_type_returns_an_empty_text_for_an_unknown_topic(client):
     assert values(client, "topic_type", {"topic": "/map"}) == {
         "type": "nav_msgs/OccupancyGrid"
     }
@@ -56,7 +56,7 @@ def test_topics_are_found_by_type_in_either_spelling(client, ros2):
             assert found == {"topics": ["/robot_0/odom", "/robot_1/odom"]}
 
 
-def test_raw_types_come_with_the_topics(client):
+def test_topics_and_raw_types_include_the_definition_texts(client):
     found = values(client, "topics_and_raw_types")
     texts = dict(zip(found["topics"], found["typedefs_full_text"], strict=True))
     assert "float64[36] covariance" in texts["/robot_0/odom"]
@@ -75,7 +75,7 @@ def test_services_and_their_types_are_listed(client, ros2):
     }
 
 
-def test_who_publishes_and_subscribes_is_known(client):
+def test_publishers_and_subscribers_of_a_topic_are_listed(client):
     assert values(client, "publishers", {"topic": "/map"}) == {
         "publishers": ["/robots"]
     }
@@ -88,7 +88,7 @@ def test_who_publishes_and_subscribes_is_known(client):
     assert values(client, "publishers", {"topic": "/nope"}) == {"publishers": []}
 
 
-def test_nodes_and_what_they_have_are_listed(client):
+def test_nodes_are_listed_with_their_topics_and_services(client):
     assert {"/robots", "/rosapi"} <= set(values(client, "nodes")["nodes"])
     details = values(client, "node_details", {"node": "/robots"})
     assert "/robot_0/cmd_vel" in details["subscribing"]
@@ -96,7 +96,7 @@ def test_nodes_and_what_they_have_are_listed(client):
     assert "/robot_1/stop" in details["services"]
 
 
-def test_message_details_are_those_of_the_real_one(client):
+def test_message_details_match_those_of_the_real_rosapi(client):
     path = frame_file("ros1", "service_response_rosapi_message_details.json")
     real = json.loads(path.read_text())["values"]["typedefs"]
     made = values(client, "message_details", {"type": "nav_msgs/Odometry"})["typedefs"]
@@ -104,7 +104,7 @@ def test_message_details_are_those_of_the_real_one(client):
     assert by_type == {definition["type"]: definition for definition in real}
 
 
-def test_service_details_are_given(client):
+def test_service_details_list_the_request_and_response_fields(client):
     (request,) = values(
         client, "service_request_details", {"type": "std_srvs/SetBool"}
     )["typedefs"]
@@ -120,18 +120,18 @@ def test_details_of_an_unknown_type_fail(client):
     assert response["result"] is False
 
 
-def test_the_time_is_the_graphs(client, ros2):
+def test_get_time_returns_the_time_of_the_graph(client, ros2):
     assert values(client, "get_time")["time"]["secs"] == int(client.bench.time)
     assert set(values(ros2, "get_time")["time"]) == {"sec", "nanosec"}
 
 
-def test_parameter_names_are_given_where_the_server_does_not_hang(client):
+def test_a_polite_server_returns_parameter_names(client):
     assert values(client, "get_param_names") == {"names": []}
     default = values(client, "get_param", {"name": "/x", "default": '"d"'})
     assert default == {"value": '"d"'}
 
 
-def test_action_servers_are_known_in_both_dialects(client, ros2):
+def test_action_servers_are_listed_in_both_dialects(client, ros2):
     assert "/robot_0/move_base" in values(client, "action_servers")["action_servers"]
     assert values(ros2, "action_servers")["action_servers"] == [
         "/robot_0/navigate_to_pose",
@@ -139,12 +139,12 @@ def test_action_servers_are_known_in_both_dialects(client, ros2):
     ]
 
 
-def test_only_ros2_tells_its_version(client, ros2):
+def test_only_ros2_returns_its_version(client, ros2):
     assert values(ros2, "get_ros_version")["version"] == 2
     assert client.call("/rosapi/get_ros_version")["result"] is False
 
 
-def test_in_ros2_parameter_names_hang_rosapi_for_good():
+def test_in_ros2_a_request_for_parameter_names_hangs_rosapi():
     bench = Bench("ros2", "real")
     assert bench.client().call("/rosapi/get_param_names") is None
     assert bench.client().call("/rosapi/get_time") is None
@@ -152,7 +152,7 @@ def test_in_ros2_parameter_names_hang_rosapi_for_good():
     assert bench.client().call("/robot_0/stop")["result"] is True
 
 
-def test_in_ros2_message_details_kill_rosapi():
+def test_in_ros2_a_request_for_message_details_kills_rosapi():
     bench = Bench("ros2", "real")
     args = {"type": "nav_msgs/msg/Odometry"}
     assert bench.client().call("/rosapi/message_details", args) is None

@@ -23,7 +23,7 @@ def wall_distance(width, height, x, y, angle, thickness=0.05):
 @pytest.mark.parametrize(
     "pose", [Pose(3.0, 2.0), Pose(1.111, 4.9, 0.7), Pose(8, 1, -2)]
 )
-def test_ranges_are_those_of_the_geometry(pose):
+def test_scan_ranges_match_the_geometry_of_the_room(pose):
     scanner = Scanner(Obstacles(room(10, 6)), ScannerOptions(range_max=30))
     (ranges,) = scanner.sweep([pose])
     expected = [
@@ -33,7 +33,7 @@ def test_ranges_are_those_of_the_geometry(pose):
     assert ranges == pytest.approx(expected, abs=1e-4)
 
 
-def test_a_thin_box_is_never_leapt_over():
+def test_no_ray_passes_through_a_thin_box():
     plan = room(10, 6, boxes=[(5.0, 0.0, 5.05, 6.0)])
     scanner = Scanner(Obstacles(plan), ScannerOptions(range_max=30))
     (ranges,) = scanner.sweep([Pose(2.0, 3.0)])
@@ -43,14 +43,14 @@ def test_a_thin_box_is_never_leapt_over():
     assert ahead == pytest.approx(reach, abs=1e-4)
 
 
-def test_nothing_within_the_range_gives_inf():
+def test_a_ray_without_an_obstacle_in_range_gives_infinity():
     scanner = Scanner(Obstacles(room(30, 30)), ScannerOptions(range_max=8))
     (ranges,) = scanner.sweep([Pose(15, 15)])
     assert np.isinf(ranges).all()
     assert (ranges > 0).all()
 
 
-def test_a_ray_that_leaves_the_plan_gives_inf():
+def test_a_ray_that_leaves_the_map_gives_infinity():
     plan = room(4, 4)
     plan.occupancy[:, -1] = 0
     scanner = Scanner(Obstacles(plan), ScannerOptions(range_max=8))
@@ -59,13 +59,13 @@ def test_a_ray_that_leaves_the_plan_gives_inf():
     assert ranges[0] == pytest.approx(1.95)
 
 
-def test_something_too_near_gives_minus_inf():
+def test_an_obstacle_below_the_minimum_range_gives_minus_infinity():
     scanner = Scanner(Obstacles(room(4, 4)), ScannerOptions(range_min=0.5))
     (ranges,) = scanner.sweep([Pose(0.3, 2.0)])
     assert ranges[0] == -math.inf
 
 
-def test_other_robots_are_round():
+def test_other_robots_appear_as_circles_in_a_scan():
     scanner = Scanner(Obstacles(room(10, 6)), ScannerOptions())
     (ranges,) = scanner.sweep([Pose(2, 3)], [[(5.0, 3.0, 0.25)]])
     assert ranges[180] == pytest.approx(2.75)
@@ -83,7 +83,7 @@ def test_another_robot_behind_a_wall_is_not_seen():
     assert ranges[180] == pytest.approx(2.0)
 
 
-def test_many_poses_give_a_row_each():
+def test_a_sweep_of_many_poses_gives_one_row_per_pose():
     scanner = Scanner(Obstacles(room(10, 6)), ScannerOptions(range_max=30))
     poses = [Pose(2, 2), Pose(7, 4, 1.0), Pose(5, 3, -2.5)]
     together = scanner.sweep(poses)
@@ -91,14 +91,14 @@ def test_many_poses_give_a_row_each():
         assert row == pytest.approx(scanner.sweep([pose])[0])
 
 
-def test_nan_comes_only_when_asked_for():
+def test_a_scan_contains_nan_only_with_the_nan_option():
     obstacles = Obstacles(room(10, 6))
     assert not np.isnan(Scanner(obstacles, ScannerOptions()).sweep([Pose(2, 2)])).any()
     noisy = Scanner(obstacles, ScannerOptions(nan=True)).sweep([Pose(2, 2)])
     assert 0 < np.isnan(noisy).mean() < 0.1
 
 
-def test_rays_along_the_axes_have_no_trouble_with_a_zero():
+def test_rays_along_the_axes_have_correct_lengths():
     obstacles = Obstacles(room(10, 6))
     ways = cast_rays(
         obstacles,
@@ -111,7 +111,7 @@ def test_rays_along_the_axes_have_no_trouble_with_a_zero():
     assert ways == pytest.approx([6.95, 3.95, 2.95, 1.95], abs=1e-6)
 
 
-def test_distances_are_in_kings_moves():
+def test_chebyshev_distances_count_diagonal_steps_as_one():
     solid = np.zeros((5, 7), bool)
     solid[2, 1] = True
     distance = chebyshev_distance(solid, 10)

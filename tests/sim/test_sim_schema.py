@@ -23,7 +23,7 @@ def test_missing_fields_are_zero(schema):
     assert schema.conform(TWIST, {}) == {"linear": ZERO, "angular": ZERO}
 
 
-def test_a_list_gives_the_fields_in_order(schema):
+def test_a_list_fills_the_fields_in_order(schema):
     message = schema.conform("geometry_msgs/Vector3", [1, 2, 3])
     assert message == {"x": 1.0, "y": 2.0, "z": 3.0}
 
@@ -40,7 +40,7 @@ def test_a_list_gives_the_fields_in_order(schema):
         7,
     ],
 )
-def test_what_does_not_fit_is_refused(schema, value):
+def test_a_value_that_does_not_fit_the_type_is_refused(schema, value):
     with pytest.raises(MessageMismatch):
         schema.conform(TWIST, value)
 
@@ -57,13 +57,13 @@ def test_what_does_not_fit_is_refused(schema, value):
         (7, f"{TWIST} message requires a table of fields, but got a <class 'int'>"),
     ],
 )
-def test_a_mismatch_is_said_in_the_words_of_rosbridge(schema, value, words):
+def test_a_mismatch_has_the_error_text_of_rosbridge(schema, value, words):
     with pytest.raises(MessageMismatch) as error:
         schema.conform(TWIST, value)
     assert str(error.value) == words
 
 
-def test_true_is_a_number_only_for_ros2():
+def test_true_is_accepted_as_a_number_only_in_ros2():
     value = {"linear": {"x": True}}
     assert Schema(Dialect("ros2")).conform(TWIST, value)["linear"]["x"] == 1.0
     with pytest.raises(MessageMismatch):
@@ -77,13 +77,13 @@ def test_infinity_is_refused_when_numbers_must_be_finite(schema):
         schema.conform(TWIST, value, finite=True)
 
 
-def test_huge_integers_become_floats(schema):
+def test_a_huge_integer_in_a_float_field_becomes_infinity(schema):
     value = {"linear": {"x": 10**400}}
     assert schema.conform(TWIST, value)["linear"]["x"] == float("inf")
 
 
 @pytest.mark.parametrize("value", [300, -1, 1.5])
-def test_integers_stay_in_their_range(schema, value):
+def test_out_of_range_and_fractional_integers_are_refused(schema, value):
     with pytest.raises(MessageMismatch):
         schema.conform("sensor_msgs/BatteryState", {"power_supply_status": value})
 
@@ -95,7 +95,7 @@ def test_number_sequences_are_typed_arrays(schema):
     assert scan["intensities"].tolist() == []
 
 
-def test_bytes_come_as_base64_or_as_a_list(schema):
+def test_bytes_are_accepted_as_base64_or_as_a_list(schema):
     text = base64.b64encode(b"\x01\x02").decode()
     for data in (text, [1, 2]):
         image = schema.conform("sensor_msgs/CompressedImage", {"data": data})
@@ -104,19 +104,19 @@ def test_bytes_come_as_base64_or_as_a_list(schema):
         schema.conform("sensor_msgs/CompressedImage", {"data": "%%%"})
 
 
-def test_a_fixed_array_needs_its_length(schema):
+def test_a_fixed_array_of_the_wrong_length_is_refused(schema):
     with pytest.raises(MessageMismatch, match="36 values"):
         schema.conform("geometry_msgs/PoseWithCovariance", {"covariance": [0.0]})
 
 
-def test_times_are_read_in_both_spellings(schema):
+def test_times_are_read_with_the_field_names_of_both_dialects(schema):
     whole, rest = schema.dialect.time(0)
     for stamp in ({"secs": 3, "nsecs": 4}, {"sec": 3, "nanosec": 4}):
         header = schema.conform("std_msgs/Header", {"stamp": stamp})
         assert header["stamp"] == {whole: 3, rest: 4}
 
 
-def test_only_ros1_numbers_its_headers():
+def test_only_ros1_headers_have_a_sequence_number():
     ros1, ros2 = Dialect("ros1"), Dialect("ros2")
     assert [ros1.header("/a", 1.5, "map")["seq"] for _ in range(2)] == [1, 2]
     assert ros1.header("/b", 1.5, "map")["seq"] == 1
@@ -135,7 +135,7 @@ def test_only_ros1_numbers_its_headers():
         ("rosapi_msgs/srv/Topics", "rosapi/Topics"),
     ],
 )
-def test_both_spellings_of_a_type_mean_it(spelled, name):
+def test_both_spellings_of_a_type_give_the_same_name(spelled, name):
     assert canonical(spelled) == name
 
 
@@ -144,19 +144,19 @@ def test_names_are_made_absolute():
     assert resolve("/a//b/") == "/a/b"
 
 
-def test_an_unknown_type_is_said(schema):
+def test_an_unknown_type_is_named_in_the_error(schema):
     with pytest.raises(UnknownType, match="no_msgs/Such"):
         schema.conform("no_msgs/Such", {})
 
 
-def test_type_definitions_cover_what_a_type_holds(schema):
+def test_type_definitions_include_the_nested_types(schema):
     names = [d["type"] for d in type_definitions(schema, "nav_msgs/Odometry")]
     assert names[0] == "nav_msgs/Odometry"
     assert "geometry_msgs/Quaternion" in names
     assert len(names) == len(set(names))
 
 
-def test_the_text_of_a_definition_is_the_message_file(schema):
+def test_the_definition_text_has_the_format_of_a_message_file(schema):
     text = definition_text(schema, "geometry_msgs/PoseWithCovariance")
     assert "float64[36] covariance" in text
     assert "MSG: geometry_msgs/Point" in text

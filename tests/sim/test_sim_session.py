@@ -29,7 +29,7 @@ class TestTopics:
         bench.run(2)
         assert len(client.operations("publish", ODOM)) == 40
 
-    def test_a_scan_comes_ten_times_a_second(self, bench):
+    def test_scans_are_sent_ten_times_a_second(self, bench):
         client = bench.client()
         client.send(op="subscribe", topic="/robot_1/base_scan")
         bench.run(1)
@@ -37,7 +37,7 @@ class TestTopics:
         assert len(scans) == 10
         assert len(scans[0]["msg"]["ranges"]) == 360
 
-    def test_a_publication_carries_no_id(self, bench):
+    def test_a_publish_operation_has_no_id(self, bench):
         client = bench.client()
         client.send(op="subscribe", topic=ODOM, id="subscribe:1")
         bench.run(0.1)
@@ -52,21 +52,21 @@ class TestTopics:
             grid["msg"]["data"]
         )
 
-    def test_each_new_id_gets_what_is_latched_again(self, bench):
+    def test_each_new_subscription_id_receives_the_latched_message_again(self, bench):
         client = bench.client()
         client.send(op="subscribe", topic="/map", id="a")
         client.send(op="subscribe", topic="/map", id="b")
         client.send(op="subscribe", topic="/map", id="b")
         assert len(client.operations("publish", "/map")) == 2
 
-    def test_two_subscriptions_give_one_copy(self, bench):
+    def test_two_subscriptions_of_one_client_receive_one_copy(self, bench):
         client = bench.client()
         client.send(op="subscribe", topic=ODOM, id="a", throttle_rate=500)
         client.send(op="subscribe", topic=ODOM, id="b")
         bench.run(1)
         assert len(client.operations("publish", ODOM)) == 20
 
-    def test_when_the_faster_goes_the_slower_stays(self, bench):
+    def test_unsubscribing_the_faster_id_keeps_the_slower_rate(self, bench):
         client = bench.client()
         client.send(op="subscribe", topic=ODOM, id="a", throttle_rate=500)
         client.send(op="subscribe", topic=ODOM, id="b")
@@ -74,7 +74,9 @@ class TestTopics:
         bench.run(3)
         assert len(client.operations("publish", ODOM)) == pytest.approx(6, abs=1)
 
-    def test_unsubscribing_without_an_id_ends_all(self, bench):
+    def test_unsubscribing_without_an_id_ends_all_subscriptions_of_the_topic(
+        self, bench
+    ):
         client = bench.client()
         client.send(op="subscribe", topic=ODOM, id="a")
         client.send(op="subscribe", topic=ODOM, id="b")
@@ -82,7 +84,7 @@ class TestTopics:
         bench.run(1)
         assert client.operations() == []
 
-    def test_throttling_sends_the_newest_when_its_time_comes(self, bench):
+    def test_throttling_sends_the_newest_message_in_each_period(self, bench):
         client = bench.client()
         client.send(op="subscribe", topic=ODOM, throttle_rate=300, queue_length=1)
         stamps = []
@@ -95,7 +97,7 @@ class TestTopics:
         assert len(stamps) == pytest.approx(2 / 0.3, abs=1)
         assert max(stamps) < 0.06
 
-    def test_a_client_hears_what_it_publishes_and_so_do_others(self, bench):
+    def test_a_published_message_reaches_its_sender_and_other_clients(self, bench):
         one, other = bench.client(), bench.client()
         for client in (one, other):
             client.send(op="subscribe", topic=CMD)
@@ -105,7 +107,7 @@ class TestTopics:
             (echo,) = client.operations("publish", CMD)
             assert echo["msg"]["linear"] == {"x": 0.5, "y": 0.0, "z": 0.0}
 
-    def test_clients_have_topics_of_their_own(self, bench):
+    def test_a_topic_of_a_client_exists_until_the_client_disconnects(self, bench):
         talker, listener = bench.client(), bench.client()
         talker.send(op="advertise", topic="/chatter", type=TEXT, latch=True)
         talker.send(op="publish", topic="/chatter", msg={"data": "hallo"})
@@ -123,13 +125,15 @@ class TestTopics:
         talker.send(op="publish", topic="/chatter", msg={"data": "at last"})
         assert listener.operations("publish")[0]["msg"]["data"] == "at last"
 
-    def test_publishing_needs_no_advertising_where_the_type_is_known(self, bench):
+    def test_publishing_to_a_topic_of_known_type_needs_no_advertising(self, bench):
         client = bench.client()
         client.send(op="publish", topic=CMD, msg=twist(0.4))
         bench.run(0.3)
         assert bench.world.robots[0].twist.vx > 0.1
 
-    def test_a_client_that_goes_leaves_nothing_behind(self, bench):
+    def test_a_disconnected_client_leaves_no_topics_services_or_subscriptions(
+        self, bench
+    ):
         topics, services = set(bench.graph.topics), set(bench.graph.services)
         client = bench.client()
         client.send(op="subscribe", topic=ODOM)
@@ -144,7 +148,7 @@ class TestTopics:
 
 class TestDriving:
     @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-    def test_odometry_says_what_was_driven(self, dialect):
+    def test_odometry_shows_the_driven_distance(self, dialect):
         bench = Bench(dialect)
         client = bench.client()
         client.send(op="subscribe", topic=ODOM)
@@ -160,7 +164,7 @@ class TestDriving:
         way = math.hypot(poses[-1]["x"] - poses[0]["x"], poses[-1]["y"] - poses[0]["y"])
         assert way == pytest.approx(0.5, abs=0.02)
 
-    def test_a_robot_that_takes_stamped_twists_takes_no_others(self):
+    def test_a_robot_with_stamped_twists_refuses_plain_twists(self):
         bench = Bench("ros2", twist="TwistStamped")
         client = bench.client()
         client.send(op="publish", topic=CMD, msg=twist(0.5))
@@ -169,7 +173,7 @@ class TestDriving:
         bench.run(0.2)
         assert bench.world.robots[0].twist.vx > 0.1
 
-    def test_nan_reaches_a_real_robot_which_refuses_it(self):
+    def test_a_real_server_forwards_nan_and_infinity_to_a_robot_that_refuses_both(self):
         bench = Bench(quirks="real")
         client = bench.client()
         client.send(op="subscribe", topic=CMD)
@@ -181,7 +185,7 @@ class TestDriving:
         bench.run(0.5)
         assert bench.world.robots[0].twist.is_zero
 
-    def test_a_polite_server_refuses_nan_itself(self, bench):
+    def test_a_polite_server_refuses_an_infinite_velocity(self, bench):
         client = bench.client()
         client.send(op="subscribe", topic=CMD)
         client.send(op="publish", topic=CMD, msg=twist(math.inf), id="x")
@@ -213,7 +217,7 @@ class TestGarbage:
     ]
 
     @pytest.mark.parametrize("bad", BAD, ids=lambda o: str(o)[:60])
-    def test_a_real_server_is_silent_and_goes_on(self, bad):
+    def test_a_real_server_ignores_an_invalid_operation_silently(self, bad):
         bench = Bench(quirks="real")
         client = bench.client()
         client.send(**bad)
@@ -221,7 +225,9 @@ class TestGarbage:
         assert client.call("/rosapi/get_time")["result"] is True
 
     @pytest.mark.parametrize("bad", BAD, ids=lambda o: str(o)[:60])
-    def test_a_polite_server_says_what_was_wrong(self, bench, bad):
+    def test_a_polite_server_answers_an_invalid_operation_with_an_error_status(
+        self, bench, bad
+    ):
         client = bench.client()
         client.send(**bad)
         (status,) = client.operations()
@@ -229,7 +235,7 @@ class TestGarbage:
         assert status["id"] == "x"
         assert status["msg"]
 
-    def test_an_id_that_is_no_text_is_refused(self, bench):
+    def test_an_id_other_than_text_is_refused(self, bench):
         client = bench.client()
         client.send(op="subscribe", topic=ODOM, id={"not": "hashable"})
         bench.run(0.1)
@@ -239,13 +245,13 @@ class TestGarbage:
     @pytest.mark.parametrize(
         "data", ["this is not json", "", "[1, 2]", "null", b"\xff\xfe\x00", "{}" * 3]
     )
-    def test_what_is_no_operation_is_let_go(self, bench, data):
+    def test_data_that_is_not_an_operation_is_ignored(self, bench, data):
         client = bench.client()
         client.session.receive(data)
         client.frames()
         assert client.call("/rosapi/get_time")["result"] is True
 
-    def test_two_objects_in_a_frame_are_both_run(self, bench):
+    def test_two_operations_in_one_frame_are_both_executed(self, bench):
         client = bench.client()
         client.session.receive(
             '{"op":"call_service","service":"/rosapi/nodes","id":"p"}'
@@ -253,14 +259,14 @@ class TestGarbage:
         )
         assert [o["id"] for o in client.operations()] == ["p", "q"]
 
-    def test_half_an_object_waits_for_the_rest(self, bench):
+    def test_an_operation_may_be_split_over_two_frames(self, bench):
         client = bench.client()
         client.session.receive('{"op":"call_service","service":"/ros')
         assert client.operations() == []
         client.session.receive('api/nodes","id":"halves"}')
         assert [o["id"] for o in client.operations()] == ["halves"]
 
-    def test_broken_text_spoils_nothing_after_it(self, bench):
+    def test_an_operation_after_broken_text_is_executed(self, bench):
         client = bench.client()
         client.session.receive('{"op": "call_service", {{{ "x" ')
         call = {"op": "call_service", "service": "/rosapi/nodes", "id": "after"}
@@ -275,7 +281,7 @@ class TestGarbage:
 
 
 class TestServices:
-    def test_the_answer_is_written_as_the_real_server_wrote_it(self):
+    def test_service_responses_match_those_of_the_real_server(self):
         bench = Bench(quirks="real")
         client = bench.client()
         for name, service, args in (
@@ -286,24 +292,24 @@ class TestServices:
             client.send(op="call_service", service=service, args=args, id="call:1")
             assert client.frames() == [path.read_text()]
 
-    def test_an_answer_without_an_id_has_none(self, bench):
+    def test_a_call_without_an_id_gets_a_response_without_an_id(self, bench):
         client = bench.client()
         client.send(op="call_service", service="/rosapi/get_time")
         assert "id" not in client.operations()[0]
 
-    def test_arguments_may_be_a_list(self, bench):
+    def test_service_arguments_may_be_a_list(self, bench):
         client = bench.client()
         response = client.call("/rosapi/topic_type", [ODOM])
         assert response["values"] == {"type": "nav_msgs/Odometry"}
 
-    def test_wrong_arguments_fail_with_a_text(self, bench):
+    def test_wrong_service_arguments_fail_with_a_text(self, bench):
         client = bench.client()
         for args in ({"bogus": 1}, {"topic": 5}):
             response = client.call("/rosapi/topic_type", args)
             assert response["result"] is False
             assert isinstance(response["values"], str)
 
-    def test_a_long_answer_may_come_in_fragments(self, bench):
+    def test_a_long_service_response_may_be_sent_in_fragments(self, bench):
         client = bench.client()
         client.send(
             op="call_service", service="/rosapi/services", id="s", fragment_size=300
@@ -313,7 +319,7 @@ class TestServices:
         whole = json.loads("".join(f["data"] for f in fragments))
         assert "/robot_0/stop" in whole["values"]["services"]
 
-    def test_stop_stops_the_robot(self, bench):
+    def test_the_stop_service_stops_the_robot(self, bench):
         client = bench.client()
         client.send(op="publish", topic=CMD, msg=twist(0.5))
         bench.run(0.2)
@@ -322,7 +328,7 @@ class TestServices:
         bench.run(0.5)
         assert bench.world.robots[0].twist.is_zero
 
-    def test_a_client_may_serve(self, bench):
+    def test_a_client_may_provide_a_service(self, bench):
         server, caller = bench.client(), bench.client()
         server.send(op="advertise_service", service="/srv", type="std_srvs/SetBool")
         caller.send(op="call_service", service="/srv", args={"data": True}, id="c")
@@ -340,7 +346,9 @@ class TestServices:
         assert response["values"] == values
         assert response["id"] == "c"
 
-    def test_when_the_serving_client_goes_its_callers_hear_of_it(self, bench):
+    def test_calls_fail_when_the_client_that_provides_the_service_disconnects(
+        self, bench
+    ):
         server, caller = bench.client(), bench.client()
         server.send(op="advertise_service", service="/srv", type="std_srvs/Trigger")
         caller.send(op="call_service", service="/srv", id="c")
@@ -348,7 +356,7 @@ class TestServices:
         assert caller.operations()[0]["result"] is False
         assert caller.call("/srv")["values"] == "Service /srv does not exist"
 
-    def test_in_ros2_a_hanging_service_blocks_its_socket_and_no_other(self):
+    def test_in_ros2_a_hanging_service_blocks_only_the_calling_socket(self):
         bench = Bench("ros2", "real")
         server, caller, other = bench.client(), bench.client(), bench.client()
         server.send(op="advertise_service", service="/slow", type="std_srvs/Trigger")
@@ -378,14 +386,14 @@ class TestServices:
         client.session.receive(call * 3000)
         assert len(client.operations("service_response")) == 3000
 
-    def test_a_stop_service_may_hang(self):
+    def test_the_hanging_stop_quirk_leaves_stop_calls_unanswered(self):
         bench = Bench(quirks="real,hanging_stop")
         client = bench.client()
         assert client.call("/robot_0/stop") is None
 
 
 class TestForms:
-    def test_a_scan_in_cbor_keeps_infinity(self):
+    def test_a_scan_in_cbor_has_its_ranges_as_a_float32_array(self):
         from simulated import room
 
         bench = Bench(quirks="real", plan=room(30, 30))
@@ -404,7 +412,7 @@ class TestForms:
             ("ros2", ODOM, "png"),
         ],
     )
-    def test_what_a_real_server_never_sends_does_not_come(
+    def test_a_real_server_never_sends_odometry_in_unsupported_encodings(
         self, dialect, topic, compression
     ):
         bench = Bench(dialect, "real")
@@ -417,7 +425,7 @@ class TestForms:
         polite.bench.run(1)
         assert len(polite.frames()) == 20
 
-    def test_cbor_in_fragments_never_comes(self):
+    def test_a_real_server_never_sends_fragmented_cbor(self):
         bench = Bench(quirks="real")
         client = bench.client()
         client.send(
@@ -425,7 +433,7 @@ class TestForms:
         )
         assert client.frames() == []
 
-    def test_fragments_make_the_message(self):
+    def test_joined_fragments_give_the_whole_message(self):
         bench = Bench(quirks="real")
         client = bench.client()
         client.send(op="subscribe", topic=ODOM, fragment_size=300)
@@ -436,7 +444,7 @@ class TestForms:
         whole = json.loads("".join(f["data"] for f in fragments))
         assert whole["topic"] == ODOM
 
-    def test_raw_cbor_comes_in_both_dialects(self):
+    def test_raw_cbor_is_sent_in_both_dialects(self):
         for dialect in ("ros1", "ros2"):
             client = Bench(dialect, "real").client()
             client.send(op="subscribe", topic=ODOM, compression="cbor-raw")
@@ -444,7 +452,7 @@ class TestForms:
             (frame,) = client.operations()
             assert set(frame["msg"]) == {"secs", "nsecs", "bytes"}
 
-    def test_nan_in_a_covariance_is_bare_in_ros2(self):
+    def test_ros2_writes_nan_in_a_covariance_as_a_bare_token(self):
         client = Bench("ros2", "real", nan=True).client()
         client.send(op="subscribe", topic=ODOM)
         client.bench.run(0.05)

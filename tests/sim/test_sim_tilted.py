@@ -43,7 +43,7 @@ def to_wall(points) -> np.ndarray:
 
 
 @DIALECTS
-def test_a_scan_upside_down_has_its_rays_the_other_way_about(dialect):
+def test_the_scan_of_an_upside_down_scanner_lies_on_the_walls(dialect):
     bench = Bench(dialect, robots=1, tilted=True)
     scan = messages_of(bench, "/robot_0/base_scan")[-1]
     assert mounted(bench, "base_laser").rotation == Quaternion(1.0, 0.0, 0.0, 0.0)
@@ -59,7 +59,7 @@ def test_a_scan_upside_down_has_its_rays_the_other_way_about(dialect):
     assert there[:, 2] == pytest.approx(0.2)
 
 
-def test_the_cloud_of_a_lidar_upside_down_has_the_floor_below():
+def test_the_cloud_of_an_upside_down_lidar_has_the_floor_at_the_bottom():
     bench = Bench(robots=1, tilted=True)
     cloud = messages_of(bench, "/robot_0/points", compression="cbor")[-1]
     points = np.frombuffer(cloud["data"], POINT)
@@ -87,6 +87,6 @@ def test_the_cloud_of_a_depth_camera_is_in_its_optical_frame():
     assert abs(aside).max() < math.radians(31), "only what is ahead is seen"
 
 
-def test_level_robots_have_no_depth_camera():
+def test_robots_without_tilted_sensors_have_no_depth_camera():
     bench = Bench(robots=1)
     assert "/robot_0/camera/points" not in bench.graph.topics

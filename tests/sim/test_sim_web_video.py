@@ -55,7 +55,7 @@ def asked(target):
         ),
     ],
 )
-def test_the_addresses_are_those_of_web_video_server(target, request_):
+def test_the_addresses_of_web_video_server_are_accepted(target, request_):
     assert asked(target) == request_
 
 
@@ -80,7 +80,7 @@ def test_the_addresses_are_those_of_web_video_server(target, request_):
         ("/../etc/passwd", 404, "there is nothing at"),
     ],
 )
-def test_what_is_asked_wrongly_is_refused_in_words(target, status, said):
+def test_an_invalid_request_target_is_refused_with_a_reason(target, status, said):
     with pytest.raises(Refusal) as refused:
         asked(target)
     assert refused.value.status == status
@@ -97,7 +97,7 @@ def test_what_is_asked_wrongly_is_refused_in_words(target, status, said):
         (b"POST / HTTP/1.1\r\n\r\n", 405),
     ],
 )
-def test_what_is_no_request_for_pictures_is_refused(head, status):
+def test_a_malformed_or_non_get_request_is_refused(head, status):
     with pytest.raises(Refusal) as refused:
         read_request(head)
     assert refused.value.status == status
@@ -119,7 +119,7 @@ def opened(jpeg):
     return image
 
 
-def test_a_picture_takes_the_form_that_was_asked_for():
+def test_a_picture_gets_the_requested_size_quality_and_orientation():
     shown = opened(Form(width=64, height=10, inverted=True).apply(a_picture()))
     assert shown.size == (64, 10)
     red, _, blue = shown.getpixel((5, 1))
@@ -132,7 +132,7 @@ def test_a_picture_takes_the_form_that_was_asked_for():
 @pytest.mark.parametrize(
     "data", [b"\xff\xd8\xff", a_picture()[:200], b"", a_picture((5000, 8))]
 )
-def test_what_cannot_be_read_is_no_picture(data):
+def test_unreadable_or_too_large_image_data_is_refused(data):
     with pytest.raises(NoPicture):
         Form(quality=50).apply(data)
 
@@ -192,7 +192,7 @@ async def until(condition, seconds=10.0):
         await asyncio.sleep(0.005)
 
 
-def test_a_stream_is_read_by_the_display_as_one_and_its_end_is_noticed():
+def test_the_display_parser_reads_a_stream_and_the_server_notices_the_end():
     async def scenario(served):
         reader, writer = await served.connect(STREAM)
         answer, seen = Answer(), []
@@ -226,7 +226,7 @@ def test_a_snapshot_is_the_next_picture_with_its_stamp():
     serving(scenario)
 
 
-def test_what_a_camera_sends_that_is_no_picture_is_left_out(caplog):
+def test_invalid_pictures_of_a_camera_are_skipped(caplog):
     async def scenario(served):
         target = f"/snapshot?topic={TOPIC}&width=64"
         asks = asyncio.create_task(served.answer(target))
@@ -241,7 +241,7 @@ def test_what_a_camera_sends_that_is_no_picture_is_left_out(caplog):
     serving(scenario)
 
 
-def test_a_reader_that_was_slow_gets_the_newest_picture_and_few_old_ones():
+def test_a_slow_reader_gets_the_newest_picture_and_few_old_pictures():
     size, count = 20_000, 500
 
     async def scenario(served):
@@ -266,7 +266,7 @@ def test_a_reader_that_was_slow_gets_the_newest_picture_and_few_old_ones():
     serving(scenario)
 
 
-def test_a_reader_that_takes_nothing_is_let_go(monkeypatch):
+def test_a_reader_that_reads_nothing_is_disconnected(monkeypatch):
     async def scenario(served):
         stuck = socket.socket()
         stuck.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -300,7 +300,7 @@ def test_a_reader_that_takes_nothing_is_let_go(monkeypatch):
         ),
     ],
 )
-def test_a_refusal_reaches_who_asked(monkeypatch, sent, status, said):
+def test_a_refusal_is_sent_to_the_client(monkeypatch, sent, status, said):
     if "0.1 s" in said:  # the others are to be in time on a busy machine too
         monkeypatch.setattr(server, "PATIENCE", 0.1)
 
@@ -316,7 +316,7 @@ def test_a_refusal_reaches_who_asked(monkeypatch, sent, status, said):
     serving(scenario)
 
 
-def test_one_client_too_many_is_told_so(monkeypatch):
+def test_a_client_above_the_connection_limit_is_refused(monkeypatch):
     monkeypatch.setattr(server, "MOST_CONNECTIONS", 2)
 
     async def scenario(served):
@@ -333,7 +333,7 @@ def test_one_client_too_many_is_told_so(monkeypatch):
     serving(scenario)
 
 
-def test_the_list_names_every_camera_and_is_no_way_in():
+def test_the_camera_list_links_every_camera_and_escapes_html():
     async def scenario(served):
         odd = "/<b>'&"
         served.graph.advertise("x", f"{odd}/compressed", "sensor_msgs/CompressedImage")
@@ -346,7 +346,7 @@ def test_the_list_names_every_camera_and_is_no_way_in():
     serving(scenario)
 
 
-def test_who_hangs_up_at_once_leaves_nothing():
+def test_a_client_that_disconnects_at_once_leaves_no_connection():
     async def scenario(served):
         for sent in (b"", b"GET / HT", f"GET {STREAM} HTTP/1.0\r\n\r\n".encode()):
             with socket.create_connection(("127.0.0.1", served.port)) as client:
@@ -380,7 +380,7 @@ def simulator():
     assert "Traceback" not in err
 
 
-def test_the_display_shows_what_a_simulated_camera_sees(monkeypatch):
+def test_the_display_shows_the_picture_of_a_simulated_camera(monkeypatch):
     monkeypatch.setattr(http_camera, "lifecycle", Lifecycle())
 
     def shown(camera):
@@ -420,7 +420,7 @@ def test_the_display_shows_what_a_simulated_camera_sees(monkeypatch):
         asyncio.run(scenario(bridge, stream))
 
 
-def test_a_port_of_the_cameras_that_is_in_use_is_an_error():
+def test_a_camera_port_in_use_is_an_error():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

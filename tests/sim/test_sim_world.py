@@ -28,7 +28,7 @@ def place(world, *poses):
         robot.pose = robot.odometry = pose
 
 
-def test_the_same_seed_gives_the_same_places(floor):
+def test_the_same_seed_gives_the_same_start_poses(floor):
     first = [r.pose for r in World(floor, WorldOptions(robots=5, seed=3)).robots]
     again = [r.pose for r in World(floor, WorldOptions(robots=5, seed=3)).robots]
     other = [r.pose for r in World(floor, WorldOptions(robots=5, seed=4)).robots]
@@ -36,7 +36,7 @@ def test_the_same_seed_gives_the_same_places(floor):
     assert first != other
 
 
-def test_robots_begin_apart_in_free_places(floor):
+def test_robots_start_apart_from_each_other_in_free_space(floor):
     world = World(floor, WorldOptions(robots=30))
     poses = [robot.pose for robot in world.robots]
     for i, a in enumerate(poses):
@@ -45,7 +45,7 @@ def test_robots_begin_apart_in_free_places(floor):
             assert math.hypot(a.x - b.x, a.y - b.y) > 1.0
 
 
-def test_a_map_without_room_is_refused():
+def test_a_map_without_enough_free_space_is_refused():
     with pytest.raises(ConfigError, match="room for"):
         World(room(2.5, 2.5), WorldOptions(robots=40))
     with pytest.raises(ConfigError, match="no free place"):
@@ -63,7 +63,7 @@ def test_a_robot_stops_at_the_wall():
     assert world.robots[0].pose.x <= 9.70
 
 
-def test_robots_stop_at_each_other():
+def test_two_robots_stop_before_they_collide():
     world = World(room(10, 6), WorldOptions(robots=2))
     place(world, Pose(3, 3, 0.0), Pose(6, 3, math.pi))
     for _ in range(400):
@@ -74,7 +74,7 @@ def test_robots_stop_at_each_other():
     assert 0.5 <= b.x - a.x < 0.56
 
 
-def test_robots_see_each_other():
+def test_scans_show_the_other_robots():
     world = World(room(10, 6), WorldOptions(robots=2))
     place(world, Pose(3, 3, 0.0), Pose(6, 3, math.pi))
     first, second = world.sweep([0, 1])
@@ -82,7 +82,7 @@ def test_robots_see_each_other():
     assert second[180] == pytest.approx(2.75)
 
 
-def test_a_goal_is_reached_around_a_wall():
+def test_a_robot_reaches_a_goal_behind_a_wall():
     plan = room(10, 6, boxes=[(5.0, 0.0, 5.2, 4.5)])
     world = World(plan, WorldOptions(robots=1))
     place(world, Pose(2, 2, 0.0))
@@ -113,7 +113,7 @@ def test_a_goal_in_a_wall_is_aborted():
     assert world.robots[0].twist.is_zero
 
 
-def test_a_goal_that_is_cancelled_stops_the_robot():
+def test_cancelling_a_goal_stops_the_robot():
     world = World(room(10, 6), WorldOptions(robots=1))
     place(world, Pose(2, 3, 0.0))
     goal = Goal(Pose(8, 3))
@@ -126,7 +126,7 @@ def test_a_goal_that_is_cancelled_stops_the_robot():
     assert world.robots[0].twist.is_zero
 
 
-def test_a_new_goal_ends_the_one_before():
+def test_a_new_goal_cancels_the_previous_goal():
     world = World(room(10, 6), WorldOptions(robots=1))
     first, second = Goal(Pose(8, 3)), Goal(Pose(2, 3))
     world.send_goal(0, first)
@@ -137,7 +137,7 @@ def test_a_new_goal_ends_the_one_before():
     assert second.state is GoalState.SUCCEEDED
 
 
-def test_a_client_that_drives_ends_the_goal():
+def test_a_velocity_from_a_client_cancels_the_goal():
     world = World(room(10, 6), WorldOptions(robots=1))
     goal = Goal(Pose(8, 3))
     world.send_goal(0, goal)
@@ -146,7 +146,7 @@ def test_a_client_that_drives_ends_the_goal():
     assert goal.state is GoalState.CANCELED
 
 
-def test_a_command_of_zero_holds_a_robot_but_its_goal_goes_on():
+def test_a_zero_velocity_pauses_a_robot_without_cancelling_its_goal():
     world = World(room(10, 6), WorldOptions(robots=1))
     place(world, Pose(2, 3, 0.0))
     goal = Goal(Pose(8, 3))
@@ -160,7 +160,7 @@ def test_a_command_of_zero_holds_a_robot_but_its_goal_goes_on():
     assert goal.state is GoalState.SUCCEEDED
 
 
-def test_a_robot_waits_for_one_in_its_way_and_plans_around_it():
+def test_a_robot_reaches_its_goal_around_another_robot():
     world = World(room(10, 6), WorldOptions(robots=2))
     place(world, Pose(2, 3, 0.0), Pose(4, 3, 0.0))
     goal = Goal(Pose(8, 3))
@@ -170,7 +170,7 @@ def test_a_robot_waits_for_one_in_its_way_and_plans_around_it():
     assert world.robots[1].pose == Pose(4, 3, 0.0)
 
 
-def test_robots_wander_only_when_asked_to(floor):
+def test_robots_wander_only_with_the_wander_option(floor):
     still = World(floor, WorldOptions(robots=2))
     before = [robot.pose for robot in still.robots]
     forward(still, 10)
@@ -180,7 +180,7 @@ def test_robots_wander_only_when_asked_to(floor):
     assert all(robot.travelled > 1 for robot in busy.robots)
 
 
-def test_a_wandering_robot_leaves_its_way_to_the_client(floor):
+def test_a_velocity_from_a_client_ends_the_goal_of_a_wandering_robot(floor):
     world = World(floor, WorldOptions(robots=1, wander=True))
     forward(world, 5)
     assert world.navigators[0].goal is not None
@@ -191,7 +191,7 @@ def test_a_wandering_robot_leaves_its_way_to_the_client(floor):
     assert world.robots[0].twist == Twist(wz=0.5)
 
 
-def test_planning_never_takes_a_step_hostage(floor):
+def test_a_long_plan_is_computed_over_several_steps(floor):
     world = World(floor, WorldOptions(robots=1))
     place(world, Pose(-18, -3.0))
     goal = Goal(Pose(16, -6.6))

@@ -3,7 +3,7 @@ import test from "node:test";
 
 import { DragEnd } from "../../src/webmap/web/map.js";
 
-test("the click that ends a drag is swallowed, and the one after it is not", () => {
+test("only the first click after a drag is discarded", () => {
   const drag = new DragEnd();
   assert.equal(drag.swallows(1, 0), false, "before any drag");
   drag.note(1000);
@@ -11,7 +11,7 @@ test("the click that ends a drag is swallowed, and the one after it is not", () 
   assert.equal(drag.swallows(1, 1020), false);
 });
 
-test("a click that comes late, from a key or after a new press is meant", () => {
+test("a late click, a click by a key and a click after a new press are kept", () => {
   const drag = new DragEnd();
   drag.note(1000);
   assert.equal(drag.swallows(1, 1501), false);

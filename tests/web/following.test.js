@@ -5,13 +5,13 @@ import { Following } from "../../src/webmap/web/view.js";
 
 const at = (x, y) => ({ x, y });
 
-test("who follows nothing shifts nothing", () => {
+test("the view is not shifted without a followed element", () => {
   const following = new Following();
   following.settle(at(1, 2));
   assert.equal(following.shift(at(5, 5)), null);
 });
 
-test("the view is shifted by as much as the element has moved on the screen", () => {
+test("the view is shifted by the movement of the element on the screen", () => {
   const following = new Following();
   following.start(7);
   following.settle(at(100, 50));
@@ -19,14 +19,14 @@ test("the view is shifted by as much as the element has moved on the screen", ()
   assert.deepEqual(following.shift(at(101, 50)), at(-1, 0), "its place is the same");
 });
 
-test("what nobody would see is let be", () => {
+test("a movement too small to see does not shift the view", () => {
   const following = new Following();
   following.start(7);
   following.settle(at(100, 50));
   assert.equal(following.shift(at(100.005, 50)), null);
 });
 
-test("an element that comes later stays where it is first seen", () => {
+test("an element that appears later keeps its first place on the screen", () => {
   const following = new Following();
   following.start(7);
   following.settle(null);
@@ -35,7 +35,7 @@ test("an element that comes later stays where it is first seen", () => {
   assert.deepEqual(following.shift(at(12, 10)), at(-2, 0));
 });
 
-test("a view that was changed otherwise makes a new place", () => {
+test("another change of the view gives the element a new place", () => {
   const following = new Following();
   following.start(7);
   following.settle(at(100, 50));
@@ -43,7 +43,7 @@ test("a view that was changed otherwise makes a new place", () => {
   assert.deepEqual(following.shift(at(201, 50)), at(-1, 0));
 });
 
-test("nothing is followed any more when it has ended", () => {
+test("the view is not shifted after the following has ended", () => {
   const following = new Following();
   following.start(7);
   following.settle(at(100, 50));

@@ -31,7 +31,7 @@ async function pass(promise) {
   return promise;
 }
 
-test("a module that could not be had is asked for again, by another address", async (t) => {
+test("a module that could not be loaded is requested again with another URL", async (t) => {
   mock.timers.enable({ apis: ["setTimeout"] });
   t.after(() => mock.timers.reset());
   const { asked, load } = loader(2);
@@ -42,7 +42,7 @@ test("a module that could not be had is asked for again, by another address", as
   assert.equal(asked.at(-1), `${url}?again=2`, "or there would be two of it");
 });
 
-test("what cannot be had for good is said in the end", async (t) => {
+test("an import fails after three failed requests", async (t) => {
   mock.timers.enable({ apis: ["setTimeout"] });
   t.after(() => mock.timers.reset());
   const { asked, load } = loader(9);
@@ -50,7 +50,7 @@ test("what cannot be had for good is said in the end", async (t) => {
   assert.equal(asked.length, 3);
 });
 
-test("a module that is wrong is not asked for again", async () => {
+test("a module with a syntax error is not requested again", async () => {
   const { asked, load } = loader(9, new SyntaxError("Unexpected token"));
   await assert.rejects(importOf(newAddress(), load), SyntaxError);
   assert.equal(asked.length, 1);

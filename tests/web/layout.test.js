@@ -51,29 +51,29 @@ function assertRefused(text, ...words) {
   );
 }
 
-describe("a layout's file", () => {
-  test("is read as it was written", () => {
+describe("a layout file", () => {
+  test("has the same content after writing and reading", () => {
     assert.deepEqual(readLayout(writeLayout(LAYOUT)), LAYOUT);
   });
 
-  test("may say a part of it only", () => {
+  test("may contain only some parts", () => {
     assert.deepEqual(readLayout('{"version": 1}'), {});
     assert.deepEqual(readLayout(writeLayout({ view: VIEW })), { view: VIEW });
   });
 
-  test("that is no JSON is refused with how it begins", () => {
+  test("that is not JSON is refused with the start of its text", () => {
     assertRefused("<svg>…", "expected JSON", '"<svg>…"', "Save");
     assertRefused("", "an empty file");
     assertRefused("x".repeat(1000), `"${"x".repeat(39)}…`);
   });
 
-  test("that is other JSON is refused", () => {
+  test("with other JSON is refused", () => {
     assertRefused("[1]", "expected a table, got a list");
     assertRefused("null", "expected a table, got null");
     assertRefused('{"bridges": {}}', '"version": 1', "got none");
   });
 
-  test("of another version is refused with both", () => {
+  test("of another version is refused with both versions", () => {
     assertRefused('{"version": 2}', "another version", "expected 1, got 2");
     assertRefused('{"version": "1"}', 'expected 1, got "1"');
   });
@@ -84,7 +84,7 @@ describe("a layout's file", () => {
     checkSize(MOST_BYTES);
   });
 
-  test("with a wrong value is refused with its place, what was expected and got", () => {
+  test("with a wrong value is refused with its key, the expected and the actual value", () => {
     const wrong = /** @type {[(layout: any) => void, ...string[]][]} */ ([
       [(l) => (l.view.x = "12"), 'view.x: expected a number from', 'got "12"'],
       [(l) => (l.view.x = 1e300), "view.x", "got 1e+300"],
@@ -102,30 +102,30 @@ describe("a layout's file", () => {
     for (const [change, ...words] of wrong) assertRefused(changed(change), ...words);
   });
 
-  test("that says anything else, such as a robot, is refused whole", () => {
+  test("with any other key, such as a robot, is refused completely", () => {
     assertRefused(changed((l) => (l.selected = "bob")), 'has "selected"', "view, layers");
     assertRefused(changed((l) => (l.view.follow = 3)), 'view: has "follow"');
     assertRefused(changed((l) => (l.camera.open = true)), 'camera: has "open"');
     assertRefused('{"version": 1, "__proto__": {}}', '"__proto__"');
   });
 
-  test("may name layers as it likes, and none is taken for a part of the program", () => {
+  test("may contain a layer with the name of a JavaScript property", () => {
     const text = '{"version": 1, "layers": {"open": false, "shown": {"__proto__": false}}}';
     const { layers } = readLayout(text);
     assert.deepEqual(Object.entries(layers.shown), [["__proto__", false]]);
   });
 });
 
-describe("a view as a place", () => {
+describe("a view that is saved as a place", () => {
   const size = { width: 800, height: 600 };
 
-  test("comes back as the same view", () => {
+  test("is restored as the same view", () => {
     const view = rotate(scale(translate(initialView(800, 600), 7, -9), 31, 5, 6), 50, 3, 4);
     const again = viewOf(placeOf(view, size), size);
     for (const key of "abcdef") assert.ok(Math.abs(again[key] - view[key]) < 1e-6, key);
   });
 
-  test("lies in the middle of a screen of any size", () => {
+  test("is centred on a screen of any size", () => {
     const phone = { width: 390, height: 844 };
     const view = viewOf(VIEW, phone);
     const middle = apply(view, VIEW.x, VIEW.y);
@@ -134,13 +134,13 @@ describe("a view as a place", () => {
     for (const key of Object.keys(VIEW)) assert.ok(Math.abs(back[key] - VIEW[key]) < 1e-9, key);
   });
 
-  test("turns counter-clockwise as it is seen", () => {
+  test("is rotated counter-clockwise on the screen", () => {
     const view = viewOf({ x: 0, y: 0, pixels_per_metre: 1, turn_rad: Math.PI / 2 }, size);
     const east = apply(view, 10, 0);
     assert.ok(Math.hypot(east.x - 400, east.y - 290) < 1e-9);
   });
 
-  test("is none if it is skewed or mirrored", () => {
+  test("is null if skewed or mirrored", () => {
     const straight = initialView(800, 600);
     assert.equal(placeOf({ ...straight, d: 1 }, size), null);
     assert.equal(placeOf({ ...straight, a: 2 }, size), null);
@@ -149,7 +149,7 @@ describe("a view as a place", () => {
 });
 
 describe("the parts of a layout", () => {
-  test("take what is theirs and leave the rest alone", () => {
+  test("read, write and reset only their own values", () => {
     const parts = new LayoutParts();
     const wrote = [];
     const part = (name) => ({
@@ -183,7 +183,7 @@ describe("the last views", () => {
     delete globalThis.localStorage;
   });
 
-  test("are kept for each address until they are forgotten", () => {
+  test("are kept for each URL path until they are removed", () => {
     keepView("/", VIEW);
     keepView("/hall", { ...VIEW, x: 1 });
     assert.deepEqual(keptView("/"), VIEW);
@@ -193,7 +193,7 @@ describe("the last views", () => {
     assert.equal(keptView("toString"), null);
   });
 
-  test("are 32 at most, of which the oldest goes first", () => {
+  test("are at most 32, and the oldest one is removed first", () => {
     for (let i = 0; i < 32; i++) keepView(`/${i}`, VIEW);
     keepView("/0", VIEW);
     keepView("/32", VIEW);
@@ -202,7 +202,7 @@ describe("the last views", () => {
     assert.equal(Object.keys(JSON.parse(text)).length, 32);
   });
 
-  test("are none where what is kept is not ours, or nothing can be", () => {
+  test("are null with invalid data in the storage or without a storage", () => {
     for (const other of ["{", "[]", "7", '{"/": 3}', '{"/": {"x": 1}}']) {
       text = other;
       assert.equal(keptView("/"), null, other);

@@ -39,7 +39,7 @@ function makeLink(t) {
   return { link: new Link(() => new URL("ws://localhost/"), events), said };
 }
 
-test("a link that hangs while it is opened is tried anew, with more time each time", (t) => {
+test("a link that does not open is opened again with a longer timeout", (t) => {
   const now = t.mock.method(performance, "now", () => 0).mock;
   const { link, said } = makeLink(t);
   const looksAt = (ms) => {
@@ -59,7 +59,7 @@ test("a link that hangs while it is opened is tried anew, with more time each ti
   assert.ok(!link.opens);
 });
 
-test("a network that is back gives up at once what was begun on another", (t) => {
+test("a new connection replaces a pending one when the network is back", (t) => {
   makeLink(t);
   online.at(-1)();
   assert.ok(Hanging.made[0].closed);

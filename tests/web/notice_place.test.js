@@ -28,7 +28,7 @@ function covered(area, taken) {
   return { ...place, count: taken.filter((one) => meets(one, notices)).length };
 }
 
-test("notices on an empty map are at its top, in the middle", () => {
+test("notices on an empty map are at the top, in the centre", () => {
   const place = freePlace(DESKTOP, [], () => 40);
   assert.deepEqual(place, { left: 452, top: 72 + GAP, width: 704 });
 });
@@ -51,12 +51,12 @@ test("notices on a phone lie below two rows, beside the buttons of the view", ()
   assert.equal(place?.top, 164 + GAP);
 });
 
-test("what is beside the map takes no room from notices", () => {
+test("elements beside the map take no room from notices", () => {
   const list = [100, 300, 500].map((y) => box(0, y, 327, y + 190));
   assert.equal(covered(DESKTOP, list)?.top, 72 + GAP);
 });
 
-test("any few buttons are covered by none", () => {
+test("notices never cover buttons at random places", () => {
   let seed = 1;
   const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
   let placed = 0;
@@ -72,6 +72,6 @@ test("any few buttons are covered by none", () => {
   assert.ok(placed > 250, `${placed} of 300`);
 });
 
-test("without room there is no place", () => {
+test("there is no place for notices without room", () => {
   assert.equal(freePlace(PHONE, [box(0, 0, 390, 844)], words), null);
 });

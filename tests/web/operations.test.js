@@ -17,13 +17,13 @@ const VIEW = initialView(700, 500);
 
 const said = (operation, ...args) => operated(VIEW, SIZE, operation, args);
 
-test("what only moves, grows or turns the view leaves the following alone", () => {
+test("translate, scale and rotate do not end the following", () => {
   assert.deepEqual(said("translate", 10, 20), { view: translate(VIEW, 10, 20) });
   assert.deepEqual(said("scale", 2, 30, 40), { view: scale(VIEW, 2, 30, 40) });
   assert.deepEqual(said("rotate", 90, 30, 40), { view: rotate(VIEW, 90, 30, 40) });
 });
 
-test("the middle is meant where no point is given", () => {
+test("scale and rotate without a point use the centre", () => {
   for (const operation of ["scale", "rotate"]) {
     const { view } = said(operation, 3);
     assert.ok(view);
@@ -31,22 +31,22 @@ test("the middle is meant where no point is given", () => {
   }
 });
 
-test("a view that is set or fitted ends the following", () => {
+test("set and fit end the following", () => {
   const fitted = fit(VIEW, [-1, -2, 3, 4], 700, 500);
   assert.deepEqual(said("fit", -1, -2, 3, 4), { view: fitted, follow: 0 });
   const view = { a: 2, b: 0, c: 0, d: -2, e: 11, f: 12 };
   assert.deepEqual(said("set", 2, 0, 0, -2, 11, 12), { view, follow: 0 });
 });
 
-test("following leaves the view alone", () => {
+test("follow does not change the view", () => {
   assert.deepEqual(said("follow", 17), { follow: 17 });
 });
 
-test("an operation of another version does nothing", () => {
+test("an unknown operation does nothing", () => {
   assert.deepEqual(said("somersault", 1), {});
 });
 
-test("an operation counts once, however often it comes", () => {
+test("an operation that arrives twice is applied once", () => {
   const operations = new Operations();
   assert.deepEqual(
     [1, 2, 2, 1, 3].map((number) => operations.reach(number)),
@@ -55,7 +55,7 @@ test("an operation counts once, however often it comes", () => {
   assert.equal(operations.applied, 3);
 });
 
-test("operations wait for a size and are then carried out in order, once", () => {
+test("operations wait until the map has a size and then run once, in order", () => {
   const operations = new Operations();
   const done = [];
   operations.whenSized(false, () => done.push(1));

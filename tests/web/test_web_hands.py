@@ -10,7 +10,9 @@ from input_bench import INPUT_BLOCKERS, Bench
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
-def test_holding_w_takes_the_robot_and_drives_after_neutral(bench: Bench) -> None:
+def test_holding_w_takes_control_and_drives_after_neutral_commands(
+    bench: Bench,
+) -> None:
     bench.drive()
     assert bench.gate.of("take") == [{"op": "take", "robot": "r1"}]
     drives = bench.gate.of("drive")
@@ -22,13 +24,15 @@ def test_holding_w_takes_the_robot_and_drives_after_neutral(bench: Bench) -> Non
 
 
 @pytest.mark.serial
-def test_commands_leave_at_20_hz(bench: Bench) -> None:
+def test_commands_are_sent_at_20_hz(bench: Bench) -> None:
     since = bench.drive()
     bench.page.wait_for_timeout(2000)
     assert 35 <= len(bench.gate.moves(since)) <= 45
 
 
-def test_letting_go_is_neutral_at_once_and_pressing_again_drives(bench: Bench) -> None:
+def test_releasing_a_key_is_neutral_at_once_and_a_new_press_drives(
+    bench: Bench,
+) -> None:
     bench.drive()
     bench.page.keyboard.up("w")
     bench.neutral_within(50)
@@ -39,7 +43,7 @@ def test_letting_go_is_neutral_at_once_and_pressing_again_drives(bench: Bench) -
 
 
 @pytest.mark.parametrize("blocker", INPUT_BLOCKERS)
-def test_doubt_is_neutral_within_50_ms_and_nothing_resumes(
+def test_an_input_block_is_neutral_within_50_ms_and_a_held_key_does_not_resume(
     bench: Bench, blocker: str
 ) -> None:
     bench.drive()
@@ -51,7 +55,7 @@ def test_doubt_is_neutral_within_50_ms_and_nothing_resumes(
     bench.still()
 
 
-def test_a_key_held_since_before_it_was_heard_does_nothing_and_that_is_said(
+def test_a_key_held_since_before_the_selection_does_nothing_and_is_shown_as_blocked(
     bench: Bench,
 ) -> None:
     bench.page.keyboard.down("w")  # no robot is selected, so no key drives
@@ -68,7 +72,7 @@ def test_a_key_held_since_before_it_was_heard_does_nothing_and_that_is_said(
 
 
 @pytest.mark.parametrize("key", ["Meta", "Control", "Alt"])
-def test_a_modifier_is_a_doubt(bench: Bench, key: str) -> None:
+def test_a_modifier_key_blocks_the_input(bench: Bench, key: str) -> None:
     bench.drive()
     bench.page.keyboard.down(key)
     bench.neutral_within(50)
@@ -77,13 +81,15 @@ def test_a_modifier_is_a_doubt(bench: Bench, key: str) -> None:
     bench.still()
 
 
-def test_a_hidden_page_gives_the_robot_back(bench: Bench) -> None:
+def test_a_hidden_page_releases_control(bench: Bench) -> None:
     bench.drive()
     bench.page.evaluate(f"() => {{ {INPUT_BLOCKERS['hidden']} }}")
     bench.until(lambda: bench.gate.of("release") == [{"op": "release", "robot": "r1"}])
 
 
-def test_a_silent_gate_is_lost_and_what_is_held_moves_nothing(bench: Bench) -> None:
+def test_a_gate_without_ticks_is_late_then_lost_and_a_held_key_moves_nothing(
+    bench: Bench,
+) -> None:
     bench.drive()
     takes = bench.gate.of("take")
     losses = bench.losses
@@ -99,7 +105,9 @@ def test_a_silent_gate_is_lost_and_what_is_held_moves_nothing(bench: Bench) -> N
     assert bench.gate.of("take") == takes
 
 
-def test_commands_that_are_not_acknowledged_turn_the_controls_red(bench: Bench) -> None:
+def test_commands_without_acknowledgement_are_shown_as_late_and_stop_the_motion(
+    bench: Bench,
+) -> None:
     bench.drive()
     bench.gate.acking = False
     bench.until(lambda: bench.shown() == "late")
@@ -108,7 +116,9 @@ def test_commands_that_are_not_acknowledged_turn_the_controls_red(bench: Bench) 
     bench.still()
 
 
-def test_a_cut_connection_moves_nothing_until_a_new_press(bench: Bench) -> None:
+def test_a_held_key_moves_nothing_after_a_lost_connection_until_a_new_press(
+    bench: Bench,
+) -> None:
     bench.drive()
     bench.cut()
     bench.until(lambda: bench.state == "open")
@@ -118,7 +128,9 @@ def test_a_cut_connection_moves_nothing_until_a_new_press(bench: Bench) -> None:
     bench.hold("w", lambda: len(bench.gate.of("take")) == 2)
 
 
-def test_a_gate_that_was_started_anew_moves_nothing_that_is_held(bench: Bench) -> None:
+def test_a_held_key_moves_nothing_after_a_gate_restart_until_a_new_press(
+    bench: Bench,
+) -> None:
     bench.drive()
     bench.gate.greet()
     bench.until(lambda: bench.page.evaluate("bench.drive.status.driven") is None)
@@ -131,7 +143,9 @@ def test_a_gate_that_was_started_anew_moves_nothing_that_is_held(bench: Bench) -
     assert bench.gate.of("drive", since)[0]["seq"] == 0
 
 
-def test_another_selection_stops_the_old_robot_and_spares_the_new(bench: Bench) -> None:
+def test_selecting_another_robot_releases_the_old_one_and_does_not_move_the_new(
+    bench: Bench,
+) -> None:
     bench.drive()
     bench.select("r2")
     bench.until(lambda: bench.gate.of("release") == [{"op": "release", "robot": "r1"}])
@@ -142,7 +156,7 @@ def test_another_selection_stops_the_old_robot_and_spares_the_new(bench: Bench) 
     bench.hold("w", lambda: bench.gate.moves()[-1]["robot"] == "r2")
 
 
-def test_a_robot_that_another_holds_is_not_taken_by_a_press(bench: Bench) -> None:
+def test_a_press_does_not_take_control_from_another_operator(bench: Bench) -> None:
     ann = {"connection": "c9", "name": "Ann"}
     bench.gate.change("r1", holder=ann, epoch=7, state="driving")
     bench.select("r1")
@@ -153,7 +167,7 @@ def test_a_robot_that_another_holds_is_not_taken_by_a_press(bench: Bench) -> Non
     assert "Ann is driving" in bench.page.inner_text(".webmap-teleop")
 
 
-def test_a_robot_that_another_holds_can_be_asked_for(bench: Bench) -> None:
+def test_control_can_be_requested_from_another_operator(bench: Bench) -> None:
     ann = {"connection": "c9", "name": "Ann"}
     bench.gate.change("r1", holder=ann, epoch=7, state="held")
     bench.select("r1")
@@ -178,7 +192,9 @@ def test_a_robot_that_another_holds_can_be_asked_for(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("answer", ["Hand over", "Keep control"])
-def test_the_holder_is_asked_and_answers(bench: Bench, answer: str) -> None:
+def test_the_operator_sees_a_request_for_control_and_can_answer(
+    bench: Bench, answer: str
+) -> None:
     bench.drive()
     ann = {"connection": "c9", "name": "Ann", "left": 8.0}
     bench.gate.change("r1", asker=ann)
@@ -211,12 +227,14 @@ def test_space_and_escape_stop_the_robot(bench: Bench, key: str) -> None:
 
 
 @pytest.mark.parametrize("key", ["Space", "Escape"])
-def test_with_no_robot_selected_they_stop_all(bench: Bench, key: str) -> None:
+def test_space_and_escape_stop_all_robots_without_a_selection(
+    bench: Bench, key: str
+) -> None:
     bench.page.keyboard.press(key)
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
 
 
-def test_escape_in_a_dialog_that_is_not_modal_is_stop(bench: Bench) -> None:
+def test_escape_in_a_non_modal_dialog_sends_stop(bench: Bench) -> None:
     bench.drive()
     bench.page.evaluate(
         """() => {
@@ -237,14 +255,14 @@ def test_shift_and_escape_stop_all(bench: Bench) -> None:
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
 
 
-def test_space_in_a_text_field_is_a_space(bench: Bench) -> None:
+def test_space_in_a_text_field_types_a_space(bench: Bench) -> None:
     bench.select("r1")
     bench.page.locator("#text").press_sequentially("w a")
     assert bench.page.locator("#text").input_value() == "w a"
     assert bench.gate.received == []
 
 
-def test_the_stop_button_is_large_named_and_stops(bench: Bench) -> None:
+def test_the_stop_button_is_large_and_named_and_sends_stop(bench: Bench) -> None:
     bench.select("r1")
     button = bench.page.get_by_role("button", name="STOP Robot r1")
     box = button.bounding_box()
@@ -254,7 +272,9 @@ def test_the_stop_button_is_large_named_and_stops(bench: Bench) -> None:
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "r1"}])
 
 
-def test_a_stop_without_a_connection_is_the_first_thing_said(bench: Bench) -> None:
+def test_a_stop_without_a_connection_is_the_first_command_after_reconnection(
+    bench: Bench,
+) -> None:
     bench.select("r1")
     bench.cut()
     bench.page.keyboard.press("Escape")
@@ -262,14 +282,14 @@ def test_a_stop_without_a_connection_is_the_first_thing_said(bench: Bench) -> No
     assert bench.gate.received[0][1] == {"op": "stop", "robot": "r1"}
 
 
-def test_the_lease_is_given_back_when_nothing_moves(open_bench) -> None:
+def test_control_is_released_after_a_time_without_motion(open_bench) -> None:
     bench = open_bench("?release=500")
     bench.drive()
     bench.page.keyboard.up("w")
     bench.until(lambda: bench.gate.of("release"))
 
 
-def test_two_maps_do_not_both_drive(open_bench) -> None:
+def test_keys_drive_only_the_robot_of_the_last_clicked_map(open_bench) -> None:
     bench = open_bench("?two")
     bench.select("r1", map=0)
     bench.select("r2", map=1)
@@ -306,7 +326,9 @@ def test_the_wheel_zooms_about_the_pointer(bench: Bench, corner) -> None:
     assert world_at(bench.view(), 200, 100) == pytest.approx(world_at(before, 200, 100))
 
 
-def test_shift_and_wheel_turn_about_the_pointer(bench: Bench, corner) -> None:
+def test_shift_and_wheel_rotate_the_view_about_the_pointer(
+    bench: Bench, corner
+) -> None:
     before = bench.view()
     bench.page.mouse.move(corner[0] + 200, corner[1] + 100)
     bench.page.keyboard.down("Shift")
@@ -317,7 +339,9 @@ def test_shift_and_wheel_turn_about_the_pointer(bench: Bench, corner) -> None:
     assert abs(after["a"] * after["d"] - after["b"] * after["c"]) == pytest.approx(1600)
 
 
-def test_a_drag_moves_and_its_end_is_no_click(bench: Bench, corner) -> None:
+def test_a_drag_moves_the_view_and_does_not_end_in_a_click(
+    bench: Bench, corner
+) -> None:
     before = bench.view()
     bench.page.mouse.move(corner[0] + 200, corner[1] + 100)
     bench.page.mouse.down()
@@ -331,7 +355,9 @@ def test_a_drag_moves_and_its_end_is_no_click(bench: Bench, corner) -> None:
     assert bench.page.evaluate("bench.maps[0].clicks") == 1
 
 
-def test_a_click_with_a_trembling_hand_selects(bench: Bench, corner) -> None:
+def test_a_click_that_moves_by_two_pixels_selects_the_robot(
+    bench: Bench, corner
+) -> None:
     bench.page.mouse.move(corner[0] + 440, corner[1] + 110)
     bench.page.mouse.down()
     bench.page.mouse.move(corner[0] + 442, corner[1] + 111)
@@ -340,7 +366,7 @@ def test_a_click_with_a_trembling_hand_selects(bench: Bench, corner) -> None:
     assert bench.view()["e"] == 400
 
 
-def test_two_fingers_zoom_turn_and_move(open_bench) -> None:
+def test_two_fingers_zoom_rotate_and_move_the_view(open_bench) -> None:
     bench = open_bench(has_touch=True)
     box = bench.page.locator("#map1").bounding_box()
     x, y = box["x"], box["y"]
@@ -363,7 +389,9 @@ def test_two_fingers_zoom_turn_and_move(open_bench) -> None:
     assert world_at(after, 450, 200) == pytest.approx(world_at(before, 400, 150))
 
 
-def test_plus_minus_and_zero_work_on_the_focused_map(bench: Bench) -> None:
+def test_plus_zooms_in_and_zero_shows_all_robots_on_the_focused_map(
+    bench: Bench,
+) -> None:
     bench.page.locator("#map1").focus()
     bench.page.keyboard.press("+")
     assert bench.view()["a"] == pytest.approx(50)
@@ -373,7 +401,7 @@ def test_plus_minus_and_zero_work_on_the_focused_map(bench: Bench) -> None:
     assert world_at(view, 400, 150) == pytest.approx((0, 1))
 
 
-def test_a_goal_is_aimed_asked_for_and_called_off(open_bench) -> None:
+def test_a_goal_is_set_by_a_drag_and_cancelled_by_its_button(open_bench) -> None:
     bench = open_bench("?modules=goals/goal_tool,drive/teleop,view/mouse_view_control")
     box = bench.page.locator("#map1").bounding_box()
     bench.select("r1")
@@ -394,7 +422,7 @@ def test_a_goal_is_aimed_asked_for_and_called_off(open_bench) -> None:
     bench.until(lambda: bench.gate.of("cancel") == [{"op": "cancel", "robot": "r1"}])
 
 
-def test_escape_leaves_the_goal_tool_before_it_stops(open_bench) -> None:
+def test_escape_first_leaves_the_goal_tool_and_then_sends_stop(open_bench) -> None:
     bench = open_bench("?modules=goals/goal_tool,drive/teleop")
     bench.select("r1")
     bench.page.keyboard.press("g")
@@ -405,7 +433,9 @@ def test_escape_leaves_the_goal_tool_before_it_stops(open_bench) -> None:
     bench.until(lambda: bench.gate.of("stop"))
 
 
-def test_stop_all_says_what_became_of_it(open_bench) -> None:
+def test_stop_all_shows_for_each_robot_whether_odometry_confirms_the_stop(
+    open_bench,
+) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r2", measured=None)
     bench.page.get_by_role("button", name="STOP ALL").click()
@@ -423,7 +453,7 @@ UNCONFIRMED = CONFIRMED | {
 }
 
 
-def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -> None:
+def test_a_stop_stays_active_until_two_separate_presses_on_reset(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.latching = True
     bench.drive()
@@ -453,7 +483,7 @@ def test_a_stop_stands_until_it_is_reset_by_two_deliberate_presses(open_bench) -
     bench.hold("w", lambda: bench.gate.moves(since))
 
 
-def test_space_on_the_reset_button_is_stop(open_bench) -> None:
+def test_space_on_the_reset_button_sends_stop(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.select("r1")
     bench.gate.change("r1", latched=True, state="stopped", stop=CONFIRMED)
@@ -465,7 +495,9 @@ def test_space_on_the_reset_button_is_stop(open_bench) -> None:
     assert bench.gate.of("reset") == []
 
 
-def test_reset_all_stands_where_stop_all_is_and_doubt_is_said(open_bench) -> None:
+def test_an_unconfirmed_stop_is_shown_and_reset_all_resets_every_stop(
+    open_bench,
+) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.select("r1")
     bench.gate.change("r1", latched=True, state="stopped", stop=UNCONFIRMED)
@@ -489,7 +521,7 @@ def test_reset_all_stands_where_stop_all_is_and_doubt_is_said(open_bench) -> Non
 STANDS = {"latched": True, "state": "stopped", "stop": CONFIRMED}
 
 
-def test_a_robot_that_is_stopped_meanwhile_takes_the_press_on_reset_back(
+def test_a_stop_of_another_robot_cancels_the_first_press_on_reset(
     open_bench,
 ) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
@@ -507,7 +539,7 @@ def test_a_robot_that_is_stopped_meanwhile_takes_the_press_on_reset_back(
 
 
 @pytest.mark.parametrize("panel", ["stop", "teleop"])
-def test_a_newer_stop_of_somebody_else_takes_the_press_on_reset_back(
+def test_a_newer_stop_of_another_operator_cancels_the_first_press_on_reset(
     open_bench, panel
 ) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
@@ -522,7 +554,7 @@ def test_a_newer_stop_of_somebody_else_takes_the_press_on_reset_back(
     assert bench.gate.of("reset") == []
 
 
-def test_a_reset_that_the_gate_refuses_is_said_beside_the_button(open_bench) -> None:
+def test_the_reason_of_a_refused_reset_is_shown_beside_the_button(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r1", **STANDS)
     why = "Ben pressed STOP meanwhile; look at the robot, then press Reset again"
@@ -533,7 +565,7 @@ def test_a_reset_that_the_gate_refuses_is_said_beside_the_button(open_bench) -> 
     bench.until(lambda: why not in standing.inner_text())
 
 
-def test_another_selection_takes_the_press_on_reset_back(bench: Bench) -> None:
+def test_selecting_another_robot_cancels_the_first_press_on_reset(bench: Bench) -> None:
     for robot in ("r1", "r2"):
         bench.gate.change(robot, **STANDS)
     bench.select("r1")
@@ -550,7 +582,9 @@ def test_another_selection_takes_the_press_on_reset_back(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("panel", ["stop", "teleop"])
-def test_a_stop_in_between_takes_the_press_on_reset_back(open_bench, panel) -> None:
+def test_a_stop_between_two_presses_on_reset_cancels_the_first_press(
+    open_bench, panel
+) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.select("r1")
     bench.gate.change("r1", **STANDS)
@@ -566,7 +600,7 @@ def test_a_stop_in_between_takes_the_press_on_reset_back(open_bench, panel) -> N
     assert bench.gate.of("reset") == []
 
 
-def test_a_stop_for_all_is_said_to_be_unconfirmed_before_a_robot_is_known(
+def test_stop_all_is_shown_as_not_confirmed_before_a_robot_is_known(
     open_bench, gate: FakeDrive
 ) -> None:
     robots = dict(gate.robots)
@@ -581,7 +615,7 @@ def test_a_stop_for_all_is_said_to_be_unconfirmed_before_a_robot_is_known(
     bench.until(lambda: verdicts.inner_text() == words)
 
 
-def test_stop_all_lists_what_the_gate_makes_of_each_robot(open_bench) -> None:
+def test_stop_all_shows_the_verdict_of_the_gate_for_each_robot(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.latching = True
     bench.page.get_by_role("button", name="STOP ALL").click()
@@ -601,7 +635,7 @@ def test_stop_all_lists_what_the_gate_makes_of_each_robot(open_bench) -> None:
     bench.until(lambda: len(bench.gate.of("stop")) == 2)
 
 
-def test_a_stop_that_nothing_answers_is_said_to_be_unconfirmed(open_bench) -> None:
+def test_a_stop_without_an_answer_is_shown_as_not_confirmed(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r1", latched=False, stop=None)
     bench.select("r1")
@@ -615,7 +649,7 @@ def test_a_stop_that_nothing_answers_is_said_to_be_unconfirmed(open_bench) -> No
     assert "Robot r1: STOP NOT CONFIRMED" in listed
 
 
-def test_a_robot_that_does_not_obey_covers_the_page(open_bench) -> None:
+def test_a_robot_that_moves_after_zero_was_sent_raises_an_alarm(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r1", sent=[0.3, 0, 0], measured=[0.3, 0, 0], state="driving")
     bench.gate.change("r1", sent=[0, 0, 0], state="stopping")
@@ -627,7 +661,7 @@ def test_a_robot_that_does_not_obey_covers_the_page(open_bench) -> None:
     alarm.wait_for(state="detached")
 
 
-def test_readouts_follow_the_view_and_everything_goes_away(open_bench) -> None:
+def test_readouts_show_the_view_and_destroyed_modules_leave_nothing(open_bench) -> None:
     view = "view/mouse_view_control,view/pointer_readout,view/scale_bar,view/follow"
     tools = "drive/teleop,goals/goal_tool,stop/stop_button"
     bench = open_bench(f"?modules={tools},{view}")

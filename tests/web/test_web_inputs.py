@@ -105,7 +105,7 @@ def drive_by_pad(bench: Bench) -> None:
 
 
 @pytest.mark.serial  # a page that is kept waiting for a processor lets go
-def test_a_thumb_on_the_stick_drives_and_letting_go_is_neutral(touched: Bench) -> None:
+def test_a_touch_on_the_stick_drives_and_its_release_is_neutral(touched: Bench) -> None:
     finger = drive_by_finger(touched)
     touched.until(lambda: touched.gate.moves()[-1]["x"] == 1)
     assert finger.size >= 120
@@ -124,7 +124,7 @@ def test_a_thumb_on_the_stick_drives_and_letting_go_is_neutral(touched: Bench) -
 
 
 @pytest.mark.serial  # a page that is kept waiting for a processor lets go
-def test_words_that_move_the_pad_under_a_finger_do_not_change_what_it_asks(
+def test_a_layout_change_that_moves_the_stick_does_not_change_the_command(
     touched: Bench,
 ) -> None:
     finger = drive_by_finger(touched)
@@ -141,7 +141,7 @@ def test_words_that_move_the_pad_under_a_finger_do_not_change_what_it_asks(
     assert after["x"] == pytest.approx(before["x"], abs=0.02)
 
 
-def test_a_touch_that_the_system_takes_away_is_neutral(touched: Bench) -> None:
+def test_a_touch_cancelled_by_the_system_is_neutral(touched: Bench) -> None:
     finger = drive_by_finger(touched)
     touched.page.evaluate(
         "addEventListener('pointercancel', () => bench.mark(), {capture: true})"
@@ -151,7 +151,7 @@ def test_a_touch_that_the_system_takes_away_is_neutral(touched: Bench) -> None:
     touched.still()
 
 
-def test_a_pointer_that_is_captured_elsewhere_is_neutral(touched: Bench) -> None:
+def test_releasing_the_pointer_capture_of_the_stick_is_neutral(touched: Bench) -> None:
     finger = drive_by_finger(touched)
     touched.page.evaluate(
         """bench.mark(() => {
@@ -166,7 +166,9 @@ def test_a_pointer_that_is_captured_elsewhere_is_neutral(touched: Bench) -> None
     touched.still()
 
 
-def test_a_capture_that_is_told_to_be_lost_is_neutral_at_once(touched: Bench) -> None:
+def test_a_lostpointercapture_event_of_the_stick_is_neutral_at_once(
+    touched: Bench,
+) -> None:
     drive_by_finger(touched)
     held = touched.page.evaluate(
         """() => {
@@ -190,7 +192,7 @@ def test_a_capture_that_is_told_to_be_lost_is_neutral_at_once(touched: Bench) ->
 
 
 @pytest.mark.parametrize("blocker", ["blur", "hidden", "lost focus"])
-def test_a_finger_that_rests_through_a_doubt_moves_nothing(
+def test_a_finger_kept_on_the_stick_moves_nothing_after_an_input_block(
     touched: Bench, blocker: str
 ) -> None:
     finger = drive_by_finger(touched)
@@ -204,7 +206,7 @@ def test_a_finger_that_rests_through_a_doubt_moves_nothing(
 @pytest.mark.parametrize(
     ("name", "robot"), [("STOP ALL", "*"), ("STOP Robot r1", "r1")]
 )
-def test_one_thumb_stops_while_the_other_holds_the_stick(
+def test_a_second_finger_can_press_stop_while_the_first_holds_the_stick(
     open_bench, name: str, robot: str
 ) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop", has_touch=True)
@@ -223,14 +225,14 @@ def test_one_thumb_stops_while_the_other_holds_the_stick(
     assert bench.gate.of("stop") == said
 
 
-def test_a_tap_on_stop_is_one_stop(open_bench) -> None:
+def test_a_tap_on_stop_sends_one_stop(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop", has_touch=True)
     bench.page.get_by_role("button", name="STOP ALL").tap()
     bench.page.wait_for_timeout(500)
     assert bench.gate.of("stop") == [{"op": "stop", "robot": "*"}]
 
 
-def test_the_stick_is_called_up_where_there_is_a_mouse(open_bench) -> None:
+def test_a_button_shows_and_hides_the_stick_on_a_page_with_a_mouse(open_bench) -> None:
     bench = open_bench("?holonomic")
     bench.select("r1")
     stick = bench.page.locator(".webmap-stick")
@@ -250,7 +252,7 @@ def test_the_stick_is_called_up_where_there_is_a_mouse(open_bench) -> None:
     assert not stick.is_visible()
 
 
-def test_a_mouse_button_that_goes_up_while_another_is_held_lets_go_of_the_stick(
+def test_releasing_the_left_button_releases_the_stick_while_another_is_held(
     open_bench,
 ) -> None:
     bench = open_bench()
@@ -271,7 +273,7 @@ def test_a_mouse_button_that_goes_up_while_another_is_held_lets_go_of_the_stick(
     mouse.up(button="middle")
 
 
-def test_q_moves_only_a_robot_whose_base_can_move_sideways(open_bench) -> None:
+def test_q_moves_only_a_robot_with_a_holonomic_base_sideways(open_bench) -> None:
     bench = open_bench("?holonomic=each")
     keyboard = bench.page.keyboard
     bench.select("r1")
@@ -288,7 +290,7 @@ def test_q_moves_only_a_robot_whose_base_can_move_sideways(open_bench) -> None:
     assert not any(m["y"] for m in bench.gate.moves(since) if m["robot"] == "r2")
 
 
-def test_the_keys_and_the_stick_do_not_both_drive(touched: Bench) -> None:
+def test_keys_are_ignored_while_the_stick_drives(touched: Bench) -> None:
     finger = drive_by_finger(touched)
     since = time.monotonic()
     touched.page.keyboard.down("s")
@@ -315,7 +317,7 @@ GONE = {
 
 
 @pytest.mark.parametrize("how", GONE)
-def test_a_gamepad_that_is_gone_is_neutral_and_its_return_moves_nothing(
+def test_a_disconnected_gamepad_is_neutral_and_its_reconnection_moves_nothing(
     padded: Bench, how: str
 ) -> None:
     drive_by_pad(padded)
@@ -329,7 +331,7 @@ def test_a_gamepad_that_is_gone_is_neutral_and_its_return_moves_nothing(
     drive_by_pad(padded)
 
 
-def test_a_gamepad_that_says_nothing_new_is_neutral(padded: Bench) -> None:
+def test_a_gamepad_whose_timestamp_does_not_change_is_neutral(padded: Bench) -> None:
     drive_by_pad(padded)
     padded.page.evaluate("alive = false")
     padded.until(lambda: padded.shown() == "hands-off")
@@ -338,7 +340,9 @@ def test_a_gamepad_that_says_nothing_new_is_neutral(padded: Bench) -> None:
     padded.still()
 
 
-def test_a_doubt_needs_the_dead_man_button_anew(padded: Bench) -> None:
+def test_a_held_dead_man_button_moves_nothing_after_the_page_loses_focus(
+    padded: Bench,
+) -> None:
     drive_by_pad(padded)
     padded.page.evaluate(f"{{ {INPUT_BLOCKERS['blur']} }}")
     padded.still(tolerance=0.1)

@@ -51,7 +51,7 @@ def drag(tab, x):
     )
 
 
-def test_a_page_says_what_it_is(host, tab, opened):
+def test_a_page_sends_its_url_its_size_and_its_theme_in_its_hello(host, tab, opened):
     (hello,) = opened.hellos
     assert hello.url == "/?x=1"
     assert (hello.width, hello.height, hello.dpr) == (800, 600, 1)
@@ -59,13 +59,13 @@ def test_a_page_says_what_it_is(host, tab, opened):
     assert hello.theme == "light"
 
 
-def test_a_page_under_a_prefix_says_its_own_path(host, tab):
+def test_a_page_under_a_prefix_sends_its_url_without_the_prefix(host, tab):
     tab.goto(f"{host.url}under/prefix/")
     host.until(lambda: host.shown and host.one.hellos, tab=tab)
     assert host.one.hellos[0].url == "/"
 
 
-def test_a_lost_link_is_said_and_comes_back(host, tab, opened):
+def test_the_page_shows_a_lost_link_and_reconnects(host, tab, opened):
     # Written down in the page, as it may be connected again before anybody looks.
     tab.evaluate(
         """() => {
@@ -87,7 +87,7 @@ def test_a_lost_link_is_said_and_comes_back(host, tab, opened):
     wait(tab, "document.querySelector('.robot').transform.baseVal.length")
 
 
-def test_the_view_outlives_a_lost_link(host, tab, opened):
+def test_the_view_is_kept_after_a_lost_link(host, tab, opened):
     drag(tab, 33)
     before = view(tab)
     host.drop()
@@ -101,7 +101,7 @@ def test_the_view_outlives_a_lost_link(host, tab, opened):
     assert view(tab)[5] == pytest.approx(before[5] + 5)
 
 
-def test_the_view_and_the_map_outlive_a_reload(host, tab, opened):
+def test_the_view_and_the_map_are_kept_after_a_reload(host, tab, opened):
     drag(tab, 33)
     before = view(tab)
     host.until(lambda: newest(host, "e") == before[4], tab=tab)
@@ -120,7 +120,7 @@ def test_another_tab_is_another_page(host, tab, opened):
     assert len(host.shown) == 2
 
 
-def test_a_tab_that_a_page_opens_is_another_page(host, tab, opened):
+def test_a_tab_opened_by_a_page_is_another_page(host, tab, opened):
     # A duplicated tab has a copy of the session's storage, as this one has.
     with tab.expect_popup() as popup:
         tab.evaluate("void window.open(location.href)")
@@ -128,7 +128,7 @@ def test_a_tab_that_a_page_opens_is_another_page(host, tab, opened):
     assert len(host.shown) == 2
 
 
-def test_a_display_that_hangs_is_noticed(host, tab, opened):
+def test_the_page_shows_that_the_display_sends_no_data(host, tab, opened):
     host.silent = True
     tab.wait_for_selector("html.disconnected", state="attached", timeout=6000)
     assert "No data from WebMap" in tab.inner_text("[role=status]")
@@ -137,7 +137,7 @@ def test_a_display_that_hangs_is_noticed(host, tab, opened):
     assert len(opened.hellos) == 1
 
 
-def test_a_page_that_is_not_welcome_does_not_come_again(host, tab):
+def test_a_refused_page_shows_the_reason_and_asks_for_a_reload(host, tab):
     host.refuse = (1008, "there is no page at this address")
     tab.goto(host.url)
     tab.wait_for_selector("[role=status]:has-text('no page at this address')")
@@ -148,7 +148,7 @@ def frame_of(record: bytes) -> bytes:
     return VERSION.to_bytes(2, "little") + bytes(13) + record
 
 
-def test_a_record_that_is_not_known_is_said_and_all_is_told_again(host, tab, opened):
+def test_an_unknown_record_is_reported_and_the_scene_is_sent_again(host, tab, opened):
     frames = opened.frames
     host.send(frame_of(b"\xfa"))
     tab.wait_for_selector("[role=alert]:has-text('cannot read a message')")
@@ -168,14 +168,14 @@ def test_a_page_of_another_version_asks_for_a_reload(host, tab, opened):
 
 
 @pytest.mark.parametrize("garbage", [b"", b"\1", frame_of(b"\x25\1\xff")])
-def test_garbage_does_not_break_the_page(host, tab, opened, garbage):
+def test_an_invalid_frame_does_not_break_the_page(host, tab, opened, garbage):
     host.send(garbage)
     tab.wait_for_selector("[role=alert]")
     host.call(opened.robot.set_pose, 1, 2, 0)
     wait(tab, "document.querySelector('.robot')?.transform.baseVal.length")
 
 
-def test_no_more_than_two_frames_are_on_the_way(host, tab, opened):
+def test_at_most_two_frames_are_sent_without_an_acknowledgement(host, tab, opened):
     tab.evaluate(
         """async () => {
           const { page } = await import("/_webmap/web/page.js");

@@ -57,7 +57,7 @@ def last_report(host, tab, true=lambda report: True):
     return host.until(found, tab=tab)
 
 
-def test_a_map_shows_the_world_with_its_origin_in_the_middle(host, tab, open_map):
+def test_a_new_map_has_the_world_origin_in_its_centre(host, tab, open_map):
     shown = open_map(width=640, height=480)
     assert view(tab) == [1, 0, 0, -1, 320, 240]
     assert shown_matrix(tab) == [1, 0, 0, -1, 320, 240]
@@ -68,14 +68,14 @@ def test_a_map_shows_the_world_with_its_origin_in_the_middle(host, tab, open_map
     assert (report.left, report.top) == (10, 5)
 
 
-def test_a_map_without_a_size_fills_what_it_is_in(host, tab, open_map):
+def test_a_map_without_a_size_fills_its_container(host, tab, open_map):
     open_map()
     assert view(tab) == [1, 0, 0, -1, 350, 250]
     report = last_report(host, tab)
     assert (report.width, report.height) == (700, 500)
 
 
-def test_operations_are_applied_in_order(host, tab, open_map):
+def test_view_operations_are_applied_in_order(host, tab, open_map):
     def build(shown):
         shown.session.view(shown.root.id, "scale", 500 / 58.7, 350, 250)
         shown.session.view(shown.root.id, "translate", 10, 20)
@@ -92,7 +92,9 @@ def test_operations_are_applied_in_order(host, tab, open_map):
     assert got == expected
 
 
-def test_the_middle_is_meant_where_no_point_is_given(host, tab, open_map):
+def test_scale_and_rotate_without_a_point_use_the_centre_of_the_map(
+    host, tab, open_map
+):
     shown = open_map()
     host.call(shown.session.view, shown.root.id, "scale", 4)
     host.call(shown.session.view, shown.root.id, "rotate", 180)
@@ -100,7 +102,7 @@ def test_the_middle_is_meant_where_no_point_is_given(host, tab, open_map):
     assert view(tab) == pytest.approx([-4, 0, 0, 4, 350, 250], abs=1e-5)
 
 
-def test_a_rectangle_of_the_world_is_fitted(host, tab, open_map):
+def test_fit_shows_the_whole_rectangle_of_the_world(host, tab, open_map):
     shown = open_map()
     host.call(shown.session.view, shown.root.id, "fit", -10, -10, 30, 10)
     last_report(host, tab, lambda report: report.applied == 1)
@@ -111,14 +113,14 @@ def test_a_rectangle_of_the_world_is_fitted(host, tab, open_map):
     assert (corner["y"] + other["y"]) / 2 == pytest.approx(250)
 
 
-def test_set_is_what_it_says(host, tab, open_map):
+def test_set_replaces_the_view(host, tab, open_map):
     shown = open_map()
     host.call(shown.session.view, shown.root.id, "set", 2, 0, 0, -2, 11, 12)
     last_report(host, tab, lambda report: report.applied == 1)
     assert view(tab) == [2, 0, 0, -2, 11, 12]
 
 
-def test_the_middle_stays_when_the_size_changes(host, tab, open_map):
+def test_the_centre_of_the_view_stays_when_the_size_changes(host, tab, open_map):
     open_map()
     on_map(tab, "map.setView({ a: 8, b: 2, c: 2, d: -8, e: 40, f: 50 })")
     before = on_map(tab, "return map.toWorld(map.width / 2, map.height / 2)")
@@ -129,7 +131,7 @@ def test_the_middle_stays_when_the_size_changes(host, tab, open_map):
     assert report.height == 500
 
 
-def test_a_map_that_is_hidden_at_first_is_shown_as_it_was_meant(host, tab, open_map):
+def test_a_fit_of_a_hidden_map_is_applied_when_the_map_is_shown(host, tab, open_map):
     def build(shown):
         shown.document.bind("map").set(hidden=True)
         shown.session.view(shown.root.id, "fit", 0, 0, 10, 10)
@@ -149,7 +151,9 @@ def test_a_map_that_is_hidden_at_first_is_shown_as_it_was_meant(host, tab, open_
     assert (middle["x"], middle["y"]) == pytest.approx((5, 5))
 
 
-def test_a_followed_robot_stays_where_it_is_on_the_screen(host, tab, open_map):
+def test_a_followed_robot_keeps_its_place_on_the_screen_until_the_view_is_moved(
+    host, tab, open_map
+):
     shown = open_map()
     host.call(shown.session.view, shown.root.id, "scale", 10)
     host.call(shown.session.view, shown.root.id, "follow", shown.robot.id)
@@ -169,7 +173,7 @@ def test_a_followed_robot_stays_where_it_is_on_the_screen(host, tab, open_map):
     last_report(host, tab, lambda report: report.follow == 0)
 
 
-def test_reports_of_a_drag_come_ten_times_a_second_at_most(host, tab, open_map):
+def test_a_drag_sends_at_most_ten_view_reports_per_second(host, tab, open_map):
     open_map()
     tab.wait_for_timeout(150)
     before = len(host.events(ViewReport))
@@ -187,7 +191,7 @@ def test_reports_of_a_drag_come_ten_times_a_second_at_most(host, tab, open_map):
     assert len(host.events(ViewReport)) - before <= 10 * took + 4
 
 
-def test_a_view_that_cannot_be_is_not_shown(host, tab, open_map):
+def test_an_invalid_view_is_ignored(host, tab, open_map):
     shown = open_map()
     on_map(tab, "map.setView({ ...map.view, e: NaN })")
     on_map(tab, "map.setView({ a: 0, b: 0, c: 0, d: 0, e: 0, f: 0 })")
@@ -196,7 +200,7 @@ def test_a_view_that_cannot_be_is_not_shown(host, tab, open_map):
     assert view(tab) == [1, 0, 0, -1, 350, 250]
 
 
-def test_the_click_that_ends_a_drag_can_be_swallowed(host, tab, open_map):
+def test_suppress_next_click_discards_one_click(host, tab, open_map):
     shown = open_map(build=lambda shown: shown.root.on("click", print))
     on_map(
         tab,
@@ -214,7 +218,7 @@ def test_the_click_that_ends_a_drag_can_be_swallowed(host, tab, open_map):
     assert [click.x for click in clicks] == [190]
 
 
-def test_the_selected_robot_is_known_to_modules(host, tab, open_map):
+def test_a_module_receives_the_selected_robot(host, tab, open_map):
     def build(shown):
         shown.session.attach(shown.root.id, 5, "test.js", {"speed": 2}, "half.css")
 
@@ -236,7 +240,9 @@ def test_the_selected_robot_is_known_to_modules(host, tab, open_map):
     assert on_map(tab, "return typeof map.drive.on") == "function"
 
 
-def test_a_module_hears_what_was_sent_before_it_came(host, tab, open_map):
+def test_a_module_receives_messages_sent_before_its_script_was_loaded(
+    host, tab, open_map
+):
     def build(shown):
         shown.session.attach(shown.root.id, 5, "test.js", {})
         shown.session.send(5, {"n": 1})
@@ -256,7 +262,7 @@ def test_a_module_hears_what_was_sent_before_it_came(host, tab, open_map):
     tab.wait_for_selector("[role=alert]", state="detached")
 
 
-def test_a_module_that_goes_leaves_nothing(host, tab, open_map):
+def test_a_detached_module_removes_its_elements(host, tab, open_map):
     shown = open_map(
         build=lambda shown: shown.session.attach(shown.root.id, 5, "test.js", {})
     )
@@ -265,7 +271,7 @@ def test_a_module_that_goes_leaves_nothing(host, tab, open_map):
     tab.wait_for_selector(".half", state="detached")
 
 
-def test_a_module_goes_with_its_map(host, tab, open_map):
+def test_a_module_is_detached_when_its_map_is_removed(host, tab, open_map):
     shown = open_map(
         build=lambda shown: shown.session.attach(shown.root.id, 5, "test.js", {})
     )
@@ -285,7 +291,9 @@ def test_a_module_goes_with_its_map(host, tab, open_map):
         ("https://evil.example/x.js", "on another server"),
     ],
 )
-def test_a_module_that_does_not_come_is_said(host, tab, open_map, module, said):
+def test_a_module_that_cannot_be_loaded_is_shown_and_reported(
+    host, tab, open_map, module, said
+):
     tab.allowed = ["404"]
     open_map(build=lambda shown: shown.session.attach(shown.root.id, 5, module, {}))
     tab.wait_for_selector(f"[role=alert]:has-text('{said}')")
@@ -293,7 +301,7 @@ def test_a_module_that_does_not_come_is_said(host, tab, open_map, module, said):
     assert tab.locator(".robot").count() == 1
 
 
-def test_the_angle_is_kept_when_everything_is_fitted(host, tab, open_map):
+def test_fit_keeps_the_rotation_of_the_view(host, tab, open_map):
     shown = open_map()
     host.call(shown.session.view, shown.root.id, "rotate", 30)
     host.call(shown.session.view, shown.root.id, "fit", 0, 0, 10, 10)

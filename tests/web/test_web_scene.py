@@ -34,7 +34,7 @@ def matrix(tab, selector):
     )
 
 
-def test_a_robot_is_where_python_puts_it(host, tab):
+def test_a_robot_is_drawn_at_the_pose_that_python_sets(host, tab):
     def build(shown):
         _, world, mount = shown.add_map()
         shown.robot, _ = shown.add_robot(world, mount)
@@ -58,7 +58,7 @@ def test_a_robot_is_where_python_puts_it(host, tab):
     )
 
 
-def test_text_is_only_ever_text(host, tab):
+def test_html_tags_in_a_text_are_shown_as_text(host, tab):
     evil = "<img src=x onerror=alert(1)>"
 
     def build(shown):
@@ -75,7 +75,7 @@ def test_text_is_only_ever_text(host, tab):
     assert tab.locator("img").count() == 0
 
 
-def test_the_users_own_elements_are_filled_and_put_back(host, tab):
+def test_elements_of_the_users_html_are_filled_and_restored(host, tab):
     def build(shown):
         label = shown.document.bind("label")
         label.set(title="hello").classes.add("on")
@@ -95,7 +95,7 @@ def test_the_users_own_elements_are_filled_and_put_back(host, tab):
     wait(tab, "document.querySelector('#log').textContent === ''")
 
 
-def test_an_id_that_the_page_lacks_is_said(host, tab):
+def test_an_id_missing_in_the_page_is_shown_and_reported(host, tab):
     def build(shown):
         shown.document.bind("nowhere").text = "lost"
         shown.document.bind("label").text = "found"
@@ -108,7 +108,7 @@ def test_an_id_that_the_page_lacks_is_said(host, tab):
     assert "nowhere" in trouble.text
 
 
-def test_addresses_lead_to_this_server_only(host, tab):
+def test_image_urls_get_the_prefix_and_urls_of_other_servers_are_refused(host, tab):
     def build(shown):
         shown.root, _, _ = shown.add_map()
         shown.image = svg.image(href="/_webmap/images/x.png")
@@ -127,9 +127,7 @@ def test_addresses_lead_to_this_server_only(host, tab):
     host.until(lambda: "evil" in str(host.events(Trouble)), tab=tab)
 
 
-def test_an_image_that_changes_more_quickly_than_it_loads_is_drawn_all_the_same(
-    host, tab
-):
+def test_a_fast_changing_image_skips_to_the_newest_url_after_each_load(host, tab):
     def build(shown):
         shown.root, _, _ = shown.add_map()
         shown.image = svg.image(href="/_webmap/images/1.png")
@@ -169,7 +167,7 @@ def test_an_image_that_changes_more_quickly_than_it_loads_is_drawn_all_the_same(
     ]
 
 
-def test_dots_are_squares_as_large_as_the_style_says(host, tab):
+def test_dots_are_squares_of_the_size_in_the_style(host, tab):
     points = struct.pack("<4h", 1000, 2000, -1000, 0)
 
     def build(shown):
@@ -198,7 +196,7 @@ def test_dots_are_squares_as_large_as_the_style_says(host, tab):
     assert matrix(tab, ".dot") == pytest.approx([0.01, 0, 0, 0.01, 3, 4])
 
 
-def test_ages_go_on_by_themselves(host, tab):
+def test_the_page_increases_ages_without_new_data(host, tab):
     def build(shown):
         _, world, mount = shown.add_map()
         shown.robot, _ = shown.add_robot(world, mount)
@@ -222,7 +220,7 @@ def test_ages_go_on_by_themselves(host, tab):
     wait(tab, f"parseInt(document.querySelector('.age').textContent) > {seconds}")
 
 
-def test_ages_go_on_while_the_server_is_gone(host, tab):
+def test_the_page_increases_ages_while_the_server_is_gone(host, tab):
     tab.allowed = ["ERR_CONNECTION_REFUSED", "WebSocket connection"]
 
     def build(shown):
@@ -243,7 +241,7 @@ def test_ages_go_on_while_the_server_is_gone(host, tab):
     )
 
 
-def test_a_class_of_a_mount_is_of_this_page_only(host, tab):
+def test_a_class_of_a_mount_does_not_change_the_shared_element(host, tab):
     def build(shown):
         _, world, mount = shown.add_map()
         shown.robot, shown.robot_mount = shown.add_robot(world, mount)
@@ -259,7 +257,7 @@ def test_a_class_of_a_mount_is_of_this_page_only(host, tab):
     tab.wait_for_selector(".robot.fast:not(.selected)")
 
 
-def test_mounts_lie_in_their_order_around_own_children(host, tab):
+def test_mounts_are_sorted_by_order_before_and_after_own_children(host, tab):
     def build(shown):
         _, world, mount = shown.add_map()
         world.append(svg.g(id="own"))
@@ -302,7 +300,7 @@ def test_one_fragment_is_shown_on_two_maps(host, tab):
         assert matrix(tab, f"{place} .robot") == [1, 0, 0, 1, 5, 6]
 
 
-def test_a_click_tells_where_in_the_world_it_was(host, tab):
+def test_a_click_event_contains_its_world_coordinates(host, tab):
     def build(shown):
         shown.root, world, mount = shown.add_map()
         shown.robot, inner = shown.add_robot(world, mount)
@@ -325,7 +323,7 @@ def test_a_click_tells_where_in_the_world_it_was(host, tab):
     assert (missed.world_x, missed.world_y) == pytest.approx((20, 10))
 
 
-def test_a_framed_map_is_measured_within_its_frame(host, tab):
+def test_click_coordinates_on_a_framed_map_start_inside_the_frame(host, tab):
     def build(shown):
         shown.root, _, _ = shown.add_map(400, 300)
         shown.root.classes.add("framed")
@@ -340,7 +338,9 @@ def test_a_framed_map_is_measured_within_its_frame(host, tab):
     assert (event.world_x, event.world_y) == pytest.approx((-100, 100))
 
 
-def test_inputs_and_keys_tell_what_they_hold(host, tab):
+def test_input_and_key_events_contain_the_value_the_checked_state_and_the_key(
+    host, tab
+):
     def build(shown):
         shown.box = html.input(type="checkbox", id="box")
         shown.field = html.input(type="text", id="field", value="a")
@@ -371,7 +371,7 @@ def test_inputs_and_keys_tell_what_they_hold(host, tab):
     wait(tab, "document.querySelector('#field').value === 'python'")
 
 
-def test_nobody_hears_any_more_after_the_removal(host, tab):
+def test_the_page_sends_no_event_after_the_listener_was_removed(host, tab):
     def build(shown):
         shown.button = html.button("Go", id="go")
         shown.removal = shown.button.on("click", print)
@@ -398,7 +398,7 @@ def test_nobody_hears_any_more_after_the_removal(host, tab):
     assert "event" not in sent
 
 
-def test_a_thousand_elements_come_and_go_and_leave_nothing(host, tab):
+def test_a_thousand_added_and_removed_robots_leave_nothing_in_the_page(host, tab):
     def build(shown):
         shown.root, shown.world, shown.mount = shown.add_map()
 

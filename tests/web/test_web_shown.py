@@ -8,7 +8,7 @@ pytestmark = pytest.mark.browser
 HALO = ".stopping-halo"
 
 
-def test_a_halo_shows_how_far_a_driven_robot_gets(bench: Bench) -> None:
+def test_a_halo_shows_the_stopping_distance_of_a_driven_robot(bench: Bench) -> None:
     moving = {"state": "driving", "measured": [0.4, 0, 0]}
     bench.gate.change("r1", **moving, reaction=0.6, brake=0.5)
     bench.page.wait_for_selector(HALO)
@@ -27,7 +27,7 @@ def test_a_halo_shows_how_far_a_driven_robot_gets(bench: Bench) -> None:
     bench.until(lambda: halo.count() == 0)
 
 
-def test_the_halo_is_no_obstacle_to_a_click_on_the_robot(bench: Bench) -> None:
+def test_the_halo_does_not_block_a_click_on_the_robot(bench: Bench) -> None:
     bench.gate.change("r1", state="driving", measured=[1, 0, 0])
     bench.page.wait_for_selector(HALO)
     box = bench.page.locator("#map1").bounding_box()
@@ -35,7 +35,9 @@ def test_the_halo_is_no_obstacle_to_a_click_on_the_robot(bench: Bench) -> None:
     assert bench.page.evaluate("bench.maps[0].selected") == "r1"
 
 
-def test_what_was_sent_echoed_and_measured_stand_side_by_side(bench: Bench) -> None:
+def test_the_page_shows_the_sent_the_echoed_and_the_measured_velocity(
+    bench: Bench,
+) -> None:
     bench.drive()
     bench.gate.change(
         "r1", sent=[0.3, 0, 0], echoed=[0.2, 0, 0], measured=[-0.1, 0, 0.5], age=42.0
@@ -59,7 +61,7 @@ WITHOUT_LINK = """() => {
 """Notes whether figures and halos are shown while the connection is lost."""
 
 
-def test_no_speed_from_before_is_shown_without_a_connection(bench: Bench) -> None:
+def test_speeds_and_halos_are_hidden_while_the_connection_is_lost(bench: Bench) -> None:
     bench.drive()
     bench.gate.change("r1", state="driving", measured=[0.4, 0, 0])
     bench.page.wait_for_selector(HALO)
@@ -70,7 +72,9 @@ def test_no_speed_from_before_is_shown_without_a_connection(bench: Bench) -> Non
     assert set(bench.page.evaluate("shown")) == {False}
 
 
-def test_how_the_robot_stops_by_itself_is_said(bench: Bench) -> None:
+def test_the_command_timeout_and_the_stop_test_of_a_robot_are_shown(
+    bench: Bench,
+) -> None:
     bench.select("r1")
     tested = {"stop_source": "tested", "stop_date": "2026-11-21"}
     bench.gate.change("r1", stop_time=0.31, **tested)
@@ -82,7 +86,7 @@ def test_how_the_robot_stops_by_itself_is_said(bench: Bench) -> None:
     bench.until(lambda: test.inner_text() == "Stop test: creeping at 0.1 m/s")
 
 
-def test_the_test_of_its_own_stop_is_asked_for_twice(bench: Bench) -> None:
+def test_a_stop_test_starts_only_after_a_second_press(bench: Bench) -> None:
     bench.drive()
     bench.page.keyboard.up("w")
     bench.gate.change("r1", stop_time=None, stop_source=None, stop_date=None)
@@ -107,7 +111,7 @@ def test_the_test_of_its_own_stop_is_asked_for_twice(bench: Bench) -> None:
     )
 
 
-def test_an_alarm_of_the_gate_covers_the_page_and_leaves_stop(open_bench) -> None:
+def test_an_alarm_of_the_gate_covers_the_page_and_stop_still_works(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.gate.change("r1", alarm="zero sent, still moving at 0.31 m/s")
     alarm = bench.page.get_by_role("alert")
@@ -156,7 +160,7 @@ OPEN = """(kind) => {
 }"""
 
 
-def test_the_alarm_lies_above_what_is_open_and_what_opens(open_bench) -> None:
+def test_the_alarm_stays_above_popovers_and_dialogs(open_bench) -> None:
     phone = {"width": 390, "height": 844}
     bench = open_bench(
         "?modules=stop/stop_button,drive/teleop", viewport=phone, has_touch=True
@@ -181,7 +185,7 @@ def test_the_alarm_lies_above_what_is_open_and_what_opens(open_bench) -> None:
     assert alarm.count() == 0
 
 
-def test_the_alarms_of_two_maps_do_not_rise_above_each_other_for_ever(
+def test_the_alarms_of_two_maps_do_not_raise_each_other_endlessly(
     open_bench,
 ) -> None:
     bench = open_bench("?two&modules=stop/stop_button,drive/teleop")
@@ -198,7 +202,7 @@ def test_the_alarms_of_two_maps_do_not_rise_above_each_other_for_ever(
     assert bench.page.evaluate("toggles") < 10
 
 
-def test_a_robots_line_has_a_width_that_any_word_of_the_user_overrides(
+def test_the_default_stroke_width_of_a_robot_can_be_overridden(
     bench: Bench,
 ) -> None:
     bench.page.add_style_tag(url="/_webmap/web/webmap.css")

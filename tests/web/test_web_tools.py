@@ -28,7 +28,7 @@ PLACES = """() => [...document.querySelectorAll(".tool > summary")].map((e) => {
 OPEN = "[...document.querySelectorAll('.tool')].map((e) => e.open)"
 
 
-def test_what_unfolds_moves_no_tool_and_folds_what_it_would_lie_over(
+def test_an_opened_tool_moves_no_other_tool_and_closes_the_open_one(
     open_bench: Callable[..., Bench],
 ) -> None:
     bench = open_bench("?modules=stop/stop_button")
@@ -47,7 +47,7 @@ def test_what_unfolds_moves_no_tool_and_folds_what_it_would_lie_over(
     bench.until(lambda: bench.page.evaluate(OPEN) == [False] * 3)
 
 
-def test_who_drives_with_a_finger_is_told_of_no_key(
+def test_the_driving_hint_on_a_touch_screen_names_no_keys(
     open_bench: Callable[..., Bench],
 ) -> None:
     bench = open_bench(has_touch=True, is_mobile=True)
@@ -59,7 +59,7 @@ def test_who_drives_with_a_finger_is_told_of_no_key(
 
 
 @pytest.mark.parametrize("width", [360, 800])
-def test_stop_of_the_driven_robot_does_not_move(
+def test_the_stop_button_keeps_its_place_in_every_state_of_the_robot(
     open_bench: Callable[..., Bench], width: int
 ) -> None:
     bench = open_bench()
@@ -121,7 +121,7 @@ WIDE_ROUTE = """async (width) => {
 
 
 @pytest.mark.parametrize("width", [320, 600])
-def test_an_open_route_stays_on_the_map_and_rules_of_the_page_do_not_shrink_tools(
+def test_an_open_route_panel_stays_on_the_map_and_is_not_shrunk_by_css_of_the_page(
     open_bench: Callable[..., Bench], width: int
 ) -> None:
     bench = open_bench("?modules=stop/stop_button")

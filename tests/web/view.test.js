@@ -41,13 +41,13 @@ function near(actual, expected, tolerance = 1e-6) {
 
 const repeat = (fn) => Array.from({ length: 500 }).forEach(fn);
 
-test("the world's origin is in the middle at first, and y points up", () => {
+test("the first view has the world origin in its centre, and y points up", () => {
   const view = initialView(700, 500);
   near(apply(view, 0, 0), { x: 350, y: 250 });
   near(apply(view, 1, 2), { x: 351, y: 248 });
 });
 
-test("a point goes to the screen and back", () => {
+test("a point is the same after apply and unapply", () => {
   repeat(() => {
     const [view, x, y] = [someView(), between(-100, 100), between(-100, 100)];
     const screen = apply(view, x, y);
@@ -73,12 +73,12 @@ test("the point under the pointer stays when turning", () => {
   });
 });
 
-test("turning is counter-clockwise as it is seen", () => {
+test("a rotation is counter-clockwise on the screen", () => {
   const turned = rotate(initialView(0, 0), 90, 0, 0);
   near(apply(turned, 1, 0), { x: 0, y: -1 });
 });
 
-test("the point in the middle stays when the size changes", () => {
+test("the point in the centre stays when the size changes", () => {
   repeat(() => {
     const view = someView();
     const before = { width: between(1, 2000), height: between(1, 2000) };
@@ -89,7 +89,7 @@ test("the point in the middle stays when the size changes", () => {
   });
 });
 
-test("a rectangle that is fitted is whole, as large as it can be, and in the middle", () => {
+test("fit shows the whole rectangle, as large as possible and centred", () => {
   repeat(() => {
     const [width, height] = [between(50, 2000), between(50, 2000)];
     const [x0, y0] = [between(-100, 100), between(-100, 100)];
@@ -108,7 +108,7 @@ test("a point and a line can be fitted", () => {
   assert.ok(isView(fit(someView(), [3, 4, 3, 9], 700, 500)));
 });
 
-test("zooming ends at the limits", () => {
+test("zooming stops at the limits", () => {
   let view = initialView(700, 500);
   for (let i = 0; i < 100; i++) view = scale(view, 10, 350, 250);
   assert.ok(Math.abs(scaleOf(view) / LARGEST - 1) < 1e-6);
@@ -117,13 +117,13 @@ test("zooming ends at the limits", () => {
   assert.ok(isView(view));
 });
 
-test("what cannot be shown is no view", () => {
+test("a matrix with NaN, with infinity or with only zeros is not a view", () => {
   assert.ok(!isView({ ...initialView(1, 1), e: NaN }));
   assert.ok(!isView({ ...initialView(1, 1), a: Infinity }));
   assert.ok(!isView({ a: 0, b: 0, c: 0, d: 0, e: 0, f: 0 }));
 });
 
-test("operations come one after the other", () => {
+test("multiply applies one view after the other", () => {
   const [m, n] = [someView(), someView()];
   const inner = apply(n, 3, 4);
   near(apply(multiply(m, n), 3, 4), apply(m, inner.x, inner.y), 1e-3);

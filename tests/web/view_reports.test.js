@@ -21,7 +21,7 @@ function reporting(count) {
   return { reports, times, all };
 }
 
-test("a change is reported soon, and the next one not too soon after it", async () => {
+test("a change is reported soon, and the next report waits for the report period", async () => {
   const first = reporting(1);
   first.reports.soon();
   first.reports.soon();
@@ -37,7 +37,7 @@ test("a change is reported soon, and the next one not too soon after it", async 
   assert.ok(second.times[1] - second.times[0] >= REPORT_PERIOD - 2);
 });
 
-test("a frame reports what changed, once", () => {
+test("a frame reports a change once", () => {
   const { reports, times } = reporting(1);
   reports.settle();
   assert.equal(times.length, 0, "nothing changed");
@@ -47,7 +47,7 @@ test("a frame reports what changed, once", () => {
   assert.equal(times.length, 1);
 });
 
-test("what a frame reported is not reported again by the timer", async () => {
+test("the timer does not report a change again that a frame reported", async () => {
   const { reports, times } = reporting(2);
   reports.soon();
   reports.settle();
@@ -55,7 +55,7 @@ test("what a frame reported is not reported again by the timer", async () => {
   assert.equal(times.length, 1);
 });
 
-test("a map that is gone reports nothing", async () => {
+test("a removed map reports nothing", async () => {
   const { reports, times } = reporting(1);
   reports.soon();
   reports.end();

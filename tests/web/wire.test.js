@@ -24,7 +24,7 @@ function frame(...bytes) {
 test("there are golden frames", () => assert.ok(golden.length >= 3));
 
 for (const name of golden) {
-  test(`${name} says what its JSON says`, () => {
+  test(`${name} is decoded to the content of its JSON file`, () => {
     const expected = JSON.parse(readFileSync(new URL(name.replace(".bin", ".json"), GOLDEN)));
     const tree = new Tree();
     const { reset, frame: number, now } = tree.apply(read(name));
@@ -32,7 +32,7 @@ for (const name of golden) {
     assert.deepEqual(JSON.parse(JSON.stringify(told)), expected);
   });
 
-  test(`${name} cut off anywhere is refused or is whole records`, () => {
+  test(`a truncated ${name} is refused or ends after a whole record`, () => {
     const whole = read(name);
     for (let length = 0; length < whole.byteLength; length++) {
       try {
@@ -62,7 +62,7 @@ test("a tag or attribute outside the tables is refused", () => {
   assert.throws(() => new Tree().apply(frame(...made, OP.ATTRIBUTE, 9, 254)), /name/);
 });
 
-test("a length beyond the frame's end is refused before memory is taken", () => {
+test("a length beyond the end of the frame is refused before memory is allocated", () => {
   const long = [255, 255, 255, 255, 255, 255, 15];
   for (const record of [
     [OP.ERROR, ...long],
@@ -72,16 +72,16 @@ test("a length beyond the frame's end is refused before memory is taken", () => 
   }
 });
 
-test("a number beyond what is exact is refused", () => {
+test("a number too large to be exact is refused", () => {
   const bytes = [OP.UNMOUNT, 255, 255, 255, 255, 255, 255, 255, 255, 1];
   assert.throws(() => new Tree().apply(frame(...bytes)), /too large/);
 });
 
-test("what should be JSON and is not is refused", () => {
+test("a message that is not valid JSON is refused", () => {
   assert.throws(() => new Tree().apply(frame(OP.MESSAGE, 1, 1, 0x7b)), WireError);
 });
 
-test("a thousand poses are read in a blink", { timeout: 1000 }, () => {
+test("a thousand poses are read within one second", { timeout: 1000 }, () => {
   const record = [OP.POSE, 200, 1, 0, 0, 128, 63, 0, 0, 0, 64, 0, 0, 0, 0];
   const buffer = frame(...Array.from({ length: 1000 }, () => record).flat());
   let poses = 0;

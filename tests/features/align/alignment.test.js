@@ -15,7 +15,7 @@ function near(actual, expected) {
   assert.ok(Math.abs(actual - expected) < 1e-9, `${actual} is not near ${expected}`);
 }
 
-test("what lies between two alignments takes one to the other", () => {
+test("the transform between two alignments maps one onto the other", () => {
   const [before, now] = [
     { x: 3, y: -1, angle: 20 },
     { x: -7, y: 4, angle: 130 },
@@ -28,7 +28,7 @@ test("what lies between two alignments takes one to the other", () => {
   }
 });
 
-test("a turn leaves the point in place that it is about", () => {
+test("a rotation keeps its centre in place", () => {
   const before = { x: 3, y: -1, angle: 170 };
   const now = turned(before, 35, { x: 6, y: 2 });
   const point = apply(between(before, now), 6, 2);
@@ -37,7 +37,7 @@ test("a turn leaves the point in place that it is about", () => {
   near(now.angle, -155);
 });
 
-test("a move goes along the common map's axes, however the map is turned", () => {
+test("a move follows the axes of the common map at any angle of the moved map", () => {
   assert.deepEqual(moved({ x: 1, y: 2, angle: 90 }, 0.5, -1), {
     x: 1.5,
     y: 1,
@@ -45,7 +45,7 @@ test("a move goes along the common map's axes, however the map is turned", () =>
   });
 });
 
-test("angles stay within half a turn, and numbers are those that are saved", () => {
+test("angles wrap to at most 180 degrees, and values are rounded for saving", () => {
   assert.deepEqual([190, -190, 540, 180].map(normal), [-170, 170, 180, 180]);
   assert.deepEqual(rounded({ x: 1.23456, y: -0.0001, angle: 359.999 }), {
     x: 1.235,

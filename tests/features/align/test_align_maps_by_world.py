@@ -152,7 +152,7 @@ CORNER = Plan(((0, 255), (128, 255)), origin=(-3.0, 4.0, math.pi / 2), resolutio
         HealthCheck.too_slow,
     ],
 )
-def test_every_cell_is_at_its_place_of_the_world(
+def test_every_cell_of_a_map_file_is_placed_at_its_world_position(
     map, link, tmp_path_factory, plan, up, across
 ):
     file = plan.write(tmp_path_factory.mktemp("map"))
@@ -265,7 +265,9 @@ WORLD_TO_SCREEN = """() => {
 
 @pytest.mark.browser
 @pytest.mark.parametrize("name", MAPS)
-def test_a_browser_shows_every_cell_at_its_place_of_the_world(tab, address, name):
+def test_a_browser_draws_every_cell_of_a_map_file_at_its_world_position(
+    tab, address, name
+):
     plan = MAPS[name]
     tab.goto(address.replace("/?", f"/{name}?"))
     image = tab.locator(".map-file > image[href]")

@@ -67,7 +67,9 @@ def save(tool, robot, x=1.0, y=2.0, angle=90.0, *, whole=False) -> None:
     asyncio.run(say())
 
 
-def test_the_page_is_told_what_there_is_to_align(tool, robot, channel, link):
+def test_begin_sends_the_robot_and_its_alignments_to_the_page(
+    tool, robot, channel, link
+):
     ann = Robot("Ann")
     ann.set_odometry_topic(link, "/ann/odom", type="geometry_msgs/PoseStamped")
     tool.map.add_robot(ann)
@@ -89,7 +91,7 @@ def test_the_page_is_told_what_there_is_to_align(tool, robot, channel, link):
     ann.destroy()
 
 
-def test_what_is_saved_holds_and_is_kept(tool, robot, channel, store, link):
+def test_a_saved_alignment_is_applied_and_restored(tool, robot, channel, store, link):
     save(tool, robot)
     line = "alignment = [1.0, 2.0, 90.0] # metres, metres, degrees"
     assert answer(channel, "saved") == {"line": line, "lost": ""}
@@ -104,7 +106,7 @@ def test_what_is_saved_holds_and_is_kept(tool, robot, channel, store, link):
     bob.destroy()
 
 
-def test_what_is_stated_anew_counts_more_than_what_was_saved(
+def test_a_changed_configuration_overrides_the_saved_alignment(
     tool, robot, store, link, caplog
 ):
     robot.set_alignment(5.0, 0.0, 0.0)
@@ -122,7 +124,9 @@ def test_what_is_stated_anew_counts_more_than_what_was_saved(
         bob.destroy()
 
 
-def test_all_behind_a_bridge_go_along_and_the_robots_own_ends(tool, robot, store, link):
+def test_saving_for_the_whole_bridge_removes_the_alignment_of_the_robot(
+    tool, robot, store, link
+):
     save(tool, robot)
     save(tool, robot, 7.0, 0.0, 0.0, whole=True)
     assert alignments.of(link) == Pose(7.0, 0.0, 0.0)
@@ -134,7 +138,7 @@ def test_all_behind_a_bridge_go_along_and_the_robots_own_ends(tool, robot, store
 
 
 @pytest.mark.parametrize("state", ["driving", "stopping"])
-def test_a_robot_that_is_driven_stays_where_it_is(tool, robot, channel, state):
+def test_a_driven_robot_cannot_be_aligned(tool, robot, channel, state):
     robot.report = SimpleNamespace(state=state)
     tool.on_message({"begin": robot.id})
     assert "Bob is being driven" in answer(channel, "refused")
@@ -143,7 +147,7 @@ def test_a_robot_that_is_driven_stays_where_it_is(tool, robot, channel, state):
     assert robot.pose_source.own_alignment is None
 
 
-def test_one_that_is_driven_keeps_its_whole_bridge_in_place(tool, robot, channel, link):
+def test_a_bridge_with_a_driven_robot_cannot_be_aligned(tool, robot, channel, link):
     ann = Robot("Ann")
     ann.set_odometry_topic(link, "/ann/odom", type="geometry_msgs/PoseStamped")
     tool.map.add_robot(ann)
@@ -156,13 +160,13 @@ def test_one_that_is_driven_keeps_its_whole_bridge_in_place(tool, robot, channel
 
 
 @pytest.mark.parametrize("wrong", ["far", None, math.inf, 1e9])
-def test_numbers_that_make_no_sense_are_refused(tool, robot, channel, wrong):
+def test_invalid_alignment_values_are_refused(tool, robot, channel, wrong):
     save(tool, robot, wrong)
     assert "metres and an angle in degrees" in answer(channel, "refused")
     assert robot.pose_source.own_alignment is None
 
 
-def test_a_viewer_aligns_nothing(tmp_path, robot, channel, store):
+def test_a_viewer_cannot_align_robots(tmp_path, robot, channel, store):
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
     page = Page(entry, channel, Someone(role="viewer"), None, {})
     map = Map(page.element("map"), 700, 500)
@@ -176,7 +180,7 @@ def test_a_viewer_aligns_nothing(tmp_path, robot, channel, store):
     page.close()
 
 
-def test_a_robot_that_nobody_places_cannot_be_aligned(tool, channel):
+def test_a_robot_without_a_pose_cannot_be_aligned(tool, channel):
     lost = Robot("Lost")
     tool.map.add_robot(lost)
     tool.on_message({"begin": lost.id})
@@ -186,7 +190,9 @@ def test_a_robot_that_nobody_places_cannot_be_aligned(tool, channel):
     lost.destroy()
 
 
-def test_what_cannot_be_kept_holds_and_that_is_said(tool, robot, channel, store):
+def test_an_alignment_that_cannot_be_saved_is_applied_with_a_warning(
+    tool, robot, channel, store
+):
     store._folder.parent.mkdir(exist_ok=True)
     store._folder.write_text("a file where the folder should be")
     save(tool, robot)
@@ -200,9 +206,7 @@ def test_what_cannot_be_kept_holds_and_that_is_said(tool, robot, channel, store)
 @pytest.mark.parametrize(
     "text", ["", "{", "[]", '{"alignment": [1, 2], "instead_of": 0}']
 )
-def test_a_file_that_cannot_be_read_aligns_nothing_and_is_said(
-    robot, store, caplog, text
-):
+def test_an_invalid_alignment_file_is_logged_and_ignored(robot, store, caplog, text):
     store.path(NAME).parent.mkdir(exist_ok=True)
     store.path(NAME).write_text(text)
     store.restore(robot)
@@ -210,22 +214,22 @@ def test_a_file_that_cannot_be_read_aligns_nothing_and_is_said(
     assert "cannot be read" in caplog.text
 
 
-def test_no_secret_of_an_address_is_kept():
+def test_the_name_of_a_saved_alignment_omits_secrets_of_the_url():
     link = SimpleNamespace(url="wss://ann:secret@south.example:9443/ros?token=secret")
     assert name_of(link, "Bob") == "wss://south.example:9443/ros Bob"
 
 
-def test_files_are_in_the_state_folder(monkeypatch, tmp_path):
+def test_alignment_files_are_in_the_state_folder(monkeypatch, tmp_path):
     monkeypatch.setenv("WEBMAP_STATE_DIR", str(tmp_path))
     assert alignment_store.store.path("x").parent == tmp_path
 
 
-def test_what_a_page_says_besides_is_ignored(tool, caplog):
+def test_an_unknown_command_of_a_page_is_logged(tool, caplog):
     tool.on_message({"align": 1})
     assert "unknown message" in caplog.text
 
 
-def test_a_robot_that_comes_later_is_aligned_as_it_was_saved(tool, robot, store, link):
+def test_a_robot_added_later_gets_its_saved_alignment(tool, robot, store, link):
     store.save("ws://test:9090 Eve", None, Pose(4.0, 0.0, 0.0), "Ann")
     store._stated.clear()
     eve = Robot("Eve")
@@ -237,9 +241,7 @@ def test_a_robot_that_comes_later_is_aligned_as_it_was_saved(tool, robot, store,
 
 
 @pytest.mark.parametrize("kind", ["deep", "pipe"])
-def test_an_alignment_that_cannot_be_read_is_as_if_nothing_was_saved(
-    store, robot, caplog, kind
-):
+def test_a_deeply_nested_alignment_file_or_a_pipe_is_logged(store, robot, caplog, kind):
     file = store.path(NAME)
     file.parent.mkdir(parents=True, exist_ok=True)
     if kind == "pipe":

@@ -97,7 +97,7 @@ def save(tab) -> str:
     return tab.locator(".webmap-align-line").inner_text()
 
 
-def test_a_map_is_aligned_by_hand_kept_and_used_for_goals(chromium, tmp_path):
+def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_path):
     state = {"WEBMAP_STATE_DIR": str(tmp_path)}
     with simulator("-n", "2") as sim:
         state["ALIGNING_URL"] = sim

@@ -59,7 +59,7 @@ HORN = {
         ({"type": None, "form": True}, "type", "a form needs the type"),
     ],
 )
-def test_a_button_that_makes_no_sense_is_refused_by_its_key(change, key, words):
+def test_an_invalid_button_is_refused_with_the_wrong_key(change, key, words):
     data = {**DOCK, **change}
     data = {name: value for name, value in data.items() if value is not None}
     with pytest.raises(ButtonMistake) as error:
@@ -89,7 +89,9 @@ def test_a_button_that_makes_no_sense_is_refused_by_its_key(change, key, words):
         ({"service": "/x", "type": "action_msgs/srv/CancelGoal"}, "the end of a goal"),
     ],
 )
-def test_what_moves_robots_is_refused_by_name_and_by_type(link, robot, button, words):
+def test_buttons_that_would_move_robots_are_refused_by_name_and_by_type(
+    link, robot, button, words
+):
     with pytest.raises(ConfigError, match="the gate") as error:
         robot.add_module("Buttons", link, [{"label": "Go", **button}])
     assert "button 'Go'" in str(error.value)
@@ -107,17 +109,17 @@ def test_what_moves_robots_is_refused_by_name_and_by_type(link, robot, button, w
         ({"a": 1}, "expected true, false, a number, a text or a list"),
     ],
 )
-def test_a_parameter_has_a_value_that_ros_knows(value, words):
+def test_a_parameter_value_that_ros_does_not_know_is_refused(value, words):
     with pytest.raises(ButtonMistake, match=words):
         read_button({"label": "P", "parameter": "/p", "value": value})
 
 
-def test_no_two_buttons_of_a_robot_have_one_label(link, robot):
+def test_two_buttons_with_the_same_label_are_refused(link, robot):
     with pytest.raises(ConfigError, match="two buttons have the label 'Dock'"):
         robot.add_module("Buttons", link, [DOCK, DOCK])
 
 
-def test_a_topic_that_a_robot_is_moved_by_is_refused_whatever_it_is_called(robot):
+def test_declared_motion_topics_of_robots_are_refused_for_buttons(robot):
     bridge = Bridge("ws://test-buttons:9090")
     other = Robot("Ann")
     try:
@@ -196,7 +198,7 @@ def pressed(robot, button, url, values=None, *, before=None, **world):
     return asyncio.run(scenario())
 
 
-def test_a_press_calls_the_service_and_says_what_it_answered(sim, robot):
+def test_a_press_calls_the_service_and_shows_its_answer(sim, robot):
     received = []
     robot.add_module(
         lambda _: SimpleNamespace(on_button=lambda b: received.append((b.state, b.by)))
@@ -207,20 +209,20 @@ def test_a_press_calls_the_service_and_says_what_it_answered(sim, robot):
     assert received == [("running", "Ann"), ("done", "Ann")]
 
 
-def test_success_false_is_a_failure_in_the_robots_words(sim, robot):
+def test_success_false_is_a_failure_with_the_message_of_the_robot(sim, robot):
     services = {"/dock": trigger(False, "no dock in sight")}
     button, _ = pressed(robot, DOCK, sim["ros1"], services=services)
     assert (button.state, button.result) == ("failed", "Failed: no dock in sight")
 
 
-def test_a_service_that_is_not_there_is_a_failure(sim, robot):
+def test_a_missing_service_is_a_failure(sim, robot):
     button, _ = pressed(robot, DOCK, sim["ros1"])
     assert button.state == "failed"
     assert "/dock" in button.result
     assert "does not exist" in button.result
 
 
-def test_a_service_that_does_not_answer_is_given_up_after_the_timeout(sim, robot):
+def test_a_service_without_an_answer_fails_after_the_timeout(sim, robot):
     services = {"/dock": ("std_srvs/Trigger", lambda args: None)}
     button, _ = pressed(robot, {**DOCK, "timeout": 0.2}, sim["ros1"], services=services)
     assert button.result == "Failed: /dock did not answer within 0.2 s"
@@ -232,7 +234,7 @@ def test_a_press_publishes_the_message(sim, robot):
     assert node.received == [("/horn", {"data": True})]
 
 
-def test_while_it_runs_it_cannot_be_pressed_again(sim, robot):
+def test_a_running_button_cannot_be_pressed_again(sim, robot):
     go_on = threading.Event()
 
     def wait(args: dict) -> dict:
@@ -258,7 +260,7 @@ def test_while_it_runs_it_cannot_be_pressed_again(sim, robot):
     asyncio.run(scenario())
 
 
-def test_while_stop_stands_only_what_may_act_then_does(sim, robot):
+def test_only_buttons_with_during_stop_work_while_stop_is_active(sim, robot):
     async def scenario():
         async with linked(sim["ros1"], services={"/dock": trigger()}) as (bridge, node):
             light = {**DOCK, "label": "Light", "during_stop": True}
@@ -274,7 +276,7 @@ def test_while_stop_stands_only_what_may_act_then_does(sim, robot):
     asyncio.run(scenario())
 
 
-def test_a_topic_that_turns_out_to_be_a_velocity_is_refused_at_the_press(sim, robot):
+def test_a_press_on_a_topic_with_a_velocity_type_is_refused(sim, robot):
     button = {"label": "Go", "topic": "/wheels", "type": "std_msgs/Bool"}
     pressed_, node = pressed(
         robot, button, sim["ros1"], topics={"/wheels": "geometry_msgs/Twist"}
@@ -284,7 +286,7 @@ def test_a_topic_that_turns_out_to_be_a_velocity_is_refused_at_the_press(sim, ro
     assert node.received == []
 
 
-def test_a_service_that_turns_out_to_cancel_goals_is_refused_at_the_press(sim, robot):
+def test_a_press_on_a_service_that_cancels_goals_is_refused(sim, robot):
     services = {"/dock": ("action_msgs/CancelGoal", lambda args: {})}
     button, node = pressed(
         robot, {"label": "Dock", "service": "/dock"}, sim["ros1"], services=services
@@ -293,7 +295,7 @@ def test_a_service_that_turns_out_to_cancel_goals_is_refused_at_the_press(sim, r
     assert node.calls == []
 
 
-def test_a_topic_that_is_declared_later_is_refused_at_the_press(sim, robot):
+def test_a_press_on_a_topic_later_declared_as_goal_topic_is_refused(sim, robot):
     def declare(bridge):
         robot.set_move_topic(Bridge(bridge.url), "/horn")
 
@@ -304,7 +306,7 @@ def test_a_topic_that_is_declared_later_is_refused_at_the_press(sim, robot):
     assert node.received == []
 
 
-def test_a_topic_of_another_type_is_not_published_on(sim, robot):
+def test_a_topic_with_another_type_gets_no_message(sim, robot):
     button, node = pressed(
         robot, HORN, sim["ros1"], topics={"/horn": "std_msgs/String"}
     )
@@ -341,7 +343,7 @@ def test_a_parameter_of_ros_1_is_set_and_read_back(sim, robot, value):
     assert json.loads(store["/planner/x"]) == value
 
 
-def test_a_parameter_that_stays_as_it_was_is_a_failure(sim, robot):
+def test_a_parameter_that_did_not_change_is_a_failure(sim, robot):
     store = {"/fixed/x": "1"}
     button = {"label": "P", "parameter": "/fixed/x", "value": 2}
     failed, _ = pressed(robot, button, sim["ros1"], services=params(store))
@@ -383,7 +385,7 @@ def test_a_parameter_of_ros_2_is_set_by_its_node(sim, robot, result, state, word
     assert said == {"type": 3, "double_value": 0.4}
 
 
-def test_without_a_link_it_says_so(robot):
+def test_a_press_without_a_link_fails_with_the_reason(robot):
     async def scenario():
         module = robot.add_module("Buttons", Bridge("ws://127.0.0.1:1"), [HORN])
         assert await module["Horn"].press() is False
@@ -392,7 +394,7 @@ def test_without_a_link_it_says_so(robot):
     assert "was never opened" in asyncio.run(scenario())
 
 
-def test_fields_that_nobody_ships_are_asked_of_ros_1_on_request_only(sim, robot):
+def test_unknown_form_fields_are_requested_only_from_ros_1_and_on_demand(sim, robot):
     button = {"label": "F", "topic": "/f", "type": "nav_msgs/Path2", "form": True}
 
     async def scenario(dialect):
@@ -440,7 +442,7 @@ def typedef(type, **fields):
 # How it looks on a page.
 
 
-def test_a_viewer_who_may_not_sees_the_button_disabled_and_cannot_press_it(
+def test_a_viewer_sees_a_disabled_button_and_cannot_press_it(
     link, robot, channel, tmp_path
 ):
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")

@@ -91,7 +91,7 @@ def button(tab: Page, label: str):
     return tab.locator(f'.robot-button[data-label="{label}"]')
 
 
-def test_a_dangerous_button_asks_first_and_then_says_what_came_of_it(tab, bench):
+def test_a_button_with_confirm_asks_first_and_then_shows_the_result(tab, bench):
     dock = button(tab, "Dock")
     dock.locator(".go").click()
     expect(dock.locator(".question")).to_contain_text("Is the dock free?")
@@ -107,7 +107,7 @@ def test_a_dangerous_button_asks_first_and_then_says_what_came_of_it(tab, bench)
     assert bench.node.calls == [("/dock", {})]
 
 
-def test_while_a_call_runs_it_is_shown_and_the_button_is_off(tab, bench):
+def test_a_running_call_shows_progress_and_disables_the_button(tab, bench):
     wait = button(tab, "Wait")
     expect(wait.locator("progress")).to_be_hidden()
     wait.locator(".go").click()
@@ -119,7 +119,7 @@ def test_while_a_call_runs_it_is_shown_and_the_button_is_off(tab, bench):
     expect(wait.locator(".go")).to_be_enabled()
 
 
-def test_a_form_takes_what_fits_and_names_the_field_that_does_not(tab, bench):
+def test_a_form_marks_an_invalid_field_and_publishes_valid_values(tab, bench):
     light = button(tab, "Light")
     light.locator(".go").click()
     expect(light.locator("[data-field=a]")).to_have_value("1.0")
@@ -143,7 +143,7 @@ def test_a_form_takes_what_fits_and_names_the_field_that_does_not(tab, bench):
     expect(light.locator(".sheet")).to_be_hidden()
 
 
-def test_while_stop_stands_buttons_are_off_and_say_why(tab):
+def test_buttons_are_disabled_while_stop_is_active_and_show_the_reason(tab):
     tab.locator(".webmap-stop-all").click()
     dock = button(tab, "Dock")
     expect(dock.locator(".go")).to_be_disabled()

@@ -14,7 +14,7 @@ describe("the newest picture", () => {
     picture = new NewestPicture(load, (one) => shown.push(one), () => now);
   });
 
-  test("loads one at a time, and of what came meanwhile the last", async () => {
+  test("loads one picture at a time and skips to the latest offer", async () => {
     for (const url of ["a", "b", "c"]) picture.offer(url, 0);
     assert.deepEqual(loads.map(({ url }) => url), ["a"]);
     loads[0].end();
@@ -25,7 +25,7 @@ describe("the newest picture", () => {
     assert.deepEqual(shown, ["a", "c"]);
   });
 
-  test("is as old as it was when it came, and ages on", async () => {
+  test("has the age of its offer plus the time since then", async () => {
     picture.offer("a", 300);
     now = 200;
     loads[0].end();
@@ -35,13 +35,13 @@ describe("the newest picture", () => {
     assert.equal(picture.age, 1500);
   });
 
-  test("is, before there is one, as old as the wait for it", () => {
+  test("has the waiting time as its age before the first picture", () => {
     now = 1234;
     assert.equal(picture.age, 1234);
     assert.ok(!picture.shown);
   });
 
-  test("that cannot be loaded makes room for the next and does not count", async () => {
+  test("is loaded from the next offer when loading fails", async () => {
     picture.offer("a", 0);
     picture.offer("b", 0);
     now = 500;
@@ -53,7 +53,7 @@ describe("the newest picture", () => {
     assert.deepEqual(shown, ["b"]);
   });
 
-  test("is not held up for good by one that never comes", async () => {
+  test("is loaded although an earlier load does not finish in time", async () => {
     picture.offer("a", 0);
     now = 2000;
     picture.offer("b", 0);
@@ -63,7 +63,7 @@ describe("the newest picture", () => {
     assert.deepEqual(shown, ["b"]);
   });
 
-  test("of the camera before is not shown for the next one", async () => {
+  test("of the previous camera is not shown after a restart", async () => {
     picture.offer("a", 0);
     now = 700;
     picture.restart();

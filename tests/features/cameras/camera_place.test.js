@@ -15,19 +15,19 @@ function storage(text) {
   };
 }
 
-describe("what is kept of the camera's panel", () => {
+describe("the saved state of the camera panel", () => {
   afterEach(() => {
     delete globalThis.localStorage;
   });
 
-  test("comes back as it was", () => {
+  test("is restored unchanged", () => {
     storage(null);
     const kept = { open: true, dock: "float", camera: "Front", x: 0.25, y: 1 };
     keep(kept);
     assert.deepEqual(readKept(), kept);
   });
 
-  test("is what is meant without it where there is no storage", () => {
+  test("has default values without storage", () => {
     assert.deepEqual(readKept(), MEANT);
     keep({ ...MEANT, open: true });
   });
@@ -43,14 +43,14 @@ describe("what is kept of the camera's panel", () => {
     '{"x": -1, "y": 1.5}',
     '{"x": 1e999}',
   ]) {
-    test(`is not taken from ${text || "nothing"}`, () => {
+    test(`falls back to defaults for ${text || "nothing"}`, () => {
       storage(text);
       assert.deepEqual(readKept(), MEANT);
     });
   }
 });
 
-test("corners follow each other clockwise, from wherever it was dragged", () => {
+test("the panel moves to the next corner clockwise from any position", () => {
   const round = [];
   let place = { x: 0.2, y: 0.4 };
   for (let turn = 0; turn < 5; turn++) {

@@ -34,7 +34,7 @@ def shown(camera) -> Image.Image:
     return Image.open(io.BytesIO(published.data)).convert("RGB")
 
 
-def test_pictures_are_asked_for_while_somebody_watches_and_once_for_all(link, robot):
+def test_watchers_share_one_subscription_that_ends_with_the_last_watcher(link, robot):
     camera = robot.add_module(Camera, link, TOPIC)
     assert TOPIC not in link.listeners
     first, second = camera.watch(lambda: None), camera.watch(lambda: 1)
@@ -46,7 +46,7 @@ def test_pictures_are_asked_for_while_somebody_watches_and_once_for_all(link, ro
 
 
 @pytest.mark.parametrize("cbor", [False, True])
-def test_a_compressed_picture_is_shown_as_it_is(link, robot, cbor):
+def test_a_compressed_picture_is_published_unchanged(link, robot, cbor):
     camera = robot.add_module(Camera, link, TOPIC)
     received = []
     camera.watch(lambda: received.append(camera.url))
@@ -72,7 +72,7 @@ def test_a_compressed_picture_is_shown_as_it_is(link, robot, cbor):
         ("/color/video", None),
     ],
 )
-def test_a_type_that_the_name_does_not_tell_is_left_to_the_bridge(
+def test_the_type_is_derived_from_the_topic_name_or_left_to_the_bridge(
     link, robot, topic, asked
 ):
     robot.add_module(Camera, link, topic).watch(lambda: None)
@@ -80,7 +80,7 @@ def test_a_type_that_the_name_does_not_tell_is_left_to_the_bridge(
 
 
 @pytest.mark.parametrize("type", [None, "sensor_msgs/msg/CompressedImage"])
-def test_a_compressed_picture_is_shown_whatever_its_topic_is_called(link, robot, type):
+def test_a_compressed_picture_is_shown_for_any_topic_name(link, robot, type):
     camera = robot.add_module(Camera, link, "/thermal/jpeg", type=type)
     camera.watch(lambda: None)
     link.say("/thermal/jpeg", compressed(a_jpeg()))
@@ -88,14 +88,14 @@ def test_a_compressed_picture_is_shown_whatever_its_topic_is_called(link, robot,
     assert not robot.problems
 
 
-def test_a_type_without_pictures_is_refused(link, robot):
+def test_a_message_type_without_pictures_is_refused(link, robot):
     with pytest.raises(ValueError, match="type: expected"):
         robot.add_module("Camera", link, TOPIC, type="sensor_msgs/LaserScan")
     with pytest.raises(ConfigError, match="is sensor_msgs/CompressedImage or"):
         Camera(robot, link, TOPIC, type="sensor_msgs/LaserScan")
 
 
-def test_old_pictures_do_not_pile_up_and_the_last_goes_with_the_last_watcher(
+def test_kept_pictures_are_limited_and_removed_after_the_last_watcher(
     link, robot, monkeypatch
 ):
     before = len(pictures)
@@ -120,7 +120,7 @@ def test_old_pictures_do_not_pile_up_and_the_last_goes_with_the_last_watcher(
     assert camera.url is None
 
 
-def test_what_is_no_picture_is_said_once_and_the_picture_before_stays(link, robot):
+def test_invalid_picture_data_is_a_problem_and_the_last_picture_stays(link, robot):
     camera = robot.add_module(Camera, link, TOPIC)
     camera.watch(lambda: None)
     link.say(TOPIC, compressed(a_jpeg()))
@@ -139,7 +139,7 @@ def raw(encoding: str, pixels: np.ndarray, pad: int = 0) -> ImageMsg:
     return ImageMsg(height, width, encoding, padded.shape[1], padded.tobytes())
 
 
-def test_colours_are_in_their_places_and_padding_is_left_out():
+def test_raw_pixels_are_in_rgb_order_without_row_padding():
     red = np.zeros((4, 5, 3), np.uint8)
     red[..., 0] = 255
     assert (raw("rgb8", red, pad=7).pixels() == red).all()
@@ -157,7 +157,7 @@ RGB = [(255, 255, 255), (0, 0, 0), (255, 0, 0), (0, 0, 255)]
     ("encoding", "order"),
     [("yuv422_yuy2", "yuyv"), ("yuyv", "yuyv"), ("yuv422", "uyvy"), ("uyvy", "uyvy")],
 )
-def test_colours_that_two_pixels_share_are_told_apart_in_light(encoding, order):
+def test_yuv422_pixels_share_a_colour_but_keep_their_own_brightness(encoding, order):
     row = []
     for y, u, v in YUV:
         row += [y, u, y, v] if order == "yuyv" else [u, y, v, y]
@@ -173,7 +173,7 @@ def test_colours_that_two_pixels_share_are_told_apart_in_light(encoding, order):
 
 @pytest.mark.parametrize("bits", [8, 16])
 @pytest.mark.parametrize("filters", ["rggb", "bggr", "gbrg", "grbg"])
-def test_a_mosaic_becomes_colours_of_half_its_size(filters, bits):
+def test_a_bayer_picture_becomes_a_colour_picture_of_half_its_size(filters, bits):
     values = {"r": [200], "g": [90, 110], "b": [0]}
     square = [values[letter].pop() for letter in filters]
     mosaic = np.tile(np.array(square).reshape(2, 2), (2, 3))
@@ -186,12 +186,12 @@ def test_a_mosaic_becomes_colours_of_half_its_size(filters, bits):
     assert np.allclose(seen, wanted, atol=1)
 
 
-def test_depth_is_stretched_and_what_is_not_finite_is_dark():
+def test_depth_is_scaled_to_grey_values_and_nan_is_black():
     depth = np.array([[0.0, 1.0], [2.0, np.nan]], np.float32)
     assert raw("32FC1", depth).pixels().tolist() == [[0, 127], [255, 0]]
 
 
-def test_the_order_of_bytes_is_minded():
+def test_big_endian_pixels_are_decoded():
     values = np.array([[0, 256], [512, 768]], ">u2")
     image = raw("mono16", values)
     image.is_bigendian = 1
@@ -210,7 +210,7 @@ def test_the_order_of_bytes_is_minded():
         (ImageMsg(1, 9, "bayer_rggb8", 9, b"\0" * 9), "9 x 1, 2 x 2 at least"),
     ],
 )
-def test_what_does_not_fit_is_refused_in_words(image, said):
+def test_an_invalid_raw_picture_is_refused_with_a_reason(image, said):
     with pytest.raises(ProtocolError, match=said):
         image.pixels()
 
@@ -221,7 +221,7 @@ def test_a_picture_that_is_too_large_is_refused():
 
 
 @pytest.mark.parametrize("topic", ["/camera/image_raw", "/color/video"])
-def test_a_raw_picture_is_made_a_jpeg_and_the_newest_wins(link, robot, topic):
+def test_the_newest_raw_picture_is_shown(link, robot, topic):
     async def scenario():
         camera = robot.add_module(Camera, link, topic)
         camera.watch(lambda: None)
@@ -263,14 +263,14 @@ def packed(form, size, **options):
         ("WEBP", {"exif": b"Exif\0\0" + bytes(90)}),
     ],
 )
-def test_the_size_of_a_picture_is_read_from_its_head(form, options):
+def test_the_size_of_a_picture_is_read_from_its_header(form, options):
     data = packed(form, (321, 123), **options)
     assert size_of(data) == (321, 123)
     assert CompressedImageMsg(data).media_type == f"image/{form.lower()}"
 
 
 @pytest.mark.parametrize("form", ["JPEG", "PNG", "WEBP"])
-def test_a_small_file_of_very_many_pixels_is_refused_before_it_is_decoded(form):
+def test_a_small_file_with_too_many_pixels_is_refused_before_decoding(form):
     data = packed(form, (4001, 4000))
     assert len(data) < 1 << 20
     with pytest.raises(ProtocolError, match="4001 x 4000, 16000000 pixels at most"):
@@ -290,13 +290,13 @@ def test_a_small_file_of_very_many_pixels_is_refused_before_it_is_decoded(form):
         packed("WEBP", (9, 9))[:24],
     ],
 )
-def test_a_picture_whose_size_is_not_plain_is_refused(data):
+def test_a_picture_without_a_size_in_its_header_is_refused(data):
     with pytest.raises(ProtocolError, match="without a size in its header"):
         _ = CompressedImageMsg(data).media_type
 
 
 @pytest.mark.parametrize("view", [ShownImageMsg, ShownAnyImageMsg])
-def test_a_large_raw_picture_comes_as_jpeg_from_where_it_is_decoded(link, robot, view):
+def test_the_camera_shows_the_digest_of_a_raw_picture(link, robot, view):
     raw = view(
         height=8, width=8, encoding="rgb8", step=24, data=bytes([9, 200, 9]) * 64
     )

@@ -67,7 +67,7 @@ def shown(camera) -> Image.Image:
     return Image.open(io.BytesIO(published.data))
 
 
-def test_a_stream_is_pulled_once_for_all_and_only_while_somebody_watches():
+def test_watchers_share_one_stream_that_closes_after_the_last_watcher():
     async def scenario(server, robot):
         camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=0)
         assert not server.asked
@@ -88,7 +88,7 @@ def test_a_stream_is_pulled_once_for_all_and_only_while_somebody_watches():
     run(scenario)
 
 
-def test_pictures_go_on_when_the_scope_of_the_first_who_watched_has_ended():
+def test_pictures_continue_after_the_scope_of_the_first_watcher_closed():
     async def scenario(server, robot):
         camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=0)
         first, scopes = Scope("first"), []
@@ -104,7 +104,7 @@ def test_pictures_go_on_when_the_scope_of_the_first_who_watched_has_ended():
     run(scenario)
 
 
-def test_who_watches_before_the_process_runs_sees_pictures_when_it_does(robot):
+def test_a_watcher_added_before_the_start_gets_pictures_after_the_start(robot):
     async def scenario():
         async with CameraServer() as server:
             camera = HttpCamera(robot, server.at(STREAM), throttle=0)
@@ -119,7 +119,7 @@ def test_who_watches_before_the_process_runs_sees_pictures_when_it_does(robot):
     asyncio.run(scenario())
 
 
-def test_a_single_picture_is_asked_for_again_at_a_polite_rate():
+def test_a_single_picture_is_requested_again_at_the_throttle_rate():
     async def scenario(server, robot):
         camera = robot.add_module("HttpCamera", server.at("/snapshot"), throttle=50)
         seen = []
@@ -132,7 +132,7 @@ def test_a_single_picture_is_asked_for_again_at_a_polite_rate():
     run(scenario)
 
 
-def test_a_stream_is_thinned_out_to_its_newest_pictures():
+def test_a_throttled_stream_shows_its_newest_pictures():
     async def scenario(server, robot):
         camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=200)
         seen = []
@@ -144,7 +144,7 @@ def test_a_stream_is_thinned_out_to_its_newest_pictures():
     run(scenario)
 
 
-def test_the_last_picture_of_a_burst_is_shown_though_nothing_follows_it():
+def test_the_last_picture_of_a_burst_is_shown():
     async def scenario(server, robot):
         server.frozen = True
         head = (
@@ -179,7 +179,9 @@ def test_the_last_picture_of_a_burst_is_shown_though_nothing_follows_it():
         ),
     ],
 )
-def test_what_is_no_camera_is_a_problem_that_ends_when_it_is_one(path, answer, said):
+def test_an_invalid_camera_answer_is_a_problem_until_pictures_arrive(
+    path, answer, said
+):
     async def scenario(server, robot):
         server.scripts[path] = (answer, True)
         camera = robot.add_module("HttpCamera", server.at(path), "Front", throttle=20)
@@ -197,7 +199,7 @@ def test_what_is_no_camera_is_a_problem_that_ends_when_it_is_one(path, answer, s
     run(scenario)
 
 
-def test_a_stream_that_ends_is_opened_again():
+def test_a_closed_stream_is_opened_again():
     async def scenario(server, robot):
         head = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace;boundary=b"
         server.scripts[STREAM] = (head + b"\r\n\r\n", True)
@@ -211,7 +213,7 @@ def test_a_stream_that_ends_is_opened_again():
     run(scenario)
 
 
-def test_a_camera_that_drips_without_a_picture_is_given_up_and_tried_again():
+def test_a_connection_without_pictures_times_out_and_is_retried():
     async def scenario(server, robot):
         server.scripts["/drip"] = (b"HTTP/1.1 200 OK\r\nContent-Type: ima", False)
         said = []
@@ -231,7 +233,7 @@ def test_a_camera_that_drips_without_a_picture_is_given_up_and_tried_again():
     run(scenario)
 
 
-def test_where_nobody_listens_it_is_said():
+def test_a_refused_connection_is_a_problem():
     async def scenario(server, robot):
         server._server.close()
         camera = robot.add_module("HttpCamera", server.at("/stream"))
@@ -243,7 +245,7 @@ def test_where_nobody_listens_it_is_said():
 
 
 @pytest.mark.parametrize("name", ["cam..local", ".local", f"{'c' * 64}.local"])
-def test_a_name_that_no_host_can_have_is_said_and_tried_again(robot, name):
+def test_an_invalid_host_name_is_a_problem_and_is_retried(robot, name):
     async def scenario():
         said = []
         pull = image_pull.Pull(
@@ -260,7 +262,7 @@ def test_a_name_that_no_host_can_have_is_said_and_tried_again(robot, name):
     asyncio.run(scenario())
 
 
-def test_who_may_vouch_for_a_camera_is_read_once_and_in_a_thread(monkeypatch):
+def test_the_ssl_context_is_created_once_in_a_thread(monkeypatch):
     read_in = []
     create = ssl.create_default_context
 
@@ -283,7 +285,7 @@ def test_who_may_vouch_for_a_camera_is_read_once_and_in_a_thread(monkeypatch):
     assert thread is not threading.main_thread()
 
 
-def test_who_watches_after_a_camera_failed_to_begin_has_it_begin_again(monkeypatch):
+def test_a_new_watcher_restarts_a_camera_that_failed_to_start(monkeypatch):
     async def scenario(server, robot):
         camera = robot.add_module("HttpCamera", server.at(STREAM), throttle=0)
 
@@ -301,7 +303,7 @@ def test_who_watches_after_a_camera_failed_to_begin_has_it_begin_again(monkeypat
     run(scenario)
 
 
-def test_what_does_not_speak_tls_is_said():
+def test_a_server_without_tls_is_a_problem():
     async def scenario(server, robot):
         address = server.at("/").replace("http:", "https:")
         camera = robot.add_module("HttpCamera", address)
@@ -313,11 +315,11 @@ def test_what_does_not_speak_tls_is_said():
 
 
 @pytest.mark.parametrize("throttle", [-1, 0.5, "100", None])
-def test_a_time_between_pictures_that_is_none_is_refused(robot, throttle):
+def test_an_invalid_throttle_is_refused(robot, throttle):
     with pytest.raises(ConfigError, match="milliseconds"):
         HttpCamera(robot, "http://cam/", throttle=throttle)
 
 
-def test_an_address_that_is_none_is_refused(robot):
+def test_an_rtsp_address_is_refused(robot):
     with pytest.raises(ConfigError, match="begins with http"):
         robot.add_module("HttpCamera", "rtsp://cam/")

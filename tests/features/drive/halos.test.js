@@ -9,7 +9,7 @@ globalThis.CSS = { escape: (text) => text };
 globalThis.SVGGraphicsElement = FakeElement;
 globalThis.requestAnimationFrame = () => 1;
 
-test("no halo tells of a speed that was heard before the connection was lost", () => {
+test("halos are hidden while the connection is lost", () => {
   const moving = { robot: "r1", state: "driving", measured: [0.4, 0, 0] };
   const drive = { state: "open", robots: new Map([["r1", moving]]) };
   const world = new FakeElement();

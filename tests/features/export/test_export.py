@@ -95,7 +95,7 @@ def differing(one: np.ndarray, other: np.ndarray) -> float:
 HIDE = "for (const e of document.querySelectorAll(%r)) e.style.visibility = 'hidden'"
 
 
-def test_the_svg_alone_looks_as_the_page_did(tab, chromium, tmp_path):
+def test_the_exported_svg_looks_like_the_page(tab, chromium, tmp_path):
     file = saved(tab, "svg", tmp_path)
     page = pixels(tab.screenshot())
     alone = drawn_alone(chromium, file, *SIZE)
@@ -105,7 +105,7 @@ def test_the_svg_alone_looks_as_the_page_did(tab, chromium, tmp_path):
         assert (np.abs(alone - colour).max(axis=2) < 4).sum() > 100, colour
 
 
-def test_the_scale_and_its_words_are_in_the_picture(tab, chromium, tmp_path):
+def test_the_exported_svg_contains_the_scale_bar_and_its_text(tab, chromium, tmp_path):
     box = tab.locator(".webmap-scale-bar").bounding_box()
     words = tab.locator(".webmap-scale-bar-text").inner_text()
     file = saved(tab, "svg", tmp_path)
@@ -119,7 +119,7 @@ def test_the_scale_and_its_words_are_in_the_picture(tab, chromium, tmp_path):
     assert differing(pixels(tab.screenshot())[part], alone[part]) < 0.15
 
 
-def test_the_svg_needs_nothing_else_and_runs_nothing(tab, tmp_path):
+def test_the_exported_svg_has_no_external_references_and_no_scripts(tab, tmp_path):
     text = saved(tab, "svg", tmp_path).read_text("utf-8")
     root = ElementTree.fromstring(text)
     assert root.tag == f"{SVG}svg"
@@ -145,7 +145,7 @@ def test_the_svg_needs_nothing_else_and_runs_nothing(tab, tmp_path):
         assert words.text is None or float(words.get("textLength", 0)) > 0, words.text
 
 
-def test_a_text_takes_the_same_room_in_another_font(tab, chromium, tmp_path):
+def test_exported_texts_have_the_same_width_in_another_font(tab, chromium, tmp_path):
     file = saved(tab, "svg", tmp_path)
     text = file.read_text("utf-8")
     other = tmp_path / "other.svg"
@@ -162,21 +162,21 @@ def test_a_text_takes_the_same_room_in_another_font(tab, chromium, tmp_path):
     assert widths[1] == pytest.approx(widths[0], rel=0.02)
 
 
-def test_the_png_is_the_same_picture(tab, chromium, tmp_path):
+def test_the_exported_png_looks_like_the_page(tab, chromium, tmp_path):
     file = saved(tab, "png", tmp_path)
     page, image = pixels(tab.screenshot()), pixels(file.read_bytes())
     beside = np.s_[80:660, :]
     assert differing(page[beside], image[beside]) < 0.002
 
 
-def test_what_is_not_seen_is_not_in_it(tab, tmp_path):
+def test_hidden_images_are_not_exported(tab, tmp_path):
     tab.evaluate("document.querySelector('.images image').style.display = 'none'")
     root = ElementTree.parse(saved(tab, "svg", tmp_path))
     tab.evaluate("document.querySelector('.images image').style.display = ''")
     assert len(list(root.iter(f"{SVG}image"))) == 2
 
 
-def test_escape_closes_the_choice_and_gives_the_focus_back(tab):
+def test_escape_closes_the_export_menu_and_restores_the_focus(tab):
     go = tab.locator(".webmap-export-go")
     go.click()
     expect(tab.locator(".webmap-export-menu")).to_be_visible()
@@ -189,7 +189,7 @@ def test_escape_closes_the_choice_and_gives_the_focus_back(tab):
     expect(tab.locator(".webmap-export-menu")).to_be_hidden()
 
 
-def test_a_picture_that_is_gone_is_left_out_and_that_is_said(tab, tmp_path):
+def test_an_image_that_cannot_be_loaded_is_left_out_with_a_notice(tab, tmp_path):
     tab.evaluate(
         "document.querySelector('.images image').setAttribute("
         "'href', '/_webmap/images/gone')"
@@ -227,7 +227,7 @@ def console(tmp_path_factory) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_console_saves_its_map_by_a_button_of_the_view(
+def test_the_export_button_of_the_console_saves_its_map(
     chromium, console, scheme, tmp_path
 ):
     with watched_tab(chromium, 1280, 800) as tab:
@@ -248,7 +248,7 @@ def test_the_console_saves_its_map_by_a_button_of_the_view(
     assert differing(page[:-60], alone[:-60]) < 0.003
 
 
-def test_on_a_phone_the_choice_opens_where_there_is_room(chromium, console):
+def test_the_export_menu_fits_on_a_phone_screen(chromium, console):
     with watched_tab(chromium, 390, 844) as tab:
         tab.goto(console)
         tab.locator(".webmap-export-go").click()

@@ -13,7 +13,7 @@ function near(one, other) {
   assert.ok(Math.hypot(one.x - other.x, one.y - other.y) < 1e-9, JSON.stringify(one));
 }
 
-test("a goal is said in words, with what the robot tells", () => {
+test("the text of a goal shows its state and the progress of the robot", () => {
   const told = { left: 3.24, eta: 75, recoveries: 2 };
   assert.equal(
     look(goal("under way", told)).text,
@@ -26,7 +26,7 @@ test("a goal is said in words, with what the robot tells", () => {
   assert.equal(look(goal("sent")).shape, "sent");
 });
 
-test("a goal that ended leaves the map after a while, a failure stays", () => {
+test("an ended goal is hidden after a while, a failed goal stays", () => {
   for (const [state, stays] of [["reached", false], ["cancelled", false], ["failed", true]]) {
     const shown = new ShownGoals();
     shown.report("r1", goal("under way"), 0);
@@ -41,7 +41,7 @@ test("a goal that ended leaves the map after a while, a failure stays", () => {
   }
 });
 
-test("a goal that was over when the page came is not shown", () => {
+test("a goal that already ended when the page opened is not shown", () => {
   const shown = new ShownGoals();
   shown.report("r1", goal("failed"), 0);
   assert.equal(shown.shown(0).size, 0);
@@ -52,7 +52,7 @@ test("a goal that was over when the page came is not shown", () => {
   assert.equal(shown.shown(2).size, 0, "nor after the robot was gone");
 });
 
-test("a goal that ended before the page had a report of it is shown", () => {
+test("a goal that starts and ends between two reports is shown", () => {
   const shown = new ShownGoals();
   shown.report("r1", null, 0);
   shown.report("r1", goal("failed"), 1);
@@ -63,7 +63,7 @@ test("a goal that ended before the page had a report of it is shown", () => {
   assert.equal(shown.shown(12_000).size, 0);
 });
 
-test("one robot goes where it is sent, and two stand beside that", () => {
+test("one robot goes to the pose, two robots go to its left and right", () => {
   const pose = { x: 1, y: 2, yaw: Math.PI / 2 };
   assert.deepEqual(formation(pose, 1, 1), [{ x: 1, y: 2, yaw: Math.PI / 2 }]);
   const [left, right] = formation(pose, 2, 1);
@@ -71,7 +71,7 @@ test("one robot goes where it is sent, and two stand beside that", () => {
   near(right, { x: 1.5, y: 2 });
 });
 
-test("many robots stand in a grid behind the pose, none nearer than the spacing", () => {
+test("goals of many robots are at least the spacing apart", () => {
   for (const count of [3, 5, 7, 12, 20]) {
     const places = formation({ x: 0, y: 0, yaw: 0.3 }, count, 1.5);
     assert.equal(places.length, count);
@@ -83,7 +83,7 @@ test("many robots stand in a grid behind the pose, none nearer than the spacing"
   }
 });
 
-test("robots are matched to places so that no ways cross", () => {
+test("robots are assigned to goals so that no paths cross", () => {
   let seed = 1;
   const random = () => ((seed = (seed * 48271) % 2147483647), seed / 2147483647);
   const turn = (a, b, c) => (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);

@@ -18,7 +18,7 @@ function gate(...answers) {
   return asked;
 }
 
-test("a goal for which there is no link is offered again until the gate takes it", async () => {
+test("a goal without a link is sent again until the gate accepts it", async () => {
   const asked = gate(LINKLESS, LINKLESS, null);
   const sent = sendGoal(asked.offer, () => true);
   await settle();
@@ -28,7 +28,7 @@ test("a goal for which there is no link is offered again until the gate takes it
   assert.equal(asked.times, 3);
 });
 
-test("after about three seconds without a link it is given up for that reason", async () => {
+test("a goal without a link fails with that reason after three seconds", async () => {
   const asked = gate(LINKLESS);
   const sent = assert.rejects(sendGoal(asked.offer, () => true), { message: LINKLESS });
   await pass(20);
@@ -37,7 +37,7 @@ test("after about three seconds without a link it is given up for that reason", 
   assert.equal((TRIES - 1) * RETRY, 3000);
 });
 
-test("a goal that is refused for another reason is not offered again", async () => {
+test("a goal refused for another reason is not sent again", async () => {
   const asked = gate("Ann has control");
   const sent = assert.rejects(sendGoal(asked.offer, () => true), /Ann has control/);
   await pass(2);
@@ -45,7 +45,7 @@ test("a goal that is refused for another reason is not offered again", async () 
   assert.equal(asked.times, 1);
 });
 
-test("a goal that is called off while it waits is not offered again", async () => {
+test("a goal cancelled while waiting is not sent again", async () => {
   const asked = gate(LINKLESS);
   let wanted = true;
   const sent = sendGoal(asked.offer, () => wanted);

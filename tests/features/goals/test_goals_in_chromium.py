@@ -154,7 +154,7 @@ def label(tab: Page):
         ("New 0", r"m to go, about \d+ s left"),
     ],
 )
-def test_a_goal_is_followed_on_the_map_until_it_is_reached(tab, name, expected):
+def test_the_map_shows_the_progress_of_a_goal_until_it_is_reached(tab, name, expected):
     send(tab, name)
     expect(label(tab)).to_contain_text("Navigating to goal")
     expect(label(tab)).to_contain_text(re.compile(expected))
@@ -163,14 +163,14 @@ def test_a_goal_is_followed_on_the_map_until_it_is_reached(tab, name, expected):
 
 
 @pytest.mark.parametrize(("name", "to"), [("Old 0", "Plain 1"), ("New 0", "New 1")])
-def test_a_goal_is_called_off_where_it_is_drawn(tab, name, to):
+def test_the_goal_label_on_the_map_cancels_the_goal(tab, name, to):
     send(tab, name, to)
     expect(label(tab)).to_contain_text("Navigating to goal")
     label(tab).get_by_role("button", name="Cancel goal").click()
     expect(label(tab)).to_contain_text("Goal cancelled")
 
 
-def test_a_goal_that_cannot_be_reached_says_why_until_it_is_put_away(tab):
+def test_an_unreachable_goal_shows_the_reason_until_it_is_hidden(tab):
     pick(tab, "New 0")
     tab.keyboard.press("g")
     press(tab, *OUTSIDE, drag=-30)
@@ -180,7 +180,7 @@ def test_a_goal_that_cannot_be_reached_says_why_until_it_is_put_away(tab):
     expect(tab.locator(".webmap-goal-arrow")).to_have_count(0)
 
 
-def test_stop_cancels_a_goal_and_says_so(tab):
+def test_stop_cancels_a_goal_and_the_label_shows_stop(tab):
     send(tab, "Old 0", "Plain 1")
     expect(label(tab)).to_contain_text("Navigating to goal")
     tab.get_by_role("button", name="STOP ALL").click()
@@ -207,7 +207,7 @@ def send_elsewhere(bridge: str) -> None:
         client.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
 
 
-def test_a_plain_topic_says_that_it_says_nothing_and_is_drawn_once(tab, bridges):
+def test_a_goal_on_a_plain_topic_has_no_progress_and_is_drawn_once(tab, bridges):
     published = tab.locator(".posestamped.goal")
     send(tab, "Plain 1", "Old 0")
     expect(label(tab)).to_have_text(re.compile("Goal sent, this robot reports no"))
@@ -239,7 +239,7 @@ def hearing(bridge: str, topic: str) -> Iterator[ClientConnection]:
         yield link
 
 
-def test_a_robot_is_told_where_it_is_unless_it_follows_a_goal(tab, bridges):
+def test_an_initial_pose_is_sent_unless_the_robot_is_navigating(tab, bridges):
     with hearing(bridges["ROS1"], "/robot_0/initialpose") as robot:
         told_and_refused(tab, robot)
 
@@ -292,7 +292,7 @@ def told_and_refused(tab: Page, robot: ClientConnection) -> None:
     label(tab).get_by_role("button", name="Cancel goal").click()
 
 
-def test_several_robots_go_to_places_beside_each_other(tab):
+def test_several_robots_get_goals_beside_each_other(tab):
     pick(tab, "New 0")
     pick(tab, "New 1", shift=True)
     expect(tab.locator(".webmap-goal-go")).to_have_text("Send goal to 2 robots")
@@ -327,7 +327,7 @@ def test_several_robots_go_to_places_beside_each_other(tab):
     expect(tab.locator(".robot.marked")).to_have_count(0)
 
 
-def test_a_route_is_drawn_run_skipped_halted_and_kept(tab):
+def test_a_route_can_be_drawn_saved_run_skipped_paused_and_interrupted(tab):
     pick(tab, "New 1")
     tab.locator(".webmap-route > summary").click()
     tab.locator(".webmap-route-edit").click()
@@ -406,7 +406,7 @@ def next_goal(tab: Page, robot: ClientConnection) -> float:
     raise AssertionError(f"no further goal: {word.inner_text()}")
 
 
-def test_a_route_is_put_in_order_and_goes_round(tab, bridges):
+def test_a_reordered_route_with_a_loop_sends_its_goals_in_order(tab, bridges):
     pick(tab, "Old 0")
     tab.locator(".webmap-route > summary").click()
     word = tab.locator(".webmap-route > .webmap-route-word")

@@ -39,7 +39,7 @@ class TestMarked:
         for robot in robots:
             robot.destroy()
 
-    def test_robots_are_selected_besides_the_one(self, map, robots):
+    def test_robots_are_marked_in_addition_to_the_selected_robot(self, map, robots):
         ann, bob, cid = robots
         listener = map.add_module(GoalListener)
         map.toggle_marked(ann)
@@ -52,12 +52,12 @@ class TestMarked:
         assert map.marked == [cid]
         assert listener.received == ["mark"] * 3
 
-    def test_the_selected_robot_is_not_marked_besides(self, map, robots):
+    def test_the_selected_robot_cannot_be_marked(self, map, robots):
         map.set_selected(robots[0])
         map.toggle_marked(robots[0])
         assert map.marked == []
 
-    def test_selecting_ends_it_for_all(self, map, robots):
+    def test_selecting_a_robot_or_none_clears_all_marks(self, map, robots):
         ann, bob, cid = robots
         for robot in robots:
             map.toggle_marked(robot)
@@ -70,7 +70,7 @@ class TestMarked:
         map.set_selected(None)
         assert map.marked == []
 
-    def test_a_robot_that_leaves_is_marked_no_more(self, map, robots):
+    def test_a_removed_robot_is_no_longer_marked(self, map, robots):
         for robot in robots[:2]:
             map.toggle_marked(robot)
         map.remove_robot(robots[1])
@@ -78,7 +78,7 @@ class TestMarked:
         with pytest.raises(ValueError, match="not on this map"):
             map.set_marked(robots[1], True)
 
-    def test_a_long_press_in_the_page_marks(self, map, robots):
+    def test_a_mark_command_of_the_page_marks_the_robot(self, map, robots):
         tool = map.add_module("GoalTool", spacing=2)
         map.set_selected(robots[0])
         tool.on_message({"mark": robots[1].id})
@@ -87,13 +87,13 @@ class TestMarked:
 
 
 @pytest.mark.parametrize("spacing", [0.1, 21, float("nan")])
-def test_a_spacing_that_makes_no_sense_is_refused(map, spacing):
+def test_an_invalid_spacing_is_refused(map, spacing):
     with pytest.raises(ValueError, match=r"0\.3 to 20 m"):
         map.add_module("GoalTool", spacing=spacing)
 
 
 class TestInitialPose:
-    def test_what_the_page_told_fires_a_trigger(self, map, robot):
+    def test_only_a_valid_pose_of_the_page_triggers_on_pose_told(self, map, robot):
         map.add_robot(robot)
         tool, listener = map.add_module("InitialPoseTool"), map.add_module(GoalListener)
         tool.on_message({"pose": {"robot": robot.id, "x": 1, "y": 2.0, "yaw": 0.5}})
@@ -109,7 +109,7 @@ class TestInitialPose:
         assert listener.received == [(robot, 1, 2.0, 0.5)]
         tool.aim()
 
-    def test_the_page_hears_how_sure_the_robot_is_told_to_be(
+    def test_the_page_gets_the_covariance_of_the_initial_pose(
         self, map, robot, monkeypatch
     ):
         map.add_robot(robot)
@@ -176,7 +176,7 @@ class TestRoutes:
         assert deleted == {"routes": []}
         assert gone == {"problem": "there is no route 'Round'"}
 
-    def test_who_may_not_drive_may_load_and_not_change(self, ask):
+    def test_a_viewer_may_load_routes_but_not_change_them(self, ask):
         ask({"op": "save", "name": "Round", "route": self.ROUTE})
         answers = ask(
             {"op": "load", "name": "Round"},
@@ -187,7 +187,7 @@ class TestRoutes:
         assert "loaded" in answers[0]
         assert all("may not drive" in answer["problem"] for answer in answers[1:])
 
-    def test_bad_words_of_a_page_are_said_and_change_nothing(self, ask):
+    def test_an_invalid_route_command_gets_a_problem_and_changes_nothing(self, ask):
         answers = ask(
             {"op": "save", "name": "", "route": self.ROUTE},
             {"op": "save", "name": "x", "route": {"points": []}},
@@ -198,20 +198,20 @@ class TestRoutes:
 
 
 class TestOnTheCard:
-    def test_every_state_has_words_a_shape_and_a_figure_only_on_the_way(self):
+    def test_progress_is_shown_only_for_goals_under_way_or_cancelling(self):
         for state in GOALS:
             seen = figures(goal(state, left=2.0))
             assert seen == (
                 "2.0 m to go" if state in ("under way", "cancelling") else ""
             )
 
-    def test_what_the_robot_tells_is_said_with_units(self):
+    def test_the_progress_of_a_goal_has_units(self):
         seen = goal(left=3.25, eta=12.4, time=4.6, recoveries=2)
         text = "3.2 m to go, about 12 s left, 5 s elapsed, 2 recoveries"
         assert figures(seen) == text
         assert figures(goal(recoveries=1)) == "1 recovery"
 
-    def test_the_line_has_the_time_and_how_often_it_got_stuck(self):
+    def test_the_goal_line_shows_the_elapsed_time_and_the_recoveries(self):
         line = GoalLine()
         seen = goal(left=3.25, eta=12.4, time=4.6, recoveries=2)
         report = SimpleNamespace(goal=seen)
@@ -223,7 +223,7 @@ class TestOnTheCard:
             "3.2 m to go, about 12 s left, 5 s elapsed, 2 recoveries",
         ]
 
-    def test_a_robot_without_a_goal_has_no_line(self, robot):
+    def test_a_robot_without_a_goal_has_no_goal_line(self, robot):
         line = GoalLine()
         line.show(robot)
         assert line.element.get("hidden") is not None

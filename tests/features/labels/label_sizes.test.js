@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { crowded } from "../../../src/webmap/features/labels/labels.js";
 
-test("of names that lie on each other the first is shown", () => {
+test("a name that overlaps an earlier visible name is hidden", () => {
   const one = { x: 100, y: 100, across: 60 };
   assert.deepEqual(crowded([one, { ...one, x: 150 }, { ...one, x: 170 }]), [
     false,
@@ -14,7 +14,7 @@ test("of names that lie on each other the first is shown", () => {
   assert.deepEqual(crowded([]), []);
 });
 
-test("a name that is not shown takes no room from others", () => {
+test("a hidden name does not hide other names", () => {
   const names = [0, 30, 60, 90].map((x) => ({ x, y: 0, across: 40 }));
   assert.deepEqual(crowded(names), [false, true, false, true]);
 });

@@ -39,7 +39,7 @@ async def saved(layer) -> None:
         await asyncio.sleep(0.005)
 
 
-def test_a_label_that_is_added_is_on_every_map_and_comes_back(map, page, state, said):
+def test_an_added_label_is_on_every_map_and_is_saved(map, page, state, said):
     async def scenario():
         one = map.add_module("Labels", [DESK])
         other = Map(page.element("other"), 100, 100).add_module("Labels", [DESK])
@@ -58,7 +58,7 @@ def test_a_label_that_is_added_is_on_every_map_and_comes_back(map, page, state, 
     }
 
 
-def test_what_was_kept_is_there_again_and_can_be_taken_away(map, page, state, said):
+def test_a_saved_label_is_shown_and_can_be_deleted(map, page, state, said):
     state.parent.mkdir(parents=True)
     state.write_text('{"labels": [{"name": "Old", "x": 0, "y": 0, "yaw": null}]}')
 
@@ -91,7 +91,7 @@ def test_what_was_kept_is_there_again_and_can_be_taken_away(map, page, state, sa
         ("x", "expected a table"),
     ],
 )
-def test_what_a_page_sends_is_checked(map, page, said, add, words):
+def test_an_invalid_label_from_a_page_is_refused(map, page, said, add, words):
     async def scenario():
         module = map.add_module("Labels")
         module.on_message({"add": add})
@@ -104,7 +104,7 @@ def test_what_a_page_sends_is_checked(map, page, said, add, words):
     assert words in answer["refused"]
 
 
-def test_a_label_is_moved_for_everybody_and_stays_there(map, page, state, said):
+def test_a_moved_label_moves_on_all_maps_and_is_saved(map, page, state, said):
     async def scenario():
         one = map.add_module("Labels", [DESK])
         other = Map(page.element("other"), 100, 100).add_module("Labels", [DESK])
@@ -131,7 +131,7 @@ def test_a_label_is_moved_for_everybody_and_stays_there(map, page, state, said):
     assert kept == {"name": "Dock", "x": -1.5, "y": 7.0, "icon": "charger", "yaw": 1.0}
 
 
-def test_what_is_added_is_kept_also_while_pages_show_other_configured_labels(
+def test_maps_with_different_configured_labels_share_added_labels(
     map, page, state, said
 ):
     async def scenario():
@@ -158,7 +158,9 @@ def test_what_is_added_is_kept_also_while_pages_show_other_configured_labels(
     assert said == [{"done": True}] * 4
 
 
-def test_the_file_is_read_anew_when_nobody_showed_its_labels(map, page, state, said):
+def test_the_label_file_is_read_again_after_its_last_map_was_removed(
+    map, page, state, said
+):
     async def scenario():
         module = map.add_module("Labels")
         module.on_message({"add": {"name": "Dock", "x": 3, "y": 4}})
@@ -171,7 +173,7 @@ def test_the_file_is_read_anew_when_nobody_showed_its_labels(map, page, state, s
     asyncio.run(scenario())
 
 
-def test_who_comes_later_is_told_too_that_labels_are_not_kept(
+def test_a_map_added_later_also_shows_the_problem_of_unsaved_labels(
     map, page, channel, state, said
 ):
     async def scenario():
@@ -194,7 +196,7 @@ def test_who_comes_later_is_told_too_that_labels_are_not_kept(
     assert len(json.loads(state.read_text())["labels"]) == 2
 
 
-def test_a_viewer_who_is_no_operator_adds_nothing(channel, tmp_path, said):
+def test_a_viewer_cannot_add_labels(channel, tmp_path, said):
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
     page = Page(
         entry, channel, SimpleNamespace(id="v", name="V", role="viewer"), None, {}
@@ -206,7 +208,7 @@ def test_a_viewer_who_is_no_operator_adds_nothing(channel, tmp_path, said):
     page.close()
 
 
-def test_a_file_that_cannot_be_read_is_said_and_never_written_over(
+def test_an_unreadable_label_file_is_a_problem_and_is_not_overwritten(
     map, page, channel, state, said
 ):
     state.parent.mkdir(parents=True)
@@ -220,7 +222,7 @@ def test_a_file_that_cannot_be_read_is_said_and_never_written_over(
     page.close()
 
 
-def test_a_disk_that_takes_nothing_is_said(map, page, channel, state, said):
+def test_a_failed_save_of_labels_is_shown_on_the_page(map, page, channel, state, said):
     state.parent.parent.mkdir(parents=True)
     state.parent.write_text("a file where a folder is to be")
 
@@ -236,7 +238,7 @@ def test_a_disk_that_takes_nothing_is_said(map, page, channel, state, said):
     assert any("labels are not kept" in words for words in channel.errors)
 
 
-def test_a_file_of_labels_comes_after_those_of_the_program(map, page, tmp_path):
+def test_labels_of_a_file_follow_labels_of_the_program(map, page, tmp_path):
     (tmp_path / "places.yaml").write_text("- {name: Lift, x: 1, y: 2, icon: lift}")
     module = map.add_module("Labels", [DESK], file=tmp_path / "places.yaml")
     assert shown(module.layer) == ["Desk", "Lift"]
@@ -252,7 +254,7 @@ def test_a_file_of_labels_comes_after_those_of_the_program(map, page, tmp_path):
         ({"file": "/no/such"}, "No such file"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(map, options, words):
+def test_invalid_options_are_refused(map, options, words):
     with pytest.raises(ConfigError, match=words):
         map.add_module("Labels", **options)
     assert map.modules == []

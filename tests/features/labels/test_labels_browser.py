@@ -109,7 +109,7 @@ def turn_and_size(tab: Page, name: str) -> tuple[float, float]:
     return math.atan2(b, a), math.hypot(a, b)
 
 
-def test_labels_are_upright_and_as_large_at_every_zoom_and_turn(tab):
+def test_labels_stay_upright_and_keep_their_size_in_every_view(tab):
     expect(label(tab, "Äpfel <b>").locator("text.name")).to_have_text("Äpfel <b>")
     assert "fruit" in label(tab, "Äpfel <b>").get_attribute("class").split()
     tab.mouse.move(800, 450)
@@ -142,7 +142,7 @@ def test_labels_are_upright_and_as_large_at_every_zoom_and_turn(tab):
     tab.locator("#show-all").click()
 
 
-def test_a_name_that_would_lie_on_another_waits_until_it_is_pointed_at(tab):
+def test_an_overlapping_name_is_hidden_until_the_pointer_is_on_its_label(tab):
     beside = label(tab, "Next to it")
     expect(beside).to_have_class(re.compile("crowded"))
     expect(label(tab, "Äpfel <b>")).not_to_have_class(re.compile("crowded"))
@@ -173,7 +173,7 @@ def added(tab: Page, name: str, x: float, y: float) -> None:
     tab.locator(".webmap-labels-save").click()
 
 
-def test_a_label_that_is_added_is_on_other_pages_and_there_after_a_restart(
+def test_an_added_label_is_on_other_pages_and_persists_after_a_restart(
     tab, chromium, serve
 ):
     added(tab, "Wall <i>", 6.0, 3.0)
@@ -200,7 +200,7 @@ def test_a_label_that_is_added_is_on_other_pages_and_there_after_a_restart(
         expect(later.locator(".webmap-labels-remove")).to_be_hidden()
 
 
-def test_labels_of_the_demo_are_there_after_a_restart(chromium, tmp_path):
+def test_labels_added_in_the_demo_persist_after_a_restart(chromium, tmp_path):
     demo = ("demo", "--robots", "1", "--port", "0", "--no-browser")
     for restarted in (False, True):
         with (
@@ -257,7 +257,7 @@ def moved(tab: Page, wall) -> None:
     tab.locator("#show-all").click()
 
 
-def test_a_press_on_a_label_sends_the_selected_robot_there(chromium, serve, bridge):
+def test_a_label_can_send_the_selected_robot_to_its_position(chromium, serve, bridge):
     goal = "/robot_0/move_base_simple/goal"
     with (
         robot_node(bridge, {}, {goal: "geometry_msgs/PoseStamped"}) as node,

@@ -18,7 +18,7 @@ from webmap.features.labels.label_store import (
 DOCK = {"name": "Dock", "x": 1, "y": -2.5, "icon": "charger", "kind": "a-b", "yaw": 3}
 
 
-def test_a_list_of_tables_is_a_list_of_labels():
+def test_a_list_of_tables_is_read_as_labels():
     one, two = read_labels([DOCK, {"name": " Tür <b> ", "x": 0, "y": 0}], "it")
     assert one == Label("Dock", 1.0, -2.5, "charger", "a-b", 3.0, "c0")
     assert (two.name, two.icon, two.kind, two.yaw) == ("Tür <b>", "pin", "", None)
@@ -43,19 +43,19 @@ def test_a_list_of_tables_is_a_list_of_labels():
         ({"nmae": "x"}, "it[0].'nmae': no such key; did you mean \"name\"?"),
     ],
 )
-def test_a_label_that_makes_no_sense_is_named(change, words):
+def test_an_invalid_label_is_refused_with_its_field(change, words):
     with pytest.raises(ConfigError) as error:
         read_labels([{**DOCK, **change}], "it")
     assert words in str(error.value)
 
 
 @pytest.mark.parametrize("data", [None, 3, "text", {"label": []}, [1], [[]]])
-def test_what_is_no_list_of_tables_is_refused(data):
+def test_data_other_than_a_list_of_tables_is_refused(data):
     with pytest.raises(ConfigError, match=r"expected|no such key"):
         read_labels(data, "it")
 
 
-def test_there_is_a_most():
+def test_more_than_2000_labels_are_refused():
     with pytest.raises(ConfigError, match="2000 labels are the most"):
         read_labels([DOCK] * 2001, "it")
 
@@ -68,7 +68,7 @@ def test_there_is_a_most():
         ("a.json", json.dumps([{"name": "Dock", "x": 1, "y": -2.5}])),
     ],
 )
-def test_a_file_is_yaml_or_json(tmp_path, name, text):
+def test_a_label_file_may_be_yaml_or_json(tmp_path, name, text):
     (tmp_path / name).write_text(text)
     (label,) = label_file(tmp_path / name)
     assert (label.name, label.x, label.y) == ("Dock", 1.0, -2.5)
@@ -93,7 +93,7 @@ def test_a_file_is_yaml_or_json(tmp_path, name, text):
         (b"x" * (1 << 20) + b"xx", "larger than 256 KiB"),
     ],
 )
-def test_a_file_that_is_none_is_refused(tmp_path, data, words):
+def test_an_invalid_or_missing_label_file_is_refused(tmp_path, data, words):
     (tmp_path / "a.yaml").write_bytes(data)
     with pytest.raises(ConfigError, match=words):
         label_file(tmp_path / "a.yaml")
@@ -101,7 +101,7 @@ def test_a_file_that_is_none_is_refused(tmp_path, data, words):
         label_file(tmp_path / "b.yaml")
 
 
-def test_labels_that_are_kept_are_read_again(tmp_path):
+def test_saved_labels_are_loaded_again(tmp_path):
     store = LabelStore(tmp_path, "hall")
     assert store.load() == ()
     store.save([new_label(DOCK), new_label({"name": "Ü", "x": 0, "y": 0})])
@@ -115,7 +115,7 @@ def test_labels_that_are_kept_are_read_again(tmp_path):
 @pytest.mark.parametrize(
     "data", [b"", b"{", b'{"labels": [{"name": 1}]}', b"\xff", b"[" * 100_000]
 )
-def test_a_file_of_kept_labels_that_is_broken_is_said(tmp_path, data):
+def test_a_broken_file_of_saved_labels_is_refused(tmp_path, data):
     store = LabelStore(tmp_path, "hall")
     store.file.parent.mkdir()
     store.file.write_bytes(data)
@@ -123,7 +123,7 @@ def test_a_file_of_kept_labels_that_is_broken_is_said(tmp_path, data):
         store.load()
 
 
-def test_a_pipe_in_place_of_kept_labels_is_not_waited_for(tmp_path):
+def test_a_pipe_in_place_of_saved_labels_is_refused(tmp_path):
     store = LabelStore(tmp_path, "hall")
     store.file.parent.mkdir()
     os.mkfifo(store.file)
@@ -132,11 +132,11 @@ def test_a_pipe_in_place_of_kept_labels_is_not_waited_for(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["", "../x", "a/b", "a.b", "x" * 41])
-def test_a_name_that_is_no_files_is_refused(tmp_path, name):
+def test_an_invalid_store_name_is_refused(tmp_path, name):
     with pytest.raises(ConfigError, match="letters, digits"):
         LabelStore(tmp_path, name)
 
 
-def test_every_icon_is_drawn_with_what_a_path_knows():
+def test_every_icon_has_only_svg_path_characters():
     for path in ICONS.values():
         assert set(path) <= set("MmLlHhVvCcSsAazZ0123456789.- ")

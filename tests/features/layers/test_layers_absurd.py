@@ -123,7 +123,7 @@ def high(z: float) -> dict:
         ),
     ],
 )
-def test_what_a_robot_has_beyond_the_size_of_a_planet_is_refused(
+def test_robot_messages_with_absurdly_large_values_are_refused(
     link, robot, module, message, said
 ):
     robot.add_module(module, link, "/topic")
@@ -153,7 +153,7 @@ def test_what_a_robot_has_beyond_the_size_of_a_planet_is_refused(
         (marker(CUBE, header=ENDLESS), "seconds of hundreds of digits"),
     ],
 )
-def test_markers_beyond_the_size_of_a_planet_are_refused(
+def test_markers_with_absurdly_large_values_are_refused(
     map, link, channel, message, said
 ):
     layer = map.add_module("Markers", link, "/markers").layer
@@ -171,7 +171,7 @@ def test_markers_beyond_the_size_of_a_planet_are_refused(
         (grid(CORNERS, origin=pose(FAR, 0)), "within 1e+07 m of the origin"),
     ],
 )
-def test_a_grid_beyond_the_size_of_a_planet_is_refused(
+def test_a_grid_with_absurdly_large_values_is_refused(
     map, link, channel, message, said
 ):
     map.add_module("OccupancyGrid", link, "/map")
@@ -181,7 +181,7 @@ def test_a_grid_beyond_the_size_of_a_planet_is_refused(
 
 
 @pytest.mark.parametrize("low", [-1e39, 0.1])
-def test_limits_that_single_precision_cannot_hold_are_no_limits(low):
+def test_range_limits_beyond_single_precision_are_applied_without_warnings(low):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         points, _ = scan_points(scan([1.0, 2.0, 1e30], low=low, high=1e39))
@@ -189,7 +189,7 @@ def test_limits_that_single_precision_cannot_hold_are_no_limits(low):
     assert np.allclose(points, [[1, 0], [0, 2]])
 
 
-def test_a_pose_that_turns_nowhere_is_left_out_and_the_others_are_drawn(link, robot):
+def test_poses_with_zero_quaternions_are_left_out_of_a_pose_array(link, robot):
     module = robot.add_module("PoseArray", link, "/particles")
     nowhere = {**pose(1, 2), "orientation": ZEROS}
     poses = [pose(3, 4), nowhere, pose(5, 6), nowhere]
@@ -201,7 +201,7 @@ def test_a_pose_that_turns_nowhere_is_left_out_and_the_others_are_drawn(link, ro
     assert not robot.problems
 
 
-def test_a_tilted_marker_higher_than_a_planet_is_refused(map, link, channel):
+def test_a_tilted_marker_with_an_absurd_height_is_refused(map, link, channel):
     layer = map.add_module("Markers", link, "/markers").layer
     on_its_side = {"x": 0, "y": 0.6, "z": 0, "w": 0.8}
     for number, type in enumerate((CUBE, SPHERE, CUBES, SPHERES)):
@@ -213,7 +213,7 @@ def test_a_tilted_marker_higher_than_a_planet_is_refused(map, link, channel):
     assert not layer.svg.children
 
 
-def test_a_fix_whose_doubt_is_larger_than_a_planet_is_drawn_without_it(link, robot):
+def test_a_fix_with_an_absurd_deviation_is_drawn_without_its_circle(link, robot):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
     link.say("/fix", fix(50.0, 14.0, spread=[4.0, 0, 0, 0, 4.0, 0, 0, 0, 9.0]))
     assert float(module.covariance.get("r")) == 2.0
@@ -229,14 +229,14 @@ def test_a_fix_whose_doubt_is_larger_than_a_planet_is_drawn_without_it(link, rob
     assert not robot.problems
 
 
-def test_a_sonar_of_endless_reach_is_drawn_up_to_what_it_sees(link, robot):
+def test_a_sonar_with_a_huge_max_range_is_accepted(link, robot):
     module = robot.add_module("Range", link, "/sonar")
     link.say("/sonar", sonar(1.5, high=3.4e38))
     assert module.distance == 1.5
     assert not robot.problems
 
 
-def test_a_plan_that_is_refused_leaves_the_one_before(link, robot):
+def test_a_refused_path_keeps_the_last_path(link, robot):
     module = robot.add_module("Path", link, "/plan")
     link.say("/plan", path([(0, 0), (1, 0)]))
     link.say("/plan", path([(0, 0), (5, 0)]) | {"header": ENDLESS})
@@ -246,7 +246,9 @@ def test_a_plan_that_is_refused_leaves_the_one_before(link, robot):
 
 
 @pytest.mark.parametrize("limits", [{}, {"low": 0.0, "high": 1.0}])
-def test_absurd_values_are_drawn_in_the_outermost_colours(link, robot, limits):
+def test_points_with_absurd_intensities_are_drawn_in_the_outermost_colours(
+    link, robot, limits
+):
     module = robot.add_module(
         "PointCloud", link, "/points", colour_by="intensity", **limits
     )
@@ -259,7 +261,9 @@ def test_absurd_values_are_drawn_in_the_outermost_colours(link, robot, limits):
     assert not robot.problems
 
 
-def test_a_frame_beyond_the_size_of_a_planet_is_left_out_and_said(link, robot, caplog):
+def test_a_transform_with_an_absurd_translation_is_ignored_and_logged(
+    link, robot, caplog
+):
     robot.set_tf(link)
     tell(link, transform("map", "base_link", 3.0, 0.0, 0.0, 100))
     assert robot.position.x == 3.0

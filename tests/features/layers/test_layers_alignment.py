@@ -40,7 +40,7 @@ def where(robot):
     return pytest.approx((robot.position.x, robot.position.y, robot.yaw), abs=1e-9)
 
 
-def test_a_robot_is_drawn_where_its_own_map_lies(link, bob):
+def test_a_robot_is_drawn_at_its_aligned_pose(link, bob):
     bob.set_alignment(10.0, 5.0, 90.0)
     go(link, 2.0, 0.0, 0.5)
     assert where(bob) == (10.0, 7.0, QUARTER + 0.5)
@@ -48,7 +48,7 @@ def test_a_robot_is_drawn_where_its_own_map_lies(link, bob):
     assert placed.apply(0, 0) == pytest.approx((10.0, 7.0))
 
 
-def test_a_robot_that_stands_moves_with_a_new_alignment_at_once(link, bob):
+def test_a_new_alignment_moves_the_robot_at_once(link, bob):
     go(link, 2.0, 0.0)
     moved = []
     bob.add_module(lambda robot: Watch(moved))
@@ -68,7 +68,7 @@ class Watch:
         self.moved.append(1)
 
 
-def test_all_robots_of_a_bridge_go_along_but_those_with_their_own(link, bob):
+def test_a_bridge_alignment_moves_all_robots_without_their_own_alignment(link, bob):
     ann = Robot("Ann")
     ann.set_odometry_topic(link, "/ann/odom", 0, type="geometry_msgs/PoseStamped")
     ann.set_alignment(0.0, 0.0, 0.0)
@@ -84,7 +84,7 @@ def test_all_robots_of_a_bridge_go_along_but_those_with_their_own(link, bob):
     ann.destroy()
 
 
-def test_a_robot_on_another_bridge_stays(bob):
+def test_a_bridge_alignment_applies_only_to_robots_of_that_bridge(bob):
     go_on = Link()
     align_bridge(go_on, 3.0, 0.0, 0.0)
     assert bob.pose_source.alignment == Pose()
@@ -93,7 +93,7 @@ def test_a_robot_on_another_bridge_stays(bob):
     assert where(bob) == (4.0, 0.0, 0.0)
 
 
-def test_what_a_robot_sees_and_plans_is_moved_with_it(link, bob):
+def test_the_path_and_the_sonar_cone_are_aligned_with_the_robot(link, bob):
     way = bob.add_module("Path", link, "/plan")
     cone = bob.add_module("Range", link, "/sonar")
     bob.set_alignment(10.0, 0.0, 90.0)
@@ -110,7 +110,7 @@ def test_what_a_robot_sees_and_plans_is_moved_with_it(link, bob):
     assert to_root(cone.cone).apply(1.0, 0.0) == pytest.approx((3.0, 0.0))
 
 
-def test_the_trail_of_a_robot_lies_behind_it(link, bob):
+def test_the_trail_of_an_aligned_robot_ends_at_the_robot(link, bob):
     bob.set_alignment(10.0, 0.0, 90.0)
     trail = bob.add_module("Trail")
     for step in range(4):
@@ -120,7 +120,9 @@ def test_the_trail_of_a_robot_lies_behind_it(link, bob):
 
 
 @pytest.mark.parametrize("map_frame", [None, "map"])
-def test_a_robots_own_grids_and_markers_lie_as_it_is_aligned(map, link, bob, map_frame):
+def test_grids_and_markers_of_a_robot_are_aligned_with_the_robot(
+    map, link, bob, map_frame
+):
     map.add_robot(bob)
     received = {"map_frame": map_frame}
     bob.add_module("OnMaps", "OccupancyGrid", link, "/bob/costmap", **received)
@@ -144,9 +146,7 @@ def test_a_robots_own_grids_and_markers_lie_as_it_is_aligned(map, link, bob, map
         assert to_root(layer.svg).apply(2.0, 0.0) == pytest.approx((3.0, 0.0))
 
 
-def test_a_robots_costmap_in_the_frame_of_its_odometry_lies_as_it_is_aligned_too(
-    map, link, bob
-):
+def test_a_costmap_in_the_odometry_frame_is_aligned_with_its_robot(map, link, bob):
     map.add_robot(bob)
     bob.add_module("OnMaps", "OccupancyGrid", link, "/bob/costmap", map_frame="map")
     bob.set_alignment(10.0, 0.0, 90.0)
@@ -156,14 +156,14 @@ def test_a_robots_costmap_in_the_frame_of_its_odometry_lies_as_it_is_aligned_too
     assert to_root(layer.svg).apply(1.0, 0.0) == pytest.approx((10.0, 4.0))
 
 
-def test_layers_let_a_robot_go_that_is_gone(map, link, bob):
+def test_layers_of_a_removed_robot_leave_no_listeners(map, link, bob):
     map.add_robot(bob)
     bob.add_module("OnMaps", "Markers", link, "/bob/markers")
     map.remove_robot(bob)
     assert bob.pose_source._listeners == {}
 
 
-def test_the_gate_is_told_where_a_robots_own_map_lies(link, bob):
+def test_the_motion_spec_for_the_gate_contains_the_alignment(link, bob):
     link.protect = lambda topic, carries: None
     bob.set_move_topic(link, "/goal")
     assert bob.motion.spec().own_map == (0.0, 0.0, 0.0)
@@ -177,13 +177,13 @@ def test_the_gate_is_told_where_a_robots_own_map_lies(link, bob):
 @pytest.mark.parametrize(
     "wrong", [(math.nan, 0, 0), (0, math.inf, 0), (0, 0, "north"), (True, 0, 0)]
 )
-def test_an_alignment_that_is_none_is_refused_and_nothing_moves(link, bob, wrong):
+def test_an_invalid_alignment_is_refused_and_the_robot_does_not_move(link, bob, wrong):
     go(link, 1.0, 0.0)
     with pytest.raises(ConfigError, match="metres and an angle in degrees"):
         bob.set_alignment(*wrong)
     assert where(bob) == (1.0, 0.0, 0.0)
 
 
-def test_the_line_for_a_file_says_its_units():
+def test_the_toml_line_of_an_alignment_names_its_units():
     line = toml_line(Pose(1.23456, -2.0, QUARTER))
     assert line == "alignment = [1.235, -2.0, 90.0] # metres, metres, degrees"

@@ -89,7 +89,7 @@ def dot_of(scanner):
     return dot
 
 
-def test_a_scan_stays_on_the_wall_while_the_robot_turns_on(link, scanner, robot):
+def test_a_scan_stays_in_place_while_the_robot_turns(link, scanner, robot):
     for seconds in (100.0, 100.1):
         odometry(link, seconds)
     link.say("/scan", scan(WALL, 100.05))
@@ -100,7 +100,7 @@ def test_a_scan_stays_on_the_wall_while_the_robot_turns_on(link, scanner, robot)
     assert scanner.svg.parent is robot.svg
 
 
-def test_a_scan_that_overtakes_the_poses_is_set_right_when_they_come(link, scanner):
+def test_a_scan_newer_than_the_poses_is_corrected_when_poses_arrive(link, scanner):
     for seconds in (100.0, 100.1):
         odometry(link, seconds)
     link.say("/scan", scan(WALL, 100.25))
@@ -112,14 +112,16 @@ def test_a_scan_that_overtakes_the_poses_is_set_right_when_they_come(link, scann
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.025))
 
 
-def test_a_scan_without_a_stamp_goes_along_with_the_robot(link, scanner):
+def test_a_scan_without_a_stamp_moves_with_the_robot(link, scanner):
     odometry(link, 100.0)
     link.say("/scan", scan(WALL, 0.0))
     odometry(link, 101.0)
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(1.0))
 
 
-def test_a_scan_by_another_clock_goes_along_and_that_is_said(link, scanner, robot):
+def test_a_scan_of_another_clock_moves_with_the_robot_and_is_a_problem(
+    link, scanner, robot
+):
     robot.set_tf(link, quiet=True)
     tell(link, transform("base_link", "laser", 0.0, 0.0, 0.0, 0), static=True)
     odometry(link, 100.0)
@@ -135,7 +137,7 @@ def test_a_scan_by_another_clock_goes_along_and_that_is_said(link, scanner, robo
     assert robot.problems == {}
 
 
-def test_of_a_robot_without_frames_stamps_that_hardly_fit_are_not_said(
+def test_without_frames_stamps_less_than_a_minute_off_are_no_problem(
     link, scanner, robot
 ):
     odometry(link, 100.0)
@@ -145,7 +147,7 @@ def test_of_a_robot_without_frames_stamps_that_hardly_fit_are_not_said(
     assert robot.problems == {}
 
 
-def test_of_a_robot_without_frames_a_clock_that_is_a_minute_off_is_said(
+def test_without_frames_stamps_more_than_a_minute_off_are_a_problem(
     link, scanner, robot
 ):
     odometry(link, 100.0)
@@ -154,7 +156,7 @@ def test_of_a_robot_without_frames_a_clock_that_is_a_minute_off_is_said(
     assert "63.000 s later; are the clocks" in problem
 
 
-def test_who_stands_and_says_nothing_more_is_no_trouble(link, scanner, robot):
+def test_a_scan_of_a_robot_without_new_poses_is_no_problem(link, scanner, robot):
     odometry(link, 100.0)
     robot.pose_source.received_at -= 90.0
     link.say("/scan", scan(WALL, 190.0))
@@ -162,7 +164,7 @@ def test_who_stands_and_says_nothing_more_is_no_trouble(link, scanner, robot):
     assert robot.problems == {}
 
 
-def test_a_sweep_is_straightened_by_how_the_robot_turned_meanwhile(link, scanner):
+def test_a_scan_is_corrected_for_the_rotation_during_its_sweep(link, scanner):
     for seconds in (100.0, 100.1, 100.2):
         odometry(link, seconds)
     took, wall = 0.1, []
@@ -184,9 +186,7 @@ def test_a_sweep_is_straightened_by_how_the_robot_turned_meanwhile(link, scanner
 
 
 @pytest.mark.parametrize("named", ["map", "nowhere"])
-def test_a_sensor_is_where_static_frames_have_it_on_a_turning_robot(
-    link, scanner, robot, named
-):
+def test_static_frames_place_a_sensor_on_a_turning_robot(link, scanner, robot, named):
     robot.set_tf(link, map_frame=named, quiet=True)
     tell(link, transform("base_link", "laser", 0.5, 0.0, math.pi / 2, 0), static=True)
     for step in range(3):
@@ -202,7 +202,7 @@ def test_a_sensor_is_where_static_frames_have_it_on_a_turning_robot(
         )
 
 
-def test_a_sensor_that_hangs_upside_down_sees_left_what_is_right(link, scanner, robot):
+def test_a_scan_of_an_upside_down_sensor_is_mirrored(link, scanner, robot):
     robot.set_tf(link)
     over = transform("base_link", "laser", 0.2, 0.0, 0.0, 0, roll=math.pi)
     tell(link, over, static=True)
@@ -216,7 +216,7 @@ def test_a_sensor_that_hangs_upside_down_sees_left_what_is_right(link, scanner, 
     assert np.array(on_map(dot_of(scanner))) == near(wanted)
 
 
-def test_a_place_that_was_told_holds_for_a_scan_too(link, robot):
+def test_a_configured_sensor_position_overrides_the_frames_for_a_scan(link, robot):
     robot.set_odometry_topic(link, "/odom", 0, type="geometry_msgs/PoseStamped")
     robot.set_tf(link)
     scanner = robot.add_module("LaserScanner", link, "/scan", 0.3, 0.0, 180.0)
@@ -230,7 +230,7 @@ def test_a_place_that_was_told_holds_for_a_scan_too(link, robot):
     assert found == pytest.approx(wanted, abs=0.002)
 
 
-def test_clouds_and_sonars_stay_where_they_were_measured_too(link, robot):
+def test_clouds_and_sonar_cones_stay_where_they_were_measured(link, robot):
     robot.set_odometry_topic(link, "/odom", 0, type="geometry_msgs/PoseStamped")
     cone = robot.add_module("Range", link, "/sonar")
     points = robot.add_module("PointCloud", link, "/points")
@@ -246,7 +246,7 @@ def test_clouds_and_sonars_stay_where_they_were_measured_too(link, robot):
     assert point == pytest.approx(wanted, abs=0.002)
 
 
-def test_a_module_that_ends_hears_of_its_robot_no_more(link, scanner, robot):
+def test_a_removed_module_has_no_listener_on_the_robot(link, scanner, robot):
     odometry(link, 100.0)
     link.say("/scan", scan(WALL, 100.2))
     robot.remove_module(scanner)

@@ -335,7 +335,7 @@ def with_scene(map, channel, scenario) -> None:
 
 
 @pytest.mark.parametrize("name", SAID)
-def test_what_makes_no_sense_is_said_once_and_disturbs_nothing(map, channel, name):
+def test_invalid_data_gives_one_notice_and_affects_nothing_else(map, channel, name):
     topic, what, said = SAID[name]
 
     async def scenario(scene: Scene) -> None:
@@ -370,7 +370,7 @@ AILING = {
 }
 
 
-def test_a_robot_that_moves_and_sends_nan_is_said_once_and_taken_back(
+def test_repeated_nan_messages_give_one_notice_until_the_data_is_valid(
     map, channel, caplog, monkeypatch
 ):
     """The words have other numbers in them each time."""
@@ -408,7 +408,7 @@ def warnings(caplog) -> list[str]:
 
 
 @pytest.mark.parametrize("name", TAKEN)
-def test_what_is_only_odd_is_drawn_without_a_word(map, channel, name):
+def test_unusual_but_valid_scans_are_drawn_without_a_notice(map, channel, name):
     topic, what, count = TAKEN[name]
 
     async def scenario(scene: Scene) -> None:
@@ -424,7 +424,9 @@ def test_what_is_only_odd_is_drawn_without_a_word(map, channel, name):
 
 
 @pytest.mark.parametrize("name", DOUBTED)
-def test_what_is_wrong_and_can_be_drawn_is_drawn_and_said_once(map, channel, name):
+def test_a_scan_without_any_range_is_drawn_without_dots_and_gives_one_notice(
+    map, channel, name
+):
     what, count, said = DOUBTED[name]
 
     async def scenario(scene: Scene) -> None:
@@ -448,7 +450,7 @@ def dots_of(scene: Scene) -> np.ndarray:
     return np.frombuffer(scanner.dots._dots.points, "<i2").reshape(-1, 2)
 
 
-def test_braces_cost_next_to_no_time(map, channel):
+def test_frames_of_nested_braces_take_little_processor_time(map, channel):
     async def scenario(scene: Scene) -> None:
         began = time.process_time()
         for _ in range(20):
@@ -464,7 +466,7 @@ SIDE = 4096
 
 @pytest.mark.slow
 @pytest.mark.serial
-def test_a_map_of_fifty_megabytes_is_drawn_while_the_rest_goes_on(map, channel):
+def test_a_map_of_50_megabytes_is_drawn_without_blocking_another_robot(map, channel):
     text = publish("/map", grid(0, width=SIDE, height=SIDE, resolution=0.05, data=[-7]))
     huge = text.replace("[-7]", "[" + "-1," * (SIDE * SIDE - 1) + "100]")
 
@@ -497,7 +499,9 @@ BEAMS = publish("/scan", scan(1, ranges=[-7])).replace(
 
 @pytest.mark.slow
 @pytest.mark.serial
-def test_two_million_beams_as_text_are_said_while_the_rest_goes_on(map, channel):
+def test_a_scan_of_two_million_rays_is_refused_without_blocking_another_robot(
+    map, channel
+):
     async def scenario(scene: Scene) -> None:
         mine = await scene.say_good(0, 1.0)
         seen: list[float] = []

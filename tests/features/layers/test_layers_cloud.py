@@ -63,7 +63,7 @@ FLAT = [(x, y) for x, y, _ in POINTS]
     "layout",
     [{}, {"pad": 5}, {"rows": 2, "row_pad": 7}, {"dtype": ">f4"}, {"dtype": "<f8"}],
 )
-def test_every_point_is_a_dot_in_its_place(link, robot, layout, ros2):
+def test_every_point_is_a_dot_at_its_position(link, robot, layout, ros2):
     module = robot.add_module("PointCloud", link, "/points")
     link.say("/points", cloud(POINTS, ros2=ros2, **layout))
     (path,) = module.dots
@@ -82,7 +82,7 @@ def test_a_single_row_needs_no_row_step(link, robot):
     assert "does not fit into rows of 0 bytes" in problem
 
 
-def test_bytes_come_as_bytes_in_cbor_and_as_numbers_from_some_bridges(link, robot):
+def test_point_data_may_be_bytes_in_cbor_or_a_list_of_numbers(link, robot):
     module = robot.add_module("PointCloud", link, "/points")
     message = cloud(POINTS)
     raw = base64.b64decode(message["data"])
@@ -95,7 +95,7 @@ def test_bytes_come_as_bytes_in_cbor_and_as_numbers_from_some_bridges(link, robo
     assert on_map(module.dots[0]) == near(FLAT[:2])
 
 
-def test_the_cloud_goes_with_the_sensor_on_the_robot(link, robot):
+def test_a_cloud_is_placed_by_the_sensor_on_the_robot(link, robot):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
     module = robot.add_module("PointCloud", link, "/points", 0.5, 0.0, 90.0)
     link.say("/odom", {"header": header(), "pose": pose(10, 20, math.pi / 2)})
@@ -104,9 +104,7 @@ def test_the_cloud_goes_with_the_sensor_on_the_robot(link, robot):
     assert on_map(module.dots[0]) == near([(9, 20.5)])
 
 
-def test_a_cloud_in_the_maps_frame_stays_and_keeps_its_millimetres_far_away(
-    link, robot
-):
+def test_a_cloud_in_the_map_frame_stays_in_place_and_is_precise_far_away(link, robot):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
     module = robot.add_module("PointCloud", link, "/points", frame="map")
     far = [[50_000.125, -70_000.25, 0], [50_001.5, -70_002.0, 0]]
@@ -115,13 +113,13 @@ def test_a_cloud_in_the_maps_frame_stays_and_keeps_its_millimetres_far_away(
     assert on_map(module.dots[0]) == near([tuple(point[:2]) for point in far])
 
 
-def test_only_what_is_within_the_window_of_heights_is_drawn(link, robot):
+def test_only_points_between_z_min_and_z_max_are_drawn(link, robot):
     module = robot.add_module("PointCloud", link, "/points", z_min=0.15, z_max=1.0)
     link.say("/points", cloud(POINTS))
     assert on_map(module.dots[0]) == near(FLAT[1:3])
 
 
-def test_points_that_are_nowhere_are_not_drawn(link, robot):
+def test_non_finite_and_very_far_points_are_not_drawn(link, robot):
     module = robot.add_module("PointCloud", link, "/points")
     nowhere = [[math.nan, 0, 0], [0, math.inf, 0], [1, 1, math.nan], [1e30, 0, 0]]
     link.say("/points", cloud([*POINTS, *nowhere]))
@@ -132,7 +130,7 @@ def test_points_that_are_nowhere_are_not_drawn(link, robot):
     assert robot.problems == {}
 
 
-def test_a_cloud_without_heights_is_drawn_whole(link, robot):
+def test_a_cloud_without_a_z_field_is_drawn_completely(link, robot):
     module = robot.add_module("PointCloud", link, "/points", z_min=0.5)
     message = cloud(POINTS)
     del message["fields"][2]
@@ -140,7 +138,7 @@ def test_a_cloud_without_heights_is_drawn_whole(link, robot):
     assert on_map(module.dots[0]) == near(FLAT)
 
 
-def test_a_wall_of_points_above_one_another_is_one_row_of_dots(link, robot):
+def test_points_above_each_other_in_a_cell_are_one_dot(link, robot):
     module = robot.add_module("PointCloud", link, "/points", cell=0.1)
     wall = [
         [2.0, 0.1 * i + 0.05, 0.01 * height] for i in range(20) for height in range(50)
@@ -153,7 +151,7 @@ def test_a_wall_of_points_above_one_another_is_one_row_of_dots(link, robot):
 
 
 @pytest.mark.parametrize("by", ["z", "intensity"])
-def test_a_field_gives_the_colours(link, robot, by):
+def test_points_are_coloured_by_the_chosen_field(link, robot, by):
     module = robot.add_module("PointCloud", link, "/points", colour_by=by)
     values = [[float(i), 0.0, 0.0, 10.0 * i] for i in range(8)]
     if by == "z":
@@ -188,7 +186,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("why", BAD)
-def test_a_cloud_whose_sizes_lie_is_refused_and_the_old_one_stays(link, robot, why):
+def test_a_cloud_with_wrong_sizes_is_refused_and_the_last_cloud_stays(link, robot, why):
     module = robot.add_module("PointCloud", link, "/points")
     link.say("/points", cloud(POINTS))
     link.say("/points", BAD[why])
@@ -197,7 +195,7 @@ def test_a_cloud_whose_sizes_lie_is_refused_and_the_old_one_stays(link, robot, w
     assert why in problem
 
 
-def test_a_field_that_the_points_have_not_is_named(link, robot):
+def test_a_missing_colour_field_is_a_problem_with_its_name(link, robot):
     robot.add_module("PointCloud", link, "/points", colour_by="rgb")
     link.say("/points", cloud(POINTS))
     (problem,) = robot.problems.values()
@@ -208,15 +206,13 @@ def test_a_field_that_the_points_have_not_is_named(link, robot):
     "options",
     [{"z_min": 2, "z_max": 1}, {"cell": -1}, {"max_points": 0}, {"z_min": math.nan}],
 )
-def test_a_cloud_with_options_that_make_no_sense_is_refused(link, robot, options):
+def test_invalid_cloud_options_are_refused(link, robot, options):
     with pytest.raises(ValueError, match="got"):
         robot.add_module("PointCloud", link, "/points", **options)
 
 
 @pytest.mark.parametrize("rows", [1, 4])
-def test_a_large_cloud_is_thinned_evenly_where_it_is_decoded(
-    link, robot, monkeypatch, rows
-):
+def test_the_digest_of_a_large_cloud_is_thinned_evenly(link, robot, monkeypatch, rows):
     monkeypatch.setattr("webmap.features.layers.point_cloud.MOST", 25)
     points = [[x, y, 0.0] for x in range(10) for y in range(12)]
     text = json.dumps(

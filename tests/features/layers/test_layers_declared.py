@@ -64,19 +64,19 @@ def made(name="Own", base=webmap.RobotLayer, **members):
         ),
     ],
 )
-def test_a_mistake_in_a_declaration_is_named_where_it_is_made(types, options, words):
+def test_an_invalid_layer_declaration_is_refused(types, options, words):
     with pytest.raises(ConfigError, match=words):
         webmap.layer(*types, **options)(made())
     assert "Own" not in robot_modules
 
 
-def test_a_layer_that_was_not_declared_says_so_when_it_is_added(robot, link):
+def test_adding_an_undeclared_layer_is_refused(robot, link):
     robot_modules.register(made())
     with pytest.raises(ConfigError, match="the layer Own is not declared"):
         robot.add_module("Own", link, "/topic")
 
 
-def test_a_kind_that_another_layer_has_is_left_out_and_logged_once(caplog):
+def test_a_kind_declared_by_another_layer_is_ignored_and_logged_once(caplog):
     declaration._warn.cache_clear()
     webmap.layer("my_msgs/X", kinds=[webmap.TopicKind("pose"), webmap.TopicKind("x")])(
         made()
@@ -91,7 +91,7 @@ def test_a_kind_that_another_layer_has_is_left_out_and_logged_once(caplog):
     assert {layer.kind for layer in layers["/a"].drawn} == {"x"}
 
 
-def test_an_own_layer_of_a_built_in_type_takes_the_topic_from_the_robot_s_roles():
+def test_a_custom_layer_takes_topics_of_its_type_from_the_roles_of_the_robot():
     webmap.layer("sensor_msgs/LaserScan", kind="my scan")(made("OwnScan"))
     webmap.layer("nav_msgs/Path", kind="my path", names="own")(made("OwnPath"))
     grids = [webmap.TopicKind("my grid", shared=True)]
@@ -113,9 +113,7 @@ def test_an_own_layer_of_a_built_in_type_takes_the_topic_from_the_robot_s_roles(
     assert kinds["/map"] == "my grid"
 
 
-def test_limits_of_options_hold_in_a_file_whose_annotations_are_texts(
-    monkeypatch, robot, link
-):
+def test_option_limits_apply_with_postponed_annotations(monkeypatch, robot, link):
     source = """
 from __future__ import annotations
 from typing import ClassVar
@@ -139,7 +137,7 @@ class Late(webmap.RobotLayer):
     assert robot.add_module("Late", link, "/x", most=None).most is None
 
 
-def test_a_refused_message_does_not_move_what_was_drawn_before(map, robot, link):
+def test_a_refused_message_does_not_move_the_last_drawing(map, robot, link):
     def draw(self, message, at):
         self.place = message.x
 
@@ -183,7 +181,7 @@ def test_nan_in_a_list_is_refused_in_every_encoding(robot, link, cbor):
     assert "ranges must be" in next(iter(robot.problems.values()))
 
 
-def test_a_header_and_a_stamp_of_its_own_are_what_the_message_says(robot, link):
+def test_draw_gets_the_frame_and_the_stamp_of_the_message(robot, link):
     seen = []
 
     def draw(self, message, at):
@@ -217,7 +215,7 @@ PUBLIC_MODULES = ("drawing", "geometry", "html", "messages", "options", "svg")
 
 
 @pytest.mark.parametrize("declared", declarations(), ids=lambda each: each.name)
-def test_a_built_in_layer_is_made_of_public_names(declared):
+def test_built_in_layers_import_only_public_or_listed_names(declared):
     if not declared.built_in:
         pytest.skip("it does not come with WebMap")
     homes = [getattr(webmap, name) for name in PUBLIC_MODULES]

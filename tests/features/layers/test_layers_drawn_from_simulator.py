@@ -158,7 +158,7 @@ def near(tab: Page, script: str, wanted, within: float, what: str) -> None:
     until(lambda: tab.evaluate(script), lambda found: off(found) <= within, what)
 
 
-def test_the_robot_is_where_it_truly_is(tab, running):
+def test_the_robot_is_drawn_at_its_true_pose(tab, running):
     pose = running.world.robots[0].pose
     odometry = running.world.robots[0].odometry
     assert math.dist((odometry.x, odometry.y), (pose.x, pose.y)) > 5
@@ -167,7 +167,7 @@ def test_the_robot_is_where_it_truly_is(tab, running):
     near(tab, script, [(pose.x, pose.y), (front.x, front.y)], 0.005, "robot")
 
 
-def test_every_dot_of_a_scan_is_where_its_ray_ends(tab, running):
+def test_every_dot_of_a_scan_is_at_the_end_of_its_ray(tab, running):
     pose = running.world.robots[0].pose
     ranges = running.world.sweep([0])[0]
     turns = pose.yaw - math.pi + np.arange(len(ranges)) * math.tau / len(ranges)
@@ -177,7 +177,7 @@ def test_every_dot_of_a_scan_is_where_its_ray_ends(tab, running):
     near(tab, 'dots(".laserscan > .dot")', np.column_stack((xs, ys)), 0.005, "scan")
 
 
-def test_a_cloud_has_walls_and_other_robots_and_no_floor(tab, running):
+def test_a_cloud_shows_walls_and_other_robots_but_no_floor(tab, running):
     pose = running.world.robots[0].pose
     ranges = running.world.sweep([0])[0]
     walls = running.world.scanner.sweep([pose])[0]
@@ -212,7 +212,7 @@ def test_a_cloud_has_walls_and_other_robots_and_no_floor(tab, running):
     assert bands[-1]
 
 
-def test_the_map_has_its_walls_and_rooms(tab, running):
+def test_the_map_shows_walls_and_free_space(tab, running):
     plan = running.world.plan
     rows, columns = np.nonzero(plan.occupancy == 100)
     solid = [plan.center(rows[i], columns[i]) for i in range(0, len(rows), 97)]
@@ -224,7 +224,7 @@ def test_the_map_has_its_walls_and_rooms(tab, running):
 
 
 @pytest.mark.parametrize("part", ["local", "global"])
-def test_costs_are_lethal_at_walls_and_fall_with_the_distance(tab, running, part):
+def test_costs_are_lethal_at_walls_and_decrease_with_distance(tab, running, part):
     world = running.world
     pose, obstacles = world.robots[0].pose, world.obstacles
     places, kinds = [], []
@@ -261,7 +261,7 @@ def _edge(obstacles, cell) -> bool:
     return not obstacles.solid[row - 1 : row + 2, column - 1 : column + 2].all()
 
 
-def test_updates_of_a_costmap_follow_a_robot_that_passes(tab, running):
+def test_costmap_updates_follow_a_passing_robot(tab, running):
     one, other = running.world.robots
     home = other.pose
     find = '(at) => pixels(".occupancy-grid.local > image", [at])'
@@ -293,7 +293,7 @@ def test_updates_of_a_costmap_follow_a_robot_that_passes(tab, running):
     running.do(lambda: setattr(other, "pose", home))
 
 
-def test_particles_and_an_ellipse_say_how_sure_it_is(tab, running):
+def test_particles_and_the_ellipse_show_the_uncertainty_of_the_pose(tab, running):
     pose = running.world.robots[0].pose
 
     def drawn_from() -> list[tuple[float, float]]:
@@ -314,7 +314,7 @@ def test_particles_and_an_ellipse_say_how_sure_it_is(tab, running):
     assert math.sin(turn) == pytest.approx(0, abs=0.01), "the long axis lies ahead"
 
 
-def test_a_footprint_is_about_the_robot_though_it_is_given_in_odom(tab, running):
+def test_a_footprint_in_the_odom_frame_is_drawn_around_the_robot(tab, running):
     pose = running.world.robots[0].pose
     turns = [pose.yaw + i * math.tau / 16 for i in range(16)]
     outline = [
@@ -323,7 +323,7 @@ def test_a_footprint_is_about_the_robot_though_it_is_given_in_odom(tab, running)
     near(tab, 'polyline(".polygon > polygon")', outline, 0.005, "footprint")
 
 
-def test_a_cone_begins_at_the_sonar_and_ends_at_what_it_hears(tab, running):
+def test_a_cone_begins_at_the_sonar_and_ends_at_its_measured_distance(tab, running):
     sonar = running.world.robots[0].pose @ Pose(0.25)
     near(tab, 'starts(".range > .cone")', [(sonar.x, sonar.y)], 0.005, "cone")
     arc = 'document.querySelector(".range > .cone").getAttribute("d")'
@@ -337,7 +337,7 @@ def test_a_cone_begins_at_the_sonar_and_ends_at_what_it_hears(tab, running):
     until(lambda: tab.evaluate(arc), lambda path: apart(path) < 0.002, "its length")
 
 
-def test_points_of_the_base_and_cells_of_odometry_are_in_place_on_the_map(tab, running):
+def test_points_in_base_link_and_cells_in_odom_are_in_place_on_the_map(tab, running):
     node, robot = running.node, running.world.robots[0]
     at = robot.odometry @ Pose(1.0, 0.5)
     messages = {
@@ -379,7 +379,7 @@ def place(x: float, y: float) -> dict[str, float]:
     return {"x": x, "y": y, "z": 0.0}
 
 
-def test_a_fix_of_satellites_is_where_the_robot_is(tab, running):
+def test_a_satellite_fix_is_drawn_at_the_robot(tab, running):
     pose = running.world.robots[0].pose
     near(
         tab, 'inWorld(".navsatfix > .cross", [[0, 0]])', [(pose.x, pose.y)], 0.02, "fix"
@@ -388,7 +388,7 @@ def test_a_fix_of_satellites_is_where_the_robot_is(tab, running):
     assert float(doubt.get_attribute("r")) == pytest.approx(0.3)
 
 
-def test_battery_health_and_picture_are_said_and_shown(tab, running):
+def test_battery_charge_health_and_log_are_shown(tab, running):
     charge = running.world.robots[0].charge
     expect(tab.locator("#charge")).to_have_text(f"{100 * charge:.1f} %")
     expect(tab.locator("#health > li")).to_have_count(3)
@@ -412,7 +412,7 @@ def test_battery_health_and_picture_are_said_and_shown(tab, running):
     expect(tab.locator("#charge")).to_have_text("5.0 %")
 
 
-def test_a_picture_is_what_the_camera_sees(tab, running):
+def test_the_shown_picture_matches_the_simulated_camera(tab, running):
     tab.wait_for_function("document.querySelector('#view').naturalWidth === 320")
     true = np.asarray(Image.open(io.BytesIO(running.world.look(0))), float)
 
@@ -500,7 +500,9 @@ def _reachable(world, here: Pose, near: float, far: float) -> Pose:
     raise AssertionError("there is no such place")
 
 
-def test_each_layer_is_switched_off_and_on_by_keyboard_and_kept(tab, chromium, url):
+def test_each_layer_can_be_switched_by_keyboard_and_the_choice_persists(
+    tab, chromium, url
+):
     tab.locator(".webmap-layers > summary").focus()
     tab.keyboard.press("Enter")
     boxes = tab.locator(".webmap-layers-row:not([hidden]) > input")

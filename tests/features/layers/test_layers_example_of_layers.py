@@ -30,7 +30,7 @@ DRAWN = (
 )
 
 
-def test_the_tutorial_draws_all_that_a_robot_says(chromium: Browser, tmp_path):
+def test_the_layers_tutorial_draws_all_its_layers(chromium: Browser, tmp_path):
     with simulators("ros1") as found:
         text = EXAMPLE.read_text()
         assert text.count("ws://localhost:9090") == 1

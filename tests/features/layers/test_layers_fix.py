@@ -30,7 +30,7 @@ def at(module) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("ros2", [False, True])
-def test_a_fix_is_as_many_metres_from_the_datum_as_the_globe_has(link, robot, ros2):
+def test_a_fix_is_drawn_at_its_true_distance_from_the_datum(link, robot, ros2):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
     link.say("/fix", fix(50.001, 13.998, ros2=ros2))
     assert at(module) == pytest.approx(
@@ -40,7 +40,7 @@ def test_a_fix_is_as_many_metres_from_the_datum_as_the_globe_has(link, robot, ro
 
 
 @pytest.mark.parametrize("type", ["gps_common/GPSFix", "gps_msgs/msg/GPSFix"])
-def test_a_gps_fix_is_drawn_as_a_fix(link, robot, type):
+def test_a_gps_fix_message_is_drawn_like_a_nav_sat_fix_message(link, robot, type):
     ros2 = type.startswith("gps_msgs")
     module = robot.add_module("NavSatFix", link, "/gps", datum=DATUM, type=type)
     assert link.types["/gps"] == type
@@ -53,18 +53,18 @@ def test_a_gps_fix_is_drawn_as_a_fix(link, robot, type):
     assert "lost" in module.svg.classes
 
 
-def test_what_tells_of_no_fix_is_refused(link, robot):
+def test_a_message_type_without_fixes_is_refused(link, robot):
     with pytest.raises(ConfigError, match="type is one of sensor_msgs/NavSatFix, "):
         robot.add_module("NavSatFix", link, type="sensor_msgs/LaserScan")
 
 
-def test_a_map_whose_x_is_north_has_north_to_the_right(link, robot):
+def test_north_is_along_x_with_east_at_90_degrees(link, robot):
     module = robot.add_module("NavSatFix", link, datum=DATUM, east=90.0)
     link.say("/fix", fix(50.001, 14.0))
     assert at(module) == pytest.approx((111.229, 0), abs=0.01)
 
 
-def test_without_a_datum_the_first_fix_is_where_the_robot_is_then(link, robot):
+def test_without_a_datum_the_first_fix_is_placed_at_the_robot(link, robot):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
     link.say("/odom", {"header": header(), "pose": pose(7, -3, 1.0)})
     module = robot.add_module("NavSatFix", link)
@@ -75,7 +75,7 @@ def test_without_a_datum_the_first_fix_is_where_the_robot_is_then(link, robot):
     assert at(module) == pytest.approx((7, -3 + 11.1229), abs=0.01)
 
 
-def test_a_fix_before_the_first_pose_is_no_anchor(link, robot):
+def test_a_fix_before_the_first_pose_does_not_set_the_datum(link, robot):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
     module = robot.add_module("NavSatFix", link)
     link.say("/fix", fix(50.0, 14.0))
@@ -100,7 +100,9 @@ def in_odometry(link, robot):
 
 
 @pytest.mark.parametrize("quiet", [False, True])
-def test_a_fix_waits_until_frames_have_the_robot_on_the_map(link, in_odometry, quiet):
+def test_the_first_fix_waits_until_frames_place_the_robot_on_the_map(
+    link, in_odometry, quiet
+):
     module = in_odometry(quiet=quiet)
     link.say("/fix", fix(50.0, 14.0))
     assert module.position is None
@@ -111,7 +113,7 @@ def test_a_fix_waits_until_frames_have_the_robot_on_the_map(link, in_odometry, q
     assert module.datum == (50.001, 14.0)
 
 
-def test_a_robot_without_a_map_has_its_fix_by_odometry_until_there_is_one(
+def test_a_fix_is_placed_by_odometry_until_the_robot_has_a_map_frame(
     link, in_odometry, monkeypatch
 ):
     module = in_odometry(quiet=True)
@@ -128,7 +130,7 @@ def test_a_robot_without_a_map_has_its_fix_by_odometry_until_there_is_one(
     assert at(module) == pytest.approx((32, 131.229), abs=0.01)
 
 
-def test_the_circle_is_as_wide_as_the_doubt(link, robot):
+def test_the_radius_of_the_circle_is_the_standard_deviation(link, robot):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
     link.say("/fix", fix(50, 14, spread=[4.0, 0, 0, 0, 2.25, 0, 0, 0, 9.0]))
     assert module.covariance.get("r") == "2"
@@ -136,13 +138,13 @@ def test_the_circle_is_as_wide_as_the_doubt(link, robot):
     assert module.covariance.get("r") == "0"
 
 
-def test_over_the_date_line_it_is_not_far(link, robot):
+def test_a_fix_across_the_date_line_is_near_the_datum(link, robot):
     module = robot.add_module("NavSatFix", link, datum=(0.0, 179.9999))
     link.say("/fix", fix(0.0, -179.9999))
     assert at(module) == pytest.approx((22.26, 0), abs=0.01)
 
 
-def test_a_receiver_that_has_lost_its_fix_leaves_the_last_one(link, robot):
+def test_a_lost_fix_keeps_the_last_position(link, robot):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
     assert module.cross.get("visibility") == "hidden"
     link.say("/fix", fix(50, 14))
@@ -158,7 +160,7 @@ def test_a_receiver_that_has_lost_its_fix_leaves_the_last_one(link, robot):
 @pytest.mark.parametrize(
     ("lat", "lon"), [(None, 14), (50, None), (91, 14), (-90.1, 0), (50, 1e9)]
 )
-def test_a_fix_that_is_on_no_globe_is_refused(link, robot, lat, lon):
+def test_a_fix_with_invalid_coordinates_is_refused(link, robot, lat, lon):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
     link.say("/fix", fix(50, 14))
     link.say("/fix", fix(lat, lon))
@@ -168,6 +170,6 @@ def test_a_fix_that_is_on_no_globe_is_refused(link, robot, lat, lon):
 
 
 @pytest.mark.parametrize("datum", [(91, 0), (50,), (math.nan, 0), (90, 0)])
-def test_a_datum_on_no_globe_is_refused(link, robot, datum):
+def test_an_invalid_datum_is_refused(link, robot, datum):
     with pytest.raises(ValueError, match=r"datum(: expected 2 in| is a latitude)"):
         robot.add_module("NavSatFix", link, datum=datum)

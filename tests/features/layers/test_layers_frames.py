@@ -48,7 +48,7 @@ def odometry(link, x, y, yaw):
     link.say("/odom", {"header": header("odom"), "pose": pose(x, y, yaw)})
 
 
-def test_a_path_in_the_frame_of_the_odometry_is_drawn_where_that_is(link, robot):
+def test_a_path_in_the_odometry_frame_is_placed_by_that_frame(link, robot):
     module = robot.add_module("Path", link, "/plan")
     tell(link, transform("map", "odom", *ODOM))
     message = path([(1.0, 2.0), (3.0, 4.0)])
@@ -62,7 +62,7 @@ def test_a_path_in_the_frame_of_the_odometry_is_drawn_where_that_is(link, robot)
     assert in_world(module.line) == near([(1, 2), (3, 4)])
 
 
-def test_a_frame_is_looked_up_as_it_was_at_the_stamp(link, robot):
+def test_a_frame_is_looked_up_at_the_stamp_of_the_message(link, robot):
     module = robot.add_module("Path", link, "/plan")
     tell(link, transform("map", "odom", 1, 0, 0, secs=3))
     tell(link, transform("map", "odom", 2, 0, 0, secs=4))
@@ -72,7 +72,7 @@ def test_a_frame_is_looked_up_as_it_was_at_the_stamp(link, robot):
     assert in_world(module.line) == near([(1, 0), (1, 4)])
 
 
-def test_a_sensor_is_where_the_frames_have_it_on_the_robot(link, robot):
+def test_sensor_data_is_placed_by_the_frame_of_the_sensor(link, robot):
     cone = robot.add_module("Range", link, "/sonar")
     points = robot.add_module("PointCloud", link, "/points")
     tell(
@@ -90,7 +90,7 @@ def test_a_sensor_is_where_the_frames_have_it_on_the_robot(link, robot):
     assert on_robot.apply(*dot) == pytest.approx((0.0, -1.5), abs=2e-3)
 
 
-def test_a_place_that_a_module_was_told_comes_before_the_frames(link, robot):
+def test_a_configured_sensor_position_overrides_the_frames(link, robot):
     cone = robot.add_module("Range", link, "/sonar", 0.2, 0.0, 0.0)
     tell(link, transform("base_link", "sonar", 5, 5, 1), static=True)
     link.say("/sonar", sonar(1.0))
@@ -98,7 +98,7 @@ def test_a_place_that_a_module_was_told_comes_before_the_frames(link, robot):
     assert on_robot.apply(0, 0) == pytest.approx((0.2, 0))
 
 
-def test_a_frame_that_nobody_tells_of_is_said_until_somebody_does(link, robot):
+def test_an_unknown_frame_is_a_problem_until_it_is_known(link, robot):
     module = robot.add_module("Path", link, "/plan")
     message = path([(1.0, 2.0), (3.0, 4.0)])
     message["header"] = header("odom")
@@ -130,7 +130,7 @@ def local(**info) -> dict:
     return {**grid(CORNERS, 1.0, pose(2, 3), **info), "header": header("odom")}
 
 
-def test_a_costmap_in_the_odometrys_frame_moves_as_that_does(map, link, channel):
+def test_a_costmap_in_the_odometry_frame_moves_with_that_frame(map, link, channel):
     before = dict(_shared_frames)
     module = map.add_module("OccupancyGrid", link, "/local", map_frame="map")
     link.say("/local", {**local(), "header": header("map")})
@@ -151,7 +151,7 @@ def test_a_costmap_in_the_odometrys_frame_moves_as_that_does(map, link, channel)
     assert _shared_frames == before
 
 
-def test_a_costmap_of_one_of_many_robots_is_placed_by_that_ones_frames(map, link):
+def test_a_costmap_is_placed_by_the_frames_of_its_namespace(map, link):
     module = map.add_module(
         "OccupancyGrid", link, "/r1/local", map_frame="map", namespace="/r1"
     )
@@ -162,7 +162,7 @@ def test_a_costmap_of_one_of_many_robots_is_placed_by_that_ones_frames(map, link
     assert "/tf" not in link.listeners
 
 
-def test_without_a_frame_of_the_map_a_grid_is_drawn_as_it_comes(map, link):
+def test_a_grid_without_a_map_frame_ignores_frames(map, link):
     module = map.add_module("OccupancyGrid", link, "/local")
     link.say("/local", local())
     assert colour(module.layer.picture.element, 2.5, 3.5) == BLACK

@@ -68,7 +68,7 @@ CORNERS = [[100, 0, 0], [0, -1, 50]]
     ("x", "y", "yaw"),
     [(0, 0, 0), (-12.34, 7.89, 0), (3.3, -4.4, math.pi / 2), (-1, -2, -2.5)],
 )
-def test_every_cell_is_where_its_origin_puts_it(link, module, x, y, yaw, ros2):
+def test_every_cell_is_placed_by_the_origin_of_the_grid(link, module, x, y, yaw, ros2):
     link.say("/map", grid(CORNERS, 0.35, pose(x, y, yaw), ros2=ros2))
     placed = Affine.translation(x, y) @ Affine.rotation(yaw)
     colours = {100: BLACK, 0: WHITE, -1: CLEAR, 50: (128, 128, 128, 255)}
@@ -80,12 +80,12 @@ def test_every_cell_is_where_its_origin_puts_it(link, module, x, y, yaw, ros2):
     assert pixel(shown(module), *outside) is None
 
 
-def test_the_image_itself_has_the_highest_row_at_the_top(link, module):
+def test_the_image_has_the_highest_row_at_the_top(link, module):
     link.say("/map", grid(CORNERS))
     assert image_of(shown(module)).getpixel((0, 1)) == BLACK
 
 
-def test_cells_in_cbor_are_the_same_cells(link, module):
+def test_cells_in_cbor_give_the_same_picture(link, module):
     message = grid(CORNERS)
     message["data"] = typed(72, np.array(CORNERS, np.int8))
     link.say("/map", message, cbor=True)
@@ -93,7 +93,7 @@ def test_cells_in_cbor_are_the_same_cells(link, module):
     assert pixel(shown(module), 0.7, 0.7) == CLEAR
 
 
-def test_a_costmap_shows_what_is_lethal_inscribed_and_free(map, link):
+def test_a_costmap_has_colours_for_lethal_inscribed_and_free_cells(map, link):
     module = map.add_module("OccupancyGrid", link, "/costmap", palette="costmap")
     link.say("/costmap", grid([[0, 1, 98, 99, 100, -1]], 1.0))
     colours = [pixel(shown(module), x + 0.5, 0.5) for x in range(6)]
@@ -106,7 +106,9 @@ def test_a_costmap_shows_what_is_lethal_inscribed_and_free(map, link):
     assert module.layer.svg.classes
 
 
-def test_a_costmap_lies_over_a_map_and_both_under_robots(map, link, channel, robot):
+def test_a_costmap_is_drawn_over_the_map_and_both_under_robots(
+    map, link, channel, robot
+):
     map.add_robot(robot)
     layers = [
         map.add_module("OccupancyGrid", link, "/costmap", palette="costmap").layer,
@@ -119,7 +121,7 @@ def test_a_costmap_lies_over_a_map_and_both_under_robots(map, link, channel, rob
     assert plan < costs < robots
 
 
-def test_an_update_changes_its_rectangle_alone(link, module):
+def test_an_update_changes_only_its_rectangle(link, module):
     link.say("/map", grid(np.zeros((4, 5)), 1.0, pose(10, 20)))
     link.say("/map_updates", update(1, 2, [[100, 100], [-1, 100]]))
     black = {
@@ -139,7 +141,7 @@ def test_an_update_before_the_grid_changes_nothing(link, module, channel):
 
 
 @pytest.mark.parametrize(("x", "y"), [(-1, 0), (0, -1), (2, 0), (0, 2), (2**31, 0)])
-def test_an_update_that_reaches_out_is_refused(link, module, channel, x, y):
+def test_an_update_outside_the_grid_is_refused(link, module, channel, x, y):
     link.say("/map", grid(np.zeros((3, 3))))
     before = shown(module).get("href")
     link.say("/map_updates", update(x, y, [[100, 100], [100, 100]]))
@@ -173,9 +175,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("why", BAD)
-def test_a_grid_that_makes_no_sense_is_refused_and_the_old_one_stays(
-    link, module, channel, why
-):
+def test_an_invalid_grid_is_refused_and_the_last_grid_stays(link, module, channel, why):
     link.say("/map", grid(CORNERS))
     before = shown(module).attributes, shown(module)._transform
     link.say("/map", BAD[why])
@@ -187,7 +187,7 @@ def test_a_grid_that_makes_no_sense_is_refused_and_the_old_one_stays(
     assert pixel(shown(module), 0.1, 0.1) == WHITE
 
 
-def test_who_opens_a_page_later_reads_what_is_wrong_too(map, page, link, channel):
+def test_a_map_added_later_also_shows_the_problem_of_a_grid(map, page, link, channel):
     first = map.add_module("OccupancyGrid", link, "/map")
     link.say("/map", grid(CORNERS, 0))
     other = Map(page.element("other"), 10, 10)
@@ -206,13 +206,13 @@ def test_raw_cells_may_have_any_value(map, link, channel):
     assert channel.errors == []
 
 
-def test_a_palette_that_does_not_exist_is_named(map, link):
+def test_an_unknown_palette_is_refused_with_the_known_names(map, link):
     with pytest.raises(ValueError, match='"map" or "costmap" or "raw", got'):
         map.add_module("OccupancyGrid", link, "/map", palette="heat")
     assert Layer._shared == {}
 
 
-def test_fifty_maps_cost_one_picture_and_leave_none_behind(page, link, monkeypatch):
+def test_fifty_maps_share_one_picture_and_release_it(page, link, monkeypatch):
     drawn, before = [], len(pictures)
     monkeypatch.setattr(
         room, "grid_png", lambda *args: drawn.append(args) or b"picture"
@@ -228,7 +228,7 @@ def test_fifty_maps_cost_one_picture_and_leave_none_behind(page, link, monkeypat
     assert len(pictures) == before
 
 
-def test_the_server_serves_the_newest_picture_and_drops_the_old_ones(
+def test_the_newest_picture_is_served_and_old_pictures_are_dropped(
     link, module, monkeypatch
 ):
     monkeypatch.setattr("webmap.core.pictures.KEPT_FOR", 0.0)
@@ -241,7 +241,7 @@ def test_the_server_serves_the_newest_picture_and_drops_the_old_ones(
     assert len(pictures) == before + 2, "what a page that is a frame behind asks for"
 
 
-def test_a_large_grid_is_drawn_beside_the_model_and_the_newest_wins(map, link):
+def test_a_large_grid_is_drawn_in_the_background_and_the_newest_is_shown(map, link):
     async def scenario():
         module = map.add_module("OccupancyGrid", link, "/map")
         cells = np.zeros((600, 600), np.int8)
@@ -260,7 +260,7 @@ def test_a_large_grid_is_drawn_beside_the_model_and_the_newest_wins(map, link):
     asyncio.run(scenario())
 
 
-def test_the_age_of_a_map_is_known_but_it_is_old_only_where_that_is_said(map, link):
+def test_a_grid_becomes_stale_only_with_an_age_limit(map, link):
     once = map.add_module("OccupancyGrid", link, "/map")
     often = map.add_module("OccupancyGrid", link, "/costmap", age_limit=2.0)
     for topic in ("/map", "/costmap"):
@@ -269,9 +269,7 @@ def test_the_age_of_a_map_is_known_but_it_is_old_only_where_that_is_said(map, li
     assert often.layer.svg._age.limit == 2.0
 
 
-def test_a_page_that_is_behind_still_gets_the_pictures_of_a_moment_ago(
-    link, module, monkeypatch
-):
+def test_a_slow_page_still_gets_recent_pictures(link, module, monkeypatch):
     monkeypatch.setattr("webmap.core.pictures.KEPT_FOR", 60.0)
     urls, before = [], len(pictures)
     for value in range(100):

@@ -36,7 +36,7 @@ def levels(module) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("ros2", [False, True])
-def test_each_part_is_known_by_its_name_and_the_worst_is_first(link, module, ros2):
+def test_parts_are_kept_by_name_with_the_worst_level_first(link, module, ros2):
     assert module.level is None
     link.say("/diagnostics", array(status("motors", 0), status("lidar", 1), ros2=ros2))
     link.say("/diagnostics", array(status("battery", 2, "low", volts="21.5")))
@@ -52,14 +52,14 @@ def test_each_part_is_known_by_its_name_and_the_worst_is_first(link, module, ros
 @pytest.mark.parametrize(
     "write", [chr, lambda n: base64.b64encode(bytes([n])).decode()]
 )
-def test_a_level_may_come_as_a_byte_in_text(link, module, write):
+def test_a_level_may_be_a_character_or_base64(link, module, write):
     parts = [status(name, write(level)) for level, name in enumerate("abcd")]
     link.say("/diagnostics", array(*parts))
     assert levels(module) == {"a": "ok", "b": "warn", "c": "error", "d": "stale"}
 
 
 @pytest.mark.parametrize("level", [4, -1, 48, "0", "error", "AAA=", ""])
-def test_a_level_that_there_is_not_is_said_and_the_other_parts_count(
+def test_an_unknown_level_is_a_problem_and_the_other_parts_are_kept(
     link, module, robot, level
 ):
     link.say("/diagnostics", array(status("one", 1)))
@@ -71,7 +71,7 @@ def test_a_level_that_there_is_not_is_said_and_the_other_parts_count(
     assert robot.problems == {}
 
 
-def test_a_part_that_falls_silent_is_stale(link, module, monkeypatch):
+def test_a_part_without_new_data_is_stale(link, module, monkeypatch):
     now = room.time.monotonic()
     monkeypatch.setattr(room.time, "monotonic", lambda: now)
     link.say("/diagnostics", array(status("one", 0), status("two", 0)))
@@ -81,7 +81,7 @@ def test_a_part_that_falls_silent_is_stale(link, module, monkeypatch):
     assert module.parts[0].message == "no data for 12 s"
 
 
-def test_robots_that_share_a_topic_have_each_its_own_parts(link, robot):
+def test_a_prefix_selects_the_parts_of_the_robot(link, robot):
     module = robot.add_module("Diagnostics", link, prefix="bob: ")
     link.say("/diagnostics", array(status("bob: arm", 0), status("eve: arm", 2)))
     assert levels(module) == {"bob: arm": "ok"}
@@ -89,16 +89,14 @@ def test_robots_that_share_a_topic_have_each_its_own_parts(link, robot):
 
 @pytest.mark.parametrize("said", ["robot_0/", "/robot_0/"])
 @pytest.mark.parametrize("name", ["robot_0/base: Motors", "/robot_0/base: Motors"])
-def test_a_slash_in_front_makes_no_other_prefix_or_name(link, robot, said, name):
+def test_a_leading_slash_in_a_prefix_or_name_is_ignored(link, robot, said, name):
     module = robot.add_module("Diagnostics", link, prefix=said)
     link.say("/diagnostics", array(status(name, 2), status("/robot_01/arm: a", 1)))
     assert levels(module) == {name: "error"}
 
 
 @pytest.mark.parametrize("name", ["base: Motors", "/Power/base", "a/base: Motors"])
-def test_the_only_robot_of_a_topic_has_all_parts_whatever_they_are_called(
-    link, robot, name
-):
+def test_the_only_robot_of_a_topic_has_all_parts_with_any_name(link, robot, name):
     module = robot.add_module("Diagnostics", link, namespace="/robot_0")
     link.say("/diagnostics", array(status(name, 0)))
     assert (levels(module), module.level) == ({name: "ok"}, "ok")
@@ -117,9 +115,7 @@ def two(link):
         robot.destroy()
 
 
-def test_of_robots_that_share_a_topic_each_has_what_begins_with_its_namespace(
-    link, two
-):
+def test_robots_that_share_a_topic_have_the_parts_of_their_namespace(link, two):
     names = ["a/base: Motors", "/b/laser: Frequency", "/a/Power/battery"]
     link.say("/diagnostics", array(*(status(name, 0) for name in names)))
     assert [set(levels(module)) for module in two] == [
@@ -129,9 +125,7 @@ def test_of_robots_that_share_a_topic_each_has_what_begins_with_its_namespace(
     assert [module.level for module in two] == ["ok", "ok"]
 
 
-def test_an_error_of_a_part_that_no_namespace_is_in_front_of_is_on_every_robot(
-    link, two
-):
+def test_an_error_of_a_part_without_a_namespace_is_shown_on_every_robot(link, two):
     link.say("/diagnostics", array(status("a/base: Motors", 0)))
     link.say("/diagnostics", array(status("base: Motors", 2, "hot")))
     assert [module.level for module in two] == ["error", "error"]
@@ -139,7 +133,7 @@ def test_an_error_of_a_part_that_no_namespace_is_in_front_of_is_on_every_robot(
     assert [part.shared for part in two[0].parts] == [True, False]
 
 
-def test_that_parts_of_nobody_are_well_says_nothing_of_any_robot(link, two):
+def test_an_ok_part_without_a_namespace_does_not_count_for_a_robot(link, two):
     link.say("/diagnostics", array(status("b/x: y", 0), status("base: Motors", 0)))
     a, b = two
     assert (a.level, b.level) == (None, "ok")
@@ -147,7 +141,7 @@ def test_that_parts_of_nobody_are_well_says_nothing_of_any_robot(link, two):
     assert a.svg.text == "no diagnostics of this robot received"
 
 
-def test_a_robot_whose_filter_lets_nothing_through_is_not_well(link, robot):
+def test_a_robot_without_matching_parts_has_no_level(link, robot):
     module = robot.add_module("Diagnostics", link, prefix="robot_0/")
     assert set(module.svg.classes) == {"diagnostics", "unheard"}
     link.say("/diagnostics", array(status("base: Motors", 0)))
@@ -155,9 +149,7 @@ def test_a_robot_whose_filter_lets_nothing_through_is_not_well(link, robot):
     assert set(module.svg.classes) == {"diagnostics", "unheard"}
 
 
-def test_a_robot_that_comes_later_takes_its_parts_from_the_one_that_was_alone(
-    link, robot
-):
+def test_a_second_robot_removes_its_parts_from_the_first_robot(link, robot):
     first = robot.add_module("Diagnostics", link, namespace="/a")
     link.say("/diagnostics", array(status("b/base: Motors", 2), status("base: x", 0)))
     assert first.level == "error"
@@ -168,7 +160,7 @@ def test_a_robot_that_comes_later_takes_its_parts_from_the_one_that_was_alone(
     assert first.level == "error", "it is the only one again"
 
 
-def test_an_error_is_not_hidden_by_another_robots_part_of_the_same_name(
+def test_an_ok_part_does_not_hide_an_error_part_with_the_same_name(
     link, two, monkeypatch
 ):
     now = room.time.monotonic()
@@ -180,7 +172,7 @@ def test_an_error_is_not_hidden_by_another_robots_part_of_the_same_name(
     assert two[0].level is None, "nobody says it any more"
 
 
-def test_of_two_parts_of_one_name_on_other_hardware_the_worse_counts(link, module):
+def test_parts_with_one_name_on_different_hardware_give_the_worse_level(link, module):
     bad, good = status("motor: Driver", 2), status("motor: Driver", 0)
     link.say("/diagnostics", array({**bad, "hardware_id": "left"}))
     link.say("/diagnostics", array({**good, "hardware_id": "right"}))
@@ -189,12 +181,12 @@ def test_of_two_parts_of_one_name_on_other_hardware_the_worse_counts(link, modul
     assert module.level == "ok"
 
 
-def test_a_namespace_and_a_prefix_are_not_given_both(link, robot):
+def test_a_namespace_together_with_a_prefix_is_refused(link, robot):
     with pytest.raises(ConfigError, match="or a prefix, not both, got '/a' and 'b/'"):
         robot.add_module("Diagnostics", link, namespace="/a", prefix="b/")
 
 
-def test_a_list_on_a_page_has_a_row_for_each_part_until_the_page_ends(link, module):
+def test_a_page_lists_each_part_in_a_row_until_the_page_closes(link, module):
     rows, page = html.ul(), Scope("page")
     with page.active():
         module.show_in(rows)
@@ -209,14 +201,16 @@ def test_a_list_on_a_page_has_a_row_for_each_part_until_the_page_ends(link, modu
     assert len(rows.children) == 2
 
 
-def test_there_is_an_end_to_the_number_of_parts(link, module, robot, monkeypatch):
+def test_the_number_of_parts_is_limited(link, module, robot, monkeypatch):
     monkeypatch.setattr(room, "MAX_PARTS", 3)
     link.say("/diagnostics", array(*(status(f"p{i}", 0) for i in range(5))))
     assert len(module.parts) == 3
     assert "3 parts are the limit" in next(iter(robot.problems.values()))
 
 
-def test_others_are_told_and_the_badge_goes_with_the_module(link, robot, module):
+def test_an_update_triggers_other_modules_and_removal_removes_the_badge(
+    link, robot, module
+):
     received = []
 
     class Listener:
@@ -234,12 +228,12 @@ def test_others_are_told_and_the_badge_goes_with_the_module(link, robot, module)
     assert link.listeners == {}
 
 
-def test_a_time_of_nothing_is_refused(link, robot):
+def test_a_hold_time_of_zero_is_refused(link, robot):
     with pytest.raises(ValueError, match="hold must be seconds above 0, got 0"):
         robot.add_module("Diagnostics", link, hold=0)
 
 
-def test_of_endless_texts_the_beginning_is_kept(link, module):
+def test_long_texts_of_diagnostics_are_truncated(link, module):
     long = "x" * 100_000
     part = {**status(long, 2, long), "hardware_id": long}
     part["values"] = [{"key": f"{i}{long}", "value": long} for i in range(200)]

@@ -83,7 +83,7 @@ def floor(x: float, y: float) -> tuple[float, float]:
     return -3 + cos * x - sin * y, -2 + sin * x + cos * y
 
 
-def test_the_map_is_drawn_where_it_is_and_stays_so_while_it_changes(tab):
+def test_the_map_is_drawn_in_place_while_it_is_updated(tab):
     corner = [(0.1, 0.1), (0.9, 0.1), (0.1, 0.9), (0.9, 0.9)]
     beside = [(1.1, 0.5), (0.5, 1.1), (0.1, 3.9), (5.0, 0.1)]
     for _ in range(3):  # it is drawn anew twenty times a second meanwhile
@@ -93,12 +93,12 @@ def test_the_map_is_drawn_where_it_is_and_stays_so_while_it_changes(tab):
         ]
 
 
-def test_costs_are_drawn_over_the_map_and_free_ones_let_it_through(tab):
+def test_costs_are_drawn_over_the_map_and_free_cells_are_transparent(tab):
     row = [(-0.7, 1.1), (-0.5, 1.1), (-0.3, 1.1)]
     assert colours(tab, *row) == [FREE, LETHAL, FREE]
 
 
-def test_a_cube_and_a_text_are_where_their_markers_are(tab):
+def test_cube_and_text_markers_are_drawn_at_their_positions(tab):
     assert colours(tab, (-1.5, 0.25), (-1.5, 0.65)) == [BLUE, FREE]
     text = tab.locator(".marker.text > text")
     expect(text).to_have_text("<b>Küche</b>")
@@ -109,7 +109,7 @@ def test_a_cube_and_a_text_are_where_their_markers_are(tab):
     assert box["width"] > box["height"], "it stands upright"
 
 
-def test_a_path_stays_and_a_cloud_and_a_footprint_go_along_with_the_robot(tab):
+def test_a_path_stays_while_a_cloud_and_a_footprint_move_with_the_robot(tab):
     robot = 'svg.webmap g.robot[data-name="Bob"]'
     before = on_screen(tab, 0, 0, robot)
     for _ in range(2):
@@ -127,7 +127,7 @@ def test_a_path_stays_and_a_cloud_and_a_footprint_go_along_with_the_robot(tab):
         )
 
 
-def test_costs_that_make_no_sense_are_said_once_and_the_old_ones_stay(tab):
+def test_an_invalid_costmap_gives_one_notice_and_the_last_costmap_stays(tab):
     tab.goto(tab.url + "broken")
     notice = tab.locator(".webmap-notice")
     expect(notice).to_contain_text("/costs: a grid of 10 x 1 cells came with 3 of them")

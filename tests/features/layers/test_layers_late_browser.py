@@ -19,7 +19,7 @@ LATE = 1.6
 DRAWN = (".robot", ".laserscan", ".range")
 
 
-def test_what_comes_late_is_drawn_as_old_with_its_age(chromium: Browser):
+def test_data_of_a_slow_link_is_drawn_as_stale_with_its_age(chromium: Browser):
     with (
         simulators("ros2") as found,
         FaultProxy(urlsplit(found["ros2"].url).port) as link,

@@ -53,7 +53,7 @@ ROWS = [[0, 254, 254], [254, 205, 100]]
 @pytest.mark.parametrize(
     "form", [{}, {"kind": "P2"}, {"comment": False}, {"most": 65535}]
 )
-def test_the_lowest_row_of_the_image_is_the_first_of_the_grid(tmp_path, form):
+def test_the_bottom_row_of_the_image_is_the_first_row_of_the_grid(tmp_path, form):
     rows = np.array(ROWS) * (257 if form.get("most") else 1)
     pgm(tmp_path, rows, **form)
     read = read_map(described(tmp_path))
@@ -62,7 +62,7 @@ def test_the_lowest_row_of_the_image_is_the_first_of_the_grid(tmp_path, form):
 
 
 @pytest.mark.parametrize("suffix", ["png", "bmp"])
-def test_other_images_are_the_same_map(tmp_path, suffix):
+def test_png_and_bmp_images_give_the_same_map(tmp_path, suffix):
     Image.fromarray(np.array(ROWS, np.uint8)).save(tmp_path / f"map.{suffix}")
     read = read_map(described(tmp_path, image=f"map.{suffix}"))
     assert read.cells.tolist() == [[0, -1, -1], [100, 0, 0]]
@@ -83,7 +83,7 @@ SEE_THROUGH = [
 
 
 @pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
-def test_an_alpha_channel_means_what_it_means_to_map_server(tmp_path, mode):
+def test_an_alpha_channel_is_read_as_by_map_server(tmp_path, mode):
     pixels = np.array([[colour for colour, _ in SEE_THROUGH]], np.uint8)
     Image.fromarray(pixels).save(tmp_path / "map.png")
     read = read_map(described(tmp_path, image="map.png", mode=mode)).cells[0]
@@ -92,7 +92,7 @@ def test_an_alpha_channel_means_what_it_means_to_map_server(tmp_path, mode):
         assert 0 <= value < 100 if want is None else value == want
 
 
-def test_greys_with_an_alpha_channel_and_palettes_are_read_alike(tmp_path):
+def test_rgba_grey_alpha_and_palette_images_give_the_same_map(tmp_path):
     colours = Image.fromarray(np.array([[[0] * 4, [150] * 3 + [255]]], np.uint8))
     palette = Image.new("P", (2, 1), 0)
     palette.putpalette([0, 0, 0, 150, 150, 150])
@@ -109,7 +109,7 @@ def test_greys_with_an_alpha_channel_and_palettes_are_read_alike(tmp_path):
 @pytest.mark.parametrize(
     ("grey", "value"), [(0, 100), (89, 100), (90, -1), (204, -1), (206, 0), (255, 0)]
 )
-def test_what_lies_between_the_thresholds_is_unknown_where_there_are_three_values(
+def test_greys_between_the_thresholds_are_unknown_in_trinary_mode(
     tmp_path, grey, value
 ):
     # (255 - 89) / 255 is above 0.65, and (255 - 205) / 255 above 0.196.
@@ -120,12 +120,12 @@ def test_what_lies_between_the_thresholds_is_unknown_where_there_are_three_value
 
 
 @pytest.mark.parametrize("word", ["1", "true"])
-def test_negate_takes_white_for_walls(tmp_path, word):
+def test_negate_makes_white_pixels_walls(tmp_path, word):
     pgm(tmp_path, [[255, 0]])
     assert read_map(described(tmp_path, negate=word)).cells.tolist() == [[100, 0]]
 
 
-def test_the_modes_are_those_of_map_server(tmp_path):
+def test_scale_and_raw_modes_give_the_values_of_map_server(tmp_path):
     pgm(tmp_path, [[0, 60, 150, 254]])
     shades = read_map(described(tmp_path, mode="scale")).cells[0]
     assert (shades[0], shades[3]) == (100, 0)
@@ -149,7 +149,7 @@ def in_a_page(scenario):
 @pytest.mark.parametrize(
     ("x", "y", "yaw"), [(0, 0, 0), (-12.34, 7.89, 0), (3, -4, 1.1), (-1, -2, -math.pi)]
 )
-def test_every_pixel_is_where_the_origin_puts_it(map, tmp_path, x, y, yaw):
+def test_every_pixel_is_placed_by_the_origin_of_the_map(map, tmp_path, x, y, yaw):
     pgm(tmp_path, ROWS)
     file = described(tmp_path, origin=f"[{x}, {y}, {yaw}]", resolution="0.2")
     module = in_a_page(lambda: map.add_module("MapFile", file))
@@ -162,7 +162,9 @@ def test_every_pixel_is_where_the_origin_puts_it(map, tmp_path, x, y, yaw):
             assert got == colour, (row, column)
 
 
-def test_maps_share_what_was_read_and_what_is_wrong_is_said(map, tmp_path, channel):
+def test_maps_share_a_map_file_layer_and_a_missing_file_gives_one_notice(
+    map, tmp_path, channel
+):
     pgm(tmp_path, ROWS)
     file = described(tmp_path)
     module = in_a_page(lambda: map.add_module("MapFile", str(file)))
@@ -209,9 +211,7 @@ WRONG = {
 @pytest.mark.parametrize(
     "key", ["image", "resolution", "origin", "negate", "mode", "free_thresh", "none"]
 )
-def test_aliases_that_stand_for_a_thousand_million_words_are_refused_at_once(
-    tmp_path, key
-):
+def test_yaml_aliases_with_exponential_growth_are_refused_quickly(tmp_path, key):
     pgm(tmp_path, ROWS)
     layers = ["a0: &a0 [" + "x, " * 10 + "]"]
     for i in range(1, 9):
@@ -227,7 +227,7 @@ def test_aliases_that_stand_for_a_thousand_million_words_are_refused_at_once(
 
 
 @pytest.mark.parametrize("why", WRONG)
-def test_a_description_that_makes_no_sense_is_refused(tmp_path, why):
+def test_an_invalid_map_description_is_refused(tmp_path, why):
     folder = tmp_path / "maps"
     (folder / "folder").mkdir(parents=True)
     pgm(tmp_path, ROWS)
@@ -258,14 +258,14 @@ NO_IMAGE = {
 
 
 @pytest.mark.parametrize("why", NO_IMAGE)
-def test_an_image_that_is_none_is_refused_before_it_costs_anything(tmp_path, why):
+def test_an_invalid_map_image_is_refused_with_a_reason(tmp_path, why):
     (tmp_path / "map.pgm").write_bytes(NO_IMAGE[why])
     with pytest.raises(ConfigError, match=re.escape(why)) as refused:
         read_map(described(tmp_path))
     assert str(refused.value).startswith(f"{tmp_path / 'map.yaml'}: the image ")
 
 
-def test_a_device_is_neither_a_description_nor_an_image(tmp_path):
+def test_a_device_is_refused_as_map_description_and_as_image(tmp_path):
     endless = Path("/dev/zero")
     (tmp_path / "map.pgm").symlink_to(endless)
     with pytest.raises(ConfigError, match=r"'map\.pgm' is not in the folder"):
@@ -289,7 +289,7 @@ def test_a_device_is_neither_a_description_nor_an_image(tmp_path):
         (b"[" * 10_000, "nested more than 50 deep"),
     ],
 )
-def test_a_file_that_is_no_description_is_refused(tmp_path, data, why):
+def test_a_file_that_is_not_a_map_description_is_refused(tmp_path, data, why):
     file = tmp_path / "map.yaml"
     file.write_bytes(data)
     with pytest.raises(ConfigError, match=why):
@@ -304,7 +304,7 @@ def write_map(folder, image, **options):
 
 
 @pytest.mark.parametrize("mode", ["L", "RGB", "RGBA", "P", "1", "I;16", "LA"])
-def test_a_map_is_the_same_read_in_one_piece_or_in_many(tmp_path, monkeypatch, mode):
+def test_reading_a_map_in_pieces_gives_the_same_cells(tmp_path, monkeypatch, mode):
     grey = Image.fromarray(np.arange(64 * 50, dtype=np.uint32).astype(np.uint8))
     grey = grey.resize((40, 31))
     image = (
@@ -317,7 +317,7 @@ def test_a_map_is_the_same_read_in_one_piece_or_in_many(tmp_path, monkeypatch, m
     assert whole.shape == (31, 40)
 
 
-def test_a_large_map_takes_little_more_memory_than_its_cells(tmp_path):
+def test_reading_a_large_map_needs_little_more_memory_than_its_cells(tmp_path):
     file = write_map(tmp_path, Image.new("L", (3000, 3000), 254))
     tracemalloc.start()
     try:

@@ -50,7 +50,7 @@ def middle(layer, number) -> tuple[float, float]:
     return to_root(layer.shapes["test", number]).apply(0.0, 0.0)
 
 
-def test_each_marker_of_an_array_is_in_its_own_frame(link, layer):
+def test_each_marker_of_an_array_is_placed_by_its_own_frame(link, layer):
     say(link, cube(9, "odom"))
     drive(link, 5.0, 100.0)
     say(link, cube(1, "map"), cube(2, "odom"), cube(3, "base_link"), cube(4, "/map"))
@@ -62,7 +62,7 @@ def test_each_marker_of_an_array_is_in_its_own_frame(link, layer):
     assert to_root(box).apply(1, 0) == pytest.approx((10.0, 2.0)), "turned as well"
 
 
-def test_a_locked_marker_goes_along_and_others_stay(link, layer):
+def test_a_frame_locked_marker_moves_with_its_frame_and_others_stay(link, layer):
     say(link, cube(9, "odom"))
     drive(link, 5.0, 100.0)
     say(link, cube(1, "base_link", locked=True), cube(2, "base_link"))
@@ -74,7 +74,7 @@ def test_a_locked_marker_goes_along_and_others_stay(link, layer):
     assert middle(layer, 1) == pytest.approx((10.0, 8.0)), "it is locked no more"
 
 
-def test_a_marker_is_where_its_frame_was_at_the_stamp(link, layer):
+def test_a_marker_is_placed_by_its_frame_at_the_stamp(link, layer):
     say(link, cube(9, "odom"))
     drive(link, 5.0, 100.0)
     drive(link, 6.0, 100.5)
@@ -86,7 +86,9 @@ def test_a_marker_is_where_its_frame_was_at_the_stamp(link, layer):
     assert middle(layer, 2) == pytest.approx((10.0, 7.5))
 
 
-def test_a_frame_that_nobody_tells_of_is_said_until_somebody_does(link, layer, channel):
+def test_an_unknown_frame_of_a_marker_is_a_problem_until_it_is_known(
+    link, layer, channel
+):
     say(link, cube(1, "odom"), cube(2, "map"))
     assert middle(layer, 1) == pytest.approx((1.0, 0.0)), "as it comes"
     (problem,) = layer.problems.values()
@@ -102,7 +104,7 @@ def test_a_frame_that_nobody_tells_of_is_said_until_somebody_does(link, layer, c
     assert layer.problems == {}, "what is gone needs no frame"
 
 
-def test_texts_are_upright_in_whatever_frame(link, layer):
+def test_text_markers_are_upright_in_any_frame(link, layer):
     say(link, cube(9, "odom"))
     drive(link, 5.0, 100.0)
     header = {"stamp": stamp(0), "frame_id": "base_link"}
@@ -112,7 +114,7 @@ def test_texts_are_upright_in_whatever_frame(link, layer):
     assert placed.b == placed.c == 0
 
 
-def test_frames_are_heard_only_when_a_marker_needs_them(map, link):
+def test_frames_are_subscribed_only_when_a_marker_needs_them(map, link):
     before = dict(_shared_frames)
     module = map.add_module("Markers", link, "/markers")
     say(link, cube(1, "map"), cube(2, ""))
@@ -124,14 +126,14 @@ def test_frames_are_heard_only_when_a_marker_needs_them(map, link):
     assert _shared_frames == before
 
 
-def test_who_wants_no_frames_gets_markers_as_they_come(map, link):
+def test_markers_without_a_map_frame_ignore_frames(map, link):
     layer = map.add_module("Markers", link, "/markers", map_frame=None).layer
     say(link, cube(1, "odom"))
     assert set(link.listeners) == {"/markers"}
     assert middle(layer, 1) == pytest.approx((1.0, 0.0))
 
 
-def test_markers_of_one_of_many_robots_go_by_that_ones_frames(map, link):
+def test_markers_are_placed_by_the_frames_of_their_namespace(map, link):
     layer = map.add_module("Markers", link, "/markers", namespace="/r1").layer
     say(link, cube(1, "odom", locked=True))
     received = transform("map", "odom", 4.0, 0.0, 0.0, 100.0)
@@ -140,13 +142,13 @@ def test_markers_of_one_of_many_robots_go_by_that_ones_frames(map, link):
     assert middle(layer, 1) == pytest.approx((5.0, 0.0))
 
 
-def test_markers_lie_as_their_bridge_is_aligned(link, layer):
+def test_markers_are_placed_by_the_alignment_of_their_bridge(link, layer):
     say(link, cube(1, "map"))
     align_bridge(link, 2.0, 3.0, 90.0)
     assert middle(layer, 1) == pytest.approx((2.0, 4.0))
 
 
-def test_a_marker_without_sense_does_not_move_with_a_frame(link, layer):
+def test_an_invalid_frame_locked_marker_is_not_drawn_when_its_frame_moves(link, layer):
     wrong = cube(1, "base_link", locked=True, at=(math.nan, 0.0, 0.0))
     say(link, {**wrong, "pose": {**pose(0, 0), "position": {"x": None, "y": 0}}})
     drive(link, 5.0, 100.0)
@@ -155,7 +157,7 @@ def test_a_marker_without_sense_does_not_move_with_a_frame(link, layer):
     assert to_root(layer.svg) == Affine()
 
 
-def test_a_marker_that_cannot_be_drawn_where_its_frame_gets_is_left_out_and_said(
+def test_a_marker_that_cannot_follow_its_frame_is_left_out_with_a_problem(
     link, layer, robot, monkeypatch
 ):
     def place(shape, marker, frame):

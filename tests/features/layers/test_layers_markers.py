@@ -66,7 +66,7 @@ def near(points):
 
 
 @pytest.mark.parametrize("ros2", [False, True])
-def test_a_cube_is_a_box_about_its_pose(link, layer, ros2):
+def test_a_cube_is_a_box_centred_on_its_pose(link, layer, ros2):
     say(link, marker(CUBE, scale=(2, 0.5, 9), ros2=ros2))
     (box,) = only(layer).children
     x, y, wide, high = (float(box.get(n)) for n in ("x", "y", "width", "height"))
@@ -78,7 +78,9 @@ def test_a_cube_is_a_box_about_its_pose(link, layer, ros2):
 
 
 @pytest.mark.parametrize(("type", "name"), [(SPHERE, "sphere"), (CYLINDER, "cylinder")])
-def test_what_is_round_has_its_two_diameters(link, layer, type, name):
+def test_spheres_and_cylinders_are_ellipses_with_their_two_diameters(
+    link, layer, type, name
+):
     say(link, marker(type, scale=(2, 1, 1), color=BLUE))
     (ellipse,) = only(layer).children
     assert (ellipse.get("rx"), ellipse.get("ry")) == ("1", "0.5")
@@ -87,7 +89,7 @@ def test_what_is_round_has_its_two_diameters(link, layer, type, name):
     assert name in only(layer).classes
 
 
-def test_an_arrow_is_as_long_as_its_scale_says(link, layer):
+def test_an_arrow_has_the_length_of_its_scale(link, layer):
     say(link, marker(ARROW, scale=(2.0, 0.1, 0.1)))
     (arrow,) = only(layer).children
     outline = corners(arrow, arrow.get("points"))
@@ -106,7 +108,7 @@ def test_an_arrow_goes_from_its_first_point_to_its_second(link, layer):
     assert begin == pytest.approx((3 - 1, -2 + 1), abs=2e-3)
 
 
-def test_a_strip_is_one_line_and_a_list_is_many(link, layer):
+def test_a_line_strip_is_one_line_and_a_line_list_is_many_lines(link, layer):
     points = [(0, 0), (1, 0), (1, 1), (2, 1)]
     there = [(3, -2), (3, -1), (2, -1), (2, 0)]
     say(link, marker(STRIP, points, scale=(0.05, 0, 0)))
@@ -121,7 +123,9 @@ def test_a_strip_is_one_line_and_a_list_is_many(link, layer):
 
 
 @pytest.mark.parametrize("type", [CUBES, POINTS])
-def test_squares_lie_about_their_points(link, layer, type):
+def test_cube_lists_and_points_are_rectangles_centred_on_their_points(
+    link, layer, type
+):
     say(link, marker(type, [(0, 0), (5, 1)], scale=(0.4, 0.2, 1)))
     (path,) = only(layer).children
     first, second = path.get("d").split("z")[:2]
@@ -132,7 +136,7 @@ def test_squares_lie_about_their_points(link, layer, type):
     assert first.startswith("M-0.2")
 
 
-def test_spheres_are_circles_about_their_points(link, layer):
+def test_sphere_lists_are_circles_centred_on_their_points(link, layer):
     say(link, marker(SPHERES, [(1, 2)], scale=(0.4, 0.4, 0.4)))
     (path,) = only(layer).children
     x, y, rx, ry, *_ = numbers(path.get("d"))
@@ -140,7 +144,7 @@ def test_spheres_are_circles_about_their_points(link, layer):
     assert (rx, ry) == (0.2, 0.2)
 
 
-def test_triangles_are_filled(link, layer):
+def test_triangles_are_closed_paths_through_their_points(link, layer):
     say(link, marker(TRIANGLES, [(0, 0), (1, 0), (0, 1)]))
     (path,) = only(layer).children
     assert corners(path, path.get("d")) == near([(3, -2), (3, -1), (2, -2)])
@@ -148,7 +152,7 @@ def test_triangles_are_filled(link, layer):
 
 
 @pytest.mark.parametrize("type", [POINTS, CUBES, SPHERES, LINES, STRIP, TRIANGLES])
-def test_points_with_colours_of_their_own_are_one_path_for_each(link, layer, type):
+def test_points_with_their_own_colours_are_drawn_in_these_colours(link, layer, type):
     count = 6
     points = [(i, i * i) for i in range(count)]
     colours = [RED] * 3 + [BLUE] * 3
@@ -159,7 +163,7 @@ def test_points_with_colours_of_their_own_are_one_path_for_each(link, layer, typ
     assert fills == {"#ff0000", "#0000ff"}
 
 
-def test_a_text_stands_upright_and_is_only_text(link, layer):
+def test_a_text_marker_is_upright_and_contains_only_text(link, layer):
     words = "<script>alert(1)</script> Küche"
     zeros = {"x": 0, "y": 0, "z": 0, "w": 0}
     at = {"position": vector(1, 2), "orientation": zeros}
@@ -172,7 +176,7 @@ def test_a_text_stands_upright_and_is_only_text(link, layer):
     assert letter == pytest.approx((1, 2.3)), "letters have y downward"
 
 
-def test_markers_are_changed_in_place_and_deleted_by_namespace_and_number(link, layer):
+def test_markers_are_replaced_and_deleted_by_namespace_and_id(link, layer):
     say(
         link,
         marker(CUBE, id=1),
@@ -194,7 +198,7 @@ def test_markers_are_changed_in_place_and_deleted_by_namespace_and_number(link, 
     assert first.parent is None
 
 
-def test_a_marker_that_only_moves_is_only_moved(link, layer):
+def test_a_moved_marker_keeps_its_element(link, layer):
     say(link, marker(CUBE))
     before = only(layer)
     say(link, marker(CUBE, at=(7, 8, 0)))
@@ -202,7 +206,7 @@ def test_a_marker_that_only_moves_is_only_moved(link, layer):
     assert to_root(before).apply(0, 0) == (7, 8)
 
 
-def test_single_markers_are_drawn_too(map, link, channel):
+def test_a_single_marker_message_is_drawn(map, link, channel):
     layer = map.add_module(
         "Markers", link, "/marker", type="visualization_msgs/msg/Marker"
     ).layer
@@ -235,7 +239,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("why", BAD)
-def test_a_marker_that_makes_no_sense_is_left_out_by_itself(link, layer, channel, why):
+def test_only_the_invalid_marker_of_an_array_is_left_out(link, layer, channel, why):
     say(link, marker(SPHERE))
     before = only(layer)
     say(link, BAD[why], marker(CUBE, id=2))
@@ -268,7 +272,7 @@ ENDS = [(0, 0), (1, 0)]
         (TRIANGLES, [*ENDS, (0, 1)]),
     ],
 )
-def test_a_marker_whose_quaternion_nobody_set_is_drawn_unturned_which_is_logged_once(
+def test_a_marker_with_a_zero_quaternion_is_drawn_unrotated_and_logged_once(
     link, layer, channel, caplog, type, points
 ):
     nowhere = {**pose(3, -2), "orientation": ZEROS["orientation"]}
@@ -282,7 +286,7 @@ def test_a_marker_whose_quaternion_nobody_set_is_drawn_unturned_which_is_logged_
     assert "marker 1 of 'test' has a quaternion of zeros and is drawn unturned" in said
 
 
-def test_markers_beyond_the_most_are_left_out_and_their_number_is_said(
+def test_markers_beyond_the_limit_are_left_out_and_counted_in_a_notice(
     map, link, channel, monkeypatch
 ):
     monkeypatch.setattr("webmap.features.layers.markers.layer.MAX_MARKERS", 10)
@@ -311,7 +315,7 @@ def test_markers_beyond_the_most_are_left_out_and_their_number_is_said(
     asyncio.run(scenario())
 
 
-def test_a_marker_with_an_endless_namespace_is_left_out_in_few_words(
+def test_a_marker_with_a_very_long_namespace_is_left_out_with_a_short_notice(
     link, layer, channel
 ):
     say(link, marker(CUBE, ns="n" * 100_000), marker(CUBE, id=2))
@@ -322,7 +326,9 @@ def test_a_marker_with_an_endless_namespace_is_left_out_in_few_words(
 
 
 @pytest.mark.parametrize("ros2", [False, True])
-def test_a_marker_is_seen_for_its_lifetime_unless_it_comes_again(map, link, ros2):
+def test_a_marker_is_removed_after_its_lifetime_unless_it_is_sent_again(
+    map, link, ros2
+):
     brief = {"sec": 0, "nanosec": 50_000_000} if ros2 else {"secs": 0, "nsecs": 5e7}
     brief = {key: int(value) for key, value in brief.items()}
 
@@ -345,7 +351,7 @@ def test_a_marker_is_seen_for_its_lifetime_unless_it_comes_again(map, link, ros2
     asyncio.run(scenario())
 
 
-def test_markers_are_drawn_once_for_all_maps_and_lie_under_robots(page, link, channel):
+def test_maps_share_one_marker_layer_and_its_drawing_order(page, link, channel):
     maps = [Map(page.element(f"m{i}"), 10, 10) for i in range(3)]
     layers = {map.add_module("Markers", link, "/markers").layer for map in maps}
     assert len(layers) == 1
@@ -359,6 +365,6 @@ def test_markers_are_drawn_once_for_all_maps_and_lie_under_robots(page, link, ch
     assert link.listeners == {}
 
 
-def test_a_type_without_markers_is_refused(map, link):
+def test_a_message_type_without_markers_is_refused(map, link):
     with pytest.raises(ValueError, match="got 'nav_msgs/Path'"):
         map.add_module("Markers", link, "/markers", type="nav_msgs/Path")

@@ -47,7 +47,7 @@ def tab(chromium: Browser) -> Iterator[Page]:
         yield tab
 
 
-def test_a_nan_at_every_message_is_one_box_and_then_none(tab):
+def test_repeated_nan_messages_show_one_notice_until_the_path_is_valid(tab):
     said = tab.locator(".webmap-notice")
     expect(said).to_contain_text("Ann: /plan: a path must be of finite numbers, got")
     path = tab.locator(".path > polyline[points]")

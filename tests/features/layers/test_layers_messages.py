@@ -54,7 +54,7 @@ MESSAGES = {
 
 
 @pytest.mark.parametrize("view", MESSAGES, ids=lambda view: view.__name__)
-def test_a_large_message_is_the_same_by_way_of_the_worker(view):
+def test_a_message_decoded_by_the_worker_is_the_same(view):
     text = json.dumps({"op": "publish", "topic": "/t", "msg": MESSAGES[view]}).encode()
     here = Publish("/t", text).decode(view)
     name = view_name(view)
@@ -67,13 +67,13 @@ def test_a_large_message_is_the_same_by_way_of_the_worker(view):
 
 @pytest.mark.parametrize("view", MESSAGES, ids=lambda view: view.__name__)
 @pytest.mark.parametrize("message", [{}, {"poses": 1}, {"x": "y"}, [], 5, "a", None])
-def test_a_message_of_another_type_is_an_error_and_nothing_is_drawn(view, message):
+def test_a_message_of_another_type_is_refused(view, message):
     text = json.dumps({"op": "publish", "topic": "/t", "msg": message}).encode()
     with pytest.raises(ProtocolError, match=r"Expected|missing"):
         Publish("/t", text).decode(view)
 
 
-def test_a_layer_that_cannot_start_leaves_nothing_behind(map):
+def test_a_layer_that_fails_to_start_leaves_no_subscription(map):
     bridge = Bridge("ws://nowhere:9090")
     with pytest.raises(ConfigError):
         map.add_module("OccupancyGrid", bridge, "two words")

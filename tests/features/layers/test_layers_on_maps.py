@@ -13,9 +13,7 @@ def grids(map: Map) -> list:
     return [m for m in map.modules if isinstance(m, ShownLayer)]
 
 
-def test_every_map_that_shows_the_robot_has_the_module_and_no_other(
-    map, page, robot, link
-):
+def test_only_maps_that_show_the_robot_have_its_map_module(map, page, robot, link):
     other = Map(page.element("other"), 10, 10)
     map.add_robot(robot)
     module = robot.add_module("OnMaps", "OccupancyGrid", link, "/c", palette="costmap")
@@ -30,7 +28,7 @@ def test_every_map_that_shows_the_robot_has_the_module_and_no_other(
     assert link.listeners == {}
 
 
-def test_a_page_that_ends_takes_its_own_away(map, page, robot, link):
+def test_closing_a_page_removes_its_map_modules(map, page, robot, link):
     map.add_robot(robot)
     robot.add_module("OnMaps", "Markers", link, "/m")
     page.close()
@@ -38,7 +36,7 @@ def test_a_page_that_ends_takes_its_own_away(map, page, robot, link):
     assert robot.maps == []
 
 
-def test_a_module_taken_from_the_map_by_hand_is_not_missed(map, robot, link):
+def test_a_map_module_may_be_removed_from_the_map_before_the_robot(map, robot, link):
     map.add_robot(robot)
     robot.add_module("OnMaps", "OccupancyGrid", link, "/c")
     map.remove_module(grids(map)[0])
@@ -46,7 +44,7 @@ def test_a_module_taken_from_the_map_by_hand_is_not_missed(map, robot, link):
     assert grids(map) == []
 
 
-def test_what_it_draws_is_drawn(map, robot, link, channel):
+def test_the_map_module_of_a_robot_draws_its_grid(map, robot, link, channel):
     map.add_robot(robot)
     robot.add_module("OnMaps", "OccupancyGrid", link, "/c")
     info = {"map_load_time": header()["stamp"], "resolution": 1, "width": 1}
@@ -55,7 +53,7 @@ def test_what_it_draws_is_drawn(map, robot, link, channel):
     assert grids(map)[0].layer.picture.element.get("href")
 
 
-def test_a_module_that_there_is_not_is_named(robot):
+def test_an_unknown_map_module_is_refused_with_its_name(robot):
     with pytest.raises(ModuleNotFound, match="OccupancyGird"):
         robot.add_module("OnMaps", "OccupancyGird")
 
@@ -68,14 +66,16 @@ def test_a_module_that_there_is_not_is_named(robot):
         ("Markers", {"type": "std_msgs/String"}, "type: expected"),
     ],
 )
-def test_arguments_of_the_wrong_kind_are_refused_before_any_map(
+def test_invalid_arguments_are_refused_before_the_robot_is_on_a_map(
     robot, link, module, options, said
 ):
     with pytest.raises(ConfigError, match=said):
         robot.add_module("OnMaps", module, link, "/c", **options)
 
 
-def test_what_it_brings_belongs_to_this_robot_unless_another_is_told(map, robot, link):
+def test_a_map_module_belongs_to_its_robot_unless_another_robot_is_given(
+    map, robot, link
+):
     map.add_robot(robot)
     robot.add_module("OnMaps", "OccupancyGrid", link, "/c")
     other = Robot("Other")
@@ -85,14 +85,14 @@ def test_what_it_brings_belongs_to_this_robot_unless_another_is_told(map, robot,
     other.destroy()
 
 
-def test_another_robot_is_refused_by_what_belongs_to_none(robot):
+def test_an_unsupported_or_invalid_robot_argument_is_refused(robot):
     with pytest.raises(ConfigError, match=r'Follow: there is no argument "robot"'):
         robot.add_module("OnMaps", "Follow", robot=robot)
     with pytest.raises(ConfigError, match="robot: expected a Robot, got 'Bob'"):
         robot.add_module("OnMaps", "Markers", robot="Bob")
 
 
-def test_arguments_that_make_no_sense_are_said_on_the_map(map, robot, channel):
+def test_invalid_arguments_of_a_map_module_give_one_notice(map, robot, channel):
     robot.add_module("OnMaps", "TileLayer", "/none", (50.0, 14.0), most=0)
     map.add_robot(robot)
     (error,) = channel.errors

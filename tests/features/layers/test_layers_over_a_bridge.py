@@ -14,7 +14,7 @@ from webmap.sim.process import run_simulator
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_the_simulators_floor_is_drawn_cell_by_cell(
+def test_drawn_cells_match_the_floor_plan_of_the_simulator(
     dialect, map: Map, page: Page, robot
 ):
     async def scenario():
@@ -43,7 +43,7 @@ def test_the_simulators_floor_is_drawn_cell_by_cell(
     asyncio.run(scenario())
 
 
-def test_frames_that_are_missing_are_said_a_while_after_the_link_is_up(
+def test_missing_frames_are_a_problem_some_time_after_the_link_opens(
     monkeypatch, map: Map, page: Page, robot
 ):
     """Nothing ever comes of them, so nothing but the time makes anybody look."""

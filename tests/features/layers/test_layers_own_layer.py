@@ -78,7 +78,7 @@ def degrees(celsius: float | None, seconds: float = 3.0) -> dict:
     return {"header": stamped(seconds), "temperature": celsius, "variance": None}
 
 
-def test_it_is_found_by_its_type_and_name_and_only_as_often_as_it_says():
+def test_a_custom_layer_is_found_by_type_and_name_up_to_its_limit():
     for space in ("/a", "/b"):
         found = find_layers(TOPICS, ["/a", "/b"])[space].drawn
         drawn = {layer.topic: layer.kind for layer in found}
@@ -93,14 +93,14 @@ def test_it_is_found_by_its_type_and_name_and_only_as_often_as_it_says():
         assert other.topic == f"{space}/temp_3"
 
 
-def test_it_has_a_switch_of_its_own_after_the_built_in_ones():
+def test_custom_layers_have_switches_after_the_built_in_layers():
     layers = all_layers()
     assert list(layers)[-2:] == ["Sensors", "Zones"]
     assert (layers["Sensors"], layers["Zones"]) == (".temperature", ".zones")
     assert layers["Points"] == ".pointstamped"
 
 
-def test_what_is_found_is_drawn_a_shared_one_once_for_all_robots():
+def test_found_layers_are_added_and_a_shared_layer_only_once():
     bridge, console = Bridge(URL), Console()
     shown = ShownRobots(console)
     for found in discover(TOPICS, "host").robots:
@@ -116,7 +116,7 @@ def test_what_is_found_is_drawn_a_shared_one_once_for_all_robots():
         robot.destroy()
 
 
-def test_a_shared_layer_that_is_no_map_is_drawn_on_a_floor_plan_too():
+def test_a_shared_custom_layer_is_added_on_a_floor_plan():
     bridge, console = Bridge(URL), Console()
     shown = ShownRobots(console, grid=False)
     topics = TOPICS | {"/map": "nav_msgs/OccupancyGrid"}
@@ -129,14 +129,14 @@ def test_a_shared_layer_that_is_no_map_is_drawn_on_a_floor_plan_too():
         robot.destroy()
 
 
-def test_it_is_written_into_the_fleet_file(tmp_path):
+def test_custom_layers_are_written_to_the_fleet_file(tmp_path):
     text = fleet_toml([("hall", URL, discover(TOPICS, "bob"))])
     assert '{ name = "Temperature", args = [{ bridge = "hall" }, "/a/temp_1"] }' in text
     assert '[[modules]]\nname = "Zones" # its type alone' in text
     assert 'args = [{ bridge = "hall" }, "/zones"]' in text
 
 
-def test_it_stays_where_the_robot_was_at_its_stamp_and_its_text_upright(link, robot):
+def test_a_robot_layer_stays_at_its_stamp_pose_with_upright_text(link, robot):
     module = robot.add_module("Temperature", link, "/bob/temp")
     assert link.types["/bob/temp"] == "sensor_msgs/Temperature"
     assert list(module.svg.classes) == ["temperature"]
@@ -161,7 +161,7 @@ def test_it_stays_where_the_robot_was_at_its_stamp_and_its_text_upright(link, ro
         (degrees(1) | {"temperature": "warm"}, "drawing failed: ValueError"),
     ],
 )
-def test_nonsense_is_a_problem_that_is_logged_once_and_the_last_one_stays(
+def test_invalid_messages_are_logged_once_and_the_last_drawing_stays(
     link, robot, caplog, wrong, said
 ):
     module = robot.add_module("Temperature", link, "/bob/temp")
@@ -186,7 +186,7 @@ def test_nonsense_is_a_problem_that_is_logged_once_and_the_last_one_stays(
         ({"x": 0.0, "y": math.inf}, "y must be a finite number, got inf"),
     ],
 )
-def test_an_absurd_place_is_refused_also_with_a_view_of_its_own(
+def test_an_absurd_position_is_refused_with_a_custom_message_view(
     link, robot, place, said
 ):
     module = robot.add_module("OwnSpot", link, "/spot")
@@ -199,7 +199,7 @@ def test_an_absurd_place_is_refused_also_with_a_view_of_its_own(
     assert said in problem
 
 
-def test_its_options_are_checked_like_those_of_a_built_in_one(link, robot, map):
+def test_invalid_options_of_custom_layers_are_refused(link, robot, map):
     with pytest.raises(ConfigError, match='"siez"; did you mean "size"'):
         robot.add_module("Temperature", link, "/t", siez=1)
     with pytest.raises(ConfigError, match=r"size must be metres above 0, got -1"):
@@ -211,7 +211,7 @@ def test_its_options_are_checked_like_those_of_a_built_in_one(link, robot, map):
     assert link.listeners.keys() == {"/odom"}
 
 
-def test_it_goes_with_its_module(link, robot):
+def test_removing_a_custom_layer_removes_its_drawing_and_its_problem(link, robot):
     module = robot.add_module("Temperature", link, "/bob/temp")
     link.say("/bob/temp", degrees(math.nan))
     robot.remove_module(module)
@@ -226,7 +226,7 @@ def zones(*circles: tuple[float, float, float], frame_id: str = "map") -> dict:
     return {"header": stamped(3.0, frame_id), "zones": listed}
 
 
-def test_a_layer_of_maps_is_shared_by_maps_and_goes_with_the_last(link, map, page):
+def test_a_map_layer_is_shared_by_maps_and_ends_with_the_last_map(link, map, page):
     other = Map(page.element("other"), 10, 10)
     modules = [each.add_module("Zones", link, "/zones") for each in (map, other)]
     layer = modules[0].layer
@@ -242,7 +242,7 @@ def test_a_layer_of_maps_is_shared_by_maps_and_goes_with_the_last(link, map, pag
     assert Layer._shared == {}
 
 
-def test_a_layer_of_maps_lies_where_its_frame_was_at_the_stamp(link, map):
+def test_a_map_layer_is_placed_by_its_frame_at_the_stamp(link, map):
     layer = map.add_module("Zones", link, "/zones", age_limit=2.0).layer
     link.say("/zones", zones((1, 2, 3), frame_id="odom"))
     for seconds, x in ((2.9, 4.9), (3.1, 5.1)):
@@ -253,7 +253,7 @@ def test_a_layer_of_maps_lies_where_its_frame_was_at_the_stamp(link, map):
     assert layer.svg._age.limit == 2.0
 
 
-def test_nonsense_on_a_layer_of_maps_is_a_problem_and_the_last_one_stays(
+def test_an_invalid_map_layer_message_is_a_problem_and_the_last_drawing_stays(
     link, map, channel
 ):
     layer = map.add_module("Zones", link, "/zones").layer
@@ -275,7 +275,7 @@ Zones = my_own_layers:Zones
 """
 
 
-def test_a_package_brings_layers_along_that_view_shows(tmp_path):
+def test_webmap_view_shows_layers_of_an_installed_package(tmp_path):
     info = tmp_path / "mine-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")

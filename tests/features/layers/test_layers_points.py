@@ -37,7 +37,7 @@ def spot(module) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("ros2", [False, True])
-def test_a_point_is_a_spot_that_stays_on_the_map(link, robot, ros2):
+def test_a_point_keeps_its_position_on_the_map_while_the_robot_moves(link, robot, ros2):
     module = robot.add_module("PointStamped", link, "/clicked_point", name="far")
     assert list(module.svg.classes) == ["pointstamped", "far"]
     assert module.svg.get("visibility") == "hidden", "there is none yet"
@@ -50,7 +50,7 @@ def test_a_point_is_a_spot_that_stays_on_the_map(link, robot, ros2):
     assert spot(module) == pytest.approx((1, 1), abs=2e-3)
 
 
-def test_a_point_of_the_base_is_where_the_base_was_at_its_stamp(link, robot):
+def test_a_point_in_the_base_frame_is_placed_at_its_stamp(link, robot):
     robot.set_tf(link)
     module = robot.add_module("PointStamped", link, "/lookahead_point", frame="robot")
     turned = (0.0, 0.0, math.pi / 2)
@@ -61,14 +61,14 @@ def test_a_point_of_the_base_is_where_the_base_was_at_its_stamp(link, robot):
     assert robot.problems == {}
 
 
-def test_without_frames_a_point_of_the_base_is_on_the_robot(link, robot):
+def test_without_frames_a_point_in_the_base_frame_is_placed_on_the_robot(link, robot):
     module = robot.add_module("PointStamped", link, "/lookahead_point", frame="robot")
     link.say("/lookahead_point", point(1, 0, frame="base_link"))
     wanted = (4 + math.cos(0.7), -2 + math.sin(0.7))
     assert spot(module) == pytest.approx(wanted, abs=2e-3)
 
 
-def test_a_tilted_point_is_turned_in_space_before_it_is_flattened(link, robot):
+def test_a_point_of_a_tilted_sensor_is_rotated_in_3d_and_projected(link, robot):
     robot.set_tf(link)
     tell(link, MAP, SLOPE)
     mounted = mount(link, (0.3, 0.1, 0.8), (0.7, -0.9, 2.5))
@@ -78,7 +78,7 @@ def test_a_tilted_point_is_turned_in_space_before_it_is_flattened(link, robot):
     assert spot(module) == pytest.approx((x, y), abs=3e-3)
 
 
-def test_a_point_without_a_height_lies_in_the_plane(link, robot):
+def test_a_point_with_a_nan_height_is_drawn_in_the_plane(link, robot):
     module = robot.add_module("PointStamped", link, "/seen")
     link.say("/seen", point(1, 2, math.nan))
     assert spot(module) == pytest.approx((1, 2), abs=2e-3)
@@ -95,9 +95,7 @@ def test_a_point_without_a_height_lies_in_the_plane(link, robot):
         (point(5, 5) | {"header": ENDLESS}, "seconds of hundreds of digits"),
     ],
 )
-def test_a_point_that_is_none_is_refused_and_the_last_one_stays(
-    link, robot, wrong, said
-):
+def test_an_invalid_point_is_refused_and_the_last_point_stays(link, robot, wrong, said):
     module = robot.add_module("PointStamped", link, "/seen")
     link.say("/seen", point(1, 2))
     before = matrix_of(module.spot)
@@ -110,7 +108,7 @@ def test_a_point_that_is_none_is_refused_and_the_last_one_stays(
 
 
 @pytest.mark.parametrize("radius", [0, -1, math.inf, math.nan])
-def test_a_spot_of_a_size_that_makes_no_sense_is_refused(link, robot, radius):
+def test_an_invalid_radius_is_refused(link, robot, radius):
     with pytest.raises(ValueError, match="radius must be metres above 0"):
         robot.add_module("PointStamped", link, "/seen", radius=radius)
 
@@ -148,7 +146,7 @@ def box(x, y, width, height) -> list:
 
 
 @pytest.mark.parametrize("ros2", [False, True])
-def test_a_cell_is_a_box_about_its_middle_that_stays_on_the_map(link, robot, ros2):
+def test_a_cell_is_a_box_centred_on_its_point_that_stays_on_the_map(link, robot, ros2):
     module = robot.add_module("GridCells", link, "/cells", name="frontiers")
     assert list(module.svg.classes) == ["gridcells", "frontiers"]
     link.say("/cells", cells([(1, 2), (4, -1)], ros2=ros2))
@@ -160,7 +158,7 @@ def test_a_cell_is_a_box_about_its_middle_that_stays_on_the_map(link, robot, ros
     assert boxes(module) == []
 
 
-def test_cells_that_touch_along_x_are_one_box_in_whatever_order(link, robot):
+def test_cells_that_touch_along_x_are_one_box_in_any_order(link, robot):
     module = robot.add_module("GridCells", link, "/cells")
     side = float(np.float32(0.05))
     middles = [(7 + 0.05 * i, 3 + 0.05 * j) for i in range(40) for j in range(3)]
@@ -175,7 +173,7 @@ def test_cells_that_touch_along_x_are_one_box_in_whatever_order(link, robot):
     ]
 
 
-def test_cells_that_are_a_little_off_are_boxes_that_stay_where_the_cells_are():
+def test_rows_of_slightly_shifted_cells_stay_near_the_cells():
     step = 0.1 * 1.0005  # far within the tolerance, which many of them are not
     middles = np.array([(number * step, 0.0, 0.0) for number in range(200)])
     rows = rows_of(middles, 0.1, 0.1)
@@ -189,7 +187,7 @@ def test_cells_that_are_a_little_off_are_boxes_that_stay_where_the_cells_are():
     assert np.abs(np.array(drawn) - middles[:, 0]).max() < 0.002
 
 
-def test_tilted_cells_are_turned_in_space_before_they_are_flattened(link, robot):
+def test_cells_of_a_tilted_sensor_are_rotated_in_3d_and_projected(link, robot):
     robot.set_tf(link)
     tell(link, MAP, SLOPE)
     mounted = mount(link, (0.3, 0.1, 0.8), (0.7, -0.9, 2.5))
@@ -202,7 +200,7 @@ def test_tilted_cells_are_turned_in_space_before_they_are_flattened(link, robot)
     assert np.array(drawn) == pytest.approx(there[:, :2], abs=3e-3)
 
 
-def test_of_many_cells_some_are_drawn_and_that_is_said(link, robot):
+def test_cells_beyond_max_cells_are_thinned_with_a_problem(link, robot):
     module = robot.add_module("GridCells", link, "/cells", max_cells=10)
     link.say("/cells", cells([(i, 0) for i in range(25)]))
     drawn = sorted(corners[0][0] for corners in boxes(module))
@@ -235,9 +233,7 @@ def test_of_many_cells_some_are_drawn_and_that_is_said(link, robot):
         (cells([(5, 5)]) | {"header": ENDLESS}, "seconds of hundreds of digits"),
     ],
 )
-def test_cells_that_are_none_are_refused_and_those_before_stay(
-    link, robot, wrong, said
-):
+def test_invalid_cells_are_refused_and_the_last_cells_stay(link, robot, wrong, said):
     module = robot.add_module("GridCells", link, "/cells")
     link.say("/cells", cells([(1, 2)]))
     before = module.drawn.get("d")
@@ -249,6 +245,6 @@ def test_cells_that_are_none_are_refused_and_those_before_stay(
     assert robot.problems == {}
 
 
-def test_a_number_of_cells_that_makes_no_sense_is_refused(link, robot):
+def test_max_cells_of_zero_is_refused(link, robot):
     with pytest.raises(ValueError, match="max_cells must be at least 1, got 0"):
         robot.add_module("GridCells", link, "/cells", max_cells=0)

@@ -22,7 +22,7 @@ def at(module) -> tuple[float, float, float]:
     return x, y, math.atan2(to_y - y, to_x - x)
 
 
-def test_a_pose_is_an_arrow_with_its_heading_that_stays_on_the_map(link, robot):
+def test_a_pose_is_an_arrow_that_keeps_its_position_and_heading_on_the_map(link, robot):
     module = robot.add_module("PoseStamped", link, "/target", name="far")
     assert module.svg.get("visibility") == "hidden", "there is none yet"
     assert {"posestamped", "far"} <= set(module.svg.classes)
@@ -36,14 +36,14 @@ def test_a_pose_is_an_arrow_with_its_heading_that_stays_on_the_map(link, robot):
     assert at(module) == pytest.approx((1, 1, 0.0), abs=1e-3)
 
 
-def test_a_pose_lies_as_the_robots_own_map_is_aligned(link, robot):
+def test_a_pose_is_placed_by_the_alignment_of_the_robot(link, robot):
     module = robot.add_module("PoseStamped", link, "/target")
     link.say("/target", {"header": header(), "pose": pose(1, 0, 0.0)})
     robot.set_alignment(10.0, 0.0, 90.0)
     assert at(module) == pytest.approx((10, 1, math.pi / 2), abs=1e-3)
 
 
-def test_a_goal_goes_when_the_robot_gets_there(link, robot):
+def test_a_reached_goal_is_hidden(link, robot):
     module = robot.add_module("PoseStamped", link, "/goal_pose", name="goal")
     robot.set_alignment(10.0, 0.0, 90.0)
     link.say("/goal_pose", {"header": header(), "pose": pose(8, 8, 0.0)})
@@ -60,7 +60,7 @@ def test_a_goal_goes_when_the_robot_gets_there(link, robot):
 
 
 @pytest.mark.parametrize(("frame", "seen"), [("odom", "hidden"), ("map", None)])
-def test_a_goal_is_reached_in_the_frame_that_the_robot_is_drawn_in(
+def test_a_goal_is_reached_only_in_the_frame_used_to_draw_the_robot(
     link, robot, frame, seen
 ):
     robot.set_tf(link, map_frame="odom", namespace="/bob", quiet=True)
@@ -71,7 +71,7 @@ def test_a_goal_is_reached_in_the_frame_that_the_robot_is_drawn_in(
     assert module.svg.get("visibility") == seen
 
 
-def test_a_pose_that_is_none_is_refused_and_the_last_one_stays(link, robot):
+def test_a_non_finite_pose_is_refused_and_the_last_pose_stays(link, robot):
     module = robot.add_module("PoseStamped", link, "/target")
     link.say("/target", {"header": header(), "pose": pose(1, 2)})
     before = matrix_of(module.arrow)
@@ -81,19 +81,19 @@ def test_a_pose_that_is_none_is_refused_and_the_last_one_stays(link, robot):
 
 
 @pytest.mark.parametrize("wrong", [{"length": 0}, {"reached": math.inf}])
-def test_a_length_that_makes_no_sense_is_refused(link, robot, wrong):
+def test_invalid_lengths_are_refused(link, robot, wrong):
     with pytest.raises(ConfigError, match="must be metres above 0"):
         robot.add_module("PoseStamped", link, "/target", **wrong)
 
 
-def test_scans_are_told_apart_by_name(link, robot):
+def test_the_name_of_a_scanner_is_a_class_of_its_element(link, robot):
     front = robot.add_module("LaserScanner", link, "/front", name="front")
     plain = robot.add_module("LaserScanner", link, "/scan")
     assert list(front.svg.classes) == ["laserscan", "front"]
     assert list(plain.svg.classes) == ["laserscan"]
 
 
-def test_what_is_drawn_says_of_what_without_the_robots_own_namespace(link, robot):
+def test_the_data_layer_attribute_omits_the_namespace_of_the_robot(link, robot):
     names = {
         "/bob/front/scan": "front/scan",  # the robot is called Bob
         "/scan": "/scan",

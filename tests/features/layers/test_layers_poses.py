@@ -39,7 +39,7 @@ def arrows(module) -> list[tuple[tuple[float, float], float]]:
         ("nav2_msgs/msg/ParticleCloud", "particles"),
     ],
 )
-def test_each_pose_is_an_arrow_in_its_place_on_the_map(link, robot, type, key):
+def test_each_pose_is_an_arrow_at_its_position_on_the_map(link, robot, type, key):
     module = robot.add_module("PoseArray", link, "/particles", type=type)
     wanted = [(1.5, 2.5, 0.0), (-3.25, 40.0, 2.0), (0.0, 0.0, -1.5)]
     poses = [pose(*at) for at in wanted]
@@ -57,7 +57,7 @@ def test_each_pose_is_an_arrow_in_its_place_on_the_map(link, robot, type, key):
     assert arrows(module)[1][0] == pytest.approx((-3.25, 40.0), abs=3e-3)
 
 
-def test_poses_in_the_robots_frame_go_along_with_it(link, robot):
+def test_poses_in_the_robot_frame_move_with_the_robot(link, robot):
     module = robot.add_module("PoseArray", link, "/seen", frame="robot")
     link.say("/seen", {"header": header("base_link"), "poses": [pose(1, 0)]})
     ((at, yaw),) = arrows(module)
@@ -85,7 +85,9 @@ ZEROS = {"x": 0, "y": 0, "z": 0, "w": 0}
         ({**pose(math.inf, 2), "orientation": {**ZEROS, "z": math.nan}}, "finite"),
     ],
 )
-def test_a_pose_that_is_none_is_refused_and_the_others_stay(link, robot, wrong, why):
+def test_an_array_with_a_non_finite_pose_is_refused_and_the_last_array_stays(
+    link, robot, wrong, why
+):
     module = robot.add_module("PoseArray", link, "/particles")
     link.say("/particles", {"header": header(), "poses": [pose(1, 2)]})
     link.say("/particles", {"header": header(), "poses": [pose(8, 8), wrong]})
@@ -99,7 +101,7 @@ def test_a_pose_that_is_none_is_refused_and_the_others_stay(link, robot, wrong, 
 @pytest.mark.parametrize(
     "options", [{"type": "nav_msgs/Path"}, {"max_poses": 0}, {"length": 0}]
 )
-def test_pose_arrays_that_make_no_sense_are_refused(link, robot, options):
+def test_invalid_pose_array_options_are_refused(link, robot, options):
     with pytest.raises(ValueError, match="got"):
         robot.add_module("PoseArray", link, "/particles", **options)
 
@@ -139,7 +141,7 @@ def test_the_ellipse_has_the_axes_of_the_covariance(link, robot, cbor):
     assert math.atan2(low[1] - 8, low[0] - 7) == pytest.approx(0.8, abs=1e-3)
 
 
-def test_odometry_has_a_covariance_too(link, robot):
+def test_the_covariance_of_odometry_is_drawn(link, robot):
     module = robot.add_module(
         "PoseWithCovariance", link, "/o", type="nav_msgs/msg/Odometry"
     )
@@ -151,7 +153,7 @@ def test_odometry_has_a_covariance_too(link, robot):
     assert module.heading.get("d") is None
 
 
-def test_a_heading_that_nobody_knows_is_drawn_all_round(link, robot):
+def test_an_unknown_heading_is_drawn_as_a_full_circle(link, robot):
     module = robot.add_module("PoseWithCovariance", link, "/amcl")
     link.say("/amcl", doubtful(pose(0, 0), covariance(1, 1, 0, 1e6)))
     assert "A2.0000 2.0000 0 1 1" in module.heading.get("d")
@@ -167,7 +169,7 @@ def test_a_heading_that_nobody_knows_is_drawn_all_round(link, robot):
         (covariance(1, 1, 0, -1), "below 0"),
     ],
 )
-def test_a_covariance_that_is_none_is_refused(link, robot, spread, why):
+def test_an_invalid_covariance_is_refused(link, robot, spread, why):
     module = robot.add_module("PoseWithCovariance", link, "/amcl")
     link.say("/amcl", doubtful(pose(1, 1), covariance(1, 1)))
     before = module.ellipse.attributes
@@ -187,7 +189,7 @@ FOOT = [(0.3, 0.2), (0.3, -0.2), (-0.3, -0.2), (-0.3, 0.2)]
 
 
 @pytest.mark.parametrize(("frame", "goes"), [("map", False), ("robot", True)])
-def test_a_footprint_is_where_its_frame_puts_it(link, robot, frame, goes):
+def test_a_footprint_is_placed_by_its_frame(link, robot, frame, goes):
     module = robot.add_module("Polygon", link, "/footprint", frame=frame)
     link.say("/footprint", polygon(FOOT, ros2=True))
     flat = numbers(module.outline.get("points"))
@@ -199,9 +201,7 @@ def test_a_footprint_is_where_its_frame_puts_it(link, robot, frame, goes):
     assert set(module.svg.classes) == {"polygon", "footprint"}
 
 
-def test_a_polygon_of_no_points_draws_nothing_and_a_broken_one_changes_nothing(
-    link, robot
-):
+def test_a_polygon_without_points_is_empty_and_an_invalid_one_is_refused(link, robot):
     module = robot.add_module("Polygon", link, "/footprint")
     link.say("/footprint", polygon(FOOT))
     before = module.outline.get("points")
@@ -215,7 +215,7 @@ def test_a_polygon_of_no_points_draws_nothing_and_a_broken_one_changes_nothing(
     assert robot.problems == {}
 
 
-def test_a_frame_that_is_none_is_named(link, robot):
+def test_an_unknown_frame_option_is_refused(link, robot):
     with pytest.raises(ValueError, match='"map" or "robot", got \'odom\''):
         robot.add_module("Polygon", link, "/footprint", frame="odom")
     assert link.listeners.keys() == {"/odom"}
@@ -232,7 +232,7 @@ def sonar(distance, *, view=0.5, low=0.1, high=4.0) -> dict:
     }
 
 
-def test_the_cone_reaches_from_the_sensor_to_what_it_sees(link, robot):
+def test_the_cone_reaches_from_the_sensor_to_the_measured_distance(link, robot):
     module = robot.add_module("Range", link, "/sonar", 0.2, 0.1, 90.0)
     link.say("/sonar", sonar(2.0))
     x0, y0, x, y, radius, *_ = numbers(module.cone.get("d"))
@@ -260,7 +260,7 @@ def test_the_cone_reaches_from_the_sensor_to_what_it_sees(link, robot):
         ("-1", None, None),
     ],
 )
-def test_a_sonar_that_sees_nothing_is_not_one_that_does_not_know(
+def test_a_sonar_distinguishes_no_echo_from_an_invalid_distance(
     link, robot, said, distance, radius
 ):
     module = robot.add_module("Range", link, "/sonar")
@@ -277,7 +277,9 @@ def test_a_sonar_that_sees_nothing_is_not_one_that_does_not_know(
     "wrong",
     [{"view": 0}, {"view": 7}, {"view": None}, {"high": 0}, {"high": None}],
 )
-def test_a_sonar_whose_own_numbers_make_no_sense_is_refused(link, robot, wrong):
+def test_a_sonar_with_an_invalid_field_of_view_or_max_range_is_refused(
+    link, robot, wrong
+):
     module = robot.add_module("Range", link, "/sonar")
     link.say("/sonar", sonar(1.0))
     before = module.cone.get("d")

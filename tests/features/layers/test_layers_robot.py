@@ -41,20 +41,20 @@ def scan(ranges, *, start=0.0, step=math.pi / 2, low=0.1, high=10.0) -> LaserSca
     return convert(plain, LaserScanMsg)
 
 
-def test_a_dot_is_where_a_ray_hits():
+def test_each_dot_is_at_the_end_of_its_ray():
     points, rays = scan_points(scan([1.0, 2.0, 3.0]))
     assert list(rays) == [0, 1, 2]
     assert points == pytest.approx(np.array([[1, 0], [0, 2], [-3, 0]]), abs=1e-6)
 
 
 @pytest.mark.parametrize("miss", [None, math.inf, -math.inf, math.nan, 0.05, 11.0])
-def test_a_ray_that_hits_nothing_has_no_dot(miss):
+def test_a_ray_without_a_valid_range_has_no_dot(miss):
     points, rays = scan_points(scan([1.0, miss, 3.0]))
     assert list(rays) == [0, 2]
     assert points == pytest.approx(np.array([[1, 0], [-3, 0]]), abs=1e-6)
 
 
-def test_a_scan_that_sweeps_clockwise():
+def test_a_clockwise_scan_has_its_dots_in_place():
     points, _ = scan_points(scan([1.0, 1.0], step=-math.pi / 2))
     assert points == pytest.approx(np.array([[1, 0], [0, -1]]), abs=1e-6)
 
@@ -68,25 +68,25 @@ def test_dots_are_thinned_evenly_and_keep_their_bearings():
     assert set(np.diff(rays)) <= {7, 8}
 
 
-def test_fewer_rays_than_dots_are_all_drawn():
+def test_all_rays_are_drawn_if_there_are_fewer_than_max_dots():
     assert len(scan_points(scan([1.0] * 20), max_dots=50)[0]) == 20
 
 
 @pytest.mark.parametrize(
     "bad", [scan([]), scan([None] * 5), scan([1.0], high=math.nan)]
 )
-def test_a_scan_with_nothing_in_it_draws_nothing_or_all_that_is_finite(bad):
+def test_an_empty_scan_or_a_scan_with_a_nan_limit_draws_at_most_one_dot(bad):
     assert len(scan_points(bad)[0]) <= 1
 
 
 @pytest.mark.parametrize("angle", [math.nan, math.inf])
-def test_a_scan_without_an_angle_is_refused(angle):
+def test_a_scan_with_a_non_finite_angle_is_refused(angle):
     for wrong in (scan([1.0], start=angle), scan([1.0], step=angle)):
         with pytest.raises(ProtocolError, match=r"angle_\w+ must be finite radians"):
             check_rays(wrong)
 
 
-def test_the_scanner_draws_one_path_of_class_dot_in_its_place_on_the_robot():
+def test_the_scanner_draws_one_path_of_class_dot_on_the_robot():
     link, robot = Link(), Robot("Bob")
     scanner = robot.add_module("LaserScanner", link, "/base_scan", 0.1, 0.0, 90.0)
     callback, type_name, options = link.listeners["/base_scan"]
@@ -104,7 +104,7 @@ def test_the_scanner_draws_one_path_of_class_dot_in_its_place_on_the_robot():
     assert scanner.svg.parent is None
 
 
-def test_a_scan_that_reaches_far_uses_a_coarser_unit():
+def test_a_scan_with_long_ranges_uses_a_coarser_unit():
     link, robot = Link(), Robot("Bob")
     scanner = robot.add_module("LaserScanner", link, "/scan", max_dots=None)
     scanner.take(scan([80.0], high=100.0))
@@ -113,7 +113,7 @@ def test_a_scan_that_reaches_far_uses_a_coarser_unit():
     assert x * dot._dots.unit == pytest.approx(80.0, abs=0.01)
 
 
-def test_a_number_of_dots_that_is_none_is_refused():
+def test_max_dots_of_zero_is_refused():
     with pytest.raises(ValueError, match="max_dots must be at least 1"):
         Robot("Bob").add_module("LaserScanner", Link(), "/scan", max_dots=0)
 
@@ -125,7 +125,7 @@ def say_percentages(link, *percentages):
         callback(convert({"percentage": percentage, "voltage": 24.0}, BatteryStateMsg))
 
 
-def test_a_battery_that_counts_to_a_hundred_is_understood_also_when_it_is_low():
+def test_a_battery_that_counts_to_100_is_read_correctly_at_low_charge():
     link, robot = Link(), Robot("Bob")
     battery = robot.add_module("Battery", link, "/battery")
     say_percentages(link, 1.04)  # a gauge that is not calibrated
@@ -138,7 +138,7 @@ def test_a_battery_that_counts_to_a_hundred_is_understood_also_when_it_is_low():
 
 
 @pytest.mark.parametrize("wrong", [-1.0, 101.0, 1e300])
-def test_a_percentage_that_none_can_be_is_said_until_one_comes_that_can(wrong):
+def test_an_invalid_battery_percentage_is_a_problem_until_a_valid_one_arrives(wrong):
     link, robot = Link(), Robot("Bob")
     battery = robot.add_module("Battery", link, "/battery")
     say_percentages(link, 0.5, wrong)
@@ -154,7 +154,7 @@ def test_a_percentage_that_none_can_be_is_said_until_one_comes_that_can(wrong):
 @pytest.mark.parametrize(
     ("percentage", "charge"), [(0.5, 0.5), (None, None), (80.0, 0.8), (-1.0, None)]
 )
-def test_a_battery_that_does_not_know_its_charge_says_so(percentage, charge):
+def test_the_battery_passes_its_charge_or_none_to_other_modules(percentage, charge):
     received = []
 
     class Listener:
@@ -171,7 +171,7 @@ def test_a_battery_that_does_not_know_its_charge_says_so(percentage, charge):
     assert received == [charge]
 
 
-def test_plain_data_with_modules_makes_them():
+def test_from_dict_adds_the_modules_of_a_robot():
     link = Link()
     robot = Robot.from_dict(
         {

@@ -49,7 +49,7 @@ def colours(chromium: Browser) -> Iterator:
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_marker_covers_what_it_should_and_nothing_beside_it(colours, name):
+def test_a_marker_covers_only_the_pixels_of_its_shape(colours, name):
     shape = SHAPES[name]
     places = ((-3.4, -0.9), *shape.in_world(shape.blue + shape.red + shape.beside))
     empty, *found = colours(places)

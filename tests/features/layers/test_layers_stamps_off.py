@@ -60,9 +60,7 @@ def drawn_at(scene: Scene, x: float) -> bool:
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_scan_an_hour_off_is_drawn_and_the_hour_is_said_once(
-    map, channel, monkeypatch, way
-):
+def test_a_scan_an_hour_off_is_drawn_with_one_notice(map, channel, monkeypatch, way):
     monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
     off = scan(1.5, header=at("laser", NOW + WAYS[way]))
 
@@ -88,7 +86,7 @@ def test_a_scan_an_hour_off_is_drawn_and_the_hour_is_said_once(
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_odometry_an_hour_off_is_drawn_and_the_hour_is_said_once(map, channel, way):
+def test_odometry_an_hour_off_is_drawn_with_one_notice(map, channel, way):
     async def scenario(scene: Scene) -> None:
         await stand(scene, 1.0, NOW)
         await stand(scene, 1.1, NOW + WAYS[way])
@@ -118,7 +116,7 @@ async def tell(scene: Scene, about: dict) -> None:
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_frame_an_hour_off_is_said_once_and_the_robot_stays_in_place(
+def test_a_transform_an_hour_off_gives_one_notice_and_does_not_move_the_robot(
     map, channel, way
 ):
     async def scenario(scene: Scene) -> None:
@@ -134,9 +132,7 @@ def test_a_frame_an_hour_off_is_said_once_and_the_robot_stays_in_place(
     with_scene(map, channel, scenario)
 
 
-def test_a_frame_of_two_thousand_million_nanoseconds_is_left_out_and_said_once(
-    map, channel
-):
+def test_a_transform_with_invalid_nanoseconds_is_ignored_with_one_notice(map, channel):
     async def scenario(scene: Scene) -> None:
         await placed(scene)
         for _ in range(3):

@@ -71,7 +71,9 @@ TURNS = {
 
 
 @pytest.mark.parametrize("turns", TURNS.values(), ids=TURNS)
-def test_a_cloud_is_turned_in_space_before_it_is_flattened(link, robot, base, turns):
+def test_a_cloud_of_a_tilted_sensor_is_rotated_in_3d_and_projected(
+    link, robot, base, turns
+):
     mounted = mount(link, (0.3, 0.1, 0.8), turns)
     module = robot.add_module("PointCloud", link, "/points", cell=0)
     link.say("/points", sensed(cloud(POINTS)))
@@ -80,7 +82,7 @@ def test_a_cloud_is_turned_in_space_before_it_is_flattened(link, robot, base, tu
 
 
 @pytest.mark.parametrize("turns", TURNS.values(), ids=TURNS)
-def test_heights_are_above_the_base_straight_up(link, robot, base, turns):
+def test_height_limits_are_measured_vertically_above_the_base(link, robot, base, turns):
     mounted = mount(link, (0.3, 0.1, 0.8), turns)
     there = taken(POINTS, *base, mounted)
     heights = there[:, 2] - base[1]["transform"]["translation"]["z"]
@@ -92,7 +94,7 @@ def test_heights_are_above_the_base_straight_up(link, robot, base, turns):
     assert on_map(*module.dots) == near(flat(there[within]))
 
 
-def test_colours_by_height_are_by_that_above_the_base_too(link, robot, base):
+def test_colours_by_height_use_the_height_above_the_base(link, robot, base):
     mounted = mount(link, (0.3, 0.1, 0.8), OPTICAL)
     module = robot.add_module(
         "PointCloud", link, "/points", cell=0, colour_by="z", low=0.0, high=8.0
@@ -105,7 +107,7 @@ def test_colours_by_height_are_by_that_above_the_base_too(link, robot, base):
         assert on_map(band) == near(point[np.newaxis, :2]), height
 
 
-def test_a_cloud_on_the_map_has_heights_above_the_map(link, robot):
+def test_height_limits_in_the_map_frame_are_measured_above_the_map(link, robot):
     robot.set_tf(link)
     tell(link, MAP, SLOPE)
     mounted = mount(link, (0.0, 0.0, 0.5), OPTICAL)
@@ -119,9 +121,7 @@ def test_a_cloud_on_the_map_has_heights_above_the_map(link, robot):
     assert on_map(*module.dots) == near(flat(there[within]))
 
 
-def test_a_cloud_that_overtakes_the_frames_is_drawn_anew_as_the_robot_leans(
-    link, robot
-):
+def test_a_cloud_newer_than_the_frames_is_redrawn_when_frames_arrive(link, robot):
     robot.set_tf(link)
     still = (3.0, 1.0, 0.0)
     for seconds in (100.0, 100.1):
@@ -136,7 +136,7 @@ def test_a_cloud_that_overtakes_the_frames_is_drawn_anew_as_the_robot_leans(
     assert on_map(*module.dots) == near(flat(taken(POINTS, leaning, mounted)))
 
 
-def test_a_robot_without_a_map_has_its_camera_where_its_frames_have_it(link, robot):
+def test_static_frames_place_the_cloud_of_a_robot_without_a_map(link, robot):
     robot.set_odometry_topic(link, "/odom", 0, type="geometry_msgs/PoseStamped")
     robot.set_tf(link, quiet=True)
     mounted = mount(link, (0.3, 0.1, 0.8), OPTICAL)
@@ -156,7 +156,7 @@ RAYS = [(2.0, 0.5), (1.0, -1.0), (-3.0, 0.25)]
 
 
 @pytest.mark.parametrize("turns", TURNS.values(), ids=TURNS)
-def test_the_plane_of_a_scan_is_seen_from_above(link, robot, base, turns):
+def test_a_scan_of_a_tilted_sensor_is_projected_from_above(link, robot, base, turns):
     mounted = mount(link, (0.2, 0.0, 0.3), turns)
     module = robot.add_module("LaserScanner", link, "/scan", max_dots=None)
     link.say("/scan", sensed(scan(RAYS, 100.0)))
@@ -177,7 +177,7 @@ def _degrees(x, y):
 
 
 @pytest.mark.parametrize("turns", [OVER, (math.pi / 2, 0, 0), (0, math.pi / 2, 0)])
-def test_a_sweep_in_any_plane_is_straightened_in_that_plane(link, robot, turns):
+def test_a_tilted_sweep_is_corrected_for_motion_in_its_own_plane(link, robot, turns):
     robot.set_tf(link)
     for step in range(3):
         seconds = 100.0 + step / 10
@@ -204,7 +204,7 @@ def outline(cone) -> np.ndarray:
 
 
 @pytest.mark.parametrize("roll", [0.0, math.pi / 2, math.pi, 2.0])
-def test_a_cone_is_the_same_however_it_is_turned_about_its_axis(link, robot, roll):
+def test_a_cone_does_not_depend_on_the_rotation_about_its_axis(link, robot, roll):
     robot.set_tf(link)
     tell(link, MAP, BASE)
     mount(link, (0.2, 0.1, 0.4), (roll, 0.0, 0.7))
@@ -219,9 +219,7 @@ def test_a_cone_is_the_same_however_it_is_turned_about_its_axis(link, robot, rol
     assert place.apply(x, y) == near(corner)
 
 
-def test_a_cone_that_looks_down_has_the_outline_that_it_has_from_above(
-    link, robot, base
-):
+def test_a_cone_that_points_down_has_its_outline_from_above(link, robot, base):
     pitch, half, reach = 1.0, 0.25, 2.0
     mounted = mount(link, (0.2, 0.1, 0.4), (0.3, pitch, 0.7))
     module = robot.add_module("Range", link, "/sonar")
@@ -242,7 +240,9 @@ def test_a_cone_that_looks_down_has_the_outline_that_it_has_from_above(
 
 
 @pytest.mark.parametrize("turns", TURNS.values(), ids=TURNS)
-def test_plans_and_polygons_of_any_frame_are_seen_from_above(link, robot, base, turns):
+def test_paths_and_polygons_of_tilted_frames_are_projected_from_above(
+    link, robot, base, turns
+):
     mounted = mount(link, (0.2, 0.1, 0.4), turns)
     outline = robot.add_module("Polygon", link, "/footprint")
     plan = robot.add_module("Path", link, "/plan")
@@ -255,7 +255,7 @@ def test_plans_and_polygons_of_any_frame_are_seen_from_above(link, robot, base, 
     assert np.array(in_world(plan.line)) == near(wanted)
 
 
-def test_the_frames_of_these_tests_are_turned_as_ros_has_it():
+def test_the_frames_of_these_tests_use_the_rotation_order_of_ros():
     """RViz turns about fixed axes: roll, then pitch, then yaw."""
     right, down, ahead = matrix(*OPTICAL).T
     assert ahead == pytest.approx([1, 0, 0])

@@ -100,7 +100,7 @@ WAYS = [np.array([math.cos(a), math.sin(a)]) for a in np.linspace(0, math.tau, 2
 
 
 @pytest.mark.parametrize("type", [CUBE, SPHERE, CYLINDER])
-def test_a_solid_has_the_outline_that_it_has_from_above(link, layer, mounted, type):
+def test_a_tilted_solid_has_its_outline_from_above(link, layer, mounted, type):
     found = outline(seen(link, layer, type))
     middle, axes = whole(mounted)
     for way in WAYS:
@@ -109,7 +109,9 @@ def test_a_solid_has_the_outline_that_it_has_from_above(link, layer, mounted, ty
 
 
 @pytest.mark.parametrize("type", [CUBES, SPHERES])
-def test_each_of_many_solids_has_it_too(link, layer, mounted, type):
+def test_each_solid_of_a_tilted_list_has_its_outline_from_above(
+    link, layer, mounted, type
+):
     path = seen(link, layer, type, CORNERS)
     own = frame("sensor", "marker", THERE, SELF)
     _, axes = whole(mounted)
@@ -122,7 +124,9 @@ def test_each_of_many_solids_has_it_too(link, layer, mounted, type):
 
 
 @pytest.mark.parametrize("type", [STRIP, LINES, TRIANGLES])
-def test_points_in_space_are_where_they_are_from_above(link, layer, mounted, type):
+def test_tilted_lines_and_triangles_are_projected_from_above(
+    link, layer, mounted, type
+):
     points = CORNERS if type != LINES else CORNERS[:2]
     drawn = seen(link, layer, type, points)
     own = frame("sensor", "marker", THERE, SELF)
@@ -131,7 +135,7 @@ def test_points_in_space_are_where_they_are_from_above(link, layer, mounted, typ
     assert corners(drawn, text) == pytest.approx(there, abs=2e-3)
 
 
-def test_an_arrow_in_space_points_where_it_does_from_above(link, layer, mounted):
+def test_a_tilted_arrow_is_projected_from_above(link, layer, mounted):
     ends = CORNERS[:2]
     drawn = seen(link, layer, ARROW, ends, scale=(0.05, 0.1, 0.2))
     own = frame("sensor", "marker", THERE, SELF)
@@ -141,7 +145,7 @@ def test_an_arrow_in_space_points_where_it_does_from_above(link, layer, mounted)
     assert (found[0] + found[6]) / 2 == pytest.approx(start, abs=2e-3)
 
 
-def test_points_face_whoever_looks(link, layer, mounted):
+def test_points_of_a_tilted_marker_keep_their_size(link, layer, mounted):
     path = seen(link, layer, POINTS, CORNERS)
     own = frame("sensor", "marker", THERE, SELF)
     for square, there in zip(
@@ -155,7 +159,7 @@ def test_points_face_whoever_looks(link, layer, mounted):
         assert middle == pytest.approx(there[:2], abs=2e-3)
 
 
-def test_a_text_stands_where_it_is_and_is_never_turned(link, layer, mounted):
+def test_a_text_of_a_tilted_marker_is_in_place_and_upright(link, layer, mounted):
     text = seen(link, layer, TEXT, text="here")
     placed = to_root(text)
     (there,) = taken([THERE], BODY, mounted)
@@ -164,7 +168,7 @@ def test_a_text_stands_where_it_is_and_is_never_turned(link, layer, mounted):
     assert placed.a == -placed.d > 0
 
 
-def test_a_marker_that_moves_with_its_frame_is_drawn_anew_as_that_tilts(link, layer):
+def test_a_frame_locked_marker_is_redrawn_when_its_frame_tilts(link, layer):
     header = {"stamp": stamp(0.0), "frame_id": "gripper"}
     tall = marker(
         CUBE, scale=(1.0, 1.0, 3.0), at=(0, 0, 0), header=header, frame_locked=True
@@ -186,7 +190,7 @@ def test_a_marker_that_moves_with_its_frame_is_drawn_anew_as_that_tilts(link, la
 
 
 @pytest.mark.parametrize("type", [CUBE, SPHERE, CYLINDER, CUBES, SPHERES])
-def test_a_marker_too_high_to_be_drawn_tilted_is_refused_while_it_lies_flat(
+def test_a_frame_locked_marker_with_an_absurd_height_is_refused_while_flat(
     link, layer, type
 ):
     header = {"stamp": stamp(0.0), "frame_id": "gripper"}
@@ -196,7 +200,7 @@ def test_a_marker_too_high_to_be_drawn_tilted_is_refused_while_it_lies_flat(
     assert any("scale.z must be 1e+07 m" in said for said in layer.problems.values())
 
 
-def test_a_marker_that_only_drives_about_is_not_drawn_anew(link, layer):
+def test_a_frame_locked_marker_that_only_moves_is_not_redrawn(link, layer):
     header = {"stamp": stamp(0.0), "frame_id": "camera"}
     over = marker(CYLINDER, at=(0, 0, 0), header=header, frame_locked=True)
     say(link, over)
@@ -209,7 +213,7 @@ def test_a_marker_that_only_drives_about_is_not_drawn_anew(link, layer):
     assert len({id(shape) for shape in shapes[0:]}) == 1
 
 
-def test_what_an_optical_frame_has_ahead_is_ahead_of_the_robot(link, layer):
+def test_a_marker_ahead_in_an_optical_frame_is_drawn_ahead_on_the_map(link, layer):
     """With plain numbers: three metres ahead of the lens, and half a metre right."""
     header = {"stamp": stamp(0.0), "frame_id": "optical"}
     say(link, marker(CUBE, header=header))

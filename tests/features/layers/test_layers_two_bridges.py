@@ -32,7 +32,7 @@ async def until(condition) -> None:
             await asyncio.sleep(0.005)
 
 
-def test_a_scan_of_one_bridge_is_drawn_where_the_poses_of_another_have_the_robot(
+def test_a_scan_of_one_bridge_is_placed_by_the_poses_of_another_bridge(
     map: Map, robot: Robot
 ):
     async def scenario(base: WitnessRobot, sensors: WitnessRobot) -> None:

@@ -52,7 +52,9 @@ ON_THE_MAP = {
 @pytest.mark.parametrize(
     ("dialect", "tilted"), [("ros1", False), ("ros2", True)], ids=["ros1", "ros2"]
 )
-def test_all_that_robots_say_is_drawn(chromium: Browser, dialect, tilted):
+def test_webmap_view_draws_all_layers_of_simulated_robots(
+    chromium: Browser, dialect, tilted
+):
     """Also where lasers hang upside down and a cloud is in its optical frame."""
     with simulators(dialect, tilted=tilted) as found:
         world = found[dialect].world

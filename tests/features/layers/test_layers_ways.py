@@ -39,7 +39,7 @@ def near(points):
 
 
 @pytest.mark.parametrize("ros2", [False, True])
-def test_a_path_stays_where_it_is_on_the_map_while_the_robot_goes(link, robot, ros2):
+def test_a_path_keeps_its_position_on_the_map_while_the_robot_moves(link, robot, ros2):
     module = robot.add_module("Path", link, "/plan")
     points = [(1.0, 2.0), (3.5, -4.25), (-7.125, 0.0)]
     link.say("/plan", path(points, ros2=ros2))
@@ -48,14 +48,14 @@ def test_a_path_stays_where_it_is_on_the_map_while_the_robot_goes(link, robot, r
         assert in_world(module.line) == near(points)
 
 
-def test_a_path_that_is_added_to_a_robot_on_its_way_is_in_place(link, robot):
+def test_a_path_added_to_a_robot_away_from_the_origin_is_in_place(link, robot):
     go(link, 10, 20, 2.0)
     module = robot.add_module("Path", link, "/plan")
     link.say("/plan", path([(1, 2), (3, 4)]))
     assert in_world(module.line) == near([(1, 2), (3, 4)])
 
 
-def test_a_path_lies_under_the_robot_and_takes_no_clicks(link, robot):
+def test_a_path_is_drawn_under_the_robot_and_ignores_clicks(link, robot):
     module = robot.add_module("Path", link, "/plan", name="local")
     children = list(robot.svg.children)
     assert children.index(module.svg) < children.index(robot.model)
@@ -66,7 +66,7 @@ def test_a_path_lies_under_the_robot_and_takes_no_clicks(link, robot):
     assert "/plan" not in link.listeners
 
 
-def test_a_path_without_poses_takes_the_line_away(link, robot):
+def test_a_path_without_poses_removes_the_line(link, robot):
     module = robot.add_module("Path", link, "/plan")
     link.say("/plan", path([(1, 2), (4, 6)]))
     assert module.length == pytest.approx(5.0)
@@ -88,7 +88,7 @@ def test_a_long_path_is_thinned_evenly_and_keeps_both_ends(link, robot):
 
 
 @pytest.mark.parametrize("wrong", [None, math.nan, math.inf])
-def test_a_path_with_a_point_that_is_nowhere_is_refused(link, robot, wrong):
+def test_a_path_with_a_non_finite_point_is_refused(link, robot, wrong):
     module = robot.add_module("Path", link, "/plan")
     link.say("/plan", path([(1, 2), (3, 4)]))
     link.say("/plan", path([(1, 2), (3, wrong)]))
@@ -101,7 +101,7 @@ def test_a_path_with_a_point_that_is_nowhere_is_refused(link, robot, wrong):
     assert in_world(module.line) == near([(5, 6), (7, 8)])
 
 
-def test_a_path_of_poses_that_turn_nowhere_is_a_path(link, robot):
+def test_a_path_with_zero_quaternions_is_drawn(link, robot):
     message = path([(1, 2), (3, 4)])
     for each in message["poses"]:
         each["pose"]["orientation"] = {"x": 0, "y": 0, "z": 0, "w": 0}
@@ -110,14 +110,14 @@ def test_a_path_of_poses_that_turn_nowhere_is_a_path(link, robot):
     assert in_world(module.line) == near([(1, 2), (3, 4)])
 
 
-def test_what_a_removed_path_complained_of_is_forgotten(link, robot):
+def test_removing_a_path_removes_its_problem(link, robot):
     module = robot.add_module("Path", link, "/plan")
     link.say("/plan", path([(math.nan, 0)]))
     robot.remove_module(module)
     assert robot.problems == {}
 
 
-def test_a_path_tells_the_other_modules_of_its_robot(link, robot):
+def test_a_path_update_triggers_other_modules_of_the_robot(link, robot):
     received = []
 
     class Listener:
@@ -133,7 +133,7 @@ def test_a_path_tells_the_other_modules_of_its_robot(link, robot):
     assert received == [3.0]
 
 
-def test_a_trail_is_where_the_robot_was(link, robot):
+def test_a_trail_follows_the_past_positions_of_the_robot(link, robot):
     trail = robot.add_module("Trail")
     way = [(0.1 * i, 0.05 * i, 0.3 * i) for i in range(30)]
     for at in way:
@@ -157,16 +157,14 @@ def test_a_jump_breaks_the_trail(link, robot):
     assert len(trail.svg.children) == 2
 
 
-def test_a_robot_that_only_jumps_leaves_no_heap_of_lines(link, robot):
+def test_a_robot_that_only_jumps_has_only_one_trail_line(link, robot):
     trail = robot.add_module("Trail")
     for x in range(0, 1000, 10):
         go(link, x, 0)
     assert len(trail.svg.children) == 1
 
 
-def test_a_trail_is_no_longer_than_it_may_be_and_its_old_pieces_stay_as_they_are(
-    link, robot
-):
+def test_a_trail_is_limited_in_length_and_its_old_pieces_are_unchanged(link, robot):
     trail = robot.add_module("Trail", length=10.0, step=0.09)
     for i in range(1000):
         go(link, 0.1 * i, 0)
@@ -179,7 +177,7 @@ def test_a_trail_is_no_longer_than_it_may_be_and_its_old_pieces_stay_as_they_are
     assert len(trail.svg.children) <= 4
 
 
-def test_a_trail_goes_on_from_one_piece_to_the_next_without_a_gap(link, robot):
+def test_pieces_of_a_trail_join_without_a_gap(link, robot):
     trail = robot.add_module("Trail", step=0.09)
     for i in range(120):
         go(link, 0.1 * i, 0)
@@ -202,12 +200,12 @@ def test_a_trail_can_be_cleared(link, robot):
 
 @pytest.mark.parametrize("name", ["length", "step", "jump"])
 @pytest.mark.parametrize("value", [0, -1, math.nan, math.inf])
-def test_a_trail_of_no_length_is_refused(robot, name, value):
+def test_invalid_trail_lengths_are_refused(robot, name, value):
     with pytest.raises(ValueError, match=f"{name} must be metres above 0"):
         robot.add_module("Trail", **{name: value})
 
 
-def test_a_robot_that_lies_on_its_side_has_its_path_in_place(link, robot):
+def test_the_path_of_a_robot_on_its_side_is_in_place(link, robot):
     module = robot.add_module("Path", link, "/plan")
     link.say("/plan", path([(1, 2), (3, 4)]))
     q = Quaternion(0.5, 0.5, 0.5, 0.5)

@@ -24,7 +24,7 @@ def log(level, text, name="/planner", *, ros2=False) -> dict:
 
 
 @pytest.mark.parametrize("ros2", [False, True])
-def test_the_levels_of_both_dialects_are_the_same(link, robot, ros2):
+def test_ros_1_and_ros_2_log_levels_map_to_the_same_names(link, robot, ros2):
     module = robot.add_module("Rosout", link, level="debug")
     for level in ROS1:
         link.say("/rosout", log(level, f"it is {level}", ros2=ros2))
@@ -37,13 +37,13 @@ def test_the_levels_of_both_dialects_are_the_same(link, robot, ros2):
 @pytest.mark.parametrize(
     ("level", "name"), [(0, "debug"), (35, "warn"), (255, "fatal"), (-5, "debug")]
 )
-def test_a_level_that_there_is_not_is_the_nearest(link, robot, level, name):
+def test_an_unknown_log_level_is_replaced_by_a_known_one(link, robot, level, name):
     module = robot.add_module("Rosout", link, level="debug")
     link.say("/rosout", log(level, "x", ros2=True))
     assert [line.level for line in module.lines] == [name]
 
 
-def test_only_what_matters_and_is_this_robots_is_kept(link, robot):
+def test_log_lines_are_filtered_by_level_and_node_prefix(link, robot):
     module = robot.add_module("Rosout", link, level="error", prefix="/bob/")
     link.say("/rosout", log("warn", "slow", "/bob/planner"))
     link.say("/rosout", log("error", "stuck", "/eve/planner"))
@@ -52,7 +52,7 @@ def test_only_what_matters_and_is_this_robots_is_kept(link, robot):
     assert [line.text for line in module.lines] == ["stuck", "gone"]
 
 
-def test_a_page_shows_the_newest_lines_as_text_until_it_ends(link, robot):
+def test_a_page_shows_the_newest_lines_as_text_until_it_closes(link, robot):
     module = robot.add_module("Rosout", link, lines=3)
     link.say("/rosout", log("warn", "before"))
     rows, page = html.ol(html.li("old")), Scope("page")
@@ -72,7 +72,7 @@ def test_a_page_shows_the_newest_lines_as_text_until_it_ends(link, robot):
     assert len(rows.children) == 3
 
 
-def test_a_line_without_an_end_is_cut_and_others_are_told(link, robot):
+def test_a_long_line_is_truncated_and_passed_to_other_modules(link, robot):
     received = []
 
     class Listener:
@@ -89,7 +89,7 @@ def test_a_line_without_an_end_is_cut_and_others_are_told(link, robot):
 
 
 @pytest.mark.parametrize("options", [{"level": "loud"}, {"lines": 0}])
-def test_options_that_make_no_sense_are_refused(link, robot, options):
+def test_invalid_options_are_refused(link, robot, options):
     with pytest.raises(ValueError, match="got"):
         robot.add_module("Rosout", link, **options)
     assert link.listeners == {}

@@ -49,7 +49,7 @@ def said(monkeypatch):
     return sent
 
 
-def test_lines_of_both_dialects_come_while_the_panel_is_open(map, page, said):
+def test_the_log_panel_receives_ros_1_and_ros_2_lines_only_while_open(map, page, said):
     old, new = LogLink("old"), LogLink("new")
 
     async def scenario():
@@ -83,7 +83,7 @@ def test_lines_of_both_dialects_come_while_the_panel_is_open(map, page, said):
     asyncio.run(scenario())
 
 
-def test_a_bridge_is_asked_once_for_all_pages_and_keeps_the_newest():
+def test_pages_share_one_log_subscription_that_keeps_the_newest_lines():
     link = LogLink("shared")
     log = log_of(link)
     assert log_of(link) is log
@@ -103,7 +103,7 @@ def test_a_bridge_is_asked_once_for_all_pages_and_keeps_the_newest():
     assert len(link.listeners) == 1
 
 
-def test_a_bridge_that_is_gone_is_not_listened_to():
+def test_a_log_that_received_nothing_has_no_lines():
     log = BridgeLog(LogLink("gone"))
     log.watch().remove()
     assert list(log.lines) == []
@@ -116,6 +116,6 @@ def test_a_bridge_that_is_gone_is_not_listened_to():
         ({"lines": 0}, "lines must be 1 to 200, got 0"),
     ],
 )
-def test_what_cannot_be_shown_is_refused(map, options, words):
+def test_invalid_options_of_the_log_panel_are_refused(map, options, words):
     with pytest.raises(ConfigError, match=words):
         map.add_module("RosoutPanel", [], **options)

@@ -23,7 +23,7 @@ const ONE_BAY = placed([
   [0, 4],
 ]);
 
-test("an area with a bay is one, whichever way round it is pressed", () => {
+test("an area with a bay is valid, clockwise and counter-clockwise", () => {
   assert.equal(problemOf(ONE_BAY), "");
   assert.equal(problemOf([...ONE_BAY].reverse()), "");
 });
@@ -90,12 +90,12 @@ for (const [what, corners, problem] of [
     `Got 0.04 m², expected at least ${LEAST_AREA} m². Use a larger area.`,
   ],
 ]) {
-  test(`${what}: what was got and what is needed`, () => {
+  test(`${what}: the area is refused with a reason`, () => {
     assert.equal(problemOf(placed(corners)), problem);
   });
 }
 
-test("more corners than a preview keeps up with are refused with both numbers", () => {
+test("too many corners are refused with their number and the limit", () => {
   const around = (count) =>
     placed(
       Array.from({ length: count }, (_, i) => [
@@ -110,7 +110,7 @@ test("more corners than a preview keeps up with are refused with both numbers", 
   );
 });
 
-test("a corner that was pressed twice is one corner, the first and last too", () => {
+test("repeated corners are merged, including the first and the last", () => {
   const pressed = placed([
     [0, 0],
     [4, 0],
@@ -121,7 +121,7 @@ test("a corner that was pressed twice is one corner, the first and last too", ()
   assert.deepEqual(cleaned(pressed), [pressed[0], pressed[1], pressed[3]]);
 });
 
-test("the longest side says the direction, and of two as long the first", () => {
+test("the direction is that of the first longest side", () => {
   assert.equal(longestSide(ONE_BAY), 0);
   const tall = placed([
     [0, 0],
@@ -132,7 +132,7 @@ test("the longest side says the direction, and of two as long the first", () => 
   assert.equal(longestSide(tall), Math.PI / 2);
 });
 
-test("what is on an edge is in the area, and what is in a bay is not", () => {
+test("points on an edge are inside the area, points in a bay are outside", () => {
   assert.ok(contains(ONE_BAY, { x: 1, y: 3 }));
   assert.ok(contains(ONE_BAY, { x: 6, y: 1 }));
   assert.ok(contains(ONE_BAY, { x: 2, y: 2 }));
@@ -140,7 +140,7 @@ test("what is on an edge is in the area, and what is in a bay is not", () => {
   assert.ok(!contains(ONE_BAY, { x: -1, y: 2 }));
 });
 
-test("a straight way stays in the area along a side and past a corner, not over a bay", () => {
+test("a line along a side or past a corner is inside the area, a line across a bay is not", () => {
   assert.ok(holds(ONE_BAY, { x: 2, y: 2 }, { x: 4, y: 2 }));
   assert.ok(holds(ONE_BAY, { x: 1, y: 1 }, { x: 3, y: 2 }));
   assert.ok(holds(ONE_BAY, { x: 0, y: 2 }, { x: 6, y: 2 }));

@@ -9,14 +9,14 @@ import {
 
 const ROUTE = { points: [{ x: 1, y: 2, yaw: 0 }], loop: true, open: true, runs: new Map() };
 
-test("a route is kept for the tool that comes next on its map, once", () => {
+test("a route is kept once for the next tool on the same map", () => {
   keepRoute(7, ROUTE, 1000);
   assert.equal(keptRoute(8, 1100), null);
   assert.equal(keptRoute(7, 1100), ROUTE);
   assert.equal(keptRoute(7, 1100), null);
 });
 
-test("a map that comes much later is another one", () => {
+test("a kept route expires", () => {
   keepRoute(7, ROUTE, 1000);
   assert.equal(keptRoute(7, 1000 + KEPT_FOR), null);
 });

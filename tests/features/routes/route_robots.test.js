@@ -71,7 +71,7 @@ async function waiting() {
   return { drive, robots, run: robots.of("r1").run };
 }
 
-test("a route goes on where another robot's goal has used up the link for a moment", async () => {
+test("a route continues after its goals were refused for a missing link", async () => {
   const { drive, run } = await waiting();
   assert.equal(run.state, "going");
   drive.refusal = null;
@@ -87,7 +87,7 @@ test("a route goes on where another robot's goal has used up the link for a mome
   assert.equal(run.state, "going");
 });
 
-test("a route halts at last where there is no link, and says so", async () => {
+test("a route without a link halts with that reason after all tries", async () => {
   const { drive, run } = await waiting();
   await pass(20);
   assert.equal(run.state, "halted");
@@ -95,7 +95,7 @@ test("a route halts at last where there is no link, and says so", async () => {
   assert.equal(drive.said.length, TRIES);
 });
 
-test("a route that waits is not busy, so a person may pause or skip it", async () => {
+test("a waiting route is not busy", async () => {
   const { robots } = await waiting();
   assert.equal(robots.of("r1").busy, false);
 });
@@ -109,7 +109,7 @@ for (const [what, act, state] of [
   ["sent elsewhere by this page", ({ drive }) => drive.tell("goal", "r1"), "halted"],
   ["sent elsewhere by another", ({ drive }) => drive.report(goal("g9")), "halted"],
 ]) {
-  test(`nothing more is sent of a route that is ${what} while it waits`, async () => {
+  test(`a waiting route that is ${what} sends no more goals`, async () => {
     const bench = await waiting();
     act(bench);
     bench.drive.refusal = null;
@@ -128,7 +128,7 @@ test("a STOP of another robot does not halt a route", async () => {
   assert.equal(run.state, "going");
 });
 
-test("a point that is skipped while it waits is not sent, and the next one is once", async () => {
+test("a skip while waiting drops the point and sends the next point once", async () => {
   const { drive, robots, run } = await waiting();
   drive.refusal = null;
   robots.act("r1", "skip");
@@ -137,7 +137,7 @@ test("a point that is skipped while it waits is not sent, and the next one is on
   assert.equal(run.state, "going");
 });
 
-test("a route that is paused and goes on while it waits sends its point once", async () => {
+test("a waiting route that is paused and resumed sends its point once", async () => {
   const { drive, robots, run } = await waiting();
   robots.act("r1", "pause");
   drive.refusal = null;
@@ -147,14 +147,14 @@ test("a route that is paused and goes on while it waits sends its point once", a
   assert.equal(run.state, "going");
 });
 
-test("nothing more is sent after the tool is gone", async () => {
+test("no goals are sent after the tool is destroyed", async () => {
   const { drive, robots } = await waiting();
   robots.destroy();
   await pass(20);
   assert.deepEqual(drive.said, [1]);
 });
 
-test("a route that is ended while the lease is taken cancels the goal that follows", async () => {
+test("a route that ends while its lease is requested cancels the goal sent later", async () => {
   const drive = new FakeDrive();
   drive.report(null);
   let take;
@@ -168,14 +168,14 @@ test("a route that is ended while the lease is taken cancels the goal that follo
   assert.equal(robots.of("r1").run.state, "ended");
 });
 
-test("a robot that is gone halts its route", async () => {
+test("a removed robot halts its route", async () => {
   const { drive, robots, run } = await waiting();
   drive.robots.clear();
   robots.look();
   assert.equal(run.why, "the robot is gone");
 });
 
-test("the robots that go, and no others, are kept for this page", async () => {
+test("the page keeps control of a robot only while its route runs", async () => {
   const { drive, robots } = await waiting();
   drive.tell("step", null);
   assert.equal(drive.kept, 1);
@@ -184,7 +184,7 @@ test("the robots that go, and no others, are kept for this page", async () => {
   assert.equal(drive.kept, 1);
 });
 
-test("a run goes on by the robots that come after, when the map was drawn again", async () => {
+test("a run continues after the map is drawn again", async () => {
   const drive = new FakeDrive();
   drive.report(null, { name: "Bob" });
   const before = new RouteRobots(drive, () => null, () => {});
@@ -200,7 +200,7 @@ test("a run goes on by the robots that come after, when the map was drawn again"
   assert.equal(before.of("r1"), undefined);
 });
 
-test("what was being sent when the map was drawn again waits for a person", async () => {
+test("a run halts if the map is drawn again while its goal waits for a link", async () => {
   const drive = new FakeDrive();
   drive.report(null, { name: "Bob" });
   drive.refusal = LINKLESS;
@@ -214,7 +214,7 @@ test("what was being sent when the map was drawn again waits for a person", asyn
   assert.equal(after.of("r1").run.why, "the map was drawn again");
 });
 
-test("a robot that is called so by a display that was started anew gets no run", async () => {
+test("a robot with the same id but another name does not get the run", async () => {
   const drive = new FakeDrive();
   drive.report(null, { name: "Bob" });
   const before = new RouteRobots(drive, () => null, () => {});
@@ -226,7 +226,7 @@ test("a robot that is called so by a display that was started anew gets no run",
   assert.equal(after.of("r1"), undefined);
 });
 
-test("a goal that leaves after the map was drawn again is called off", async () => {
+test("a goal sent after the map was drawn again is cancelled", async () => {
   const drive = new FakeDrive();
   drive.report(null, { name: "Bob" });
   let take = () => {};

@@ -22,7 +22,7 @@ function say(run, word, { mine = true, latched = false, away = null, now = 0 } =
   return run.report({ mine, latched, goal: word }, away, now);
 }
 
-test("one goal follows the other, and after the last it ends", () => {
+test("a route sends its goals one after another and ends after the last", () => {
   const run = underWay();
   for (const n of [1, 2]) {
     assert.deepEqual(say(run, goal(`g${n}`, "reached")), { send: POINTS[n] });
@@ -36,7 +36,7 @@ test("one goal follows the other, and after the last it ends", () => {
   assert.equal(run.go("g3"), null);
 });
 
-test("a loop begins anew", () => {
+test("a loop starts again at its first point", () => {
   const run = underWay({ loop: true });
   run.skip("g1");
   run.skip("g1");
@@ -47,7 +47,7 @@ test("a loop begins anew", () => {
   assert.equal(run.rounds, 1);
 });
 
-test("a loop of points that are all reached already sends one goal a second", () => {
+test("a loop whose points are already reached sends one goal per second", () => {
   const run = new RouteRun(POINTS, { loop: true });
   run.go(null);
   run.accepted(0);
@@ -61,18 +61,18 @@ test("a loop of points that are all reached already sends one goal a second", ()
   assert.deepEqual(sent, [1, 2, 3, 4, 5, 6, 7, 8, 9].map((second) => 1000 * second));
 });
 
-test("a route that does not loop does not wait at points that are reached at once", () => {
+test("a route without a loop does not wait at points that are reached at once", () => {
   assert.deepEqual(say(underWay(), goal("g1", "reached")), { send: POINTS[1] });
 });
 
-test("a STOP while a loop waits at a point that it has reached halts it", () => {
+test("a STOP halts a loop that waits at a reached point", () => {
   const run = underWay({ loop: true });
   assert.equal(say(run, goal("g1", "reached"), { now: 500 }), null);
   say(run, goal("g1", "reached"), { now: 1500, latched: true });
   assert.equal(run.state, "halted");
 });
 
-test("a loop of one point ends there, as there is nowhere to go on to", () => {
+test("a loop with one point ends at that point", () => {
   const run = new RouteRun(POINTS.slice(0, 1), { loop: true });
   run.go(null);
   run.accepted(0);
@@ -81,7 +81,7 @@ test("a loop of one point ends there, as there is nowhere to go on to", () => {
   assert.equal(run.state, "ended");
 });
 
-test("a failure halts it, and a person goes on or skips", () => {
+test("a failed goal halts the route until the operator resumes or skips", () => {
   const run = underWay();
   assert.equal(say(run, goal("g1", "failed", { why: "no path" })), null);
   assert.equal(run.state, "halted");
@@ -93,7 +93,7 @@ test("a failure halts it, and a person goes on or skips", () => {
   assert.deepEqual(run.skip("g2"), { send: POINTS[1] });
 });
 
-test("STOP, a lost lease, another's goal and a cancel halt it", () => {
+test("STOP, a lost lease, another goal and a cancel halt the route", () => {
   const cases = [
     [goal("g1"), { latched: true }, /STOP/],
     [goal("g1"), { mine: false }, /has no control of the robot/],
@@ -110,7 +110,7 @@ test("STOP, a lost lease, another's goal and a cancel halt it", () => {
   }
 });
 
-test("before the gate has accepted a goal a missing lease is no news", () => {
+test("a missing lease does not halt the route before the gate accepts the goal", () => {
   const run = new RouteRun(POINTS);
   run.go(null);
   assert.equal(say(run, null, { mine: false }), null);
@@ -119,7 +119,7 @@ test("before the gate has accepted a goal a missing lease is no news", () => {
   assert.equal(run.why, "Ann has control");
 });
 
-test("a goal that the gate never tells of halts it", () => {
+test("a goal that never appears in a report halts the route", () => {
   const run = new RouteRun(POINTS);
   run.go("g0");
   run.accepted(0);
@@ -129,7 +129,7 @@ test("a goal that the gate never tells of halts it", () => {
   assert.equal(run.state, "halted");
 });
 
-test("a pause cancels, and going on sends the same point again", () => {
+test("a pause cancels the goal and a resume sends the same point again", () => {
   const run = underWay();
   assert.deepEqual(run.pause(), { cancel: true });
   assert.equal(run.pause(), null);
@@ -140,7 +140,7 @@ test("a pause cancels, and going on sends the same point again", () => {
   assert.deepEqual(run.go("g1"), { send: POINTS[1] });
 });
 
-test("skipping goes to the next point at once, and the last one ends it", () => {
+test("a skip sends the next point at once and ends the route at the last point", () => {
   const run = underWay();
   assert.deepEqual(run.skip("g1"), { send: POINTS[1] });
   assert.deepEqual(run.skip("g2"), { send: POINTS[2] });
@@ -149,14 +149,14 @@ test("skipping goes to the next point at once, and the last one ends it", () => 
   assert.equal(run.skip("g3"), null);
 });
 
-test("ending cancels what is under way", () => {
+test("ending the route cancels the goal under way", () => {
   const run = underWay();
   assert.deepEqual(run.end(), { cancel: true });
   assert.equal(run.end(), null);
   assert.equal(run.live, false);
 });
 
-test("a robot that does not say how it goes is there when it is near", () => {
+test("a goal without progress counts as reached when the robot is near", () => {
   const run = new RouteRun(POINTS);
   run.go(null);
   run.accepted(0);
@@ -165,7 +165,7 @@ test("a robot that does not say how it goes is there when it is near", () => {
   assert.deepEqual(say(run, sent, { away: 0.2 }), { send: POINTS[1] });
 });
 
-test("a robot that says how it goes is not believed to be there before it says so", () => {
+test("a goal with progress is not reached by distance alone", () => {
   const run = underWay();
   assert.equal(say(run, goal("g1"), { away: 0.1 }), null);
   assert.equal(say(run, goal("g1", "unknown"), { away: 0.1 }), null);

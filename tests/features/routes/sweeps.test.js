@@ -52,7 +52,7 @@ function rounded(points) {
 
 const BACK = Math.round(Math.PI * 1e6) / 1e6;
 
-test("a hall is gone over along its longest side, half a sweep from its edges", () => {
+test("sweeps run along the longest side, half a spacing from the edges", () => {
   assert.deepEqual(rounded(plan(placed(HALL)).points), [
     [0.5, 0.5, 0],
     [5.5, 0.5, 0],
@@ -63,7 +63,7 @@ test("a hall is gone over along its longest side, half a sweep from its edges", 
   ]);
 });
 
-test("a hall is gone over across its longest side where that is wanted", () => {
+test("sweeps run across the longest side with the across option", () => {
   const { points, sweeps } = plan(placed(HALL), { across: true, spacing: 2 });
   assert.equal(sweeps.length, 3);
   assert.deepEqual(
@@ -80,7 +80,7 @@ test("a hall is gone over across its longest side where that is wanted", () => {
   for (const { yaw } of points) assert.ok(Math.abs(Math.abs(yaw) - Math.PI / 2) < 1e-9);
 });
 
-test("what is narrower than a sweep is gone over once, in its middle", () => {
+test("an area narrower than the spacing gets one sweep in its middle", () => {
   const strip = placed([
     [0, 0],
     [8, 0],
@@ -93,7 +93,7 @@ test("what is narrower than a sweep is gone over once, in its middle", () => {
   ]);
 });
 
-test("a line that a bay divides has a part on each side", () => {
+test("a bay splits a sweep into one part on each side", () => {
   const { sweeps } = plan(placed(BAYS["two arms"]), { spacing: 2 });
   const parts = sweeps
     .filter(([{ y }]) => y > 3.5)
@@ -109,7 +109,7 @@ test("a line that a bay divides has a part on each side", () => {
   );
 });
 
-test("robots look along each sweep at both ends of it", () => {
+test("points at both ends of a sweep have its heading", () => {
   for (const yaw of [0, 1, -2.5]) {
     const { points, sweeps } = plan(placed(BAYS["two arms"], yaw));
     for (const [p, q] of sweeps) {
@@ -131,7 +131,7 @@ test("every point is in the area or on its edge", () => {
   }
 });
 
-test("every sweep is in the area all along", () => {
+test("every sweep is completely inside the area", () => {
   for (const areaOf of [roundArea, starArea]) {
     for (const { area, sweeps, told } of plans(areaOf, 2, 60)) {
       const places = sweeps.flatMap(([p, q]) => along(p, q));
@@ -140,7 +140,7 @@ test("every sweep is in the area all along", () => {
   }
 });
 
-test("neighbouring sweeps are as far apart as was said at most, and half at the bounds", () => {
+test("sweeps are at most the spacing apart and half the spacing from the bounds", () => {
   for (const areaOf of [roundArea, starArea]) {
     for (const { area, sweeps, spacing, across, told } of plans(areaOf, 3)) {
       const over = acrossOf(area, across);
@@ -157,7 +157,7 @@ test("neighbouring sweeps are as far apart as was said at most, and half at the 
   }
 });
 
-test("all of an area without bays is within half a sweep and the inset of a sweep", () => {
+test("every place in an area without bays is within one spacing of a sweep", () => {
   for (const { area, sweeps, spacing, told } of plans(roundArea, 4, 80)) {
     for (const point of spread(area)) {
       const away = Math.min(...sweeps.map((sweep) => awayFrom(sweep, point)));
@@ -167,7 +167,7 @@ test("all of an area without bays is within half a sweep and the inset of a swee
 });
 
 for (const [name, corners] of Object.entries(BAYS)) {
-  test(`${name}: no way from point to point leaves the area`, () => {
+  test(`${name}: no path between successive points leaves the area`, () => {
     const number = numbersFrom(5);
     for (let i = 0; i < 12; i++) {
       const area = placed(corners, number() * 7, [number() * 50, number() * 50]);
@@ -185,7 +185,7 @@ for (const [name, corners] of Object.entries(BAYS)) {
   });
 }
 
-test("every sweep is gone along, each once", () => {
+test("the route follows every sweep exactly once", () => {
   const { points, sweeps } = plan(placed(BAYS["a comb"]));
   for (const [p, q] of sweeps) {
     const times = points.filter(
@@ -196,7 +196,7 @@ test("every sweep is gone along, each once", () => {
   }
 });
 
-test("where an order is as good as another, it begins at the first corner", () => {
+test("among equally good orders the route begins at the first corner", () => {
   for (const [i, { x, y }] of placed(HALL).entries()) {
     const turned = placed([...HALL.slice(i), ...HALL.slice(0, i)]);
     const [first] = plan(turned).points;
@@ -204,7 +204,7 @@ test("where an order is as good as another, it begins at the first corner", () =
   }
 });
 
-test("it does not matter how far from the map's origin an area is", () => {
+test("the distance of an area from the map origin does not change its route", () => {
   const near = plan(placed(BAYS["a comb"], 1));
   const far = plan(placed(BAYS["a comb"], 1, [9e5, -9e5]));
   assert.equal(far.points.length, near.points.length);
@@ -214,7 +214,7 @@ test("it does not matter how far from the map's origin an area is", () => {
   }
 });
 
-test("a corner that was pressed twice changes nothing", () => {
+test("a corner pressed twice does not change the route", () => {
   const [a, b, c, d] = placed(HALL);
   assert.deepEqual(plan([a, b, b, c, d, a]), plan([a, b, c, d]));
 });
@@ -225,7 +225,7 @@ for (const [spacing, got] of [
   [-1, "-1 m"],
   [NaN, "no number"],
 ]) {
-  test(`sweeps ${got} apart are refused with what may be chosen`, () => {
+  test(`a spacing of ${got} is refused with the allowed range`, () => {
     const { problem, points } = plan(placed(HALL), { spacing });
     assert.equal(
       problem,
@@ -235,7 +235,7 @@ for (const [spacing, got] of [
   });
 }
 
-test("more points than the route has room for are refused with both numbers", () => {
+test("too many points for the route are refused with their number and the limit", () => {
   assert.equal(plan(placed(HALL), { room: 6 }).points.length, 6);
   const { problem, points } = plan(placed(HALL), { room: 5 });
   assert.equal(
@@ -246,12 +246,12 @@ test("more points than the route has room for are refused with both numbers", ()
   assert.deepEqual(points, []);
 });
 
-test("a country is refused before its sweeps are laid", () => {
+test("an area as large as a country is refused with an estimate of its points", () => {
   const country = placed(HALL.map(([x, y]) => [x * 1e5, y * 1e5]));
   assert.match(plan(country).problem, /^Got at least 300000 points/);
 });
 
-test("what is no area is refused with its own sentence", () => {
+test("an invalid area is refused with its own reason", () => {
   const bow = placed([HALL[0], HALL[1], HALL[3], HALL[2]]);
   assert.match(plan(bow).problem, /^Sides 2 and 4 cross or touch/);
   assert.equal(plan(placed(HALL.slice(0, 2))).problem, "Got 2 corners, expected at least 3. Add corners.");

@@ -62,7 +62,7 @@ def swept(tab: Page) -> list[float]:
     return [float(number) for number in re.findall(r"-?[\d.]+(?:e-?\d+)?", drawn)]
 
 
-def test_an_area_that_is_pressed_on_the_map_becomes_points_of_the_route(tab, state):
+def test_an_area_pressed_on_the_map_becomes_points_of_the_route(tab, state):
     press(tab, *FIELD)
     three = [14.5, 4.5, 19.5, 4.5, 19.5, 5.45, 14.5, 5.45, 14.5, 6.4, 19.5, 6.4]
     assert swept(tab) == pytest.approx(three, abs=NEAR)
@@ -98,7 +98,7 @@ def test_an_area_that_is_pressed_on_the_map_becomes_points_of_the_route(tab, sta
     assert headings == pytest.approx([1, 1, -1, -1], abs=0.01)
 
 
-def test_what_is_no_area_is_refused_in_words_and_escape_leaves_it(tab):
+def test_an_invalid_area_is_refused_with_a_reason_and_escape_discards_an_area(tab):
     first, second, third, fourth = FIELD
     press(tab, first, second)
     # It has the focus, so that the keys go on where the button was pressed.
@@ -121,7 +121,7 @@ def test_what_is_no_area_is_refused_in_words_and_escape_leaves_it(tab):
     expect(tab.locator(".webmap-route-point")).to_have_count(0)
 
 
-def test_points_outlive_a_link_that_breaks_for_a_moment(tab):
+def test_route_points_persist_after_a_reconnect(tab):
     press(tab, *FIELD, FIELD[0])
     tab.get_by_role("button", name="Add to route").click()
     expect(tab.locator(".webmap-route-point")).to_have_count(6)

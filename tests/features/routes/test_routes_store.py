@@ -26,7 +26,7 @@ def route(*points, loop=False):
     return read_route({"points": list(points) or [POINT], "loop": loop})
 
 
-def test_a_route_is_kept_loaded_replaced_and_deleted(store, tmp_path):
+def test_a_route_is_saved_loaded_replaced_and_deleted(store, tmp_path):
     assert store.names() == []
     store.save("Round", route(POINT, POINT, loop=True))
     store.save("a first", route())
@@ -42,7 +42,7 @@ def test_a_route_is_kept_loaded_replaced_and_deleted(store, tmp_path):
         again.load("Round")
 
 
-def test_each_map_has_routes_of_its_own_whatever_it_is_called(tmp_path):
+def test_maps_with_any_name_have_separate_routes(tmp_path):
     names = ["Hall 1", "hall-1", "../../etc", "Höhle", "", "x" * 300]
     stores = [RouteStore(tmp_path / "routes", name) for name in names]
     for number, store in enumerate(stores):
@@ -52,7 +52,7 @@ def test_each_map_has_routes_of_its_own_whatever_it_is_called(tmp_path):
         assert store.file.parent == tmp_path / "routes"
 
 
-def test_a_file_that_cannot_be_read_is_said_and_left_as_it_is(store):
+def test_an_unreadable_route_file_is_refused_and_left_unchanged(store):
     store.save("Round", route())
     store.file.write_text("{ broken")
     for act in (store.names, lambda: store.save("New", route())):
@@ -61,13 +61,13 @@ def test_a_file_that_cannot_be_read_is_said_and_left_as_it_is(store):
     assert store.file.read_text() == "{ broken"
 
 
-def test_a_folder_that_cannot_be_written_is_said(tmp_path):
+def test_an_unwritable_route_folder_is_an_error(tmp_path):
     (tmp_path / "routes").write_text("in the way")
     with pytest.raises(ConfigError, match="cannot be"):
         RouteStore(tmp_path / "routes", "Hall").save("Round", route())
 
 
-def test_there_is_an_end_to_how_many_are_kept(store, monkeypatch):
+def test_the_number_of_saved_routes_is_limited(store, monkeypatch):
     monkeypatch.setattr("webmap.features.routes.route_tool.MOST_ROUTES", 2)
     store.save("1", route())
     store.save("2", route())
@@ -92,22 +92,22 @@ def test_there_is_an_end_to_how_many_are_kept(store, monkeypatch):
         {"points": [POINT], "loop": 1},
     ],
 )
-def test_what_is_no_route_is_refused(value):
+def test_an_invalid_route_is_refused(value):
     with pytest.raises(ConfigError, match=r"not a route|a route has|no point"):
         read_route(value)
 
 
 @pytest.mark.parametrize("value", [None, "", "  ", "a\nb", "x" * 61, 7])
-def test_what_is_no_name_is_refused(value):
+def test_an_invalid_route_name_is_refused(value):
     with pytest.raises(ConfigError, match="a route's name"):
         read_name(value)
 
 
-def test_a_name_loses_the_room_around_it():
+def test_spaces_around_a_route_name_are_removed():
     assert read_name("  Round ") == "Round"
 
 
-def test_a_file_of_routes_that_is_nested_deep_or_a_pipe_is_refused(store):
+def test_a_deeply_nested_route_file_or_a_pipe_is_refused(store):
     store.file.parent.mkdir(parents=True)
     store.file.write_bytes(b'{"map":"Hall 1","routes":' + b"[" * 100_000)
     with pytest.raises(ConfigError, match="cannot be read"):

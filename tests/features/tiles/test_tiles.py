@@ -19,7 +19,7 @@ def tiles(tmp_path_factory) -> Path:
     return folder
 
 
-def test_tiles_end_with_their_map(map, tiles, channel):
+def test_removing_the_tile_layer_releases_its_tiles(map, tiles, channel):
     async def scenario():
         before = len(pictures)
         map.fit(-200, -150, 400, 300)
@@ -38,9 +38,7 @@ def test_tiles_end_with_their_map(map, tiles, channel):
     asyncio.run(scenario())
 
 
-def test_a_tile_that_is_none_is_said_once_and_the_others_are_drawn(
-    map, channel, tmp_path
-):
+def test_invalid_tiles_give_one_notice_and_the_others_are_drawn(map, channel, tmp_path):
     made_tiles(tmp_path)
     x, y = (int(n) for n in number(17, *DATUM))
     for row in (y, y + 1):
@@ -85,7 +83,7 @@ class Slow:
         self.closed_in = threading.current_thread()
 
 
-def test_a_page_that_closes_does_not_wait_for_a_tile_that_is_read(
+def test_closing_a_page_does_not_wait_for_the_reading_of_a_tile(
     map, page, channel, monkeypatch
 ):
     slow = Slow()
@@ -116,7 +114,7 @@ def test_a_page_that_closes_does_not_wait_for_a_tile_that_is_read(
         ({"source": "https://tiles.example"}, "this machine's disk alone"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(map, tiles, change, words):
+def test_invalid_options_are_refused(map, tiles, change, words):
     options = {"source": tiles, "datum": DATUM, **change}
     with pytest.raises(ConfigError, match=words):
         map.add_module("TileLayer", **options)

@@ -97,7 +97,7 @@ def world(tab: Page) -> Affine:
 
 
 @pytest.mark.parametrize("level", [17, 18])
-def test_tiles_lie_where_the_globe_has_them_and_fixes_where_the_tiles_say(tab, level):
+def test_tiles_and_satellite_fixes_are_drawn_at_their_true_positions(tab, level):
     if level == 18:
         for _ in range(2):
             before = tab.evaluate(CTM, "svg.webmap .world")[0]
@@ -140,7 +140,7 @@ def test_tiles_lie_where_the_globe_has_them_and_fixes_where_the_tiles_say(tab, l
         assert np.hypot(*off) < 1.5, fix
 
 
-def test_a_tile_that_is_not_there_is_left_empty_and_is_not_said(tab):
+def test_a_missing_tile_is_left_empty_without_a_notice(tab):
     z, x, y = missing()
     middle = (x + 0.5) / 2**z * 360 - 180
     lat = np.degrees(np.arctan(np.sinh(np.pi * (1 - 2 * (y + 0.5) / 2**z))))
@@ -150,11 +150,11 @@ def test_a_tile_that_is_not_there_is_left_empty_and_is_not_said(tab):
     assert tab.locator(".webmap-notice").count() == 0
 
 
-def test_whose_tiles_they_are_is_said_as_text(tab):
+def test_the_attribution_of_tiles_is_shown_as_text(tab):
     expect(tab.locator(".webmap-attribution")).to_have_text("<b>Nobody's</b> tiles")
 
 
-def test_another_view_has_other_tiles_and_never_more_than_the_most(tab):
+def test_a_moved_view_loads_other_tiles_within_the_limit(tab):
     before = tab.locator(".tile").evaluate_all("all => all.map((t) => t.dataset.tile)")
     tab.mouse.move(450, 350)
     tab.mouse.down()

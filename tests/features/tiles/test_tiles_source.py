@@ -41,7 +41,7 @@ def ground(latitude: float, metres: float, steps: int = 2000) -> float:
 
 
 @pytest.mark.parametrize(("metres", "error"), [(10_000, 0.005), (50_000, 0.6)])
-def test_lengths_are_wrong_by_as_much_as_is_said(metres, error):
+def test_the_length_error_of_the_local_plane_is_within_its_limit(metres, error):
     x, y = LocalPlane(50, 14).from_globe(ground(50, metres), 14)
     assert x == pytest.approx(0, abs=1e-6)
     assert metres - error < y < metres
@@ -49,7 +49,7 @@ def test_lengths_are_wrong_by_as_much_as_is_said(metres, error):
 
 @pytest.mark.parametrize("east", [0.0, 30.0, -135.0])
 @pytest.mark.parametrize("datum", PLACES)
-def test_there_and_back_again_is_the_same_place(datum, east):
+def test_a_conversion_to_the_globe_and_back_returns_the_same_position(datum, east):
     plane = LocalPlane(*datum, east)
     assert plane.from_globe(*datum) == pytest.approx((0, 0), abs=1e-6)
     for x, y in [(3, 4), (-5e3, 2e3), (4e4, -6e4)]:
@@ -57,7 +57,7 @@ def test_there_and_back_again_is_the_same_place(datum, east):
         assert back == pytest.approx((x, y), abs=1e-5)
 
 
-def test_a_map_whose_x_is_north_has_north_to_the_right():
+def test_north_is_along_x_with_east_at_90_degrees():
     x, y = LocalPlane(50, 14, 90).from_globe(50.001, 14)
     assert (x, y) == pytest.approx((111.23, 0), abs=0.01)
 
@@ -73,7 +73,7 @@ def globe_of(z: int, x: float, y: float) -> tuple[float, float]:
 @pytest.mark.parametrize(
     ("z", "away", "within"), [(19, 0, 0.002), (16, 3, 0.02), (13, 2, 0.1), (10, 0, 1)]
 )
-def test_a_point_of_a_tile_lies_where_the_globe_has_it_within_a_pixel(z, away, within):
+def test_a_point_of_a_tile_is_within_a_pixel_of_its_true_position(z, away, within):
     """`within` is in pixels of the tile, for tiles so many away from the datum."""
     plane = LocalPlane(50, 14, 25)
     grid = TileGrid(plane, [z], size=256, most=64)
@@ -95,7 +95,7 @@ def view(scale: float, x: float = 0, y: float = 0, turn: float = 0) -> Affine:
     return middle @ Affine(scale, 0, 0, -scale, 0, 0) @ Affine.translation(-x, -y)
 
 
-def test_the_level_is_the_one_whose_pixels_are_as_large_as_the_screens():
+def test_the_zoom_level_has_pixels_of_the_screen_pixel_size():
     grid = TileGrid(LocalPlane(50, 14), range(5, 20), size=256, most=64)
     for z in (14, 17, 19):
         scale = 256 * 2**z / (40_075_016.686 * math.cos(math.radians(50)))
@@ -105,7 +105,7 @@ def test_the_level_is_the_one_whose_pixels_are_as_large_as_the_screens():
 
 
 @pytest.mark.parametrize("turn", [0, 0.7])
-def test_the_tiles_that_are_wanted_cover_the_view(turn):
+def test_the_wanted_tiles_cover_the_view(turn):
     grid = TileGrid(LocalPlane(50, 14, 40), [17], size=256, most=64)
     seen = view(1.2, 500, -200, turn)
     tiles = grid.wanted(seen, 800, 600)
@@ -121,7 +121,7 @@ def test_the_tiles_that_are_wanted_cover_the_view(turn):
 
 @pytest.mark.parametrize("scale", [1e-4, 1e-2, 1, 100, 1e5])
 @pytest.mark.parametrize("datum", PLACES)
-def test_never_more_tiles_are_wanted_than_the_most(datum, scale):
+def test_the_number_of_wanted_tiles_is_limited(datum, scale):
     for zooms in ([18], range(10, 19), [0, 1]):
         grid = TileGrid(LocalPlane(*datum), zooms, size=256, most=20)
         tiles = grid.wanted(view(scale), 800, 600)
@@ -132,7 +132,7 @@ def test_never_more_tiles_are_wanted_than_the_most(datum, scale):
             assert 0 <= tile.y < 2**tile.z
 
 
-def test_a_coarser_level_is_taken_before_tiles_are_left_out():
+def test_a_small_tile_limit_selects_a_coarser_zoom_level():
     fine = TileGrid(LocalPlane(50, 14), range(10, 19), size=256, most=64)
     few = TileGrid(LocalPlane(50, 14), range(10, 19), size=256, most=6)
     (z,) = {tile.z for tile in fine.wanted(view(0.5), 800, 600)}
@@ -151,7 +151,7 @@ def folder(tmp_path):
     return tiles
 
 
-def test_a_folder_gives_its_tiles_by_their_content(folder):
+def test_a_folder_returns_tiles_with_their_detected_media_type(folder):
     (folder / "notes").mkdir()
     source = open_tiles(str(folder))
     assert list(source.zooms) == [3]
@@ -160,7 +160,7 @@ def test_a_folder_gives_its_tiles_by_their_content(folder):
     assert source.read(Tile(3, 4, 7)) is None
 
 
-def test_a_link_that_leads_out_of_the_folder_is_refused(folder, tmp_path):
+def test_a_symbolic_link_out_of_the_folder_is_refused(folder, tmp_path):
     (tmp_path / "secret.png").write_bytes(png())
     (folder / "3" / "4" / "7.png").symlink_to(tmp_path / "secret.png")
     (folder / "3" / "9").symlink_to(tmp_path)
@@ -171,7 +171,7 @@ def test_a_link_that_leads_out_of_the_folder_is_refused(folder, tmp_path):
             source.read(tile)
 
 
-def test_a_ring_of_links_is_no_tile_and_neither_is_a_folder_or_a_pipe(folder):
+def test_a_symbolic_link_loop_a_folder_or_a_pipe_is_not_a_tile(folder):
     column = folder / "3" / "4"
     (column / "7.png").symlink_to("7.png")
     (column / "8.png").mkdir()
@@ -194,7 +194,7 @@ def test_a_ring_of_links_is_no_tile_and_neither_is_a_folder_or_a_pipe(folder):
         (png(form="GIF"), "is no PNG, JPEG or WebP"),
     ],
 )
-def test_what_is_no_picture_of_a_tile_is_refused(folder, data, words):
+def test_an_invalid_tile_picture_in_a_folder_is_refused(folder, data, words):
     (folder / "3" / "4" / "5.png").write_bytes(data)
     with pytest.raises(ConfigError, match=words):
         FolderTiles(folder).read(Tile(3, 4, 5))
@@ -203,12 +203,12 @@ def test_what_is_no_picture_of_a_tile_is_refused(folder, data, words):
 @pytest.mark.parametrize(
     "source", ["https://tiles.example/{z}/{x}/{y}.png", "file:///etc", "ftp://x"]
 )
-def test_tiles_of_other_hosts_are_refused(source):
+def test_urls_as_tile_sources_are_refused(source):
     with pytest.raises(ConfigError, match="this machine's disk alone"):
         open_tiles(source)
 
 
-def test_what_is_not_there_or_has_no_level_is_refused(tmp_path):
+def test_a_missing_empty_or_invalid_tile_source_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="no such folder and no such file"):
         open_tiles(tmp_path / "none")
     with pytest.raises(ConfigError, match="no folder of a level"):
@@ -247,7 +247,7 @@ def mbtiles(tmp_path):
         source.close()
 
 
-def test_an_mbtiles_file_gives_its_tiles_whose_rows_are_counted_from_the_south(mbtiles):
+def test_mbtiles_rows_are_counted_from_the_south(mbtiles):
     said = "<a href='https://x' onclick='y'>&copy; Somebody</a>\n and more"
     source = mbtiles(metadata=[("attribution", said), ("format", "png")])
     assert list(source.zooms) == [3]
@@ -257,7 +257,7 @@ def test_an_mbtiles_file_gives_its_tiles_whose_rows_are_counted_from_the_south(m
 
 
 @pytest.mark.parametrize("made", ["table", "view"])
-def test_the_levels_of_a_large_file_are_found_without_reading_it_all(
+def test_zoom_levels_of_a_large_mbtiles_file_are_found_without_a_full_scan(
     mbtiles, monkeypatch, made
 ):
     rows = (
@@ -288,7 +288,7 @@ def test_the_levels_of_a_large_file_are_found_without_reading_it_all(
     assert list(source.zooms) == list(range(4, 13))
 
 
-def test_the_levels_are_those_of_the_metadata_where_there_are_any(mbtiles):
+def test_zoom_levels_are_taken_from_the_metadata_if_present(mbtiles):
     source = mbtiles(metadata=[("minzoom", "2"), ("maxzoom", "99")])
     assert list(source.zooms) == list(range(2, 25))
 
@@ -300,12 +300,14 @@ def test_the_levels_are_those_of_the_metadata_where_there_are_any(mbtiles):
         ([("minzoom", "5"), ("maxzoom", "3")], "there are no tiles"),
     ],
 )
-def test_a_file_without_pictures_is_refused(mbtiles, metadata, words):
+def test_an_mbtiles_file_with_vector_tiles_or_no_levels_is_refused(
+    mbtiles, metadata, words
+):
     with pytest.raises(ConfigError, match=words):
         mbtiles(metadata=metadata)
 
 
-def test_an_empty_table_and_a_missing_one_are_refused(mbtiles, tmp_path):
+def test_an_empty_or_missing_tiles_table_is_refused(mbtiles, tmp_path):
     with pytest.raises(ConfigError, match="there are no tiles"):
         mbtiles(tiles=())
     (tmp_path / "m ü?#.mbtiles").unlink()
@@ -317,12 +319,12 @@ def test_an_empty_table_and_a_missing_one_are_refused(mbtiles, tmp_path):
     ("data", "words"),
     [("text", "got str, expected a picture"), (7, "got int"), (b"MZ", "is no PNG")],
 )
-def test_what_is_no_picture_in_an_mbtiles_file_is_refused(mbtiles, data, words):
+def test_an_invalid_tile_picture_in_an_mbtiles_file_is_refused(mbtiles, data, words):
     with pytest.raises(ConfigError, match=words):
         mbtiles(tiles=[(3, 4, 2, data)]).read(Tile(3, 4, 5))
 
 
-def test_a_tile_that_never_ends_is_given_up(mbtiles, monkeypatch):
+def test_an_endless_tile_query_is_interrupted(mbtiles, monkeypatch):
     monkeypatch.setattr("webmap.features.tiles.tile_source.PATIENCE", 0.2)
     endless = (
         "CREATE VIEW tiles AS WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 "
@@ -335,7 +337,7 @@ def test_a_tile_that_never_ends_is_given_up(mbtiles, monkeypatch):
         source.read(Tile(3, 4, 5))
 
 
-def test_a_tile_of_gigabytes_is_given_up(mbtiles):
+def test_a_tile_of_gigabytes_is_refused(mbtiles):
     bomb = (
         "CREATE VIEW tiles AS SELECT 3 AS zoom_level, 4 AS tile_column, 2 AS tile_row,"
         " zeroblob(2000000000) AS tile_data"
@@ -346,9 +348,7 @@ def test_a_tile_of_gigabytes_is_given_up(mbtiles):
         source.read(Tile(3, 4, 5))
 
 
-def test_a_file_is_opened_to_be_read_only_and_nothing_is_written_beside_it(
-    mbtiles, tmp_path
-):
+def test_an_mbtiles_file_is_opened_read_only_without_files_beside_it(mbtiles, tmp_path):
     before = sorted(tmp_path.iterdir())
     source = mbtiles()
     source.read(Tile(3, 4, 5))
@@ -362,7 +362,7 @@ def test_an_attribution_is_one_short_line_of_plain_text():
     assert len(plain("x" * 5000)) == 300
 
 
-def test_tiles_that_cannot_be_read_are_refused_with_their_name(tmp_path, monkeypatch):
+def test_an_unreadable_tile_folder_is_refused_with_its_name(tmp_path, monkeypatch):
     def unreadable(self):
         raise PermissionError(errno.EACCES, "Permission denied")
 

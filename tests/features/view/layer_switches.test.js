@@ -8,7 +8,7 @@ const LAYERS = [
   ["Maps", ".floor, .map-file"],
 ];
 
-test("only what is switched off is hidden, and only on this map", () => {
+test("only layers that are switched off are hidden, and only on this map", () => {
   assert.equal(hiding(LAYERS, {}, "[a]"), "");
   assert.equal(hiding(LAYERS, { Scans: true, Other: false }, "[a]"), "");
   assert.equal(
@@ -17,7 +17,7 @@ test("only what is switched off is hidden, and only on this map", () => {
   );
 });
 
-test("one of several drawings of a layer is hidden by itself", () => {
+test("one topic of a layer can be hidden alone", () => {
   const shown = { "Scans\nrear/scan": false, "Scans\nfront/scan": true };
   assert.equal(
     hiding(LAYERS, shown, "[a]"),
@@ -27,7 +27,7 @@ test("one of several drawings of a layer is hidden by itself", () => {
 
 const drawn = (...names) => names.map((layer) => ({ dataset: layer ? { layer } : {} }));
 
-test("a layer is divided when it draws different things, and not for each robot", () => {
+test("a layer lists its topic names only if it has different ones", () => {
   assert.deepEqual(several(drawn("rear/scan", "front/scan", "rear/scan")), [
     "front/scan",
     "rear/scan",
@@ -37,7 +37,7 @@ test("a layer is divided when it draws different things, and not for each robot"
   assert.equal(several(drawn(...many)).length, many.length);
 });
 
-test("layers of robots are together, and robot_2 comes before robot_10", () => {
+test("topic names are grouped by robot, and robot_2 comes before robot_10", () => {
   const topics = ["/robot_10/scan", "/robot_2/rear", "/robot_1/scan", "/robot_2/front"];
   assert.deepEqual(several(drawn(...topics)), [
     "/robot_1/scan",

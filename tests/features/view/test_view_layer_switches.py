@@ -22,18 +22,18 @@ def main(page):
 """
 
 
-def test_a_layer_that_does_not_exist_is_named_with_those_that_do(map):
+def test_an_unknown_layer_in_off_is_refused_with_the_known_names(map):
     there_are = "no layer 'Scan'; there are Tiles, Maps, Pictures, Costmaps"
     with pytest.raises(ConfigError, match=there_are):
         map.add_module("LayerSwitches", off=["Scan"])
 
 
-def test_the_browser_is_told_names_selectors_and_what_is_off(map):
+def test_layer_switches_accept_custom_layers_and_layers_that_are_off(map):
     switches = map.add_module("LayerSwitches", {"Dust": ".dust"}, off=["Dust"])
     assert switches in map.modules
 
 
-def test_each_of_several_drawings_has_the_name_that_it_is_switched_by(map, link, robot):
+def test_each_layer_element_has_the_topic_name_of_its_switch(map, link, robot):
     made = [
         robot.add_module("Range", link, "/bob/sonar/left"),
         robot.add_module("PoseWithCovariance", link, "/bob/amcl_pose"),
@@ -45,7 +45,7 @@ def test_each_of_several_drawings_has_the_name_that_it_is_switched_by(map, link,
 
 
 @pytest.mark.browser
-def test_many_robots_are_in_natural_order_and_those_without_a_switch_explained(
+def test_switches_are_in_natural_order_and_a_note_counts_the_omitted_ones(
     chromium, tmp_path
 ):
     file = tmp_path / "many.py"

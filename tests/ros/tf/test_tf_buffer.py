@@ -39,16 +39,16 @@ def place(transform):
     return pytest.approx((transform.planar.x, transform.planar.y), abs=1e-9)
 
 
-def test_a_way_of_several_frames_is_put_together(robot):
+def test_a_lookup_combines_the_transforms_of_several_frames(robot):
     assert place(robot.lookup("map", "base_link", 11.0)) == (101.0, 0.0)
     assert place(robot.lookup("map", "laser", 11.0)) == (101.3, 0.0)
 
 
-def test_between_two_transforms_there_is_one_in_between(robot):
+def test_a_lookup_interpolates_between_two_transforms(robot):
     assert place(robot.lookup("map", "base_link", 11.05)) == (101.05, 0.0)
 
 
-def test_without_a_time_it_is_the_newest_at_which_all_is_known(robot):
+def test_a_lookup_without_a_time_uses_the_newest_common_time(robot):
     assert robot.newest("map", "base_link") == 11.8
     assert place(robot.lookup("map", "base_link")) == (101.8, 0.0)
     assert place(robot.lookup("odom", "base_link")) == (2.0, 0.0)
@@ -60,17 +60,17 @@ def test_static_frames_are_known_at_all_times(robot):
         assert place(robot.lookup("base_link", "laser", time)) == (0.3, 0.0)
 
 
-def test_a_frame_in_itself_is_at_its_origin(robot):
+def test_the_transform_of_a_frame_to_itself_is_the_identity(robot):
     assert robot.lookup("laser", "laser", 1e9) == Transform()
 
 
-def test_two_branches_meet_at_their_common_ancestor(robot):
+def test_a_lookup_between_two_branches_uses_their_common_ancestor(robot):
     robot.add("base_link", "camera", at(-0.2), 0.0, static=True)
     assert place(robot.lookup("laser", "camera")) != (-0.5, 0.0)
     assert place(robot.lookup("laser", "camera")) == (0.5, 0.0)
 
 
-def test_a_sensor_that_hangs_upside_down_keeps_its_sides():
+def test_an_upside_down_sensor_has_its_left_side_on_the_right_of_the_base():
     buffer = Buffer()
     over = Transform(Vector3(0, 0, 0.5), Quaternion(1, 0, 0, 0))
     buffer.add("base", "laser", over, 0.0, static=True)
@@ -85,20 +85,22 @@ def test_a_sensor_that_hangs_upside_down_keeps_its_sides():
         (9.0, "the oldest is of 10.000 s, and 9.000 s is 1.000 s earlier"),
     ],
 )
-def test_a_time_of_which_nothing_was_told_is_said(robot, time, words):
+def test_a_lookup_outside_the_known_times_names_the_nearest_known_time(
+    robot, time, words
+):
     with pytest.raises(NotKnownThen) as error:
         robot.lookup("odom", "base_link", time)
     assert words in str(error.value)
 
 
-def test_a_gap_is_not_bridged(robot):
+def test_a_lookup_in_a_time_gap_is_refused(robot):
     robot.add("odom", "base_link", at(9.0), 15.0)
     with pytest.raises(NotKnownThen, match=r"gap of 3\.000 s from 12\.000 s on"):
         robot.lookup("odom", "base_link", 13.0)
     assert place(robot.lookup("odom", "base_link", 15.0)) == (9.0, 0.0)
 
 
-def test_a_missing_frame_is_said_with_what_there_is(robot):
+def test_the_error_for_a_missing_frame_lists_the_known_frames(robot):
     with pytest.raises(FrameMissing) as error:
         robot.lookup("map", "base_lnk")
     assert "did you mean 'base_link'?" in str(error.value)
@@ -107,7 +109,7 @@ def test_a_missing_frame_is_said_with_what_there_is(robot):
         Buffer().lookup("map", "odom")
 
 
-def test_many_frames_are_not_all_listed():
+def test_the_error_for_a_missing_frame_lists_only_some_of_many_frames():
     buffer = Buffer()
     for number in range(50):
         buffer.add("root", f"f{number}", at(0), 0.0)
@@ -115,7 +117,7 @@ def test_many_frames_are_not_all_listed():
         buffer.lookup("root", "nothing")
 
 
-def test_two_trees_are_said_with_their_roots(robot):
+def test_a_lookup_between_two_trees_names_their_roots(robot):
     robot.add("world_2", "odom_2", at(0), 10.0)
     with pytest.raises(
         NotConnected, match="tree of 'map', 'odom_2' in the tree of 'wor"
@@ -123,7 +125,7 @@ def test_two_trees_are_said_with_their_roots(robot):
         robot.lookup("odom_2", "laser")
 
 
-def test_a_loop_is_refused_and_nothing_is_changed(robot):
+def test_a_frame_loop_is_refused_and_changes_nothing(robot):
     words = "'laser' -> 'odom' would close a loop: 'odom' -> 'base_link' -> 'laser' -> "
     with pytest.raises(TransformError, match=words):
         robot.add("laser", "odom", at(0), 11.0)
@@ -132,7 +134,7 @@ def test_a_loop_is_refused_and_nothing_is_changed(robot):
     assert place(robot.lookup("map", "base_link", 11.0)) == (101.0, 0.0)
 
 
-def test_time_that_jumps_back_is_noted_and_what_was_known_forgotten(robot):
+def test_a_backward_time_jump_is_noted_and_clears_the_history_of_the_frame(robot):
     robot.add("odom", "base_link", at(5.0), 3.0)
     assert "jumped back by 9.000 s" in robot.notes[-1]
     assert place(robot.lookup("odom", "base_link", 3.0)) == (5.0, 0.0)
@@ -140,13 +142,13 @@ def test_time_that_jumps_back_is_noted_and_what_was_known_forgotten(robot):
         robot.lookup("odom", "base_link", 11.0)
 
 
-def test_what_comes_a_little_late_is_put_where_it_belongs(robot):
+def test_a_slightly_late_transform_is_inserted_in_time_order(robot):
     robot.add("odom", "base_link", at(1.5, 1.0), 11.45)
     assert place(robot.lookup("odom", "base_link", 11.45)) == (1.5, 1.0)
     assert not robot.notes
 
 
-def test_ten_seconds_are_kept():
+def test_a_buffer_keeps_ten_seconds_of_transforms():
     buffer = Buffer()
     for step in range(300):
         buffer.add("odom", "base", at(step), step / 10)
@@ -154,7 +156,7 @@ def test_ten_seconds_are_kept():
         buffer.lookup("odom", "base", 19.0)
 
 
-def test_what_is_found_is_of_the_time_or_else_the_newest(robot):
+def test_find_uses_the_given_time_or_else_the_newest_transform(robot):
     then, now = robot.find("map", "base_link", 11.0), robot.find("map", "base_link")
     assert place(then.transform) == (101.0, 0.0)
     assert (then.newest, then.on_time) == (11.8, True)
@@ -167,7 +169,7 @@ def test_what_is_found_is_of_the_time_or_else_the_newest(robot):
         robot.find("map", "camera", 11.0)
 
 
-def test_a_way_that_was_looked_for_is_another_when_the_tree_changes(robot):
+def test_a_lookup_follows_changes_of_the_frame_tree(robot):
     robot.add("world", "tag", at(1.0), 11.0)
     with pytest.raises(NotConnected):
         robot.lookup("map", "tag", 11.0)
@@ -186,14 +188,14 @@ def test_a_frame_that_changes_its_parent_is_noted(robot):
     assert "odom" in robot.frames
 
 
-def test_a_parent_that_nobody_names_any_more_is_gone():
+def test_a_parent_without_children_is_removed():
     buffer = Buffer()
     buffer.add("old", "base", at(0), 1.0)
     buffer.add("new", "base", at(0), 2.0)
     assert buffer.frames == ["base", "new"]
 
 
-def test_namespaces_are_put_in_front_but_for_what_is_shared():
+def test_a_namespace_prefixes_all_frames_except_shared_frames():
     buffer = Buffer()
     for name in ("robot_0", "robot_1"):
         buffer.add("map", "odom", at(1.0), 1.0, namespace=f"/{name}")
@@ -204,7 +206,7 @@ def test_namespaces_are_put_in_front_but_for_what_is_shared():
     assert place(buffer.lookup("robot_0/base_link", "robot_1/base_link")) == (0.0, 0.0)
 
 
-def test_a_prefix_that_is_there_already_is_not_put_there_twice():
+def test_an_existing_namespace_prefix_is_not_added_twice():
     buffer = Buffer()
     assert buffer.name("robot_0/odom", "/robot_0") == "robot_0/odom"
     assert buffer.name("/odom") == "odom"
@@ -218,18 +220,20 @@ def test_a_prefix_that_is_there_already_is_not_put_there_twice():
         ("a", "b", math.nan, "the stamp is nan"),
     ],
 )
-def test_what_has_no_name_or_time_is_refused(parent, child, stamp, words):
+def test_a_transform_without_a_frame_name_or_a_valid_stamp_is_refused(
+    parent, child, stamp, words
+):
     with pytest.raises(TransformError, match=words):
         Buffer().add(parent, child, at(0), stamp)
 
 
-def test_a_wrong_transform_is_refused_with_its_frames():
+def test_the_error_for_an_invalid_transform_names_its_frames():
     bad = Transform(rotation=Quaternion(0, 0, 0, 0))
     with pytest.raises(TransformError, match="'odom' -> 'base': the rotation has a"):
         Buffer().add("odom", "base", bad, 0.0)
 
 
-def test_a_flood_of_frames_pushes_out_those_heard_of_longest_ago(robot):
+def test_a_flood_of_frames_removes_the_least_recently_updated_frames(robot):
     for number in range(2 * MOST_FRAMES):
         robot.add("map", f"object_{number}", at(number), 1e6 - number)
         if number % 100 == 0:
@@ -245,7 +249,7 @@ def test_a_flood_of_frames_pushes_out_those_heard_of_longest_ago(robot):
     assert place(robot.lookup("map", "laser", 11.8)) == (102.1, 0.0)
 
 
-def test_a_parent_is_not_pushed_out_by_its_own_first_child():
+def test_a_full_buffer_does_not_remove_the_parent_of_a_new_frame():
     buffer = Buffer()
     for number in range(MOST_FRAMES):
         buffer.add("root", f"f{number}", at(1.0), 0.0)
@@ -254,7 +258,7 @@ def test_a_parent_is_not_pushed_out_by_its_own_first_child():
     assert "f1" not in buffer.frames
 
 
-def test_a_flood_of_frames_that_must_all_stay_ends():
+def test_a_buffer_full_of_static_frames_refuses_new_frames():
     buffer = Buffer()
     for number in range(MOST_FRAMES):
         buffer.add("root", f"f{number}", at(0), 0.0, static=True)
@@ -263,7 +267,7 @@ def test_a_flood_of_frames_that_must_all_stay_ends():
     buffer.add("root", "f7", at(1), 1.0, static=True)
 
 
-def test_names_are_compared_with_a_missing_one_once_and_not_when_there_are_many(
+def test_a_missing_name_is_compared_once_and_never_with_too_many_frames(
     robot, monkeypatch
 ):
     compared = []
@@ -320,7 +324,9 @@ def same(one, other):
 
 
 @given(trees(), FRAMES, FRAMES, FRAMES, TIMES)
-def test_a_way_over_any_frame_is_the_same_way(tree, target, over, source, time):
+def test_a_lookup_over_any_intermediate_frame_gives_the_same_transform(
+    tree, target, over, source, time
+):
     same(
         tree.lookup(target, source, time),
         tree.lookup(target, over, time) @ tree.lookup(over, source, time),
@@ -328,7 +334,7 @@ def test_a_way_over_any_frame_is_the_same_way(tree, target, over, source, time):
 
 
 @given(trees(), FRAMES, FRAMES, TIMES)
-def test_the_way_back_undoes_the_way(tree, target, source, time):
+def test_the_reverse_lookup_gives_the_inverse_transform(tree, target, source, time):
     there, back = tree.lookup(target, source, time), tree.lookup(source, target, time)
     same(there @ back, Transform())
 
@@ -336,13 +342,13 @@ def test_the_way_back_undoes_the_way(tree, target, source, time):
 # Beyond what was told.
 
 
-def test_a_frame_goes_on_as_it_did_for_a_while(robot):
+def test_a_moving_frame_is_extrapolated_for_a_limited_time(robot):
     assert place(robot.lookup("odom", "base_link", 12.15, ahead=0.2)) == (2.15, 0.0)
     with pytest.raises(NotKnownThen, match="later"):
         robot.lookup("odom", "base_link", 12.25, ahead=0.2)
 
 
-def test_one_that_turned_goes_on_turning():
+def test_a_turning_frame_is_extrapolated():
     buffer = Buffer()
     for step in range(5):
         buffer.add("odom", "base", at(0, 0, step / 10), 10.0 + step / 10)
@@ -360,7 +366,7 @@ def test_one_that_turned_goes_on_turning():
         [(10.09, 2.99, 0.0), (10.1, 3.0, 0.0)],  # too close together to tell
     ],
 )
-def test_what_does_not_tell_how_it_goes_on_stays(received):
+def test_a_frame_without_a_plausible_velocity_is_not_extrapolated(received):
     buffer = Buffer()
     for stamp, x, yaw in received:
         buffer.add("odom", "base", at(x, 0.0, yaw), stamp)
@@ -368,6 +374,6 @@ def test_what_does_not_tell_how_it_goes_on_stays(received):
     assert place(buffer.lookup("odom", "base", stamp + 0.1, ahead=0.2)) == (x, 0.0)
 
 
-def test_a_frame_hangs_from_a_chain_of_others(robot):
+def test_chain_lists_a_frame_and_all_its_ancestors(robot):
     assert robot.chain("laser") == ["laser", "base_link", "odom", "map"]
     assert robot.chain("nowhere") == ["nowhere"]

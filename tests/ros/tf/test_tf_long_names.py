@@ -10,7 +10,7 @@ LONG = "f" * 1_000_000
 
 
 @pytest.mark.parametrize("names", [(LONG, "a"), ("a", LONG)])
-def test_a_frame_with_a_name_that_is_too_long_is_left_out(names):
+def test_a_frame_with_a_too_long_name_is_refused(names):
     buffer = Buffer()
     with pytest.raises(TransformError, match="name of 1000000 characters; 256") as said:
         buffer.add(*names, Transform(), 1.0)
@@ -18,7 +18,7 @@ def test_a_frame_with_a_name_that_is_too_long_is_left_out(names):
     assert buffer.frames == []
 
 
-def test_asking_for_such_a_frame_takes_no_time_and_says_little():
+def test_looking_up_a_too_long_name_is_fast_and_raises_a_short_error():
     buffer = Buffer()
     for number in range(100):
         buffer.add("map", f"f{number}", Transform(), 1.0)

@@ -106,7 +106,7 @@ def to_wall(points: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_dots_stay_on_the_wall_while_the_robot_turns(chromium, dialect):
+def test_scan_dots_stay_on_the_wall_while_the_robot_turns(chromium, dialect):
     with (
         simulator("-n", "1", "--dialect", dialect) as sim,
         page_of(PAGE, TURNING_URL=sim) as url,

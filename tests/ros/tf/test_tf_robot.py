@@ -90,28 +90,28 @@ def where(robot):
     return pytest.approx(place, abs=1e-6)
 
 
-def test_odometry_is_taken_to_the_frame_of_the_map(link, bob):
+def test_odometry_is_transformed_into_the_map_frame(link, bob):
     link.say("/tf", {"transforms": [transform("map", "odom", 10.0, 5.0, math.pi / 2)]})
     link.say("/odom", odometry(1.0))
     assert (10.0, 6.0, math.pi / 2) == where(bob)
     assert not bob.problems
 
 
-def test_the_frames_of_the_stamp_are_used_not_the_newest(link, bob):
+def test_odometry_uses_the_frames_at_its_stamp_not_the_newest_frames(link, bob):
     for stamp, x in ((10.0, 0.0), (10.5, 50.0)):
         link.say("/tf", {"transforms": [transform("map", "odom", x, stamp=stamp)]})
     link.say("/odom", odometry(1.0, stamp=10.25))
     assert where(bob) == (26.0, 0.0, 0.0)
 
 
-def test_a_pose_that_is_newer_than_the_frames_is_taken_by_the_newest(link, bob):
+def test_a_pose_newer_than_the_frames_uses_the_newest_frames(link, bob):
     link.say("/tf", {"transforms": [transform("map", "odom", 10.0)]})
     link.say("/odom", odometry(1.0, stamp=10.3))
     assert where(bob) == (11.0, 0.0, 0.0)
     assert not bob.problems
 
 
-def test_without_the_map_s_frame_it_stays_where_odometry_has_it_and_says_so(link, bob):
+def test_without_the_map_frame_a_robot_keeps_its_odometry_pose_and_a_problem(link, bob):
     link.say("/odom", odometry(1.0))
     assert where(bob) == (1.0, 0.0, 0.0)
     assert "there is no frame 'map'" in bob.problems["tf"]
@@ -121,19 +121,19 @@ def test_without_the_map_s_frame_it_stays_where_odometry_has_it_and_says_so(link
     assert not bob.problems
 
 
-def test_one_who_is_quiet_says_nothing_of_it(link, bob):
+def test_a_quiet_robot_does_not_report_a_missing_map_frame(link, bob):
     bob.set_tf(link, quiet=True)
     link.say("/odom", odometry(1.0))
     assert not bob.problems
 
 
-def test_a_pose_in_the_map_s_frame_stays_as_it_is(link, bob):
+def test_a_pose_in_the_map_frame_is_unchanged(link, bob):
     link.say("/odom", odometry(3.0, frame="map"))
     assert where(bob) == (3.0, 0.0, 0.0)
     assert not bob.problems
 
 
-def test_a_robot_without_odometry_is_where_the_frames_have_its_base(link):
+def test_a_robot_without_odometry_has_the_pose_of_its_base_frame(link):
     bob = Robot("Bob", base_link="base_footprint")
     bob.set_tf(link)
     chain = [transform("map", "odom", 10.0), transform("odom", "base_footprint", 2.0)]
@@ -146,7 +146,7 @@ def test_a_robot_without_odometry_is_where_the_frames_have_its_base(link):
     bob.destroy()
 
 
-def test_frames_of_a_namespace_are_kept_apart(link):
+def test_frames_of_different_namespaces_are_kept_apart(link):
     robots = [Robot(name) for name in ("ann", "bob")]
     for number, robot in enumerate(robots):
         space = f"/{robot.name}"
@@ -160,7 +160,7 @@ def test_frames_of_a_namespace_are_kept_apart(link):
         robot.destroy()
 
 
-def test_robots_of_one_bridge_share_what_they_hear_and_the_last_ends_it(link):
+def test_robots_of_one_bridge_share_tf_until_the_last_robot_is_destroyed(link):
     robots = [Robot("Ann"), Robot("Bob")]
     for robot in robots:
         robot.set_tf(link)
@@ -172,7 +172,7 @@ def test_robots_of_one_bridge_share_what_they_hear_and_the_last_ends_it(link):
     assert link.subscribed == []
 
 
-def test_a_wrong_transform_is_logged_once_and_the_others_are_taken(link, bob, caplog):
+def test_an_invalid_transform_is_logged_once_and_the_others_are_used(link, bob, caplog):
     bad = transform("odom", "base_link", math.nan)
     for _ in range(3):
         link.say("/tf", {"transforms": [bad, transform("map", "odom", 10.0)]})
@@ -184,7 +184,7 @@ def test_a_wrong_transform_is_logged_once_and_the_others_are_taken(link, bob, ca
     assert bob.problems["frames"] == said[0].removeprefix("test: ")
 
 
-def test_frames_are_plain_data_and_back():
+def test_the_tf_settings_survive_the_conversion_to_plain_data():
     bridge = Bridge("ws://bob:9090")
     bob = Robot("Bob")
     bob.set_tf(bridge, namespace="bob", quiet=True)
@@ -204,7 +204,7 @@ def test_frames_are_plain_data_and_back():
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_a_simulated_robot_is_drawn_where_its_frames_have_it(dialect):
+def test_a_simulated_robot_has_the_pose_of_its_frames(dialect):
     options = ("--wander", "--drift", "0.3", "--dialect", dialect)
     with simulator(*options) as url:
         asyncio.run(follow(url))

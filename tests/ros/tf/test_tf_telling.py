@@ -29,7 +29,7 @@ async def until(condition) -> None:
         await asyncio.sleep(0.005)
 
 
-def test_a_listener_that_raises_keeps_no_other_from_hearing_and_is_logged_once(caplog):
+def test_a_raising_frame_listener_is_logged_once_and_others_are_still_called(caplog):
     link = Link()
     frames = frames_of(link)
 
@@ -49,7 +49,7 @@ def test_a_listener_that_raises_keeps_no_other_from_hearing_and_is_logged_once(c
     robot.destroy()
 
 
-def test_many_messages_in_a_row_are_told_of_at_once_and_then_together(monkeypatch):
+def test_frame_listeners_are_called_at_once_and_then_once_per_period(monkeypatch):
     monkeypatch.setattr("webmap.poses.frames.PERIOD", 0.3)
 
     async def scenario() -> None:
@@ -80,7 +80,7 @@ def test_many_messages_in_a_row_are_told_of_at_once_and_then_together(monkeypatc
 
 
 @pytest.mark.parametrize("robots", [1, 20])
-def test_robots_of_frames_alone_are_shown_twenty_times_a_second(robots):
+def test_robots_without_odometry_are_updated_in_almost_every_frame_period(robots):
     """What is told at each period is taken, and not every other time."""
 
     async def scenario() -> None:

@@ -39,18 +39,18 @@ def angle(p, q):
 
 
 @given(TRANSFORMS, TRANSFORMS, POINTS)
-def test_a_product_applies_the_right_one_first(one, other, point):
+def test_a_product_applies_its_right_transform_first(one, other, point):
     assert near((one @ other).apply(point), one.apply(other.apply(point)))
 
 
 @given(TRANSFORMS, POINTS)
-def test_the_inverse_undoes(transform, point):
+def test_the_inverse_undoes_a_transform(transform, point):
     assert near(transform.inverse.apply(transform.apply(point)), point)
     assert near((transform @ transform.inverse).apply(point), point)
 
 
 @given(TRANSFORMS, POINTS, POINTS)
-def test_distances_are_kept(transform, one, other):
+def test_a_transform_preserves_distances(transform, one, other):
     def far(a, b):
         return math.dist((a.x, a.y, a.z), (b.x, b.y, b.z))
 
@@ -59,7 +59,7 @@ def test_distances_are_kept(transform, one, other):
 
 
 @given(POSES, POSES)
-def test_in_the_plane_it_is_what_poses_do(one, other):
+def test_transforms_of_plane_poses_compose_like_poses(one, other):
     both = (Transform.from_pose(one) @ Transform.from_pose(other)).planar
     flat = one @ other
     assert (both.x, both.y) == pytest.approx((flat.x, flat.y), abs=1e-6)
@@ -67,7 +67,7 @@ def test_in_the_plane_it_is_what_poses_do(one, other):
 
 
 @given(TRANSFORMS, TRANSFORMS)
-def test_the_ends_of_a_way_are_its_ends(one, other):
+def test_interpolation_starts_and_ends_at_the_given_transforms(one, other):
     for share, end in ((0.0, one), (1.0, other)):
         mixed = between(one, other, share)
         assert near(mixed.translation, end.translation)
@@ -75,7 +75,7 @@ def test_the_ends_of_a_way_are_its_ends(one, other):
 
 
 @given(TRANSFORMS, TRANSFORMS, SHARES)
-def test_what_lies_on_a_way_lies_between_its_ends(one, other, share):
+def test_an_interpolated_transform_lies_between_its_ends(one, other, share):
     mixed = between(one, other, share)
     for axis in ("x", "y", "z"):
         low, high = sorted(getattr(t.translation, axis) for t in (one, other))
@@ -86,14 +86,14 @@ def test_what_lies_on_a_way_lies_between_its_ends(one, other, share):
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), SHARES)
-def test_turning_is_even_and_the_shorter_way_about(start, by, share):
+def test_rotation_is_interpolated_evenly_and_in_the_shorter_direction(start, by, share):
     one = Transform.from_pose(Pose(0, 0, start))
     other = Transform.from_pose(Pose(0, 0, start + by))
     yaw = between(one, other, share).rotation.yaw
     assert math.cos(yaw - start - share * by) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_rotation_that_is_nearly_one_is_set_right():
+def test_a_rotation_with_a_norm_near_one_is_normalised():
     odd = Transform(rotation=Quaternion(0, 0, 0, 1.05)).checked()
     assert odd.rotation == Quaternion()
 
@@ -107,32 +107,32 @@ def test_a_rotation_that_is_nearly_one_is_set_right():
         (Transform(Vector3(math.inf, 0, 0)), "not finite"),
     ],
 )
-def test_what_is_no_transform_is_refused(transform, words):
+def test_an_invalid_transform_is_refused(transform, words):
     with pytest.raises(TransformError, match=words):
         transform.checked()
 
 
-def test_from_above_a_frame_that_hangs_upside_down_is_mirrored():
+def test_an_upside_down_frame_is_mirrored_when_seen_from_above():
     over = Transform(Vector3(1.0, 2.0, 3.0), Quaternion(1.0, 0.0, 0.0, 0.0))
     assert over.from_above.apply(1.0, 0.5) == pytest.approx((2.0, 1.5))
     assert over.from_above.determinant == pytest.approx(-1.0)
 
 
-def test_from_above_a_frame_that_stands_upright_is_a_line():
+def test_a_vertical_plane_is_a_line_when_seen_from_above():
     half = math.sqrt(0.5)
     upright = Transform(Vector3(), Quaternion(half, 0.0, 0.0, half))
     assert upright.from_above.apply(1.0, 7.0) == pytest.approx((1.0, 0.0))
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-9, 9), st.floats(-9, 9))
-def test_from_above_a_plane_turn_is_that_turn(yaw, x, y):
+def test_a_rotation_in_the_plane_is_unchanged_when_seen_from_above(yaw, x, y):
     flat = Transform.from_pose(Pose(1.0, -1.0, yaw))
     there = flat.apply(Vector3(x, y))
     assert flat.from_above.apply(x, y) == pytest.approx((there.x, there.y))
 
 
 @given(TRANSFORMS, POINTS)
-def test_heading_and_tilt_together_are_the_whole(transform, point):
+def test_heading_and_tilt_combine_to_the_whole_transform(transform, point):
     pose, tilt = transform.heading_and_tilt
     both = Transform.from_pose(pose).apply(tilt.apply(point))
     assert near(both, transform.apply(point), 1e-3), "a tilt of a microradian is none"
@@ -141,13 +141,13 @@ def test_heading_and_tilt_together_are_the_whole(transform, point):
 
 
 @given(POSES, METRES)
-def test_what_stands_upright_has_no_tilt_at_all(pose, height):
+def test_an_upright_transform_has_no_tilt(pose, height):
     lifted = Transform(Vector3(0.0, 0.0, height)) @ Transform.from_pose(pose)
     assert lifted.upright
     assert lifted.heading_and_tilt[1] == Transform(Vector3(0.0, 0.0, height))
 
 
-def test_what_hangs_upside_down_is_tilted_by_half_a_turn():
+def test_an_upside_down_transform_is_tilted_by_half_a_turn():
     over = Transform(Vector3(1.0, 2.0, 0.5), Quaternion(1.0, 0.0, 0.0, 0.0))
     assert not over.upright
     pose, tilt = over.heading_and_tilt
@@ -156,7 +156,7 @@ def test_what_hangs_upside_down_is_tilted_by_half_a_turn():
 
 
 @given(TRANSFORMS, POINTS)
-def test_the_rows_of_the_matrix_do_the_same(transform, point):
+def test_the_matrix_rows_map_points_like_the_transform(transform, point):
     x, y, z = (
         a * point.x + b * point.y + c * point.z + by for a, b, c, by in transform.rows
     )
@@ -164,7 +164,7 @@ def test_the_rows_of_the_matrix_do_the_same(transform, point):
 
 
 @given(TRANSFORMS, st.floats(0.01, math.pi), st.floats(0.01, 10.0))
-def test_transforms_are_alike_up_to_what_does_not_matter(transform, turn, way):
+def test_transforms_are_alike_within_the_given_tolerances(transform, turn, way):
     turned = transform @ Transform(rotation=Quaternion.from_yaw(turn))
     moved = Transform(Vector3(way)) @ transform
     assert alike(transform, turned, 0.0001, turn + 0.001)

@@ -63,7 +63,7 @@ def ready(link, bob, clock):
     return go
 
 
-def test_a_missing_map_is_said_once_it_lasts_and_taken_back(link, bob, clock):
+def test_a_lasting_missing_map_frame_is_reported_and_then_cleared(link, bob, clock):
     link.say("/odom", odometry(1.0))
     assert bob.problems == {}, "frames come one after another"
     clock.now += 2.5
@@ -77,7 +77,7 @@ def test_a_missing_map_is_said_once_it_lasts_and_taken_back(link, bob, clock):
     assert bob.problems == {}
 
 
-def test_two_trees_are_said_by_their_roots(link, bob, clock):
+def test_unconnected_frame_trees_are_reported_with_their_roots(link, bob, clock):
     chain = [transform("map", "other", 1.0), transform("odom", "base_link", 1.0)]
     for _ in range(3):
         link.say("/tf", {"transforms": chain})
@@ -86,7 +86,7 @@ def test_two_trees_are_said_by_their_roots(link, bob, clock):
     assert "'odom' is in the tree of 'odom', 'map' in the" in bob.problems["tf"]
 
 
-def test_a_loop_is_said_whole_and_the_others_hold(ready, bob):
+def test_a_frame_loop_is_reported_completely_and_other_frames_stay_valid(ready, bob):
     ready(10.1, transform("base_link", "map", 0.0, stamp=10.1))
     said = bob.problems["frames"]
     assert "would close a loop" in said
@@ -98,25 +98,27 @@ def test_a_loop_is_said_whole_and_the_others_hold(ready, bob):
     assert bob.problems == {}
 
 
-def test_time_that_jumps_back_is_said_and_the_robot_goes_on(ready, bob):
+def test_a_backward_time_jump_is_reported_and_the_pose_still_updates(ready, bob):
     ready(50.0)
     ready(20.0, x=0.4)
     assert "time jumped back by 30.000 s" in bob.problems["frames"]
     assert bob.position.x == pytest.approx(1.4)
 
 
-def test_two_nodes_that_tell_of_one_frame_are_said(ready, bob):
+def test_two_publishers_of_one_frame_are_reported(ready, bob):
     ready(10.1, transform("world", "base_link", 5.0, stamp=10.1))
     assert "two nodes publish it" in bob.problems["frames"]
 
 
-def test_a_fault_of_another_robots_frames_is_not_said_of_this_one(ready, bob, caplog):
+def test_a_frame_fault_of_another_robot_is_not_reported_for_this_robot(
+    ready, bob, caplog
+):
     ready(10.1, transform("r2/odom", "r2/base_link", math.nan, stamp=10.1))
     assert bob.problems == {}
     assert "test: a transform was left out: 'r2/odom' -> 'r2/base_link'" in caplog.text
 
 
-def test_localisation_that_falls_silent_is_said_and_taken_back(link, ready, bob, clock):
+def test_silent_localisation_is_reported_and_then_cleared(link, ready, bob, clock):
     for seconds in (11.0, 12.5):
         clock.now = 990.0 + seconds
         link.say("/odom", odometry(0.0, stamp=seconds))
@@ -130,7 +132,7 @@ def test_localisation_that_falls_silent_is_said_and_taken_back(link, ready, bob,
     assert bob.problems == {}
 
 
-def test_frames_alone_that_stop_are_said_while_others_go_on(link, clock):
+def test_stopped_frames_of_a_robot_without_odometry_are_reported(link, clock):
     robot = Robot("Bob")
     robot.set_tf(link)
     chain = [transform("map", "odom", 1.0), transform("odom", "base_link", 1.0)]
@@ -147,7 +149,7 @@ def test_frames_alone_that_stop_are_said_while_others_go_on(link, clock):
     robot.destroy()
 
 
-def test_a_leap_of_a_robot_is_said_for_a_while(ready, bob):
+def test_a_pose_jump_is_reported_for_some_seconds(ready, bob):
     ready(10.1, x=0.1)
     ready(10.2, x=12.0)
     assert "the pose jumped by 11.9 m within 0.10 s" in bob.problems["jumps"]
@@ -164,7 +166,7 @@ def reading(x, stamp, frame="map"):
     return PoseReading(Vector3(x), Quaternion(), None, frame, stamp)
 
 
-def test_a_robot_that_is_in_two_places_again_and_again_is_told_of_twice():
+def test_repeated_pose_jumps_are_reported_as_two_publishers():
     jumps = Jumps()
     for step in range(5):
         jumps.look(reading(20.0 * (step % 2), 10.0 + step / 10), step / 10)
@@ -181,7 +183,7 @@ def test_a_robot_that_is_in_two_places_again_and_again_is_told_of_twice():
         [(0.0, 10.0), (50.0, 9.0)],  # time goes back
     ],
 )
-def test_what_may_have_been_driven_is_no_jump(poses):
+def test_a_plausible_or_untimed_movement_is_no_pose_jump(poses):
     jumps = Jumps()
     for x, stamp in poses:
         jumps.look(reading(x, stamp), stamp)
@@ -198,7 +200,7 @@ def test_what_may_have_been_driven_is_no_jump(poses):
         (9999.5, 0.1, None),  # one that another has overtaken
     ],
 )
-def test_a_clock_of_poses_that_leaps_is_told_with_how_far(stamp, passed, leapt):
+def test_a_jump_of_the_pose_clock_is_reported_with_its_size(stamp, passed, leapt):
     jumps = Jumps()
     jumps.look(reading(0.0, 10000.0), 5.0)
     jumps.look(reading(0.0, stamp), 5.0 + passed)
@@ -208,7 +210,7 @@ def test_a_clock_of_poses_that_leaps_is_told_with_how_far(stamp, passed, leapt):
         assert f"the clock of its poses jumped by {leapt} s" in jumps.problem
 
 
-def test_frames_alone_that_leap_are_told_of_once(link, clock):
+def test_a_time_jump_of_a_robot_without_odometry_is_reported_once(link, clock):
     robot = Robot("Bob")
     robot.set_tf(link)
     for stamp in (5000.0, 1400.0):
@@ -224,7 +226,7 @@ def test_frames_alone_that_leap_are_told_of_once(link, clock):
     ("ahead", "said"), [(3600, "3600.0 s later"), (-3600, "3600.0 s earlier")]
 )
 @pytest.mark.parametrize("quiet", [False, True])
-def test_odometry_by_another_clock_than_the_frames_is_said_with_the_difference(
+def test_a_clock_difference_of_odometry_and_frames_is_reported_with_its_size(
     link, bob, clock, ahead, said, quiet
 ):
     bob.set_tf(link, quiet=quiet)
@@ -241,21 +243,21 @@ def test_odometry_by_another_clock_than_the_frames_is_said_with_the_difference(
     assert "tf" not in bob.problems
 
 
-def test_a_pose_in_another_frame_is_no_jump():
+def test_a_change_of_the_frame_is_no_pose_jump():
     jumps = Jumps()
     jumps.look(reading(0.0, 10.0, "odom"), 0.0)
     jumps.look(reading(50.0, 10.1, "map"), 0.1)
     assert jumps.problem is None
 
 
-def test_faults_are_kept_of_so_many_frames_and_no_more():
+def test_the_number_of_frames_with_stored_faults_is_limited():
     faults = FrameFaults(Buffer())
     said = [faults.note("map", f"f{n}", "wrong", 0.0) for n in range(60)]
     assert sum(said) == 50
     assert not faults.note("map", "f0", "wrong again", 1.0)
 
 
-def test_faults_with_the_robots_prefix_concern_it_though_nothing_connects_them():
+def test_a_fault_of_a_frame_with_the_robots_prefix_concerns_the_robot():
     faults = FrameFaults(Buffer())
     faults.note("r1/odom", "r1/laser", "it is none", 0.0)
     assert faults.of("r1/base_link", 1.0) == "it is none"
@@ -264,7 +266,7 @@ def test_faults_with_the_robots_prefix_concern_it_though_nothing_connects_them()
     assert not faults.any
 
 
-def test_trouble_that_comes_and_goes_is_never_said(clock):
+def test_only_lasting_problems_are_reported(clock):
     waits = Lasting()
     for _ in range(10):
         assert lasting(waits, "late") == ""

@@ -59,7 +59,9 @@ def decoder():
 
 @given(histories)
 @settings(max_examples=150)
-def test_any_history_of_a_scene_shows_the_same_tree(decoder, history):
+def test_the_browser_decoder_builds_the_same_tree_for_any_scene_history(
+    decoder, history
+):
     session = SceneSession()
     answer = decoder.read(play(history, session))
     assert "error" not in answer, answer
@@ -67,7 +69,9 @@ def test_any_history_of_a_scene_shows_the_same_tree(decoder, history):
 
 
 @given(st.binary(max_size=200), st.booleans())
-def test_any_bytes_are_read_or_refused_clearly(decoder, data, with_header):
+def test_the_browser_decoder_reads_any_bytes_or_raises_a_known_error(
+    decoder, data, with_header
+):
     session = SceneSession()
     session.error("x")
     frame = session.frame(0.0)[:15] + data if with_header else data
@@ -139,7 +143,7 @@ GOLDEN_SESSIONS = (everything_about_elements, a_page_with_a_map, one_tick_of_two
 
 
 @pytest.mark.parametrize("make", GOLDEN_SESSIONS)
-def test_the_golden_frames_are_what_is_sent(make, decoder, monkeypatch):
+def test_the_encoded_frames_match_the_golden_files(make, decoder, monkeypatch):
     monkeypatch.setattr(node, "_node_ids", itertools.count(1))
     monkeypatch.setattr(node, "_fragment_ids", itertools.count(1))
     monkeypatch.setattr(secrets, "randbits", lambda bits: 12345)

@@ -30,12 +30,12 @@ def read_varint(data):
 
 
 @given(st.integers(0, 2**53))
-def test_a_varint_is_read_back(number):
+def test_a_varint_survives_encoding_and_decoding(number):
     assert read_varint(varint(number)) == (number, b"")
 
 
 @given(st.text())
-def test_text_comes_after_its_length(text):
+def test_a_string_is_encoded_after_its_length(text):
     length, data = read_varint(string(text))
     assert (len(data), data.decode()) == (length, text)
 
@@ -48,12 +48,12 @@ def records_since(fragment, revision):
     return data[len(head) :]
 
 
-def test_nothing_changed_is_nothing_to_say():
+def test_an_unchanged_fragment_is_encoded_as_no_bytes():
     fragment = Fragment(svg.g())
     assert encode_changes(fragment, fragment.revision) == b""
 
 
-def test_half_a_character_becomes_a_mark():
+def test_a_lone_surrogate_is_encoded_as_a_question_mark():
     assert string("a\ud800") == b"\x02a?"
 
 
@@ -69,7 +69,7 @@ def test_a_pose_is_at_most_18_bytes():
     assert head + 1 + len(varint(10_000)) + 12 <= 18
 
 
-def test_a_dot_is_two_bytes_a_coordinate():
+def test_a_dot_needs_two_bytes_per_coordinate():
     path = svg.path()
     fragment = Fragment(path)
     path.set_dots(bytes(4 * 360), 0.001)
@@ -77,7 +77,7 @@ def test_a_dot_is_two_bytes_a_coordinate():
     assert len(data) - 4 * 360 <= 1 + len(varint(path.id)) + 4 + 2
 
 
-def test_far_poses_keep_millimetres():
+def test_a_far_pose_keeps_millimetre_precision():
     root = svg.g()
     fragment = Fragment(root)
     root.set_pose(500_000.123, 5_000_000.456, 7)
@@ -89,13 +89,13 @@ def test_far_poses_keep_millimetres():
 
 
 @pytest.mark.parametrize("yaw", [1e300, -1e300])
-def test_any_angle_fits(yaw):
+def test_a_huge_angle_can_be_encoded(yaw):
     root = svg.g()
     root.set_pose(0, 0, yaw)
     assert encode_snapshot(Fragment(root))
 
 
-def test_a_changed_fragment_is_encoded_once_for_all():
+def test_the_encoding_of_a_fragment_is_cached_until_its_next_change():
     root = svg.g()
     fragment = Fragment(root)
     root.set_matrix(Affine(e=3))
@@ -106,11 +106,11 @@ def test_a_changed_fragment_is_encoded_once_for_all():
     assert encode_snapshot(fragment) is not before
 
 
-def test_every_slot_has_a_name_of_its_own():
+def test_only_the_class_and_transform_slots_share_names_with_attributes():
     assert set(_SLOTS) & set(ATTRIBUTES) == {"class", "transform"}
 
 
-def test_a_tag_in_both_namespaces_is_told_apart():
+def test_a_tag_of_both_namespaces_has_two_different_encodings():
     both = {tag for tag in TAGS if TAGS.count(tag) > 1}
     for tag in both:
         in_svg = encode_snapshot(Fragment(getattr(svg, tag)()))
@@ -118,7 +118,7 @@ def test_a_tag_in_both_namespaces_is_told_apart():
         assert in_svg[-1] != in_html[-1]
 
 
-def test_bound_elements_say_the_id_in_the_page():
+def test_a_bound_element_is_encoded_with_its_html_id():
     document = Document()
     document.bind("log")
     data = encode_snapshot(Fragment(document))
@@ -126,7 +126,7 @@ def test_bound_elements_say_the_id_in_the_page():
     assert data.endswith(b"\x03log")
 
 
-def test_an_unset_attribute_is_sent_as_such():
+def test_an_unset_attribute_is_encoded_as_unset():
     root = svg.g(fill="red")
     fragment = Fragment(root)
     root.set(fill=None, data_name="Bob")
@@ -136,7 +136,7 @@ def test_an_unset_attribute_is_sent_as_such():
     assert ops.endswith(b"\x09data-name")
 
 
-def test_an_attribute_of_the_page_that_was_unset_is_unset_for_who_comes_later():
+def test_an_unset_attribute_of_the_page_html_is_unset_for_later_viewers():
     """The page's own HTML may have it, as a card that is hidden at first."""
     document = Document()
     fragment = Fragment(document)

@@ -30,14 +30,14 @@ def text(message, **changes):
     return json.dumps({**message, **changes})
 
 
-def test_a_hello_says_which_page_it_is():
+def test_a_hello_message_identifies_the_page():
     hello = read_message(text(HELLO))
     assert isinstance(hello, Hello)
     assert hello.containers == {"map": (700, 500)}
     assert (hello.page, hello.url, hello.theme) == ("abcdefgh-1", "/lab?x=1", "dark")
 
 
-def test_an_event_has_what_the_hand_did():
+def test_an_event_message_contains_the_position_and_the_modifier_keys():
     event = read_message(
         '{"op":"event","mount":1,"element":2,"event":"click","x":3.5,"shift":true}'
     )
@@ -69,7 +69,7 @@ def test_an_event_has_what_the_hand_did():
         b'{"op":"trouble","text":"\xff"}',
     ],
 )
-def test_garbage_is_refused_clearly(garbage):
+def test_an_invalid_message_raises_a_wire_error(garbage):
     with pytest.raises(WireError):
         read_message(garbage)
 
@@ -105,7 +105,7 @@ def test_any_json_gives_a_message_or_a_wire_error(message):
         return
 
 
-def test_a_view_report_has_the_matrix_and_the_place():
+def test_a_view_report_contains_the_matrix_and_the_position():
     numbers = {name: index for index, name in enumerate("abcdef")}
     place = {"width": 700, "height": 500, "left": 10, "top": 20}
     report = read_message(text({"op": "view", "map_element": 3, **numbers, **place}))
@@ -114,7 +114,7 @@ def test_a_view_report_has_the_matrix_and_the_place():
 
 
 @pytest.mark.parametrize("depth", [40, 900, 5000])
-def test_a_message_of_a_module_is_not_nested_without_end(depth):
+def test_a_module_message_nested_too_deeply_is_refused(depth):
     data = '{"a":' + "[" * depth + "]" * depth + "}"
     text = '{"op":"module","instance":1,"data":' + data + "}"
     with pytest.raises(WireError, match=r"nested deeper than 32|recursion"):

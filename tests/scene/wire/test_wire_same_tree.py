@@ -107,11 +107,11 @@ def blank(chromium, request):
     suppress_health_check=list(HealthCheck),
     phases=[Phase.explicit, Phase.generate],
 )
-def test_any_history_of_a_scene_gives_the_same_document(blank, history):
+def test_a_real_document_matches_the_scene_after_any_history(blank, history):
     assert_same(blank, history)
 
 
-def test_dots_keep_a_transform_that_was_given_as_text(blank):
+def test_dots_keep_a_transform_set_as_text(blank):
     add = ("add", 0, 0, 0, 0.0, "")
     transform = ("transform", 0, 2, 0, 0.0, "")
     dots = ("dots", 0, 2, 0, 3.0, "")

@@ -48,7 +48,7 @@ def a_map():
     return root, world
 
 
-def test_nothing_to_say_is_no_frame():
+def test_a_session_without_changes_sends_no_frame():
     assert SceneSession().frame(0.0) is None
 
 
@@ -58,7 +58,7 @@ def test_a_frame_has_a_version_a_number_and_the_time():
     assert header(session.frame(12.5)) == (VERSION, 0, 1, 12.5)
 
 
-def test_what_did_not_change_is_not_sent_again():
+def test_only_changes_are_sent_after_the_first_frame():
     session = SceneSession()
     root = svg.g()
     session.mount(Fragment(root), under=0)
@@ -71,7 +71,7 @@ def test_what_did_not_change_is_not_sent_again():
     assert session.frame(0.0) is None
 
 
-def test_a_page_that_was_spoken_to_is_told_the_time():
+def test_a_page_receives_a_heartbeat_one_second_after_the_last_frame():
     session = SceneSession()
     assert session.frame(100.0) is None
     session.error("hello")
@@ -83,7 +83,7 @@ def test_a_page_that_was_spoken_to_is_told_the_time():
     assert session.frame(101.5) is None
 
 
-def test_a_viewer_that_acknowledges_nothing_gets_no_third_frame():
+def test_a_viewer_without_acknowledgements_gets_no_third_frame():
     session = SceneSession()
     root = svg.g()
     session.mount(Fragment(root), under=0)
@@ -97,7 +97,7 @@ def test_a_viewer_that_acknowledges_nothing_gets_no_third_frame():
     assert session.frame(0.0) is None
 
 
-def test_an_acknowledgement_of_the_future_is_worth_nothing():
+def test_an_acknowledgement_of_an_unsent_frame_is_ignored():
     session = SceneSession()
     for _ in range(2):
         session.error("x")
@@ -107,7 +107,7 @@ def test_an_acknowledgement_of_the_future_is_worth_nothing():
     assert session.frame(0.0) is None
 
 
-def test_one_viewer_costs_another_nothing():
+def test_a_slow_viewer_does_not_delay_a_fast_viewer():
     root = svg.g()
     fragment = Fragment(root)
     slow, quick = SceneSession(), SceneSession()
@@ -139,7 +139,7 @@ def test_the_same_change_is_encoded_once_for_all_sessions(monkeypatch):
     assert len(calls) == 1
 
 
-def test_a_viewer_too_far_behind_is_told_everything():
+def test_a_viewer_too_far_behind_receives_a_full_reset():
     session = SceneSession()
     root = svg.g()
     fragment = Fragment(root)
@@ -153,7 +153,7 @@ def test_a_viewer_too_far_behind_is_told_everything():
     assert header(session.frame(0.0))[1] == RESET
 
 
-def test_a_restart_tells_everything_and_keeps_choices():
+def test_a_restart_sends_the_whole_scene_with_the_choices_of_the_page():
     session = SceneSession()
     root, _ = a_map()
     mount = session.mount(Fragment(root), under=0)
@@ -171,7 +171,7 @@ def test_a_restart_tells_everything_and_keeps_choices():
     assert struct.pack("<dd", 1, 2) in again
 
 
-def test_a_restart_counts_on_from_what_was_sent():
+def test_a_restart_allows_two_new_unacknowledged_frames():
     session = SceneSession()
     for _ in range(2):
         session.error("x")
@@ -184,7 +184,7 @@ def test_a_restart_counts_on_from_what_was_sent():
     assert session.frame(0.0) is None
 
 
-def test_a_page_that_lost_track_is_told_everything():
+def test_a_page_that_asks_for_a_resync_receives_a_full_reset():
     session = SceneSession()
     session.mount(Fragment(svg.g()), under=0)
     next_frame(session)
@@ -192,7 +192,7 @@ def test_a_page_that_lost_track_is_told_everything():
     assert header(session.frame(0.0))[1] == RESET
 
 
-def test_a_mount_that_came_and_went_between_frames_is_not_told():
+def test_a_mount_removed_before_the_next_frame_is_not_sent():
     session = SceneSession()
     fragment = Fragment(svg.g())
     session.unmount(session.mount(fragment, under=0))
@@ -200,7 +200,7 @@ def test_a_mount_that_came_and_went_between_frames_is_not_told():
     session.unmount(99)
 
 
-def test_what_is_mounted_within_goes_along():
+def test_unmounting_a_fragment_also_unmounts_the_fragments_inside():
     session = SceneSession()
     root, world = a_map()
     outer = session.mount(Fragment(root), under=0)
@@ -217,7 +217,7 @@ def test_what_is_mounted_within_goes_along():
         session.mount(Fragment(svg.g()), under=1, within=outer)
 
 
-def test_only_events_that_somebody_hears_come_through():
+def test_only_events_with_a_handler_are_accepted():
     session = SceneSession()
     button, other = html.button(), html.button()
     mount = session.mount(Fragment(html.div(button, other)), under=0)
@@ -233,7 +233,7 @@ def test_only_events_that_somebody_hears_come_through():
     assert session.receive(event(mount, button)) == []
 
 
-def test_a_viewers_own_listening_is_its_own():
+def test_a_listener_of_one_session_does_not_apply_to_another_session():
     ours, theirs = SceneSession(), SceneSession()
     root = svg.g()
     fragment = Fragment(root)
@@ -246,7 +246,7 @@ def test_a_viewers_own_listening_is_its_own():
     assert ours.receive(event(mounts[0], root)) == []
 
 
-def test_reported_operations_are_not_told_again():
+def test_applied_view_operations_are_not_sent_again():
     session = SceneSession()
     root, _ = a_map()
     session.mount(Fragment(root), under=0)
@@ -262,7 +262,7 @@ def test_reported_operations_are_not_told_again():
     assert received == [3.5]
 
 
-def test_operations_of_a_page_that_looks_away_are_bounded():
+def test_pending_view_operations_of_an_inactive_page_are_limited():
     session = SceneSession()
     root, _ = a_map()
     session.mount(Fragment(root), under=0)
@@ -277,7 +277,7 @@ def test_operations_of_a_page_that_looks_away_are_bounded():
     ("operation", "args"),
     [("spin", (1,)), ("scale", ()), ("set", (1, 2)), ("rotate", (float("nan"),))],
 )
-def test_a_wrong_operation_is_refused(operation, args):
+def test_an_invalid_view_operation_is_refused(operation, args):
     session = SceneSession()
     root, _ = a_map()
     session.mount(Fragment(root), under=0)
@@ -296,7 +296,7 @@ def test_only_maps_have_views_and_modules():
     assert session.receive(report(root)) == []
 
 
-def test_a_module_speaks_while_it_is_attached():
+def test_module_messages_pass_only_while_the_module_is_attached():
     session = SceneSession()
     root, _ = a_map()
     session.mount(Fragment(root), under=0)
@@ -311,7 +311,7 @@ def test_a_module_speaks_while_it_is_attached():
     assert b"again" not in session.frame(0.0)
 
 
-def test_messages_for_a_page_that_looks_away_are_bounded():
+def test_pending_error_messages_of_an_inactive_page_are_limited():
     session = SceneSession()
     for number in range(5000):
         session.error(f"number {number}")
@@ -320,7 +320,7 @@ def test_messages_for_a_page_that_looks_away_are_bounded():
     assert b"number 4999" in frame
 
 
-def test_a_page_is_told_how_each_problem_is_now():
+def test_a_page_receives_the_current_state_of_each_problem():
     session = SceneSession()
     session.problem(7, "it is 1 m off")
     session.problem(8, "it is hot")
@@ -332,7 +332,7 @@ def test_a_page_is_told_how_each_problem_is_now():
     assert session.frame(0.0)[15:] == b"\x0e\x07\x00"
 
 
-def test_a_page_that_was_loaded_again_is_told_what_is_not_mended():
+def test_a_reloaded_page_receives_the_newest_unsolved_problems():
     session = SceneSession()
     for number in range(200):
         session.problem(number, f"number {number}.")
@@ -345,7 +345,7 @@ def test_a_page_that_was_loaded_again_is_told_what_is_not_mended():
     assert received == list(range(100, 199))
 
 
-def test_problems_for_a_page_that_looks_away_are_bounded_and_none_is_lost():
+def test_pending_problems_of_an_inactive_page_are_limited_without_losing_one():
     session = SceneSession()
     for number in range(5000):
         session.problem(number, f"number {number}.")
@@ -357,7 +357,7 @@ def test_problems_for_a_page_that_looks_away_are_bounded_and_none_is_lost():
     assert len(frame) < 100_000
 
 
-def test_a_page_opened_a_thousand_times_leaves_nothing():
+def test_opening_a_page_a_thousand_times_leaves_no_state_behind():
     session = SceneSession()
     fragment = Fragment(svg.g())
     for _ in range(1000):
@@ -377,7 +377,7 @@ def test_a_page_opened_a_thousand_times_leaves_nothing():
     assert left == ({}, {}, {}, {})
 
 
-def test_a_page_that_was_loaded_again_is_told_the_newest_notices_again():
+def test_a_reloaded_page_receives_the_newest_notices_again():
     session = SceneSession()
     for number in range(7):
         session.error(f"number {number}")

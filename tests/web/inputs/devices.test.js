@@ -38,7 +38,7 @@ const fails = () => {
   throw new Error("a module of somebody's");
 };
 
-test("Escape ends a tool that is in use and is STOP when there is none", () => {
+test("Escape closes an active tool, and sends STOP without an active tool", () => {
   assert.deepEqual(
     escapeAt(() => true),
     [],
@@ -49,12 +49,12 @@ test("Escape ends a tool that is in use and is STOP when there is none", () => {
   );
 });
 
-test("a tool that fails keeps no STOP from leaving, and its error is told", () => {
+test("a tool that throws does not prevent STOP, and its error is reported", () => {
   assert.deepEqual(escapeAt(fails), ["r1"]);
   assert.equal(reported[0].message, "a module of somebody's");
 });
 
-test("a tool that fails keeps Escape from no other tool", () => {
+test("a tool that throws does not prevent Escape for another tool", () => {
   let left = 0;
   const leaves = () => {
     left += 1;

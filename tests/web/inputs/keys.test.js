@@ -21,11 +21,11 @@ for (const [codes, axes] of cases) {
   });
 }
 
-test("A turns counter-clockwise in reverse, too", () => {
+test("A turns counter-clockwise also in reverse", () => {
   assert.deepEqual(axesOf(["KeyS", "KeyA"]), { x: -1, y: 0, turn: 1 });
 });
 
-test("Q and E go sideways only where a base can", () => {
+test("Q and E move only a holonomic base sideways", () => {
   assert.deepEqual(axesOf(["KeyQ"]), { x: 0, y: 0, turn: 0 });
   assert.deepEqual(axesOf(["KeyQ"], { holonomic: true }), { x: 0, y: 1, turn: 0 });
   assert.deepEqual(axesOf(["KeyE"], { holonomic: true }), { x: 0, y: -1, turn: 0 });

@@ -32,7 +32,7 @@ test("a gamepad drives only while its dead-man button is held", () => {
   assert.equal(read(pad(false)), null);
 });
 
-test("a button that was held as the gamepad came does nothing until it was let go of", () => {
+test("a dead-man button held when the gamepad connects does nothing until released", () => {
   assert.equal(read(pad(true)), null);
   assert.equal(pads.spent, true);
   read(pad(false));
@@ -40,7 +40,7 @@ test("a button that was held as the gamepad came does nothing until it was let g
   assert.equal(pads.spent, false);
 });
 
-test("after a doubt the button must be let go of", () => {
+test("after an input block the dead-man button must be released", () => {
   read(pad(false));
   read(pad(true));
   pads.drop();
@@ -58,7 +58,7 @@ for (const [what, fields] of Object.entries({
   });
 }
 
-test("a gamepad that went away and came back starts anew", () => {
+test("a reconnected gamepad does nothing until its dead-man button is released", () => {
   read(pad(false));
   read(pad(true));
   assert.equal(read(null), null);
@@ -66,7 +66,7 @@ test("a gamepad that went away and came back starts anew", () => {
   assert.equal(read(pad(true)), null);
 });
 
-test("a gamepad that says nothing new is doubted, also when it speaks again", () => {
+test("a gamepad with an old timestamp is blocked, also when its timestamp changes again", () => {
   read(pad(false));
   const { timestamp } = pad(true);
   for (let t = 0; t < SILENT - 100; t += 50) {
@@ -78,20 +78,20 @@ test("a gamepad that says nothing new is doubted, also when it speaks again", ()
   assert.equal(read(pad(true)), null);
 });
 
-test("of two gamepads the one whose button is held drives", () => {
+test("of two gamepads the one with the held dead-man button drives", () => {
   const other = (held) => pad(held, { index: 1, axes: [0, 1, 0, 0] });
   read(pad(false), other(false));
   assert.equal(read(pad(false), other(true)).x, -1);
 });
 
-test("on a base that moves sideways the right stick turns", () => {
+test("on a holonomic base the left stick moves sideways and the right stick turns", () => {
   read(pad(false));
   const axes = [-1, 0, -1, 0];
   const asked = pads.read([pad(true, { axes })], now + 50, { holonomic: true });
   assert.deepEqual(asked, { x: 0, y: 1, turn: 1 });
 });
 
-test("garbage on the axes is no throw", () => {
+test("a gamepad without axes is neutral", () => {
   read(pad(false));
   const asked = read(pad(true, { axes: [] }));
   assert.deepEqual(asked, { x: 0, y: 0, turn: 0 });

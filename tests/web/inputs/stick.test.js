@@ -45,14 +45,14 @@ beforeEach(() => {
   new Stick(drive, pad, () => false);
 });
 
-test("a press on the stick drives, and its end is neutral", () => {
+test("a press on the stick drives, and its release is neutral", () => {
   pad.fire("pointerdown", { buttons: 1 });
   assert.ok(asked.at(-1).x > 0);
   pad.fire("pointerup", { buttons: 0 });
   assert.equal(asked.at(-1), null);
 });
 
-test("a mouse button that goes up while another is held lets go of the stick", () => {
+test("releasing the first mouse button releases the stick while another button is held", () => {
   pad.fire("pointerdown", { buttons: 1 });
   pad.fire("pointermove", { button: 1, buttons: 5 });
   assert.ok(asked.at(-1).x > 0);

@@ -27,11 +27,11 @@ function doubtsOfDrag() {
   return doubts;
 }
 
-test("what is dragged out of its place is doubt, as no key is heard meanwhile", () => {
+test("dragging an element is reported as lost attention", () => {
   assert.equal(doubtsOfDrag(), 1);
 });
 
-test("a drag that somebody prevents, as a map does, is no doubt", () => {
+test("a prevented drag is not reported as lost attention", () => {
   window.addEventListener("dragstart", (event) => event.preventDefault());
   assert.equal(doubtsOfDrag(), 0);
 });

@@ -18,28 +18,28 @@ test("a second press counts when it was neither too soon nor too late", () => {
   }
 });
 
-test("a double click is one press, after which another still counts", () => {
+test("a double click counts as one press, and a later press as the second", () => {
   const twice = new DoublePress();
   twice.press(0);
   assert.equal(twice.press(SOONEST - 1), false);
   assert.equal(twice.press(SOONEST + 1), true);
 });
 
-test("a press after a long while is a first one again", () => {
+test("a press after a long time is a first press again", () => {
   const twice = new DoublePress();
   twice.press(0);
   assert.equal(twice.press(LATEST + 1), false);
   assert.equal(twice.press(LATEST + 1 + SOONEST), true);
 });
 
-test("a first press can be forgotten", () => {
+test("a first press can be cancelled", () => {
   const twice = new DoublePress();
   twice.press(0);
   twice.forget();
   assert.equal(twice.press(SOONEST), false);
 });
 
-test("a second press is said of what the first was said of", () => {
+test("a second press applies to the robots of the first press", () => {
   const twice = new DoublePress();
   twice.press(0, ["r1"]);
   twice.look(["r1"]);
@@ -47,7 +47,7 @@ test("a second press is said of what the first was said of", () => {
   assert.deepEqual(twice.meant, ["r1"]);
 });
 
-test("something new that the first press was not said of takes it back", () => {
+test("a new robot cancels the first press", () => {
   const twice = new DoublePress();
   twice.press(0, ["r1", "r2"]);
   twice.look(["r2"]);

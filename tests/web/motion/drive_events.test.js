@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { Listeners } from "../../../src/webmap/web/motion/drive_events.js";
 
-test("who listens is told, until that is ended", () => {
+test("a listener receives its events until its removal", () => {
   const listeners = new Listeners();
   /** @type {string[]} */
   const heard = [];
@@ -15,7 +15,7 @@ test("who listens is told, until that is ended", () => {
   assert.deepEqual(heard, ["r1"]);
 });
 
-test("a listener that fails is reported, and keeps nobody from hearing", () => {
+test("an error in a listener is reported and does not affect other listeners", () => {
   /** @type {unknown[]} */
   const reported = [];
   globalThis.reportError = (error) => reported.push(error);

@@ -17,7 +17,7 @@ function report(fields = {}) {
 }
 
 describe("a speed", () => {
-  test("is along the ground and below zero backwards", () => {
+  test("is the ground speed, negative when driving backwards", () => {
     assert.equal(speedAlong([0.3, 0.4, 9]), 0.5);
     assert.equal(speedAlong([-0.3, 0.4, 9]), -0.5);
     assert.equal(speedAlong([0, 0.4, 0]), 0.4);
@@ -25,7 +25,7 @@ describe("a speed", () => {
     assert.equal(speedAlong([NaN, 0, 0]), null);
   });
 
-  test("of now is the measured one, else the best there is", () => {
+  test("is the measured one, else the echoed one, else the sent one", () => {
     const echoed = [0.2, 0, 0];
     assert.equal(speedNow(report({ echoed, sent: [0.1, 0, 0] })), 0.4);
     assert.equal(speedNow(report({ echoed, measured: null })), 0.2);
@@ -33,31 +33,31 @@ describe("a speed", () => {
   });
 });
 
-describe("the way to a stop", () => {
-  test("is the reaction at the speed of now, and then the braking", () => {
+describe("the stopping distance", () => {
+  test("is the way during the reaction plus the way of braking", () => {
     assert.ok(Math.abs(stoppingDistance(report()) - (0.24 + 0.16)) < 1e-9);
   });
 
-  test("is none for a robot that stands or that nobody drives", () => {
+  test("is null for a robot that does not move or is not driven", () => {
     assert.equal(stoppingDistance(report({ measured: [0.019, 0, 0.5] })), null);
     assert.equal(stoppingDistance(report({ state: "free" })), null);
   });
 
-  test("is there while a stopped robot still moves", () => {
+  test("is known while a stopped robot still moves", () => {
     assert.ok(stoppingDistance(report({ state: "stopped" })) > 0);
   });
 
-  test("is assumed on the safe side where an older gate says nothing", () => {
+  test("uses safe defaults if an older gate does not report the values", () => {
     const older = report({ reaction: undefined, brake: undefined });
     assert.ok(Math.abs(stoppingDistance(older) - (0.4 + 0.16)) < 1e-9);
   });
 
-  test("is not told when it has no end", () => {
+  test("is null for a robot that cannot brake", () => {
     assert.equal(stoppingDistance(report({ brake: 0 })), null);
   });
 });
 
-test("one motion is told three times", () => {
+test("the sent, the echoed and the measured velocity are listed", () => {
   const told = motions(report({ measured: [-0.3, 0, -0.001] }));
   assert.deepEqual(told, [
     { name: "Sent", kind: "motion", text: "0.40 m/s", more: ", 0.00 rad/s" },
@@ -66,7 +66,7 @@ test("one motion is told three times", () => {
   ]);
 });
 
-test("times are the gate's own where it gives them", () => {
+test("the round trip is that of the gate, or else that of the page", () => {
   const texts = (...about) => timings(...about).map(({ text }) => text);
   assert.deepEqual(texts(report({ age: 41.6 }), 55, 230), ["42 ms", "230 ms", "0.40 m"]);
   assert.deepEqual(texts(report({ age: null }), 55, null)[0], "55 ms");
@@ -74,7 +74,7 @@ test("times are the gate's own where it gives them", () => {
   assert.deepEqual(texts(standing, null, null), ["unknown", "unknown", "not moving"]);
 });
 
-test("a robot is text to stand only where odometry says so", () => {
+test("a robot is shown as not moving only if odometry shows standstill", () => {
   const stop = (fields) => timings(report(fields), null, null)[2].text;
   const rest = { sent: [0, 0, 0], echoed: null };
   assert.equal(stop({ ...rest, measured: [0, 0, 0] }), "not moving");
@@ -82,7 +82,7 @@ test("a robot is text to stand only where odometry says so", () => {
   assert.equal(stop({ ...rest, state: "free", measured: [0.4, 0, 0] }), "unknown");
 });
 
-test("the test of its own stop is told while it goes on, and when it failed", () => {
+test("a running or failed stop test is shown, a successful one is not", () => {
   const text = (state) => stopTestText({ test: { state, text: "creeping" } });
   assert.equal(text("creeping"), "Stop test: creeping");
   assert.equal(text("failed"), "Stop test: creeping");
@@ -91,7 +91,7 @@ test("the test of its own stop is told while it goes on, and when it failed", ()
   assert.equal(stopTestText({}), "");
 });
 
-test("how a robot stops by itself is text with where that is known from", () => {
+test("the command timeout is shown with its source", () => {
   const text = (stop_time, stop_source, stop_date, why = []) =>
     ownStop({ stop_time, stop_source, stop_date, why });
   assert.equal(text(undefined), "");

@@ -86,7 +86,7 @@ function pressAt(at) {
   return { title, moved };
 }
 
-test("the first press moves the robot, or the page says that it is getting ready", () => {
+test("the first press moves the robot, or the page shows that input is being prepared", () => {
   const refused = [];
   for (let at = 0; at < 2500; at += 10) {
     const { title, moved } = pressAt(at);
@@ -95,7 +95,7 @@ test("the first press moves the robot, or the page says that it is getting ready
   assert.deepEqual(refused, []);
 });
 
-test("a page that has loaded is ready soon", () => {
+test("a page is ready for input soon after loading", () => {
   const last = BUSY[BUSY.length - 1][1];
   assert.deepEqual(pressAt(last + CALM + 60), { title: "Free", moved: true });
 });

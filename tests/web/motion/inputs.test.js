@@ -12,13 +12,13 @@ function rested() {
   return new Inputs(-REST);
 }
 
-test("a press after rest acts", () => {
+test("a press after the rest time is accepted", () => {
   const inputs = rested();
   inputs.set("keys", FORWARD, 0);
   assert.deepEqual(inputs.axes, FORWARD);
 });
 
-test("a press on a page that was just made does nothing, however long it is held", () => {
+test("a press before the rest time of a new page does nothing, even if held for long", () => {
   const inputs = new Inputs(0);
   inputs.set("keys", FORWARD, REST - 1);
   inputs.set("keys", LEFT, 10_000);
@@ -33,7 +33,7 @@ test("the operator may press again at once after a release", () => {
   assert.deepEqual(inputs.axes, LEFT);
 });
 
-test("after a doubt what is held does nothing until rest and a new press", () => {
+test("after an input block a held key does nothing until a rest and a new press", () => {
   const inputs = rested();
   inputs.set("keys", FORWARD, 0);
   inputs.block(100);
@@ -47,7 +47,7 @@ test("after a doubt what is held does nothing until rest and a new press", () =>
   assert.deepEqual(inputs.axes, FORWARD);
 });
 
-test("rest is counted from the last doubt, not only from the last release", () => {
+test("the rest time counts from the last input block, not only from the last release", () => {
   const inputs = rested();
   inputs.block(0);
   inputs.block(500);
@@ -55,7 +55,7 @@ test("rest is counted from the last doubt, not only from the last release", () =
   assert.deepEqual(inputs.axes, NEUTRAL);
 });
 
-test("the first input owns the motion, and another must be let go of first", () => {
+test("the first input drives, and a second one must be released and pressed again", () => {
   const inputs = rested();
   inputs.set("keys", FORWARD, 0);
   inputs.set("stick", LEFT, 10);
@@ -67,7 +67,7 @@ test("the first input owns the motion, and another must be let go of first", () 
   assert.deepEqual(inputs.axes, LEFT);
 });
 
-test("what is dropped is forgotten and asks for a new press", () => {
+test("a dropped input is neutral until a new press", () => {
   const inputs = rested();
   inputs.set("keys", FORWARD, 0);
   inputs.drop(10);
@@ -77,17 +77,17 @@ test("what is dropped is forgotten and asks for a new press", () => {
   assert.deepEqual(inputs.axes, FORWARD);
 });
 
-test("axes that are no numbers are neutral, all of them", () => {
+test("one axis that is not a number makes all axes neutral", () => {
   for (const x of [NaN, Infinity, "1", {}, true]) {
     assert.deepEqual(clean({ x: /** @type {any} */ (x), turn: 1 }), NEUTRAL);
   }
 });
 
-test("axes beyond one are one", () => {
+test("axes are limited to one", () => {
   assert.deepEqual(clean({ x: 7, turn: -7 }), { x: 1, y: 0, turn: -1 });
 });
 
-test("what was pressed before it could be heard does nothing until it is released", () => {
+test("an input pressed before the page listened does nothing until released", () => {
   const inputs = rested();
   inputs.set("keys", FORWARD, 0, { fresh: false });
   assert.equal(inputs.pressed, true);
@@ -98,7 +98,7 @@ test("what was pressed before it could be heard does nothing until it is release
   assert.deepEqual(inputs.axes, FORWARD);
 });
 
-test("a key that was not heard ends what its keyboard asked for until then", () => {
+test("a key whose press the page did not see makes the keyboard neutral", () => {
   const inputs = rested();
   inputs.set("keys", LEFT, 0);
   inputs.set("keys", { x: 1, y: 0, turn: 1 }, 100, { fresh: false });

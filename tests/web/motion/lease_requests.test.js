@@ -40,7 +40,7 @@ function press() {
 }
 
 describe("a press", () => {
-  test("asks for the chosen robot once, and drives it when it comes", () => {
+  test("requests the lease of the selected robot once and drives after the grant", () => {
     assert.deepEqual(press(), TAKE);
     assert.deepEqual(it.reach.step(50), []);
     assert.equal(it.reach.robot, "r1");
@@ -50,13 +50,13 @@ describe("a press", () => {
     assert.equal(it.inputs.blocked, false);
   });
 
-  test("uses a lease that is there already", () => {
+  test("uses an existing lease", () => {
     say("r1", MINE, 0);
     assert.deepEqual(press(), []);
     assert.equal(it.stream.lease?.robot, "r1");
   });
 
-  test("reaches for nothing where nothing is chosen, or nothing is held", () => {
+  test("is needed for a request, and so is a selected robot", () => {
     assert.deepEqual(it.reach.step(0), []);
     it.reach.choose(null);
     assert.deepEqual(press(), []);
@@ -69,14 +69,14 @@ describe("a press", () => {
     "was stopped": { latched: true },
   };
   for (const [how, fields] of Object.entries(barred)) {
-    test(`means nothing for a robot that ${how}`, () => {
+    test(`requests nothing and blocks the inputs for a robot that ${how}`, () => {
       say("r1", fields, 0);
       assert.deepEqual(press(), []);
       assert.equal(it.inputs.blocked, true);
     });
   }
 
-  test("that takes over from a program does not drive yet", () => {
+  test("that takes control from a program does not drive yet", () => {
     say("r1", PROGRAM, 0);
     assert.deepEqual(press(), TAKE);
     say("r1", MINE, 50);
@@ -101,8 +101,8 @@ describe("a press", () => {
   }
 });
 
-describe("a lease that was asked for by name", () => {
-  test("comes with inputs that are dead", () => {
+describe("a lease that was requested without a key", () => {
+  test("starts with blocked inputs", () => {
     assert.deepEqual(it.reach.take("r1", 0), TAKE);
     it.inputs.set("keys", { x: 1 }, 0);
     say("r1", MINE, 50);
@@ -110,13 +110,13 @@ describe("a lease that was asked for by name", () => {
     assert.equal(it.inputs.blocked, true);
   });
 
-  test("of another robot than the chosen one does not drive", () => {
+  test("of a robot that is not selected does not drive", () => {
     it.reach.take("r2", 0);
     say("r2", MINE, 50);
     assert.equal(it.stream.lease, null);
   });
 
-  test("is waited for no more when that was ended", () => {
+  test("does not drive if the request was ended before the grant", () => {
     it.reach.take("r1", 0);
     it.reach.end();
     say("r1", MINE, 50);
@@ -124,20 +124,20 @@ describe("a lease that was asked for by name", () => {
   });
 });
 
-describe("a robot that its holder was asked for", () => {
+describe("a robot whose control was requested from its operator", () => {
   beforeEach(() => {
     say("r1", ANN, 0);
     assert.deepEqual(it.reach.ask("r1"), [{ op: "ask", robot: "r1" }]);
     it.inputs.set("keys", { x: 1 }, 0);
   });
 
-  test("comes with inputs that are dead", () => {
+  test("starts with blocked inputs", () => {
     say("r1", MINE, 50);
     assert.equal(it.stream.lease?.robot, "r1");
     assert.equal(it.inputs.blocked, true);
   });
 
-  test("is kept for later if the operator has turned to another", () => {
+  test("is kept without driving if another robot was selected before the grant", () => {
     it.reach.choose("r2");
     say("r1", MINE, 50);
     assert.equal(it.stream.lease, null);
@@ -150,7 +150,7 @@ describe("a robot that its holder was asked for", () => {
     "asked for on a connection that ended": () => it.reach.forget(),
   };
   for (const [how, happen] of Object.entries(endings)) {
-    test(`is waited for no more when it was ${how}`, () => {
+    test(`is not driven by a late grant after the robot was ${how}`, () => {
       happen();
       say("r1", MINE, 60);
       assert.equal(it.stream.lease, null);
@@ -159,7 +159,7 @@ describe("a robot that its holder was asked for", () => {
 });
 
 describe("a refusal", () => {
-  test("is shown of the chosen robot, until something else is asked for", () => {
+  test("is shown for the selected robot until the next request", () => {
     it.reach.refuse("r2", "take", "no", 0);
     assert.equal(it.reach.refusal, null);
     it.reach.refuse("r1", "goal", "too far", 0); // shown by the tool that sent it
@@ -179,7 +179,7 @@ describe("a refusal", () => {
     }
   });
 
-  test("of a command is a doubt while there is a lease, and no news without", () => {
+  test("of a velocity command blocks the inputs with a lease and is ignored without one", () => {
     it.reach.refuse("r1", "drive", "nobody has it", 0);
     assert.equal(it.reach.refusal, null);
     press();

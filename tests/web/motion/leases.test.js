@@ -18,7 +18,7 @@ function say(robot, mine, epoch) {
   return leases.report(/** @type {any} */ ({ robot, mine, epoch }));
 }
 
-test("a lease has its epoch while the gate says that it is this page's", () => {
+test("only a lease of this page has an epoch", () => {
   assert.equal(leases.epoch("r1"), null);
   say("r1", true, 7);
   assert.equal(leases.epoch("r1"), 7);
@@ -26,7 +26,7 @@ test("a lease has its epoch while the gate says that it is this page's", () => {
   assert.equal(leases.epoch("r1"), null);
 });
 
-test("a lease that was given back is believed in again only with another epoch", () => {
+test("a released lease is accepted again only with another epoch", () => {
   say("r1", true, 7);
   leases.giveBack("r1", 7);
   say("r1", true, 7);
@@ -35,12 +35,12 @@ test("a lease that was given back is believed in again only with another epoch",
   assert.equal(leases.epoch("r1"), 9);
 });
 
-test("the report before is told, to see what changed", () => {
+test("report() returns the previous report", () => {
   assert.equal(say("r1", false, null), undefined);
   assert.equal(say("r1", true, 3)?.mine, false);
 });
 
-test("a parked lease is due after a while without use", () => {
+test("a parked lease is unused after a time without use", () => {
   leases.park("r1", 0);
   leases.park("r2", 0);
   leases.use("r2", 600);
@@ -50,7 +50,7 @@ test("a parked lease is due after a while without use", () => {
   assert.deepEqual(leases.unused(1600, 1000), ["r1", "r2"]);
 });
 
-test("a lease that is gone in any way is parked no more", () => {
+test("a lease that ended in any way is no longer parked", () => {
   for (const end of [
     () => leases.unpark("r1"),
     () => leases.unpark("*"),
@@ -64,14 +64,14 @@ test("a lease that is gone in any way is parked no more", () => {
   }
 });
 
-test("with the connection all leases end, and robots stay known", () => {
+test("all leases end with the connection, and robots stay known", () => {
   say("r1", true, 7);
   leases.forget();
   assert.equal(leases.epoch("r1"), null);
   assert.deepEqual([...leases.robots.keys()], ["r1"]);
 });
 
-test("a robot that is gone is not known any more", () => {
+test("a gone robot and its lease are removed", () => {
   say("r1", true, 7);
   leases.gone("r1");
   assert.equal(leases.robots.size, 0);

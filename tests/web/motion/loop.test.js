@@ -10,7 +10,7 @@ function opened() {
   return loop;
 }
 
-test("a loop that ticks is open", () => {
+test("a loop with ticks is open", () => {
   const loop = opened();
   for (let now = 0; now < 2000; now += 50) {
     loop.receive(100 + now, -1, now);
@@ -18,14 +18,14 @@ test("a loop that ticks is open", () => {
   }
 });
 
-test("without ticks it is late, then lost", () => {
+test("a loop without ticks is late, then lost", () => {
   const loop = opened();
   assert.equal(loop.state(LATE), "open");
   assert.equal(loop.state(LATE + 1), "late");
   assert.equal(loop.state(LOST + 1), "lost");
 });
 
-test("with ticks but no acknowledgement it is late", () => {
+test("a loop with ticks but without acknowledgements is late", () => {
   const loop = opened();
   loop.sent(0, 1000);
   loop.receive(101, -1, 1000 + LATE);
@@ -35,7 +35,7 @@ test("with ticks but no acknowledgement it is late", () => {
   assert.equal(loop.state(1000 + LATE + 10), "open");
 });
 
-test("an acknowledgement speaks for every earlier command", () => {
+test("an acknowledgement includes every earlier command", () => {
   const loop = opened();
   loop.sent(0, 0);
   loop.sent(1, 50);
@@ -55,13 +55,13 @@ test("an old acknowledgement changes nothing", () => {
   assert.equal(loop.acknowledged(0), true);
 });
 
-test("a clock that is set back does not hide a silence for ever", () => {
+test("a clock that is set back does not keep a silent loop open", () => {
   const loop = opened();
   loop.receive(101, -1, 3_600_000);
   assert.notEqual(loop.state(0), "open");
 });
 
-test("the age of a long stall is that of its first command", () => {
+test("the age of a loop is that of its oldest command without acknowledgement", () => {
   const loop = opened();
   for (let seq = 0; seq < 1000; seq++) loop.sent(seq, seq * 50);
   assert.equal(loop.age(50_000), 50_000);

@@ -13,7 +13,7 @@ beforeEach(() => {
   onset.report(STILL, 0);
 });
 
-test("motion is measured from the first command that asks for it", () => {
+test("the time to motion is measured from the first command with motion", () => {
   onset.sent("r1", false, 900);
   onset.sent("r1", true, 1000);
   onset.sent("r1", true, 1050);
@@ -23,20 +23,20 @@ test("motion is measured from the first command that asks for it", () => {
   assert.equal(onset.delay("r1"), 230);
 });
 
-test("turning is motion, too", () => {
+test("turning is also motion", () => {
   onset.sent("r1", true, 1000);
   onset.report({ robot: "r1", measured: [0, 0, -0.2] }, 1150);
   assert.equal(onset.delay("r1"), 150);
 });
 
-test("a robot that moves already tells nothing", () => {
+test("a robot that already moves gives no measurement", () => {
   onset.report(GOING, 500);
   onset.sent("r1", true, 1000);
   onset.report(GOING, 1100);
   assert.equal(onset.delay("r1"), null);
 });
 
-test("motion that comes after the release, or much later, was not ours", () => {
+test("motion after the release or much later is not measured", () => {
   onset.sent("r1", true, 1000);
   onset.sent("r1", false, 1050);
   onset.report(GOING, 1100);
@@ -46,7 +46,7 @@ test("motion that comes after the release, or much later, was not ours", () => {
   assert.equal(onset.delay("r1"), null);
 });
 
-test("another robot's motion, and odometry that is silent, say nothing", () => {
+test("motion of another robot and missing odometry give no measurement", () => {
   onset.sent("r1", true, 1000);
   onset.report({ ...GOING, robot: "r2" }, 1100);
   onset.report({ robot: "r1", measured: null }, 1150);
@@ -54,7 +54,7 @@ test("another robot's motion, and odometry that is silent, say nothing", () => {
   assert.equal(onset.delay("r2"), null);
 });
 
-test("what is gone is forgotten", () => {
+test("the measurement of a removed robot is deleted", () => {
   onset.sent("r1", true, 1000);
   onset.report(GOING, 1230);
   onset.gone("r1");

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { BLIND, Pictures } from "../../../src/webmap/web/motion/pictures.js";
 
-test("a robot without a camera is never driven blind", () => {
+test("a robot without a camera has no picture age and is not blind", () => {
   const pictures = new Pictures();
   assert.equal(pictures.age("r1"), undefined);
   assert.equal(pictures.blind("r1"), false);
@@ -19,7 +19,7 @@ test("a picture is too old after a second", () => {
   assert.equal(pictures.blind("r2"), false);
 });
 
-test("an age is a whole number that JSON can carry", () => {
+test("a picture age is a finite whole number", () => {
   const pictures = new Pictures();
   for (const [age, said] of [
     [12.6, 13],
@@ -31,7 +31,7 @@ test("an age is a whole number that JSON can carry", () => {
   }
 });
 
-test("the end of one camera does not end the one that was chosen after it", () => {
+test("the end of one camera does not end the camera selected after it", () => {
   const pictures = new Pictures();
   const end = pictures.goBy("r1", () => 1);
   const endOther = pictures.goBy("r1", () => 2);

@@ -14,12 +14,12 @@ beforeEach(() => {
 });
 
 describe("the first press", () => {
-  test("takes a free robot and nothing more", () => {
+  test("takes control of a free robot and sends nothing else", () => {
     assert.deepEqual(bench.press(), [{ op: "take", robot: "r1" }]);
     assert.deepEqual(bench.run(200), []);
   });
 
-  test("takes effect after neutral that the gate has seen for 200 ms", () => {
+  test("moves the robot after the gate has received neutral for 200 ms", () => {
     bench.press();
     const epoch = bench.grant("r1");
     const messages = bench.run(600);
@@ -29,14 +29,14 @@ describe("the first press", () => {
     assert.ok(messages.slice(first).every((m) => m.x === 1));
   });
 
-  test("waits for the gate to say that it is armed", () => {
+  test("does not move the robot while the gate is not armed", () => {
     bench.arming = false;
     bench.press();
     bench.grant("r1");
     assert.deepEqual(moves(bench.run(600)), []);
   });
 
-  test("waits for the acknowledgement of neutral, however long the way", () => {
+  test("does not move the robot before neutral is acknowledged", () => {
     bench.acking = false;
     bench.press();
     bench.grant("r1");
@@ -45,7 +45,7 @@ describe("the first press", () => {
     assert.deepEqual(moves(bench.run(200)), []);
   });
 
-  test("does nothing on a robot that somebody else drives", () => {
+  test("does nothing on a robot of another operator", () => {
     bench.say("r1", {
       holder: { connection: "c2", name: "Ann" },
       epoch: 9,
@@ -61,7 +61,7 @@ describe("the first press", () => {
     assert.deepEqual(bench.press(), []);
   });
 
-  test("reaches over a program, and then asks for a new press", () => {
+  test("takes control from a program, and only a new press drives", () => {
     bench.say("r1", {
       holder: { connection: "program", name: "program" },
       epoch: 9,
@@ -91,8 +91,8 @@ describe("the first press", () => {
   });
 });
 
-describe("while driving", () => {
-  test("the state goes out at every step with the newest tick and a growing number", () => {
+describe("while a robot is driven", () => {
+  test("every step sends a command with the newest tick and the next number", () => {
     bench.drive();
     const messages = bench.run(200);
     assert.equal(messages.length, 4);
@@ -100,7 +100,7 @@ describe("while driving", () => {
     assert.equal(messages.at(-1).tick, bench.tick);
   });
 
-  test("a release is neutral at once, and a press moves again at once", () => {
+  test("a release is neutral at once, and a new press moves at once", () => {
     bench.drive();
     assert.equal(bench.letGo().at(-1).x, 0);
     assert.equal(bench.press().at(-1).x, 1);
@@ -170,7 +170,7 @@ describe("while driving", () => {
       },
     ],
   ]) {
-    test(`nothing resumes when ${what}`, () => {
+    test(`a held key does not resume motion when ${what}`, () => {
       bench.drive();
       happen();
       bench.run(100);
@@ -180,7 +180,7 @@ describe("while driving", () => {
     });
   }
 
-  test("after a doubt, a release and a new press drive again", () => {
+  test("after an input block, a release and a new press drive again", () => {
     bench.drive();
     bench.pilot.goNeutral(bench.now);
     bench.run(300);
@@ -189,7 +189,7 @@ describe("while driving", () => {
     assert.equal(moves(bench.press()).length, 1);
   });
 
-  test("after a doubt, a new press waits for neutral that the gate has seen", () => {
+  test("after an input block, a new press waits for acknowledged neutral commands", () => {
     bench.drive();
     bench.letGo();
     bench.run(300);
@@ -199,7 +199,7 @@ describe("while driving", () => {
     assert.deepEqual(moves(bench.press()), []);
   });
 
-  test("the stream stays neutral while the loop is late", () => {
+  test("the stream sends neutral commands while the loop is late", () => {
     bench.drive();
     bench.acking = false;
     assert.ok(moves(bench.run(1000)).length <= 7);
@@ -207,8 +207,8 @@ describe("while driving", () => {
   });
 });
 
-describe("another choice", () => {
-  test("lets go of the driven robot, neutral first", () => {
+describe("a new selection", () => {
+  test("sends neutral and then releases the driven robot", () => {
     bench.drive();
     const messages = bench.pilot.choose("r2", bench.now);
     assert.deepEqual(
@@ -220,7 +220,7 @@ describe("another choice", () => {
     );
   });
 
-  test("is not driven by what is held", () => {
+  test("does not let a held key drive the new robot", () => {
     bench.drive();
     bench.keep(bench.pilot.choose("r2", bench.now));
     assert.deepEqual(bench.run(1000), []);
@@ -229,7 +229,7 @@ describe("another choice", () => {
     assert.deepEqual(bench.press(), [{ op: "take", robot: "r2" }]);
   });
 
-  test("gives back a lease that is on its way", () => {
+  test("releases a requested lease that was not granted yet", () => {
     bench.press();
     assert.deepEqual(bench.pilot.choose("r2", bench.now), [
       { op: "release", robot: "r1" },
@@ -238,14 +238,14 @@ describe("another choice", () => {
     assert.deepEqual(bench.run(500), []);
   });
 
-  test("is not driven by what was pressed while none was chosen", () => {
+  test("does not let a key pressed without a selection drive the new robot", () => {
     bench.keep(bench.pilot.choose(null, bench.now));
     bench.press();
     bench.keep(bench.pilot.choose("r2", bench.now));
     assert.deepEqual(bench.run(500), []);
   });
 
-  test("of nothing leaves nothing to drive", () => {
+  test("of no robot leaves no robot to drive", () => {
     bench.drive();
     bench.keep(bench.pilot.choose(null, bench.now));
     bench.letGo();
@@ -255,7 +255,7 @@ describe("another choice", () => {
 });
 
 describe("leases", () => {
-  test("are given back after a while without motion", () => {
+  test("are released after a time without motion", () => {
     bench = new Bench({ releaseAfter: 5000 });
     bench.drive();
     bench.letGo();
@@ -264,13 +264,13 @@ describe("leases", () => {
     assert.equal(bench.pilot.driven, null);
   });
 
-  test("are not given back while something is held", () => {
+  test("are not released while a key is held", () => {
     bench = new Bench({ releaseAfter: 5000 });
     bench.drive();
     assert.ok(bench.run(10_000).every((m) => m.op === "drive"));
   });
 
-  test("that were given back are not believed in by a late report", () => {
+  test("that were released are not restored by a late report", () => {
     const epoch = bench.drive();
     bench.letGo();
     bench.keep(bench.pilot.release("r1", bench.now));
@@ -279,7 +279,7 @@ describe("leases", () => {
     assert.deepEqual(bench.press(), [{ op: "take", robot: "r1" }]);
   });
 
-  test("asked for by name do not move by what is held", () => {
+  test("taken without a key do not let a held key drive", () => {
     bench.press({ x: 0, y: 0, turn: 0 });
     bench.keep(bench.pilot.take("r1", bench.now));
     bench.inputs.set("keys", FORWARD, bench.now);
@@ -287,7 +287,7 @@ describe("leases", () => {
     assert.deepEqual(moves(bench.run(600)), []);
   });
 
-  test("for a goal are kept quietly and given back later", () => {
+  test("for a goal are kept without commands and released later", () => {
     bench = new Bench({ releaseAfter: 5000 });
     const epoch = bench.grant("r1");
     const goal = bench.pilot.place("goal", "r1", { x: 1, y: 2, yaw: 0 }, bench.now);
@@ -296,7 +296,7 @@ describe("leases", () => {
     assert.deepEqual(bench.run(200), [{ op: "release", robot: "r1" }]);
   });
 
-  test("that serve a route are renewed now and then, as long as that goes on", () => {
+  test("for a route are renewed regularly while the route runs", () => {
     bench = new Bench({ releaseAfter: 5000 });
     const epoch = bench.grant("r1");
     bench.pilot.place("goal", "r1", { x: 1, y: 2, yaw: 0 }, bench.now);
@@ -312,7 +312,7 @@ describe("leases", () => {
     assert.deepEqual(bench.pilot.keep("r1", bench.now), []);
   });
 
-  test("end with a STOP, at once and without a word", () => {
+  test("end with a STOP, after which no command is sent and no refusal is shown", () => {
     const epoch = bench.drive();
     bench.pilot.stopped("r1", bench.now);
     bench.grant("r1", epoch);
@@ -321,7 +321,7 @@ describe("leases", () => {
     assert.equal(bench.pilot.status.refusal, null);
   });
 
-  test("on other robots do not end with the STOP of one", () => {
+  test("do not end with a STOP of another robot, but the inputs are blocked", () => {
     bench.drive();
     bench.pilot.stopped("r2", bench.now);
     assert.equal(bench.pilot.driven, "r1");
@@ -336,10 +336,10 @@ describe("leases", () => {
   });
 });
 
-describe("a robot that another holds", () => {
+describe("a robot of another operator", () => {
   const holder = { connection: "c9", name: "Ann" };
 
-  test("that was asked for comes neutral, and not by what is held", () => {
+  test("is neutral after a granted request until a new press", () => {
     bench.say("r1", { holder, epoch: 3, state: "held" });
     bench.keep(bench.pilot.ask("r1"));
     bench.press();
@@ -353,7 +353,7 @@ describe("a robot that another holds", () => {
     assert.ok(moves(bench.run(100)).length > 0);
   });
 
-  test("that comes when the operator has turned to another is given back in time", () => {
+  test("is released after a time if another robot was selected before the grant", () => {
     bench = new Bench({ releaseAfter: 5000 });
     bench.say("r1", { holder, epoch: 3, state: "held" });
     bench.keep(bench.pilot.ask("r1"));
@@ -363,7 +363,7 @@ describe("a robot that another holds", () => {
     assert.deepEqual(bench.run(200), [{ op: "release", robot: "r1" }]);
   });
 
-  test("is not believed to be ours by an ask that was refused", () => {
+  test("is not driven after a refused request, and the reason is shown", () => {
     bench.say("r1", { holder, epoch: 3, state: "held" });
     bench.keep(bench.pilot.ask("r1"));
     bench.pilot.refuse("r1", "ask", "Ann keeps it", bench.now);
@@ -373,8 +373,8 @@ describe("a robot that another holds", () => {
   });
 });
 
-describe("a robot that is handed over", () => {
-  test("is given neutral first, and what is held means nothing from then on", () => {
+describe("a robot whose control is handed over", () => {
+  test("receives neutral first, and a held key has no effect afterwards", () => {
     bench.drive();
     const [neutral, grant] = bench.keep(bench.pilot.grant("r1", bench.now));
     assert.deepEqual([neutral.x, neutral.turn], [0, 0]);
@@ -382,7 +382,7 @@ describe("a robot that is handed over", () => {
     assert.deepEqual(moves(bench.run(600)), []);
   });
 
-  test("stays ours, to be driven by a new press, while the gate does not say otherwise", () => {
+  test("can be driven by a new press until the gate reports a change of control", () => {
     bench.drive();
     bench.keep(bench.pilot.grant("r1", bench.now));
     bench.letGo();
@@ -392,8 +392,8 @@ describe("a robot that is handed over", () => {
   });
 });
 
-describe("a robot for which a STOP stands", () => {
-  test("is not taken by a press, nor by one that is held through its reset", () => {
+describe("a robot with an active STOP", () => {
+  test("is taken neither by a press nor by a key held during its Reset", () => {
     bench.say("r1", { state: "stopped", latched: true });
     bench.press();
     bench.run(300);
@@ -406,10 +406,10 @@ describe("a robot for which a STOP stands", () => {
   });
 });
 
-describe("a camera that the operator goes by", () => {
+describe("a camera that is used for driving", () => {
   const last = () => bench.sent.filter((m) => m.op === "drive").at(-1);
 
-  test("is spoken of in each command, and only while there is one", () => {
+  test("adds the age of its picture to each command only while in use", () => {
     const end = bench.pilot.pictures.goBy("r1", () => 123.4);
     bench.drive();
     assert.equal(last().video, 123);
@@ -418,13 +418,13 @@ describe("a camera that the operator goes by", () => {
     assert.ok(!("video" in last()));
   });
 
-  test("of another robot says nothing of this one", () => {
+  test("of another robot adds nothing to the commands", () => {
     bench.pilot.pictures.goBy("r2", () => 9999);
     bench.drive();
     assert.ok(!("video" in last()));
   });
 
-  test("stops the robot when it freezes, until inputs are off and press again", () => {
+  test("stops the robot when its picture freezes, until a release and a new press", () => {
     let age = 100;
     bench.pilot.pictures.goBy("r1", () => age);
     bench.drive();
@@ -438,7 +438,7 @@ describe("a camera that the operator goes by", () => {
     assert.equal(moves(bench.press()).length, 1);
   });
 
-  test("that never had a picture is as old as a number can tell", () => {
+  test("without any picture sends the largest age and no motion", () => {
     bench.pilot.pictures.goBy("r1", () => Infinity);
     bench.press();
     bench.grant("r1");

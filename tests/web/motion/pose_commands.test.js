@@ -38,7 +38,7 @@ const acknowledge = (ack) =>
 
 const said = () => it.sent.map(({ op }) => op);
 
-test("a robot that is free is taken first, and sent when it came", async () => {
+test("a goal for a free robot first takes control and is then sent", async () => {
   const placed = it.poseCommands.place("goal", "r1", POSE);
   await step();
   assert.deepEqual(said(), ["take"]);
@@ -52,7 +52,7 @@ test("a robot that is free is taken first, and sent when it came", async () => {
   assert.equal(await placed, true, "the lease was taken for it");
 });
 
-test("a robot that this page has is sent at once", async () => {
+test("a pose for a robot under control of this page is sent at once", async () => {
   say(true);
   const placed = it.poseCommands.place("locate", "r1", POSE);
   assert.deepEqual(said(), ["locate"]);
@@ -61,7 +61,7 @@ test("a robot that this page has is sent at once", async () => {
   assert.equal(await placed, false);
 });
 
-test("a lease that was taken for nothing is given back", async () => {
+test("a lease that was taken for a refused goal is released", async () => {
   const placed = it.poseCommands.place("goal", "r1", POSE);
   const failed = assert.rejects(placed, /no such place/);
   say(true);
@@ -73,21 +73,21 @@ test("a lease that was taken for nothing is given back", async () => {
   assert.deepEqual(said(), ["take", "goal", "release"]);
 });
 
-test("a lease that is refused is the end of it", async () => {
+test("a refused lease rejects the goal", async () => {
   const placed = it.poseCommands.place("goal", "r1", POSE);
   it.poseCommands.refused("r1", "take", "Ann has control");
   await assert.rejects(placed, /Ann has control/);
   assert.deepEqual(said(), ["take"]);
 });
 
-test("a gate that does not answer is not waited for", async () => {
+test("a goal is rejected when the gate does not answer", async () => {
   const failed = assert.rejects(it.poseCommands.place("goal", "r1", POSE), /No answer/);
   await step(TAKE_PATIENCE);
   await step(1);
   await failed;
 });
 
-test("a place needs finite numbers", async () => {
+test("a goal with a number that is not finite is rejected", async () => {
   const nowhere = { ...POSE, yaw: NaN };
   await assert.rejects(it.poseCommands.place("goal", "r1", nowhere), /finite.+1, 2, NaN/);
   assert.deepEqual(it.sent, []);

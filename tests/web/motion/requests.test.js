@@ -8,7 +8,7 @@ function report(fields = {}) {
   return { robot: "r1", name: "Bob", mine: true, asker, ...fields };
 }
 
-test("a request is counted down from what the gate said last", () => {
+test("the time left of a request counts down from the last report", () => {
   const asking = new Requests();
   asking.report(report(), 1000);
   assert.deepEqual(asking.requests(1000), [
@@ -18,7 +18,7 @@ test("a request is counted down from what the gate said last", () => {
   assert.equal(asking.requests(60_000)[0].left, 0);
 });
 
-test("a request is over when the gate says nothing of it any more", () => {
+test("a request ends when the report has no asker", () => {
   for (const asker of [null, undefined]) {
     const asking = new Requests();
     asking.report(report(), 0);
@@ -27,13 +27,13 @@ test("a request is over when the gate says nothing of it any more", () => {
   }
 });
 
-test("who has no name is called by the connection", () => {
+test("an asker without a name is shown with the connection", () => {
   const asking = new Requests();
   asking.report(report({ asker: { connection: "c9", name: "", left: 1 } }), 0);
   assert.equal(asking.requests(0)[0].who, "c9");
 });
 
-test("requests for a robot that is gone are forgotten", () => {
+test("requests for a gone robot are removed", () => {
   const asking = new Requests();
   asking.report(report(), 0);
   asking.gone("r1");

@@ -119,7 +119,7 @@ function digestOf(seed) {
   return hash.digest("hex").slice(0, 12);
 }
 
-test("pages send and show for scripted inputs what was recorded", () => {
+test("scripted inputs give the recorded commands and texts", () => {
   const found = Array.from({ length: SCRIPTS }, (_, seed) => digestOf(seed + 1));
   if (MODE === "write") writeFileSync(FILE, `${JSON.stringify(found, null, 0)}\n`);
   assert.deepEqual(found, JSON.parse(readFileSync(FILE, "utf8")));

@@ -47,7 +47,7 @@ function drive() {
 }
 
 describe("a connection", () => {
-  test("is open with the gate's first word, and not before", () => {
+  test("is open after the hello of the gate and not before", () => {
     assert.deepEqual(session.judge(100), []);
     assert.equal(session.state, "connecting");
     const { send: say, events: news } = session.receive(HELLO, 100);
@@ -56,7 +56,7 @@ describe("a connection", () => {
     assert.deepEqual(session.judge(110), [], "what is no news is not told");
   });
 
-  test("is late without a tick for a while, and then to be given up", () => {
+  test("is late without ticks and is then given up", () => {
     session.receive(HELLO, 0);
     assert.deepEqual(session.judge(301), [["state", "late"]]);
     session.receive({ op: "tick", tick: 1, ack: -1 }, 310);
@@ -64,7 +64,7 @@ describe("a connection", () => {
     assert.equal(session.judge(811), null);
   });
 
-  test("that is lost takes leases and ticks with it, and says so of each robot", () => {
+  test("that is lost ends leases and ticks and reports each robot", () => {
     drive();
     const [[kind, state], [also, report]] = session.lost(800);
     assert.deepEqual([kind, state], ["state", "lost"]);
@@ -75,7 +75,7 @@ describe("a connection", () => {
     assert.equal(session.inputs.blocked, true);
   });
 
-  test("to a gate that was started anew begins with nothing", () => {
+  test("to a restarted gate begins without control and with blocked inputs", () => {
     drive();
     const { events: news } = session.receive({ op: "hello", connection: "c2" }, 800);
     assert.deepEqual(news, [], "the link was open all the time");
@@ -86,7 +86,7 @@ describe("a connection", () => {
 });
 
 describe("a STOP", () => {
-  test("that could not leave is the first thing said, once", () => {
+  test("that could not be sent is the first command of the next connection, once", () => {
     session.stopped("*", false, 0);
     session.stopped("*", false, 10);
     assert.deepEqual(session.receive(HELLO, 100).send, [{ op: "stop", robot: "*" }]);
@@ -95,7 +95,7 @@ describe("a STOP", () => {
     assert.deepEqual(session.receive(HELLO, 300).send, []);
   });
 
-  test("that left by a connection which died of it is said again until answered", () => {
+  test("that was sent on a lost connection is sent again until the gate answers", () => {
     session.receive(HELLO, 0);
     session.receive(REPORT, 0);
     session.stopped("r1", true, 10);
@@ -109,7 +109,7 @@ describe("a STOP", () => {
     assert.deepEqual(session.receive(HELLO, 1000).send, []);
   });
 
-  test("for all is said again until every robot is stopped or gone", () => {
+  test("for all robots is sent again until every robot is stopped or gone", () => {
     session.receive(HELLO, 0);
     session.receive(REPORT, 0);
     session.receive({ ...REPORT, robot: "r2" }, 0);
@@ -127,7 +127,7 @@ describe("a STOP", () => {
     assert.deepEqual(session.receive(HELLO, 800).send, []);
   });
 
-  test("pressed while one stands is answered by another STOP, not by the same", () => {
+  test("pressed during an active STOP is answered only by a new STOP", () => {
     const stands = (/** @type {string} */ id) => ({
       ...{ ...REPORT, state: "stopped", latched: true },
       stop: { by: "Ann", confirmed: true, why: "", id },
@@ -144,14 +144,14 @@ describe("a STOP", () => {
     assert.deepEqual(session.receive(HELLO, 800).send, []);
   });
 
-  test("that a gate took to its end is said to the one started anew", () => {
+  test("that a gate did not answer is sent again to the restarted gate", () => {
     drive();
     session.stopped("r1", true, 800);
     const { send: say } = session.receive({ op: "hello", connection: "c2" }, 810);
     assert.deepEqual(say, [{ op: "stop", robot: "r1" }]);
   });
 
-  test("ends the lease, kills the inputs, and is followed up", () => {
+  test("ends the lease, blocks the inputs and gets a verdict", () => {
     drive();
     session.stopped("r1", true, 800);
     assert.equal(session.pilot.driven, null);
@@ -160,7 +160,7 @@ describe("a STOP", () => {
     assert.deepEqual([verdict.robot, verdict.state], ["r1", "stopping"]);
   });
 
-  test("for all, said before any robot was known, is answered by a stopped robot only", () => {
+  test("for all robots before any is known is answered by a stopped or gone robot", () => {
     const again = (/** @type {object[]} */ ...said) => {
       session = new Session(0, {});
       session.receive(HELLO, 0);
@@ -182,8 +182,8 @@ describe("a STOP", () => {
   });
 });
 
-describe("what the gate says", () => {
-  test("of a robot is known, followed and told", () => {
+describe("a message of the gate", () => {
+  test("about a robot updates the robot and its request and emits an event", () => {
     const asker = { connection: "c9", name: "Ann", left: 8 };
     const { events: news } = session.receive({ ...REPORT, asker }, 0);
     assert.equal(news[0][0], "robot");
@@ -191,13 +191,13 @@ describe("what the gate says", () => {
     assert.equal(session.requests.requests(0)[0].who, "Ann");
   });
 
-  test("tells how long a robot took to move", () => {
+  test("about a robot that starts to move gives the time to motion", () => {
     drive();
     session.receive({ ...REPORT, measured: [0.5, 0, 0] }, 900);
     assert.ok(Number(session.onset.delay("r1")) > 0);
   });
 
-  test("of a robot that is gone is forgotten by all", () => {
+  test("about a gone robot removes the robot, its request and its verdict", () => {
     session.receive({ ...REPORT, asker: { connection: "c9", name: "", left: 8 } }, 0);
     session.stopped("r1", true, 0);
     assert.deepEqual(session.receive({ op: "gone", robot: "r1" }, 0).events, [
@@ -208,14 +208,14 @@ describe("what the gate says", () => {
     assert.deepEqual(session.verdicts(0), []);
   });
 
-  test("in refusal is told, and a doubt if it was a command", () => {
+  test("that refuses a velocity command emits an event and blocks the inputs", () => {
     drive();
     const no = { op: "refused", robot: "r1", what: "drive", why: "too old" };
     assert.deepEqual(session.receive(no, 800).events, [["refused", no]]);
     assert.equal(session.inputs.blocked, true);
   });
 
-  test("in words of another version is nothing", () => {
+  test("with an unknown op is ignored", () => {
     assert.deepEqual(session.receive({ op: "sing" }, 0), { send: [], events: [] });
   });
 });

@@ -102,11 +102,11 @@ for (const [state, status, report] of cases) {
   });
 }
 
-test("without a selection nothing can be driven", () => {
+test("without a selected robot the state is none", () => {
   assert.equal(describe(STATUS, null, null, true).state, "none");
 });
 
-test("the name of who drives is shown", () => {
+test("the title names the operator", () => {
   const title = (more) =>
     describe(STATUS, "r1", { ...REPORT, holder: ANN, ...more }, true).title;
   assert.equal(title({ doing: "held" }), "Ann has control");
@@ -117,13 +117,13 @@ test("the name of who drives is shown", () => {
   assert.equal(title({ ...DRIVING, holder: nameless }), "c2 is driving");
 });
 
-test("who holds a robot is shown where the state does not name anybody", () => {
+test("the detail names the operator if the title does not", () => {
   const report = { ...REPORT, holder: ANN, state: "stopping", doing: "stopping" };
   const words = describe(STATUS, "r1", report, true);
   assert.deepEqual([words.title, words.detail], ["Stopping", "Ann has control."]);
 });
 
-test("a speed has its sign, and a robot that does not move is not driven in green", () => {
+test("speeds are shown with their sign, and a driven robot at standstill as blocked", () => {
   const driven = { ...STATUS, driven: "r1", settled: true };
   const report = { ...REPORT, ...ME, ...DRIVING, sent: [-1, 0, 0] };
   const back = describe(driven, "r1", { ...report, measured: [-0.98, 0, 0.1] }, true);
@@ -136,7 +136,7 @@ test("a speed has its sign, and a robot that does not move is not driven in gree
   );
 });
 
-test("who holds a robot without driving it reads so", () => {
+test("the operator who does not drive reads that this page has control", () => {
   const { title, detail } = describe(STATUS, "r1", { ...REPORT, ...ME }, true);
   assert.equal(title, "You have control");
   assert.equal(detail, "Hold W A S D or the arrow keys to drive. Press Space for STOP.");
@@ -146,7 +146,7 @@ test("who holds a robot without driving it reads so", () => {
   assert.equal(held.detail, "No link.");
 });
 
-test("the title is the state of the gate, or what the display alone knows", () => {
+test("the title is the state of the gate or a state that only the display knows", () => {
   const title = (doing, seen) => {
     const armable = doing === "free";
     const more = { seen, since: "10:32" };
@@ -166,21 +166,21 @@ test("the title is the state of the gate, or what the display alone knows", () =
   assert.equal(doingOf({ ...REPORT, doing: "driven" }, "gone"), "driven");
 });
 
-test("a robot without a velocity topic has the words of the display", () => {
+test("a robot without a velocity topic is shown with the state of the display", () => {
   const title = (more) => describe(STATUS, "r1", null, true, more).title;
   assert.equal(title({}), "View only");
   assert.equal(title({ seen: "watched" }), "View only");
   assert.equal(title({ seen: "gone", since: "10:32" }), "No pose since 10:32");
 });
 
-test("a name at the beginning of a sentence keeps its small letter", () => {
+test("a lower-case name at the beginning of a sentence is not capitalized", () => {
   assert.equal(sentence("no connection to ws://a"), "No connection to ws://a.");
   assert.equal(sentence("ws://a:9090 is lost."), "ws://a:9090 is lost.");
   assert.equal(sentence("robot_0 is free"), "robot_0 is free.");
   assert.equal(sentence("zero sent, still moving"), "Zero sent, still moving.");
 });
 
-test("the cap says why it is in force", () => {
+test("the speed limit is shown with its reason", () => {
   const why = ["stop not verified"];
   assert.equal(
     capOf({ ...REPORT, why }),
@@ -188,7 +188,7 @@ test("the cap says why it is in force", () => {
   );
 });
 
-test("a stop hook that failed is said, whatever else there is to say", () => {
+test("a failed stop hook is shown in every state of a connected robot", () => {
   const hooks = ["stop hook /e_stop: refused", "stop hook /lock: no answer within 2 s"];
   const words = "Stop hook /e_stop: refused. Stop hook /lock: no answer within 2 s.";
   const detail = (more, status = {}) =>
@@ -202,7 +202,7 @@ test("a stop hook that failed is said, whatever else there is to say", () => {
   assert.equal(detail({}, { link: "connecting" }), "Connecting.");
 });
 
-test("another program that publishes velocities is said in every state", () => {
+test("another program that publishes velocities is shown in every state", () => {
   const other_writer = "another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s)";
   const said = "Another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s).";
   const mine = { ...STATUS, driven: "r1", settled: true };

@@ -45,11 +45,11 @@ function verdict(heard, at, now, connected = true) {
 }
 
 describe("a STOP", () => {
-  test("is confirmed by odometry that says the robot stands", () => {
+  test("is confirmed by odometry that shows standstill", () => {
     assert.equal(verdict(report(), 100, 200).state, "confirmed");
   });
 
-  test("is not confirmed by a robot that was reported to stand before the gate answered", () => {
+  test("is not confirmed by a standstill reported before the gate answered", () => {
     assert.equal(verdict(report({ state: "driving" }), 10, 20).state, "stopping");
   });
 
@@ -75,7 +75,7 @@ describe("a STOP", () => {
     });
   }
 
-  test("of a robot that still climbs says how fast", () => {
+  test("of a robot that still climbs shows its speed", () => {
     const climbing = report({ measured: [0.3, 0, 0, -0.4, 0, 0] });
     const { text } = verdict(climbing, 100, STAND_PATIENCE + 1);
     assert.match(text, /still moving at 0.50 m\/s/);
@@ -86,19 +86,19 @@ describe("a STOP", () => {
     assert.match(verdict(blind, 100, STAND_PATIENCE + 1).text, /no odometry/);
   });
 
-  test("of a robot that cannot be reached says so at once", () => {
+  test("of a robot without a connection is shown as such at once", () => {
     assert.match(verdict(report({ link: "down" }), 10, 20).text, /no connection to the robot/);
     assert.match(verdict(null, 0, 1, false).text, /no connection/);
   });
 
-  test("of all watches every robot", () => {
+  test("of all robots has a verdict for every robot", () => {
     const stopping = new Stopping();
     stopping.start("*", new Map([["r1", report()], ["r2", report()]]), 0);
     const names = stopping.verdicts(new Map(), true, 1).map(({ robot }) => robot);
     assert.deepEqual(names, ["r1", "r2"]);
   });
 
-  test("is shown for some seconds once it is confirmed, and until then for ever", () => {
+  test("is shown until confirmed, and then for some seconds", () => {
     const stopping = new Stopping();
     stopping.start("r1", new Map(), 0);
     const robots = new Map([["r1", report()]]);
@@ -109,7 +109,7 @@ describe("a STOP", () => {
   });
 });
 
-describe("a STOP for all that no robot is known to", () => {
+describe("a STOP for all robots before any robot is known", () => {
   const latched = { state: "stopped", latched: true };
   const free = { state: "free", latched: false };
 
@@ -125,7 +125,7 @@ describe("a STOP for all that no robot is known to", () => {
     return stopping.verdicts(robots, connected, now);
   }
 
-  test("is shown all the same", () => {
+  test("is shown as not confirmed", () => {
     const [unheard, ...others] = verdicts([], 10, false);
     assert.deepEqual(others, []);
     assert.equal(unheard.name, "All robots");
@@ -134,7 +134,7 @@ describe("a STOP for all that no robot is known to", () => {
     assert.equal(silent.text, "STOP NOT CONFIRMED: no answer from the gate");
   });
 
-  test("is that of the robots that are heard of before it is answered", () => {
+  test("applies to robots that are reported before the answer", () => {
     const two = report({ ...free, robot: "r2" });
     const said = verdicts([[10, report(free)], [11, two]], ANSWER_PATIENCE);
     assert.deepEqual(
@@ -145,7 +145,7 @@ describe("a STOP for all that no robot is known to", () => {
     assert.deepEqual(new Set(later.map(({ state }) => state)), new Set(["unconfirmed"]));
   });
 
-  test("is not that of a robot which comes when it was answered", () => {
+  test("does not apply to a robot that is reported after the answer", () => {
     const later = report({ ...free, robot: "r2" });
     const stopped = report({ ...latched, stop: { by: "Ann", confirmed: true, why: "" } });
     const said = verdicts([[10, report(free)], [20, stopped], [30, later]], 40);
@@ -155,7 +155,7 @@ describe("a STOP for all that no robot is known to", () => {
     );
   });
 
-  test("can be shown no longer", () => {
+  test("can be dismissed", () => {
     const stopping = new Stopping();
     stopping.start("*", new Map(), 0);
     stopping.dismiss();
@@ -164,37 +164,37 @@ describe("a STOP for all that no robot is known to", () => {
   });
 });
 
-describe("a STOP that latches", () => {
+describe("a latched STOP", () => {
   const word = (confirmed, why = "") => ({ by: "Ann", confirmed, why });
   const latched = (fields) => report({ state: "stopped", latched: true, ...fields });
 
-  test("is confirmed when the gate says so", () => {
+  test("is confirmed by the gate", () => {
     const said = latched({ measured: null, stop: word(true) });
     assert.equal(verdict(said, 100, 200).state, "confirmed");
   });
 
-  test("is not confirmed while the gate still looks, though odometry stands", () => {
+  test("is not confirmed while the gate still checks, even if odometry shows standstill", () => {
     assert.equal(verdict(latched({ stop: word(null) }), 100, 200).state, "stopping");
   });
 
-  test("is not confirmed for the reason that the gate gives", () => {
+  test("that is not confirmed shows the reason of the gate", () => {
     const said = latched({ stop: word(false, "no connection to ws://bob") });
     assert.equal(verdict(said, 100, 200).text, "NOT CONFIRMED: no connection to ws://bob");
   });
 
-  test("is not answered by a report without the latch", () => {
+  test("is not answered by a report that is not latched", () => {
     const free = report({ state: "free", latched: false });
     assert.match(verdict(free, 100, ANSWER_PATIENCE + 1).text, /^STOP NOT CONFIRMED/);
   });
 
-  test("said again needs no answer", () => {
+  test("sent again needs no new answer", () => {
     const stopping = new Stopping();
     const robots = new Map([["r1", latched({ stop: word(true) })]]);
     stopping.start("r1", robots, 0);
     assert.equal(stopping.verdicts(robots, true, 400)[0].state, "confirmed");
   });
 
-  test("is forgotten when it is reset", () => {
+  test("is removed by its Reset", () => {
     const stopping = new Stopping();
     stopping.start("r1", new Map(), 0);
     stopping.report(latched({ stop: word(false, "no odometry") }), 50);
@@ -202,7 +202,7 @@ describe("a STOP that latches", () => {
     assert.deepEqual(stopping.verdicts(new Map(), true, 5000), []);
   });
 
-  test("is told with who said it and what became of it", () => {
+  test("is shown with its operator and its confirmation", () => {
     const text = (stop) => stopText(latched({ stop })).text;
     assert.equal(text(word(true)), "By Ann, confirmed by odometry.");
     assert.equal(text(word(null)), "By Ann, waiting for odometry to confirm.");
@@ -211,7 +211,7 @@ describe("a STOP that latches", () => {
     assert.equal(text(null), "");
   });
 
-  test("that the disk does not have is said to be forgotten at a restart", () => {
+  test("that is not on the disk is shown with a warning about a restart", () => {
     const forgotten = "a restart would end this STOP: the disk is full";
     const text = (confirmed, why) =>
       stopText(latched({ stop: { by: "Ann", confirmed, why: `${why}; ${forgotten}` } }))
@@ -223,7 +223,7 @@ describe("a STOP that latches", () => {
     assert.equal(verdict(latched({ stop }), 100, 200).text, `${said}; ${forgotten}`);
   });
 
-  test("stands where STOP ALL is", () => {
+  test("is listed beside STOP ALL", () => {
     const one = latched({ stop: word(true) });
     const doubtful = latched({ stop: word(false, "no odometry") });
     assert.equal(standingStops([report()]), "");
@@ -244,18 +244,18 @@ describe("a robot", () => {
     return watch;
   }
 
-  test("that moves on for a second after zero does not obey", () => {
+  test("that still moves one second after zero does not obey", () => {
     const watch = obedience([0, driven], [100, told], [900, told]);
     assert.deepEqual(watch.disobeying(100 + STAND_PATIENCE), []);
     assert.equal(watch.disobeying(101 + STAND_PATIENCE)[0].name, "Bob");
   });
 
-  test("that stood meanwhile obeys, whatever moves it later", () => {
+  test("that stood still after zero obeys, even when moving later", () => {
     const watch = obedience([0, driven], [100, told], [500, report()], [600, told]);
     assert.deepEqual(watch.disobeying(5000), []);
   });
 
-  test("that goes to a goal obeys", () => {
+  test("that drives to a goal obeys", () => {
     const watch = obedience([0, told], [100, told]);
     assert.deepEqual(watch.disobeying(5000), []);
     const excused = obedience([0, driven], [100, told]);
@@ -263,23 +263,23 @@ describe("a robot", () => {
     assert.deepEqual(excused.disobeying(5000), []);
   });
 
-  test("whose odometry is silent is not accused", () => {
+  test("without odometry is not reported as not obeying", () => {
     const watch = obedience([0, driven], [100, report({ measured: null })]);
     assert.deepEqual(watch.disobeying(5000), []);
   });
 });
 
-describe("a stop hook that failed", () => {
+describe("a failed stop hook", () => {
   const stop = { by: "Ann", confirmed: true, why: "" };
   const hooks = ["stop hook /e_stop: refused"];
   const failed = report({ state: "stopped", latched: true, stop, hooks });
 
-  test("is said of a STOP that odometry confirms", () => {
+  test("is shown with a STOP that odometry confirms", () => {
     const text = "stopped, confirmed by odometry; stop hook /e_stop: refused";
     assert.equal(verdict(failed, 100, 200).text, text);
   });
 
-  test("is said where STOP ALL is", () => {
+  test("is shown beside STOP ALL", () => {
     const words = "STOP active: Bob. Stop hooks failed: Bob.";
     assert.equal(standingStops([failed, report()]), words);
   });

@@ -39,13 +39,13 @@ function run(ms, { armed = true, attentive = true, acking = true } = {}) {
 }
 
 describe("a stream", () => {
-  test("is silent without a lease", () => {
+  test("sends nothing without a lease", () => {
     it.stream.close();
     assert.deepEqual(run(200), []);
     assert.deepEqual(it.stream.neutral(it.now), []);
   });
 
-  test("says under which lease, in which order and to which tick it goes out", () => {
+  test("sends its lease, a growing number and the newest tick with each command", () => {
     const [first, second] = run(100);
     assert.deepEqual(first, {
       op: "drive",
@@ -60,7 +60,7 @@ describe("a stream", () => {
     assert.deepEqual([second.seq, second.tick], [1, 101]);
   });
 
-  test("is neutral until the gate has seen neutral for a stretch", () => {
+  test("is neutral until the gate has received neutral for the settling time", () => {
     const said = run(600);
     const first = said.findIndex(({ x }) => x === 1);
     assert.ok(50 * first >= SETTLE, `moved after ${50 * first} ms`);
@@ -76,7 +76,7 @@ describe("a stream", () => {
     assert.ok(run(600, { armed: false }).every(({ x }) => x === 0));
   });
 
-  test("is numbered from the start on another connection", () => {
+  test("restarts its numbers on another connection", () => {
     run(200);
     it.stream.restart();
     assert.equal(it.stream.lease, null);
@@ -91,7 +91,7 @@ describe("a stream", () => {
     assert.equal(it.stream.lease?.usedAt, 200);
   });
 
-  test("knows how long its oldest command waits to be acknowledged", () => {
+  test("measures how long its oldest command waits for an acknowledgement", () => {
     run(200);
     assert.equal(it.stream.delay, 0);
     run(200, { acking: false });
@@ -121,7 +121,7 @@ describe("a stream that moves a robot", () => {
     "somebody says so": () => it.stream.goNeutral(it.now),
   };
   for (const [what, happen] of Object.entries(doubts)) {
-    test(`is neutral and settles anew when ${what}`, () => {
+    test(`is neutral and settles again when ${what}`, () => {
       happen();
       assert.equal(it.inputs.blocked, true);
       assert.equal(it.stream.settled, false);
@@ -130,7 +130,7 @@ describe("a stream that moves a robot", () => {
     });
   }
 
-  test("can say neutral at once, as its last word", () => {
+  test("can send neutral at once as its last command", () => {
     assert.equal(it.stream.neutral(it.now)[0].x, 0);
   });
 });

@@ -11,7 +11,7 @@ function makeButton() {
   return button;
 }
 
-test("a STOP button acts when it is touched, and once in one press", () => {
+test("a STOP button sends STOP on pointerdown, once per press", () => {
   const button = makeButton();
   button.fire("pointerdown", { button: 0, pointerId: 7 });
   assert.equal(button.stops, 1);
@@ -20,7 +20,7 @@ test("a STOP button acts when it is touched, and once in one press", () => {
   assert.equal(button.stops, 1);
 });
 
-test("a STOP button acts again at the next press", () => {
+test("a STOP button sends STOP again on the next press", () => {
   const button = makeButton();
   for (const pointerId of [7, 8, 8]) {
     button.fire("pointerdown", { button: 0, pointerId });
@@ -29,7 +29,7 @@ test("a STOP button acts again at the next press", () => {
   assert.equal(button.stops, 3);
 });
 
-test("a STOP button acts on a click that no pointer makes, whatever was before", () => {
+test("a STOP button sends STOP on every click without a pointer", () => {
   const button = makeButton();
   button.fire("click", { pointerId: -1 });
   assert.equal(button.stops, 1);
@@ -41,7 +41,7 @@ test("a STOP button acts on a click that no pointer makes, whatever was before",
   assert.equal(button.stops, 4);
 });
 
-test("a STOP button that is off, or that another mouse button presses, does nothing", () => {
+test("a disabled STOP button or another mouse button sends no STOP", () => {
   const button = makeButton();
   button.fire("pointerdown", { button: 2, pointerId: 1 });
   button.disabled = true;
@@ -49,7 +49,7 @@ test("a STOP button that is off, or that another mouse button presses, does noth
   assert.equal(button.stops, 0);
 });
 
-test("a press that was left, or that no pointerdown tells of, is a STOP when it clicks", () => {
+test("a click after a pointerleave or without its own pointerdown sends STOP", () => {
   const button = makeButton();
   const mouse = { button: 0, pointerId: 1, pointerType: "mouse" };
   button.fire("pointerdown", mouse);

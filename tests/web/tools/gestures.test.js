@@ -31,7 +31,7 @@ function shows(view, world, point, tolerance = 1e-6) {
   near([at.x, at.y], [point.x, point.y], tolerance);
 }
 
-test("the point under the pointer stays, whatever the zoom and the turn", () => {
+test("the point under the pointer stays at any zoom and rotation", () => {
   const numbers = random(-1000, 1000);
   const next = () => numbers.next().value;
   for (let i = 0; i < 500; i++) {
@@ -44,7 +44,7 @@ test("the point under the pointer stays, whatever the zoom and the turn", () => 
   }
 });
 
-test("what was under two fingers stays under them", () => {
+test("the two points under two fingers stay under the fingers", () => {
   const numbers = random(0, 700, 7);
   const point = () => ({ x: numbers.next().value, y: numbers.next().value });
   for (let i = 0; i < 500; i++) {
@@ -56,7 +56,7 @@ test("what was under two fingers stays under them", () => {
   }
 });
 
-test("two fingers on one spot only move", () => {
+test("two fingers on one point only move the view", () => {
   const [from, to] = [
     { x: 5, y: 5 },
     { x: 9, y: 7 },
@@ -65,7 +65,7 @@ test("two fingers on one spot only move", () => {
   assert.deepEqual(view, { ...VIEW, e: VIEW.e + 4, f: VIEW.f + 2 });
 });
 
-test("a thousand notches of the wheel do not lose the world", () => {
+test("a thousand wheel steps stay within the zoom limits", () => {
   for (const factor of [0.8, 1.25]) {
     let view = VIEW;
     for (let i = 0; i < 1000; i++) {
@@ -81,19 +81,19 @@ test("a thousand notches of the wheel do not lose the world", () => {
   }
 });
 
-test("a view beyond the limits may come back and does not jump", () => {
+test("a view beyond the zoom limits can zoom back and does not jump", () => {
   const far = { ...VIEW, a: 0.1, b: 0, c: 0, d: -0.1 };
   assert.equal(gestures.allowedFactor(far, 0.5, ZOOM), 1);
   assert.equal(gestures.allowedFactor(far, 1.2, ZOOM), 1.2);
 });
 
-test("a factor that is no positive number changes nothing", () => {
+test("a zoom factor that is not a positive number changes nothing", () => {
   for (const factor of [0, -1, NaN, Infinity]) {
     assert.equal(gestures.allowedFactor(VIEW, factor, ZOOM), 1);
   }
 });
 
-test("a wheel zooms the same there and back, in any of its units", () => {
+test("opposite wheel steps cancel each other in every unit", () => {
   for (const deltaMode of [0, 1, 2]) {
     const there = gestures.wheelFactor({ ...wheel, deltaY: 3, deltaMode });
     const back = gestures.wheelFactor({ ...wheel, deltaY: -3, deltaMode });
@@ -102,13 +102,13 @@ test("a wheel zooms the same there and back, in any of its units", () => {
   }
 });
 
-test("shift and wheel turn, also where shift makes the wheel a horizontal one", () => {
+test("shift and wheel rotate the view, also with a horizontal wheel delta", () => {
   const vertical = gestures.wheelAngle({ ...wheel, shiftKey: true, deltaY: 100 });
   const horizontal = gestures.wheelAngle({ ...wheel, shiftKey: true, deltaX: 100 });
   assert.equal(vertical, horizontal);
   near([vertical], [Math.PI / 20]);
 });
 
-test("sideways scrolling without shift does nothing", () => {
+test("horizontal scrolling without shift does nothing", () => {
   assert.equal(gestures.wheelFactor({ ...wheel, deltaX: 100 }), 1);
 });

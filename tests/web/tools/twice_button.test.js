@@ -23,14 +23,14 @@ function pressedOnce(robots) {
   return { button, reset };
 }
 
-test("a second press is for the robots that the first was said of", () => {
+test("a second press resets the robots of the first press", () => {
   const { button, reset } = pressedOnce(["r1", "r2"]);
   button.element.fire("click");
   assert.deepEqual(reset, ["r1", "r2"]);
   assert.equal(button.element.textContent, "Reset");
 });
 
-test("a robot that joins the others takes the first press back", () => {
+test("an added robot cancels the first press", () => {
   const { button, reset } = pressedOnce(["r1"]);
   button.show(true, ["r1", "r2"]);
   assert.equal(button.element.textContent, "Reset");
@@ -38,21 +38,21 @@ test("a robot that joins the others takes the first press back", () => {
   assert.deepEqual(reset, []);
 });
 
-test("another robot takes the first press back", () => {
+test("a different robot cancels the first press", () => {
   const { button, reset } = pressedOnce(["r1"]);
   button.show(true, ["r2"]);
   button.element.fire("click");
   assert.deepEqual(reset, []);
 });
 
-test("a robot that is there no longer leaves the press to the others", () => {
+test("after one robot is removed the second press resets the others", () => {
   const { button, reset } = pressedOnce(["r1", "r2"]);
   button.show(true, ["r2"]);
   button.element.fire("click");
   assert.deepEqual(reset, ["r2"]);
 });
 
-test("a robot that was gone meanwhile takes the first press back", () => {
+test("a robot that was removed and added again cancels the first press", () => {
   const { button, reset } = pressedOnce(["r1", "r2"]);
   button.show(true, ["r2"]);
   button.show(true, ["r1", "r2"]);
