@@ -197,7 +197,7 @@ class TestWithLimits:
         assert bench.written[-1].twist == Twist(vz=0.4)
 
 
-class TestStanding:
+class TestStandstill:
     CLIMBING = Twist(vz=0.3)
     ROLLING = Twist(wx=0.3)
 

@@ -451,7 +451,7 @@ class TestLinks:
         )
 
 
-class TestLife:
+class TestLifecycle:
     def test_a_killed_gate_is_restarted_and_restores_everything_but_leases(
         self, client, page, fake, reports
     ):
@@ -551,7 +551,7 @@ class TestLife:
         eventually(lambda: client.ready, "a gate")
 
 
-class TestStopStands:
+class TestActiveStop:
     def test_a_stop_stays_active_after_the_gate_was_killed(self, page, client, fake):
         page.drive_off(fake)
         client.stop_robot("r1")
@@ -664,7 +664,7 @@ class TestStopStands:
         client.forget("r1")
 
 
-class TestHands:
+class TestInputs:
     def test_control_changes_from_page_to_page_at_standstill(self, page, client, fake):
         other = Page(client, "Ben")
         page.drive_off(fake)

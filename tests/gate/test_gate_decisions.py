@@ -17,7 +17,7 @@ def bench():
     return Bench().begin()
 
 
-class TestTaking:
+class TestTakeControl:
     def test_taking_a_free_robot_gives_control_and_an_epoch(self, bench):
         assert bench.report().state == "free"
         epoch = bench.take("a")
@@ -340,7 +340,7 @@ class TestFreshness:
         assert tick.acks["b"] == -1
 
 
-class TestGarbage:
+class TestMalformed:
     def test_invalid_commands_do_not_restart_the_dead_man_timeout(self, bench):
         bench.drive_off()
         last = bench.now
@@ -634,7 +634,7 @@ class TestDisplay:
         assert ticks == list(range(ticks[0], ticks[0] + len(ticks)))
 
 
-class TestBlindness:
+class TestOdometryLost:
     @pytest.fixture
     def bench(self):
         return Bench().begin(spec(odometry_topic="/odom"))

@@ -94,7 +94,7 @@ def held():
     return report(Holder(PROGRAM, PROGRAM), 3)
 
 
-class TestQuickProgram:
+class TestProgramRate:
     """One that gives velocities without a pause: each STOP would go behind them."""
 
     @pytest.fixture
@@ -318,7 +318,7 @@ class TestPages:
         assert second.of(protocol.FromPage) == []
 
 
-class TestLife:
+class TestLifecycle:
     def test_a_new_gate_receives_all_robots_pages_and_pending_stops(
         self, client, gate, made
     ):

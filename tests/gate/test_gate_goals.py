@@ -237,7 +237,7 @@ def test_removing_the_robot_cancels_a_goal_only_if_configured(policy):
     assert order == [*called_off, actions.Detach], "before nothing reaches it any more"
 
 
-class TestElsewhere:
+class TestNewSettings:
     """What becomes of a goal when the robot is declared with other places for goals."""
 
     def declare(self, before, after, **goal):
@@ -320,7 +320,7 @@ class TestElsewhere:
 MOVE_BASE = {"action": "/move_base", "action_type": "move_base_msgs/MoveBaseAction"}
 
 
-class TestWay:
+class TestMethod:
     @pytest.mark.parametrize(
         ("changes", "way"),
         [
@@ -366,7 +366,7 @@ class TestWay:
         assert bench.report().method == "navigate_to_pose"
 
 
-class TestHowItGoes:
+class TestProgress:
     @pytest.fixture
     def bench(self):
         bench = Bench().begin(spec(action="/go"))
@@ -592,7 +592,7 @@ class TestHowItGoes:
         assert bench.report() == before
 
 
-class TestWhereItIs:
+class TestInitialPose:
     @pytest.fixture
     def bench(self):
         return Bench().begin(spec(pose_topic="/initialpose"))

@@ -41,7 +41,7 @@ def moving(bench, seconds, speed, turn=0.0):
     bench.run(seconds, lambda: bench.tell(events.OdometryReceived(KEY, twist)))
 
 
-class TestAsking:
+class TestRequest:
     def test_the_operator_sees_a_request_for_control_and_keeps_driving(self, bench):
         ask(bench)
         assert bench.report().asker == protocol.AskerReport("b", "B", 10.0)
@@ -150,7 +150,7 @@ class TestAsking:
         assert bench.refusals("b")[-1].why == "c9 has already requested control"
 
 
-class TestChanging:
+class TestTransfer:
     def test_a_hand_over_sends_zero_and_the_new_operator_must_release_inputs(
         self, bench
     ):

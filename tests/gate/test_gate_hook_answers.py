@@ -282,7 +282,7 @@ def test_stop_hooks_do_not_run_for_a_stop_that_was_reset_elsewhere(bench):
     assert bench.did(actions.RunHook) == []
 
 
-class TestDeclaredAnew:
+class TestNewDeclaration:
     def test_a_robot_that_is_declared_again_still_gets_its_hook_reset(self, bench):
         stop(bench)
         bench.tell(events.LinkDown(URL, "tasks"))

@@ -14,16 +14,16 @@ from webmap.gate.specs import checked, key_of
 
 
 class TestSpecs:
-    def test_names_are_brought_into_one_spelling(self):
+    def test_urls_and_topic_names_are_normalized(self):
         one = checked(spec(bridge_url="ws://ROBOT:9090/", twist_topic="cmd_vel"))
         assert key_of(one) == key_of(checked(spec())) == KEY
         assert one.goal_url == one.odometry_url == URL
 
-    def test_other_bridges_for_other_things_are_kept(self):
+    def test_separate_bridges_for_goals_and_odometry_are_kept(self):
         one = checked(spec(goal_url="ws://g:1/", odometry_url="ws://o:1/"))
         assert (one.goal_url, one.odometry_url) == ("ws://g:1", "ws://o:1")
 
-    def test_a_robot_without_velocity_is_known_by_its_goals(self):
+    def test_a_robot_without_a_velocity_topic_has_its_goal_topic_or_id_as_key(self):
         goal_only = checked(spec(twist_topic=None, goal_url="ws://g:1"))
         assert key_of(goal_only) == Key("ws://g:1", "goal /goal")
         nothing = spec(twist_topic=None, goal_topic=None)
@@ -49,19 +49,19 @@ class TestSpecs:
             {"stops_within": -0.1},
         ],
     )
-    def test_what_cannot_be_meant_is_refused(self, changes):
+    def test_an_invalid_robot_spec_raises_config_error(self, changes):
         with pytest.raises(ConfigError):
             checked(spec(**changes))
 
-    def test_a_robot_that_cannot_be_meant_is_not_there(self, caplog):
+    def test_the_gate_logs_and_ignores_an_invalid_robot_spec(self, caplog):
         bench = Bench()
         bench.tell(spec(v_max=math.nan))
         assert bench.done == []
         assert "v_max" in caplog.text
 
 
-class TestDeclaring:
-    def test_the_same_again_changes_nothing(self):
+class TestDeclaration:
+    def test_a_repeated_declaration_changes_nothing(self):
         bench = Bench().begin()
         epoch = bench.drive_off()
         done = len(bench.done)
@@ -69,7 +69,7 @@ class TestDeclaring:
         assert len(bench.done) == done
         assert bench.report().epoch == epoch
 
-    def test_a_change_ends_the_lease_and_counts_from_then_on(self):
+    def test_a_changed_declaration_ends_the_lease_and_sets_the_new_limits(self):
         bench = Bench().begin()
         bench.drive_off()
         bench.tell(spec(v_max=0.5))
@@ -79,7 +79,7 @@ class TestDeclaring:
         bench.drive_off()
         assert bench.written[-1].twist == Twist(0.5)
 
-    def test_another_topic_makes_it_another_machine(self):
+    def test_a_robot_declared_with_another_velocity_topic_is_another_machine(self):
         bench = Bench().begin()
         bench.drive_off()
         bench.tell(spec(twist_topic="/other"))
@@ -93,7 +93,7 @@ class TestDeclaring:
         bench.drive_off()
         assert bench.written[-1].key == other
 
-    def test_a_forgotten_robot_is_stopped_before_it_is_dropped(self):
+    def test_a_removed_robot_gets_its_zeros_before_the_machine_is_detached(self):
         bench = Bench().begin()
         bench.drive_off()
         bench.tell(protocol.Forget("r1"))
@@ -110,7 +110,7 @@ class TestDeclaring:
         assert not bench.gate.busy
 
     @pytest.mark.parametrize("later", [10.0, None])
-    def test_one_that_is_owed_a_zero_is_kept_for_it_a_while(self, later):
+    def test_a_removed_robot_without_a_link_waits_up_to_60_s_for_its_zero(self, later):
         bench = Bench().begin()
         bench.drive_off()
         bench.break_links()
@@ -129,13 +129,13 @@ class TestDeclaring:
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
         assert bench.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
 
-    def test_one_that_stands_is_dropped_at_once(self):
+    def test_a_removed_robot_that_was_not_driven_is_detached_at_once(self):
         bench = Bench().begin()
         bench.tell(protocol.Forget("r1"))
         assert bench.did(actions.Detach)
         assert bench.did(actions.Unlock)
 
-    def test_one_that_comes_back_while_it_is_being_stopped_stays(self):
+    def test_a_robot_declared_again_during_its_last_zeros_is_not_detached(self):
         bench = Bench().begin()
         bench.drive_off()
         bench.tell(protocol.Forget("r1"))
@@ -146,24 +146,26 @@ class TestDeclaring:
         assert bench.written[-1].twist == Twist(1.0)
 
 
-class TestSharing:
+class TestSharedMachine:
     """Two robots of the display that are one machine."""
 
     @pytest.fixture
     def bench(self):
         return Bench().begin(spec(), spec(id="r2", name="Bob again", v_max=0.4))
 
-    def test_they_share_one_lease(self, bench):
+    def test_two_robots_on_one_machine_share_one_lease(self, bench):
         assert bench.take("a", "r1")
         assert bench.take("b", "r2") is None
         assert bench.report("r2").holder.connection == "a"
 
-    def test_the_lower_limits_count(self, bench):
+    def test_the_lowest_speed_limit_of_the_two_robots_applies(self, bench):
         bench.drive_off(robot="r1")
         assert bench.written[-1].twist == Twist(0.4)
         assert {s.robot for s in bench.of(protocol.SentTwist)} == {"r1", "r2"}
 
-    def test_forgetting_one_that_holds_the_machine_back_stops_it_first(self, bench):
+    def test_removing_the_robot_with_the_lower_limit_stops_the_machine_first(
+        self, bench
+    ):
         bench.drive_off(robot="r1")
         bench.tell(protocol.Forget("r2"))
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r2")]
@@ -185,15 +187,13 @@ class TestSharing:
             {"a_max": 0.5},
         ],
     )
-    def test_whatever_held_for_the_machine_by_the_one_that_leaves_ends_the_lease(
-        self, more
-    ):
+    def test_removing_a_robot_with_settings_of_its_own_ends_the_lease(self, more):
         bench = Bench().begin(spec(), spec(id="r2", **more))
         assert bench.take("a", "r1")
         bench.tell(protocol.Forget("r2"))
         assert bench.report().holder is None
 
-    def test_forgetting_one_of_two_that_are_alike_leaves_the_other_driving(self):
+    def test_removing_one_of_two_equal_robots_does_not_stop_the_other(self):
         bench = Bench().begin(spec(), spec(id="r2", name="Bob again"))
         bench.drive_off(robot="r1")
         bench.tell(protocol.Forget("r2"))
@@ -201,7 +201,7 @@ class TestSharing:
         assert bench.written[-1].twist == Twist(1.0)
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r2")]
 
-    def test_forgetting_both_stops_the_machine_first(self, bench):
+    def test_removing_both_robots_sends_zeros_before_they_are_detached(self, bench):
         bench.drive_off(robot="r1")
         bench.tell(protocol.Forget("r2"))
         bench.tell(protocol.Forget("r1"))
@@ -209,7 +209,7 @@ class TestSharing:
         bench.run(1.0)
         assert len(bench.did(actions.Detach)) == 2
 
-    def test_stopping_all_stops_it_once(self, bench):
+    def test_stop_all_sends_one_zero_to_a_shared_machine(self, bench):
         bench.say("b", op="stop", robot="*")
         assert len(bench.written) == 1
 
@@ -219,7 +219,9 @@ class TestTypes:
 
     STAMPED = "geometry_msgs/msg/TwistStamped"
 
-    def test_of_two_types_of_one_topic_the_first_counts_and_that_is_said(self, caplog):
+    def test_the_first_of_two_types_of_one_topic_is_used_and_a_warning_is_logged(
+        self, caplog
+    ):
         bench = Bench().begin(spec(), spec(id="r2", name="Al", twist_type=self.STAMPED))
         sure = [not it.spec.twist_type_assumed for it in bench.did(actions.Attach)]
         assert sure == [True, False]
@@ -234,7 +236,7 @@ class TestTypes:
         bench.say("b", op="stop", robot="r2")
         assert bench.report("r1").latched
 
-    def test_two_robots_whose_base_comes_back_with_another_type_change_theirs(self):
+    def test_two_robots_on_one_topic_can_both_change_to_another_type(self):
         bench = Bench().begin(spec(), spec(id="r2"))
         for robot in ("r1", "r2"):
             bench.tell(spec(id=robot, twist_type=self.STAMPED))
@@ -244,7 +246,7 @@ class TestTypes:
                 False,
             )
 
-    def test_who_drives_goes_on_when_the_assumed_type_proves_true(self):
+    def test_confirming_the_assumed_type_does_not_interrupt_driving(self):
         bench = Bench().begin(spec(twist_type_assumed=True))
         bench.drive_off()
         bench.tell(spec())
@@ -262,19 +264,19 @@ class TestTypes:
             ({"twist_type": STAMPED}, {"twist_topic": None}),
         ],
     )
-    def test_what_is_assumed_or_the_same_or_elsewhere_is_not(self, one, other, caplog):
+    def test_assumed_equal_or_unrelated_types_log_no_warning(self, one, other, caplog):
         bench = Bench().begin(spec(**one), spec(id="r2", **other))
         assert len(bench.did(actions.Attach)) == 2
         assert caplog.text == ""
 
-    def test_a_robot_may_be_declared_anew_with_another_type(self):
+    def test_a_robot_can_be_declared_again_with_another_type(self):
         bench = Bench().begin(spec())
         bench.tell(spec(twist_type=self.STAMPED))
         assert bench.did(actions.Attach)[-1].spec.twist_type == self.STAMPED
 
 
-class TestSeveral:
-    def test_one_robots_stop_leaves_the_other_alone(self):
+class TestSeveralMachines:
+    def test_a_stop_of_one_robot_does_not_stop_another_robot(self):
         bench = Bench().begin(spec(), spec(id="r2", twist_topic="/r2/cmd_vel"))
         bench.drive_off("b", robot="r2")
         bench.say("a", op="stop", robot="r1")
@@ -282,7 +284,7 @@ class TestSeveral:
         bench.say("a", op="stop", robot="*")
         assert bench.report("r2").state == "stopped"
 
-    def test_links_of_other_bridges_do_not_matter(self):
+    def test_links_to_another_bridge_do_not_affect_driving(self):
         other = "ws://other:9090"
         bench = Bench().begin(spec(), spec(id="r2", bridge_url=other))
         bench.tell(events.LinkUp(other, "control"))
@@ -295,28 +297,28 @@ class TestSeveral:
         assert bench.report("r2").v == 1.0
 
 
-class TestAfterACrash:
-    def test_a_machine_that_was_driven_gets_zeros_on_first_contact(self):
+class TestCrash:
+    def test_a_machine_marked_as_driven_gets_zeros_on_the_first_link(self):
         bench = Bench(was_driven=True).begin()
         assert bench.written[0].twist == ZERO
         bench.run(5.0)
         assert len(bench.written) in (60, 61), "a bridge may find the robot late"
         assert bench.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
 
-    def test_also_if_the_link_was_there_before_the_lock(self):
+    def test_a_machine_marked_as_driven_gets_zero_when_the_gate_gets_its_lock(self):
         bench = Bench(lock_held=False).begin()
         bench.run(1.0)
         assert bench.written == []
         bench.tell(events.LockState(KEY, held=True, driven=True))
         assert bench.written[0].twist == ZERO
 
-    def test_a_machine_that_stood_hears_nothing(self):
+    def test_a_machine_not_marked_as_driven_gets_no_velocity(self):
         bench = Bench().begin()
         bench.run(2.0)
         assert bench.written == []
         assert bench.did(actions.MarkDriven) == []
 
-    def test_driving_is_marked_before_anything_moves_and_unmarked_after_zeros(self):
+    def test_the_driven_mark_is_set_before_motion_and_cleared_after_the_zeros(self):
         bench = Bench().begin()
         bench.drive_off()
         kept = (actions.MarkDriven, actions.WriteTwist)
@@ -329,7 +331,7 @@ class TestAfterACrash:
         ]
         assert not bench.did(actions.WriteTwist)[-1].twist.vx
 
-    def test_a_machine_whose_link_broke_stays_marked_until_it_is_stopped(self):
+    def test_the_driven_mark_stays_after_a_broken_link_until_zeros_are_sent(self):
         bench = Bench().begin()
         bench.drive_off()
         bench.break_links()

@@ -22,7 +22,7 @@ START = b'{"op":"stop"'
         START + b"x" * 5000,
     ],
 )
-def test_what_begins_like_a_stop_is_one(frame):
+def test_a_message_that_begins_like_a_stop_is_recognized(frame):
     assert begins_like_stop(frame)
 
 
@@ -40,7 +40,7 @@ def test_what_begins_like_a_stop_is_one(frame):
         b"stop",
     ],
 )
-def test_what_begins_otherwise_is_none(frame):
+def test_a_message_that_does_not_begin_like_a_stop_is_not_recognized(frame):
     assert not begins_like_stop(frame)
 
 
@@ -74,7 +74,7 @@ def test_what_begins_otherwise_is_none(frame):
         (b',"x":' + b"1" * 5000 + b"}", None),
     ],
 )
-def test_its_robot_is_read_where_that_leaves_no_doubt(rest, robot):
+def test_the_robot_of_a_malformed_stop_is_read_only_if_it_is_unambiguous(rest, robot):
     assert robot_in(START + rest) == robot
 
 
@@ -122,7 +122,7 @@ def test_a_malformed_stop_stops_the_robot_that_it_names(two, frame):
 
 
 @pytest.mark.parametrize("frame", NAMES_NONE, ids=range(len(NAMES_NONE)))
-def test_one_that_names_none_that_is_known_stops_all(two, frame):
+def test_a_malformed_stop_without_a_known_robot_stops_all_robots(two, frame):
     send(two, frame)
     assert two.report("r1").latched
     assert two.report("r2").latched
@@ -132,7 +132,7 @@ def test_one_that_names_none_that_is_known_stops_all(two, frame):
     assert [w for w in two.moving_since(at) if w.at > at] == []
 
 
-def test_a_viewer_stops_by_it_too_and_a_stranger_does_not(two):
+def test_a_malformed_stop_counts_from_a_viewer_but_not_from_an_unknown_page(two):
     send(two, b'{"op":"stop"', "nobody")
     assert not two.report("r1").latched
     two.join("v", "viewer")
@@ -140,7 +140,7 @@ def test_a_viewer_stops_by_it_too_and_a_stranger_does_not(two):
     assert two.report("r1").latched
 
 
-def test_it_counts_as_garbage_and_is_served_before_the_page_is_closed(two):
+def test_a_malformed_stop_is_executed_before_the_page_is_closed_for_garbage(two):
     for _ in range(19):
         send(two, b"{")
     assert two.of(protocol.CloseConnection) == []
@@ -159,7 +159,7 @@ def test_it_counts_as_garbage_and_is_served_before_the_page_is_closed(two):
     assert two.report("r2").latched, "also of a page that is being closed"
 
 
-def test_it_feeds_no_dead_man_of_another_robot(two):
+def test_a_malformed_stop_does_not_keep_the_dead_man_of_another_robot_alive(two):
     since = two.now
     frame = b'{"op":"stop","robot":"r2",'
     two.run(0.5, lambda: send(two, frame, "a"))
@@ -167,14 +167,14 @@ def test_it_feeds_no_dead_man_of_another_robot(two):
     assert not two.report("r1").latched
 
 
-def test_what_only_resembles_it_stops_nothing(two):
+def test_invalid_messages_other_than_stop_do_not_stop_a_robot(two):
     for frame in (b'{"op":"stop-test","x":1}', b'{"op":"sto', b'{"op":"drive"'):
         send(two, frame)
     assert not two.report("r1").latched
     assert {refused.what for refused in two.refusals("b")} == {"command"}
 
 
-def test_a_good_one_is_no_garbage(two):
+def test_a_valid_stop_does_not_count_as_garbage(two):
     for _ in range(30):
         send(two, json.dumps({"op": "stop", "robot": "r1"}).encode())
     assert two.of(protocol.CloseConnection) == []

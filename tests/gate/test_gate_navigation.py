@@ -42,7 +42,7 @@ class TestAction:
         fields = {"op": "action_result", "id": "g1", "status": status, "result": True}
         return of_action(**{**fields, "values": values or {}, **frame})
 
-    def test_feedback_says_how_far_how_long_and_how_often_it_got_stuck(self):
+    def test_action_feedback_gives_distance_times_and_recoveries(self):
         assert self.feedback(
             distance_remaining=3.26,
             navigation_time={"sec": 4, "nanosec": 500000000},
@@ -51,7 +51,7 @@ class TestAction:
             current_pose={"header": {"frame_id": "map"}},
         ) == GoalProgress("r1", "g1", True, left=3.3, time=4.5, eta=6.0, recoveries=2)
 
-    def test_numbers_that_say_nothing_are_left_out(self):
+    def test_nan_and_negative_numbers_in_feedback_are_left_out(self):
         word = of_action(
             '{"op": "action_feedback", "id": "g1", "values": '
             '{"distance_remaining": NaN, "estimated_time_remaining": {"sec": -1}}}'
@@ -59,12 +59,12 @@ class TestAction:
         assert word == GoalProgress("r1", "g1", True)
 
     @pytest.mark.parametrize("number", [-1, 2**31, 10**30, 10**400])
-    def test_counts_that_nobody_counted_are_left_out(self, number):
+    def test_recovery_counts_out_of_range_are_left_out(self, number):
         word = self.feedback(number_of_recoveries=number)
         assert word == GoalProgress("r1", "g1", True)
         assert pipe.pack(word)
 
-    def test_times_beyond_all_numbers_are_no_word(self):
+    def test_feedback_with_a_time_too_large_for_a_float_is_ignored(self):
         assert self.feedback(navigation_time={"sec": 10**400, "nanosec": 0}) is None
 
     @pytest.mark.parametrize(
@@ -79,15 +79,15 @@ class TestAction:
             (None, [1], "failed", ""),
         ],
     )
-    def test_a_result_ends_it(self, status, values, outcome, why):
+    def test_an_action_result_ends_the_goal(self, status, values, outcome, why):
         assert self.result(status, values) == GoalEnded("r1", "g1", outcome, why)
 
-    def test_a_long_reason_is_cut_and_holds_no_control_characters(self):
+    def test_a_failure_reason_is_shortened_and_has_no_control_characters(self):
         end = self.result(6, {"error_msg": "\x1b[31m" + "x" * 999})
         assert end.why.startswith("[31mx")
         assert len(end.why) == navigation.MOST_WORDS
 
-    def test_a_bridge_that_knows_no_actions_is_told_apart(self):
+    def test_a_bridge_without_action_support_is_recognized(self):
         said = "Unknown operation: send_action_goal.  Allowed operations: [...]"
         end = of_action(op="status", level="error", msg=said)
         assert end.outcome == "failed"
@@ -108,11 +108,11 @@ class TestAction:
             {"op": 7},
         ],
     )
-    def test_what_is_not_about_it_is_passed_over(self, frame):
+    def test_unrelated_messages_are_ignored(self, frame):
         assert of_action(**frame) is None
 
     @pytest.mark.parametrize("text", ["{", "[]", "7"])
-    def test_what_makes_no_sense_is_passed_over(self, text):
+    def test_messages_that_are_not_json_objects_are_ignored(self, text):
         assert of_action(text) is None
 
 
@@ -123,7 +123,9 @@ class TestTopics:
     @pytest.mark.parametrize(
         ("status", "active"), [(0, False), (1, True), (6, True), (7, False)]
     )
-    def test_the_status_says_whether_it_is_under_way(self, status, active):
+    def test_the_move_base_status_gives_whether_the_goal_is_active(
+        self, status, active
+    ):
         others = self.status(3, id="g0")
         word = of_topics("status", {"status_list": [others, self.status(status)]})
         assert word == GoalProgress("r1", "g1", active)
@@ -139,13 +141,15 @@ class TestTopics:
             (9, "", "failed", "the robot lost the goal"),
         ],
     )
-    def test_status_and_result_end_it(self, status, text, outcome, why):
+    def test_a_move_base_status_or_result_ends_the_goal(
+        self, status, text, outcome, why
+    ):
         end = GoalEnded("r1", "g1", outcome, why)
         said = self.status(status, text)
         assert of_topics("status", {"status_list": [said]}) == end
         assert of_topics("result", {"status": said, "result": {}}) == end
 
-    def test_feedback_says_how_far_it_is_as_the_crow_flies(self):
+    def test_move_base_feedback_gives_the_straight_line_distance_to_the_goal(self):
         place = {"header": {"frame_id": "/map"}, "pose": {"position": {"x": 0, "y": 0}}}
         said = {"status": self.status(1), "feedback": {"base_position": place}}
         word = of_topics("feedback", said)
@@ -160,12 +164,14 @@ class TestTopics:
             None,
         ],
     )
-    def test_from_a_place_that_is_not_known_it_is_no_distance(self, place):
+    def test_move_base_feedback_without_a_valid_map_position_gives_no_distance(
+        self, place
+    ):
         feedback = {"base_position": place} if place else None
         said = {"status": self.status(1), "feedback": feedback}
         assert of_topics("feedback", said) == GoalProgress("r1", "g1", True)
 
-    def test_what_is_not_about_it_is_passed_over(self):
+    def test_unrelated_messages_are_ignored(self):
         other = self.status(1, id="g0")
         assert of_topics("status", {"status_list": [other]}) is None
         assert of_topics("status", {"status_list": [self.status(77)]}) is None

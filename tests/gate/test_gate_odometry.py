@@ -40,7 +40,7 @@ def scan_of(topic, message=SCAN):
 
 
 @in_loop
-async def test_odometry_is_told_of_every_machine_that_it_is_of():
+async def test_odometry_is_reported_for_every_machine_that_uses_the_topic():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         noting.witness.watch("/odom", "nav_msgs/Odometry", ANN)
         noting.witness.watch("/odom", "nav_msgs/Odometry", BEN)
@@ -63,7 +63,7 @@ async def test_odometry_is_told_of_every_machine_that_it_is_of():
 
 
 @in_loop
-async def test_words_that_are_no_odometry_are_passed_over():
+async def test_messages_that_are_not_odometry_are_ignored():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         noting.witness.watch("/odom", None, ANN)
         await until(lambda: bridge.of("subscribe"), "that it listens")
@@ -82,7 +82,7 @@ async def test_words_that_are_no_odometry_are_passed_over():
 
 
 @in_loop
-async def test_a_scan_is_told_of_the_machines_that_are_assisted_by_it():
+async def test_a_scan_is_reported_for_every_machine_that_uses_the_topic():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         noting.witness.watch("/odom", None, ANN)
         noting.witness.watch_scan("/scan", ANN)

@@ -36,8 +36,8 @@ def hear(writer, twist, times, now=100.0, every=0.1):
         writer.on_echo(twist, now + n * every)
 
 
-class TestWhatIsAnothers:
-    def test_two_velocities_within_a_while_are_and_one_is_not(self, writer):
+class TestOtherProgram:
+    def test_two_foreign_velocities_within_3_s_report_another_program(self, writer):
         hear(writer, THEIRS, SURE - 1)
         assert writer.description("/cmd_vel") is None
         hear(writer, THEIRS, 1, 100.0 + WITHIN)
@@ -46,7 +46,7 @@ class TestWhatIsAnothers:
         hear(other, THEIRS, 5, every=WITHIN + 0.1)
         assert other.seen is None
 
-    def test_it_is_gone_when_it_is_not_heard_for_a_while(self, writer):
+    def test_another_program_is_dropped_after_3_s_without_its_velocities(self, writer):
         hear(writer, THEIRS, 3, every=0.0)
         writer.named(("/teleop",))
         writer.step(100.0 + WITHIN)
@@ -59,7 +59,7 @@ class TestWhatIsAnothers:
             "who it was then is not known now"
         )
 
-    def test_while_the_gate_writes_too_it_is_found(self, writer):
+    def test_another_program_is_found_while_the_gate_writes_too(self, writer):
         for n in range(40):
             now = 100.0 + n * 0.05
             writer.on_written(OURS, now)
@@ -68,19 +68,19 @@ class TestWhatIsAnothers:
                 writer.on_echo(THEIRS, now)
         assert writer.seen == THEIRS
 
-    def test_also_of_the_very_value_that_the_gate_writes(self, writer):
+    def test_another_program_with_the_same_velocity_as_the_gate_is_found(self, writer):
         for n in range(200):
             now = 100.0 + n * 0.05
             writer.on_written(OURS, now)
             hear(writer, OURS, ECHOES + 1, now, 0.0)
         assert writer.seen == OURS
 
-    def test_or_wrote_long_ago(self, writer):
+    def test_a_velocity_that_the_gate_wrote_long_ago_counts_as_foreign(self, writer):
         writer.on_written(OURS, 100.0)
         hear(writer, OURS, 2, 100.0 + REMEMBERED + 0.1)
         assert writer.seen == OURS
 
-    def test_what_is_not_sound_in_a_name_is_left_out(self, writer):
+    def test_invalid_node_names_are_dropped_and_long_names_are_shortened(self, writer):
         hear(writer, THEIRS, 2)
         writer.named(("/a\x1b[31m", " ", "/b" * 100, "/c", "/d", "/e"))
         assert writer.nodes == (("/b" * 100)[:80], "/c", "/d")
@@ -95,13 +95,13 @@ class TestWhatIsAnothers:
             (Twist(0.0, 0.4, 1.0), "(0.40 m/s, 1.00 rad/s)"),
         ],
     )
-    def test_it_is_said_how_fast(self, writer, twist, words):
+    def test_the_description_gives_the_speed_and_turn_rate(self, writer, twist, words):
         hear(writer, twist, 2)
         assert words in writer.description("/cmd_vel")
 
 
-class TestWhatIsNot:
-    def test_zeros_are_nobodys(self, writer):
+class TestOwnEcho:
+    def test_zeros_do_not_report_another_program(self, writer):
         hear(writer, Twist(), 1000, every=0.01)
         hear(writer, Twist(-0.0, 0.0, -0.0), 1000, every=0.01)
         assert writer.seen is None
@@ -109,7 +109,9 @@ class TestWhatIsNot:
     @pytest.mark.parametrize("late", [0.0, 0.4, 5.0, 30.0])
     @pytest.mark.parametrize("each", [1, ECHOES])
     @pytest.mark.parametrize("digits", ["float64", "float32", 6])
-    def test_an_echo_is_not_late_twice_or_rounded(self, writer, late, each, digits):
+    def test_late_doubled_and_rounded_echoes_do_not_report_another_program(
+        self, writer, late, each, digits
+    ):
         """Driven for ten seconds at speeds that change, with echoes that come late."""
 
         def echo(part):
@@ -144,7 +146,7 @@ class TestWhatIsNot:
             max_size=60,
         )
     )
-    def test_no_order_of_own_echoes_is_another(self, written):
+    def test_own_echoes_in_any_rhythm_do_not_report_another_program(self, written):
         """However they are held up, and in whatever bursts they come."""
         writer, way, clock = OtherWriter(), deque(), count(100, 0.05)
         for speed, held_up, each in written:
@@ -158,7 +160,7 @@ class TestWhatIsNot:
                     writer.on_echo(way.popleft(), now)
         assert writer.seen is None
 
-    def test_what_is_expected_is_no_news(self, writer):
+    def test_expected_foreign_velocities_do_not_report_another_program(self, writer):
         writer.expect(101.0)
         writer.expect(100.5)
         hear(writer, THEIRS, 10)
@@ -166,7 +168,7 @@ class TestWhatIsNot:
         hear(writer, THEIRS, 2, 101.0)
         assert writer.seen == THEIRS
 
-    def test_what_was_written_long_ago_takes_no_memory(self, writer):
+    def test_velocities_written_long_ago_are_removed_from_memory(self, writer):
         for n in range(5000):
             writer.on_written(Twist(n / 1000), 100.0 + n * 0.05)
         assert len(writer._own) < 1.1 * REMEMBERED / 0.05
@@ -192,7 +194,9 @@ def publish(bench, seconds=0.5, twist=THEIRS, key=KEY):
 
 
 class TestReport:
-    def test_it_is_said_before_anybody_drives_and_ends_with_it(self, bench):
+    def test_another_program_is_reported_for_a_free_robot_until_the_program_ends(
+        self, bench
+    ):
         assert bench.report().other_writer is None
         publish(bench)
         assert (bench.report().other_writer, bench.report().holder) == (SAID, None)
@@ -200,7 +204,7 @@ class TestReport:
         assert bench.report().other_writer is None
         assert not bench.gate.busy
 
-    def test_it_is_said_while_somebody_drives(self, bench):
+    def test_another_program_is_reported_while_an_operator_drives(self, bench):
         bench.drive_off()
 
         def each():
@@ -218,7 +222,7 @@ class TestReport:
         report = bench.report()
         assert (report.state, report.other_writer) == ("driving", SAID)
 
-    def test_it_is_said_beside_the_alarm(self):
+    def test_another_program_and_the_motion_alarm_are_reported_together(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
         bench.run(EXPECTED_FOR)
         seen = events.OdometryReceived(KEY, Twist(0.4))
@@ -232,7 +236,7 @@ class TestReport:
         assert bench.report().alarm
         assert bench.report().other_writer == SAID
 
-    def test_its_nodes_are_named_as_the_display_tells_them(self, bench):
+    def test_the_report_names_the_nodes_that_the_display_found(self, bench):
         bench.tell(protocol.WriterNodes("r1", ("/teleop",)))
         publish(bench)
         assert bench.report().other_writer == SAID
@@ -240,7 +244,9 @@ class TestReport:
         bench.tell(protocol.WriterNodes("r9", ("/other",)))
         assert bench.report().other_writer == f"{SAID}: /teleop"
 
-    def test_speeds_that_change_are_said_ten_times_a_second_at_most(self, bench):
+    def test_changing_foreign_speeds_are_reported_at_most_about_10_times_a_second(
+        self, bench
+    ):
         publish(bench)
         bench.said.clear()
         turn = count()
@@ -252,7 +258,7 @@ class TestReport:
         bench.run(1.0, each)
         assert 5 <= len(bench.of(protocol.RobotReport)) <= 11
 
-    def test_a_new_link_may_bring_what_was_written_before(self, bench):
+    def test_foreign_velocities_are_ignored_for_2_s_after_a_new_link(self, bench):
         bench.break_links()
         bench.connect_links()
         publish(bench, EXPECTED_FOR - 0.1)
@@ -260,13 +266,13 @@ class TestReport:
         publish(bench, 0.5)
         assert bench.report().other_writer == SAID
 
-    def test_what_another_gate_on_this_computer_drives_is_its_own(self, bench):
+    def test_velocities_of_another_gate_on_this_computer_are_not_reported(self, bench):
         why = "another WebMap on this computer drives it"
         bench.tell(LockState(KEY, held=False, why=why, elsewhere=True))
         publish(bench, 5.0)
         assert bench.report().other_writer is None
 
-    def test_what_follows_a_goal_is_expected_to_drive(self):
+    def test_velocities_during_a_goal_and_shortly_after_are_not_reported(self):
         bench = Bench().begin(spec(action="/navigate"))
         bench.run(EXPECTED_FOR)
         bench.take()
@@ -281,7 +287,7 @@ class TestReport:
         publish(bench, 1.0)
         assert bench.report().other_writer == SAID
 
-    def test_but_not_after_a_goal_whose_end_nobody_tells(self):
+    def test_velocities_after_a_goal_whose_end_is_unknown_are_reported(self):
         bench = Bench().begin(spec(cancel_topic=None))
         bench.run(EXPECTED_FOR)
         bench.take()
@@ -289,6 +295,6 @@ class TestReport:
         publish(bench, 5.0)
         assert bench.report().other_writer == SAID
 
-    def test_a_machine_that_is_gone_is_no_matter(self, bench):
+    def test_an_echo_of_an_unknown_machine_is_ignored(self, bench):
         publish(bench, key=Key("ws://gone:9090", "/cmd_vel"))
         assert bench.report().other_writer is None

@@ -33,31 +33,35 @@ def goal(x, y, yaw) -> SendGoal:
     return SendGoal(KEY, "r1", "g1", x, y, yaw, "c1", "topic")
 
 
-def test_a_goal_of_a_robot_on_the_common_map_stays_as_it_is():
+def test_a_goal_of_a_robot_on_the_common_map_is_not_changed():
     at = goal(1.0, 2.0, 0.5)
     assert in_own_map(robot(), at) is at
 
 
 @given(LENGTH, LENGTH, ANGLE, LENGTH, LENGTH, ANGLE)
-def test_its_own_map_laid_on_the_common_one_gives_the_goal_again(x, y, a, gx, gy, yaw):
+def test_a_goal_converted_to_the_own_map_converts_back_to_the_common_map(
+    x, y, a, gx, gy, yaw
+):
     received = in_own_map(robot(own_map=(x, y, a)), goal(gx, gy, yaw))
     back = Pose(x, y, a) @ Pose(received.x, received.y, received.yaw)
     assert (back.x, back.y) == pytest.approx((gx, gy), abs=1e-6)
     assert math.cos(back.yaw - yaw) == pytest.approx(1.0)
 
 
-def test_a_pose_that_it_is_told_to_be_at_is_in_its_own_map_too():
+def test_a_set_pose_is_converted_to_the_own_map_of_the_robot():
     at = SendPose(KEY, "r1", 10.0, 3.0, QUARTER, "c1")
     received = in_own_map(robot(own_map=(10.0, 0.0, QUARTER)), at)
     assert (received.x, received.y, received.yaw) == pytest.approx((3.0, 0.0, 0.0))
 
 
-def test_a_map_that_lies_nowhere_is_refused():
+def test_an_own_map_with_a_nan_position_raises_config_error():
     with pytest.raises(ConfigError, match="its own map lies on the common one"):
         checked(robot(own_map=(0.0, math.nan, 0.0)))
 
 
-def test_a_page_s_goal_reaches_the_robot_in_its_own_map(client, fake, robot_spec):
+def test_a_goal_from_a_page_arrives_in_the_own_map_of_the_robot(
+    client, fake, robot_spec
+):
     aligned = msgspec.structs.replace(
         robot_spec, own_map=(10.0, 0.0, QUARTER), pose_topic="/initialpose"
     )

@@ -34,42 +34,42 @@ def issue(ticks, *times):
 
 
 class TestTicks:
-    def test_come_at_20_hz(self):
+    def test_ticks_are_issued_at_20_hz(self):
         ticks = Ticks(7)
         assert issue(ticks, 0.0, 0.02, 0.0501, 0.09, 0.1001) == [7, None, 8, None, 9]
 
-    def test_are_not_caught_up_on_after_a_standstill(self):
+    def test_missed_ticks_are_not_issued_after_a_pause(self):
         ticks = Ticks(7)
         assert issue(ticks, 0.0, 3.0, 3.01, 3.04, 3.05) == [7, 8, None, None, 9]
 
-    def test_know_their_age(self):
+    def test_the_age_of_a_tick_counts_from_its_issue(self):
         ticks = Ticks(7)
         issue(ticks, 10.0, 10.05)
         assert ticks.age(7, 10.2) == pytest.approx(0.2)
         assert ticks.age(8, 10.2) == pytest.approx(0.15)
 
     @pytest.mark.parametrize("tick", [6, 9, 0, 2**60])
-    def test_that_were_not_issued_here_are_unknown(self, tick):
+    def test_ticks_that_were_never_issued_are_refused(self, tick):
         ticks = Ticks(7)
         issue(ticks, 10.0, 10.05)
         assert ticks.age(tick, 10.1) is None
         with pytest.raises(Refusal, match="unknown"):
             ticks.check(tick, 10.1)
 
-    def test_are_refused_after_300_ms(self):
+    def test_ticks_older_than_300_ms_are_refused(self):
         ticks = Ticks(7)
         ticks.issue(0.0)
         ticks.check(7, 0.3)
         with pytest.raises(Refusal, match="over 300 ms"):
             ticks.check(7, 0.3001)
 
-    def test_are_forgotten_in_the_end(self):
+    def test_old_ticks_are_forgotten(self):
         ticks = Ticks(0)
         issue(ticks, *(n * 0.0501 for n in range(100)))
         assert ticks.age(0, 5.0) is None
         assert ticks.age(99, 5.0) is not None
 
-    def test_of_two_sessions_do_not_meet(self):
+    def test_two_sessions_begin_with_different_ticks(self):
         assert Ticks().newest != Ticks().newest
 
 
@@ -77,31 +77,31 @@ class TestLeases:
     lease = Lease("a", "Ann", 3)
     by_program = Lease("program", "program", 4, program=True)
 
-    def test_epochs_only_grow(self):
+    def test_epochs_only_increase_and_differ_between_sessions(self):
         epochs = Epochs(5)
         assert [epochs.next() for _ in range(3)] == [6, 7, 8]
         assert Epochs().next() != Epochs().next()
 
-    def test_what_nobody_has_can_be_taken(self):
+    def test_a_free_robot_can_be_taken(self):
         check_take(None, "operator", program=False)
         check_take(None, "admin", program=True)
 
-    def test_what_an_operator_has_cannot_be_taken(self):
+    def test_a_robot_of_an_operator_cannot_be_taken(self):
         for program in (False, True):
             with pytest.raises(Refusal, match="Ann has control"):
                 check_take(self.lease, "operator", program)
 
-    def test_an_operator_takes_from_a_program_but_no_program_does(self):
+    def test_an_operator_can_take_a_robot_from_a_program_but_a_program_cannot(self):
         check_take(self.by_program, "operator", program=False)
         with pytest.raises(Refusal):
             check_take(self.by_program, "operator", program=True)
 
-    def test_viewers_take_nothing(self):
+    def test_a_viewer_cannot_take_a_robot(self):
         with pytest.raises(Refusal, match="viewers"):
             check_take(None, "viewer", program=False)
         check_role("operator")
 
-    def test_only_the_holder_passes_and_only_by_its_own_epoch(self):
+    def test_the_lease_check_accepts_only_the_holder_with_the_current_epoch(self):
         check_lease(self.lease, "a", 3)
         for lease, who, epoch in [
             (None, "a", 3),
@@ -112,7 +112,7 @@ class TestLeases:
             with pytest.raises(Refusal):
                 check_lease(lease, who, epoch)
 
-    def test_a_holder_without_a_name_is_called_by_its_connection(self):
+    def test_a_refusal_names_a_holder_without_a_name_by_its_connection(self):
         with pytest.raises(Refusal, match="c5 has control"):
             check_lease(Lease("c5", "", 3), "a", 3)
         with pytest.raises(Refusal, match="c5 has control"):
@@ -123,35 +123,37 @@ class TestLimits:
     def in_force(self, *more, **changes):
         return speed_in_force([*caps_of(spec(**changes)), *more])
 
-    def test_the_least_is_in_force_and_says_why(self):
+    def test_the_lowest_limits_are_in_force_with_their_reasons(self):
         page = Cap(0.4, 9.0, "limit of the page")
         assert self.in_force(page) == Speed(
             0.4, 1.5, ("limit of the robot", "limit of the page")
         )
 
-    def test_a_robot_not_known_to_stop_by_itself_is_slow(self):
+    def test_a_robot_without_a_verified_stop_gets_the_slow_limits(self):
         speed = self.in_force(stops_within=None)
         assert speed == Speed(0.3, 0.6, ("stop not verified",))
 
-    def test_a_robot_that_stops_late_is_slow(self):
+    def test_a_robot_with_a_long_command_timeout_gets_the_slow_limits(self):
         speed = self.in_force(stops_within=0.8)
         assert (speed.v, speed.w) == (0.3, 0.6)
         assert "0.8 s" in speed.why[0]
 
-    def test_a_robot_without_limits_is_slow(self):
+    def test_a_robot_without_stated_limits_gets_the_slow_limits(self):
         speed = self.in_force(v_max=None, w_max=None)
         assert speed == Speed(0.3, 0.6, ("no limit stated",))
 
-    def test_one_limit_that_is_missing_is_slow_and_the_other_stands(self):
+    def test_a_missing_limit_is_replaced_by_the_slow_limit(self):
         speed = self.in_force(v_max=None)
         assert (speed.v, speed.w) == (0.3, 0.6)
         assert set(speed.why) == {"limit of the robot", "no limit stated"}
 
-    def test_nothing_known_at_all_is_slow(self):
+    def test_no_limits_at_all_give_the_slow_limits(self):
         assert speed_in_force([]) == Speed(0.3, 0.6, ("no limit stated",))
 
     @given(axis, axis, axis, positive, positive, st.booleans())
-    def test_no_wish_exceeds_the_speeds_in_force(self, vx, vy, wz, v, w, holonomic):
+    def test_no_velocity_exceeds_the_speed_limits_in_force(
+        self, vx, vy, wz, v, w, holonomic
+    ):
         twist = fit(Twist(vx, vy, wz), Speed(v, w, ()), holonomic=holonomic)
         assert math.hypot(twist.vx, twist.vy) <= v * (1 + 1e-12) + 1e-300
         assert abs(twist.wz) <= w
@@ -159,20 +161,22 @@ class TestLimits:
         parts = (twist.vx, twist.vy, twist.wz)
         assert all(math.copysign(1, part) == 1 for part in parts if part == 0)
 
-    def test_the_direction_is_kept(self):
+    def test_the_speed_limit_keeps_the_direction_of_the_velocity(self):
         twist = fit(Twist(3.0, -4.0, 0.0), Speed(1.0, 1.0, ()), holonomic=True)
         assert (twist.vx, twist.vy) == pytest.approx((0.6, -0.8))
         assert fit(Twist(-3.0), Speed(0.7, 1.0, ()), holonomic=False).vx == -0.7
 
     @given(near, near, near, near, st.floats(0.01, 10.0), st.floats(0.001, 0.1))
-    def test_speeding_up_aslant_is_ramped_as_along_one_axis(self, x, y, vx, vy, a, dt):
+    def test_diagonal_acceleration_is_limited_like_acceleration_on_one_axis(
+        self, x, y, vx, vy, a, dt
+    ):
         found = ramp(Twist(x, y), Twist(vx, vy), a, dt)
         speed = math.hypot(found.vx, found.vy)
         assert speed <= math.hypot(x, y) + a * dt + 1e-9
         assert abs(found.vx) <= abs(vx) + 1e-9
         assert abs(found.vy) <= abs(vy) + 1e-9
 
-    def test_a_stop_aslant_is_not_ramped(self):
+    def test_braking_from_diagonal_motion_to_zero_is_not_ramped(self):
         assert ramp(Twist(0.5, 0.5), Twist(), 1.0, 0.05) == Twist()
 
     @given(
@@ -187,7 +191,7 @@ class TestLimits:
         if abs(to) <= from_:
             assert speed == to
 
-    def test_turning_round_begins_at_standstill(self):
+    def test_a_reversed_velocity_ramps_up_from_zero(self):
         assert ramp(Twist(1.0), Twist(-1.0), 1.0, 0.05).vx == pytest.approx(-0.05)
 
 
@@ -198,41 +202,41 @@ class TestDeadMan:
         for n in range(round(seconds / 0.05) + 1):
             deadman.accept(True, next(self.ticks), since + n * 0.05)
 
-    def test_holds_for_200_ms(self):
+    def test_the_dead_man_expires_after_200_ms(self):
         deadman = DeadMan()
         assert deadman.expired(0.0)
         deadman.accept(True, next(self.ticks), 1.0)
         assert not deadman.expired(1.0 + DEADMAN - 1e-9)
         assert deadman.expired(1.0 + DEADMAN)
 
-    def test_arms_after_200_ms_of_released_inputs(self):
+    def test_the_dead_man_arms_after_200_ms_of_released_inputs(self):
         deadman = DeadMan()
         self.neutral_for(deadman, NEUTRAL - 0.05)
         assert not deadman.armed
         self.neutral_for(deadman, 0.05, since=NEUTRAL)
         assert deadman.armed
 
-    def test_a_press_begins_the_200_ms_anew(self):
+    def test_a_press_restarts_the_200_ms(self):
         deadman = DeadMan()
         self.neutral_for(deadman, 0.15)
         deadman.accept(False, next(self.ticks), 0.2)
         deadman.accept(True, next(self.ticks), 0.25)
         assert not deadman.armed
 
-    def test_a_gap_begins_the_200_ms_anew(self):
+    def test_a_gap_in_commands_restarts_the_200_ms(self):
         deadman = DeadMan()
         deadman.accept(True, next(self.ticks), 0.0)
         deadman.accept(True, next(self.ticks), 0.5)
         assert not deadman.armed
 
-    def test_a_gap_disarms(self):
+    def test_a_gap_in_commands_disarms_the_dead_man(self):
         deadman = DeadMan()
         self.neutral_for(deadman, 0.3)
         assert deadman.armed
         deadman.accept(False, next(self.ticks), 1.0)
         assert not deadman.armed
 
-    def test_a_program_needs_no_neutral(self):
+    def test_a_program_is_armed_without_released_inputs(self):
         deadman = DeadMan(needs_neutral=False)
         deadman.accept(False, next(self.ticks), 0.0)
         assert deadman.armed
@@ -240,14 +244,14 @@ class TestDeadMan:
         deadman.accept(False, next(self.ticks), 1.0)
         assert deadman.armed
 
-    def test_a_command_that_echoes_no_newer_tick_holds_no_longer(self):
+    def test_commands_without_a_newer_tick_do_not_extend_the_dead_man(self):
         deadman, tick = DeadMan(), next(self.ticks)
         deadman.accept(True, tick, 1.0)
         deadman.accept(True, tick, 1.1)
         deadman.accept(True, tick - 1, 1.15)
         assert deadman.expired(1.0 + DEADMAN)
 
-    def test_hands_that_hear_nothing_are_never_seen_to_be_off(self):
+    def test_released_inputs_without_newer_ticks_never_arm_the_dead_man(self):
         deadman, tick = DeadMan(), next(self.ticks)
         for n in range(40):
             deadman.accept(True, tick, n * 0.05)
@@ -260,7 +264,7 @@ class TestBurst:
         burst.start(times[0])
         return [t for t in times if burst.zero_due(t)], burst
 
-    def test_is_20_hz_for_500_ms_then_silence(self):
+    def test_a_burst_sends_zeros_at_20_hz_for_500_ms(self):
         times = [n * 0.01 for n in range(100)]
         zeros, burst = self.zeros(times)
         assert len(zeros) == 10
@@ -268,11 +272,11 @@ class TestBurst:
         assert zeros[-1] < 0.5
         assert not burst.running
 
-    def test_does_not_make_up_for_a_standstill(self):
+    def test_missed_zeros_are_not_sent_after_a_pause(self):
         zeros, _ = self.zeros([0.0, 0.32, 0.33, 0.34, 0.36])
         assert zeros == [0.0, 0.32, 0.36]
 
-    def test_can_be_ended(self):
+    def test_an_ended_burst_sends_no_zeros(self):
         burst = ZeroBurst()
         burst.start(0.0)
         burst.end()
@@ -280,7 +284,7 @@ class TestBurst:
 
 
 class TestHealth:
-    def test_only_a_link_that_answered_just_now_is_fresh(self):
+    def test_a_link_is_fresh_for_300_ms_after_an_answer(self):
         link = LinkHealth()
         assert not link.fresh(0.0)
         link.opened(0.0)
@@ -294,7 +298,7 @@ class TestHealth:
         assert not link.fresh(0.6)
         assert not link.stalled(9.0)
 
-    def test_an_answer_that_was_long_under_way_does_not_make_a_link_fresh(self):
+    def test_a_late_answer_does_not_make_a_link_fresh(self):
         link = LinkHealth()
         link.opened(0.0)
         for asked_at in (0.0, 0.05, 0.1):
@@ -302,7 +306,7 @@ class TestHealth:
             assert not link.fresh(asked_at + 0.4)
         assert link.trips.p95 == pytest.approx(0.4)
 
-    def test_a_link_that_says_nothing_for_a_second_is_stalled(self):
+    def test_a_link_without_answers_for_one_second_is_stalled(self):
         link = LinkHealth()
         link.opened(0.0)
         assert not link.stalled(1.0)
@@ -311,7 +315,7 @@ class TestHealth:
         assert not link.stalled(2.0)
         assert link.stalled(2.01)
 
-    def test_an_answer_counts_for_what_came_before_its_question(self):
+    def test_a_ping_answer_confirms_only_what_was_sent_before_the_ping(self):
         link = LinkHealth()
         link.opened(1.0)
         assert not link.answered_since(0.9), "a handshake says nothing of when"
@@ -325,7 +329,7 @@ class TestHealth:
         assert not link.answered_since(1.9), "that was another link"
         assert link.trips.p95 is None
 
-    def test_a_display_is_there_for_250_ms_after_its_heartbeat(self):
+    def test_the_display_counts_as_alive_for_250_ms_after_a_heartbeat(self):
         pulse = DisplayPulse()
         assert pulse.fault(0.0)
         pulse.beat(0.0)
@@ -337,7 +341,7 @@ class TestHealth:
 
 
 class TestConnection:
-    def test_too_often_is_the_limit_within_a_second(self):
+    def test_the_rate_limit_counts_events_within_one_second(self):
         rate = RateLimit(3)
         assert [rate.too_often(t) for t in (0.0, 0.5, 1.1, 1.2)] == [
             False,
@@ -346,14 +350,14 @@ class TestConnection:
             True,
         ]
 
-    def test_speeds_that_make_no_sense_mean_standstill(self):
+    def test_invalid_page_speeds_set_a_limit_of_zero(self):
         connection = Connection("c1", "Ann", "operator")
         connection.set_speeds(math.nan, -1.0)
         assert (connection.cap.v, connection.cap.w) == (0.0, 0.0)
         connection.set_speeds(math.inf, 0.5)
         assert (connection.cap.v, connection.cap.w) == (math.inf, 0.5)
 
-    def test_the_same_refusal_is_news_once_a_second(self):
+    def test_an_equal_refusal_is_reported_at_most_once_a_second(self):
         connection = Connection("c1", "Ann", "operator")
         news = connection.is_new_refusal
         assert news("r1", "drive", "why", 0.0)
@@ -362,7 +366,7 @@ class TestConnection:
         assert news("r1", "drive", "why", 1.0)
 
 
-def test_a_burst_that_begins_again_ends_no_earlier_than_it_would_have():
+def test_restarting_a_burst_of_zeros_never_shortens_the_burst():
     burst = ZeroBurst(period=0.05, length=0.5)
     burst.start(0.0, 3.0)
     burst.start(1.0)

@@ -31,14 +31,16 @@ def received(read):
 
 
 class TestOutbox:
-    def test_messages_come_in_order(self, pipe):
+    def test_messages_are_sent_in_order(self, pipe):
         box = Outbox(pipe[1])
         for number in range(3):
             box.put(Ready(number))
         box.close(5.0)
         assert received(pipe[0]) == [Ready(0), Ready(1), Ready(2)]
 
-    def test_what_newer_messages_replace_is_dropped_first(self, pipe, monkeypatch):
+    def test_a_full_outbox_drops_only_messages_that_newer_ones_replace(
+        self, pipe, monkeypatch
+    ):
         monkeypatch.setattr(pipe_module, "FULL", -1)
         box = Outbox(pipe[1])
         box.put(Tick(1, {}))
@@ -46,7 +48,7 @@ class TestOutbox:
         box.close(5.0)
         assert received(pipe[0]) == [Ready(1)]
 
-    def test_in_the_end_everything_is_dropped(self, pipe, monkeypatch):
+    def test_an_overfull_outbox_drops_every_message(self, pipe, monkeypatch):
         monkeypatch.setattr(pipe_module, "OVERFULL", -1)
         box = Outbox(pipe[1])
         box.put(Ready(1))
@@ -54,7 +56,7 @@ class TestOutbox:
         shut(pipe[1])
         assert os.read(pipe[0], 100) == b""
 
-    def test_a_display_that_is_gone_is_no_error(self, pipe):
+    def test_writing_to_a_closed_display_raises_no_error(self, pipe):
         shut(pipe[0])
         box = Outbox(pipe[1])
         box.put(Ready(1))
@@ -66,7 +68,7 @@ class TestLog:
     def record(self, text):
         return logging.LogRecord("gate", logging.INFO, "", 0, text, (), None)
 
-    def test_a_terminal_that_stands_still_holds_nothing_up(self, monkeypatch):
+    def test_a_blocked_terminal_does_not_block_logging(self, monkeypatch):
         monkeypatch.setattr(pipe_module, "FULL", 2)
         go_on, written = threading.Event(), []
 
@@ -88,17 +90,17 @@ class TestLog:
 
 
 class TestFraming:
-    def test_what_is_no_message_is_left_out(self, caplog):
+    def test_data_that_is_not_a_valid_message_is_skipped_and_logged(self, caplog):
         data = pipe_module.pack(GateUp()) + pipe_module.pack(Ready(5))
         assert Unpacker(FromGate).feed(data) == [Ready(5)]
         assert "not a message" in caplog.text
 
-    def test_bytes_in_pieces_make_the_same_messages(self):
+    def test_messages_are_decoded_from_single_bytes(self):
         unpacker, data = Unpacker(FromGate), pipe_module.pack(Ready(5)) * 2
         found = [m for byte in data for m in unpacker.feed(bytes([byte]))]
         assert found == [Ready(5), Ready(5)]
 
-    def test_a_length_that_makes_no_sense_ends_the_pipe(self):
+    def test_an_invalid_message_length_raises_a_wire_error(self):
         with pytest.raises(
             pipe_module.WireError, match="a message of 4294967295 bytes"
         ):

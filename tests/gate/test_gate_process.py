@@ -51,13 +51,13 @@ def said_until_ready(gate):
     return said
 
 
-def test_it_says_who_it_is_and_ends_with_the_pipe(gate):
+def test_the_gate_reports_its_process_id_and_exits_when_the_pipe_closes(gate):
     assert said_until_ready(gate)[0] == Ready(gate.pid)
     _, err = gate.communicate(pipe.pack(Heartbeat()), timeout=60)
     assert (gate.returncode, err) == (0, b"")
 
 
-def test_a_gate_that_can_hear_no_longer_is_told_to_end():
+def test_an_error_in_the_reader_thread_shuts_the_gate_down():
     """Whatever kept it from reading: one that hears no STOP must not go on."""
 
     class Loop:
@@ -83,20 +83,20 @@ def test_a_gate_that_can_hear_no_longer_is_told_to_end():
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_ends_it_in_good_order(gate, number):
+def test_a_signal_makes_the_gate_exit_with_code_0(gate, number):
     said_until_ready(gate)
     gate.send_signal(number)
     assert gate.wait(60) == 0, "and not by the signal itself"
 
 
-def test_a_pipe_that_brings_nonsense_ends_it(gate):
+def test_invalid_data_on_the_pipe_makes_the_gate_exit(gate):
     said_until_ready(gate)
     gate.stdin.write(b"\xff" * 8)
     gate.stdin.flush()
     assert gate.wait(60) == 0, "although the pipe is still open"
 
 
-def test_an_error_of_its_own_ends_it_with_a_code(monkeypatch, caplog):
+def test_an_internal_error_is_logged_and_ends_the_gate_with_code_1(monkeypatch, caplog):
     def fail(*_):
         raise ArithmeticError("a slip")
 
@@ -122,6 +122,6 @@ def test_an_error_of_its_own_ends_it_with_a_code(monkeypatch, caplog):
     assert not reader.is_alive(), "a loop that has ended is told nothing more"
 
 
-def test_what_only_looks_at_the_module_starts_no_gate(monkeypatch):
+def test_importing_the_main_module_does_not_start_a_gate(monkeypatch):
     monkeypatch.setattr(os, "_exit", lambda code: pytest.fail("it ended the process"))
     assert importlib.import_module("webmap.gate.__main__").main is not None

@@ -27,7 +27,7 @@ def policies_of_threads(pid):
 
 
 @linux
-def test_a_thread_that_may_runs_before_what_is_not_urgent_as_do_those_it_starts():
+def test_a_raised_thread_and_its_new_threads_get_realtime_priority():
     def rise():
         risen, policies = process.rise(), []
         thread = threading.Thread(
@@ -42,7 +42,7 @@ def test_a_thread_that_may_runs_before_what_is_not_urgent_as_do_those_it_starts(
 
 
 @linux
-def test_one_that_may_not_goes_on_as_one_among_all(monkeypatch):
+def test_a_thread_without_permission_keeps_the_normal_priority(monkeypatch):
     def refuse(*_):
         raise PermissionError(1, "Operation not permitted")
 
@@ -50,14 +50,14 @@ def test_one_that_may_not_goes_on_as_one_among_all(monkeypatch):
     assert not in_a_thread(process.rise)
 
 
-def test_another_system_is_not_asked(monkeypatch):
+def test_the_priority_is_not_changed_on_other_systems_than_linux(monkeypatch):
     monkeypatch.setattr(sys, "platform", "win32")
     monkeypatch.delattr(os, "sched_setscheduler", raising=False)
     assert not in_a_thread(process.rise)
 
 
 @linux
-def test_all_of_the_gate_is_urgent_where_it_may_be_and_the_display_is_not():
+def test_all_gate_threads_have_realtime_priority_but_the_display_does_not():
     may = in_a_thread(process.rise)
     client = GateClient()
     client.start()

@@ -26,7 +26,7 @@ def twist(bench, *velocity, epoch=None, tick=None):
     bench.tell(protocol.FromProgram(commands.SetVelocity("r1", epoch, tick, velocity)))
 
 
-def test_a_program_takes_and_is_answered(bench):
+def test_a_program_takes_control_and_gets_a_reply(bench):
     reply = take(bench)
     assert (reply.request, reply.robot, reply.why) == (7, "r1", None)
     assert reply.epoch == bench.report().epoch
@@ -34,13 +34,13 @@ def test_a_program_takes_and_is_answered(bench):
     assert take(bench).epoch == reply.epoch
 
 
-def test_a_program_does_not_get_what_an_operator_has(bench):
+def test_a_program_cannot_take_a_robot_from_an_operator(bench):
     bench.take("a")
     assert take(bench).epoch is None
     assert take(bench).why == "A has control"
 
 
-def test_an_operator_gets_what_a_program_has(bench):
+def test_an_operator_takes_a_robot_from_a_program_after_standstill(bench):
     epoch = take(bench).epoch
     twist(bench, 0.5, 0.0, 0.0)
     assert bench.take("a") is None  # not before it stands
@@ -53,7 +53,7 @@ def test_an_operator_gets_what_a_program_has(bench):
     assert bench.refusals(PROGRAM)[-1].why == "A has control"
 
 
-def test_a_velocity_is_written_once_within_the_limits(bench):
+def test_a_velocity_of_a_program_is_sent_once_and_within_the_limits(bench):
     take(bench)
     twist(bench, 9.0, 1.0, -0.5)
     bench.run(0.15)
@@ -61,7 +61,7 @@ def test_a_velocity_is_written_once_within_the_limits(bench):
     assert bench.written[0].by == PROGRAM
 
 
-def test_without_another_it_is_zero_after_200_ms_and_the_lease_stays(bench):
+def test_a_program_without_new_commands_is_stopped_but_keeps_its_lease(bench):
     take(bench)
     at = bench.now
     twist(bench, 0.5, 0.0, 0.0)
@@ -82,7 +82,7 @@ def test_without_another_it_is_zero_after_200_ms_and_the_lease_stays(bench):
         {"velocity": (math.inf, 0.0, 0.0)},
     ],
 )
-def test_what_is_not_right_is_refused(bench, bad):
+def test_an_invalid_velocity_of_a_program_is_refused(bench, bad):
     take(bench)
     velocity = bad.pop("velocity", (0.5, 0.0, 0.0))
     twist(bench, *velocity, **bad)
@@ -90,7 +90,7 @@ def test_what_is_not_right_is_refused(bench, bad):
     assert bench.refusals(PROGRAM)
 
 
-def test_without_a_lease_nothing_moves(bench):
+def test_velocities_and_goals_of_a_program_without_a_lease_are_not_sent(bench):
     twist(bench, 0.5, 0.0, 0.0)
     bench.tell(
         protocol.FromProgram(commands.Goal("r1", 0, 0, bench.tick, 1.0, 2.0, 0.0))
@@ -99,7 +99,7 @@ def test_without_a_lease_nothing_moves(bench):
     assert not bench.did(actions.SendGoal)
 
 
-def test_doubt_while_it_drives_ends_its_lease(bench):
+def test_a_lost_link_ends_the_lease_of_a_driving_program(bench):
     take(bench)
     twist(bench, 0.5, 0.0, 0.0)
     bench.break_links()
@@ -108,7 +108,7 @@ def test_doubt_while_it_drives_ends_its_lease(bench):
     assert (lost.what, "no connection" in lost.why) == ("lease", True)
 
 
-def test_doubt_that_a_command_meets_first_ends_its_lease_too(bench):
+def test_a_velocity_that_arrives_after_the_display_timeout_ends_the_lease(bench):
     take(bench)
     bench.run(0.04)
     twist(bench, 0.5, 0.0, 0.0)
@@ -119,7 +119,7 @@ def test_doubt_that_a_command_meets_first_ends_its_lease_too(bench):
     assert bench.report().holder is None
 
 
-def test_a_program_that_stood_still_with_its_display_does_not_drive_on(bench):
+def test_a_program_cannot_drive_with_its_old_lease_after_the_display_paused(bench):
     """Its dead-man ends before the silence of the display shows, as by SIGSTOP."""
     take(bench)
     epoch = bench.report().epoch
@@ -134,7 +134,7 @@ def test_a_program_that_stood_still_with_its_display_does_not_drive_on(bench):
     assert bench.report().holder is None
 
 
-def test_doubt_while_nothing_moves_only_refuses(bench):
+def test_an_idle_program_keeps_its_lease_when_the_bridge_does_not_answer(bench):
     take(bench)
     bench.answering = False
     bench.run(0.4)
@@ -144,20 +144,20 @@ def test_doubt_while_nothing_moves_only_refuses(bench):
     assert bench.report().holder is not None
 
 
-class TestTheAnswerToATake:
+class TestTakeAnswer:
     def ask(self, bench):
         bench.answering = False
         bench.run(0.4)
         bench.tell(protocol.FromProgram(commands.Take("r1"), 7))
         assert not bench.of(protocol.TakeReply)
 
-    def test_comes_once_the_robot_would_move(self, bench):
+    def test_the_reply_comes_as_soon_as_the_robot_can_move(self, bench):
         self.ask(bench)
         bench.answering = True
         bench.run(0.02)
         assert bench.of(protocol.TakeReply)[-1].epoch
 
-    def test_comes_in_any_case_after_a_while(self):
+    def test_the_reply_comes_after_a_timeout_even_without_odometry(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
         bench.tell(protocol.FromProgram(commands.Take("r1"), 7))
         bench.run(1.4)
@@ -165,18 +165,20 @@ class TestTheAnswerToATake:
         bench.run(0.2)
         assert bench.of(protocol.TakeReply)[-1].epoch
 
-    def test_is_a_refusal_if_somebody_else_was_quicker(self, bench):
+    def test_the_reply_is_a_refusal_if_an_operator_took_the_robot_meanwhile(
+        self, bench
+    ):
         self.ask(bench)
         bench.say("a", op="take", robot="r1")
         bench.run(0.02)
         assert "no operator has control" in bench.of(protocol.TakeReply)[-1].why
 
-    def test_comes_at_once_for_a_robot_that_takes_goals_only(self):
+    def test_the_reply_comes_at_once_for_a_robot_without_a_velocity_topic(self):
         bench = Bench().begin(spec(twist_topic=None))
         assert take(bench).epoch
 
 
-def test_it_gives_the_lease_back(bench):
+def test_a_program_releases_its_lease(bench):
     take(bench)
     twist(bench, 0.5, 0.0, 0.0)
     bench.tell(protocol.FromProgram(commands.Release("r1")))
@@ -186,7 +188,7 @@ def test_it_gives_the_lease_back(bench):
     bench.tell(protocol.FromProgram(commands.Release("r9")))
 
 
-def test_it_sends_goals_and_cancels_them(bench):
+def test_a_program_with_a_lease_sends_and_cancels_goals(bench):
     epoch = take(bench).epoch
     bench.tell(
         protocol.FromProgram(commands.Goal("r1", epoch, 0, bench.tick, 1.0, 2.0, 0.5))
@@ -205,7 +207,7 @@ def test_it_sends_goals_and_cancels_them(bench):
     bench.tell(protocol.FromProgram(commands.Cancel("r9")))
 
 
-def test_its_own_twist_of_zero_is_a_release(bench):
+def test_a_zero_velocity_of_a_program_stops_the_robot(bench):
     take(bench)
     twist(bench, 0.5, 0.0, 0.0)
     twist(bench, 0.0, 0.0, 0.0)

@@ -83,7 +83,7 @@ def press(page, reached, what):
 
 
 @pytest.mark.parametrize("forged", [(), ("epoch", "seq")])
-def test_a_session_that_was_recorded_moves_nothing_when_it_is_played_again(
+def test_replayed_commands_of_an_old_session_do_not_move_the_robot(
     client, driven, witness, forged
 ):
     page = driven()
@@ -110,7 +110,7 @@ def test_a_session_that_was_recorded_moves_nothing_when_it_is_played_again(
     other.end()
 
 
-def test_a_robot_is_not_sped_up_more_than_it_may_be(driven, witness):
+def test_a_robot_does_not_accelerate_faster_than_its_limit(driven, witness):
     with Sentinel() as sentinel:
         page = driven(a_max=0.4)
         page.take()
@@ -155,7 +155,7 @@ class LatePage(Recorder):
             super().drive(x, robot)
 
 
-def test_a_link_that_is_slow_by_fits_and_starts_slows_the_robot_down(driven, witness):
+def test_a_slow_page_connection_with_jitter_reduces_the_speed(driven, witness):
     page = driven(kind=lambda client: LatePage(client, 0.12, 0.03))
     page.take()
     press(page, lambda: len(moving(witness)) > 60, "a drive")
@@ -165,7 +165,7 @@ def test_a_link_that_is_slow_by_fits_and_starts_slows_the_robot_down(driven, wit
     assert fastest <= 0.25 / (0.2 + 0.25 + 0.15)
 
 
-def test_a_link_beyond_the_limit_moves_nothing_however_it_jitters(driven, witness):
+def test_a_page_connection_slower_than_300_ms_does_not_move_the_robot(driven, witness):
     page = driven(kind=lambda client: LatePage(client, 0.32, 0.2))
     page.take()
     for x in (0.0, 1.0):

@@ -20,7 +20,7 @@ def deaths(tmp_path_factory):
     return [json.loads(line) for line in said.splitlines()]
 
 
-def test_a_stop_is_there_before_it_is_acknowledged(deaths):
+def test_a_stop_is_on_disk_before_it_is_acknowledged(deaths):
     stops = [death for death in deaths if death[0] == "Ann"]
     assert len(stops) > 10, "it takes more lines than that"
     assert {stands for _, _, _, _, stands in stops} == {None, "Ann"}, "whole, or not"
@@ -29,12 +29,12 @@ def test_a_stop_is_there_before_it_is_acknowledged(deaths):
     assert stops[-1][2:] == [True, True, "Ann"]
 
 
-def test_once_there_it_stays_however_often_it_is_killed_on_the_way(deaths):
+def test_a_stop_on_disk_stays_at_every_later_crash_point(deaths):
     stands = [death[4] for death in deaths if death[0] == "Ann"]
     assert stands == sorted(stands, key=lambda by: by == "Ann")
 
 
-def test_a_stop_that_is_being_ended_is_gone_when_that_is_acknowledged(deaths):
+def test_a_reset_stop_is_gone_from_disk_before_the_reset_is_acknowledged(deaths):
     ends = [death for death in deaths if death[0] is None]
     assert {stands for _, _, _, _, stands in ends} == {"Ann", None}
     for _, lines, acknowledged, _, stands in ends:

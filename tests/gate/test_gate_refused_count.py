@@ -27,7 +27,7 @@ def garbage(gate, texts, at):
     ]
 
 
-def test_nine_bad_messages_in_an_instant_are_nine(gate):
+def test_nine_invalid_messages_at_once_are_counted_as_nine(gate):
     received = garbage(gate, ['{"op":"drive"}'] * 9, 1.0)
     received += (
         counts(gate.step(1.01)) + counts(gate.step(1.5)) + counts(gate.step(2.1))
@@ -37,7 +37,7 @@ def test_nine_bad_messages_in_an_instant_are_nine(gate):
     assert received[-1].last.startswith("command: ")
 
 
-def test_somebody_who_sends_much_is_told_of_once_a_second(gate):
+def test_the_refusals_of_one_page_are_reported_about_once_a_second(gate):
     received = []
     for tick in range(200):
         now = 1.0 + tick / 100
@@ -47,7 +47,7 @@ def test_somebody_who_sends_much_is_told_of_once_a_second(gate):
     assert len(received) <= 3
 
 
-def test_what_was_not_told_yet_is_told_when_the_page_goes(gate):
+def test_remaining_refusals_are_reported_when_the_page_disconnects(gate):
     received = garbage(gate, ["x"], 1.0) + counts(gate.step(1.0))
     received += garbage(gate, ["y", "z"], 1.1)
     received += counts(gate.handle(Disconnect("c1"), 1.2))
@@ -55,7 +55,7 @@ def test_what_was_not_told_yet_is_told_when_the_page_goes(gate):
     assert counts(gate.handle(Disconnect("c1"), 1.3)) == []
 
 
-def test_a_refused_wish_counts_too(gate):
+def test_a_refused_command_is_counted(gate):
     text = '{"op":"take","robot":"nobody"}'
     received = garbage(gate, [text], 1.0) + counts(gate.step(1.0))
     assert [count.last for count in received] == ["take: there is no robot 'nobody'"]

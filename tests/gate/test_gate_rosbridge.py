@@ -27,7 +27,9 @@ def goal_by(way, **changes):
         ("geometry_msgs/msg/TwistStamped", {"sec": 0, "nanosec": 0}),
     ],
 )
-def test_a_velocity_with_a_header_has_stamp_zero_in_the_dialect(type, stamp):
+def test_a_stamped_velocity_has_a_zero_stamp_in_the_format_of_its_ros_version(
+    type, stamp
+):
     velocity = rosbridge.velocity("/cmd_vel", type, Twist(0.5, 0.25, -1.0), "base")
     message = said(velocity)["msg"]
     assert message["header"] == {"stamp": stamp, "frame_id": "base"}
@@ -56,20 +58,20 @@ def heard_with(**changes):
     return rosbridge.parse(json.dumps(frame).encode()).twist
 
 
-def test_odometry_tells_all_six_numbers():
+def test_odometry_is_read_with_all_six_numbers():
     assert heard_with() == Twist(1.0, 2.0, 6.0, vz=3.0, wx=4.0, wy=5.0)
 
 
 @pytest.mark.parametrize(("axis", "field"), [("z", "vz"), ("rx", "wx"), ("ry", "wy")])
 @pytest.mark.parametrize("nothing", [None, math.nan])
-def test_a_number_out_of_the_plane_that_is_missing_is_nan(axis, field, nothing):
+def test_a_missing_number_outside_the_plane_is_read_as_nan(axis, field, nothing):
     twist = heard_with(**{axis: nothing})
     assert math.isnan(getattr(twist, field))
     assert (twist.vx, twist.vy, twist.wz) == (1.0, 2.0, 6.0)
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "rz"])
-def test_without_a_number_in_the_plane_there_is_no_velocity(axis):
+def test_odometry_with_a_missing_number_in_the_plane_has_no_velocity(axis):
     assert heard_with(**{axis: None}) is None
 
 
@@ -80,7 +82,7 @@ def test_a_plain_velocity_has_no_header():
     assert message.keys() == {"linear", "angular"}
 
 
-def test_a_goal_goes_to_a_topic():
+def test_a_topic_goal_is_published_as_a_pose():
     received = goal_by("topic", goal_frame="odom")
     assert (received["op"], received["topic"]) == ("publish", "/goal")
     assert received["msg"]["header"]["frame_id"] == "odom"
@@ -88,14 +90,14 @@ def test_a_goal_goes_to_a_topic():
     assert received["msg"]["pose"]["orientation"]["z"] == pytest.approx(1.0)
 
 
-def test_a_goal_goes_to_move_base():
+def test_a_move_base_goal_is_published_on_its_goal_topic():
     received = goal_by("move_base", action="/move_base")
     assert received["topic"] == "/move_base/goal"
     assert received["msg"]["goal_id"]["id"] == "g1"
     assert received["msg"]["goal"]["target_pose"]["header"]["frame_id"] == "map"
 
 
-def test_a_goal_goes_to_an_action():
+def test_an_action_goal_is_sent_with_send_action_goal():
     received = goal_by("navigate_to_pose", action="/go")
     assert (received["op"], received["id"], received["action"]) == (
         "send_action_goal",
@@ -105,7 +107,7 @@ def test_a_goal_goes_to_an_action():
     assert received["args"]["pose"]["header"]["stamp"] == {"sec": 0, "nanosec": 0}
 
 
-def test_everything_else_is_said():
+def test_cancels_hooks_and_poses_are_encoded():
     assert said(rosbridge.cancel_by_topic("/cancel"))["msg"] == {}
     cancel = said(rosbridge.cancel_by_service("/go", "c1"))
     assert cancel["service"] == "/go/_action/cancel_goal"
@@ -133,7 +135,7 @@ FLAT = {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": -1.0}}
 
 
 @pytest.mark.parametrize("message", [FLAT, {"twist": FLAT}, {"twist": {"twist": FLAT}}])
-def test_a_velocity_is_found_in_what_has_one(message):
+def test_a_velocity_is_read_from_plain_stamped_and_odometry_messages(message):
     assert rosbridge.parse(frame(message)).twist == Twist(0.5, 0.0, -1.0)
 
 
@@ -148,11 +150,11 @@ def test_a_velocity_is_found_in_what_has_one(message):
         {"twist": None},
     ],
 )
-def test_no_velocity_is_found_in_what_has_none(message):
+def test_a_message_without_a_valid_twist_has_no_velocity(message):
     assert rosbridge.parse(frame(message)).twist is None
 
 
-def test_a_bare_nan_is_read_and_is_no_velocity():
+def test_a_nan_in_json_is_parsed_but_is_not_a_velocity():
     seen = rosbridge.parse(frame({"linear": {"x": math.nan}, "angular": {"z": 0.0}}))
     assert (seen.topic, seen.twist) == ("/odom", None)
 
@@ -160,10 +162,10 @@ def test_a_bare_nan_is_read_and_is_no_velocity():
 @pytest.mark.parametrize(
     "data", [b"", b"{", b"\xff", b"[]", b'{"op": 5}', b'{"op": NaN}']
 )
-def test_what_makes_no_sense_is_nothing(data):
+def test_invalid_data_is_parsed_as_none(data):
     assert rosbridge.parse(data) is None
 
 
-def test_a_number_for_an_id_is_a_text():
+def test_a_numeric_id_is_converted_to_text():
     assert rosbridge.parse(b'{"op": "service_response", "id": 7}').id == "7"
     assert rosbridge.parse(b'{"op": "status"}').id is None

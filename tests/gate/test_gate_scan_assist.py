@@ -51,13 +51,13 @@ def under_way(bench):
     assert bench.state == "driving"
 
 
-def test_with_nothing_in_the_way_the_robot_goes_as_told(bench):
+def test_a_robot_without_obstacles_drives_at_full_speed(bench):
     under_way(bench)
     assert speeds(bench, 0)[-1] == 1.0
     assert bench.report().why == ("limit of the robot",)
 
 
-def test_the_robot_slows_down_before_a_wall_and_says_why(bench):
+def test_a_robot_slows_down_before_a_wall_and_reports_the_reason(bench):
     under_way(bench)
     hold_seeing(bench, 0.9, 0.3, x=1.0)
     slower = speeds(bench, 0)[-1]
@@ -70,7 +70,7 @@ def test_the_robot_slows_down_before_a_wall_and_says_why(bench):
     assert bench.report().why == ("limit of the robot",)
 
 
-def test_what_is_judged_is_what_is_sent_also_while_it_speeds_up():
+def test_scan_assist_checks_the_ramped_velocity_and_not_the_command():
     """It could pass the point on the wide arc that is asked for, not on the ramp's."""
     tail = ((0.3, 0.3), (-0.9, 0.3), (-0.9, -0.3), (0.3, -0.3))
     point = (-0.91, 0.23)
@@ -103,7 +103,7 @@ def test_a_robot_without_a_scan_does_not_move(bench):
     assert "scan assist: no scan yet" in bench.report().why
 
 
-def test_a_scan_that_stops_coming_stops_the_robot(bench):
+def test_a_robot_stops_when_its_scans_end(bench):
     under_way(bench)
     since = bench.now
     bench.hold(1.0, x=1.0)
@@ -111,7 +111,7 @@ def test_a_scan_that_stops_coming_stops_the_robot(bench):
     assert any("s old" in why for why in bench.report().why)
 
 
-def test_a_scan_of_before_counts_for_nobody_after(bench):
+def test_a_scan_from_before_taking_control_does_not_allow_motion(bench):
     under_way(bench)
     bench.say("a", op="release", robot="r1")
     bench.run(1.0)
@@ -136,23 +136,21 @@ def see_frames(bench, frames, seconds, x=1.0):
 
 
 @pytest.mark.parametrize("frames", ["fr", "ffffffffffffffrrr"], ids=["turns", "runs"])
-def test_two_scanners_on_one_topic_stop_the_robot_as_neither_is_where_it_is_said(
-    bench, frames
-):
+def test_scans_with_two_frames_on_one_topic_stop_the_robot(bench, frames):
     under_way(bench)
     see_frames(bench, frames, 1.0)
     assert see_frames(bench, frames, 4.0) == []
     assert "scan assist: the scans have two different frames" in bench.report().why
 
 
-def test_a_scanner_that_is_started_anew_in_another_frame_is_believed_after_2_s(bench):
+def test_scans_with_a_new_frame_are_accepted_after_2_s(bench):
     under_way(bench)
     assert see_frames(bench, ["rear"], 1.9) == []
     see_frames(bench, ["rear"], 0.3, x=0.0)
     assert see_frames(bench, ["rear"], 0.5) != []
 
 
-def test_a_scan_of_another_frame_than_was_asked_for_is_no_sight():
+def test_a_scan_with_another_frame_than_configured_stops_the_robot():
     assist = msgspec.structs.replace(ASSIST, frame="laser")
     bench = Bench().begin(spec(assist=assist))
     bench.take()
@@ -170,7 +168,7 @@ def test_a_scan_of_another_frame_than_was_asked_for_is_no_sight():
     assert said in bench.report().why
 
 
-def test_a_scan_for_a_machine_that_is_gone_is_nothing(bench):
+def test_a_scan_for_an_unknown_machine_is_ignored(bench):
     key = events.Key("ws://other:9090", "/cmd_vel")
     bench.tell(
         events.ScanReceived(key, "/scan", Scan(0.0, 0.1, 0.1, 8.0, [], bench.now))
@@ -190,12 +188,12 @@ def test_a_scan_for_a_machine_that_is_gone_is_nothing(bench):
         ({"sensor": (math.inf, 0.0, 0.0)}, "finite"),
     ],
 )
-def test_an_assist_that_makes_no_sense_is_refused(changed, said):
+def test_an_invalid_scan_assist_configuration_raises_config_error(changed, said):
     about = {"topic": "/scan", "footprint": BOX, **changed}
     with pytest.raises(ConfigError, match=said):
         checked(spec(assist=AssistSpec(**about)))
 
 
-def test_the_topic_of_an_assist_is_resolved():
+def test_the_scan_topic_gets_a_leading_slash():
     checked_spec = checked(spec(assist=AssistSpec(topic="scan", footprint=BOX)))
     assert checked_spec.assist.topic == "/scan"

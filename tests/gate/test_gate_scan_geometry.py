@@ -35,25 +35,25 @@ def verdict(sweep, wanted, **more):
 
 
 class TestAhead:
-    def test_a_scanner_that_looks_to_the_front_is_enough_to_go_ahead(self):
+    def test_a_scan_of_the_front_allows_driving_ahead(self):
         for half in (180, 135, 90, 60):
             assert verdict(scan(-half, half), AHEAD).scale == 1.0
 
-    def test_one_that_looks_through_a_slit_is_not(self):
+    def test_a_narrow_scan_does_not_allow_driving_ahead(self):
         found = verdict(scan(-20, 20), AHEAD)
         assert (found.scale, found.why) == (0.0, PART)
         assert verdict(scan(-20, 20), AHEAD, blind="creep").scale == pytest.approx(0.2)
 
-    def test_one_that_looks_to_one_side_is_not(self):
+    def test_a_scan_of_one_side_does_not_allow_driving_ahead(self):
         # Its rays are most of what is asked for ahead, and all of them are free.
         assert verdict(scan(-90, 5), AHEAD).why == PART
         assert verdict(scan(-5, 90), AHEAD).why == PART
 
-    def test_one_with_a_gap_ahead_is_not(self):
+    def test_a_scan_with_a_gap_ahead_allows_driving_backwards_only(self):
         assert verdict(scan(15, 345), AHEAD).why == PART
         assert verdict(scan(15, 345), Twist(-0.5)).scale == 1.0
 
-    def test_where_the_scanner_is_and_looks_counts(self):
+    def test_the_position_and_direction_of_the_scanner_count(self):
         behind = (-0.3, 0.0, math.pi)
         assert verdict(scan(-90, 90), AHEAD, sensor=behind).scale == 0.0
         assert verdict(scan(90, 270), AHEAD, sensor=behind).scale == 1.0
@@ -61,13 +61,13 @@ class TestAhead:
         assert verdict(scan(-35, 35), AHEAD).scale == 1.0
         assert verdict(scan(-35, 35), AHEAD, sensor=(0.3, 0.0, 0.0)).why == PART
 
-    def test_what_is_nearer_than_the_stop_distance_need_not_be_seen(self):
+    def test_the_scan_need_not_cover_the_path_within_the_stop_distance(self):
         front = (0.3, 0.0, 0.0)
         assert verdict(scan(-60, 60), AHEAD, sensor=front).scale == 1.0
         near = verdict(scan(-60, 60), AHEAD, sensor=front, stop_distance=0.05)
         assert near.why == PART
 
-    def test_rays_may_run_the_other_way_round(self):
+    def test_a_scan_with_a_negative_angle_increment_is_supported(self):
         there = scan(-90, 90)
         back = Scan(
             -there.angle_min, -there.angle_increment, 0.05, 8.0, there.ranges, 0
@@ -76,25 +76,25 @@ class TestAhead:
         assert verdict(back, Twist(-0.5)).scale == 0.0
 
 
-class TestOtherWays:
-    def test_an_arc_leads_out_of_what_a_narrow_scanner_sees(self):
+class TestOtherDirections:
+    def test_driving_a_curve_needs_a_wider_scan_than_driving_straight(self):
         narrow = scan(-40, 40)
         assert verdict(narrow, Twist(0.5)).scale == 1.0
         assert verdict(narrow, Twist(0.5, 0.0, 1.2)).why == PART
         assert verdict(scan(-90, 90), Twist(0.5, 0.0, 1.2)).scale == 1.0
 
-    def test_backwards_and_sideways_need_eyes_there(self):
+    def test_driving_backwards_or_sideways_needs_a_scan_in_that_direction(self):
         front = scan(-90, 90)
         assert verdict(front, Twist(-0.5)).scale == 0.0
         assert verdict(front, Twist(0.0, 0.5)).why == PART
         assert verdict(scan(-180, 180), Twist(0.0, 0.5)).scale == 1.0
 
-    def test_on_the_spot_half_of_the_circle_is_enough(self):
+    def test_turning_on_the_spot_needs_a_scan_of_half_the_circle(self):
         turn = Twist(0.0, 0.0, 0.5)
         assert verdict(scan(-90, 90), turn).scale == 1.0
         assert verdict(scan(-60, 60), turn).why == PART
 
-    def test_it_is_quick_enough_to_be_asked_at_every_command(self):
+    def test_scan_assist_takes_less_than_20_ms_for_one_command(self):
         round_one = spec(footprint=polygon_around(0.3))
         all_around = scan(-180, 179)
         begun = time.process_time()
@@ -105,25 +105,27 @@ class TestOtherWays:
 
 class TestFan:
     @given(st.floats(-10, 10), st.floats(0.001, 0.5), st.integers(1, 400))
-    def test_covers_each_of_its_rays_and_the_way_to_the_next(self, first, step, count):
+    def test_scan_directions_cover_every_ray_and_the_angle_to_the_next(
+        self, first, step, count
+    ):
         fan = ScanDirections(first, step, count)
         for ray in range(count):
             assert fan.covers(first + (ray + 0.4) * step)
             assert fan.covers(first + ray * step - math.tau)
 
     @given(st.floats(-math.pi, math.pi), st.floats(0.001, 0.1), st.floats(-0.9, 0.9))
-    def test_covers_nothing_on_the_other_side(self, first, step, aside):
+    def test_scan_directions_do_not_cover_the_opposite_side(self, first, step, aside):
         fan = ScanDirections(first, step, 2)
         other = first + math.pi + aside * (math.pi - 0.4)
         assert not fan.covers(other)
 
-    def test_a_whole_circle_covers_everything(self):
+    def test_a_full_circle_scan_covers_every_direction(self):
         fan = ScanDirections(-math.pi, math.radians(1), 360)
         assert fan.share == 1.0
         assert all(fan.covers(math.radians(angle / 3)) for angle in range(-999, 999))
 
 
-def test_a_robot_that_goes_nowhere_needs_no_eyes():
+def test_a_path_shorter_than_the_stop_distance_needs_no_scan():
     nothing = ScanDirections(3.0, 0.01, 1)
     assert looks_ahead(nothing, BOX, (0.0, 0.0, 0.0), AHEAD, 0.1, 0.15)
     assert not looks_ahead(nothing, BOX, (0.0, 0.0, 0.0), AHEAD, 1.0, 0.15)

@@ -16,7 +16,7 @@ from webmap.gate.lanes.odometry import parse_scan, subscribe
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_a_real_bridge_s_scan_keeps_nothing_apart_from_unknown(dialect):
+def test_a_recorded_scan_keeps_infinite_and_nan_ranges_apart(dialect):
     frame = frame_file(dialect, "cbor_scan_inf_nan.bin").read_bytes()
     topic, sweep = parse_scan(frame, 5.0)
     assert topic.endswith("base_scan")
@@ -26,7 +26,7 @@ def test_a_real_bridge_s_scan_keeps_nothing_apart_from_unknown(dialect):
     assert sweep.angle_increment > 0
 
 
-def test_scans_are_asked_for_in_cbor_and_the_newest_only():
+def test_a_scan_subscription_asks_for_cbor_and_a_queue_of_one():
     asked = json.loads(subscribe("/scan", "x"))
     assert asked["compression"] == "cbor"
     assert asked["queue_length"] == 1
@@ -46,7 +46,7 @@ def scan(**changed):
     return cbor2.dumps({"op": "publish", "topic": "/scan", "msg": message})
 
 
-def test_a_scan_is_read():
+def test_a_scan_is_parsed():
     topic, sweep = parse_scan(scan(), 1.0)
     assert (topic, sweep.ranges) == ("/scan", [1.0, 2.0])
 
@@ -63,7 +63,7 @@ def test_a_scan_is_read():
         (None, ""),
     ],
 )
-def test_the_frame_of_a_scan_is_what_its_header_says(header, frame):
+def test_the_frame_of_a_scan_comes_from_its_header(header, frame):
     assert parse_scan(scan(header=header), 1.0)[1].frame == frame
 
 
@@ -86,16 +86,16 @@ def test_a_dense_scan_keeps_its_frame():
         scan(ranges=[None]),
     ],
 )
-def test_anything_else_is_no_scan(frame):
+def test_invalid_scan_messages_are_ignored(frame):
     assert parse_scan(frame, 1.0) is None
 
 
-def test_a_scan_without_ranges_is_empty():
+def test_missing_ranges_are_parsed_as_an_empty_list():
     assert parse_scan(scan(ranges=None), 1.0)[1].ranges == []
 
 
 @given(st.binary(max_size=200))
 @example(b"\xa0[\x80" + bytes(7))  # a byte string that claims 2**63 bytes
-def test_no_bytes_do_any_harm(frame):
+def test_arbitrary_bytes_raise_only_protocol_errors(frame):
     with contextlib.suppress(ProtocolError):
         parse_scan(frame, 1.0)

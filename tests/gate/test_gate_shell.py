@@ -107,7 +107,7 @@ async def driving(folder, **more):
 
 
 @in_loop
-async def test_a_gate_whose_display_has_ended_stops_its_robots_and_ends(tmp_path):
+async def test_a_gate_without_its_display_stops_its_robots_and_ends(tmp_path):
     async with driving(tmp_path) as (bridge, gate):
         before = asyncio.get_running_loop().time()
         await gate.end()
@@ -118,9 +118,7 @@ async def test_a_gate_whose_display_has_ended_stops_its_robots_and_ends(tmp_path
 
 
 @in_loop
-async def test_goals_that_are_to_be_cancelled_are_before_the_gate_ends(
-    tmp_path, monkeypatch
-):
+async def test_goals_are_cancelled_before_the_gate_ends(tmp_path, monkeypatch):
     monkeypatch.setattr(shell, "DRAIN", 30.0)
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         gate.shell.deliver(
@@ -142,7 +140,7 @@ async def test_goals_that_are_to_be_cancelled_are_before_the_gate_ends(
 
 
 @in_loop
-async def test_a_hook_that_hangs_does_not_keep_the_gate_alive(tmp_path):
+async def test_a_hanging_stop_hook_does_not_prevent_the_end_of_the_gate(tmp_path):
     hook = {"service": "/e_stop", "type": "std_srvs/Trigger"}
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         bridge.answers_services = False
@@ -158,9 +156,7 @@ async def test_a_hook_that_hangs_does_not_keep_the_gate_alive(tmp_path):
 
 @pytest.mark.parametrize("where", ["handle", "step"])
 @in_loop
-async def test_a_gate_that_fails_sends_zero_and_ends(
-    tmp_path, monkeypatch, caplog, where
-):
+async def test_a_failed_gate_sends_zero_and_ends(tmp_path, monkeypatch, caplog, where):
     async with driving(tmp_path) as (bridge, gate):
 
         def fail(*_):
@@ -181,7 +177,7 @@ async def test_a_gate_that_fails_sends_zero_and_ends(
 
 
 @in_loop
-async def test_a_link_that_breaks_on_the_last_zero_keeps_none_from_the_others(
+async def test_an_error_while_sending_one_last_zero_does_not_prevent_the_others(
     tmp_path, monkeypatch, caplog
 ):
     """The first machine's link is broken; the second and the end do not wait for it."""
@@ -213,7 +209,7 @@ async def test_a_link_that_breaks_on_the_last_zero_keeps_none_from_the_others(
 
 
 @in_loop
-async def test_a_gate_that_has_failed_writes_nothing_but_zero_whoever_goes_on(
+async def test_a_failed_gate_sends_only_zeros_while_the_page_continues_to_drive(
     tmp_path, monkeypatch
 ):
     """While it waits for a hook that hangs, hand and display go on as before."""
@@ -238,7 +234,7 @@ async def test_a_gate_that_has_failed_writes_nothing_but_zero_whoever_goes_on(
 
 
 @in_loop
-async def test_a_link_that_stalls_is_cut_and_on_the_next_zero_goes_first(tmp_path):
+async def test_a_stalled_link_is_cut_and_zero_is_sent_first_on_the_new_link(tmp_path):
     async with driving(tmp_path) as (bridge, gate):
         links = set(bridge.links)
         for link in links:
@@ -270,7 +266,7 @@ async def robot_of_another_gate(tmp_path, monkeypatch):
 
 
 @in_loop
-async def test_a_robot_that_another_gate_has_is_asked_for_until_it_is_free(
+async def test_a_gate_retries_the_lock_of_a_robot_until_another_gate_releases_it(
     tmp_path, monkeypatch
 ):
     async with robot_of_another_gate(tmp_path, monkeypatch) as (gate, other, key):
@@ -283,9 +279,7 @@ async def test_a_robot_that_another_gate_has_is_asked_for_until_it_is_free(
 
 
 @in_loop
-async def test_a_robot_that_is_forgotten_meanwhile_is_left_to_the_other_gate(
-    tmp_path, monkeypatch
-):
+async def test_removing_a_robot_ends_the_wait_for_its_lock(tmp_path, monkeypatch):
     async with robot_of_another_gate(tmp_path, monkeypatch) as (gate, other, key):
         await gate.reported(lambda r: not r.armable, "that it is not to be had")
         gate.shell.deliver(protocol.Forget("r1"))
@@ -297,7 +291,7 @@ async def test_a_robot_that_is_forgotten_meanwhile_is_left_to_the_other_gate(
 
 
 @in_loop
-async def test_a_robot_that_is_forgotten_may_be_had_by_another_gate(tmp_path):
+async def test_removing_a_robot_releases_its_lock_for_another_gate(tmp_path):
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         key = Key(bridge.url, "/cmd_vel")
         gate.shell.deliver(robot(bridge))
@@ -308,7 +302,7 @@ async def test_a_robot_that_is_forgotten_may_be_had_by_another_gate(tmp_path):
 
 
 @in_loop
-async def test_a_state_file_that_cannot_be_read_is_a_stop_that_stands(tmp_path, caplog):
+async def test_an_unreadable_stop_file_means_an_active_stop(tmp_path, caplog):
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         path = path_of(tmp_path, Key(bridge.url, "/cmd_vel"), "stop")
         path.write_bytes(b"\xff{")
@@ -325,7 +319,7 @@ async def test_a_state_file_that_cannot_be_read_is_a_stop_that_stands(tmp_path, 
 
 
 @in_loop
-async def test_a_stop_of_another_gate_is_seen_and_one_of_its_own_is_kept(tmp_path):
+async def test_a_gate_follows_stops_of_another_gate_and_saves_its_own(tmp_path):
     async with driving(tmp_path) as (bridge, gate):
         key = Key(bridge.url, "/cmd_vel")
         Records(tmp_path).keep_latch(key, Press("Ben", "b1"), frozenset())
@@ -343,7 +337,7 @@ async def test_a_stop_of_another_gate_is_seen_and_one_of_its_own_is_kept(tmp_pat
 
 
 @in_loop
-async def test_a_robot_is_one_however_this_computer_is_spelled(tmp_path):
+async def test_all_spellings_of_this_computer_name_the_same_machine(tmp_path):
     async with driving(tmp_path) as (bridge, gate):
         url = bridge.url.replace("127.0.0.1", "localhost")
         assert url != bridge.url
@@ -365,7 +359,7 @@ async def test_a_robot_is_one_however_this_computer_is_spelled(tmp_path):
 
 
 @in_loop
-async def test_a_gate_that_has_failed_decides_nothing_more(tmp_path):
+async def test_the_step_loop_of_a_failed_gate_ends_at_once(tmp_path):
     failed = Running(tmp_path).shell
     failed.failed = True
     async with asyncio.timeout(5):

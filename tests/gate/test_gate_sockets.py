@@ -40,7 +40,7 @@ async def forever(link):
 
 class TestOpen:
     @in_loop
-    async def test_what_is_sent_arrives_and_the_answer_is_heard(self):
+    async def test_a_message_arrives_and_its_answer_is_received(self):
         seen = Received()
         async with noting_bridge() as bridge:
             link = await opened(bridge.url, seen)
@@ -56,7 +56,7 @@ class TestOpen:
         assert seen.lost == [], "what is closed on purpose is not lost"
 
     @in_loop
-    async def test_a_message_in_pieces_is_heard_once_and_whole(self):
+    async def test_a_fragmented_message_is_received_once_and_complete(self):
         seen = Received()
 
         async def talk(link):
@@ -74,7 +74,7 @@ class TestOpen:
             link.close()
 
     @in_loop
-    async def test_a_ping_of_the_bridge_is_answered_and_heard_by_nobody(self):
+    async def test_a_ping_of_the_bridge_is_answered_without_calling_a_handler(self):
         seen, answers = Received(), []
 
         async def talk(link):
@@ -90,7 +90,9 @@ class TestOpen:
             link.close()
 
     @in_loop
-    async def test_the_loop_goes_on_while_the_authorities_are_read(self, monkeypatch):
+    async def test_loading_the_certificate_authorities_does_not_block_the_event_loop(
+        self, monkeypatch
+    ):
         reading, may_end, ended = threading.Event(), threading.Event(), []
 
         def slow_disk():
@@ -106,7 +108,7 @@ class TestOpen:
             await asking
         assert ended == [True], "the loop stood still while it was read"
 
-    def test_a_bridge_behind_tls_is_spoken_to_if_its_name_is_vouched_for(
+    def test_a_tls_bridge_is_accepted_only_with_a_trusted_certificate(
         self, tmp_path, monkeypatch
     ):
         key, cert = str(tmp_path / "key.pem"), str(tmp_path / "cert.pem")
@@ -142,7 +144,7 @@ class TestOpen:
 
 class TestRefused:
     @in_loop
-    async def test_where_nobody_listens_the_reason_is_told(self):
+    async def test_a_refused_connection_raises_bridge_closed_with_the_reason(self):
         with socket.socket() as taken:
             taken.bind(("127.0.0.1", 0))
             url = f"ws://127.0.0.1:{taken.getsockname()[1]}"
@@ -158,7 +160,7 @@ class TestRefused:
         ],
     )
     @in_loop
-    async def test_what_speaks_no_websocket_is_refused_with_the_reason(self, answer):
+    async def test_a_server_without_websocket_is_refused_with_the_reason(self, answer):
         seen = Received()
 
         async def talk(link):
@@ -172,7 +174,7 @@ class TestRefused:
         assert seen.lost == [], "what was never open cannot be lost"
 
     @in_loop
-    async def test_a_bridge_that_hangs_up_before_the_handshake_is_refused(self):
+    async def test_a_bridge_that_closes_before_the_handshake_is_refused(self):
         seen = Received()
 
         async def talk(link):
@@ -185,7 +187,7 @@ class TestRefused:
         assert seen.lost == []
 
     @in_loop
-    async def test_a_bridge_that_says_nothing_is_given_up_and_was_never_lost(
+    async def test_a_handshake_without_an_answer_times_out_and_reports_no_loss(
         self, monkeypatch
     ):
         monkeypatch.setattr(sockets, "CONNECT_TIMEOUT", 0.1)
@@ -205,7 +207,7 @@ class TestRefused:
         assert seen.lost == []
 
     @in_loop
-    async def test_an_attempt_that_is_no_longer_wanted_leaves_nothing_behind(self):
+    async def test_a_cancelled_connection_attempt_closes_its_socket(self):
         seen, asked, ended = Received(), asyncio.Event(), []
 
         async def talk(link):
@@ -226,7 +228,7 @@ class TestRefused:
         assert seen.lost == []
 
     @in_loop
-    async def test_a_socket_that_never_connected_is_closed_without_a_word(self):
+    async def test_closing_a_socket_that_never_connected_reports_no_loss(self):
         seen = Received()
         link = Socket("ws://127.0.0.1:1", seen.ears, Budget())
         assert link.unsent == 0
@@ -238,7 +240,7 @@ class TestRefused:
 
 class TestEnd:
     @in_loop
-    async def test_of_a_socket_that_is_cut_what_was_not_sent_never_arrives(self):
+    async def test_aborting_a_socket_discards_its_unsent_data(self):
         seen, arrived, go_on = Received(), [], asyncio.Event()
 
         async def talk(link):
@@ -267,7 +269,7 @@ class TestEnd:
         assert seen.lost == ["no longer used"], "it is lost once"
 
     @in_loop
-    async def test_a_goodbye_is_said_and_what_comes_after_it_is_heard_by_nobody(self):
+    async def test_closing_sends_a_close_frame_and_ignores_later_messages(self):
         seen, goodbyes, go_on = Received(), [], asyncio.Event()
 
         async def talk(link):
@@ -286,7 +288,7 @@ class TestEnd:
         assert (seen.texts, seen.lost) == ([], [])
 
     @in_loop
-    async def test_a_bridge_that_says_goodbye_is_lost(self):
+    async def test_a_close_frame_from_the_bridge_reports_a_loss(self):
         seen = Received()
 
         async def talk(link):
@@ -300,7 +302,7 @@ class TestEnd:
             assert seen.lost == ["the bridge closed the connection"]
 
     @in_loop
-    async def test_a_bridge_that_only_stops_sending_is_lost(self):
+    async def test_an_end_of_stream_from_the_bridge_reports_a_loss(self):
         seen = Received()
 
         async def talk(link):
@@ -313,7 +315,7 @@ class TestEnd:
             await until(lambda: seen.lost == ["the bridge closed the connection"], "it")
 
     @in_loop
-    async def test_a_bridge_that_dies_is_lost_with_the_reason_of_the_system(self):
+    async def test_a_connection_reset_reports_a_loss_with_the_system_error(self):
         seen = Received()
         async with noting_bridge() as bridge:
             link = await opened(bridge.url, seen)
@@ -326,7 +328,7 @@ class TestEnd:
             assert "reset" in seen.lost[0]
 
     @in_loop
-    async def test_a_message_that_is_too_long_ends_the_link(self, monkeypatch):
+    async def test_a_message_that_is_too_long_closes_the_socket(self, monkeypatch):
         monkeypatch.setattr(sockets, "MAX_FRAME", 100)
         seen = Received()
 

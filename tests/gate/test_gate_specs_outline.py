@@ -17,7 +17,7 @@ HOOK = ((0, 0), (2, 0), (2, 2), (1, 2), (1, 1), (0, 1))
     "corners",
     [BOX, BOX[::-1], HOOK, polygon_around(0.3), polygon_around(20.0, MOST_CORNERS)],
 )
-def test_outlines_round_either_way_and_with_hooks_are_taken(corners):
+def test_outlines_in_both_directions_and_concave_outlines_are_accepted(corners):
     assert why_no_outline(corners) is None
 
 
@@ -39,12 +39,12 @@ def test_outlines_round_either_way_and_with_hooks_are_taken(corners):
         (((0, 0), (9e-3, 0), (9e-3, 9e-3)), "it has an area of 4.05e-05 m²; expected"),
     ],
 )
-def test_what_has_no_inside_is_refused_with_a_sentence(corners, said):
+def test_an_invalid_outline_is_refused_with_a_reason(corners, said):
     assert said in why_no_outline(corners)
 
 
 @given(st.permutations(polygon_around(0.5, 7)))
-def test_only_the_order_round_the_robot_is_taken(corners):
+def test_only_corners_in_order_around_the_robot_make_an_outline(corners):
     turns = [
         math.atan2(y, x) - math.atan2(corners[0][1], corners[0][0]) for x, y in corners
     ]

@@ -51,7 +51,7 @@ def watch_it(bench, seconds, *speeds):
 
 
 class TestLatch:
-    def test_while_stop_stands_nobody_gets_the_robot(self, bench):
+    def test_nobody_can_take_a_robot_while_a_stop_is_active(self, bench):
         bench.drive_off()
         stop(bench)
         report = bench.report()
@@ -65,7 +65,7 @@ class TestLatch:
         assert bench.of(protocol.TakeReply)[-1].epoch is None
         assert bench.report().latched
 
-    def test_no_command_and_no_goal_gets_through_it(self, bench):
+    def test_no_command_and_no_goal_is_sent_while_a_stop_is_active(self, bench):
         epoch = bench.drive_off()
         stop(bench)
         at = bench.now
@@ -82,7 +82,7 @@ class TestLatch:
         assert bench.moving_since(at) == []
         assert bench.did(actions.SendGoal) == []
 
-    def test_zeros_go_on_at_10_hz_and_not_for_ever(self, bench):
+    def test_a_stop_sends_zeros_at_10_hz_for_a_limited_time(self, bench):
         stop(bench)
         bench.run(1.0)
         at = bench.now
@@ -102,7 +102,7 @@ class TestLatch:
         bench.run(1.0)
         assert bench.written[-1].at > bench.now - 0.11
 
-    def test_a_link_that_is_down_is_not_written_to(self, bench):
+    def test_a_stop_writes_no_zeros_while_the_link_is_down(self, bench):
         stop(bench)
         bench.break_links()
         bench.run(1.0)
@@ -110,7 +110,7 @@ class TestLatch:
         bench.run(2.0)
         assert len(bench.dropped) == before
 
-    def test_its_zero_goes_before_anything_is_written_to_disk(self, bench):
+    def test_the_zero_of_a_stop_is_sent_before_any_disk_write(self, bench):
         bench.done.clear()
         stop(bench)
         kinds = [type(each) for each in bench.done]
@@ -118,7 +118,7 @@ class TestLatch:
         first = min(kinds.index(kind) for kind in disk)
         assert kinds.index(actions.WriteTwist) < first
 
-    def test_on_every_new_link_it_is_the_first_thing_sent(self, bench):
+    def test_a_stop_sends_zero_first_on_a_new_link(self, bench):
         bench.drive_off()
         stop(bench)
         bench.break_links()
@@ -130,7 +130,7 @@ class TestLatch:
         bench.run(2.0)
         assert bench.written[-1].at > bench.now - 0.11
 
-    def test_reset_moves_nothing_and_gives_nothing(self, bench):
+    def test_a_reset_sends_no_velocity_and_gives_nobody_control(self, bench):
         epoch = bench.drive_off()
         stop(bench)
         bench.run(1.0, lambda: bench.drive(x=1.0, epoch=epoch))
@@ -143,7 +143,7 @@ class TestLatch:
         bench.run(1.0, lambda: bench.drive(x=1.0, epoch=epoch))
         assert bench.since(at) == []
 
-    def test_after_reset_a_key_that_was_held_all_along_moves_nothing(self, bench):
+    def test_a_key_held_before_and_after_the_reset_moves_nothing(self, bench):
         bench.drive_off()
         stop(bench)
         bench.hold(0.5, x=1.0)
@@ -156,7 +156,7 @@ class TestLatch:
         bench.hold(0.1, x=1.0)
         assert bench.moving_since(at) != []
 
-    def test_reset_needs_an_operator_and_a_stop(self, bench):
+    def test_a_reset_needs_an_operator_and_an_active_stop(self, bench):
         bench.join("v", "viewer")
         reset(bench)
         assert bench.refusals("b")[-1].why == "no STOP is active"
@@ -167,7 +167,7 @@ class TestLatch:
         reset(bench, "b", "r9")
         assert "'r9'" in bench.refusals("b")[-1].why
 
-    def test_stop_for_all_latches_all_and_each_has_its_own_reset(self):
+    def test_stop_all_stops_every_robot_and_each_needs_its_own_reset(self):
         other = "/r2/cmd_vel"
         bench = Bench().begin(spec(), spec(id="r2", twist_topic=other))
         stop(bench, robot="*")
@@ -180,7 +180,7 @@ class TestLatch:
         assert not bench.report("r2").latched
         assert bench.refusals("b") == []
 
-    def test_python_stops_and_resets(self, bench):
+    def test_a_program_can_stop_a_robot_and_reset_the_stop(self, bench):
         bench.tell(protocol.FromProgram(commands.Stop("r1")))
         assert bench.report().stop.by == PROGRAM
         bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
@@ -188,7 +188,7 @@ class TestLatch:
         bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
         assert bench.refusals(PROGRAM)[-1].what == "reset"
 
-    def test_a_robot_that_is_declared_anew_is_still_stopped(self, bench):
+    def test_a_stop_stays_active_when_the_robot_is_declared_again(self, bench):
         stop(bench)
         bench.tell(spec(v_max=0.5))
         assert bench.report().latched
@@ -201,7 +201,7 @@ class TestLatch:
         reset(bench)
         assert bench.take()
 
-    def test_a_robot_that_is_forgotten_while_it_is_watched_is_watched_no_more(self):
+    def test_removing_a_stopped_robot_stops_watching_its_odometry(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
         stop(bench)
         bench.run(0.6)
@@ -211,7 +211,7 @@ class TestLatch:
         last = [a for a in bench.done if isinstance(a, kept)][-2:]
         assert last == [actions.Watch(KEY, False), actions.Detach(KEY, "r1")]
 
-    def test_one_that_another_gate_has_is_not_looked_at_anew_every_second(self):
+    def test_a_repeated_lock_failure_does_not_revoke_the_confirmation_of_a_stop(self):
         bench = Bench(lock_held=False).begin(spec(odometry_topic="/odom"))
         stop(bench)
         watch_it(bench, 0.5, 0.0)
@@ -219,13 +219,13 @@ class TestLatch:
         bench.tell(events.LockState(KEY, held=False, why="another has it"))
         assert bench.report().stop.confirmed
 
-    def test_two_robots_that_are_one_machine_share_it(self):
+    def test_two_robots_on_one_machine_share_a_stop(self):
         bench = Bench().begin(spec(), spec(id="r2"))
         stop(bench, robot="r1")
         assert bench.report("r2").latched
         assert bench.take("a", "r2") is None
 
-    def test_a_robot_that_takes_goals_only_is_latched_too(self):
+    def test_a_robot_without_a_velocity_topic_can_be_stopped(self):
         bench = Bench().begin(spec(twist_topic=None))
         stop(bench)
         assert bench.report().latched
@@ -238,7 +238,7 @@ class TestLatch:
         assert bench.written == bench.dropped == []
 
 
-class TestByAnotherKey:
+class TestChangedKey:
     """A robot that takes goals only is known by those, else by its velocity topic."""
 
     ONLY_GOALS = spec(twist_topic=None)
@@ -250,7 +250,7 @@ class TestByAnotherKey:
         stop(bench)
         return bench
 
-    def test_one_that_is_stopped_and_gets_velocity_stays_stopped(self, bench):
+    def test_a_stopped_robot_that_gets_a_velocity_topic_stays_stopped(self, bench):
         bench.tell(spec())
         assert bench.written[-1].twist == ZERO
         assert bench.stops == {self.GOALS: "B", KEY: "B"}
@@ -264,7 +264,7 @@ class TestByAnotherKey:
         bench.drive_off()
         assert bench.written[-1].twist == Twist(1.0)
 
-    def test_one_that_is_stopped_and_loses_velocity_stays_stopped(self):
+    def test_a_stopped_robot_that_loses_its_velocity_topic_stays_stopped(self):
         bench = Bench().begin()
         bench.drive_off()
         stop(bench)
@@ -276,7 +276,7 @@ class TestByAnotherKey:
         reset(bench)
         assert bench.take()
 
-    def test_its_reset_ends_it_by_the_key_that_it_is_only_just_leaving(self):
+    def test_a_reset_also_ends_the_stop_under_the_key_that_the_robot_is_leaving(self):
         bench = Bench().begin()
         bench.drive_off()
         stop(bench)
@@ -284,7 +284,7 @@ class TestByAnotherKey:
         reset(bench)
         assert bench.stops == {}
 
-    def test_its_reset_ends_it_by_every_key_that_it_had(self, bench):
+    def test_a_reset_ends_the_stop_under_every_earlier_key_of_the_robot(self, bench):
         bench.tell(spec())
         bench.tell(spec(twist_topic="/other"))
         bench.run(1.0)
@@ -293,7 +293,7 @@ class TestByAnotherKey:
         bench.tell(self.ONLY_GOALS)
         assert bench.take()
 
-    def test_its_reset_leaves_another_robot_stopped_that_has_its_old_key(self):
+    def test_a_reset_does_not_end_the_stop_of_another_robot_with_the_old_key(self):
         bench = Bench().begin(self.ONLY_GOALS, spec(id="r2", twist_topic=None))
         stop(bench)
         bench.tell(spec())
@@ -302,7 +302,7 @@ class TestByAnotherKey:
         assert bench.report("r2").latched
         assert bench.stops == {self.GOALS: "B"}
 
-    def test_one_that_is_reset_where_it_was_before_needs_no_other_reset(self, bench):
+    def test_a_stop_that_was_reset_under_the_old_key_is_not_reset_again(self, bench):
         bench.tell(spec())
         bench.tell(spec(id="r2", twist_topic=None))
         reset(bench, robot="r2")
@@ -311,15 +311,15 @@ class TestByAnotherKey:
         reset(bench)
         assert len(bench.did(actions.SaveStop)) == kept + 1
 
-    def test_one_that_is_not_stopped_is_not(self):
+    def test_a_robot_that_was_not_stopped_is_not_stopped_under_its_new_key(self):
         bench = Bench().begin(self.ONLY_GOALS)
         bench.tell(spec())
         assert not bench.report().latched
         assert bench.take()
 
 
-class TestOnDisk:
-    def test_zero_goes_out_before_the_disk_and_the_word_of_it_after(self):
+class TestDisk:
+    def test_zero_is_sent_before_the_disk_write_and_the_report_afterwards(self):
         bench = Bench(slow_disk=True).begin()
         bench.drive_off()
         stop(bench)
@@ -334,7 +334,7 @@ class TestOnDisk:
         bench.keep(last[1])
         assert bench.report().latched
 
-    def test_pressed_often_it_is_written_as_quickly_as_the_disk_goes(self):
+    def test_only_the_newest_of_several_stops_during_a_disk_write_is_saved(self):
         bench = Bench(slow_disk=True).begin()
         for who in "babab":
             stop(bench, who)
@@ -347,7 +347,7 @@ class TestOnDisk:
         assert bench.report().stop.id == newest.press.id
         assert newest.press.id != first.press.id
 
-    def test_while_it_is_written_again_the_earlier_one_is_shown_and_not_reset(self):
+    def test_the_earlier_stop_is_shown_and_not_reset_while_a_newer_stop_is_saved(self):
         bench = Bench().begin()
         stop(bench, "b")
         bench.slow_disk = True
@@ -357,7 +357,7 @@ class TestOnDisk:
         assert "A pressed STOP meanwhile" in bench.refusals("b")[-1].why
         assert bench.report().latched
 
-    def test_an_answer_of_the_disk_that_was_overtaken_does_not_count(self):
+    def test_only_the_answer_to_the_newest_disk_write_changes_the_report(self):
         bench = Bench(slow_disk=True).begin()
         stop(bench)
         (only,) = bench.did(actions.SaveStop)
@@ -371,7 +371,7 @@ class TestOnDisk:
         bench.keep(third)
         assert bench.report().latched
 
-    def test_a_forgotten_robots_stop_is_kept_all_the_same(self):
+    def test_the_stop_of_a_removed_robot_is_still_saved(self):
         bench = Bench(slow_disk=True).begin()
         stop(bench)
         bench.tell(protocol.Forget("r1"))
@@ -380,7 +380,7 @@ class TestOnDisk:
         bench.tell(spec())
         assert bench.report().latched
 
-    def test_a_disk_that_is_full_is_said_and_stop_stands(self):
+    def test_a_full_disk_is_reported_and_the_stop_stays_active(self):
         bench = Bench(full_disk=True).begin()
         stop(bench)
         assert bench.report().latched
@@ -390,7 +390,7 @@ class TestOnDisk:
         assert bench.stops == {KEY: "B"}
         assert "disk" not in bench.report().stop.why
 
-    def test_a_new_gate_finds_it_and_says_it_all_again(self):
+    def test_a_new_gate_enforces_a_saved_stop_until_its_reset(self):
         old = Bench().begin()
         stop(old)
         bench = Bench(disk=old.disk)
@@ -407,11 +407,11 @@ class TestOnDisk:
         assert bench.drive_off()
         assert bench.moving_since(0)
 
-    def test_no_report_says_before_it_is_known_that_none_stands(self):
+    def test_every_report_of_a_new_gate_shows_the_saved_stop(self):
         bench = Bench(disk={KEY: Press("B", "b1")}).begin()
         assert all(r.latched for r in bench.of(protocol.RobotReport))
 
-    def test_a_machine_that_another_gate_has_gets_no_zeros_from_the_disk(self):
+    def test_a_saved_stop_sends_zeros_only_after_the_gate_gets_the_lock(self):
         bench = Bench(disk={KEY: Press("B", "b1")}, lock_held=False).begin()
         bench.run(1.0)
         assert bench.written == []
@@ -422,7 +422,7 @@ class TestOnDisk:
 
 
 class TestConfirmation:
-    def test_300_ms_of_standstill_confirm_it(self, seen):
+    def test_a_stop_is_confirmed_after_300_ms_of_standstill(self, seen):
         stop(seen)
         assert verdict(seen) == ("B", None, "")
         watch_it(seen, 0.4, 0.4, 0.2)
@@ -430,7 +430,7 @@ class TestConfirmation:
         watch_it(seen, 0.4, 0.01)
         assert seen.report().stop.confirmed is True
 
-    def test_it_is_confirmed_only_as_long_as_there_is_a_link(self, seen):
+    def test_a_lost_link_revokes_the_confirmation_of_a_stop(self, seen):
         stop(seen)
         watch_it(seen, 0.4, 0.0)
         assert seen.report().stop.confirmed is True
@@ -445,7 +445,7 @@ class TestConfirmation:
         watch_it(seen, 0.4, 0.0)
         assert seen.report().stop.confirmed is True
 
-    def test_a_gap_in_odometry_that_says_it_stands_is_no_motion(self, seen):
+    def test_a_one_second_gap_in_odometry_does_not_revoke_the_confirmation(self, seen):
         stop(seen)
         watch_it(seen, 0.4, 0.0)
         seen.run(1.0)
@@ -453,7 +453,7 @@ class TestConfirmation:
         watch_it(seen, 0.05, 0.0)
         assert seen.report().stop.confirmed is True
 
-    def test_odometry_that_comes_once_a_second_is_said_to_tell_too_little(self, seen):
+    def test_odometry_at_1_hz_does_not_confirm_a_stop(self, seen):
         stop(seen)
         for _ in range(4):
             watch_it(seen, 0.01, 0.0)
@@ -461,7 +461,7 @@ class TestConfirmation:
         too_seldom = "only one odometry message in 1.0 s"
         assert verdict(seen) == ("B", False, too_seldom)
 
-    def test_one_that_has_only_just_come_to_a_standstill_says_so(self, seen):
+    def test_a_robot_that_has_just_stopped_is_reported_as_not_yet_still(self, seen):
         stop(seen)
         watch_it(seen, 1.9, 0.4)
         watch_it(seen, 0.2, 0.0)
@@ -469,7 +469,7 @@ class TestConfirmation:
         watch_it(seen, 0.2, 0.0)
         assert seen.report().stop.confirmed is True
 
-    def test_one_that_moves_again_is_confirmed_no_longer_however_late(self, seen):
+    def test_later_silence_or_motion_revokes_the_confirmation_of_a_stop(self, seen):
         """By a goal that begins late, by a ramp, or by another that publishes."""
         stop(seen)
         watch_it(seen, 0.4, 0.0)
@@ -485,28 +485,28 @@ class TestConfirmation:
         seen.run(2.0)
         assert seen.did(actions.Watch)[-1] == actions.Watch(KEY, False)
 
-    def test_one_that_moves_on_is_not_confirmed_until_it_stands(self, seen):
+    def test_a_stop_of_a_moving_robot_is_not_confirmed_until_standstill(self, seen):
         stop(seen)
         watch_it(seen, 2.1, 0.31)
         assert verdict(seen) == ("B", False, "still moving at 0.31 m/s")
         watch_it(seen, 0.5, 0.0)
         assert seen.report().stop.confirmed is True
 
-    def test_a_turn_is_a_motion_too(self, seen):
+    def test_a_stop_of_a_turning_robot_is_not_confirmed(self, seen):
         stop(seen)
         seen.run(1.0, lambda: seen.tell(events.OdometryReceived(KEY, Twist(0, 0, 0.1))))
         assert seen.report().stop.confirmed is None
         seen.run(1.1, lambda: seen.tell(events.OdometryReceived(KEY, Twist(0, 0, 0.1))))
         assert seen.report().stop.why == "still turning at 0.10 rad/s"
 
-    def test_odometry_with_gaps_proves_nothing(self, seen):
+    def test_odometry_with_long_gaps_does_not_confirm_a_stop(self, seen):
         stop(seen)
         for _ in range(3):
             seen.tell(events.OdometryReceived(KEY, ZERO))
             seen.run(0.6)
         assert seen.report().stop.confirmed is None
 
-    def test_what_was_seen_before_stop_does_not_count(self, seen):
+    def test_standstill_before_the_stop_does_not_confirm_the_stop(self, seen):
         seen.take()
         watch_it(seen, 0.5, 0.0)
         stop(seen)
@@ -514,26 +514,24 @@ class TestConfirmation:
         assert seen.report().stop.confirmed is None
 
     @pytest.mark.parametrize("received", [[], [None]])
-    def test_odometry_that_does_not_come_confirms_nothing(self, seen, received):
+    def test_missing_or_empty_odometry_does_not_confirm_a_stop(self, seen, received):
         stop(seen)
         for twist in received:
             seen.tell(events.OdometryReceived(KEY, twist))
         seen.run(2.2)
         assert verdict(seen) == ("B", False, "no odometry")
 
-    def test_odometry_that_fell_silent_says_so(self, seen):
+    def test_odometry_that_ends_after_the_stop_is_reported_as_no_odometry(self, seen):
         stop(seen)
         watch_it(seen, 0.2, 0.3)
         seen.run(2.5)
         assert seen.report().stop.why == "no odometry"
 
-    def test_without_odometry_nothing_is_confirmed(self, bench):
+    def test_a_stop_of_a_robot_without_odometry_is_not_confirmed(self, bench):
         stop(bench)
         assert verdict(bench) == ("B", False, "no odometry")
 
-    def test_without_a_link_it_is_not_confirmed_and_with_one_it_is_looked_at(
-        self, seen
-    ):
+    def test_a_stop_without_a_link_can_be_confirmed_after_the_link_is_up(self, seen):
         seen.break_links()
         stop(seen)
         assert verdict(seen) == ("B", False, f"no connection to {URL}")
@@ -542,7 +540,7 @@ class TestConfirmation:
         watch_it(seen, 0.6, 0.0)
         assert seen.report().stop.confirmed is True
 
-    def test_a_bridge_that_does_not_answer_has_perhaps_not_heard_it(self, seen):
+    def test_a_stop_is_confirmed_only_after_the_bridge_answers(self, seen):
         seen.answering = False
         seen.run(0.2)
         stop(seen)
@@ -552,7 +550,7 @@ class TestConfirmation:
         watch_it(seen, 0.1, 0.0)
         assert seen.report().stop.confirmed is True
 
-    def test_one_that_never_answered_says_so_in_the_end(self):
+    def test_a_bridge_that_never_answers_is_the_reason_for_no_confirmation(self):
         from webmap.gate.rules.stop import Confirmation
 
         confirmation = Confirmation()
@@ -575,26 +573,28 @@ class TestHooks:
         hooks = bench.did(actions.RunHook)
         return [(h.hook.get("topic") or h.hook["service"], h.stopped) for h in hooks]
 
-    def test_are_said_on_stop_and_the_flag_is_taken_back_on_reset(self, bench):
+    def test_hooks_run_on_stop_and_a_reset_clears_only_the_topic_hook(self, bench):
         stop(bench)
         assert self.said(bench) == [("/lock", True), ("/e_stop", True)]
         reset(bench)
         assert self.said(bench)[2:] == [("/lock", False)]
 
-    def test_come_after_the_zero(self, bench):
+    def test_hooks_run_after_the_zero_is_sent(self, bench):
         bench.drive_off()
         stop(bench)
         kept = (actions.WriteTwist, actions.RunHook)
         last = [a for a in bench.done if isinstance(a, kept)][-3:]
         assert isinstance(last[0], actions.WriteTwist)
 
-    def test_are_said_again_on_every_new_link(self, bench):
+    def test_hooks_run_again_on_a_new_link(self, bench):
         stop(bench)
         bench.break_links()
         bench.connect_links()
         assert self.said(bench)[2:] == [("/lock", True), ("/e_stop", True)]
 
-    def test_what_could_not_be_taken_back_is_as_soon_as_there_is_a_link(self, bench):
+    def test_a_topic_hook_not_cleared_by_reset_is_cleared_once_on_the_next_link(
+        self, bench
+    ):
         stop(bench)
         bench.break_links()
         reset(bench)
@@ -603,7 +603,7 @@ class TestHooks:
         bench.connect_links()
         assert self.said(bench)[2:] == [("/lock", False)]
 
-    def test_go_to_the_bridge_of_the_velocity_when_goals_have_another(self):
+    def test_hooks_run_on_the_velocity_bridge_and_not_on_the_goal_bridge(self):
         other = "ws://nav:9090"
         bench = Bench().begin(spec(stop_hooks=self.HOOKS, goal_url=other))
         stop(bench)
@@ -623,21 +623,21 @@ class TestHooks:
             {"topic": "/lock", "extra": "1"},
         ],
     )
-    def test_that_make_no_sense_are_refused(self, hook):
+    def test_an_invalid_stop_hook_raises_config_error(self, hook):
         with pytest.raises(ConfigError, match="stop hook"):
             checked(spec(stop_hooks=(hook,)))
 
     @pytest.mark.parametrize("hooks", ["/lock", {"topic": "/lock"}, 5, ["/lock"]])
-    def test_that_are_no_list_of_tables_are_refused(self, hooks):
+    def test_stop_hooks_that_are_not_a_list_of_tables_raise_config_error(self, hooks):
         with pytest.raises(ConfigError, match=r"stop_hooks is a list|is a table such"):
             checked(spec(stop_hooks=hooks))
 
-    def test_get_their_type_and_the_full_name(self):
+    def test_a_stop_hook_gets_its_default_type_and_full_name(self):
         (hook,) = checked(spec(stop_hooks=({"topic": "lock"},))).stop_hooks
         assert hook == {"topic": "/lock", "type": "std_msgs/Bool"}
 
 
-def test_a_robots_stop_leaves_other_machines_alone():
+def test_a_stop_of_one_robot_does_not_stop_other_machines():
     other = "/r2/cmd_vel"
     bench = Bench().begin(spec(), spec(id="r2", twist_topic=other))
     stop(bench)
@@ -646,8 +646,8 @@ def test_a_robots_stop_leaves_other_machines_alone():
     assert Key(URL, other) not in bench.disk
 
 
-class TestResetNamesAStop:
-    def test_one_in_flight_does_not_end_the_newer_stop_of_somebody_else(self, bench):
+class TestResetOfAStop:
+    def test_a_reset_does_not_end_a_newer_stop_of_another_operator(self, bench):
         stop(bench, "a")
         seen = bench.stop_of()
         stop(bench, "b")
@@ -659,14 +659,16 @@ class TestResetNamesAStop:
         reset(bench, "a")
         assert not bench.report().latched
 
-    def test_pressed_again_by_the_same_person_it_is_another_stop(self, bench):
+    def test_a_reset_does_not_end_a_newer_stop_of_the_same_operator(self, bench):
         stop(bench)
         seen = bench.stop_of()
         stop(bench)
         bench.say("b", op="reset", robot="r1", stop=seen)
         assert bench.report().latched
 
-    def test_nor_one_that_came_after_a_reset(self, bench):
+    def test_a_repeated_reset_does_not_end_a_stop_pressed_after_the_first_reset(
+        self, bench
+    ):
         stop(bench)
         seen = bench.stop_of()
         reset(bench)
@@ -674,7 +676,7 @@ class TestResetNamesAStop:
         bench.say("b", op="reset", robot="r1", stop=seen)
         assert bench.report().latched
 
-    def test_nor_one_of_another_gate_that_was_found_in_the_file(self, bench):
+    def test_a_reset_does_not_end_a_newer_stop_that_another_gate_saved(self, bench):
         stop(bench)
         seen = bench.stop_of()
         bench.disk[KEY] = Press("Ann", "a1")
@@ -686,7 +688,7 @@ class TestResetNamesAStop:
         assert not bench.report().latched
         assert bench.disk == {}
 
-    def test_nor_one_of_another_gate_that_is_in_the_file_unseen(self, bench):
+    def test_a_reset_does_not_delete_an_unseen_stop_file_of_another_gate(self, bench):
         stop(bench)
         bench.disk[KEY] = Press("Ann", "a1")
         reset(bench)
@@ -694,7 +696,7 @@ class TestResetNamesAStop:
         bench.tell(events.StopFileChanged(KEY, Press("Ann", "a1")))
         assert bench.report().latched
 
-    def test_of_a_python_program_likewise(self, bench):
+    def test_a_reset_by_a_program_does_not_end_a_newer_stop(self, bench):
         bench.tell(protocol.FromProgram(commands.Stop("r1")))
         seen = bench.stop_of()
         stop(bench)
@@ -702,7 +704,7 @@ class TestResetNamesAStop:
         assert bench.report().latched
         assert "B pressed STOP" in bench.refusals(PROGRAM)[-1].why
 
-    def test_it_is_known_by_its_name_after_a_restart(self):
+    def test_a_stop_keeps_its_identity_after_a_restart_of_the_gate(self):
         old = Bench().begin()
         stop(old)
         seen = old.stop_of()
@@ -711,7 +713,7 @@ class TestResetNamesAStop:
         bench.say("b", op="reset", robot="r1", stop=seen)
         assert not bench.report().latched
 
-    def test_one_that_names_none_is_garbage(self, bench):
+    def test_a_reset_without_a_valid_stop_identity_is_refused(self, bench):
         stop(bench)
         for stated in ({}, {"stop": ""}, {"stop": 7}, {"stop": "x" * 65}):
             command = {"op": "reset", "robot": "r1", **stated}
@@ -720,7 +722,7 @@ class TestResetNamesAStop:
         assert len(bench.refusals("b")) == 4
         assert bench.report().latched
 
-    def test_a_stop_for_all_while_its_file_is_written_is_not_overlooked(self):
+    def test_a_second_stop_during_a_disk_write_is_saved_after_the_first(self):
         bench = Bench(slow_disk=True).begin()
         stop(bench)
         stop(bench, "a")
@@ -730,7 +732,7 @@ class TestResetNamesAStop:
         bench.keep(bench.did(actions.SaveStop)[1])
         assert bench.report().stop.by == "A"
 
-    def test_of_a_robot_that_has_another_topic_now_the_newer_stop_stands(self, bench):
+    def test_a_reset_after_a_topic_change_does_not_end_a_newer_stop_all(self, bench):
         stop(bench)
         bench.tell(spec(twist_topic="/other/cmd_vel"))
         seen = bench.stop_of()
@@ -741,7 +743,9 @@ class TestResetNamesAStop:
         assert not bench.report().latched
         assert bench.disk == {}, "by either topic"
 
-    def test_and_one_of_another_gate_by_the_topic_it_had_stands(self, bench):
+    def test_a_reset_does_not_delete_a_stop_of_another_gate_on_the_old_topic(
+        self, bench
+    ):
         stop(bench)
         bench.tell(spec(twist_topic="/other/cmd_vel"))
         bench.run(1.0)

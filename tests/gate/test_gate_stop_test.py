@@ -64,7 +64,7 @@ def state(bench):
 
 
 class TestRunning:
-    def test_a_base_that_stops_is_measured_and_may_go_faster(self, bench, base):
+    def test_a_measured_command_timeout_raises_the_speed_limit(self, bench, base):
         assert bench.report().v == 0.3
         assert bench.report().stop_source is None
         begin(bench)
@@ -84,7 +84,9 @@ class TestRunning:
         assert "stop not verified" not in report.why
         assert bench.written[-1].twist == ZERO
 
-    def test_each_creeping_command_answers_one_of_the_drivers(self, bench, base):
+    def test_every_slow_velocity_of_the_stop_test_answers_one_command_of_the_page(
+        self, bench, base
+    ):
         begin(bench)
         at = bench.now
         base.run(0.15, x=None)
@@ -92,7 +94,7 @@ class TestRunning:
         bench.drive(x=0.0)
         assert len(bench.since(at - 0.01)) == 1
 
-    def test_a_base_that_moves_on_is_found_and_gets_zero(self, bench):
+    def test_a_base_that_keeps_moving_fails_the_stop_test_and_gets_zero(self, bench):
         base = Machine(bench, timeout=None)
         begin(bench)
         base.run(0.2)
@@ -110,7 +112,7 @@ class TestRunning:
         assert report.v == 0.3
         assert report.why == ("stop test failed on 2026-11-21",)
 
-    def test_a_coarse_encoder_does_not_stop_a_base_that_moves_on(self, bench):
+    def test_single_zeros_of_a_coarse_encoder_do_not_count_as_standstill(self, bench):
         base = Machine(bench, timeout=None)
         base.coarse = 6
         begin(bench)
@@ -118,16 +120,14 @@ class TestRunning:
         assert bench.report().test.text == "the base did not stop within 3 s"
         assert bench.report().stop_time is None
 
-    def test_it_stopped_when_the_standstill_began_that_lasted(self, bench):
+    def test_the_command_timeout_ends_where_the_lasting_standstill_begins(self, bench):
         base = Machine(bench, timeout=0.8)
         base.coarse = 6
         begin(bench)
         base.run(1.6)
         assert bench.report().stop_time == pytest.approx(0.85, abs=0.05)
 
-    def test_a_base_that_stops_at_the_last_moment_is_looked_at_until_it_is_sure(
-        self, bench
-    ):
+    def test_a_base_that_stops_just_before_3_s_is_watched_until_standstill(self, bench):
         base = Machine(bench, timeout=2.8)
         begin(bench)
         base.run(3.1)
@@ -136,7 +136,9 @@ class TestRunning:
         assert bench.report().test.text.startswith("the base stopped after 2.8")
 
     @pytest.mark.parametrize("foreign", [ZERO, Twist(0.2), Twist(0.1)])
-    def test_what_another_commands_meanwhile_makes_it_void(self, bench, base, foreign):
+    def test_a_velocity_of_another_program_fails_a_waiting_stop_test(
+        self, bench, base, foreign
+    ):
         begin(bench)
         base.run(0.1)
         assert state(bench) == "waiting"
@@ -149,12 +151,14 @@ class TestRunning:
         assert bench.written[-1].twist == ZERO
         assert bench.did(actions.SaveStopTest) == []
 
-    def test_what_others_say_while_it_creeps_ends_nothing_yet(self, bench, base):
+    def test_a_zero_of_another_program_does_not_end_a_creeping_stop_test(
+        self, bench, base
+    ):
         begin(bench)
         bench.tell(events.EchoReceived(KEY, ZERO))
         assert state(bench) == "creeping"
 
-    def test_a_base_that_stops_late_stays_slow(self, bench):
+    def test_a_base_with_a_long_command_timeout_keeps_the_low_speed_limit(self, bench):
         base = Machine(bench, timeout=1.0)
         begin(bench)
         base.run(1.5)
@@ -162,7 +166,7 @@ class TestRunning:
         assert bench.report().v <= 0.3
         assert "command timeout of the base over 0.5 s: 1" in bench.report().why[0]
 
-    def test_a_base_that_does_not_move_proves_nothing(self, bench):
+    def test_a_stop_test_of_a_base_that_does_not_move_saves_no_result(self, bench):
         base = Machine(bench, timeout=0.0)
         begin(bench)
         base.run(1.6)
@@ -171,7 +175,7 @@ class TestRunning:
         assert bench.written[-1].twist == ZERO
         assert bench.report().stop_source is None
 
-    def test_a_goal_that_may_run_is_cancelled_first(self, bench, base):
+    def test_a_stop_test_cancels_goals_when_it_begins(self, bench, base):
         bench.tell(protocol.Forget("r1"))
         begin(bench)
         assert bench.did(actions.CancelGoals) == []
@@ -182,14 +186,16 @@ class TestRunning:
         base.run(0.2)
         assert len(bench.did(actions.CancelGoals)) == 1
 
-    def test_it_can_be_done_again(self, bench, base):
+    def test_a_stop_test_can_be_repeated(self, bench, base):
         begin(bench)
         base.run(1.5)
         begin(bench)
         base.run(1.5)
         assert len(bench.did(actions.SaveStopTest)) == 2
 
-    def test_a_machine_stays_marked_while_nothing_is_sent(self, bench, base):
+    def test_a_machine_stays_marked_as_driven_while_the_stop_test_waits(
+        self, bench, base
+    ):
         begin(bench)
         base.run(0.25)
         assert state(bench) == "waiting"
@@ -197,14 +203,14 @@ class TestRunning:
         base.run(2.0)
         assert bench.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
 
-    def test_odometry_without_a_velocity_tells_nothing(self, bench, base):
+    def test_odometry_without_a_velocity_does_not_end_the_stop_test(self, bench, base):
         begin(bench)
         base.run(0.2)
         bench.tell(events.OdometryReceived(KEY, None))
         assert state(bench) == "waiting"
 
 
-class TestDoubt:
+class TestAbort:
     @pytest.mark.parametrize("phase", ["creeping", "waiting"])
     @pytest.mark.parametrize(
         ("doubt", "text"),
@@ -220,7 +226,9 @@ class TestDoubt:
             ("link", "no connection to ws://robot:9090"),
         ],
     )
-    def test_ends_it_with_zero(self, bench, phase, doubt, text):
+    def test_an_interruption_fails_the_stop_test_and_sends_zero(
+        self, bench, phase, doubt, text
+    ):
         base = Machine(bench, timeout=None)
         begin(bench)
         base.run(0.05)
@@ -260,7 +268,9 @@ class TestDoubt:
         pressed = [w for w in bench.moving_since(at) if w.twist != Twist(0.1)]
         assert pressed == []
 
-    def test_a_gate_that_stood_still_ends_it_at_the_next_command(self, bench, base):
+    def test_the_first_command_after_a_pause_of_the_gate_fails_the_stop_test(
+        self, bench, base
+    ):
         begin(bench)
         base.run(0.05)
         bench.now += 0.25
@@ -270,7 +280,9 @@ class TestDoubt:
         assert bench.report().test.text == "the page stopped sending commands"
         assert bench.written[-1].twist == ZERO
 
-    def test_its_driver_must_let_go_again_after_pressing(self, bench, base):
+    def test_after_a_press_during_the_stop_test_inputs_must_be_released_first(
+        self, bench, base
+    ):
         begin(bench)
         base.run(0.1)
         base.run(0.5, x=1.0)
@@ -289,59 +301,65 @@ class TestRefused:
         assert refused.what == "stop-test"
         return refused.why
 
-    def test_without_the_lease(self, bench):
+    def test_a_stop_test_is_refused_without_control(self, bench):
         assert self.why(bench, "b") == "take control first"
 
-    def test_without_hands_that_were_seen_to_be_off(self, bench, base):
+    def test_a_stop_test_is_refused_without_recent_commands_with_released_inputs(
+        self, bench, base
+    ):
         base.run(0.3, x=None)
         assert self.why(bench) == "release all inputs first"
 
-    def test_while_it_is_driven(self, bench, base):
+    def test_a_stop_test_is_refused_while_the_robot_is_driven(self, bench, base):
         base.run(0.2, x=1.0)
         assert self.why(bench) == "release all inputs first"
 
     @pytest.mark.parametrize("motion", [Twist(0.2), Twist(0.0, 0.0, 0.3)])
-    def test_while_something_else_moves_it(self, bench, motion):
+    def test_a_stop_test_is_refused_while_the_robot_is_already_moving(
+        self, bench, motion
+    ):
         bench.tell(events.OdometryReceived(KEY, motion))
         assert self.why(bench) == "the robot is already moving"
 
-    def test_without_odometry(self):
+    def test_a_stop_test_is_refused_without_odometry(self):
         bench = Bench().begin(spec(stops_within=None))
         bench.take()
         bench.hold(0.4)
         assert "odometry" in self.why(bench)
 
-    def test_in_doubt(self, bench):
+    def test_a_stop_test_is_refused_without_a_link(self, bench):
         bench.break_links()
         assert "no connection" in self.why(bench)
 
-    def test_while_one_goes_on(self, bench, base):
+    def test_a_stop_test_is_refused_while_another_stop_test_is_running(
+        self, bench, base
+    ):
         begin(bench)
         base.run(0.05)
         begin(bench)
         assert bench.refusals()[-1].why == "a stop test is running"
 
 
-class TestKept:
-    def test_it_is_known_after_a_restart_and_counts_more_than_what_was_stated(self):
+class TestSavedResult:
+    def test_a_saved_stop_test_overrides_the_stated_command_timeout(self):
         tests = {KEY: StopRecord(0.8, "2026-11-20")}
         bench = Bench(tests=tests).begin(spec(stops_within=0.1))
         report = bench.report()
         assert (report.stop_time, report.stop_date) == (0.8, "2026-11-20")
         assert report.v <= 0.3
 
-    def test_a_result_for_a_machine_that_is_gone_does_no_harm(self, bench):
+    def test_a_stop_test_result_for_a_removed_machine_is_ignored(self, bench):
         bench.tell(protocol.Forget("r1"))
         bench.run(1.0)
         bench.tell(events.StopTestSaved(KEY, StopRecord(0.2, "2026-11-20")))
 
-    def test_what_was_stated_is_shown_as_that(self):
+    def test_a_stated_command_timeout_is_reported_as_stated(self):
         bench = Bench().begin(spec(stops_within=0.25))
         report = bench.report()
         assert (report.stop_time, report.stop_source) == (0.25, "stated")
         assert report.stop_date is None
 
-    def test_of_two_robots_that_are_one_machine_the_worse_counts(self):
+    def test_the_worse_command_timeout_of_two_robots_on_one_machine_applies(self):
         bench = Bench().begin(spec(stops_within=0.25), spec(id="r2", stops_within=0.4))
         assert bench.report().stop_time == 0.4
         bench.tell(spec(id="r2", stops_within=None))

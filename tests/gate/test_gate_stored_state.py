@@ -54,7 +54,7 @@ def reports(tmp_path_factory):
             return {report["name"]: report for report in page.robots.values()}
 
 
-def test_stop_is_still_in_force_by_the_same_people(reports):
+def test_stored_stops_are_still_active_and_name_the_same_operators(reports):
     stopped = [report for report in reports.values() if report["latched"]]
     found = {report["name"]: report["stop"]["by"] for report in stopped}
     assert found == {**STOPPED, "Unreadable": UNKNOWN}
@@ -62,12 +62,12 @@ def test_stop_is_still_in_force_by_the_same_people(reports):
     assert not any(report["armable"] for report in stopped)
 
 
-def test_each_stop_has_the_identity_that_it_had(reports):
+def test_every_stored_stop_keeps_its_identity(reports):
     found = {name: reports[name]["stop"]["id"] for name in IDENTITIES}
     assert found == IDENTITIES
 
 
-def test_the_results_of_stop_tests_are_known_with_their_days(reports):
+def test_stored_stop_test_results_are_reported_with_their_dates(reports):
     found = {
         name: (report["stop_time"], report["stop_date"])
         for name, report in reports.items()
@@ -76,7 +76,7 @@ def test_the_results_of_stop_tests_are_known_with_their_days(reports):
     assert found == TESTED
 
 
-def test_a_reset_ends_each_stop_on_the_disk_and_a_new_one_has_the_same_file(stored):
+def test_a_reset_deletes_a_stored_stop_file_and_a_new_stop_has_the_same_name(stored):
     def stops():
         return {path.name for path in stored.glob("*.stop*")}
 
@@ -111,7 +111,7 @@ class Outbox:
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]"])
-def test_a_robot_that_was_driven_is_told_zero_first_however_this_computer_is_spelled(
+def test_a_driven_robot_gets_zero_first_for_every_spelling_of_this_computer(
     stored, monkeypatch, host
 ):
     monkeypatch.setattr(shell, "Links", Links)
@@ -129,7 +129,7 @@ def test_a_robot_that_was_driven_is_told_zero_first_however_this_computer_is_spe
     assert asyncio.run(scenario()) == [(Key(url, "/driven/cmd_vel"), ZERO)]
 
 
-def test_only_what_was_driven_or_stopped_was_left_as_driven(stored):
+def test_tidy_keeps_only_lock_files_of_machines_marked_as_driven(stored):
     """A gate that starts removes the files of machines that rest."""
     Locks(stored).tidy()
     left = [path.read_text().split()[:3] for path in stored.glob("*.lock")]

@@ -24,18 +24,18 @@ class TestRestarts:
     def test_the_first_gate_is_started_at_once(self):
         assert Restarts().due(0.0)
 
-    def test_one_that_ends_is_replaced_at_once_and_then_after_longer_pauses(self):
+    def test_an_ended_gate_is_restarted_at_once_and_then_after_longer_pauses(self):
         assert pauses(Restarts(), 8) == [0, 0.25, 0.5, 1, 2, 4, 4, 4]
         assert LONGEST_PAUSE == 4
 
-    def test_the_second_end_in_a_row_is_trouble(self):
+    def test_two_early_ends_in_a_row_count_as_failing(self):
         restarts = Restarts()
         pauses(restarts, 1)
         assert not restarts.failing
         pauses(restarts, 1)
         assert restarts.failing
 
-    def test_one_that_lived_for_a_while_is_replaced_at_once(self):
+    def test_a_gate_that_ran_for_10_s_is_restarted_at_once(self):
         restarts = Restarts()
         pauses(restarts, 5)
         restarts.started(200.0)
@@ -44,7 +44,7 @@ class TestRestarts:
         assert not restarts.failing
         assert pauses(restarts, 2, now=300.0) == [0.25, 0.5]
 
-    def test_one_that_lives_for_a_while_ends_the_trouble(self):
+    def test_a_gate_that_runs_for_10_s_no_longer_counts_as_failing(self):
         restarts = Restarts()
         pauses(restarts, 3)
         restarts.started(200.0)
@@ -55,14 +55,14 @@ class TestRestarts:
         restarts.lives(200.0 + LIVED + 1)
         assert not restarts.failing
 
-    def test_it_is_said_whether_a_gate_ever_came_to_run(self):
+    def test_the_failure_message_depends_on_whether_a_gate_ever_ran(self):
         assert in_words("no disk", spoke=False).startswith(
             "The gate does not start: no disk. "
         )
         assert "ended repeatedly: no disk" in in_words("no disk", spoke=True)
 
 
-class TestUnheard:
+class TestSilence:
     @pytest.fixture
     def pending(self):
         pending = PendingStops()
@@ -70,7 +70,7 @@ class TestUnheard:
         pending.add("c1", None, 10.5)
         return pending
 
-    def test_a_stop_is_kept_until_a_gate_has_gone_on_for_a_while(self, pending):
+    def test_a_pending_stop_is_kept_until_a_later_gate_tick_confirms_it(self, pending):
         pending.on_tick(10.0 + CONFIRMED_AFTER - 0.1)
         assert list(pending) == [(None, "r1"), ("c1", None)]
         pending.on_tick(10.0 + CONFIRMED_AFTER)
@@ -79,7 +79,7 @@ class TestUnheard:
         assert list(pending) == []
         pending.on_tick(99.0)
 
-    def test_for_a_new_gate_the_time_begins_anew(self, pending):
+    def test_a_new_gate_restarts_the_confirmation_time_of_pending_stops(self, pending):
         pending.on_gate_ready(50.0)
         pending.on_tick(50.0 + CONFIRMED_AFTER - 0.1)
         assert len(list(pending)) == 2

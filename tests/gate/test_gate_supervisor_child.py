@@ -56,7 +56,7 @@ def shell(script):
 ENDLESS = ("/bin/sleep", "600")
 
 
-def test_messages_go_both_ways_whole_and_in_order(run):
+def test_messages_are_sent_and_received_complete_and_in_order(run):
     mirror = run("/bin/cat")
     mirror.child.send(Ready(1), Ready(2))
     mirror.child.send(Tick(3, {}))
@@ -65,7 +65,7 @@ def test_messages_go_both_ways_whole_and_in_order(run):
     assert mirror.child.pid > 0
 
 
-def test_one_that_is_told_to_end_ends_and_is_told_nothing_more(run):
+def test_a_stopped_process_ends_and_gets_no_more_messages(run):
     mirror = run("/bin/cat")
     mirror.child.stop(30.0)
     assert mirror.ends == [mirror.child]
@@ -74,7 +74,7 @@ def test_one_that_is_told_to_end_ends_and_is_told_nothing_more(run):
     assert mirror.on_echo == []
 
 
-def test_its_last_words_are_kept_and_all_of_them_passed_on(run, capfd):
+def test_the_last_line_of_stderr_is_the_end_reason_and_all_is_passed_on(run, capfd):
     gate = run(*shell("echo first >&2; echo 'no such module' >&2; echo >&2; exit 3"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
@@ -82,7 +82,7 @@ def test_its_last_words_are_kept_and_all_of_them_passed_on(run, capfd):
     assert capfd.readouterr().err == "first\nno such module\n\n"
 
 
-def test_its_last_words_steer_no_terminal(run, capfd):
+def test_control_characters_in_stderr_are_escaped(run, capfd):
     gate = run(*shell(r"printf 'ValueError: \033[2J\r\302\233 \377\n' >&2; exit 3"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
@@ -90,21 +90,21 @@ def test_its_last_words_steer_no_terminal(run, capfd):
     assert capfd.readouterr().err == "ValueError: \\x1b[2J\\r\\x9b �\n"
 
 
-def test_one_that_was_killed_is_said_to_have_been(run):
+def test_the_end_reason_of_a_killed_process_names_the_signal(run):
     gate = run(*shell("kill -9 $$"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
     assert gate.child.end_reason == "ended by SIGKILL"
 
 
-def test_one_that_does_not_end_is_killed(run, caplog):
+def test_a_process_that_does_not_end_in_time_is_killed(run, caplog):
     gate = run(*ENDLESS)
     gate.child.stop(0.05)
     assert gate.child.end_reason == "ended by SIGKILL"
     assert "it has not ended within 0.05 s" in caplog.text
 
 
-def test_one_that_does_not_read_holds_nothing_up_and_is_killed_in_the_end(
+def test_a_process_that_does_not_read_blocks_nothing_and_is_ended_at_a_limit(
     run, caplog, monkeypatch
 ):
     gate = run(*ENDLESS)
@@ -118,7 +118,7 @@ def test_one_that_does_not_read_holds_nothing_up_and_is_killed_in_the_end(
     assert "it does not read" in caplog.text
 
 
-def test_what_it_did_not_read_in_time_comes_later_and_in_order(run):
+def test_unread_messages_are_delivered_later_and_in_order(run):
     mirror = run("/bin/cat")
     mirror.may_go_on.clear()
     text = "x" * (1 << 14)
@@ -136,14 +136,14 @@ def test_what_it_did_not_read_in_time_comes_later_and_in_order(run):
     assert mirror.on_echo == sent
 
 
-def test_one_that_is_gone_can_be_written_to(run):
+def test_sending_to_an_ended_process_drops_the_message(run):
     gate = run("/bin/true")
     eventually(lambda: gate.ends, "its end")
     gate.child.send(Ready(1))
     assert not gate.child._unsent
 
 
-def test_one_that_talks_nonsense_is_killed(run, caplog):
+def test_a_process_that_sends_invalid_data_is_killed(run, caplog):
     gate = run(*shell(r"printf '\377\377\377\377'; exec sleep 600"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
@@ -151,7 +151,7 @@ def test_one_that_talks_nonsense_is_killed(run, caplog):
     assert "a message of 4294967295 bytes" in caplog.text
 
 
-def test_one_whose_words_cannot_be_dealt_with_is_killed(run, caplog):
+def test_a_process_whose_message_raises_an_error_is_killed(run, caplog):
     data = pipe.pack(Ready(5)).hex()
     words = f"import os, time; os.write(1, bytes.fromhex('{data}')); time.sleep(600)"
 
@@ -168,7 +168,7 @@ def test_one_whose_words_cannot_be_dealt_with_is_killed(run, caplog):
     assert "LookupError: Ready(pid=5)" in caplog.text
 
 
-def test_a_gate_that_its_display_cannot_deal_with_ends_in_good_order():
+def test_a_gate_whose_message_raises_an_error_exits_with_code_0():
     """It is this side that failed; the other still has robots to send zero to."""
 
     def hear(child, message):
@@ -182,7 +182,7 @@ def test_a_gate_that_its_display_cannot_deal_with_ends_in_good_order():
     assert gate.end_reason == "exit code 0, no message"
 
 
-def test_who_hears_of_its_end_may_stop_it_there_and_then():
+def test_the_ended_callback_may_stop_the_process():
     epitaphs = []
 
     def ended(gate):

@@ -56,7 +56,7 @@ def action_word(op, id, **more):
 
 
 class TestTopics:
-    def test_a_robot_needs_the_topics_of_its_ways_and_no_others(self):
+    def test_goal_topics_are_only_the_topics_that_the_robot_uses(self):
         assert goal_topics(spec(goal_topic=None, cancel_topic=None)) == []
         pose = spec(pose_topic="/initialpose")
         assert [name for name, _ in goal_topics(pose)] == [
@@ -71,7 +71,7 @@ class TestTopics:
             "/move_base/cancel",
         ]
 
-    def test_a_topic_that_is_needed_twice_is_announced_once(self):
+    def test_a_goal_topic_that_is_used_twice_is_listed_once(self):
         robot = spec(
             goal_topic=None,
             cancel_topic="/move_base/cancel",
@@ -81,7 +81,7 @@ class TestTopics:
         names = [name for name, _ in goal_topics(robot)]
         assert sorted(names) == ["/move_base/cancel", "/move_base/goal"]
 
-    def test_of_hooks_only_flags_need_a_topic(self):
+    def test_only_topic_hooks_have_a_hook_topic(self):
         robot = spec(
             stop_hooks=(
                 {"service": "/e_stop", "type": "std_srvs/Trigger"},
@@ -93,7 +93,7 @@ class TestTopics:
 
 class TestTopicGoals:
     @in_loop
-    async def test_topics_are_announced_and_taken_back(self):
+    async def test_topics_are_advertised_and_unadvertised(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             noting.tasks.attach(goal_topics(spec()))
             await until(lambda: len(bridge.of("advertise")) == 2, "both topics")
@@ -101,7 +101,7 @@ class TestTopicGoals:
             await until(lambda: len(bridge.of("unadvertise")) == 2, "the end of both")
 
     @in_loop
-    async def test_a_goal_is_written_now_or_never(self):
+    async def test_a_goal_without_a_link_is_never_sent(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             assert noting.tasks.send(spec(), goal("g1"))
             await until(lambda: bridge.of("publish", "/goal"), "the goal")
@@ -116,7 +116,7 @@ class TestTopicGoals:
             assert len(bridge.of("publish", "/goal")) == 1
 
     @in_loop
-    async def test_goals_are_cancelled_by_every_way_that_a_robot_has(self):
+    async def test_goals_are_cancelled_by_every_topic_and_service_of_the_robot(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             noting.tasks.cancel(spec(cancel_topic=None))  # it has none
             noting.tasks.cancel(spec(cancel_topic="/stop_it", action="/go"))
@@ -140,7 +140,7 @@ class TestTopicGoals:
             assert call.link != bridge.of("publish")[0].link
 
     @in_loop
-    async def test_hooks_are_flags_and_calls(self):
+    async def test_topic_hooks_publish_flags_and_service_hooks_call_services(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             flag = {"topic": "/lock", "type": "std_msgs/Bool"}
             ended = []
@@ -158,7 +158,7 @@ class TestTopicGoals:
 
 class TestActionGoals:
     @in_loop
-    async def test_a_goal_that_blocks_its_socket_holds_up_neither_goals_nor_cancel(
+    async def test_a_goal_that_blocks_its_socket_does_not_delay_other_goals_or_cancels(
         self,
     ):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
@@ -175,7 +175,7 @@ class TestActionGoals:
             bridge.unblock()
 
     @in_loop
-    async def test_its_words_are_told_until_the_result_which_ends_its_socket(
+    async def test_feedback_is_reported_until_the_result_closes_the_goal_socket(
         self, monkeypatch
     ):
         monkeypatch.setattr(tasks, "FEEDBACK_PERIOD", 60.0)
@@ -198,7 +198,9 @@ class TestActionGoals:
             assert noting.of(GoalLost) == []
 
     @in_loop
-    async def test_a_robot_may_say_more_after_a_while(self, monkeypatch):
+    async def test_feedback_is_reported_again_after_the_feedback_period(
+        self, monkeypatch
+    ):
         monkeypatch.setattr(tasks, "FEEDBACK_PERIOD", 0.0)
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             await noting.send(NAVIGATES, "g1")
@@ -210,7 +212,7 @@ class TestActionGoals:
             await until(lambda: len(noting.of(GoalProgress)) == 2, "both words")
 
     @in_loop
-    async def test_a_goal_whose_socket_is_lost_is_said_to_be_out_of_sight(self):
+    async def test_a_goal_whose_socket_breaks_is_reported_as_lost(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             await noting.send(NAVIGATES, "g1")
             (sent,) = await until(lambda: bridge.of("send_action_goal"), "the goal")
@@ -220,9 +222,7 @@ class TestActionGoals:
             assert lost.why.startswith("connection lost: ")
 
     @in_loop
-    async def test_of_too_many_goals_the_oldest_is_followed_no_longer(
-        self, monkeypatch
-    ):
+    async def test_the_oldest_of_too_many_goals_is_reported_as_lost(self, monkeypatch):
         monkeypatch.setattr(tasks, "MAX_SPENT", 2)
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             for number in range(3):
@@ -236,7 +236,9 @@ class TestActionGoals:
             await until(lambda: first not in bridge.links, "the end of its socket")
 
     @in_loop
-    async def test_the_end_of_the_lane_ends_its_goals_sockets_and_no_call(self):
+    async def test_closing_the_lane_closes_its_goal_sockets_but_not_a_running_call(
+        self,
+    ):
         async with noting_bridge() as bridge:
             bridge.answers_services = False
             async with Noting(bridge.url) as noting:
@@ -259,7 +261,9 @@ class TestMoveBase:
         return json.dumps(message)
 
     @in_loop
-    async def test_its_topics_are_listened_to_before_it_is_sent_and_until_it_ends(self):
+    async def test_move_base_topics_are_subscribed_from_before_the_goal_until_its_end(
+        self,
+    ):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             assert noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
             await until(lambda: bridge.of("publish", "/move_base/goal"), "the goal")
@@ -274,7 +278,7 @@ class TestMoveBase:
             noting.tasks.forget("r1")  # there is nothing to forget
 
     @in_loop
-    async def test_without_a_link_nothing_is_sent_and_nothing_followed(self):
+    async def test_a_move_base_goal_without_a_link_is_neither_sent_nor_followed(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             noting.tasks.lane.cut("no longer used")
             assert not noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
@@ -283,7 +287,9 @@ class TestMoveBase:
             assert noting.of(GoalLost) == []
 
     @in_loop
-    async def test_a_link_that_is_lost_loses_sight_of_its_goal_and_it_comes_back(self):
+    async def test_a_move_base_goal_is_lost_with_the_link_and_found_on_the_next_link(
+        self,
+    ):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
             await until(lambda: bridge.of("publish"), "the goal")
@@ -296,7 +302,7 @@ class TestMoveBase:
             await until(lambda: noting.of(GoalProgress), "that it is under way")
 
     @in_loop
-    async def test_a_goal_for_another_robot_s_action_leaves_it_followed(self):
+    async def test_an_action_goal_of_another_robot_does_not_lose_a_move_base_goal(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
             noting.tasks.send(NAVIGATES, goal("g2", "navigate_to_pose", "r2"))

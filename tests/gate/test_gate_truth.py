@@ -28,7 +28,7 @@ class TestAlarm:
 
         bench.run(seconds, each)
 
-    def test_a_robot_that_moves_on_a_second_after_zero_is_said(self, bench):
+    def test_motion_one_second_after_zero_raises_an_alarm(self, bench):
         self.run(bench, 0.95, 0.31, x=0.0)
         assert bench.report().alarm is None
         self.run(bench, 0.2, 0.31, x=0.0)
@@ -38,7 +38,7 @@ class TestAlarm:
         self.run(bench, 0.25, 0.05, x=0.0)
         assert bench.report().alarm is None
 
-    def test_a_robot_that_spins_on_is_said_as_well(self, bench):
+    def test_rotation_one_second_after_zero_raises_an_alarm(self, bench):
         self.run(bench, 0.95, 0.0, x=0.0, turn=-0.8)
         assert bench.report().alarm is None
         self.run(bench, 0.2, 0.0, x=0.0, turn=-0.8)
@@ -46,7 +46,7 @@ class TestAlarm:
         self.run(bench, 0.45, 0.0, x=0.0, turn=-0.1)
         assert bench.report().alarm is None
 
-    def test_also_when_its_driver_has_gone(self, bench):
+    def test_motion_after_the_release_of_control_raises_an_alarm(self, bench):
         bench.say("a", op="release", robot="r1")
         self.run(bench, 1.1, 0.31)
         assert bench.report().alarm
@@ -54,33 +54,33 @@ class TestAlarm:
         assert bench.report().alarm is None
         assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
 
-    def test_also_under_a_stop(self, bench):
+    def test_motion_during_a_stop_raises_an_alarm(self, bench):
         bench.say("b", op="stop", robot="r1")
         self.run(bench, 1.1, 0.31)
         assert bench.report().alarm
 
-    def test_a_robot_that_stood_and_is_moved_by_others_is_no_alarm(self, bench):
+    def test_motion_after_a_standstill_raises_no_alarm(self, bench):
         self.run(bench, 0.45, 0.0, x=0.0)
         self.run(bench, 3.0, 0.4, x=0.0)
         assert bench.report().alarm is None
 
-    def test_a_robot_that_was_sent_somewhere_is_no_alarm(self, bench):
+    def test_motion_after_a_goal_was_sent_raises_no_alarm(self, bench):
         bench.goal()
         self.run(bench, 3.0, 0.4, x=0.0)
         assert bench.report().alarm is None
 
-    def test_driving_on_is_no_alarm(self, bench):
+    def test_driving_again_after_zero_raises_no_alarm(self, bench):
         self.run(bench, 0.1, 0.5, x=0.0)
         self.run(bench, 3.0, 0.5, x=0.5)
         assert bench.report().alarm is None
 
-    def test_without_odometry_nobody_is_listened_to_for_long(self, bench):
+    def test_watching_ends_soon_for_a_released_robot_without_odometry(self, bench):
         bench.say("a", op="release", robot="r1")
         bench.run(3.0)
         assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
         assert bench.report().alarm is None
 
-    def test_odometry_after_a_long_silence_tells_nothing_of_that_zero(self):
+    def test_motion_after_a_long_gap_in_odometry_raises_no_alarm(self):
         obedience = Obedience()
         obedience.on_written(ZERO, Twist(0.5), 0.0)
         obedience.observe(None, 0.5)
@@ -89,7 +89,7 @@ class TestAlarm:
         assert obedience.alarm(9.5) is None
         assert not obedience.watching(9.5)
 
-    def test_a_gap_in_odometry_ends_no_alarm(self, bench):
+    def test_a_gap_in_odometry_does_not_end_an_alarm(self, bench):
         self.run(bench, 1.2, 0.31, x=0.0)
         bench.hold(1.5)
         assert bench.report().alarm == (
@@ -100,7 +100,9 @@ class TestAlarm:
         self.run(bench, 0.6, 0.0, x=0.0)
         assert bench.report().alarm is None
 
-    def test_after_a_minute_of_silence_it_ends_and_odometry_brings_it_back(self, bench):
+    def test_an_alarm_ends_after_a_minute_without_odometry_and_returns_with_motion(
+        self, bench
+    ):
         self.run(bench, 1.2, 0.31, x=0.0)
         bench.hold(59.0)
         assert bench.report().alarm
@@ -109,27 +111,27 @@ class TestAlarm:
         self.run(bench, 0.2, 0.31, x=0.0)
         assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
 
-    def test_under_a_stop_a_robot_that_is_seen_late_is_said_as_well(self, bench):
+    def test_motion_first_measured_late_during_a_stop_raises_an_alarm(self, bench):
         bench.say("b", op="stop", robot="r1")
         bench.run(9.0)
         assert bench.report().alarm is None
         self.run(bench, 0.2, 0.31)
         assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
 
-    def test_a_gate_that_was_started_anew_looks_whether_its_zeros_are_obeyed(self):
+    def test_a_restarted_gate_raises_an_alarm_for_motion_after_its_zeros(self):
         bench = Bench(was_driven=True).begin(spec(odometry_topic="/odom"))
         assert bench.written
         self.run(bench, 1.2, 0.31)
         assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
 
-    def test_what_odometry_said_is_shown_as_long_as_it_comes(self, bench):
+    def test_the_measured_velocity_is_reported_only_while_odometry_arrives(self, bench):
         assert bench.report().measured == Twist(0.5).numbers
         bench.hold(0.9, x=0.5)
         assert bench.report().measured == Twist(0.5).numbers
         bench.hold(0.3)
         assert bench.report().measured is None
 
-    def test_the_second_counts_from_the_first_zero(self):
+    def test_the_second_before_an_alarm_counts_from_the_first_zero(self):
         obedience = Obedience()
         obedience.on_written(ZERO, Twist(0.5), 0.0)
         obedience.on_written(ZERO, ZERO, 0.5)
@@ -138,7 +140,7 @@ class TestAlarm:
         assert obedience.alarm(0.95) is None
         assert obedience.alarm(1.0) == "zero sent, still moving at 0.20 m/s"
 
-    def test_one_message_that_says_it_stands_in_every_six_excuses_nobody(self):
+    def test_single_odometry_messages_of_standstill_do_not_prevent_an_alarm(self):
         obedience = Obedience()
         obedience.on_written(ZERO, Twist(0.5), 0.0)
         for n in range(1, 200):
@@ -147,7 +149,7 @@ class TestAlarm:
             expected = "zero sent, still moving at 0.50 m/s" if now >= 1.0 else None
             assert obedience.alarm(now) == expected, now
 
-    def test_it_ends_when_the_robot_has_stood_for_a_while(self):
+    def test_an_alarm_ends_after_a_lasting_standstill(self):
         obedience = Obedience()
         obedience.on_written(ZERO, Twist(0.5), 0.0)
         obedience.observe(Twist(0.5), 0.9)
@@ -160,7 +162,7 @@ class TestAlarm:
         obedience.observe(Twist(0.5), 1.9)
         assert obedience.alarm(2.0) is None, "it is somebody else's business"
 
-    def test_one_that_braked_in_time_raises_none_while_it_is_looked_at(self):
+    def test_a_standstill_in_time_raises_no_alarm_until_the_robot_moves_again(self):
         obedience = Obedience()
         obedience.on_written(ZERO, Twist(0.5), 0.0)
         obedience.observe(Twist(0.3), 0.9)
@@ -173,7 +175,7 @@ class TestAlarm:
 
 
 class TestLoopAge:
-    def test_is_what_most_commands_of_two_seconds_stay_below(self):
+    def test_the_loop_age_is_the_95th_percentile_of_the_last_two_seconds(self):
         ages = LoopAge(Ages())
         assert ages.p95 is None
         for n in range(40):
@@ -189,7 +191,7 @@ class TestLoopAge:
         ages.clear()
         assert ages.p95 is None
 
-    def test_is_told_while_somebody_drives(self):
+    def test_the_loop_age_is_reported_only_while_the_holder_sends_commands(self):
         bench = Bench().begin()
         bench.take()
         assert bench.report().age is None
@@ -200,19 +202,19 @@ class TestLoopAge:
 
     @pytest.mark.parametrize("ms", [151, 180, 200, 250, 300])
     @pytest.mark.parametrize("stop", [None, 0.1, 0.25, 0.5])
-    def test_over_a_slow_link_a_robot_goes_a_quarter_of_a_metre_blind(self, ms, stop):
+    def test_a_slow_link_limits_the_distance_before_a_reaction_to_25_cm(self, ms, stop):
         speed = governed(Speed(5.0, 1.0, ()), ms / 1000, stop)
         assert speed.v * (ms / 1000 + 0.2 + (stop or 0.5 * (stop is None))) <= 0.25
         assert speed.w == 1.0
         assert len(speed.why) == 1
 
-    def test_over_a_quick_link_the_robot_has_the_speed_that_was_stated(self):
+    def test_a_fast_link_does_not_reduce_the_stated_speed_limit(self):
         bench = Bench().begin(spec(v_max=1.0, stops_within=0.25))
         bench.drive_off()
         assert bench.report().v == 1.0
         assert bench.written[-1].twist.vx == 1.0
 
-    def test_a_link_is_slow_above_150_ms_and_quick_again_below_130(self):
+    def test_a_link_is_slow_above_150_ms_and_fast_again_below_130_ms(self):
         ages = LoopAge(Ages())
         slow = []
         for n, ms in enumerate((50, 150, 151, 140, 131, 129, 145, 151)):
@@ -221,18 +223,18 @@ class TestLoopAge:
             slow.append(ages.slow is not None)
         assert slow == [False, False, True, True, True, False, False, True]
 
-    def test_a_slow_link_is_said_even_if_it_takes_nothing(self):
+    def test_a_slow_link_is_reported_even_if_it_does_not_reduce_the_speed(self):
         slow = Speed(0.1, 0.6, ())
         assert governed(slow, None, 0.25) is slow
         assert governed(slow, 0.172, 0.25) == Speed(
             0.1, 0.6, ("slow connection: 180 ms",)
         )
 
-    def test_reaction_counts_the_hand_the_loop_and_the_base(self):
+    def test_the_reaction_time_adds_loop_age_dead_man_and_command_timeout(self):
         assert reaction(None, None) == pytest.approx(0.7)
         assert reaction(0.1, 0.25) == pytest.approx(0.55)
 
-    def test_a_late_driver_is_slowed_and_told(self):
+    def test_commands_with_old_ticks_reduce_the_speed_and_report_the_reason(self):
         bench = Bench().begin(spec(v_max=2.0, stops_within=0.25))
         assert bench.report().v == 2.0
         bench.take()
@@ -251,7 +253,7 @@ class TestLoopAge:
         assert bench.written[-1].twist.vx <= bound
         assert report.reaction == pytest.approx(report.age / 1000 + 0.45, abs=0.001)
 
-    def test_the_way_to_the_robot_and_back_is_part_of_the_loop(self):
+    def test_the_loop_age_includes_the_round_trip_to_the_robot(self):
         trips = Ages()
         ages = LoopAge(trips)
         trips.add(0.12, 0.0)
@@ -266,7 +268,9 @@ class TestLoopAge:
         assert ages.p95 == 0.02
 
     @pytest.mark.parametrize("rtt", [0.05, 0.1, 0.15, 0.25])
-    def test_a_robot_behind_a_slow_link_is_slowed_and_its_driver_told(self, rtt):
+    def test_a_slow_link_to_the_robot_reduces_the_speed_and_reports_the_reason(
+        self, rtt
+    ):
         bench = Bench(rtt=rtt).begin(spec(v_max=2.0, stops_within=0.25))
         bench.drive_off()
         bench.hold(0.5, x=1.0)
@@ -278,12 +282,12 @@ class TestLoopAge:
         assert bench.written[-1].twist.vx == report.v == pytest.approx(bound, abs=0.01)
         assert report.reaction == pytest.approx(report.age / 1000 + 0.45, abs=0.001)
 
-    def test_a_robot_whose_answers_take_longer_than_300_ms_is_not_driven(self):
+    def test_a_robot_whose_bridge_answers_after_more_than_300_ms_is_not_driven(self):
         bench = Bench(rtt=0.9).begin()
         bench.drive_off()
         assert bench.moving_since(0.0) == []
         assert "no answer from" in bench.report().reason
 
-    def test_brakes_are_what_was_stated_or_little(self):
+    def test_the_reported_brake_is_the_stated_limit_or_a_low_default(self):
         assert Bench().begin().report().brake == 0.5
         assert Bench().begin(spec(a_max=1.5)).report().brake == 1.5

@@ -32,8 +32,8 @@ def onlooker():
     return bench
 
 
-class TestTheOneThatHasIt:
-    def test_takes_over_a_stop_that_was_said_to_the_other(self, owner):
+class TestOwner:
+    def test_the_owner_enforces_a_stop_of_the_other_gate(self, owner):
         owner.drive_off()
         at = owner.now
         owner.tell(StopFileChanged(KEY, ANN))
@@ -44,32 +44,32 @@ class TestTheOneThatHasIt:
         owner.hold(1.0, x=1.0)
         assert [w for w in owner.moving_since(at) if w.at > at] == []
 
-    def test_cancels_goals_and_says_hooks_then_too(self):
+    def test_the_owner_cancels_goals_and_runs_hooks_for_a_stop_of_the_other_gate(self):
         hook = {"topic": "/lock", "type": "std_msgs/Bool"}
         bench = Bench().begin(spec(stop_hooks=(hook,)))
         bench.tell(StopFileChanged(KEY, ANN))
         assert bench.did(actions.CancelGoals)
         assert [hook.stopped for hook in bench.did(actions.RunHook)] == [True]
 
-    def test_stops_what_takes_goals_only(self):
+    def test_the_owner_stops_a_robot_without_a_velocity_topic(self):
         bench = Bench().begin(spec(twist_topic=None, cancel_topic=None))
         bench.tell(StopFileChanged(Key(URL, "goal /goal"), ANN))
         assert bench.state == "stopped"
 
-    def test_hears_its_own_stop_without_a_stir(self, owner):
+    def test_the_owner_ignores_the_file_change_of_its_own_stop(self, owner):
         owner.say("a", op="stop", robot="r1")
         before = len(owner.done)
         owner.tell(StopFileChanged(KEY, owner.disk[KEY]))
         assert owner.done[before:] == []
 
-    def test_keeps_a_stop_whose_file_is_gone(self, owner):
+    def test_the_owner_keeps_a_stop_whose_file_is_gone(self, owner):
         owner.say("a", op="stop", robot="r1")
         owner.disk.clear()
         owner.tell(StopFileChanged(KEY, None))
         assert owner.stops == {KEY: "A"}
         assert owner.state == "stopped"
 
-    def test_trusts_no_look_at_what_it_is_writing(self, owner):
+    def test_the_owner_ignores_a_file_change_during_its_own_disk_write(self, owner):
         owner.say("a", op="stop", robot="r1")
         owner.slow_disk = True
         owner.say("a", op="reset", robot="r1")
@@ -79,13 +79,15 @@ class TestTheOneThatHasIt:
         owner.run(0.1)
         assert not owner.report().latched
 
-    def test_hears_of_a_machine_that_is_gone(self, owner):
+    def test_the_owner_ignores_the_stop_file_of_an_unknown_machine(self, owner):
         owner.tell(StopFileChanged(Key(URL, "/gone"), ANN))
         assert owner.state == "free"
 
 
-class TestTheOther:
-    def test_stops_it_and_leaves_the_reset_to_the_one_that_has_it(self, onlooker):
+class TestSecondGate:
+    def test_the_other_gate_can_stop_the_robot_but_cannot_reset_the_stop(
+        self, onlooker
+    ):
         onlooker.say("a", op="stop", robot="r1")
         assert onlooker.stops == {KEY: "A"}
         assert onlooker.written[-1].twist == ZERO
@@ -95,7 +97,7 @@ class TestTheOther:
         )
         assert onlooker.stops == {KEY: "A"}
 
-    def test_writes_zero_no_more_when_it_was_reset_there(self, onlooker):
+    def test_the_other_gate_sends_no_zeros_after_a_reset_by_the_owner(self, onlooker):
         onlooker.say("a", op="stop", robot="r1")
         onlooker.run(1.0)
         onlooker.disk.clear()
@@ -106,12 +108,12 @@ class TestTheOther:
         assert onlooker.stops == {}
         assert not onlooker.report().latched
 
-    def test_writes_nothing_for_a_stop_that_was_said_there(self, onlooker):
+    def test_the_other_gate_sends_nothing_for_a_stop_of_the_owner(self, onlooker):
         onlooker.tell(StopFileChanged(KEY, ANN))
         onlooker.run(0.2)
         assert onlooker.written == []
 
-    def test_shows_the_newer_stop_that_was_said_there(self, onlooker):
+    def test_the_other_gate_shows_a_newer_stop_of_the_owner(self, onlooker):
         onlooker.say("a", op="stop", robot="r1")
         onlooker.run(1.0)
         onlooker.disk[KEY] = ANN
@@ -119,14 +121,16 @@ class TestTheOther:
         assert onlooker.report().stop.by == "Ann"
         assert onlooker.stop_of() == ANN.id
 
-    def test_trusts_no_look_for_a_file_that_it_is_writing(self, onlooker):
+    def test_the_other_gate_ignores_a_missing_file_during_its_own_disk_write(
+        self, onlooker
+    ):
         onlooker.slow_disk = True
         onlooker.say("a", op="stop", robot="r1")
         onlooker.tell(StopFileChanged(KEY, None))
         onlooker.keep(onlooker.did(actions.SaveStop)[-1])
         assert onlooker.report().latched
 
-    def test_has_a_stop_of_its_own_stand_when_it_gets_the_machine(self, onlooker):
+    def test_the_other_gate_keeps_its_stop_when_it_gets_the_lock(self, onlooker):
         onlooker.say("a", op="stop", robot="r1")
         onlooker.tell(LockState(KEY, held=True, latched=onlooker.disk[KEY]))
         assert onlooker.state == "stopped"
@@ -135,7 +139,7 @@ class TestTheOther:
         assert onlooker.state == "free"
 
 
-def test_a_disk_tells_of_each_file_that_changed_once(tmp_path):
+def test_every_changed_stop_file_is_reported_once(tmp_path):
     async def scenario():
         mine, theirs = Disk(Records(tmp_path)), Records(tmp_path)
         mine.recall(LockState(KEY, held=True))
@@ -156,7 +160,7 @@ def test_a_disk_tells_of_each_file_that_changed_once(tmp_path):
     asyncio.run(scenario())
 
 
-def test_a_stop_that_is_said_while_another_is_reset_is_not_overlooked(tmp_path):
+def test_a_stop_of_another_gate_saved_during_a_reset_is_reported(tmp_path):
     async def scenario():
         theirs = Records(tmp_path)
 
@@ -176,7 +180,7 @@ def test_a_stop_that_is_said_while_another_is_reset_is_not_overlooked(tmp_path):
     asyncio.run(scenario())
 
 
-def test_what_comes_and_goes_between_two_looks_is_seen_by_who_wrote_it(tmp_path):
+def test_an_own_stop_deleted_by_another_gate_before_a_check_is_reported(tmp_path):
     async def scenario():
         disk = Disk(Records(tmp_path))
         disk.recall(LockState(KEY, held=False))
@@ -188,7 +192,7 @@ def test_what_comes_and_goes_between_two_looks_is_seen_by_who_wrote_it(tmp_path)
     asyncio.run(scenario())
 
 
-def test_a_stop_to_the_other_gate_stops_who_drives(client, page, robot_spec, fake):
+def test_a_stop_on_another_gate_stops_the_driven_robot(client, page, robot_spec, fake):
     page.drive_off(fake)
     second = GateClient()
     second.start()

@@ -20,23 +20,23 @@ def full(*, topic="/cmd_vel", twist=AHEAD):
     return unproven
 
 
-def test_six_may_be_on_their_way_and_no_more():
+def test_at_most_six_velocities_may_be_unconfirmed():
     assert MOST == 6
     full()
 
 
-def test_each_robot_has_six_of_its_own():
+def test_every_topic_may_have_six_unconfirmed_velocities():
     assert full().room("/other/cmd_vel")
 
 
-def test_zeros_are_not_counted():
+def test_zeros_do_not_count_as_unconfirmed_velocities():
     unproven = UnconfirmedWrites()
     for _ in range(100):
         unproven.on_written("/cmd_vel", ZERO)
     assert unproven.room("/cmd_vel")
 
 
-def test_an_echo_makes_room_for_one():
+def test_an_echo_makes_room_for_one_velocity():
     unproven = full()
     unproven.echoed("/cmd_vel", AHEAD)
     assert unproven.room("/cmd_vel")
@@ -44,7 +44,7 @@ def test_an_echo_makes_room_for_one():
     assert not unproven.room("/cmd_vel")
 
 
-def test_an_echo_proves_what_was_written_before_it_too():
+def test_an_echo_also_confirms_the_velocities_written_before_it():
     unproven = UnconfirmedWrites()
     for _ in range(MOST - 1):
         unproven.on_written("/cmd_vel", AHEAD)
@@ -55,21 +55,21 @@ def test_an_echo_proves_what_was_written_before_it_too():
         unproven.on_written("/cmd_vel", AHEAD)
 
 
-def test_an_echo_of_zero_proves_nothing_as_others_say_zero_too():
+def test_an_echo_of_zero_confirms_nothing():
     unproven = full()
     unproven.on_written("/cmd_vel", ZERO)
     unproven.echoed("/cmd_vel", ZERO)
     assert not unproven.room("/cmd_vel")
 
 
-def test_what_others_say_proves_nothing():
+def test_velocities_of_other_programs_and_topics_confirm_nothing():
     unproven = full()
     unproven.echoed("/cmd_vel", TURN)
     unproven.echoed("/other/cmd_vel", AHEAD)
     assert not unproven.room("/cmd_vel")
 
 
-def test_an_echo_of_what_a_ping_has_proven_already_makes_no_room_for_another():
+def test_an_echo_of_a_velocity_already_confirmed_by_a_ping_makes_no_room():
     unproven = full()
     unproven.on_ping(1, 0.0)
     unproven.on_pong(1)
@@ -82,7 +82,7 @@ def test_an_echo_of_what_a_ping_has_proven_already_makes_no_room_for_another():
     assert unproven.room("/cmd_vel")
 
 
-def test_echoes_that_never_come_are_not_waited_for_without_end():
+def test_the_memory_of_velocities_without_an_echo_is_limited():
     unproven = UnconfirmedWrites()
     for number in range(100):
         unproven.on_written("/cmd_vel", AHEAD)
@@ -91,7 +91,7 @@ def test_echoes_that_never_come_are_not_waited_for_without_end():
     assert len(unproven._unechoed["/cmd_vel"]) == REMEMBERED
 
 
-def test_an_answer_tells_when_it_was_asked_for():
+def test_a_ping_answer_gives_the_time_when_the_ping_was_written():
     unproven = UnconfirmedWrites()
     for number, at in enumerate((1.0, 1.5, 1.7)):
         unproven.on_ping(number, at)
@@ -99,7 +99,7 @@ def test_an_answer_tells_when_it_was_asked_for():
     assert unproven.on_pong(2) == 1.7
 
 
-def test_a_ping_that_is_answered_proves_what_was_written_before_it():
+def test_a_ping_answer_confirms_the_velocities_written_before_the_ping():
     unproven = UnconfirmedWrites()
     for _ in range(4):
         unproven.on_written("/cmd_vel", AHEAD)
@@ -114,7 +114,7 @@ def test_a_ping_that_is_answered_proves_what_was_written_before_it():
     assert not unproven.room("/cmd_vel")
 
 
-def test_a_ping_that_is_answered_answers_for_those_before_it():
+def test_a_ping_answer_also_counts_for_earlier_pings():
     unproven = UnconfirmedWrites()
     unproven.on_ping(1, 0.0)
     for _ in range(MOST):
@@ -124,7 +124,7 @@ def test_a_ping_that_is_answered_answers_for_those_before_it():
     assert unproven.room("/cmd_vel")
 
 
-def test_an_early_ping_proves_nothing_of_what_came_after_it():
+def test_a_ping_answer_does_not_confirm_velocities_written_after_the_ping():
     unproven = UnconfirmedWrites()
     unproven.on_ping(1, 0.0)
     for _ in range(MOST):
@@ -133,7 +133,7 @@ def test_an_early_ping_proves_nothing_of_what_came_after_it():
     assert not unproven.room("/cmd_vel")
 
 
-def test_a_new_link_begins_anew():
+def test_a_new_link_forgets_the_velocities_of_the_old_link():
     unproven = full()
     unproven.on_ping(1, 0.0)
     unproven.begin()
@@ -150,7 +150,7 @@ def test_a_new_link_begins_anew():
         max_size=200,
     )
 )
-def test_a_link_of_any_latency_never_holds_more_than_six(steps):
+def test_a_link_of_any_latency_never_holds_more_than_six_moving_velocities(steps):
     """The link takes in order, and answers in order, whenever it likes."""
     unproven, link, back = UnconfirmedWrites(), [], []
     pings = 0

@@ -28,7 +28,7 @@ def held(bench):
     return bench.report().holder is not None
 
 
-def test_a_lease_that_nothing_is_done_with_expires_and_its_holder_hears_why(
+def test_an_unused_lease_expires_after_120_s_with_a_reason_for_its_holder(
     bench, monkeypatch
 ):
     monkeypatch.undo()
@@ -41,12 +41,12 @@ def test_a_lease_that_nothing_is_done_with_expires_and_its_holder_hears_why(
     assert (refused.what, refused.why) == ("lease", "not used for 120 s")
 
 
-def test_it_expires_also_if_its_holder_hangs_and_says_nothing_at_all(bench):
+def test_a_lease_expires_when_the_page_of_its_holder_sends_nothing(bench):
     bench.run(UNUSED)
     assert not held(bench)
 
 
-def test_what_its_old_driver_says_after_that_moves_nothing(bench):
+def test_commands_with_an_expired_lease_do_not_move_the_robot(bench):
     epoch = bench.report().epoch
     bench.hold(UNUSED)
     at = bench.now
@@ -55,7 +55,7 @@ def test_what_its_old_driver_says_after_that_moves_nothing(bench):
 
 
 @pytest.mark.parametrize("act", ["drives", "goal", "locate", "renew", "deny"])
-def test_it_begins_anew_with_whatever_is_done_with_it(bench, act):
+def test_every_use_of_the_lease_restarts_its_expiry_time(bench, act):
     bench.hold(UNUSED - 2.0)
     match act:
         case "drives":
@@ -76,7 +76,7 @@ def test_it_begins_anew_with_whatever_is_done_with_it(bench, act):
     assert not held(bench)
 
 
-def test_only_the_lease_of_now_can_be_renewed(bench):
+def test_only_the_holder_can_renew_the_lease_and_only_with_the_current_epoch(bench):
     epoch = bench.report().epoch
     bench.say("b", op="renew", robot="r1", epoch=epoch)
     assert bench.refusals("b")[-1].why == "A has control"
@@ -84,14 +84,14 @@ def test_only_the_lease_of_now_can_be_renewed(bench):
     assert "expected 1, the epoch of the lease" in bench.refusals("a")[-1].why
 
 
-def test_who_asks_for_it_gets_it_as_ever(bench):
+def test_an_operator_who_requests_control_gets_an_unused_lease(bench):
     bench.hold(UNUSED - 2.0)
     bench.say("b", op="ask", robot="r1")
     bench.hold(12.0)
     assert bench.report().holder.connection == "b"
 
 
-def test_a_programs_lease_stays_as_any_person_may_take_it():
+def test_the_lease_of_a_program_does_not_expire():
     bench = Bench().begin()
     bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
     bench.run(2 * UNUSED)

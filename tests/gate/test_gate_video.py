@@ -32,7 +32,7 @@ def freeze(bench, seconds, **axes):
     )
 
 
-def test_a_robot_stops_when_the_picture_is_a_second_old(bench):
+def test_a_robot_stops_when_the_camera_picture_is_one_second_old(bench):
     before = bench.now
     freeze(bench, 3.0, x=1.0)
     last = max(w.at for w in bench.moving_since(before))
@@ -43,7 +43,7 @@ def test_a_robot_stops_when_the_picture_is_a_second_old(bench):
     assert "no picture from the camera" in bench.refusals()[-1].why
 
 
-def test_it_stops_also_when_the_last_command_that_came_was_fresh(bench):
+def test_a_picture_continues_to_age_after_the_last_command(bench):
     look(bench, 0.1, 990, x=1.0)
     at = bench.now
     bench.run(0.15)
@@ -51,7 +51,7 @@ def test_it_stops_also_when_the_last_command_that_came_was_fresh(bench):
     assert bench.report().reason == "no picture from the camera for 1 s"
 
 
-def test_pictures_that_come_again_move_nothing_until_hands_are_off_and_press(bench):
+def test_new_pictures_move_nothing_until_inputs_are_released_and_pressed(bench):
     freeze(bench, 2.0, x=1.0)
     at = bench.now
     look(bench, 2.0, 50, x=1.0)
@@ -63,7 +63,7 @@ def test_pictures_that_come_again_move_nothing_until_hands_are_off_and_press(ben
     assert bench.moving_since(at)
 
 
-def test_what_a_picture_ages_on_the_way_here_counts(bench):
+def test_the_age_of_the_tick_is_added_to_the_age_of_the_picture(bench):
     at = bench.now
 
     def late():
@@ -73,7 +73,7 @@ def test_what_a_picture_ages_on_the_way_here_counts(bench):
     assert not bench.moving_since(at + 0.06)
 
 
-def test_without_a_camera_nobody_asks_for_pictures(bench):
+def test_commands_without_a_picture_age_can_drive_the_robot(bench):
     freeze(bench, 2.0, x=1.0)
     bench.hold(0.3)
     at = bench.now
@@ -81,7 +81,7 @@ def test_without_a_camera_nobody_asks_for_pictures(bench):
     assert bench.moving_since(at)
 
 
-def test_the_next_driver_does_not_inherit_an_old_picture(bench):
+def test_the_next_operator_does_not_inherit_an_old_picture(bench):
     freeze(bench, 2.0, x=0.0)
     bench.say("a", op="release", robot="r1")
     bench.run(1.0)
@@ -89,7 +89,7 @@ def test_the_next_driver_does_not_inherit_an_old_picture(bench):
     assert bench.state == "driving"
 
 
-def test_an_old_picture_stands_against_nobody_who_does_not_drive(bench):
+def test_forgetting_an_old_picture_ends_the_video_fault(bench):
     video = Video()
     video.observe(5.0, 100.0)
     assert video.fault(100.0)
@@ -98,7 +98,7 @@ def test_an_old_picture_stands_against_nobody_who_does_not_drive(bench):
 
 
 @pytest.mark.parametrize("video", [-1, 1.5, None, "100", True, [], 2**53])
-def test_an_age_that_is_none_is_garbage(video):
+def test_an_invalid_picture_age_is_refused(video):
     import json
 
     fields = {"op": "drive", "robot": "r1", "epoch": 1, "seq": 1, "tick": 1}

@@ -5,7 +5,9 @@ from gate_harness import Bench
 
 
 @pytest.mark.parametrize(("seconds", "written"), [(0.03, True), (0.1, False)])
-def test_a_command_that_waited_long_is_not_written(seconds, written):
+def test_a_waiting_command_is_written_after_30_ms_but_not_after_100_ms(
+    seconds, written
+):
     bench = Bench().begin()
     bench.drive_off()
     bench.drive(x=0.5)
@@ -18,7 +20,7 @@ def test_a_command_that_waited_long_is_not_written(seconds, written):
     assert bool(bench.moving_since(last.at + 0.001)) is written
 
 
-def test_a_gate_that_stood_still_goes_on_with_the_next_command():
+def test_a_gate_that_paused_writes_the_next_command():
     bench = Bench().begin()
     bench.drive_off()
     bench.drive(x=0.5)

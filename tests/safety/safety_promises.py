@@ -86,7 +86,7 @@ PROMISES = (
         9,
         "speed limits always hold",
         "",
-        "test_no_wish_exceeds_the_speeds_in_force",
+        "test_no_velocity_exceeds_the_speed_limits_in_force",
     ),
     Promise(
         10,
@@ -110,7 +110,7 @@ PROMISES = (
         13,
         "a start sends nothing or zero",
         "",
-        "test_a_machine_that_was_driven_gets_zeros_on_first_contact",
+        "test_a_machine_marked_as_driven_gets_zeros_on_the_first_link",
     ),
     Promise(
         14,

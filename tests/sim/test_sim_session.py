@@ -194,7 +194,7 @@ class TestDriving:
         assert status["id"] == "x"
 
 
-class TestGarbage:
+class TestMalformed:
     BAD = [
         {"op": "bogus", "id": "x"},
         {"op": 5, "id": "x"},

@@ -29,7 +29,7 @@ class GoalListener:
         self.received.append("mark")
 
 
-class TestMarked:
+class TestGoalMark:
     @pytest.fixture
     def robots(self, map):
         robots = [Robot(name) for name in ("Ann", "Bob", "Cid")]
@@ -197,7 +197,7 @@ class TestRoutes:
         assert ask({"op": "delete", "name": "x"}) == [{"routes": []}]
 
 
-class TestOnTheCard:
+class TestCard:
     def test_progress_is_shown_only_for_goals_under_way_or_cancelling(self):
         for state in GOALS:
             seen = figures(goal(state, left=2.0))
