@@ -103,9 +103,12 @@ def test_pages_share_one_log_subscription_that_keeps_the_newest_lines():
     assert len(link.listeners) == 1
 
 
-def test_a_log_that_received_nothing_has_no_lines():
-    log = BridgeLog(LogLink("gone"))
+def test_a_log_keeps_no_lines_from_a_time_without_viewers():
+    link = LogLink("quiet")
+    log = BridgeLog(link)
+    link.say("error", "before")
     log.watch().remove()
+    link.say("error", "after")
     assert list(log.lines) == []
 
 
