@@ -35,7 +35,7 @@ def one(field, some):
 
 
 @pytest.mark.parametrize("release", ["ROS1_NOETIC", "ROS2_HUMBLE", "ROS2_JAZZY"])
-def test_rosbags_reads_every_type_and_makes_the_same_bytes_of_it(release):
+def test_rosbags_reads_and_writes_the_same_bytes_for_every_type(release):
     store, ros2 = get_typestore(Stores[release]), "ROS2" in release
     some = random.Random(release)
     read = store.deserialize_cdr if ros2 else store.deserialize_ros1

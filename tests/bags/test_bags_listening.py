@@ -114,7 +114,7 @@ class Story:
         return asyncio.run(story())
 
 
-def test_all_topics_are_recorded_but_what_a_replay_says_of_itself():
+def test_all_topics_except_the_replay_status_are_recorded():
     story = Story({"/odom": ODOMETRY, STATUS: STRING})
 
     async def happens():
@@ -125,7 +125,7 @@ def test_all_topics_are_recorded_but_what_a_replay_says_of_itself():
     assert set(story.bridge.callbacks) == {"/odom"}
 
 
-def test_topics_that_come_later_are_recorded_too():
+def test_topics_that_appear_later_are_recorded():
     story = Story({"/odom": ODOMETRY})
 
     async def happens():
@@ -137,7 +137,7 @@ def test_topics_that_come_later_are_recorded_too():
     assert story.said == []
 
 
-def test_of_topics_that_are_named_no_other_is_recorded():
+def test_only_the_named_topics_are_recorded():
     story = Story({"/odom": ODOMETRY, "/chat": STRING}, only=["/odom", "/later"])
 
     async def happens():
@@ -147,7 +147,7 @@ def test_of_topics_that_are_named_no_other_is_recorded():
     assert set(story.bridge.callbacks) == {"/odom"}
 
 
-def test_topics_of_unknown_types_are_named_once():
+def test_topics_with_unknown_types_are_reported_once():
     story = Story({"/a": "acme_msgs/Arm", "/b": "acme_msgs/Leg", "/odom": ODOMETRY})
 
     async def happens():
@@ -162,7 +162,7 @@ def test_topics_of_unknown_types_are_named_once():
     ]
 
 
-def test_a_link_that_was_lost_and_is_back_is_said_with_the_gap():
+def test_a_lost_and_restored_link_is_reported_with_the_gap():
     story = Story({"/odom": ODOMETRY})
 
     async def happens():
@@ -175,7 +175,7 @@ def test_a_link_that_was_lost_and_is_back_is_said_with_the_gap():
     assert back == "The connection is open again; 0.0 s are missing in the bag"
 
 
-def test_it_ends_by_itself_after_its_time():
+def test_recording_ends_after_its_duration():
     story = Story({"/odom": ODOMETRY})
 
     async def ended():
@@ -190,7 +190,7 @@ def test_it_ends_by_itself_after_its_time():
     assert 0.01 <= asyncio.run(ended()) < 5
 
 
-def test_a_disk_that_is_full_ends_it_with_an_error():
+def test_a_full_disk_ends_recording_with_an_error():
     story = Story({"/odom": ODOMETRY})
 
     async def happens():
@@ -201,7 +201,7 @@ def test_a_disk_that_is_full_ends_it_with_an_error():
         story.run(happens)
 
 
-def test_a_link_that_never_opens_is_said_with_the_reason(monkeypatch):
+def test_a_link_that_never_opens_is_reported_with_the_reason(monkeypatch):
     monkeypatch.setattr(listening, "OPEN_WITHIN", 0.001)
     story = Story({"/odom": ODOMETRY})
     story.bridge.opens, story.bridge.trouble = False, "nothing listens there"
@@ -222,7 +222,7 @@ def test_a_link_that_never_opens_is_said_with_the_reason(monkeypatch):
     ]
 
 
-def test_a_message_has_the_time_at_which_it_came_however_long_writing_takes():
+def test_slow_writing_does_not_change_the_arrival_time_of_messages():
     story = Story({"/odom": ODOMETRY})
     story.recorder.pause = 0.2
     all_came = []
@@ -238,7 +238,7 @@ def test_a_message_has_the_time_at_which_it_came_however_long_writing_takes():
     assert story.recorder.times[2] <= all_came[0]
 
 
-def test_what_cannot_be_read_is_counted():
+def test_unreadable_messages_are_counted_as_dropped():
     story = Story({"/odom": ODOMETRY})
 
     async def happens():
@@ -251,7 +251,7 @@ def test_what_cannot_be_read_is_counted():
     assert "not JSON" in error
 
 
-def test_what_is_too_much_to_wait_is_counted(monkeypatch):
+def test_messages_above_the_queue_limit_are_counted_as_dropped(monkeypatch):
     monkeypatch.setattr(recorder, "HELD", 3 * recorder.ASIDE)
     story = Story({"/odom": ODOMETRY})
     all_came, write = threading.Event(), story.recorder.take
@@ -286,7 +286,7 @@ class HandFed(Bridge):
         self._link._received(json.dumps(operation).encode())
 
 
-def test_no_large_message_is_lost_nor_a_small_one_behind_it():
+def test_large_messages_and_the_small_messages_between_them_are_all_recorded():
     """For whoever shows messages the newest large one is enough; not for a bag."""
     story = Story({"/map": "nav_msgs/OccupancyGrid"}, stated_types={})
     story.bridge = HandFed("ws://127.0.0.1:1")

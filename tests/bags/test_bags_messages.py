@@ -59,19 +59,19 @@ def plain(value):
         ("std_msgs/Empty", {}),
     ],
 )
-def test_a_message_is_the_same_after_it_was_written_and_read(made, type_name, fields):
+def test_a_message_is_unchanged_after_writing_and_reading(made, type_name, fields):
     message = made.message(type_name, **fields)
     assert plain(again(made, type_name, message)) == plain(message)
 
 
-def test_arrays_are_taken_as_cbor_has_them_and_as_json_has_them(made):
+def test_arrays_from_cbor_and_lists_from_json_give_the_same_bytes(made):
     by_list = made.message(SCAN) | {"ranges": [1.0, 2.0]}
     by_array = by_list | {"ranges": array("f", [1.0, 2.0])}
     version = version_of(made, SCAN)
     assert version.bytes_of(by_list) == version.bytes_of(by_array)
 
 
-def test_bytes_are_taken_as_base64_and_as_they_are(made):
+def test_base64_text_and_plain_bytes_give_the_same_bytes(made):
     image = made.message("sensor_msgs/CompressedImage", data=[1, 2, 3])
     version = version_of(made, "sensor_msgs/CompressedImage")
     text = image | {"data": base64.b64encode(bytes([1, 2, 3])).decode()}
@@ -80,7 +80,7 @@ def test_bytes_are_taken_as_base64_and_as_they_are(made):
     )
 
 
-def test_what_json_has_for_a_number_that_is_none_becomes_nan(made):
+def test_null_in_json_becomes_nan(made):
     scan = made.message(SCAN) | {"ranges": [None, 2.0], "range_max": None}
     read = again(made, SCAN, scan)
     assert math.isnan(read["ranges"][0])
@@ -100,7 +100,9 @@ def test_what_json_has_for_a_number_that_is_none_becomes_nan(made):
         ({"header": {"stemp": {}}}, "header.stemp: no such field; there are "),
     ],
 )
-def test_a_message_that_does_not_fit_its_type_says_where(made, change, words):
+def test_the_error_for_a_message_that_does_not_fit_its_type_names_the_field(
+    made, change, words
+):
     scan = made.message(SCAN) | change
     with pytest.raises(Misfit) as refused:
         version_of(made, SCAN).bytes_of(scan)
@@ -108,14 +110,14 @@ def test_a_message_that_does_not_fit_its_type_says_where(made, change, words):
 
 
 @pytest.mark.parametrize("data", [[1.7, 2], [300, 2], array("d", [1.7]), [None]])
-def test_whole_numbers_are_not_made_of_what_is_none(made, data):
+def test_values_that_are_not_valid_integers_are_refused(made, data):
     grid = made.message("nav_msgs/OccupancyGrid") | {"data": data}
     with pytest.raises(Misfit, match="data: "):
         version_of(made, "nav_msgs/OccupancyGrid").bytes_of(grid)
 
 
 @pytest.mark.parametrize("data", [[1.0, -1], array("h", [1, -1]), b"\x01\xff"])
-def test_whole_numbers_are_taken_in_whatever_form_they_come(made, data):
+def test_integers_are_accepted_as_floats_arrays_and_bytes(made, data):
     version = version_of(made, "nav_msgs/OccupancyGrid")
     grid = made.message("nav_msgs/OccupancyGrid")
     assert version.bytes_of(grid | {"data": data}) == version.bytes_of(
@@ -123,13 +125,13 @@ def test_whole_numbers_are_taken_in_whatever_form_they_come(made, data):
     )
 
 
-def test_a_number_that_is_too_large_for_a_float_does_not_fit(made):
+def test_a_number_too_large_for_a_float_field_is_refused(made):
     scan = made.message(SCAN) | {"range_min": 1e300}
     with pytest.raises(Misfit):
         version_of(made, SCAN).bytes_of(scan)
 
 
-def test_a_fixed_array_of_another_length_does_not_fit(made):
+def test_a_fixed_array_with_a_wrong_length_is_refused(made):
     odometry = made.message("nav_msgs/Odometry")
     odometry["pose"] = odometry["pose"] | {"covariance": [0.0] * 35}
     with pytest.raises(Misfit, match=r"pose.covariance: got 35 values, expected 36"):
@@ -180,7 +182,7 @@ def test_a_fixed_array_of_another_length_does_not_fit(made):
         ),
     ],
 )
-def test_how_goals_go_and_particles_are_written(dialect, type_name, message):
+def test_goal_feedback_and_particle_clouds_are_written(dialect, type_name, message):
     version = next(types_of(dialect).versions(type_name))
     data = version.bytes_of(message)
     assert len(data) > 40
@@ -191,7 +193,7 @@ def test_how_goals_go_and_particles_are_written(dialect, type_name, message):
         assert read.feedback.distance_remaining == 2.5
 
 
-def test_the_feedback_of_a_goal_is_recorded_and_played_again(tmp_path):
+def test_goal_feedback_is_unchanged_after_recording(tmp_path):
     type_name = "nav2_msgs/action/NavigateToPose_FeedbackMessage"
     made = Made("ros2")
     message = made.message(type_name, feedback={"distance_remaining": 2.5})
@@ -202,13 +204,13 @@ def test_the_feedback_of_a_goal_is_recorded_and_played_again(tmp_path):
     recording.close()
 
 
-def test_a_type_that_no_release_has_has_no_way_to_be_written(made):
+def test_an_unknown_type_has_no_version(made):
     types = types_of(made.dialect)
     for name in ("acme_msgs/Arm", "nonsense", "nav2_msgs/action/Wait_Feedback"):
         assert list(types.versions(name)) == []
 
 
-def test_every_stamp_is_moved_however_deep_and_no_other_time(made):
+def test_all_nested_header_stamps_are_moved_and_other_times_are_not(made):
     schema = made.schema
     path = made.message(
         "nav_msgs/Path", poses=[{"header": {"stamp": made.time(3.0)}}, {}]
@@ -225,21 +227,21 @@ def test_every_stamp_is_moved_however_deep_and_no_other_time(made):
     assert grid["info"]["map_load_time"] == made.time(1)
 
 
-def test_stamps_in_lists_of_parts_are_moved_too():
+def test_stamps_in_lists_of_nested_messages_are_moved():
     schema = Schema(Dialect("ros1"))
     message = schema.conform(GOALS, {"status_list": [{"goal_id": {"id": "a"}}]})
     Stamps(schema).move(GOALS, message, lambda stamp: stamp + 7)
     assert message["status_list"][0]["goal_id"]["stamp"] == {"secs": 0, "nsecs": 7}
 
 
-def test_a_type_whose_parts_nobody_knows_is_unknown_as_a_whole(made):
+def test_a_type_with_an_unknown_field_type_is_unknown(made):
     store = version_of(made, SCAN).store
     store.register(get_types_from_msg("acme_msgs/Joint[] joints", "acme_msgs/msg/Arm"))
     with pytest.raises(UnknownType, match="acme_msgs/msg/Joint"):
         texts_of(store, "acme_msgs/msg/Arm")
 
 
-def test_a_field_that_is_a_word_of_python_keeps_its_name(made):
+def test_a_field_named_like_a_python_keyword_keeps_its_name(made):
     store = version_of(made, SCAN).store
     name = "acme_msgs/msg/Way"
     store.register(get_types_from_msg("string from\nfloat32 class", name))

@@ -9,36 +9,36 @@ from webmap.bags.times import LAST, SECOND, Pace
 THEN, NOW = 1_500_000_000 * SECOND, 1_700_000_000 * SECOND
 
 
-def test_at_the_rate_of_one_everything_keeps_its_distance():
+def test_at_rate_one_time_intervals_are_unchanged():
     pace = Pace(THEN, NOW)
     assert pace.due(THEN) == NOW
     assert pace.due(THEN + 12_345_678_901) == NOW + 12_345_678_901
     assert pace.moved(THEN - 40_000_001) == NOW - 40_000_001
 
 
-def test_at_the_rate_of_four_all_is_due_in_a_quarter_of_the_time():
+def test_at_rate_four_time_intervals_are_a_quarter_as_long():
     pace = Pace(THEN, NOW, 4.0)
     assert pace.due(THEN + 8 * SECOND) == NOW + 2 * SECOND
     assert pace.moved(THEN + 8 * SECOND) == NOW + 2 * SECOND
 
 
-def test_a_stamp_that_says_no_time_goes_on_saying_none():
+def test_a_zero_stamp_stays_zero():
     assert Pace(THEN, NOW).moved(0) == 0
 
 
 @pytest.mark.parametrize("stamp", [5 * SECOND, LAST - 1])
-def test_a_stamp_stays_that_would_leave_what_stamps_can_say(stamp):
+def test_a_stamp_that_would_leave_the_valid_range_is_unchanged(stamp):
     assert Pace(THEN, NOW, 0.1).moved(stamp) == stamp
 
 
-def test_what_is_put_off_is_played_later_and_from_the_same_moment_on():
+def test_a_pause_delays_playing_without_skipping_messages():
     pace = Pace(THEN, NOW, 2.0)
     pace.put_off(3 * SECOND)
     assert pace.at(NOW + 3 * SECOND) == THEN
 
 
 @given(some.floats(0.01, 100.0), some.integers(0, 10**14))
-def test_the_moment_that_is_played_now_is_the_one_that_is_due_now(rate, after):
+def test_the_recording_time_played_now_is_the_inverse_of_the_due_time(rate, after):
     pace = Pace(THEN, NOW, rate)
     assert pace.at(pace.due(THEN + after)) == pytest.approx(THEN + after, abs=1000)
 

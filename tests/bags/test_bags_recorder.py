@@ -21,7 +21,7 @@ def recording(made, tmp_path):
     return Recorder(bag, types_of(made.dialect), said.append), bag, said
 
 
-def test_what_is_recorded_is_read_by_others(made, recording):
+def test_a_recorded_bag_is_readable_with_rosbags(made, recording):
     recorder, bag, said = recording
     assert recorder.add("/odom", made.schema.dialect.spell(ODOMETRY))
     recorder.take("/odom", made.odometry(0.0, 1.25), BEGIN)
@@ -36,9 +36,7 @@ def test_what_is_recorded_is_read_by_others(made, recording):
     assert said == []
 
 
-def test_a_map_and_static_frames_are_marked_as_kept_for_those_who_come_late(
-    made, recording
-):
+def test_maps_and_static_frames_are_recorded_as_latched(made, recording):
     recorder, bag, _ = recording
     messages = {
         "/map": (GRID, made.grid([0])),
@@ -61,13 +59,15 @@ def is_kept(ext):
     return any(qos.durability == durable for qos in ext.offered_qos_profiles)
 
 
-def test_a_topic_of_a_type_that_nobody_knows_is_not_taken_in(recording):
+def test_a_topic_with_an_unknown_type_is_not_recorded(recording):
     recorder, bag, _ = recording
     assert not recorder.add("/arm", "acme_msgs/Arm")
     bag.close()
 
 
-def test_messages_that_do_not_fit_are_counted_and_said_once(made, recording):
+def test_messages_that_do_not_fit_their_type_are_counted_and_reported_once(
+    made, recording
+):
     recorder, bag, said = recording
     recorder.add("/odom", ODOMETRY)
     recorder.take("/odom", {"pose": 3}, BEGIN)
@@ -80,7 +80,9 @@ def test_messages_that_do_not_fit_are_counted_and_said_once(made, recording):
 
 
 @pytest.mark.parametrize("fields", [{}, {"variance": 0.5}])
-def test_a_type_is_written_as_the_release_of_the_robot_has_it(tmp_path, fields):
+def test_a_message_is_written_with_the_type_version_that_fits_its_fields(
+    tmp_path, fields
+):
     """Since Jazzy a Range has a variance, and before it had none."""
     bag, said = new_bag(tmp_path / "office", "ros2"), []
     recorder = Recorder(bag, types_of("ros2"), said.append)
@@ -96,14 +98,14 @@ def test_a_type_is_written_as_the_release_of_the_robot_has_it(tmp_path, fields):
     assert getattr(read, "variance", None) == fields.get("variance")
 
 
-def test_a_bag_that_exists_is_not_overwritten(made, tmp_path):
+def test_an_existing_bag_is_not_overwritten(made, tmp_path):
     first = new_bag(tmp_path / "office", made.dialect)
     first.close()
     with pytest.raises(ConfigError, match="exists already, and nothing is overwritten"):
         new_bag(tmp_path / "office", made.dialect)
 
 
-def test_what_rosbags_refuses_to_make_is_one_sentence(made, tmp_path, monkeypatch):
+def test_a_bag_that_rosbags_cannot_create_is_an_error(made, tmp_path, monkeypatch):
     monkeypatch.setattr(Path, "exists", lambda _: False)  # it comes in between
     (tmp_path / "office").mkdir()
     (tmp_path / "office.bag").touch()
@@ -111,12 +113,12 @@ def test_what_rosbags_refuses_to_make_is_one_sentence(made, tmp_path, monkeypatc
         new_bag(tmp_path / "office", made.dialect)
 
 
-def test_a_bag_of_ros_1_is_called_so_that_others_know_it(tmp_path):
+def test_a_ros_1_bag_file_gets_the_suffix_bag(tmp_path):
     bag = new_bag(tmp_path / "office.today", "ros1")
     bag.close()
     assert bag.path.name == "office.today.bag"
 
 
-def test_a_bag_of_ros_2_is_not_called_as_a_file(tmp_path):
+def test_a_ros_2_bag_with_a_file_suffix_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="a bag of ROS 2 is a folder"):
         new_bag(tmp_path / "office.bag", "ros2")

@@ -25,7 +25,7 @@ def bag(made, tmp_path_factory):
     )
 
 
-def test_a_bag_tells_its_topics_its_types_and_how_long_it_is(made, bag):
+def test_a_recording_has_the_topics_types_dialect_and_length_of_its_bag(made, bag):
     recording = Recording([bag])
     types = {topic.name: topic.type for topic in recording.topics.values()}
     assert types == {"/map": GRID, "/odom": ODOMETRY, "/cmd_vel": TWIST}
@@ -35,7 +35,7 @@ def test_a_bag_tells_its_topics_its_types_and_how_long_it_is(made, bag):
     recording.close()
 
 
-def test_messages_come_in_their_order_from_a_moment_on(bag):
+def test_messages_are_read_in_order_from_a_start_time(bag):
     recording = Recording([bag])
     received = [(one.topic, one.time) for one in recording.messages(BEGIN + 10**9)]
     assert received == [
@@ -46,7 +46,7 @@ def test_messages_come_in_their_order_from_a_moment_on(bag):
     recording.close()
 
 
-def test_a_message_is_decoded_as_the_rosbridge_server_publishes_it(made, bag):
+def test_a_message_is_decoded_as_the_rosbridge_server_publishes_messages(made, bag):
     recording = Recording([bag])
     *_, last = recording.messages(BEGIN)
     message = recording.message(last)
@@ -55,14 +55,14 @@ def test_a_message_is_decoded_as_the_rosbridge_server_publishes_it(made, bag):
     recording.close()
 
 
-def test_what_was_latched_before_a_moment_still_counts_at_it(bag):
+def test_latched_messages_before_a_start_time_are_kept(bag):
     recording = Recording([bag])
     kept = list(recording.kept_until(BEGIN + 2 * 10**9))
     assert [one.topic for one in kept] == ["/map"]
     recording.close()
 
 
-def test_a_topic_is_latched_by_what_the_bag_says_or_by_its_name(made, tmp_path):
+def test_static_frames_and_grids_are_latched_topics(made, tmp_path):
     bag = made.bag(
         tmp_path / "names",
         ("/bob/tf_static", FRAMES, 0.0, made.frame("base")),
@@ -75,7 +75,7 @@ def test_a_topic_is_latched_by_what_the_bag_says_or_by_its_name(made, tmp_path):
     recording.close()
 
 
-def test_a_lone_mcap_file_is_read_without_its_folder(tmp_path):
+def test_a_single_mcap_file_is_read_without_its_folder(tmp_path):
     made = Made("ros2")
     folder = made.bag(
         tmp_path / "office", ("/odom", ODOMETRY, 0.0, made.odometry(0.0, 1.0))
@@ -85,7 +85,7 @@ def test_a_lone_mcap_file_is_read_without_its_folder(tmp_path):
     recording.close()
 
 
-def test_a_bag_of_sqlite3_is_read_too(tmp_path):
+def test_a_sqlite3_bag_is_read_from_its_folder_and_from_its_file(tmp_path):
     made, version = Made("ros2"), next(types_of("ros2").versions(ODOMETRY))
     with Writer2(
         tmp_path / "office", version=8, storage_plugin=StoragePlugin.SQLITE3
@@ -101,7 +101,7 @@ def test_a_bag_of_sqlite3_is_read_too(tmp_path):
         recording.close()
 
 
-def test_several_bags_of_ros_1_are_played_as_one(tmp_path):
+def test_several_ros_1_bags_are_read_as_one_recording(tmp_path):
     made = Made("ros1")
     bags = [
         made.bag(
@@ -124,23 +124,23 @@ def refusal(*paths):
     return words
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path):
+def test_a_missing_file_is_refused_with_its_name(tmp_path):
     assert refusal(tmp_path / "gone.bag").endswith(
         "gone.bag: there is no such file or folder"
     )
 
 
-def test_a_file_that_is_no_recording_by_its_name_says_what_would_be(tmp_path):
+def test_a_file_with_an_unknown_suffix_is_refused_with_the_known_suffixes(tmp_path):
     file = tmp_path / "notes.txt"
     file.write_text("hello")
     assert "expected .bag, .mcap, .db3, or the folder of a bag" in refusal(file)
 
 
-def test_a_folder_without_its_description_says_what_is_missing(tmp_path):
+def test_a_folder_without_metadata_is_refused(tmp_path):
     assert "there is no metadata.yaml in this folder" in refusal(tmp_path)
 
 
-def test_bags_of_both_kinds_are_not_played_as_one(tmp_path):
+def test_bags_of_ros_1_and_ros_2_together_are_refused(tmp_path):
     for name in ("a.bag", "b.mcap"):
         (tmp_path / name).touch()
     words = refusal(tmp_path / "a.bag", tmp_path / "b.mcap")
@@ -148,7 +148,7 @@ def test_bags_of_both_kinds_are_not_played_as_one(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a.bag", "a.mcap", "folder"])
-def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path, name):
+def test_a_pipe_or_a_device_is_refused(tmp_path, name):
     folder = tmp_path / "folder"
     folder.mkdir()
     (folder / "metadata.yaml").touch()
@@ -158,12 +158,12 @@ def test_a_pipe_or_a_device_is_refused_and_not_waited_for(tmp_path, name):
     assert f"expected a file or a folder, got {kind}" in refusal(tmp_path / name)
 
 
-def test_links_in_a_circle_are_no_recording(tmp_path):
+def test_circular_symbolic_links_are_refused(tmp_path):
     (tmp_path / "a.bag").symlink_to("a.bag")
     assert "a.bag: the symbolic links lead in a circle" in refusal(tmp_path / "a.bag")
 
 
-def test_a_description_of_a_bag_that_is_too_large_is_not_read(tmp_path):
+def test_a_too_large_metadata_file_is_refused(tmp_path):
     with (tmp_path / "metadata.yaml").open("wb") as file:
         file.truncate(5 << 20)
     assert "5242880 bytes are too many for the description of a bag" in refusal(
@@ -172,13 +172,13 @@ def test_a_description_of_a_bag_that_is_too_large_is_not_read(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["empty.bag", "empty.mcap", "empty.db3"])
-def test_an_empty_file_cannot_be_read(tmp_path, name):
+def test_an_empty_file_is_refused(tmp_path, name):
     (tmp_path / name).touch()
     assert refusal(tmp_path / name).startswith(f"{name} cannot be read as a recording")
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
-def test_a_file_that_is_cut_off_cannot_be_read(made, bag, tmp_path, share):
+def test_a_truncated_file_is_refused(made, bag, tmp_path, share):
     whole = bag if bag.is_file() else bag / "office.mcap"
     short = tmp_path / f"short{whole.suffix}"
     data = whole.read_bytes()
@@ -187,16 +187,16 @@ def test_a_file_that_is_cut_off_cannot_be_read(made, bag, tmp_path, share):
 
 
 @pytest.mark.parametrize("name", ["noise.bag", "noise.mcap", "noise.db3"])
-def test_a_file_of_something_else_cannot_be_read(tmp_path, name):
+def test_a_file_with_other_content_is_refused(tmp_path, name):
     (tmp_path / name).write_bytes(bytes(range(256)) * 40)
     assert refusal(tmp_path / name).startswith(f"{name} cannot be read as a recording")
 
 
-def test_a_bag_without_a_message_says_so(made, tmp_path):
+def test_a_bag_without_messages_is_refused(made, tmp_path):
     assert "it contains no message" in refusal(made.bag(tmp_path / "nothing"))
 
 
-def test_a_topic_of_a_type_without_a_definition_is_named_and_left_out(tmp_path):
+def test_a_topic_with_an_undefined_type_is_left_out_with_a_warning(tmp_path):
     version = next(types_of("ros2").versions(ODOMETRY))
     with Writer2(
         tmp_path / "office", version=8, storage_plugin=StoragePlugin.MCAP
@@ -220,7 +220,7 @@ def test_a_topic_of_a_type_without_a_definition_is_named_and_left_out(tmp_path):
     recording.close()
 
 
-def test_a_topic_of_a_type_that_holds_itself_is_named_and_left_out(tmp_path):
+def test_a_topic_with_a_recursive_type_is_left_out_with_a_warning(tmp_path):
     version = next(types_of("ros2").versions(ODOMETRY))
     with Writer2(
         tmp_path / "office", version=8, storage_plugin=StoragePlugin.MCAP
@@ -242,7 +242,7 @@ def test_a_topic_of_a_type_that_holds_itself_is_named_and_left_out(tmp_path):
     recording.close()
 
 
-def test_bytes_that_are_not_of_their_type_are_left_out_and_said_once(tmp_path):
+def test_messages_that_do_not_match_their_type_are_left_out_with_one_warning(tmp_path):
     version = next(types_of("ros1").versions(ODOMETRY))
     with Writer1(tmp_path / "bad.bag") as writer:
         odom = writer.add_connection(
@@ -260,5 +260,5 @@ def test_bytes_that_are_not_of_their_type_are_left_out_and_said_once(tmp_path):
     recording.close()
 
 
-def test_a_recording_is_called_as_its_file(tmp_path):
+def test_a_recording_is_named_after_its_file(tmp_path):
     assert recording_name([tmp_path / "office.bag"]) == "office.bag"

@@ -19,6 +19,8 @@ from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.session import Session
 
+pytestmark = pytest.mark.slow
+
 NOW = 1_800_000_000 * SECOND
 
 
@@ -93,7 +95,7 @@ def bag(made, tmp_path_factory):
     )
 
 
-def test_who_listens_hears_every_message_in_its_order(bag):
+def test_a_subscriber_receives_every_message_in_order(bag):
     async def story():
         async with played(bag) as player:
             client = Client(player).listen("/odom")
@@ -103,7 +105,7 @@ def test_who_listens_hears_every_message_in_its_order(bag):
     asyncio.run(story())
 
 
-def test_stamps_are_moved_to_the_time_at_which_it_is_played(made, bag):
+def test_stamps_are_moved_to_the_time_of_playing(made, bag):
     async def story():
         recording = Recording([bag])
         player = Player(recording, now=lambda: NOW + SECOND)
@@ -121,7 +123,7 @@ def test_stamps_are_moved_to_the_time_at_which_it_is_played(made, bag):
     asyncio.run(story())
 
 
-def test_who_comes_late_gets_the_map_and_all_static_frames(bag):
+def test_a_late_subscriber_receives_the_map_and_all_static_frames(bag):
     async def story():
         async with played(bag) as player:
             early = Client(player).listen("/odom")
@@ -135,7 +137,7 @@ def test_who_comes_late_gets_the_map_and_all_static_frames(bag):
     asyncio.run(story())
 
 
-def test_from_a_moment_on_the_map_of_before_it_is_there(bag):
+def test_playing_from_a_start_time_publishes_the_earlier_map(bag):
     async def story():
         async with played(bag, start=2.5) as player:
             client = Client(player).listen("/odom", "/map")
@@ -146,7 +148,7 @@ def test_from_a_moment_on_the_map_of_before_it_is_there(bag):
     asyncio.run(story())
 
 
-def test_a_loop_begins_anew_and_one_recording_ends(bag):
+def test_a_recording_ends_without_loop_and_restarts_with_loop(bag):
     async def story():
         async with played(bag, loop=True) as player:
             client = Client(player).listen("/odom")
@@ -176,7 +178,9 @@ def test_a_short_recording_is_played_at_most_once_a_second(made, tmp_path, monke
     asyncio.run(story())
 
 
-def test_what_is_kept_of_before_is_read_once_and_beside_the_loop(bag, monkeypatch):
+def test_latched_messages_before_the_start_are_read_once_in_another_thread(
+    bag, monkeypatch
+):
     whole, threads = Recording.kept_until, []
 
     def noted(self, *arguments):
@@ -196,7 +200,7 @@ def test_what_is_kept_of_before_is_read_once_and_beside_the_loop(bag, monkeypatc
     assert thread is not threading.main_thread()
 
 
-def test_it_begins_anew_when_it_is_told_to(bag):
+def test_an_ended_replay_can_be_restarted(bag):
     async def story():
         async with played(bag) as player:
             client = Client(player).listen("/odom")
@@ -207,7 +211,7 @@ def test_it_begins_anew_when_it_is_told_to(bag):
     asyncio.run(story())
 
 
-def test_nothing_is_played_before_somebody_listens(bag):
+def test_playing_starts_only_after_the_first_subscription(bag):
     async def story():
         async with played(bag) as player:
             for _ in range(50):
@@ -218,7 +222,7 @@ def test_nothing_is_played_before_somebody_listens(bag):
     asyncio.run(story())
 
 
-def test_it_says_what_is_played_and_where_in_it(bag):
+def test_the_replay_publishes_its_status(bag):
     async def story():
         async with played(bag, start=1.0) as player:
             client = Client(player).listen(STATUS)
@@ -229,7 +233,7 @@ def test_it_says_what_is_played_and_where_in_it(bag):
     asyncio.run(story())
 
 
-def test_its_words_have_the_moment_the_length_and_the_speed(bag):
+def test_the_status_names_the_position_the_length_and_the_speed(bag):
     recording = Recording([bag])
     player = Player(recording, rate=2.0, start=1.0, now=lambda: NOW)
     assert player.status == (
@@ -238,7 +242,7 @@ def test_its_words_have_the_moment_the_length_and_the_speed(bag):
     recording.close()
 
 
-def test_rosapi_tells_the_topics_of_the_recording_in_its_own_spelling(made, bag):
+def test_rosapi_lists_the_topics_of_the_recording_with_types_of_its_dialect(made, bag):
     async def story():
         async with played(bag) as player:
             topics = Client(player).call("/rosapi/topics")
@@ -260,7 +264,7 @@ def test_rosapi_tells_the_topics_of_the_recording_in_its_own_spelling(made, bag)
         {"op": "advertise_service", "service": "/stop", "type": "std_srvs/Trigger"},
     ],
 )
-def test_nothing_is_taken_in_whatever_a_client_sends(bag, operation):
+def test_the_replay_refuses_publications_and_services_of_clients(bag, operation):
     async def story():
         async with played(bag) as player:
             other = Client(player).listen("/cmd_vel")
@@ -274,7 +278,7 @@ def test_nothing_is_taken_in_whatever_a_client_sends(bag, operation):
     asyncio.run(story())
 
 
-def test_there_is_no_action_to_send_a_goal_to(bag):
+def test_the_replay_refuses_goals(bag):
     async def story():
         async with played(bag) as player:
             client = Client(player)
@@ -299,16 +303,14 @@ def test_there_is_no_action_to_send_a_goal_to(bag):
         ({"rate": 1e9}, "a rate is a number from 0.001 to 1000, got 1e"),
     ],
 )
-def test_a_pace_that_makes_no_sense_is_refused(bag, options, words):
+def test_an_invalid_start_or_rate_is_refused(bag, options, words):
     recording = Recording([bag])
     with pytest.raises(ConfigError, match=words):
         Player(recording, **options)
     recording.close()
 
 
-def test_a_recording_that_is_damaged_in_the_middle_is_played_up_to_there(
-    bag, monkeypatch, caplog
-):
+def test_a_damaged_recording_is_played_up_to_the_damage(bag, monkeypatch, caplog):
     whole = Recording.messages
 
     def damaged(self, start):

@@ -19,6 +19,8 @@ from webmap.gate.protocol import Ready
 from webmap.ros.offload import Offload
 from webmap.ros.rosbridge.events import Publish
 
+pytestmark = pytest.mark.slow
+
 SOURCE = Path(webmap.__file__).parent
 
 HOSTILE = """\

@@ -10,6 +10,8 @@ from webmap.base.errors import ConfigError
 from webmap.base.lined_yaml import LinedYaml
 from webmap.base.plain_files import read_file, refuse_special, resolved, write_file
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_file_is_read_through_a_symbolic_link(tmp_path):
     (tmp_path / "a").write_bytes(b"abc")

@@ -115,9 +115,7 @@ def expect_recorded(tab, name: str, dialect: str) -> None:
         assert dot == pytest.approx(place, abs=0.003)
 
 
-def test_robots_of_both_kinds_of_ros_are_on_one_map_where_they_were_recorded(
-    tab, ros1, ros2
-):
+def test_one_map_shows_ros_1_and_ros_2_robots_at_their_recorded_poses(tab, ros1, ros2):
     robots = [f"1@Anna:{ROBOT}", f"2@Berta:{ROBOT}"]
     with viewing(ros1, ros2, robots=robots) as server:
         tab.goto(server.url)
@@ -154,7 +152,9 @@ def expect_going_on(tab, name: str, dialect: str) -> None:
     expect_recorded(tab, name, dialect)
 
 
-def test_a_bridge_that_is_not_there_is_said_and_the_other_robot_goes_on(tab, ros1):
+def test_an_unreachable_bridge_is_reported_and_the_other_robot_is_still_updated(
+    tab, ros1
+):
     gone = f"ws://127.0.0.1:{closed_port()}"
     with viewing(ros1, gone, robots=[f"1@Anna:{ROBOT}", f"2@Gone:{ROBOT}"]) as server:
         tab.goto(server.url)
@@ -181,7 +181,7 @@ def test_a_bridge_that_is_not_there_is_said_and_the_other_robot_goes_on(tab, ros
     ids=["odometry", "scan"],
 )
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_a_topic_of_another_type_is_said_and_the_other_robot_goes_on(
+def test_a_topic_with_a_wrong_type_is_reported_and_the_other_robot_is_still_updated(
     tab, request, dialect, topics, sentence
 ):
     url = request.getfixturevalue(dialect)
@@ -196,7 +196,7 @@ def test_a_topic_of_another_type_is_said_and_the_other_robot_goes_on(
 
 
 @pytest.mark.parametrize("url", ["http://robot:9090", "robot:9090", "ws://robot:x"])
-def test_a_wrong_url_is_refused_in_one_sentence(url):
+def test_an_invalid_url_is_refused_with_one_line(url):
     # Nothing is served, so that there is no page to say it on.
     process = Process("view", url, "--port", 0, "--no-browser")
     assert process.popen.wait(30) == 2

@@ -116,14 +116,14 @@ def row(page, map):
 
 
 @both
-def test_a_map_that_is_near_has_sharp_edges(page, map, image):
+def test_a_zoomed_in_map_has_sharp_edges(page, map, image):
     look(page, "Near")
     assert rendering(page, image) == "pixelated"
     assert len(set(row(page, map)[40:-40])) == 2, "nothing between wall and floor"
 
 
 @both
-def test_of_a_map_that_is_far_away_every_wall_is_seen(page, map, image):
+def test_a_zoomed_out_map_shows_every_wall(page, map, image):
     look(page, "Far")
     assert rendering(page, image) == "auto"
     greys = row(page, map)
@@ -138,7 +138,7 @@ def test_of_a_map_that_is_far_away_every_wall_is_seen(page, map, image):
     assert rendering(page, image) == "pixelated"
 
 
-def test_a_rule_of_the_page_says_otherwise(page, folder):
+def test_a_css_rule_of_the_page_overrides_the_image_rendering(page, folder):
     (folder / "style.css").write_text("svg.webmap image { image-rendering: auto; }")
     try:
         page.reload()

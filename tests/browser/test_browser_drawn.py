@@ -31,7 +31,7 @@ SCAN = ".laserscan > .dot[d]"
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_the_demo_is_drawn_as_it_was(chromium, dialect):
+def test_the_demo_matches_the_recorded_drawing(chromium, dialect):
     command = ("demo", "--port", "0", "--no-browser", "--dialect", dialect)
     shown = (robots(2), SCAN, ".diagnostics", "#robots .charge", *CONSOLE)
     with webmap(*command) as url, opened(chromium, url, *shown) as page:
@@ -45,7 +45,7 @@ def test_the_demo_is_drawn_as_it_was(chromium, dialect):
         expect_drawn(page, f"{name}_selected", unstable=unstable)
 
 
-def test_frames_of_real_bridges_are_drawn_as_they_were(chromium):
+def test_messages_of_real_bridges_match_the_recorded_drawing(chromium):
     with (
         running(*played("ros1"), "--port", 0, pattern=BRIDGE, **PLAYER) as one,
         running(*played("ros2"), "--port", 0, pattern=BRIDGE, **PLAYER) as other,
@@ -74,7 +74,7 @@ PLAYED = {
 """How often a second a topic is in the bag; what is latched is there once."""
 
 
-def test_a_bag_is_drawn_as_it_was(chromium, tmp_path):
+def test_a_played_bag_matches_the_recorded_drawing(chromium, tmp_path):
     made = Made("ros1")
 
     def at(moment: float, topic: str) -> tuple:
@@ -127,7 +127,9 @@ def flat():
     ],
     ids=["simple", "advanced", "module", "layers"],
 )
-def test_an_example_is_drawn_as_it_was(chromium, tmp_path, request, script, sim, shown):
+def test_each_example_matches_its_recorded_drawing(
+    chromium, tmp_path, request, script, sim, shown
+):
     bridge = request.getfixturevalue(sim)
     with (
         serving(script, bridge, tmp_path / "example") as server,

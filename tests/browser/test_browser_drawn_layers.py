@@ -34,7 +34,7 @@ def go_along(page: Page, bridge: FixedBridge, *behind: str) -> None:
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_what_is_found_behind_a_bridge_is_drawn_as_it_was(chromium, dialect):
+def test_discovered_robots_and_layers_match_the_recorded_drawing(chromium, dialect):
     with (
         fixed_bridge(dialect) as bridge,
         webmap("view", bridge.url, "--port", "0", "--no-browser") as url,
@@ -49,7 +49,7 @@ def test_what_is_found_behind_a_bridge_is_drawn_as_it_was(chromium, dialect):
         expect_drawn(page, f"view_{dialect}", level=[".world"])
 
 
-def test_each_way_to_a_pose_and_each_option_of_a_layer_is_drawn_as_it_was(
+def test_every_pose_source_and_layer_option_matches_the_recorded_drawing(
     chromium, tmp_path
 ):
     make_files(tmp_path)
@@ -64,7 +64,7 @@ def test_each_way_to_a_pose_and_each_option_of_a_layer_is_drawn_as_it_was(
             expect_drawn(page, "page")
 
 
-def test_a_fleet_is_drawn_as_it_was(chromium, tmp_path):
+def test_a_fleet_file_matches_the_recorded_drawing(chromium, tmp_path):
     make_files(tmp_path)
     with fixed_bridge("ros2") as bridge:
         text = (HERE / "fixed_fleet.toml").read_text().replace("BRIDGE", bridge.url)

@@ -80,13 +80,13 @@ def shape(tab, name):
 # The advanced tutorial.
 
 
-def test_the_log_says_that_the_connection_is_established(tab, advanced):
+def test_the_log_shows_that_the_connection_is_established(tab, advanced):
     opened(tab, advanced, robots=2)
     expect(tab.locator("#log")).to_have_text("Connection established.\n")
     assert style(tab, "#log", "white-space-collapse") == "preserve"
 
 
-def test_each_robot_is_its_own_model_in_classes_of_its_own(tab, advanced, witness):
+def test_each_robot_is_drawn_with_its_own_model_and_css_classes(tab, advanced, witness):
     opened(tab, advanced, robots=2)
     for index in range(2):
         group = tab.locator(robot(f"Robot {index}"))
@@ -99,13 +99,13 @@ def test_each_robot_is_its_own_model_in_classes_of_its_own(tab, advanced, witnes
     assert place == pytest.approx(witness.place(ODOM), abs=0.01)
 
 
-def test_the_style_sheet_of_the_page_reaches_robots(tab, advanced):
+def test_the_style_sheet_of_the_page_applies_to_robots(tab, advanced):
     opened(tab, advanced, robots=2)
     assert shape(tab, "Robot 0") == (RED, "rgb(0, 0, 0)")
     assert style(tab, robot("Robot 0"), "stroke-width") == "0.01px"
 
 
-def test_the_image_of_the_map_is_there(tab, advanced):
+def test_the_image_of_the_map_is_loaded(tab, advanced):
     opened(tab, advanced, robots=2)
     assert tab.locator(".world image").evaluate(
         "async e => { const i = new Image(); i.src = e.href.baseVal;"
@@ -113,9 +113,7 @@ def test_the_image_of_the_map_is_there(tab, advanced):
     )
 
 
-def test_the_page_names_the_selected_robot_and_shows_it_in_another_colour(
-    tab, advanced
-):
+def test_the_page_names_the_selected_robot_and_changes_its_colour(tab, advanced):
     opened(tab, advanced, robots=2)
     selected = tab.locator("#selected")
     expect(selected).to_have_text("No selection")
@@ -141,7 +139,7 @@ def test_keys_drive_the_selected_robot(tab, advanced, witness):
     wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="standing still")
 
 
-def test_the_log_tells_of_a_simulator_that_dies_and_comes_back(tab, tmp_path):
+def test_the_log_reports_when_the_simulator_dies_and_restarts(tab, tmp_path):
     with running("sim", "--port", 0, pattern=BRIDGE) as first:
         port = first.url.rpartition(":")[2]
         with serving("advanced/advanced.py", first.url, tmp_path) as server:
@@ -166,7 +164,7 @@ def test_the_log_tells_of_a_simulator_that_dies_and_comes_back(tab, tmp_path):
 # The module tutorial.
 
 
-def test_the_tutorials_own_module_names_the_selected_robot(tab, module):
+def test_the_module_of_the_tutorial_names_the_selected_robot(tab, module):
     opened(tab, module, robots=1)
     shown = tab.locator("#show_selected")
     expect(shown).to_have_text("No selection")
@@ -177,7 +175,7 @@ def test_the_tutorials_own_module_names_the_selected_robot(tab, module):
     expect(shown).to_have_text("No selection")
 
 
-def test_the_tutorials_own_layer_shows_the_voltage_beside_the_robot(
+def test_the_layer_of_the_tutorial_shows_the_voltage_of_the_robot(
     tab, simulator, tmp_path
 ):
     with serving("module/voltage.py", simulator, tmp_path) as server:
@@ -212,7 +210,7 @@ def driven(ros, topic, x, turn):
         velocity.unadvertise()
 
 
-def test_a_followed_robot_keeps_its_place_on_the_screen_while_it_moves(
+def test_a_followed_robot_stays_at_its_screen_position_while_moving(
     tab, module, witness
 ):
     opened(tab, module, robots=1)

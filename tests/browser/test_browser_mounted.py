@@ -76,7 +76,7 @@ def host(simulator, tmp_path_factory):
     assert "Traceback" not in rest, rest
 
 
-def test_a_page_under_a_prefix_shows_and_drives_a_robot(host, simulator, tab):
+def test_a_page_mounted_under_a_prefix_shows_and_drives_a_robot(host, simulator, tab):
     url, token = host
     witness = Witness(simulator)
     witness.follow("/odom", "nav_msgs/Odometry")
@@ -97,7 +97,7 @@ def test_a_page_under_a_prefix_shows_and_drives_a_robot(host, simulator, tab):
     witness.close()
 
 
-def test_the_host_keeps_its_own_pages(host, tab):
+def test_the_host_application_keeps_its_own_pages(host, tab):
     url, _ = host
     tab.allowed.append("404")  # the host has no icon
     tab.goto(url)

@@ -53,7 +53,7 @@ def standing(witness):
     return witness.speed(ODOM) == (0.0, 0.0)
 
 
-def test_anybody_stops_a_robot_that_somebody_else_drives(server, witness, tab, other):
+def test_another_page_stops_a_driven_robot_with_stop_all(server, witness, tab, other):
     open_and_drive(tab, server, witness)
     other.goto(server.url)
     row = other.locator("#robots .row")
@@ -66,7 +66,9 @@ def test_anybody_stops_a_robot_that_somebody_else_drives(server, witness, tab, o
     tab.keyboard.up("s")
 
 
-def test_only_one_of_two_viewers_drives(server, witness, tab, other):
+def test_keys_of_a_page_without_control_do_not_drive_the_robot(
+    server, witness, tab, other
+):
     # First, as a page that loads may hold up the page that drives.
     other.goto(server.url)
     other.locator("#robots .row button").click()
@@ -82,7 +84,7 @@ def test_only_one_of_two_viewers_drives(server, witness, tab, other):
     wait_until(lambda: standing(witness), what="standing still")
 
 
-def test_a_display_that_is_killed_stops_the_robot(server, witness, tab):
+def test_killing_the_display_stops_the_robot(server, witness, tab):
     open_and_drive(tab, server, witness)
     tab.allowed = ["WebSocket", "ERR_CONNECTION"]
     os.kill(server.popen.pid, signal.SIGKILL)

@@ -84,39 +84,39 @@ def colour(page, x, y):
     return Image.open(io.BytesIO(shot)).convert("RGB").getpixel((x, y))
 
 
-def test_the_image_of_a_robot_lies_beside_the_program_and_is_drawn(page):
+def test_an_image_file_beside_the_program_is_drawn_as_robot(page):
     # Two metres to each side of the middle, at 50 pixels to the metre.
     wait_until(lambda: colour(page, 230, 200) == BLUE, what="the rear")
     assert colour(page, 370, 200) == RED
 
 
-def test_an_image_that_cannot_be_loaded_is_said_on_the_page_and_in_the_log(
+def test_an_image_that_cannot_be_loaded_is_reported_on_the_page_and_in_the_log(
     page, server
 ):
     expect(page.locator(".webmap-notice")).to_contain_text("/nowhere.png could not be")
     wait_until(lambda: "image /nowhere.png could not be" in server.log, what="the log")
 
 
-def test_the_first_robot_is_found_by_css_among_what_else_is_in_the_world(page):
+def test_css_nth_child_finds_robots_among_other_elements_of_the_world(page):
     assert page.evaluate(
         "['.robot:nth-child(1)', '.robot:nth-child(2)'].map((css) =>"
         " [...document.querySelectorAll(css)].map((robot) => robot.dataset.name))"
     ) == [["Ann"], ["Bob"]]
 
 
-def test_what_is_put_on_the_root_of_a_map_is_drawn_in_its_pixels(page):
+def test_elements_of_the_map_root_are_drawn_in_pixels(page):
     assert colour(page, 12, 22) == GREEN
     assert colour(page, 38, 58) == GREEN
 
 
-def test_what_is_put_into_the_world_is_drawn_in_metres(page):
+def test_elements_of_the_world_are_drawn_in_metres(page):
     map = page.locator("svg.webmap").bounding_box()
     slab = page.locator(".slab").bounding_box()
     assert (slab["x"] - map["x"], slab["y"] - map["y"]) == pytest.approx((50, 300))
     assert (slab["width"], slab["height"]) == pytest.approx((100, 50))
 
 
-def test_a_map_knows_where_it_is_in_the_window(page):
+def test_a_map_knows_its_position_in_the_window(page):
     place = page.locator("svg.webmap").bounding_box()
     assert place["x"] > 20
     expect(page.locator(".words")).to_have_text(f"{place['x']:.0f} {place['y']:.0f}")

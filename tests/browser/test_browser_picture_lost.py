@@ -12,7 +12,7 @@ from real_browser import hold
 pytestmark = pytest.mark.browser
 
 
-def test_who_drives_lets_go_when_the_picture_is_cut_off(tab):
+def test_the_page_releases_its_inputs_when_the_scene_connection_is_lost(tab):
     pictures, said = [], []
     cut = threading.Event()
 

@@ -23,13 +23,15 @@ def program(page: str) -> str:
     return found
 
 
-def test_the_documentation_begins_with_the_same_twelve_lines():
+def test_the_readme_and_the_documentation_show_the_same_twelve_line_program():
     text = program("README.md")
     assert program("docs/index.md") == text
     assert len([line for line in text.splitlines() if line.strip()]) == 12
 
 
-def test_they_show_a_robot_that_can_be_clicked_and_driven(tab, tmp_path):
+def test_the_program_of_the_readme_shows_a_robot_that_can_be_selected_and_driven(
+    tab, tmp_path
+):
     simulator = ("sim", "--flat", "--port", 0, "--seed", 7)
     file = tmp_path / "first.py"
     with running(*simulator, pattern=BRIDGE) as robot:

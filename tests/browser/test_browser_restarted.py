@@ -19,9 +19,7 @@ webmap.run()
 """
 
 
-def test_a_page_whose_token_is_of_the_past_is_told_to_open_the_new_address(
-    tab, tmp_path
-):
+def test_a_page_with_an_old_token_asks_the_user_to_open_the_new_address(tab, tmp_path):
     tab.allowed += ["WebSocket", "ERR_CONNECTION", "401", "403"]
     script = tmp_path / "page.py"
     script.write_text(SCRIPT)

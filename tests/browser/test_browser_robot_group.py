@@ -121,16 +121,16 @@ def colour(page, x, y):
     return "rgb({}, {}, {})".format(*picture.getpixel((200 + 40 * x, 100 - 40 * y)))
 
 
-def test_css_counts_robots_in_the_order_in_which_they_were_added(page):
+def test_css_nth_child_counts_robots_in_the_order_they_were_added(page):
     assert fills(page, "one") == [["Ann", FIRST], ["Bob", SECOND], ["Cid", OTHERS]]
     assert page.locator("#one .robot:nth-child(1)").count() == 1
 
 
-def test_a_robot_has_its_own_place_on_each_map(page):
+def test_each_map_has_its_own_order_of_robots(page):
     assert fills(page, "two") == [["Cid", FIRST], ["Ann", SECOND]]
 
 
-def test_a_robot_that_is_removed_and_added_again_is_the_last(page):
+def test_a_robot_that_is_removed_and_added_again_becomes_the_last_robot(page):
     first = page.locator("#one .robot:nth-child(1)")
     page.get_by_role("button", name="Again").click()
     expect(first).to_have_attribute("data-name", "Bob")
@@ -141,7 +141,7 @@ def test_a_robot_that_is_removed_and_added_again_is_the_last(page):
     assert fills(page, "one") == [["Bob", FIRST], ["Cid", SECOND], ["Ann", OTHERS]]
 
 
-def test_layers_lie_under_and_over_all_robots_by_their_order(page):
+def test_layers_are_drawn_under_or_over_all_robots_by_their_order(page):
     for x, robot in ((-2, FIRST), (0, SECOND), (2, OTHERS)):
         assert colour(page, x, 0.0) == robot  # over the band of order 99
         assert colour(page, x, 0.3) == OVER

@@ -54,7 +54,7 @@ def shows_its_map(page):
     expect(page.get_by_role("status")).to_be_hidden()
 
 
-def test_the_file_that_is_opened_signs_in_and_leaves_a_clean_address(
+def test_the_file_opened_in_the_browser_signs_in_and_leaves_a_clean_url(
     tab, script, tmp_path, monkeypatch
 ):
     said = tmp_path / "command line"
@@ -85,7 +85,9 @@ def test_the_file_that_is_opened_signs_in_and_leaves_a_clean_address(
     assert list(home.iterdir()) == []
 
 
-def test_the_printed_address_works_again_and_leaves_no_token(tab, other, script):
+def test_the_printed_url_works_several_times_and_its_token_disappears(
+    tab, other, script
+):
     with running("run", script, "--port", 0, "--no-browser", pattern=WEB) as process:
         root = process.url.partition("?")[0]
         for page in (tab, other):
@@ -113,9 +115,7 @@ class Neighbour(http.server.BaseHTTPRequestHandler):
         pass
 
 
-def test_a_server_on_another_port_gets_the_cookie_and_can_do_nothing_with_it(
-    tab, script
-):
+def test_the_cookie_alone_gives_a_server_on_another_port_no_access(tab, script):
     Neighbour.cookies = []
     near = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Neighbour)
     threading.Thread(target=near.serve_forever).start()
@@ -144,7 +144,7 @@ def test_a_server_on_another_port_gets_the_cookie_and_can_do_nothing_with_it(
         near.server_close()
 
 
-def test_a_page_without_a_key_says_how_to_sign_in_and_goes_on_by_itself(
+def test_a_page_without_a_key_explains_the_sign_in_and_resumes_afterwards(
     tab, script, tmp_path
 ):
     with running("run", script, "--port", 0, "--no-browser", pattern=WEB) as process:

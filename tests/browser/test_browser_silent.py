@@ -30,7 +30,7 @@ def server(robots):
         yield process
 
 
-def test_a_robot_whose_odometry_ceases_looks_old_everywhere_and_the_log_says_so(
+def test_a_robot_without_odometry_becomes_stale_on_the_page_and_in_the_log(
     robots, server, tab
 ):
     bob = robots[0]

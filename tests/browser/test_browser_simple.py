@@ -83,7 +83,7 @@ def middle(tab):
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
-def test_the_token_leaves_the_address_and_the_robot_is_where_odometry_says(
+def test_the_page_removes_the_token_and_draws_the_robot_at_its_odometry_pose(
     opened, witness
 ):
     assert "token" not in opened.url
@@ -95,7 +95,7 @@ def test_the_token_leaves_the_address_and_the_robot_is_where_odometry_says(
     assert opened.locator(".laserscan > .dot").count() == 1
 
 
-def test_drag_moves_the_view_by_as_many_pixels_and_is_no_click(opened):
+def test_dragging_moves_the_view_by_the_same_distance_and_is_not_a_click(opened):
     opened.mouse.click(*robot_on_screen(opened))
     opened.locator(".robot.selected").wait_for()
     before = view(opened)
@@ -113,7 +113,7 @@ def test_drag_moves_the_view_by_as_many_pixels_and_is_no_click(opened):
     assert opened.locator(".robot.selected").count() == 1, "the drag deselected"
 
 
-def test_the_wheel_zooms_about_the_pointer(opened):
+def test_the_wheel_zooms_the_view_about_the_pointer(opened):
     box = opened.locator("svg.webmap").bounding_box()
     px, py = 200, 150
     before = view(opened)
@@ -124,7 +124,7 @@ def test_the_wheel_zooms_about_the_pointer(opened):
     assert apply(view(opened), *world) == pytest.approx((px, py), abs=0.5)
 
 
-def test_shift_and_the_wheel_turn_about_the_pointer(opened):
+def test_shift_and_the_wheel_rotate_the_view_about_the_pointer(opened):
     box = opened.locator("svg.webmap").bounding_box()
     px, py = 420, 300
     before = view(opened)
@@ -141,7 +141,7 @@ def test_shift_and_the_wheel_turn_about_the_pointer(opened):
     )
 
 
-def test_a_click_on_the_robot_selects_and_one_on_nothing_clears(opened):
+def test_a_click_on_a_robot_selects_and_a_click_on_the_background_deselects(opened):
     opened.mouse.click(*robot_on_screen(opened))
     opened.locator(".robot.selected").wait_for()
     x, y = middle(opened)
@@ -149,7 +149,7 @@ def test_a_click_on_the_robot_selects_and_one_on_nothing_clears(opened):
     opened.locator(".robot:not(.selected)").wait_for()
 
 
-def test_a_selection_is_in_one_viewers_page_only(opened, other, server):
+def test_a_selection_does_not_appear_on_other_pages(opened, other, server):
     other.goto(server.url)
     other.locator(".robot:not(.unplaced)").wait_for(state="attached")
     opened.mouse.click(*robot_on_screen(opened))
@@ -167,7 +167,7 @@ def select(tab):
     ("key", "forward", "turn"),
     [("w", 1, 0), ("s", -1, 0), ("a", 0, 1), ("d", 0, -1)],
 )
-def test_each_key_drives_the_selected_robot_while_it_is_held(
+def test_a_held_key_drives_the_selected_robot_until_release(
     opened, witness, key, forward, turn
 ):
     select(opened)
@@ -206,7 +206,7 @@ ROBOT = """(() => {
 })()"""
 
 
-def test_a_hidden_tab_stops_the_robot_and_coming_back_does_not_start_it(
+def test_a_hidden_tab_stops_the_robot_and_showing_the_tab_again_sends_nothing(
     server, witness
 ):
     with Chromium() as browser:
@@ -241,7 +241,7 @@ def test_a_closed_tab_stops_the_robot(opened, witness, other, server):
     wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
 
 
-def test_stop_stands_until_it_is_reset_and_the_key_is_pressed_again(opened, witness):
+def test_a_stop_blocks_motion_until_reset_and_a_new_key_press(opened, witness):
     select(opened)
     hold(opened.keyboard, "s", lambda: witness.speed(ODOM)[0] < -0.2)
     opened.keyboard.press("Space")
@@ -259,7 +259,7 @@ def test_stop_stands_until_it_is_reset_and_the_key_is_pressed_again(opened, witn
     opened.keyboard.up("s")
 
 
-def test_nothing_is_sent_to_an_idle_robot(opened, witness):
+def test_no_velocity_is_sent_to_an_idle_robot(opened, witness):
     opened.wait_for_timeout(1200)
     before = witness.count("/cmd_vel")
     opened.wait_for_timeout(1000)

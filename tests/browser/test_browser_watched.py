@@ -41,7 +41,7 @@ def failure(chromium, do) -> str:
         ("exception", "setTimeout(() => { throw 'ouch'; })"),
     ],
 )
-def test_a_complaint_of_any_page_of_a_tab_s_context_fails_its_test(
+def test_an_error_or_warning_on_any_page_of_a_browser_context_fails_the_test(
     chromium, which, kind, script
 ):
     def do(tab: Page) -> None:
@@ -52,7 +52,7 @@ def test_a_complaint_of_any_page_of_a_tab_s_context_fails_its_test(
     assert f"{kind}: ouch" in failure(chromium, do)
 
 
-def test_what_a_test_provokes_is_named_and_nothing_else_is_let_pass(chromium):
+def test_only_the_errors_that_a_test_allows_are_ignored(chromium):
     def do(tab: Page) -> None:
         tab.allowed = ["expected"]
         tab.evaluate("console.error('as expected'), console.error('another')")

@@ -12,6 +12,8 @@ from cli_inside import run_inside
 
 import webmap
 
+pytestmark = pytest.mark.slow
+
 WEB = r"WebMap is ready at http://127\.0\.0\.1:\d+/\?token=[\w-]{43,}\n"
 TOLD = ("--robot", "Bob:/odom::")
 
@@ -58,7 +60,7 @@ def test_help_names_every_command():
         assert run_inside(command, "--help").returncode == 0
 
 
-def test_version_is_the_packages():
+def test_version_prints_the_version_of_the_package():
     assert run("--version").stdout.strip().endswith(webmap.__version__)
 
 
@@ -83,7 +85,9 @@ def test_version_is_the_packages():
         (("demo", "--host", "0.0.0.0"), "--insecure-lan"),
     ],
 )
-def test_a_wrong_argument_is_one_sentence_and_exit_code_2(arguments, said):
+def test_an_invalid_argument_prints_one_error_line_and_exits_with_code_2(
+    arguments, said
+):
     result = run_inside(*arguments)
     assert result.returncode == 2, result.stderr
     [error] = [line for line in result.stderr.splitlines() if not is_logged(line)]
@@ -103,7 +107,7 @@ def test_a_wrong_argument_is_one_sentence_and_exit_code_2(arguments, said):
         ("run", "--no-browser", "PAGE", "--port"),
     ],
 )
-def test_a_port_in_use_is_one_sentence_and_exit_code_2(arguments, page):
+def test_a_port_in_use_prints_one_error_line_and_exits_with_code_2(arguments, page):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -128,7 +132,7 @@ def test_a_port_in_use_is_one_sentence_and_exit_code_2(arguments, page):
         (("view", "ws://127.0.0.1:1", *TOLD, "--port", 0, "--no-browser"), WEB),
     ],
 )
-def test_one_line_says_it_is_ready_and_a_signal_ends_it_with_exit_code_0(
+def test_a_command_prints_one_ready_line_and_a_signal_ends_it_with_exit_code_0(
     command, line, sig, page
 ):
     process = start(*[page if word == "PAGE" else word for word in command])
@@ -144,7 +148,7 @@ def test_one_line_says_it_is_ready_and_a_signal_ends_it_with_exit_code_0(
     assert "Traceback" not in err
 
 
-def test_the_simulator_of_a_demo_that_is_killed_ends_too():
+def test_killing_the_demo_also_ends_its_gate_and_simulator():
     process = start("demo", "--port", 0, "--no-browser")
     assert process.stdout.readline().startswith("WebMap is ready")
     for _ in range(100):
@@ -174,7 +178,7 @@ def test_the_simulator_of_a_demo_that_is_killed_ends_too():
     raise AssertionError(f"still there: {alive}")
 
 
-def test_a_script_that_fails_says_where():
+def test_a_failing_script_is_named_with_its_error():
     import tempfile
     from pathlib import Path
 

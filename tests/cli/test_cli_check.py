@@ -6,7 +6,10 @@ import signal
 import subprocess
 import sys
 
+import pytest
 from cli_inside import run_inside
+
+pytestmark = pytest.mark.slow
 
 
 def webmap(*arguments):
@@ -19,7 +22,7 @@ def webmap(*arguments):
     )
 
 
-def test_the_file_that_discovery_writes_is_right_and_runs(ros1, ros2, tmp_path):
+def test_the_fleet_file_of_discover_passes_the_check_and_runs(ros1, ros2, tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text(webmap("discover", "--toml", ros1, ros2).stdout)
     said = webmap("check", file)
@@ -41,7 +44,7 @@ def test_the_file_that_discovery_writes_is_right_and_runs(ros1, ros2, tmp_path):
     assert out == ""
 
 
-def test_a_wrong_file_is_refused_with_exit_code_2_by_both(tmp_path):
+def test_check_and_run_refuse_an_invalid_fleet_file_with_exit_code_2(tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text('[bridges]\na = "ws://a"\n[[robots]]\nnmae = "Bob"\n')
     for command in ("check", "run"):
@@ -52,7 +55,7 @@ def test_a_wrong_file_is_refused_with_exit_code_2_by_both(tmp_path):
         assert "Traceback" not in said.stderr
 
 
-def test_a_pipe_in_place_of_a_file_is_refused_and_not_waited_for(tmp_path):
+def test_check_refuses_a_pipe_instead_of_a_file(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     said = run_inside("check", tmp_path / "pipe")
     assert said.returncode == 2

@@ -11,7 +11,7 @@ from webmap.ros.asking import ask_topics
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_a_robot_s_topics_are_those_that_the_simulator_has(dialect):
+def test_a_demo_robot_uses_the_topics_of_the_simulator(dialect):
     with simulator("--port", 0, "--robots", 1, "--dialect", dialect) as url:
         topics = asyncio.run(ask_topics(url, wait=10.0, waiting=print))
         (found,) = discover(topics, "bob").robots

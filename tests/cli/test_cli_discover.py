@@ -4,6 +4,10 @@ import subprocess
 import sys
 import tomllib
 
+import pytest
+
+pytestmark = pytest.mark.slow
+
 
 def discover(*arguments):
     return subprocess.run(
@@ -15,28 +19,28 @@ def discover(*arguments):
     )
 
 
-def test_the_robots_of_ros_1_are_found_by_namespace(ros1):
+def test_discover_finds_ros_1_robots_by_namespace(ros1):
     said = discover(ros1)
     assert said.returncode == 0, said.stderr
     assert "ROS 1, 2 robots" in said.stdout
     assert "robot_1 (in /robot_1)" in said.stdout
 
 
-def test_the_bare_robot_of_ros_2_is_found_with_its_type_of_velocity(ros2):
+def test_discover_finds_a_ros_2_robot_without_namespace_and_its_velocity_type(ros2):
     said = discover(ros2)
     assert said.returncode == 0, said.stderr
     assert "robot (without a namespace)" in said.stdout
     assert "geometry_msgs/msg/TwistStamped" in said.stdout
 
 
-def test_both_make_one_fleet_file(ros1, ros2):
+def test_discover_writes_two_bridges_to_one_fleet_file(ros1, ros2):
     said = discover("--toml", ros1, ros2)
     data = tomllib.loads(said.stdout)
     assert len(data["bridges"]) == 2
     assert len(data["robots"]) == 3
 
 
-def test_a_bridge_that_is_away_is_waited_for_and_then_said():
+def test_discover_waits_for_an_unreachable_bridge_and_then_fails():
     said = discover("ws://127.0.0.1:1", "--wait", "2")
     assert said.returncode == 1
     assert said.stdout == ""

@@ -8,6 +8,8 @@ import pytest
 
 from webmap_process import simulator
 
+pytestmark = pytest.mark.slow
+
 
 def webmap(*arguments):
     return subprocess.run(
@@ -20,7 +22,7 @@ def webmap(*arguments):
 
 
 @pytest.mark.serial  # rates and ages are measured
-def test_robots_of_ros_1_are_ready(ros1):
+def test_doctor_reports_ros_1_robots_as_ready(ros1):
     said = webmap("doctor", ros1, "--seconds", "2")
     assert said.returncode == 0, said.stdout
     assert "0 wrong" in said.stdout
@@ -30,7 +32,7 @@ def test_robots_of_ros_1_are_ready(ros1):
     assert "/robot_0/cmd_vel has the type Twist," in said.stdout
 
 
-def test_ros_2_is_asked_nothing_that_ends_its_rosapi(ros2):
+def test_doctor_does_not_crash_the_rosapi_of_ros_2(ros2):
     said = webmap("doctor", ros2, "--seconds", "1", "--ask-parameters")
     assert said.returncode == 0, said.stdout
     assert "has the type TwistStamped" in said.stdout
@@ -39,7 +41,7 @@ def test_ros_2_is_asked_nothing_that_ends_its_rosapi(ros2):
     assert webmap("discover", ros2).returncode == 0, "rosapi is still there"
 
 
-def test_another_client_that_writes_velocity_is_noted():
+def test_doctor_names_another_client_that_publishes_velocities():
     from websockets.sync.client import connect
 
     with (
@@ -52,14 +54,14 @@ def test_another_client_that_writes_velocity_is_noted():
     assert "writes to /robot_0/cmd_vel now" in said.stdout
 
 
-def test_a_bridge_that_is_away_is_wrong():
+def test_doctor_reports_an_unreachable_bridge_as_wrong():
     said = webmap("doctor", "ws://127.0.0.1:1", "--wait", "0")
     assert said.returncode == 1
     assert "WRONG    The rosbridge cannot be reached" in said.stdout
     assert "Traceback" not in said.stderr
 
 
-def test_a_list_of_topics_takes_the_place_of_rosapi(ros1, tmp_path):
+def test_doctor_checks_the_robots_of_a_topic_list(ros1, tmp_path):
     topics = tmp_path / "topics.txt"
     topics.write_text("/robot_1/odom [nav_msgs/Odometry]\n")
     said = webmap("doctor", ros1, "--seconds", "1", "--topics", str(topics))
@@ -67,7 +69,7 @@ def test_a_list_of_topics_takes_the_place_of_rosapi(ros1, tmp_path):
     assert "robot_0" not in said.stdout
 
 
-def test_robots_are_looked_at_as_they_were_told(ros1):
+def test_doctor_checks_robots_as_robot_and_set_options_configure_them(ros1):
     received = ("--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
     sent = ("--set", "Bob.velocity_type=geometry_msgs/TwistStamped")
     said = webmap("doctor", ros1, "--seconds", "2", *received, *sent)
@@ -82,7 +84,7 @@ def test_robots_are_looked_at_as_they_were_told(ros1):
     assert "they were not checked: robot_1." in said.stdout
 
 
-def test_robots_are_looked_at_as_a_fleet_file_has_them(ros1, tmp_path):
+def test_doctor_checks_robots_as_a_fleet_file_configures_them(ros1, tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text(
         f'[bridges]\nhall = "{ros1}"\n[[robots]]\nname = "Bob"\nbridge = "hall"\n'
@@ -102,6 +104,6 @@ def test_robots_are_looked_at_as_a_fleet_file_has_them(ros1, tmp_path):
 
 
 @pytest.mark.serial  # how long an answer takes is measured
-def test_a_call_that_hangs_is_tried_where_that_is_wanted(ros1):
+def test_doctor_tries_a_hanging_call_with_try_call(ros1):
     said = webmap("doctor", ros1, "--seconds", "0.5", "--try-call")
     assert "A service that hangs blocks no socket (tried)" in said.stdout

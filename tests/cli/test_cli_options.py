@@ -24,7 +24,7 @@ def webmap(*arguments, stdin=""):
     )
 
 
-def test_robots_of_a_list_are_found_without_asking_the_bridge():
+def test_discover_finds_robots_of_a_topic_list_without_the_bridge():
     command = ("discover", "ws://127.0.0.1:1", "--topics", "-", "--toml")
     said = run_inside(*command, stdin=TOPICS)
     assert said.returncode == 0, said.stderr
@@ -33,13 +33,13 @@ def test_robots_of_a_list_are_found_without_asking_the_bridge():
     assert "/bob/odom" in said.stdout
 
 
-def test_a_wrong_line_is_said_with_its_number_and_what_was_expected():
+def test_an_invalid_line_of_a_topic_list_is_reported_with_its_number():
     said = webmap("discover", "ws://127.0.0.1:1", "--topics", "-", stdin="/odom\n")
     assert said.returncode == 2
     assert said.stderr.startswith("Error: <stdin>, line 1: got '/odom'; expected a")
 
 
-def test_a_list_is_of_one_bridge(tmp_path):
+def test_a_topic_list_with_two_bridges_is_refused(tmp_path):
     topics = tmp_path / "topics.txt"
     topics.write_text(TOPICS)
     for command in ("discover", "doctor"):
@@ -48,25 +48,25 @@ def test_a_list_is_of_one_bridge(tmp_path):
         assert "one bridge, got 2 bridges" in said.stderr
 
 
-def test_help_shows_each_example_on_a_line_of_its_own():
+def test_help_shows_each_example_on_its_own_line():
     lines = run_inside("discover", "--help").stdout.splitlines()
     assert "  webmap discover ws://robot:9090 --toml > fleet.toml" in lines
 
 
-def test_a_list_without_an_end_is_refused():
+def test_an_endless_topic_list_is_refused():
     said = webmap("discover", "ws://127.0.0.1:1", "--topics", "/dev/zero")
     assert said.returncode == 2
     assert "has more than 4194304 characters, expected a list of topics" in said.stderr
 
 
-def test_a_list_that_is_not_utf_8_is_refused_with_a_sentence(tmp_path):
+def test_a_topic_list_that_is_not_utf_8_is_refused(tmp_path):
     (tmp_path / "list").write_bytes(b"/odom \xff")
     said = webmap("discover", "ws://127.0.0.1:1", "--topics", str(tmp_path / "list"))
     assert said.returncode == 2
     assert "list is not UTF-8" in said.stderr
 
 
-def test_a_program_without_an_end_is_refused():
+def test_a_device_instead_of_a_program_is_refused():
     said = run_inside("run", "/dev/zero", "--no-browser")
     assert said.returncode == 2
     assert "/dev/zero: expected a file or a folder, got a device" in said.stderr
@@ -102,7 +102,7 @@ BY_HAND = """\
     ],
     ids=["ros2 topic list -t", "rostopic list -v", "by hand"],
 )
-def test_what_ros_prints_and_what_people_write_is_read(text, types):
+def test_topic_lists_printed_by_ros_or_written_by_hand_are_read(text, types):
     topics = parse_topics(text)
     assert list(topics.values()) == types
     assert {"/odom", "/cmd_vel"} <= set(topics)
@@ -121,12 +121,12 @@ def test_what_ros_prints_and_what_people_write_is_read(text, types):
         ("\x00\xff" * 100, "line 1"),
     ],
 )
-def test_what_is_wrong_is_said_with_its_line(text, words):
+def test_an_invalid_topic_list_error_names_the_line(text, words):
     with pytest.raises(ConfigError) as caught:
         parse_topics(text, "list.txt")
     assert words in str(caught.value)
     assert len(str(caught.value)) < 400
 
 
-def test_a_topic_that_is_listed_twice_alike_is_no_fault():
+def test_a_topic_listed_twice_with_the_same_type_is_accepted():
     assert parse_topics("/a x/A\n/a x/A\n") == {"/a": "x/A"}

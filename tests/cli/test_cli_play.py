@@ -14,6 +14,8 @@ from webmap.bags import need_rosbags
 from webmap.base.errors import ConfigError
 from webmap.cli.play import replay
 
+pytestmark = pytest.mark.slow
+
 COMMAND = [sys.executable, "-m", "webmap", "play", "--no-browser", "--port", "0"]
 
 
@@ -45,13 +47,13 @@ def assert_refused(done, words):
     assert done.stdout == ""
 
 
-def test_a_file_that_is_not_there_is_one_sentence_and_exit_code_2(tmp_path):
+def test_a_missing_file_prints_one_error_line_and_exits_with_code_2(tmp_path):
     done = run_inside("play", tmp_path / "gone.bag")
     assert_refused(done, "gone.bag: there is no such file or folder")
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_a_file_that_is_cut_off_is_one_sentence_and_exit_code_2(bag):
+def test_a_truncated_file_prints_one_error_line_and_exits_with_code_2(bag):
     data = bag.read_bytes()
     bag.write_bytes(data[: len(data) // 2])
     done = run(bag)
@@ -68,11 +70,11 @@ def test_a_file_that_is_cut_off_is_one_sentence_and_exit_code_2(bag):
         (("--rate", "1e9"), "0.001<=x<=1000"),
     ],
 )
-def test_a_pace_that_makes_no_sense_is_exit_code_2(bag, options, words):
+def test_an_invalid_start_or_rate_exits_with_code_2(bag, options, words):
     assert_refused(run_inside("play", bag, *options), words)
 
 
-def test_a_replay_that_has_ended_is_said_and_no_error(bag, capfd):
+def test_restarting_an_ended_replay_prints_a_notice_and_raises_no_error(bag, capfd):
     with replay("--loop", "--", bag) as (url, begin_anew):
         assert url.startswith("ws://")
         (child,) = [
@@ -84,14 +86,14 @@ def test_a_replay_that_has_ended_is_said_and_no_error(bag, capfd):
     assert "The replay has ended" in capfd.readouterr().err
 
 
-def test_without_rosbags_it_says_what_to_install(monkeypatch):
+def test_the_error_without_rosbags_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "rosbags", None)
     with pytest.raises(ConfigError) as refused:
         need_rosbags()
     assert str(refused.value).endswith('pip install "webmap[bags]"')
 
 
-def test_robots_are_found_without_anything_that_drives_them(bag):
+def test_play_finds_robots_without_their_velocity_topics(bag):
     with subprocess.Popen(
         [*COMMAND, str(bag), "--loop"],
         stdout=subprocess.PIPE,
@@ -110,7 +112,7 @@ def test_robots_are_found_without_anything_that_drives_them(bag):
     assert "cmd_vel" not in found
 
 
-def test_a_bridge_port_in_use_is_one_sentence_and_exit_code_2(bag):
+def test_a_bridge_port_in_use_prints_an_error_and_exits_with_code_2(bag):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()

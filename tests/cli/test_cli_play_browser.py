@@ -11,7 +11,7 @@ from cli_shown import shown
 pytestmark = pytest.mark.browser
 
 
-def test_a_recording_shows_the_robot_where_it_was_and_offers_no_driving(
+def test_a_recording_shows_the_robot_at_its_pose_and_allows_no_driving(
     chromium, tmp_path
 ):
     made = Made("ros2")
@@ -47,7 +47,7 @@ def test_a_recording_shows_the_robot_where_it_was_and_offers_no_driving(
         expect(card.locator(".state")).to_contain_text("View only")
 
 
-def test_a_round_of_a_recording_is_no_jump(chromium, tmp_path):
+def test_a_looping_recording_causes_no_problems_or_notices(chromium, tmp_path):
     made = Made("ros2")
     moments = [step / 10 for step in range(20)]
     bag = made.bag(

@@ -18,6 +18,8 @@ from websockets.sync.client import connect
 from webmap.cli.play import replay
 from webmap_process import simulator
 
+pytestmark = pytest.mark.slow
+
 COMMAND = [sys.executable, "-m", "webmap", "record"]
 
 
@@ -69,7 +71,7 @@ def age(message):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_a_recording_that_is_played_says_what_the_robot_said(tmp_path, dialect):
+def test_a_played_recording_repeats_the_messages_of_the_robot(tmp_path, dialect):
     odom, scan = "/robot_0/odom", "/robot_0/base_scan"
     received = ("--robots", "1", "--wander", "--dialect", dialect)
     bag = tmp_path / ("drive.bag" if dialect == "ros1" else "drive")
@@ -107,7 +109,7 @@ def killed(process):
         process.kill()
 
 
-def test_only_the_topics_that_are_named_are_recorded_until_a_signal(ros2, tmp_path):
+def test_record_stores_only_the_named_topics_until_a_signal(ros2, tmp_path):
     bag = tmp_path / "office"
     with (
         subprocess.Popen(
@@ -141,7 +143,7 @@ def run(*arguments):
     )
 
 
-def test_a_topic_that_has_no_type_is_not_waited_for(tmp_path):
+def test_a_named_topic_without_a_known_type_is_refused(tmp_path):
     listed = tmp_path / "topics"
     listed.write_text("/odom nav_msgs/Odometry\n")
     named = ("--topic", "/odom", "--topic", "/x")
@@ -156,7 +158,7 @@ def assert_refused(done, words):
     assert done.stdout == ""
 
 
-def test_a_bag_that_exists_is_left_as_it_is(ros1, tmp_path):
+def test_record_does_not_overwrite_an_existing_bag(ros1, tmp_path):
     bag = tmp_path / "office.bag"
     bag.write_text("mine")
     assert_refused(run(ros1, "--out", bag, "--duration", "1"), "nothing is overwritten")
@@ -177,14 +179,16 @@ def test_a_bag_that_exists_is_left_as_it_is(ros1, tmp_path):
         (("ws://robot:9090", "--topic", "a b"), "'a b' is not the name of a topic"),
     ],
 )
-def test_a_wrong_argument_of_record_is_one_sentence(arguments, words, tmp_path):
+def test_an_invalid_argument_of_record_is_refused_and_no_bag_is_created(
+    arguments, words, tmp_path
+):
     done = run_inside("record", *arguments, "--out", tmp_path / "bag")
     assert_refused(done, words)
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_pictures_that_came_in_cbor_are_recorded_whole(tmp_path, dialect):
+def test_compressed_images_received_in_cbor_are_recorded_completely(tmp_path, dialect):
     topic = "/robot_0/camera/image_raw/compressed"
     bag = tmp_path / ("camera.bag" if dialect == "ros1" else "camera")
     with simulator("--robots", "1", "--dialect", dialect) as url:

@@ -77,7 +77,7 @@ def viewing(*arguments):
             process.kill()
 
 
-def test_robots_of_both_dialects_are_found_before_the_page_opens(ros1, ros2):
+def test_view_finds_robots_of_ros_1_and_ros_2(ros1, ros2):
     with viewing(ros1, ros2) as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
         view.wait_for(r"Found robot_0: odometry /robot_0/odom, velocity /robot_0/")
@@ -85,13 +85,13 @@ def test_robots_of_both_dialects_are_found_before_the_page_opens(ros1, ros2):
         view.wait_for(r"Found robot: odometry /odom, velocity /cmd_vel")
 
 
-def test_robots_that_are_told_are_all_there_is(ros1):
+def test_view_with_a_robot_option_discovers_no_other_robots(ros1):
     with viewing(ros1, "--robot", "Bob:/odom:/cmd_vel:/scan") as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
     assert "Found" not in view.said
 
 
-def test_a_robot_that_is_told_takes_the_place_of_the_one_found(ros1):
+def test_a_robot_option_replaces_the_discovered_robot_with_the_same_topics(ros1):
     given = "Bob:/robot_0/odom:/robot_0/cmd_vel:"
     with viewing(ros1, "--discover", "--robot", given) as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
@@ -99,7 +99,7 @@ def test_a_robot_that_is_told_takes_the_place_of_the_one_found(ros1):
     assert "Found robot_0" not in view.said
 
 
-def test_the_page_opens_without_a_bridge_and_its_robots_come_later(later_port):
+def test_view_opens_the_page_without_a_bridge_and_robots_appear_later(later_port):
     with viewing(f"ws://127.0.0.1:{later_port}", "--wait", "3") as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
         view.wait_for(r"Waiting for the rosbridge at ws://127\.0\.0\.1")
@@ -108,7 +108,7 @@ def test_the_page_opens_without_a_bridge_and_its_robots_come_later(later_port):
             view.wait_for(r"A robot appeared behind ws://.*: robot_0: odometry", 40)
 
 
-def test_a_told_robot_takes_the_place_of_one_that_comes_when_its_bridge_does(
+def test_a_robot_option_replaces_a_robot_of_a_bridge_that_starts_later(
     later_port,
 ):
     given = ("--discover", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
@@ -120,7 +120,7 @@ def test_a_told_robot_takes_the_place_of_one_that_comes_when_its_bridge_does(
     assert "robot_0: odometry" not in view.said
 
 
-def test_without_rosapi_the_page_opens_and_says_what_to_give():
+def test_view_without_rosapi_opens_the_page_and_advises_robot_options():
     from websockets.sync.client import connect
 
     with simulator("--port", "0", "--dialect", "ros2") as url:
@@ -134,7 +134,7 @@ def test_without_rosapi_the_page_opens_and_says_what_to_give():
 
 
 @pytest.mark.parametrize("sig", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_waiting_with_exit_code_0(sig):
+def test_a_signal_ends_the_wait_for_a_bridge_with_exit_code_0(sig):
     with subprocess.Popen(
         [*COMMAND, "ws://127.0.0.1:1", "--no-browser", "--port", "0"],
         stdout=subprocess.PIPE,
@@ -182,7 +182,7 @@ def found(name="bob", **more):
     return robot
 
 
-def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge):
+def test_a_new_robot_appears_on_open_pages_and_on_later_pages(bridge):
     console = Console()
     late = ShownRobots(console)
     early = FakePage()
@@ -201,7 +201,7 @@ def test_a_newcomer_is_on_pages_that_are_open_and_on_those_to_come(bridge):
     late.robots[0].destroy()
 
 
-def test_a_newcomer_gets_a_name_that_nobody_has(bridge, capsys):
+def test_a_new_robot_gets_a_unique_name(bridge, capsys):
     given = [candidate(Bridge("ws://al:9090"), "BOB")]
     late = ShownRobots(Console(), Overrides(stops_within=0.25), given=given)
     came = late.came
@@ -216,7 +216,7 @@ def test_a_newcomer_gets_a_name_that_nobody_has(bridge, capsys):
     late.robots[0].destroy()
 
 
-def test_a_robot_has_its_frames_its_plan_and_its_cameras(bridge):
+def test_a_discovered_robot_gets_its_frames_plan_and_four_cameras(bridge):
     late = ShownRobots(Console())
     more = {"/tf": "tf2_msgs/TFMessage", "/plan": "nav_msgs/Path"}
     more |= {f"/cam{n}/image_raw/compressed": IMAGE for n in range(6)}
@@ -231,13 +231,13 @@ def test_a_robot_has_its_frames_its_plan_and_its_cameras(bridge):
     made.destroy()
 
 
-def test_where_there_is_no_odometry_a_localiser_s_pose_is_shown(bridge):
+def test_a_robot_without_odometry_uses_the_amcl_pose(bridge):
     topics = {"/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
     (robot,) = discover(topics, "bob").robots
     assert robot.config(bridge.url).odometry.topic == "/amcl_pose"
 
 
-def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
+def test_a_robot_uses_topics_that_appear_later(bridge, capsys):
     console = Console()
     late = ShownRobots(console, Overrides(stops_within=0.25))
     came = late.came
@@ -266,7 +266,7 @@ def test_a_robot_that_gets_more_topics_uses_them(bridge, capsys):
     robot.destroy()
 
 
-def test_each_camera_that_comes_later_is_used_as_long_as_there_is_room(bridge, capsys):
+def test_cameras_that_appear_later_are_used_up_to_four(bridge, capsys):
     late = ShownRobots(Console(), Overrides(stops_within=0.25))
     came = late.came
     newcomers = Newcomers()
@@ -300,7 +300,7 @@ def test_each_camera_that_comes_later_is_used_as_long_as_there_is_room(bridge, c
     late.robots[0].destroy()
 
 
-def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, capsys):
+def test_new_topics_of_a_robot_that_is_not_shown_are_ignored(bridge, capsys):
     late = ShownRobots(Console())
     late.came(News(found(), ("velocity",)), bridge)
     assert late.robots == []
@@ -316,7 +316,7 @@ def test_a_robot_that_was_told_by_hand_does_not_grow(bridge, capsys):
         ({"name": "Al", "scan": "/scan"}, False),
     ],
 )
-def test_a_told_robot_is_the_found_one_by_name_odometry_or_velocity(
+def test_a_robot_option_matches_a_found_robot_by_name_odometry_or_velocity(
     bridge, given, is_it
 ):
     (robot,) = discover(TOPICS, "bob").robots
@@ -334,7 +334,7 @@ def fleet_of(bridge, *given, topics, settings=()):
     return find_fleet([bridge], given, wait=0.0, topics=topics, overrides=said)
 
 
-def test_a_robot_of_a_list_is_driven_with_the_type_that_the_list_tells(bridge):
+def test_a_robot_from_a_topic_list_is_driven_with_the_listed_velocity_type(bridge):
     fleet = fleet_of(bridge, topics=TOPICS | {"/cmd_vel": STAMPED})
     ((_, found),) = fleet.robots
     robot = make_robot(found.config(bridge.url), [bridge])
@@ -345,7 +345,7 @@ def test_a_robot_of_a_list_is_driven_with_the_type_that_the_list_tells(bridge):
 @pytest.mark.parametrize(
     ("listed", "type"), [(STAMPED, STAMPED), ("std_msgs/String", "")]
 )
-def test_a_robot_that_is_told_has_the_type_of_a_list_if_that_drives(
+def test_a_robot_option_gets_the_listed_velocity_type_only_for_twist_types(
     bridge, listed, type
 ):
     given = candidate(bridge, "Al", velocity="al/go")
@@ -354,7 +354,7 @@ def test_a_robot_that_is_told_has_the_type_of_a_list_if_that_drives(
     assert ("/go  " + type in fleet.table(grid=True, only_given=True)) == bool(type)
 
 
-def test_a_velocity_topic_that_is_said_has_the_type_of_the_list(bridge):
+def test_a_velocity_topic_from_a_setting_gets_its_type_from_the_topic_list(bridge):
     topics = TOPICS | {"/cmd_vel_nav": STAMPED}
     settings = ["bob.velocity=/cmd_vel_nav"]
     fleet = fleet_of(bridge, topics=topics, settings=settings)
@@ -363,7 +363,7 @@ def test_a_velocity_topic_that_is_said_has_the_type_of_the_list(bridge):
     assert (velocity.topic, velocity.type) == ("/cmd_vel_nav", STAMPED)
 
 
-def test_velocity_that_comes_later_is_sent_in_its_type(bridge):
+def test_a_velocity_topic_that_appears_later_is_used_with_its_type(bridge):
     late = ShownRobots(Console(), Overrides(stops_within=0.25))
     came = late.came
     (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
@@ -373,7 +373,7 @@ def test_velocity_that_comes_later_is_sent_in_its_type(bridge):
     late.robots[0].destroy()
 
 
-def test_what_comes_later_leaves_alone_what_drives_the_robot(bridge):
+def test_topics_that_appear_later_do_not_change_the_velocity_topic(bridge):
     settings = [parse_setting("bob.velocity=/cmd_vel_nav")]
     topics = TOPICS | {"/cmd_vel_nav": STAMPED}
     fleet = fleet_of(bridge, topics=topics, settings=["bob.velocity=/cmd_vel_nav"])
@@ -418,7 +418,7 @@ def topics_of(robot, name):
     return [m.topic for m in robot.modules if type(m).__name__ == name]
 
 
-def test_all_scans_maps_and_paths_are_drawn_and_each_once(bridge):
+def test_all_scans_maps_and_paths_are_drawn_once(bridge):
     robot, console, layers = drawing_of(bridge, RICH)
     assert topics_of(robot, "LaserScanner") == ["/a/front/scan", "/a/rear/scan"]
     scans = [m for m in robot.modules if type(m).__name__ == "LaserScanner"]
@@ -436,7 +436,7 @@ def test_all_scans_maps_and_paths_are_drawn_and_each_once(bridge):
     robot.destroy()
 
 
-def test_what_is_overruled_leaves_all_else_as_it_was_found(bridge):
+def test_settings_replace_scan_and_map_and_keep_the_paths(bridge):
     robot, console, _ = drawing_of(bridge, RICH, "a.scan=/a/other", "a.map=")
     assert topics_of(robot, "LaserScanner") == ["/a/other"]
     assert sorted(topics_of(robot, "Path")) == ["/a/plan", "/a/trajectory"]
@@ -444,7 +444,7 @@ def test_what_is_overruled_leaves_all_else_as_it_was_found(bridge):
     robot.destroy()
 
 
-def test_cameras_that_are_left_out_are_said_once(bridge, capsys):
+def test_each_camera_above_the_limit_is_reported_once(bridge, capsys):
     def cameras(count):
         return {f"/a/cam{n}/image_raw/compressed": IMAGE for n in range(count)}
 
@@ -466,14 +466,14 @@ def test_cameras_that_are_left_out_are_said_once(bridge, capsys):
     robot.destroy()
 
 
-def test_cameras_that_are_all_shown_are_not_said_to_be_left_out(bridge, capsys):
+def test_cameras_within_the_limit_are_not_reported_as_left_out(bridge, capsys):
     cameras = {f"/a/cam{n}/image_raw/compressed": IMAGE for n in range(4)}
     robot, _, _ = drawing_of(bridge, RICH | cameras)
     assert "cam" not in capsys.readouterr().err
     robot.destroy()
 
 
-def test_what_is_left_out_is_said_once(bridge, capsys):
+def test_paths_above_the_limit_are_reported_once(bridge, capsys):
     many = RICH | {f"/a/path_{number}": PATH for number in range(9)}
     robot, _, layers = drawing_of(bridge, many)
     asyncio.run(layers.take(many))

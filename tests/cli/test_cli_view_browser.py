@@ -20,14 +20,14 @@ def expect_two_robots_on_their_map(page, within=15_000):
     expect(page.locator(".laserscan > .dot").first).to_be_attached(timeout=within)
 
 
-def test_everything_that_is_found_is_on_the_page(chromium, ros1):
+def test_the_page_shows_all_discovered_robots_with_map_and_scan(chromium, ros1):
     with shown(chromium, "view", ros1) as page:
         expect_two_robots_on_their_map(page)
         names = page.locator("#robots .row .name").all_inner_texts()
         assert names == ["robot_0", "robot_1"]
 
 
-def test_a_robot_that_is_told_has_all_that_is_in_its_namespace(chromium, ros1):
+def test_the_page_shows_a_robot_option_with_the_layers_of_its_namespace(chromium, ros1):
     received = "Bob:/robot_0/odom:/robot_0/cmd_vel:"
     with shown(chromium, "view", ros1, "--robot", received) as page:
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(1, timeout=15_000)
@@ -42,9 +42,7 @@ def test_a_robot_that_is_told_has_all_that_is_in_its_namespace(chromium, ros1):
         assert page.locator(".laserscan").count() == 0, "it was told to have none"
 
 
-def test_a_list_of_topics_says_what_is_drawn_where_there_is_no_rosapi(
-    chromium, tmp_path
-):
+def test_the_page_draws_the_layers_of_a_topic_list_without_rosapi(chromium, tmp_path):
     listed = tmp_path / "topics.txt"
     listed.write_text(
         "/odom nav_msgs/msg/Odometry\n"
@@ -59,7 +57,7 @@ def test_a_list_of_topics_says_what_is_drawn_where_there_is_no_rosapi(
             expect(costmap).to_have_count(1, timeout=15_000)
 
 
-def test_a_bridge_that_comes_later_brings_its_robots_to_the_open_page(
+def test_robots_of_a_bridge_that_starts_later_appear_on_the_open_page(
     chromium, later_port
 ):
     url = f"ws://127.0.0.1:{later_port}"
@@ -69,7 +67,7 @@ def test_a_bridge_that_comes_later_brings_its_robots_to_the_open_page(
             expect_two_robots_on_their_map(page, 40_000)
 
 
-def test_a_fleet_file_is_on_the_page(chromium, ros1, tmp_path):
+def test_the_page_shows_the_robots_and_title_of_a_fleet_file(chromium, ros1, tmp_path):
     file = tmp_path / "fleet.toml"
     found = subprocess.run(
         [sys.executable, "-m", "webmap", "discover", "--toml", ros1],

@@ -31,7 +31,7 @@ QUOTED = " . ".join(['"a"', "'b'"] * 4000)
         "x = " + "[" * (DEEPEST + 1) + "]" * (DEEPEST + 1),
     ],
 )
-def test_what_is_nested_very_deep_is_refused_at_once_with_its_line(tmp_path, line):
+def test_too_deeply_nested_toml_is_refused_quickly_with_its_line(tmp_path, line):
     file = tmp_path / "fleet.toml"
     file.write_text(f"{HEAD}\n{line}\n")
     began = time.process_time()
@@ -57,23 +57,23 @@ def test_what_is_nested_very_deep_is_refused_at_once_with_its_line(tmp_path, lin
         'title = "it\\"s' + "[" * 100 + '"',
     ],
 )
-def test_dots_and_brackets_in_texts_and_comments_are_no_depth(text):
+def test_dots_and_brackets_in_strings_and_comments_do_not_count_as_nesting(text):
     assert too_deep(text) is None
 
 
 @given(st.text(alphabet="\"'\\[]{}.=a#\n \t1"))
-def test_any_text_is_gone_through(text):
+def test_the_depth_check_accepts_any_text_without_dots_and_brackets(text):
     assert too_deep(text) is None or text.count(".") + text.count("[") + text.count("{")
 
 
-def test_a_file_that_is_too_large_is_refused(tmp_path):
+def test_a_too_large_fleet_file_is_refused(tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text("#" * (LARGEST + 1))
     with pytest.raises(ConfigError, match="the file is larger than 512 KiB"):
         prepare(file)
 
 
-def test_of_very_many_mistakes_the_first_are_named_and_the_others_counted(tmp_path):
+def test_the_first_of_many_mistakes_are_listed_and_the_others_are_counted(tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text(HEAD + "[[robots]]\n" + "".join(f"k{n} = 1\n" for n in range(5000)))
     with pytest.raises(ConfigError) as refused:
@@ -85,7 +85,7 @@ def test_of_very_many_mistakes_the_first_are_named_and_the_others_counted(tmp_pa
     assert 4900 <= int(counted[1]) <= 4903
 
 
-def test_quoted_keys_are_known_by_what_they_mean():
+def test_quoted_keys_are_found_by_their_decoded_name():
     text = '"a b" = 1\n\'c\\d\' = 2\n"\\u0065\\"" = 3\n'
     lines = Lines(text)
     assert [lines.of((key,)) for key in FleetText("x", text).data] == [1, 2, 3]

@@ -60,19 +60,19 @@ def fleet() -> FleetConfig:
     return found
 
 
-def test_a_file_that_is_read_is_written_as_it_was():
+def test_a_fleet_file_is_written_exactly_as_it_was_read():
     data = fleet().to_dict()
     data["bridges"]["the yard"] = "ws://yard:9090"
     assert dump(data, remarks=REMARKS, below=BELOW) == FILE
 
 
-def test_what_is_written_without_remarks_means_the_same():
+def test_a_fleet_file_without_comments_has_the_same_content():
     text = dump(fleet().to_dict())
     again = read_fleet(tomllib.loads(text), mistakes := Mistakes())
     assert (again, mistakes.found) == (fleet(), [])
 
 
-def test_a_remark_ends_where_its_line_does():
+def test_a_line_break_in_a_comment_is_escaped():
     data = {"bridges": {"hall": "ws://hall:9090"}}
     text = dump(data, remarks={("bridges", "hall"): "a\n[robots]"})
     assert text == '[bridges]\nhall = "ws://hall:9090" # a\\n[robots]\n'

@@ -66,7 +66,7 @@ def numbers(value, path=()):
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_every_number_stands_on_the_line_that_it_says(newline):
+def test_the_line_of_every_value_is_found(newline):
     text = EVERYTHING.replace("\n", newline)
     lines = Lines(text)
     found = list(numbers(tomllib.loads(text)))
@@ -75,14 +75,14 @@ def test_every_number_stands_on_the_line_that_it_says(newline):
         assert lines.of(path) == line, path
 
 
-def test_headers_have_lines_too():
+def test_the_lines_of_table_headers_are_found():
     lines = Lines(EVERYTHING)
     assert lines.of(("table",)) == 7
     assert lines.of(("robots", 1)) == 38
     assert lines.of(("robots", 0, "modules", 1)) == 36
 
 
-def test_what_is_not_there_has_the_line_of_what_is_around_it():
+def test_a_missing_key_has_the_line_of_its_table():
     lines = Lines(EVERYTHING)
     assert lines.of(("robots", 1, "name")) == 38
     assert lines.of(("nothing",)) == 1
@@ -94,7 +94,7 @@ PIECES = st.sampled_from(
 
 
 @given(st.lists(PIECES, max_size=25).map("".join))
-def test_whatever_is_toml_is_scanned_to_its_end(text):
+def test_any_valid_toml_can_be_scanned_for_lines(text):
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError:

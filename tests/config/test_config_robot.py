@@ -42,7 +42,7 @@ WHOLE = {
 PICTURE = {"file": "bob.png", "width": 1.0, "height": 0.5}
 
 
-def test_plain_data_is_a_configuration_and_back():
+def test_a_configuration_survives_from_dict_and_to_dict():
     config = RobotConfig.from_dict(WHOLE)
     assert config.motion.twist.stops_within == 0.25
     assert config.to_dict() == WHOLE
@@ -51,12 +51,12 @@ def test_plain_data_is_a_configuration_and_back():
     assert RobotConfig.from_dict(shown).to_dict() == shown
 
 
-def test_a_robot_has_a_picture_or_a_model():
+def test_a_robot_with_both_a_picture_and_a_model_is_refused():
     with pytest.raises(ConfigError, match='picture: a robot has a "picture" or a "mod'):
         RobotConfig.from_dict({**WHOLE, "picture": PICTURE})
 
 
-def test_mistakes_in_the_model_and_in_other_parts_are_named_together():
+def test_mistakes_in_the_model_and_in_modules_are_reported_together():
     bad = {"name": "Bob", "model": {"tag": "script"}, "classes": ["fast"]}
     bad["modules"] = [{"name": "Trial"}]
     with pytest.raises(ConfigError) as error:
@@ -66,17 +66,17 @@ def test_mistakes_in_the_model_and_in_other_parts_are_named_together():
 
 
 @pytest.mark.parametrize("name", ["", "a b", "selected", 5])
-def test_a_class_is_one_word_that_is_not_webmap_s_own(name):
+def test_an_invalid_or_reserved_class_name_is_refused(name):
     with pytest.raises(ConfigError, match=r"classes\[0\]: got .*expected a"):
         RobotConfig.from_dict({"name": "Bob", "classes": [name]})
 
 
-def test_classes_are_an_array():
+def test_classes_that_are_not_an_array_are_refused():
     with pytest.raises(ConfigError, match="expected an array of texts"):
         RobotConfig.from_dict({"name": "Bob", "classes": "fast"})
 
 
-def test_all_mistakes_in_buttons_are_named_with_those_of_other_keys():
+def test_all_mistakes_in_buttons_and_other_keys_are_reported_together():
     buttons = [{"label": "Dock"}, 5, {"label": "A", "service": "/a"}, {"lable": "A"}]
     with pytest.raises(ConfigError) as error:
         RobotConfig.from_dict({"name": "Bob", "buttons": buttons, "battery": 5})
@@ -87,7 +87,7 @@ def test_all_mistakes_in_buttons_are_named_with_those_of_other_keys():
 
 
 @pytest.mark.parametrize("robot", ["", "two\nlines", "x" * 101])
-def test_a_robot_of_a_program_may_have_any_name(robot):
+def test_a_robot_created_by_a_program_may_have_any_name(robot):
     made = Robot(robot, base_link="")
     try:
         assert RobotConfig.from_dict(made.to_dict()).name == robot
@@ -123,7 +123,7 @@ def test_classes_that_a_new_configuration_leaves_out_are_removed():
 
 
 @pytest.mark.parametrize("key", ["odometry", "tf", "twist", "move", "initial_pose"])
-def test_a_part_that_needs_a_bridge_says_so(key):
+def test_configuring_a_part_without_a_bridge_is_refused(key):
     robot = Robot("Bob")
     try:
         with pytest.raises(ConfigError, match=f"{key}: a bridge is missing"):
@@ -134,7 +134,7 @@ def test_a_part_that_needs_a_bridge_says_so(key):
         robot.destroy()
 
 
-def test_a_short_form_means_the_table_with_a_topic():
+def test_a_plain_topic_is_short_for_a_table_with_a_topic():
     short = {"name": "Bob", "odometry": "odom", "scan": "/scan", "tf": True}
     config = RobotConfig.from_dict({**short, "cameras": "http://bob/", "twist": "c"})
     assert config.to_dict() == {
@@ -148,7 +148,7 @@ def test_a_short_form_means_the_table_with_a_topic():
     assert RobotConfig.from_dict({"name": "Bob", "tf": False}).tf is None
 
 
-def test_every_mistake_is_named_at_once_with_the_way_to_it():
+def test_all_mistakes_are_reported_at_once_with_their_keys():
     wrong = {
         "nmae": "Bob",
         "odometry": {"topic": "/a b", "throtle": 5},
@@ -175,12 +175,12 @@ def test_every_mistake_is_named_at_once_with_the_way_to_it():
         assert line.startswith(start)
 
 
-def test_a_number_that_is_too_large_is_told_how_large_it_may_be():
+def test_the_error_for_a_too_large_number_names_the_maximum():
     with pytest.raises(ConfigError, match="from 0 on, 1e\\+06 at the most"):
         RobotConfig.from_dict({"name": "Bob", "twist": {"topic": "/c", "v_max": 1e9}})
 
 
-def test_a_part_without_any_bridge_is_refused():
+def test_topics_without_a_bridge_are_refused():
     with pytest.raises(ConfigError) as refused:
         Robot.from_dict({"name": "Bob", "twist": "/cmd_vel", "scan": "/scan"})
     assert str(refused.value).split("\n") == [
@@ -194,7 +194,7 @@ LIMITS = ("stops_within", "v_max", "w_max")
 
 
 @given(st.dictionaries(st.sampled_from(LIMITS), NUMBERS))
-def test_what_passes_the_check_passes_the_gate_s_check_too(limits):
+def test_limits_accepted_by_the_configuration_are_accepted_by_the_gate(limits):
     mistakes = Mistakes()
     twist = read(TwistConfig, {"topic": "/c", **limits}, (), mistakes)
     if mistakes.found:
@@ -218,7 +218,7 @@ def modules_of(robot):
     return [(name, args[1:]) for name, args, _ in robot.module_arguments()]
 
 
-def test_only_what_differs_is_changed(bridges):
+def test_applying_a_configuration_changes_only_different_parts(bridges):
     old = RobotConfig(
         name="Bob",
         bridge=URL,
@@ -251,7 +251,7 @@ def test_only_what_differs_is_changed(bridges):
         robot.destroy()
 
 
-def test_a_part_that_is_refused_keeps_no_other_from_being_changed(bridges):
+def test_a_refused_part_does_not_block_changes_of_other_parts(bridges):
     old = RobotConfig(name="Bob", bridge=URL)
     robot = Robot.from_config(old, bridges)
     try:
@@ -266,7 +266,7 @@ def test_a_part_that_is_refused_keeps_no_other_from_being_changed(bridges):
         robot.destroy()
 
 
-def test_a_picture_without_a_page_to_show_it_is_refused():
+def test_a_picture_without_the_console_is_refused():
     picture = {"file": "bob.png", "width": 1, "height": 1}
     with pytest.raises(ConfigError, match="picture: only the console shows a picture"):
         Robot.from_dict({"name": "Bob", "picture": picture})

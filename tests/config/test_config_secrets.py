@@ -33,7 +33,7 @@ def warned(tmp_path, caplog):
         HEAD.replace("robot:9090", "robot:9090/?token=word"),
     ],
 )
-def test_a_password_that_others_can_read_is_warned_of(warned, text, mode):
+def test_a_password_readable_by_other_users_causes_a_warning(warned, text, mode):
     (said,) = warned(text, mode)
     assert "my fleet.toml contains a password, and other users of this comp" in said
     assert f"(its mode is {mode:04o}): run chmod 600 '/" in said
@@ -52,17 +52,17 @@ def test_a_password_that_others_can_read_is_warned_of(warned, text, mode):
         ({"url": "ftp://[bad", "token": 5}, False),
     ],
 )
-def test_a_password_may_be_any_field(tmp_path, data, is_one):
+def test_passwords_are_recognised_by_the_name_of_their_field(tmp_path, data, is_one):
     file = tmp_path / "fleet.toml"
     file.touch(0o644)
     assert (readable_secret(file, data) is not None) == is_one
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o400, 0o700])
-def test_a_file_that_others_cannot_read_is_not_warned_of(warned, mode):
+def test_a_private_file_with_a_password_causes_no_warning(warned, mode):
     assert warned(HEAD + CAMERA.format("ann:word@cam.local/"), mode) == []
 
 
-def test_a_file_without_a_password_is_not_warned_of(warned):
+def test_a_file_without_a_password_causes_no_warning(warned):
     text = HEAD + CAMERA.format("cam.local:8080/stream?topic=/a@b&type=mjpeg")
     assert warned(text, 0o644) == []

@@ -18,6 +18,8 @@ from webmap.discovery.doctor.configured import merge_configured
 from webmap.discovery.doctor.measure import observe
 from webmap.discovery.doctor.observed import Clock, FramePath
 
+pytestmark = pytest.mark.slow
+
 SECONDS = 0.4
 STAMPED = "geometry_msgs/msg/TwistStamped"
 TOPICS = {
@@ -64,7 +66,7 @@ def said(seen, words):
     return found
 
 
-def test_what_was_said_is_measured_and_what_was_not_is_as_it_was_found():
+def test_configured_topics_are_used_and_missing_topics_come_from_discovery():
     findings, _ = laid(
         ConfiguredRobot("Bob", {"odometry": (("/a/ekf/odometry/filtered", ""),)})
     )
@@ -74,18 +76,18 @@ def test_what_was_said_is_measured_and_what_was_not_is_as_it_was_found():
     assert bob.topic("scan") == "/a/scan"
 
 
-def test_a_robot_that_does_without_a_topic_is_not_measured_by_it():
+def test_a_topic_that_is_configured_off_is_not_measured():
     (bob,) = laid(ConfiguredRobot("Bob", {**DRIVEN, "scan": ()}))[0].robots
     assert "scan" not in bob.guesses
 
 
-def test_a_relative_name_of_a_topic_is_the_one_that_is_behind_the_bridge():
+def test_a_relative_topic_name_matches_the_topic_of_the_bridge():
     (bob,) = laid(ConfiguredRobot("Bob", {"odometry": (("a/odom/", ""),)}))[0].robots
     assert bob.first("odometry").topic == "/a/odom"
     assert bob.topic("velocity") == "/a/cmd_vel", "it is the robot that was found"
 
 
-def test_topics_tell_which_robot_is_meant_before_any_name_does():
+def test_a_configured_robot_is_matched_by_its_topics_before_its_name():
     turned = (
         ConfiguredRobot("b", {"odometry": (("/a/odom", ""),)}),
         ConfiguredRobot("a", {"velocity": (("/b/cmd_vel", ""),)}),
@@ -95,7 +97,7 @@ def test_topics_tell_which_robot_is_meant_before_any_name_does():
     assert [one.found_as for one in configured.values()] == ["a", "b"]
 
 
-def test_two_robots_of_one_name_are_told_apart():
+def test_two_configured_robots_with_one_name_get_different_names():
     findings, configured = laid(ConfiguredRobot("Bob", DRIVEN), ConfiguredRobot("Bob"))
     assert [robot.name for robot in findings.robots] == ["Bob", "Bob 2"]
     assert list(configured) == ["Bob", "Bob 2"]
@@ -127,7 +129,7 @@ def test_two_robots_of_one_name_are_told_apart():
         ),
     ],
 )
-def test_the_type_that_is_sent_is_held_against_the_one_that_the_base_takes(
+def test_the_configured_velocity_type_is_compared_with_the_type_of_the_base(
     takes, sends, level, words
 ):
     topics = TOPICS | {"/a/cmd_vel": takes}
@@ -137,14 +139,14 @@ def test_the_type_that_is_sent_is_held_against_the_one_that_the_base_takes(
     assert ("twist.type" in found.advice) is (level == "wrong")
 
 
-def test_a_type_that_only_a_person_says_is_no_good_news():
+def test_a_configured_type_that_the_bridge_does_not_confirm_is_only_a_note():
     bob = ConfiguredRobot("Bob", {**DRIVEN, "velocity": (("/a/other", STAMPED),)})
     assert (
         said(seen_of(bob), "/a/other has the stated type TwistStamped").level == "note"
     )
 
 
-def test_a_robot_that_was_given_no_velocity_is_no_mistake():
+def test_a_robot_configured_without_velocity_is_a_note_and_no_mistake():
     seen = seen_of(ConfiguredRobot("Bob", {**DRIVEN, "velocity": ()}))
     assert (
         said(seen, "without a velocity topic: it can be seen but not driven").level
@@ -153,14 +155,14 @@ def test_a_robot_that_was_given_no_velocity_is_no_mistake():
     assert is_ready(judge(seen))
 
 
-def test_robots_that_nobody_meant_are_named_and_not_measured():
+def test_robots_that_are_not_configured_are_named_but_not_checked():
     seen = seen_of(ConfiguredRobot("Bob", DRIVEN))
     assert said(seen, "they were not checked: b.").level == "note"
     assert said(seen, "robots checked: Bob.").level == "good"
     assert {each.about for each in judge(seen)} == {"bridge", "Bob"}
 
 
-def test_the_stop_test_is_told_by_the_name_that_the_command_finds():
+def test_the_stop_test_advice_uses_the_discovered_name_of_the_robot():
     words = "This check does not find out whether the base stops by itself"
     advice = said(seen_of(ConfiguredRobot("Bob", DRIVEN)), words).advice
     assert "--stop-test a, or the button on its card" in advice
@@ -170,7 +172,7 @@ def test_the_stop_test_is_told_by_the_name_that_the_command_finds():
     assert "the button on its card" in advice
 
 
-def test_what_goes_over_another_bridge_is_not_missed_at_this_one():
+def test_topics_of_another_bridge_are_not_reported_as_missing():
     bob = ConfiguredRobot(
         "Bob",
         {"odometry": (), "pose": (), "velocity": (), "tf": ()},
@@ -204,7 +206,7 @@ BOB = {
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_a_robot_is_measured_by_the_topics_that_it_was_given(dialect):
+def test_a_configured_robot_is_measured_by_its_configured_topics(dialect):
     seen = looked_at(site(dialect), ConfiguredRobot("Bob", BOB))
     assert (
         said(seen, "/robot_0/cmd_vel has the type Twist, but WebMap is").level
@@ -216,7 +218,7 @@ def test_a_robot_is_measured_by_the_topics_that_it_was_given(dialect):
     ]
 
 
-def test_without_rosapi_the_robots_that_were_given_are_measured():
+def test_configured_robots_are_measured_without_rosapi():
     seen = looked_at(site(rosapi=False), ConfiguredRobot("Bob", BOB))
     assert [robot.name for robot in seen.findings.robots] == ["Bob"]
     assert seen.measured["/robot_0/odom"].count > 0
@@ -225,21 +227,21 @@ def test_without_rosapi_the_robots_that_were_given_are_measured():
     assert said(seen, "blocks its socket is not known").level == "note"
 
 
-def test_a_topic_that_is_not_there_is_wrong():
+def test_a_configured_topic_without_messages_is_wrong():
     seen = looked_at(
         site(), ConfiguredRobot("Bob", {**BOB, "odometry": (("/odometer", ""),)})
     )
     assert said(seen, "No message was received on /odometer").level == "wrong"
 
 
-def test_where_nobody_said_anything_all_that_is_found_is_measured():
+def test_without_configured_robots_all_discovered_robots_are_measured():
     seen = looked_at(site())
     assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
     assert seen.configured == {}
     assert said(seen, "robots found: robot_0.").level == "good"
 
 
-def test_the_frames_are_followed_from_the_frame_that_was_said():
+def test_the_frame_path_starts_at_the_configured_map_frame():
     received = {**BOB, "tf": (("/tf", ""),)}
     seen = looked_at(site(), ConfiguredRobot("Bob", received, map_frame="site"))
     assert seen.frame_paths["Bob"].start == "site"

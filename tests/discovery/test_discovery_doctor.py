@@ -22,6 +22,8 @@ from webmap.discovery.doctor.verdict import report
 from webmap.ros.rosbridge.checks import LinkFacts, is_loopback, listening_addresses
 from webmap.ros.rosbridge.events import Publish
 
+pytestmark = pytest.mark.slow
+
 TOPICS = {
     "/odom": "nav_msgs/Odometry",
     "/cmd_vel": "geometry_msgs/Twist",
@@ -55,14 +57,14 @@ def noted(**changes):
     return replace(GOOD, measured={**LISTENED, "/odom": odometry})
 
 
-def test_a_good_robot_is_ready_and_what_cannot_be_seen_is_a_note():
+def test_a_good_robot_is_ready_and_the_unknown_command_timeout_is_a_note():
     findings = judge(GOOD)
     assert is_ready(findings)
     assert {each.level for each in findings} == {"good", "note"}
     assert said(GOOD, "stops by itself") == "note"
 
 
-def test_a_bridge_that_is_away_is_all_there_is_to_say():
+def test_an_unreachable_bridge_is_the_only_finding():
     findings = judge(Observed("ws://bob:9090", trouble="nothing listens there"))
     assert [each.level for each in findings] == ["wrong"]
     assert not is_ready(findings)
@@ -76,7 +78,7 @@ def test_a_bridge_that_is_away_is_all_there_is_to_say():
         ("no answer within 5 s", "address and firewall"),
     ],
 )
-def test_why_a_bridge_is_away_says_what_to_do(trouble, advice):
+def test_the_advice_depends_on_why_the_bridge_is_unreachable(trouble, advice):
     (finding,) = judge(Observed("ws://bob:9090", trouble=trouble))
     assert advice in finding.advice
 
@@ -91,7 +93,9 @@ def test_why_a_bridge_is_away_says_what_to_do(trouble, advice):
         ("wss://bob:9090", "192.168.1.7", "note"),
     ],
 )
-def test_a_bridge_that_others_reach_is_open_to_them(url, peer, level):
+def test_an_unencrypted_bridge_reachable_from_the_network_is_a_warning(
+    url, peer, level
+):
     findings = judge(replace(GOOD, url=url, link=LinkFacts(peer)))
     (found,) = [f for f in findings if "open to the" in f.text or "reached" in f.text]
     assert found.level == level
@@ -107,7 +111,9 @@ def test_a_bridge_that_others_reach_is_open_to_them(url, peer, level):
         (("127.0.0.1", "::"), "warning", "listens at ::: it has no sign-in"),
     ],
 )
-def test_a_bridge_on_this_machine_may_be_open_to_others(listens, level, words):
+def test_a_local_bridge_that_listens_on_all_addresses_is_a_warning(
+    listens, level, words
+):
     assert said(replace(GOOD, link=LinkFacts("127.0.0.1", listens)), words) == level
 
 
@@ -138,7 +144,9 @@ TCP6 = f"""\
         (1, ()),
     ],
 )
-def test_where_a_port_listens_is_read_from_the_kernels_tables(port, addresses):
+def test_listening_addresses_are_read_from_the_tcp_tables_of_the_kernel(
+    port, addresses
+):
     found = listening_addresses(port, [TCP, TCP6])
     assert [ipaddress.ip_address(each) for each in found] == [
         ipaddress.ip_address(each) for each in addresses
@@ -158,11 +166,11 @@ def test_where_a_port_listens_is_read_from_the_kernels_tables(port, addresses):
         ("bob", False),
     ],
 )
-def test_only_some_addresses_are_of_this_machine_alone(address, here):
+def test_only_loopback_addresses_count_as_loopback(address, here):
     assert is_loopback(address) is here
 
 
-def test_a_bridge_that_hides_nothing_is_told_so_where_others_reach_it():
+def test_a_reachable_bridge_that_hides_no_topic_is_a_warning():
     link = LinkFacts("192.168.1.7")
     seen = replace(GOOD, url="ws://bob:9090", link=link, shown=("/rosout",))
     assert said(seen, "No topic is hidden from its clients (/rosout") == "warning"
@@ -170,13 +178,13 @@ def test_a_bridge_that_hides_nothing_is_told_so_where_others_reach_it():
     assert not any("hidden" in each.text for each in judge(at_home))
 
 
-def test_only_the_first_of_many_robots_are_listened_to_and_that_is_said():
+def test_a_note_says_that_only_the_first_ten_robots_are_measured():
     topics = {f"/r{n}/odom": "nav_msgs/Odometry" for n in range(12)}
     many = replace(GOOD, findings=discover(topics))
     assert said(many, "Only the first 10 of 12 robots") == "note"
 
 
-def test_a_map_that_nobody_publishes_is_told():
+def test_a_map_without_a_publisher_is_a_warning():
     topics = TOPICS | {"/map": "nav_msgs/OccupancyGrid"}
     seen = replace(GOOD, findings=discover(topics, "bob"))
     assert not any("no map under it" in each.text for each in judge(seen))
@@ -184,7 +192,7 @@ def test_a_map_that_nobody_publishes_is_told():
     assert said(seen, "No node publishes /map") == "warning"
 
 
-def test_a_battery_may_be_slow():
+def test_a_slow_battery_topic_is_no_warning():
     topics = TOPICS | {"/battery_state": "sensor_msgs/BatteryState"}
     seen = replace(GOOD, findings=discover(topics, "bob"))
     seen = replace(
@@ -200,7 +208,7 @@ def test_a_battery_may_be_slow():
     assert said(replace(seen, measured=broken), "cannot be read: not JSON") == "warning"
 
 
-def test_a_battery_has_an_age():
+def test_an_old_battery_message_is_a_warning():
     topics = TOPICS | {"/battery_state": "sensor_msgs/BatteryState"}
     seen = replace(GOOD, findings=discover(topics, "bob"))
     came = Measurement(3, 3.0, 1.0, stamp=99.0, arrived=100.0)
@@ -267,11 +275,13 @@ def shown(topic, came):
         ),
     ],
 )
-def test_every_topic_in_use_has_a_rate_and_an_age(topic, changes, level, words):
+def test_every_displayed_topic_is_judged_by_its_rate_and_age(
+    topic, changes, level, words
+):
     assert said(shown(topic, replace(CAME, **changes)), words) == level
 
 
-def test_the_status_of_goals_is_asked_for_by_the_action_that_the_robot_has():
+def test_the_goal_status_topic_belongs_to_the_action_of_the_robot():
     (robot,) = discover(SHOWN, "bob").robots
     found = {kind: (topic, type) for kind, topic, type in shown_topics(robot)}
     assert found["status"] == (STATUS, "actionlib_msgs/GoalStatusArray")
@@ -288,13 +298,13 @@ def test_the_status_of_goals_is_asked_for_by_the_action_that_the_robot_has():
     )
 
 
-def test_a_bridge_without_rosapi_is_told_what_to_do():
+def test_a_bridge_without_rosapi_is_a_warning_with_advice():
     bare = Observed("ws://localhost:9090", unlisted="no answer")
     assert said(bare, "rosapi does not list") == "warning"
     assert said(bare, "is not known") == "note"
 
 
-def test_no_robot_is_wrong():
+def test_finding_no_robot_is_wrong():
     empty = replace(GOOD, findings=discover({}))
     assert said(empty, "No robot was found") == "wrong"
 
@@ -308,18 +318,18 @@ def test_no_robot_is_wrong():
         (-1.7e9, "note", "the clock of a simulator"),
     ],
 )
-def test_clocks_are_compared(ahead, level, words):
+def test_a_clock_difference_is_a_warning(ahead, level, words):
     assert said(replace(GOOD, clock=Clock(ahead, 0.004)), words) == level
 
 
 @pytest.mark.parametrize(
     ("trip", "level"), [(0.02, "good"), (0.2, "warning"), (0.5, "wrong")]
 )
-def test_a_long_way_is_no_way_to_drive(trip, level):
+def test_a_slow_service_call_is_a_warning_or_wrong(trip, level):
     assert said(replace(GOOD, clock=Clock(0.0, trip)), "A service call takes") == level
 
 
-def test_an_offset_within_half_the_way_is_no_offset():
+def test_a_clock_offset_within_half_the_round_trip_is_accepted():
     assert said(replace(GOOD, clock=Clock(0.6, 0.28)), "Both clocks agree") == "good"
 
 
@@ -332,7 +342,9 @@ def test_an_offset_within_half_the_way_is_no_offset():
         ("ros2", False, "warning"),
     ],
 )
-def test_whether_a_call_that_hangs_blocks_is_said(dialect, threads, level):
+def test_the_check_says_whether_a_hanging_call_blocks_its_socket(
+    dialect, threads, level
+):
     findings = replace(GOOD.findings, dialect=dialect)
     seen = replace(GOOD, findings=findings, link=LinkFacts(calls_in_threads=threads))
     (found,) = [f for f in judge(seen) if "hangs" in f.text or "of its own" in f.text]
@@ -352,25 +364,25 @@ def test_whether_a_call_that_hangs_blocks_is_said(dialect, threads, level):
         (None, "note", "does not list the publishers"),
     ],
 )
-def test_other_writers_of_velocity_are_named(writers, level, words):
+def test_other_publishers_of_velocities_are_named(writers, level, words):
     publishers = {} if writers is None else {"/cmd_vel": writers}
     assert said(replace(GOOD, publishers=publishers), words) == level
 
 
-def test_a_velocity_that_nobody_listens_to_is_wrong():
+def test_a_velocity_topic_without_subscriber_is_wrong():
     assert (
         said(replace(GOOD, subscribers={"/cmd_vel": ()}), "No node subscribes")
         == "wrong"
     )
 
 
-def test_the_type_of_velocity_is_said():
+def test_the_velocity_type_is_reported():
     stamped = TOPICS | {"/cmd_vel": "geometry_msgs/msg/TwistStamped"}
     seen = replace(GOOD, findings=discover(stamped, "bob"))
     assert said(seen, "has the type TwistStamped") == "good"
 
 
-def test_a_robot_without_velocity_or_place_is_warned_of():
+def test_a_missing_pose_is_wrong_and_a_missing_velocity_topic_is_a_warning():
     blind = replace(GOOD, findings=discover({"/cmd_vel": "geometry_msgs/Twist"}))
     assert said(blind, "No topic gives its pose") == "wrong"
     fixed = replace(GOOD, findings=discover({"/odom": "nav_msgs/Odometry"}))
@@ -390,29 +402,29 @@ def test_a_robot_without_velocity_or_place_is_warned_of():
         ({"stamp": None}, "good", "in the frame odom."),
     ],
 )
-def test_odometry_has_a_rate_and_an_age(changes, level, words):
+def test_odometry_is_judged_by_its_rate_and_age(changes, level, words):
     assert said(noted(**changes), words) == level
 
 
-def test_a_silent_scan_is_a_warning_and_no_more():
+def test_a_silent_scan_is_a_warning_and_the_robot_stays_ready():
     seen = replace(GOOD, measured={**LISTENED, "/scan": Measurement(seconds=3.0)})
     assert said(seen, "No message was received on /scan") == "warning"
     assert is_ready(judge(seen))
 
 
-def test_the_worst_comes_first_for_each_robot():
+def test_the_worst_findings_of_a_robot_come_first():
     levels = [each.level for each in judge(noted(count=0)) if each.about == "bob"]
     assert levels == sorted(levels, key=["wrong", "warning", "note", "good"].index)
 
 
-def test_the_report_counts_and_lets_no_control_character_through():
+def test_the_report_counts_the_findings_and_removes_control_characters():
     odd = replace(GOOD, publishers={"/cmd_vel": ("/joy\x1b[2J",)})
     text = report(odd.url, judge(odd))
     assert "\x1b" not in text
     assert text.endswith("0 wrong, 1 warning, 1 note, 9 good")
 
 
-def test_a_way_from_the_map_is_good_and_a_missing_one_a_note():
+def test_a_frame_path_from_the_map_is_good_and_a_missing_path_is_a_note():
     seen = replace(GOOD, frame_paths={"bob": FramePath("odom")})
     assert said(seen, "Frames lead from map to odom") == "good"
     seen = replace(
@@ -421,7 +433,7 @@ def test_a_way_from_the_map_is_good_and_a_missing_one_a_note():
     assert said(seen, "at the pose from odometry: there is no frame 'map'") == "note"
 
 
-def test_the_way_begins_in_the_map_that_the_robot_is_drawn_in():
+def test_the_frame_path_starts_in_the_map_frame_of_the_robot():
     seen = replace(GOOD, frame_paths={"bob": FramePath("bob/odom", start="world")})
     assert said(seen, "Frames lead from world to bob/odom") == "good"
     lost = FramePath("bob/odom", "there is no frame 'world'", start="world")
@@ -467,7 +479,7 @@ def checked(seen, extra=None):
         ),
     ],
 )
-def test_a_robot_that_frames_alone_tell_of_is_found_and_drawn(
+def test_a_robot_with_only_frames_is_found_and_its_pose_is_good(
     topic, frames, name, words
 ):
     seen = checked({topic: chain(*frames)})
@@ -476,7 +488,7 @@ def test_a_robot_that_frames_alone_tell_of_is_found_and_drawn(
     assert not [each for each in judge(seen) if each.level == "wrong"]
 
 
-def test_a_robot_whose_frames_are_silent_is_nowhere():
+def test_a_robot_without_frame_messages_has_an_unknown_pose():
     seen = checked({"/bob/tf": []}, {"/bob/scan": TOPICS["/scan"]})
     words = (
         "Its pose is unknown: /bob/tf has no transform from map or odom to base_link"
@@ -484,7 +496,7 @@ def test_a_robot_whose_frames_are_silent_is_nowhere():
     assert said(seen, words) == "wrong"
 
 
-def test_robots_with_a_map_each_are_followed_from_what_holds_the_maps():
+def test_robots_with_their_own_maps_get_their_pose_in_the_world_frame():
     names = ("ann", "bob")
     seen = [
         transform
@@ -496,7 +508,7 @@ def test_robots_with_a_map_each_are_followed_from_what_holds_the_maps():
         assert said(seen, f"from its frames, {name}/base_link in world") == "good"
 
 
-def test_odd_frames_are_a_warning():
+def test_invalid_transforms_are_a_warning():
     seen = replace(
         GOOD, frame_paths={"bob": FramePath("odom", "", ("'a' -> 'a' would close",))}
     )
@@ -521,7 +533,7 @@ def frames(*transforms, topic="/tf"):
     return listening
 
 
-def test_frames_are_followed_from_the_map():
+def test_the_frame_path_from_the_map_is_checked_for_each_namespace():
     whole = frames(("map", "odom", 1.0), ("odom", "base", 1.0))
     assert whole.missing("", "odom") == ""
     assert whole.missing("", "map") == ""
@@ -531,7 +543,7 @@ def test_frames_are_followed_from_the_map():
     assert own.missing("/bob", "odom") == ""
 
 
-def test_what_is_wrong_with_frames_is_kept_once():
+def test_each_invalid_transform_is_stored_once():
     odd = frames(("a", "b", 0.0), ("a", "b", 0.0), ("b", "b", 1.0)).oddities("")
     assert len(odd) == 2
     assert "norm of 0" in odd[0]
@@ -547,7 +559,7 @@ def message(topic, stamp=(5, 250_000_000), frame="odom"):
     return Publish(topic, json.dumps(operation).encode())
 
 
-def test_messages_are_counted_with_the_longest_silence():
+def test_listening_counts_messages_and_measures_the_longest_gap():
     listening = Listening({"/odom": ""}, 10.0)
     for now in (10.5, 10.6, 11.4, 11.5):
         listening.received(message("/odom"), now, now + 1000)
@@ -560,20 +572,20 @@ def test_messages_are_counted_with_the_longest_silence():
     assert not found.binary
 
 
-def test_a_stamp_that_nobody_set_is_none():
+def test_a_zero_stamp_counts_as_no_stamp():
     listening = Listening({"/odom": ""}, 0.0)
     listening.received(message("/odom", (0, 0)), 1.0, 1.0)
     assert listening.end(2.0)["/odom"].stamp is None
 
 
-def test_a_message_that_is_none_is_said():
+def test_a_message_with_invalid_json_is_reported():
     listening = Listening({"/odom": ""}, 0.0)
     broken = Publish("/odom", b'{"op":"publish","topic":"/odom","msg":[}')
     listening.received(broken, 1.0, 1.0)
     assert "not JSON" in listening.end(2.0)["/odom"].trouble
 
 
-def test_a_topic_is_left_after_a_few_messages():
+def test_sampling_leaves_a_topic_after_four_messages():
     sampling = Sampling(["/a", "/b"], 0.0)
     left = [sampling.received(message("/a"), now, now) for now in (1.0, 1.5, 2.0, 2.5)]
     assert left == [False, False, False, True]
@@ -585,7 +597,7 @@ def test_a_topic_is_left_after_a_few_messages():
     assert (found["/b"].count, found["/b"].every, found["/b"].seconds) == (0, 0.0, 3.0)
 
 
-def test_a_large_topic_is_left_sooner_and_all_when_it_is_too_much():
+def test_sampling_leaves_a_large_topic_at_once_and_ends_at_the_size_limit():
     sampling = Sampling([f"/{n}" for n in range(12)], 0.0)
     large = b"x" * MOST_BYTES
     for n in range(8):

@@ -39,20 +39,20 @@ ROS2 = {
         ),
     ],
 )
-def test_the_action_of_either_ros_is_found_and_the_initial_pose(topics, action, pose):
+def test_the_action_and_initial_pose_of_ros_1_and_ros_2_are_found(topics, action, pose):
     (robot,) = discover(topics, "robot").robots
     assert robot.action == action
     assert robot.topic("initialpose") == pose
     assert robot.topic("goal")
 
 
-def test_a_robot_with_a_goal_topic_alone_has_no_action():
+def test_a_robot_with_only_a_goal_topic_has_no_action():
     topics = {name: type for name, type in ROS1.items() if "move_base/" not in name}
     (robot,) = discover(topics, "robot").robots
     assert robot.action is None
 
 
-def test_a_fleet_file_keeps_what_was_found():
+def test_the_fleet_file_contains_the_action_and_the_initial_pose():
     found = discover(ROS2, "robot")
     text = fleet_toml([("robot", "ws://robot:9090", found)])
     assert 'move.action = "/navigate_to_pose" # Nav2\'s action' in text
@@ -60,7 +60,7 @@ def test_a_fleet_file_keeps_what_was_found():
     assert 'initial_pose = "/initialpose"' in text
 
 
-def test_the_file_of_a_robot_without_goals_says_the_frame_of_its_map():
+def test_the_fleet_file_names_the_map_frame_for_a_robot_without_goals():
     topics = {
         "/bob/odom": "nav_msgs/Odometry",
         "/bob/initialpose": "geometry_msgs/PoseWithCovarianceStamped",

@@ -15,6 +15,8 @@ from webmap.discovery.tf_robots import Trees
 from webmap.fleet.shown import ShownRobots
 from webmap.fleet.watch import LookingForLayers, LookingForRobots
 
+pytestmark = pytest.mark.slow
+
 CLOUD = "sensor_msgs/PointCloud2"
 
 
@@ -40,7 +42,7 @@ def quick(monkeypatch):
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_a_robot_whose_frames_come_while_running_is_shown_where_they_have_it(
+def test_a_robot_whose_frames_appear_later_is_shown_at_the_pose_from_its_frames(
     quick, dialect, capsys
 ):
     received = {"/tf": chain("ann", 1.0, 2.0)}
@@ -87,7 +89,7 @@ def test_a_robot_whose_frames_come_while_running_is_shown_where_they_have_it(
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_a_robot_that_is_localised_while_running_is_drawn_on_the_map(
+def test_a_robot_that_is_localised_later_is_drawn_in_the_map_frame(
     quick, dialect, capsys
 ):
     """As with a localiser that waits for its initial pose."""
@@ -123,7 +125,7 @@ def test_a_robot_that_is_localised_while_running_is_drawn_on_the_map(
     assert capsys.readouterr().err.count("now is drawn by base_link in map") == 1
 
 
-def test_a_bridge_without_frames_is_not_listened_to():
+def test_a_bridge_without_frame_topics_is_not_listened_to():
     async def scenario() -> None:
         late = late_frames(Bridge("ws://127.0.0.1:9"))
         began = time.monotonic()
@@ -133,7 +135,7 @@ def test_a_bridge_without_frames_is_not_listened_to():
     asyncio.run(scenario())
 
 
-def test_what_was_heard_once_is_kept_for_the_next_look():
+def test_received_frames_are_kept_for_the_next_discovery():
     with telling({"/tf": chain("ann", 1.0, 2.0)}) as url:
 
         async def scenario() -> None:

@@ -40,14 +40,14 @@ def kinds(found) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("first", ["/diagnostics", "/diagnostics_agg"])
-def test_what_an_aggregator_says_is_shown_where_nobody_else_does(first):
+def test_aggregated_diagnostics_are_drawn_if_there_are_no_plain_diagnostics(first):
     topics = {"/diagnostics_agg": "diagnostic_msgs/DiagnosticArray"}
     topics[first] = "diagnostic_msgs/DiagnosticArray"
     assert [layer.topic for layer in find_layers(topics, [""])[""].drawn] == [first]
 
 
 @pytest.mark.parametrize("space", ["/a", "/z"])
-def test_a_robots_own_diagnostics_come_before_those_that_all_share(space):
+def test_the_diagnostics_of_a_robot_are_preferred_to_shared_diagnostics(space):
     topics = dict.fromkeys(
         ["/diagnostics", f"{space}/diagnostics"], "diagnostic_msgs/DiagnosticArray"
     )
@@ -56,14 +56,14 @@ def test_a_robots_own_diagnostics_come_before_those_that_all_share(space):
     assert drawing(layer, space, None).options == {"namespace": ""}
 
 
-def test_of_a_topic_that_robots_share_each_gets_what_is_in_its_namespace():
+def test_shared_diagnostics_are_limited_to_the_namespace_of_the_robot():
     layer = FoundLayer("health", "/diagnostics", "diagnostic_msgs/DiagnosticArray", "")
     drawn = drawing(layer, "/a", None)
     assert drawn == Drawing("Diagnostics", {"namespace": "/a"})
 
 
 @pytest.mark.parametrize("type", ["gps_common/GPSFix", "gps_msgs/msg/GPSFix"])
-def test_a_gps_fix_is_drawn_where_there_is_no_other(type):
+def test_a_gps_fix_message_is_drawn_if_there_is_no_nav_sat_fix(type):
     topics = {"/gps/detailed": type}
     (layer,) = find_layers(topics, [""])[""].drawn
     assert (layer.kind, layer.topic) == ("fix", "/gps/detailed")
@@ -73,7 +73,7 @@ def test_a_gps_fix_is_drawn_where_there_is_no_other(type):
     assert drawing(layer, "", None) == Drawing("NavSatFix")
 
 
-def test_what_nav2_publishes_is_drawn_once_each():
+def test_each_topic_of_nav2_is_drawn_once():
     found = find_layers(NAV2, ["/tb"])["/tb"].drawn
     assert kinds(found) == {
         "/local_costmap/costmap": "costmap",
@@ -98,13 +98,13 @@ def test_what_nav2_publishes_is_drawn_once_each():
 
 @pytest.mark.parametrize("space", ["", "/tb"])
 @pytest.mark.parametrize("above", ["", "/move_base"])
-def test_the_global_costmap_is_one_of_its_own_also_without_a_local_one(space, above):
+def test_a_global_costmap_is_recognised_without_a_local_costmap(space, above):
     topic = f"{space}{above}/global_costmap/costmap"
     (found,) = find_layers({topic: "nav_msgs/OccupancyGrid"}, [space])[space].drawn
     assert (found.kind, found.topic) == ("global costmap", topic)
 
 
-def test_move_base_has_other_names():
+def test_topics_of_move_base_are_recognised():
     topics = {
         "/move_base/local_costmap/costmap": "nav_msgs/OccupancyGrid",
         "/move_base/local_costmap/footprint": "geometry_msgs/PolygonStamped",
@@ -120,7 +120,7 @@ def test_move_base_has_other_names():
     ]
 
 
-def test_inflated_cells_of_a_local_costmap_come_first_and_the_unknown_is_none():
+def test_inflated_local_cells_are_drawn_first_and_unknown_cells_are_not_drawn():
     names = "obstacles", "inflated_obstacles", "unknown_space"
     costmaps = "/a/global_costmap", "/a/local_costmap"
     topics = {
@@ -137,14 +137,14 @@ def test_inflated_cells_of_a_local_costmap_come_first_and_the_unknown_is_none():
     assert other.topic == "/a/global_costmap/obstacles"
 
 
-def test_what_a_controller_steers_to_is_on_the_robot_where_no_frames_are_told():
+def test_a_lookahead_point_without_known_frames_is_drawn_in_the_robot_frame():
     topics = {"/lookahead_point": "geometry_msgs/msg/PointStamped"}
     (layer,) = find_layers(topics, [""])[""].drawn
     options = drawing(layer, "", None).options
     assert (options["name"], options["frame"]) == ("lookahead", "robot")
 
 
-def test_what_has_an_odd_name_is_drawn_by_its_type():
+def test_a_topic_with_an_unusual_name_is_drawn_by_its_type():
     topics = {
         "/a/front": "sensor_msgs/LaserScan",
         "/a/rear": "sensor_msgs/LaserScan",
@@ -185,7 +185,7 @@ def test_what_has_an_odd_name_is_drawn_by_its_type():
     assert other.topic == "/a/move_base_simple/goal"
 
 
-def test_every_map_is_drawn_a_robots_own_with_it_and_a_shared_one_once():
+def test_the_map_of_each_robot_and_the_shared_map_are_drawn_once():
     grid = "nav_msgs/OccupancyGrid"
     topics = {"/map": grid, "/a/map": grid, "/b/map": grid, "/b/static_map": grid}
     found = find_layers(topics, ["/a", "/b"])
@@ -213,7 +213,7 @@ KINDS = [
 
 
 @pytest.mark.parametrize(("kind", "type"), KINDS, ids=str)
-def test_every_kind_has_a_module_that_takes_its_arguments(kind, type):
+def test_every_layer_kind_has_a_module_that_accepts_its_arguments(kind, type):
     layer = FoundLayer(kind.name, "/a/topic", type)
     drawn = drawing(layer, "/a", FRAMES, 2)
     factory = (map_modules if drawn.of_maps or drawn.shared else robot_modules)[
@@ -223,7 +223,7 @@ def test_every_kind_has_a_module_that_takes_its_arguments(kind, type):
     assert all(kind.names.values()), "they are shown to people"
 
 
-def test_each_robot_gets_its_own_and_health_is_everybodys():
+def test_each_robot_gets_its_own_range_and_the_shared_diagnostics():
     topics = {
         "/a/sonar": "sensor_msgs/Range",
         "/b/sonar": "sensor_msgs/Range",
@@ -246,10 +246,10 @@ def test_each_robot_gets_its_own_and_health_is_everybodys():
         ("visualization_msgs/MarkerArray", 3),
     ],
 )
-def test_a_robot_gets_so_many_of_a_kind_and_no_more(type, most):
+def test_the_number_of_layers_of_one_kind_is_limited(type, most):
     topics = {f"/cloud_points_{number}": type for number in range(20)}
     assert len(find_layers(topics, [""])[""].drawn) == most
 
 
-def test_without_robots_nothing_is_drawn():
+def test_without_robots_no_layers_are_found():
     assert find_layers(NAV2, []) == {}

@@ -48,7 +48,7 @@ def said(findings, words):
 
 @pytest.mark.serial  # rates and ages are measured
 @DIALECTS
-def test_nothing_is_wrong_with_a_good_robot_and_nothing_is_disturbed(dialect):
+def test_a_good_robot_has_no_warnings_and_the_check_publishes_nothing(dialect):
     progress = []
     there, findings, _ = looked_at(
         site(dialect), seconds=LONG, progress=progress.append
@@ -65,7 +65,7 @@ def test_nothing_is_wrong_with_a_good_robot_and_nothing_is_disturbed(dialect):
 
 
 @DIALECTS
-def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
+def test_every_displayed_topic_is_measured_with_only_a_few_messages(dialect):
     _, findings, seen = looked_at(site(dialect))
     camera = "/robot_0/camera/image_raw/compressed"
     assert said(findings, f"{camera}: ") == "good"
@@ -77,7 +77,7 @@ def test_each_topic_that_is_shown_is_measured_and_then_left(dialect):
     assert seen.measured[camera].every > 0
 
 
-def test_a_map_above_the_limit_of_the_bridge_is_told_with_the_parameter():
+def test_a_map_above_the_message_limit_is_a_warning_that_names_the_parameter():
     _, findings, seen = looked_at(site("ros2", limit=8000))
     assert seen.link.too_large["/map"] > 8000
     (found,) = [each for each in findings if each.text.startswith("/map comes")]
@@ -86,7 +86,7 @@ def test_a_map_above_the_limit_of_the_bridge_is_told_with_the_parameter():
     assert "parameter max_message_size of rosbridge_websocket to" in found.advice
 
 
-def test_a_map_that_nobody_sends_in_json_either_is_silent_and_the_limit_is_named(
+def test_a_map_received_neither_in_cbor_nor_in_json_is_silent_and_names_the_limit(
     monkeypatch,
 ):
     monkeypatch.setattr(measure, "AS_TEXT", 0.3)
@@ -102,7 +102,7 @@ def test_a_map_that_nobody_sends_in_json_either_is_silent_and_the_limit_is_named
     assert "max_message_size" in found.advice
 
 
-def test_a_camera_that_is_silent_is_told_with_what_it_costs():
+def test_a_silent_camera_is_a_warning_about_driving_with_the_camera():
     def change(name, message):
         return None if name.endswith("/compressed") else message
 
@@ -114,20 +114,22 @@ def test_a_camera_that_is_silent_is_told_with_what_it_costs():
 @pytest.mark.parametrize(
     ("dialect", "twist"), [("ros1", "Twist"), ("ros2", "TwistStamped")]
 )
-def test_the_type_of_velocity_is_the_one_that_the_base_takes(dialect, twist):
+def test_the_check_reports_the_velocity_type_that_the_base_subscribes_to(
+    dialect, twist
+):
     _, findings, _ = looked_at(site(dialect, twist=twist))
     assert said(findings, f"/robot_0/cmd_vel has the type {twist}, and") == "good"
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="Linux tells it there")
-def test_where_a_bridge_of_this_machine_listens_is_seen():
+def test_the_check_finds_the_listening_address_of_a_local_bridge():
     _, findings, seen = looked_at(site())
     assert seen.link.listens == ("127.0.0.1",)
     assert said(findings, "listens on this machine alone") == "good"
 
 
 @DIALECTS
-def test_a_node_that_writes_velocity_too_is_named(dialect):
+def test_another_node_that_publishes_velocities_is_named(dialect):
     def joystick(there):
         there.graph.advertise(
             object(), "/robot_0/cmd_vel", "geometry_msgs/Twist", node="/joy_teleop"
@@ -146,9 +148,7 @@ def test_a_node_that_writes_velocity_too_is_named(dialect):
     ("ahead", "words"),
     [(4.0, "4.0 s ahead of this"), (-7.0, "7.0 s behind this")],
 )
-def test_clocks_that_differ_are_told_and_ages_are_right_all_the_same(
-    dialect, ahead, words
-):
+def test_a_clock_difference_is_reported_and_does_not_change_ages(dialect, ahead, words):
     _, findings, seen = looked_at(site(dialect, ahead=ahead), seconds=LONG)
     assert said(findings, words) == "warning"
     assert said(findings, "/robot_0/odom:") == "good"
@@ -156,7 +156,7 @@ def test_clocks_that_differ_are_told_and_ages_are_right_all_the_same(
 
 
 @DIALECTS
-def test_stamps_that_stand_still_are_old(dialect):
+def test_old_stamps_are_reported_as_old_messages(dialect):
     first = []
 
     def stuck(name, message):
@@ -173,7 +173,7 @@ def test_stamps_that_stand_still_are_old(dialect):
 
 
 @DIALECTS
-def test_a_topic_that_nobody_feeds_is_told_with_the_node_that_could(dialect):
+def test_a_silent_topic_is_reported_with_its_publisher_node(dialect):
     def mute(name, message):
         return None if name in ("/robot_0/odom", "/robot_0/base_scan") else message
 
@@ -211,13 +211,13 @@ def without(*children):
         ("base_laser", "warning", "The pose of the scanner on the robot is unknown"),
     ],
 )
-def test_each_frame_that_is_missing_is_told(dialect, lost, level, words):
+def test_each_missing_frame_is_reported(dialect, lost, level, words):
     _, findings, _ = looked_at(site(dialect, change=without(lost)))
     assert said(findings, words) == level
 
 
 @DIALECTS
-def test_frames_that_are_complete_are_good(dialect):
+def test_complete_frames_are_good(dialect):
     _, findings, _ = looked_at(site(dialect))
     assert said(findings, "Frames lead from map to robot_0/odom (/tf:") == "good"
     assert said(
@@ -244,7 +244,7 @@ def apart(name, message):
 
 
 @DIALECTS
-def test_the_frames_of_a_robot_with_a_map_of_its_own_are_good(dialect):
+def test_the_frames_of_a_robot_with_its_own_map_frame_are_good(dialect):
     _, findings, _ = looked_at(site(dialect, change=apart))
     assert said(findings, "Frames lead from world to robot_0/odom (/tf:") == "good"
     assert not any("at the pose from odometry" in each.text for each in findings)
@@ -258,13 +258,15 @@ def test_the_frames_of_a_robot_with_a_map_of_its_own_are_good(dialect):
     ],
 )
 @DIALECTS
-def test_what_a_call_that_hangs_holds_up_is_tried(dialect, quirks, level, words):
+def test_a_trial_call_shows_whether_a_hanging_call_blocks_its_socket(
+    dialect, quirks, level, words
+):
     there, findings, _ = looked_at(site(dialect, quirks=quirks), try_call=True)
     assert said(findings, words) == level
     assert not any("webmap_doctor" in name for name in there.graph.services)
 
 
-def test_a_bridge_that_offers_no_services_of_its_clients_leaves_that_open():
+def test_a_bridge_without_client_services_leaves_the_blocking_unknown():
     def deaf(there):
         there.graph.serve = lambda *arguments, **named: None
 
@@ -274,13 +276,13 @@ def test_a_bridge_that_offers_no_services_of_its_clients_leaves_that_open():
     assert said(findings, words) == "note"
 
 
-def test_without_rosapi_a_call_is_not_tried_and_why_is_said():
+def test_without_rosapi_no_trial_call_is_made_and_the_reason_is_reported():
     there, findings, _ = looked_at(site("ros2", rosapi=False), try_call=True)
     assert said(findings, "is not known: rosapi does not answer") == "note"
     assert not any("webmap_doctor" in name for name in there.called)
 
 
-def test_a_call_is_tried_again_without_looking_at_the_rest_again():
+def test_repeating_the_trial_call_keeps_the_other_measurements():
     async def run():
         async with site("ros2", quirks="polite") as there:
             seen = await observe(there.url, seconds=SECONDS)
@@ -297,7 +299,7 @@ def test_a_call_is_tried_again_without_looking_at_the_rest_again():
     assert "/rosapi/get_time" in called, "nothing that hangs or ends a rosapi"
 
 
-def test_what_trying_told_before_is_not_said_of_a_bridge_that_went_away():
+def test_an_unreachable_bridge_resets_the_result_of_an_earlier_trial_call():
     facts = LinkFacts(calls_in_threads=False, tried=True)
     blocking = Observed("ws://127.0.0.1:1", link=facts)
     seen = asyncio.run(tried(blocking))
@@ -313,7 +315,7 @@ TOPICS = {
 
 @pytest.mark.serial  # rates and ages are measured
 @DIALECTS
-def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
+def test_without_rosapi_a_given_topic_list_is_used(dialect):
     _, findings, seen = looked_at(
         site(dialect, rosapi=False), seconds=LONG, topics=TOPICS
     )
@@ -324,14 +326,14 @@ def test_without_rosapi_a_list_of_topics_takes_its_place(dialect):
     assert said(findings, "The bridge does not list the publishers of") == "note"
 
 
-def test_without_rosapi_and_without_a_list_the_list_is_asked_for():
+def test_without_rosapi_and_topic_list_the_check_advises_to_give_a_list():
     _, findings, _ = looked_at(site(rosapi=False))
     (found,) = [each for each in findings if "rosapi does not list" in each.text]
     assert found.level == "warning"
     assert "--topics FILE" in found.advice
 
 
-def test_topics_that_nobody_needs_tell_that_nothing_is_hidden():
+def test_a_visible_rosout_shows_that_the_bridge_hides_no_topic():
     def log_topic(there):
         there.graph.advertise(object(), "/rosout", "rosgraph_msgs/Log", node="/rosout")
 
@@ -340,7 +342,7 @@ def test_topics_that_nobody_needs_tell_that_nothing_is_hidden():
 
 
 @pytest.mark.parametrize(("compression", "offered"), [("deflate", True), (None, False)])
-def test_whether_the_socket_could_be_compressed_is_seen(compression, offered):
+def test_the_check_detects_whether_the_bridge_offers_compression(compression, offered):
     async def run():
         async with serve(
             lambda link: link.wait_closed(), "127.0.0.1", 0, compression=compression

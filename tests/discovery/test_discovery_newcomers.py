@@ -20,28 +20,28 @@ def looks(newcomers, *topics):
     ]
 
 
-def test_a_robot_is_told_once_when_two_looks_say_the_same():
+def test_a_new_robot_is_reported_once_after_two_equal_looks():
     assert looks(Newcomers(), BOTH, BOTH, BOTH) == [[], [("a",)], []]
 
 
-def test_a_robot_whose_topics_still_come_is_waited_for():
+def test_a_new_robot_is_not_reported_while_its_topics_change():
     newcomers = Newcomers()
     assert looks(newcomers, ODOM, BOTH) == [[], []]
     (news,) = newcomers.look(discover(BOTH))
     assert news.robot.topic("velocity") == "/a/cmd_vel"
 
 
-def test_a_known_robot_is_never_told_even_when_it_was_away():
+def test_a_known_robot_that_was_away_is_not_reported():
     newcomers = Newcomers(discover(BOTH).robots)
     assert looks(newcomers, BOTH, {}, BOTH, BOTH) == [[], [], [], []]
 
 
-def test_what_a_known_robot_has_more_is_told_once():
+def test_a_new_topic_of_a_known_robot_is_reported_once():
     newcomers = Newcomers(discover(ODOM).robots)
     assert looks(newcomers, BOTH, BOTH, BOTH) == [[], [("a", "velocity")], []]
 
 
-def test_a_topic_that_goes_and_comes_back_is_no_news():
+def test_a_topic_that_disappears_and_returns_is_not_reported():
     newcomers = Newcomers(discover(BOTH).robots)
     assert looks(newcomers, ODOM, ODOM, BOTH, BOTH) == [[], [], [], []]
 
@@ -70,7 +70,7 @@ def with_frames(*chain):
         (("odom", "base_link"), ("map", "base_link"), False),
     ],
 )
-def test_frames_are_news_once_if_they_lead_above_those_that_are_known(
+def test_new_frames_are_reported_once_if_they_give_a_higher_map_frame(
     first, then, moved
 ):
     newcomers = Newcomers(with_frames(*first).robots)
@@ -79,7 +79,7 @@ def test_frames_are_news_once_if_they_lead_above_those_that_are_known(
     assert received == [[], [True] if moved else [], []]
 
 
-def test_what_a_robot_has_more_is_told_with_the_frames_that_are_known_of_it():
+def test_a_report_of_new_topics_keeps_the_known_frames_of_the_robot():
     newcomers = Newcomers(with_frames("world", "odom", "base_link").robots)
     more = discover(TF | BOTH)
     newcomers.look(more)

@@ -28,7 +28,7 @@ def names(topics):
     return [robot.name for robot in discover(topics).robots]
 
 
-def test_a_bare_robot_is_named_after_the_host():
+def test_a_robot_without_namespace_is_named_after_the_host():
     robot = only({"/odom": ODOM, "/cmd_vel": TWIST, "/scan": SCAN}, "bob")
     assert (robot.name, robot.namespace) == ("bob", "")
     assert robot.topic("odometry") == "/odom"
@@ -37,7 +37,7 @@ def test_a_bare_robot_is_named_after_the_host():
 
 
 @pytest.mark.parametrize("kind", ["", "msg/"])
-def test_each_namespace_is_a_robot_in_either_dialect(kind):
+def test_each_namespace_is_a_robot_in_ros_1_and_ros_2(kind):
     topics = {
         f"/robot_{n}/{name}": type.replace("/", f"/{kind}", 1)
         for n in range(3)
@@ -53,23 +53,23 @@ def test_each_namespace_is_a_robot_in_either_dialect(kind):
     assert found.robots[1].topic("scan") == "/robot_1/base_scan"
 
 
-def test_a_velocity_keeps_the_type_that_the_bridge_says():
+def test_a_velocity_topic_keeps_the_type_from_the_bridge():
     robot = only({"/odom": ODOM, "/cmd_vel": STAMPED})
     assert robot.first("velocity").type == STAMPED
 
 
-def test_a_filter_comes_before_plain_odometry_and_the_rest_is_noted():
+def test_filtered_odometry_is_preferred_and_plain_odometry_is_noted():
     robot = only({"/odom": ODOM, "/odometry/filtered": ODOM, "/cmd_vel": TWIST})
     assert robot.topic("odometry") == "/odometry/filtered"
     assert any("/odom is odometry too" in note for note in robot.notes)
 
 
-def test_the_truth_of_a_simulator_comes_last():
+def test_the_ground_truth_of_a_simulator_is_used_last():
     robot = only({"/base_pose_ground_truth": ODOM, "/odom": ODOM})
     assert robot.topic("odometry") == "/odom"
 
 
-def test_amcl_is_noted_and_odometry_used():
+def test_odometry_is_used_and_the_amcl_pose_is_noted():
     robot = only({"/odom": ODOM, "/amcl_pose": POSE})
     assert robot.topic("odometry") == "/odom"
     assert robot.topic("pose") == "/amcl_pose"
@@ -85,18 +85,18 @@ def test_amcl_is_noted_and_odometry_used():
         ("/mav/pose2D", "geometry_msgs/msg/Pose2D"),
     ],
 )
-def test_a_pose_without_a_header_says_where_a_robot_is(topic, type):
+def test_a_pose_topic_without_a_header_makes_a_robot(topic, type):
     robot = only({topic: type})
     assert robot.namespace == topic.rpartition("/")[0]
     assert (robot.first("pose").topic, robot.first("pose").type) == (topic, type)
 
 
-def test_a_pose_that_says_its_frame_comes_before_one_that_does_not():
+def test_a_pose_with_a_frame_is_preferred_to_a_pose_without_a_frame():
     bare = {"/robot_pose": "geometry_msgs/Pose", "/pose2D": "geometry_msgs/Pose2D"}
     assert only({**bare, "/amcl_pose": POSE}).topic("pose") == "/amcl_pose"
 
 
-def test_a_controller_is_a_part_and_no_robot():
+def test_the_namespace_of_a_controller_is_not_a_robot():
     robot = only(
         {
             "/diff_drive_controller/odom": ODOM,
@@ -126,34 +126,34 @@ def test_a_robot_with_parts_in_its_namespace_is_one_robot():
     assert robot.topic("battery") == "/j100_0001/platform/bms/state"
 
 
-def test_the_base_s_own_input_is_taken_where_there_is_no_cmd_vel():
+def test_the_velocity_input_of_the_base_is_used_if_there_is_no_cmd_vel():
     robot = only({"/odom": ODOM, "/mobile_base/commands/velocity": TWIST})
     assert robot.topic("velocity") == "/mobile_base/commands/velocity"
 
 
-def test_an_input_that_was_made_for_webmap_comes_first():
+def test_a_velocity_topic_for_webmap_is_preferred_to_cmd_vel():
     robot = only({"/odom": ODOM, "/cmd_vel": TWIST, "/webmap/cmd_vel": TWIST})
     assert robot.topic("velocity") == "/webmap/cmd_vel"
 
 
-def test_steps_on_the_way_to_the_base_are_not_driven_and_are_named():
+def test_cmd_vel_is_preferred_and_cmd_vel_nav_is_noted():
     robot = only({"/odom": ODOM, "/cmd_vel": TWIST, "/cmd_vel_nav": TWIST})
     assert robot.topic("velocity") == "/cmd_vel"
     assert any("/cmd_vel_nav" in note for note in robot.notes)
 
 
-def test_a_twist_with_another_name_is_no_velocity():
+def test_a_twist_topic_with_an_unusual_name_is_not_used_for_velocities():
     robot = only({"/odom": ODOM, "/cmd_vel_smoothed": TWIST})
     assert robot.first("velocity") is None
     assert any("Its velocity topic is unknown" in note for note in robot.notes)
 
 
-def test_a_camera_with_odometry_of_its_own_is_part_of_the_robot():
+def test_a_camera_with_its_own_odometry_is_part_of_the_robot():
     robot = only({"/odom": ODOM, "/cmd_vel": TWIST, "/t265/odom/sample": ODOM})
     assert robot.topic("odometry") == "/odom"
 
 
-def test_many_inputs_of_a_mux_are_one_robot():
+def test_a_robot_with_many_velocity_inputs_is_one_robot():
     robot = only(
         {
             "/odom": ODOM,
@@ -165,27 +165,27 @@ def test_many_inputs_of_a_mux_are_one_robot():
     assert robot.topic("velocity") == "/cmd_vel"
 
 
-def test_a_fleet_beside_a_topic_for_all_is_a_fleet():
+def test_a_velocity_topic_for_all_robots_does_not_merge_the_robots_of_a_fleet():
     topics = {"/cmd_vel": TWIST, "/a/odom": ODOM, "/a/cmd_vel": TWIST}
     topics |= {"/b/odom": ODOM, "/b/cmd_vel": TWIST}
     assert names(topics) == ["robot", "a", "b"]
 
 
-def test_what_is_outside_of_the_only_robot_is_its_own():
+def test_a_scan_outside_the_namespace_of_the_only_robot_belongs_to_this_robot():
     robot = only({"/bob/odom": ODOM, "/bob/cmd_vel": TWIST, "/scan": SCAN})
     assert robot.name == "bob"
     assert robot.topic("scan") == "/scan"
     assert "shared" in robot.first("scan").rule
 
 
-def test_a_map_without_a_namespace_is_everybody_s_and_a_scan_is_not():
+def test_all_robots_share_a_map_without_namespace_but_not_a_scan():
     topics = {"/a/odom": ODOM, "/b/odom": ODOM, "/scan": SCAN}
     found = discover(topics | {"/map": "nav_msgs/OccupancyGrid"})
     assert [robot.topic("map") for robot in found.robots] == ["/map", "/map"]
     assert [robot.topic("scan") for robot in found.robots] == ["", ""]
 
 
-def test_frames_are_everybody_s_unless_a_robot_has_its_own():
+def test_all_robots_share_tf_except_a_robot_with_its_own_tf():
     frames = "tf2_msgs/msg/TFMessage"
     topics = {"/a/odom": ODOM, "/b/odom": ODOM, "/tf": frames, "/a/tf": frames}
     found = discover(topics | {"/tf_static": frames})
@@ -193,13 +193,13 @@ def test_frames_are_everybody_s_unless_a_robot_has_its_own():
     assert only({"/odom": ODOM}).tf_namespace is None
 
 
-def test_a_robot_s_own_map_comes_before_the_shared_one():
+def test_the_map_of_a_robot_is_preferred_to_the_shared_map():
     grid = "nav_msgs/OccupancyGrid"
     robot = only({"/a/odom": ODOM, "/a/map": grid, "/map": grid})
     assert robot.topic("map") == "/a/map"
 
 
-def test_costmaps_are_no_maps():
+def test_costmaps_are_not_used_as_maps():
     grid = "nav_msgs/msg/OccupancyGrid"
     robot = only(
         {
@@ -212,7 +212,7 @@ def test_costmaps_are_no_maps():
     assert len(robot.guesses["costmap"]) == 2
 
 
-def test_goals_of_both_navigations_are_found():
+def test_goal_topics_of_move_base_and_nav2_are_found():
     stamped = "geometry_msgs/PoseStamped"
     robot = only(
         {
@@ -235,7 +235,7 @@ def cameras(topics):
     return [guess.topic for guess in robot.guesses.get("camera", ())]
 
 
-def test_packed_pictures_come_before_plain_ones_and_once_for_a_camera():
+def test_a_camera_counts_once_and_compressed_images_are_listed_first():
     assert cameras(
         {
             "/camera/image_raw": RAW,
@@ -262,16 +262,16 @@ def test_packed_pictures_come_before_plain_ones_and_once_for_a_camera():
         "/camera/image_raw/zstd",
     ],
 )
-def test_how_far_away_things_are_is_no_camera_s_picture(topic):
+def test_a_depth_image_is_not_used_as_camera(topic):
     assert cameras({topic: RAW}) == cameras({topic: PACKED}) == []
 
 
-def test_a_depth_camera_has_colours_too():
+def test_the_colour_image_of_a_depth_camera_is_used_as_camera():
     topics = {"/depth_camera/image_raw": RAW}
     assert cameras(topics) == ["/depth_camera/image_raw"]
 
 
-def test_pictures_with_other_names_come_last_by_their_type_alone():
+def test_images_with_unusual_names_are_found_by_type_and_listed_last():
     assert cameras(
         {
             "/color/video": RAW,
@@ -289,24 +289,24 @@ def test_pictures_with_other_names_come_last_by_their_type_alone():
     ]
 
 
-def test_two_robots_of_one_last_name_have_their_whole_namespaces_for_names():
+def test_robots_with_equal_last_names_are_named_by_their_full_namespaces():
     topics = {"/hall/bob/odom": ODOM, "/yard/bob/odom": ODOM}
     assert names(topics) == ["hall/bob", "yard/bob"]
 
 
-def test_who_publishes_is_said_to_be_unknown():
+def test_a_note_says_that_the_publishers_are_unknown():
     assert "does not show which nodes publish" in discover({"/odom": ODOM}).notes[0]
 
 
 @pytest.mark.parametrize("topics", [{}, {"/rosout": "rosgraph_msgs/Log"}])
-def test_nothing_found_is_said(topics):
+def test_a_note_says_that_no_robot_was_found(topics):
     found = discover(topics)
     assert found.robots == ()
     assert len(found.notes) == 1
 
 
 @pytest.mark.parametrize("file", sorted(CAPTURED.rglob("*rosapi_topics.*json")))
-def test_captured_systems_have_their_two_robots(file):
+def test_both_robots_are_found_in_captured_systems(file):
     values = json.loads(file.read_text())["values"]
     found = discover(dict(zip(values["topics"], values["types"], strict=True)))
     assert [robot.name for robot in found.robots] == ["robot_0", "robot_1"]
@@ -326,11 +326,11 @@ def test_captured_systems_have_their_two_robots(file):
         ("ws://[fe80::1]:9090", "robot"),
     ],
 )
-def test_a_host_has_a_short_name(url, name):
+def test_the_host_gives_the_robot_name_except_ip_addresses_and_localhost(url, name):
     assert host_name(url) == name
 
 
-def test_a_thousand_robots_are_found_in_a_moment():
+def test_a_thousand_robots_are_found_within_seconds():
     kinds = {"odom": ODOM, "cmd_vel": TWIST, "scan": SCAN, "x": "std_msgs/String"}
     topics = {
         f"/fleet/robot_{n}/{name}": type
@@ -350,7 +350,7 @@ TOPICS = st.lists(WORDS, min_size=1, max_size=4).map(
 
 
 @given(st.dictionaries(TOPICS, TYPES, max_size=12))
-def test_whatever_there_is_no_topic_moves_two_robots(topics):
+def test_no_two_robots_share_a_name_a_velocity_topic_or_an_odometry_topic(topics):
     found = discover(topics)
     assert len({robot.name for robot in found.robots}) == len(found.robots)
     for role in ("odometry", "velocity"):
@@ -362,7 +362,7 @@ def test_whatever_there_is_no_topic_moves_two_robots(topics):
             assert all(guess.topic in topics and guess.rule for guess in guesses)
 
 
-def test_a_robot_without_a_namespace_is_called_as_its_frames_are():
+def test_a_robot_without_namespace_is_named_after_its_frame_prefix():
     trees = Trees()
     trees.take("", "map", "odom")
     trees.take("", "odom", "base_link")

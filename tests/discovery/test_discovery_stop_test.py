@@ -44,7 +44,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_a_base_with_a_timeout_of_its_own_stops_by_itself_and_that_is_kept(folder):
+def test_a_base_with_a_command_timeout_passes_and_the_result_is_stored(folder):
     with simulator("--port", "0", "--robot-timeout", "0.25") as url:
         said = run(url, "robot_1", "--yes")
     assert said.returncode == 0, said.stdout + said.stderr
@@ -56,7 +56,7 @@ def test_a_base_with_a_timeout_of_its_own_stops_by_itself_and_that_is_kept(folde
     assert kept.seconds == pytest.approx(float(found[2]), abs=0.006)
 
 
-def test_a_base_without_a_timeout_is_found_although_it_passed_before(folder):
+def test_a_base_without_a_command_timeout_fails_even_after_an_earlier_pass(folder):
     with simulator("--port", "0", "--robot-timeout", "0") as url:
         key = Key(url, "/robot_0/cmd_vel")
         Records(folder).keep_stop_test(key, StopRecord(0.3, TODAY))
@@ -67,7 +67,7 @@ def test_a_base_without_a_timeout_is_found_although_it_passed_before(folder):
     assert Records(folder).stop_test_of(key).seconds is None
 
 
-def test_nothing_moves_unless_the_person_agrees(folder):
+def test_the_robot_does_not_move_if_the_user_declines(folder):
     with WitnessRobot() as robot:
         said = run(robot.url, "robot", says="n\n")
         moving = robot.log.moving_since(0.0)
@@ -77,7 +77,7 @@ def test_nothing_moves_unless_the_person_agrees(folder):
     assert moving == []
 
 
-def test_it_creeps_and_ends_with_zero_when_it_is_interrupted(folder):
+def test_a_stop_test_moves_slowly_and_ends_with_zero_when_interrupted(folder):
     with WitnessRobot(timeout=None) as robot:
         with subprocess.Popen(
             command(robot.url, "robot", "--yes"),
@@ -100,7 +100,7 @@ def test_it_creeps_and_ends_with_zero_when_it_is_interrupted(folder):
     assert time.monotonic() > ended.at > moving[-1].at
 
 
-def test_a_robot_whose_stop_stands_is_not_moved(folder):
+def test_a_robot_with_an_active_stop_is_not_moved(folder):
     with WitnessRobot() as robot:
         Records(folder).keep_latch(
             Key(robot.url, "/cmd_vel"), Press("Ann", "a1"), frozenset()
@@ -111,14 +111,14 @@ def test_a_robot_whose_stop_stands_is_not_moved(folder):
     assert "The stop test gave no result: STOP" in said.stdout
 
 
-def test_a_robot_that_is_not_there_is_told_from_those_that_are(ros1, folder):
+def test_an_unknown_robot_is_an_error_that_lists_the_known_robots(ros1, folder):
     said = run(ros1, "robot_7", "--yes")
     assert said.returncode == 2
     assert "no robot 'robot_7'" in said.stderr
     assert "robot_0, robot_1" in said.stderr
 
 
-def test_a_bridge_that_is_away_is_said():
+def test_an_unreachable_bridge_gives_no_result_and_no_traceback():
     said = run("ws://127.0.0.1:1", "robot_0", "--yes", "--wait", "0")
     assert said.returncode == 2
     assert "The stop test gave no result" in said.stderr
@@ -126,7 +126,7 @@ def test_a_bridge_that_is_away_is_said():
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_one_that_is_interrupted_while_it_waits_has_found_nothing_out(number):
+def test_a_stop_test_interrupted_before_the_bridge_opens_gives_no_result(number):
     with subprocess.Popen(
         command("ws://127.0.0.1:1", "robot_0", "--yes", "--wait", "30"),
         stdout=subprocess.PIPE,
@@ -139,7 +139,7 @@ def test_one_that_is_interrupted_while_it_waits_has_found_nothing_out(number):
         assert process.wait(10) == UNKNOWN
 
 
-def test_two_addresses_are_one_too_many():
+def test_two_urls_are_refused():
     said = run("ws://127.0.0.1:1", "robot_0", "ws://127.0.0.1:2")
     assert said.returncode == 2
     assert "--stop-test takes one URL, got 2" in said.stderr
@@ -174,7 +174,7 @@ def client_that_tests():
     return client
 
 
-def test_the_hand_takes_the_robot_only_when_the_person_agreed():
+def test_the_client_takes_control_only_after_the_user_agrees():
     client = StopTestClient(0.0)
     client.receive(FREE, 0.0)
     assert client.stage == "ready"
@@ -184,7 +184,7 @@ def test_the_hand_takes_the_robot_only_when_the_person_agreed():
     assert client.step(60.05) == [], "it is not asked for at each step"
 
 
-def test_the_hand_says_that_every_input_is_released_and_nothing_else():
+def test_the_client_sends_only_released_inputs():
     client = client_that_tests()
     (state,) = client.step(0.25)
     assert json.dumps(state) == (
@@ -204,7 +204,7 @@ def test_the_hand_says_that_every_input_is_released_and_nothing_else():
         ),
     ],
 )
-def test_the_hand_gives_up_when_it_cannot_go_on(words, why):
+def test_the_client_ends_without_result_when_the_test_cannot_continue(words, why):
     client = client_that_tests()
     client.receive(words, 0.3)
     assert client.stage == "over"
@@ -212,7 +212,7 @@ def test_the_hand_gives_up_when_it_cannot_go_on(words, why):
     assert client.news[-1] == f"The stop test gave no result: {why}."
 
 
-def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
+def test_the_client_waits_ten_seconds_and_then_reports_why_control_is_impossible():
     client = StopTestClient(0.0)
     client.receive({**FREE, "armable": False, "reason": "another WebMap has it"}, 1.0)
     assert client.step(9.0) == []
@@ -233,7 +233,7 @@ def test_the_hand_waits_for_a_gate_and_then_says_what_was_in_the_way():
         ),
     ],
 )
-def test_the_result_of_the_test_before_is_not_taken_for_this_ones(
+def test_the_client_ignores_the_result_of_an_earlier_stop_test(
     test, before, after, code
 ):
     client = client_that_tests()

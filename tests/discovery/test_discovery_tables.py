@@ -23,7 +23,7 @@ TOPICS = {
 }
 
 
-def test_the_table_names_each_topic_with_its_rule():
+def test_the_report_names_each_topic_with_its_rule():
     text = report("ws://bob:9090", discover(TOPICS, "bob"))
     assert text.startswith("ws://bob:9090: ROS 1, 1 robot\n\nbob (without a namespace)")
     line = next(line for line in text.splitlines() if "/cmd_vel" in line)
@@ -36,7 +36,7 @@ def test_the_table_names_each_topic_with_its_rule():
     assert "--set ROBOT.ROLE=TOPIC" in text
 
 
-def test_cancel_is_not_missing_where_the_action_takes_it():
+def test_the_report_of_a_robot_with_an_action_does_not_miss_the_cancel_topic():
     action = {
         "/navigate_to_pose/_action/feedback": "nav2_msgs/NavigateToPose_FeedbackMessage"
     }
@@ -53,20 +53,20 @@ def test_cancel_is_not_missing_where_the_action_takes_it():
     assert "velocity" in missing
 
 
-def test_a_note_does_not_name_another_frame_than_the_one_above():
+def test_the_note_about_the_pose_topic_names_the_odometry_that_is_used():
     pose = {"/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
     text = report("ws://bob:9090", discover(TOPICS | pose, "bob"))
     assert "/odom is used, in its own frame." in text
     assert "the usual name of Nav2" not in text
 
 
-def test_a_type_with_control_characters_does_not_reach_the_terminal():
+def test_the_report_removes_control_characters_from_types():
     odd = {"/odom": "nav_msgs/Odometry\n", "/scan": "sensor_msgs/Laser\x1b[2JScan"}
     text = report("ws://bob:9090", discover(TOPICS | odd))
     assert "\x1b" not in text
 
 
-def test_one_line_has_what_is_used():
+def test_the_summary_line_lists_the_topics_in_use():
     (robot,) = discover(TOPICS, "bob").robots
     assert summary_line(robot) == (
         "bob: odometry /odom, velocity /cmd_vel, scan /scan, "
@@ -74,7 +74,7 @@ def test_one_line_has_what_is_used():
     )
 
 
-def test_the_report_says_what_is_drawn_by_which_rule_and_what_is_used():
+def test_the_report_names_each_drawn_topic_with_its_rule_and_each_topic_left_out():
     more = {"/other/odom": "nav_msgs/Odometry", "/trajectory": "nav_msgs/Path"}
     more |= {f"/cloud_{n}": "sensor_msgs/PointCloud2" for n in range(3)}
     said = report("ws://bob:9090", discover(TOPICS | more, "bob"))
@@ -86,7 +86,7 @@ def test_the_report_says_what_is_drawn_by_which_rule_and_what_is_used():
     assert left in lines
 
 
-def test_of_several_topics_of_a_role_the_report_says_which_is_used():
+def test_the_report_marks_the_used_one_of_several_topics_for_a_role():
     more = {"/odometry/filtered": "nav_msgs/Odometry"}
     said = report("ws://bob:9090", discover(TOPICS | more, "bob"))
     lines = [" ".join(line.split()) for line in said.splitlines()]
@@ -103,7 +103,7 @@ def rows_of_the_documentation() -> list[str]:
     return [line for line in PAGE.read_text().splitlines() if line.startswith("|")]
 
 
-def test_every_rule_of_what_a_robot_is_driven_by_is_in_the_documentation():
+def test_every_topic_rule_is_in_the_documentation():
     rows = {row.split("|")[1].strip(): row for row in rows_of_the_documentation()}
     for rule in rules.RULES:
         for type in rule.types:
@@ -124,7 +124,7 @@ def test_every_layer_rule_is_in_the_documentation():
             assert any(name.replace("|", "\\|") in row for row in found), kind
 
 
-def test_the_file_is_toml_with_every_topic_that_is_used():
+def test_the_fleet_file_is_toml_with_every_topic_in_use():
     text = fleet_toml([("bob", "ws://bob:9090", discover(TOPICS, "bob"))])
     data = tomllib.loads(text)
     assert data["bridges"] == {"bob": "ws://bob:9090"}
@@ -145,7 +145,7 @@ def test_the_file_is_toml_with_every_topic_that_is_used():
     assert "map" not in data
 
 
-def test_maps_costmaps_and_every_camera_are_in_the_file():
+def test_the_fleet_file_contains_maps_costmaps_and_cameras():
     more = {"/map": "nav_msgs/OccupancyGrid", "/costmap": "nav_msgs/OccupancyGrid"}
     more |= {"/cam/image_raw/compressed": "sensor_msgs/CompressedImage"}
     found = discover(TOPICS | more, "bob")
@@ -157,24 +157,24 @@ def test_maps_costmaps_and_every_camera_are_in_the_file():
     assert data["robots"][0]["cameras"] == ["/cam/image_raw/compressed"]
 
 
-def test_an_address_as_a_name_is_a_quoted_key():
+def test_an_ipv6_address_as_bridge_name_is_a_quoted_toml_key():
     text = fleet_toml([("fe80::1", "ws://[fe80::1]:9090", discover(TOPICS, "é"))])
     assert tomllib.loads(text)["bridges"] == {"fe80::1": "ws://[fe80::1]:9090"}
 
 
-def test_robots_of_one_name_behind_two_bridges_get_their_hosts_names():
+def test_robots_with_one_name_on_two_bridges_get_the_host_in_their_names():
     found = discover(TOPICS, "Bob")
     named = unique_names([("hall", found), ("yard", discover(TOPICS, "bob"))])
     assert [one.robots[0].name for one in named] == ["Bob (hall)", "bob (yard)"]
 
 
-def test_one_bridge_twice_still_gives_two_names():
+def test_the_same_bridge_listed_twice_still_gives_unique_robot_names():
     found = discover(TOPICS, "bob")
     named = unique_names([("hall", found), ("hall", found)])
     assert [one.robots[0].name for one in named] == ["bob (hall)", "bob (hall) 2"]
 
 
-def test_names_that_differ_in_case_or_unicode_form_alone_are_the_same():
+def test_names_that_differ_only_in_case_or_unicode_form_are_equal():
     assert same_name("BOB") == same_name("bob ")
     assert same_name("é") == same_name("e\u0301")
     assert same_name("bob") != same_name("rob")

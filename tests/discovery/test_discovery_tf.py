@@ -17,6 +17,8 @@ from webmap.discovery.frame_listening import frame_topics, receive_frames
 from webmap.discovery.tf_robots import MOST_FRAMES, Trees, bases
 from webmap.poses.frames import frames_of
 
+pytestmark = pytest.mark.slow
+
 ODOM, TWIST = "nav_msgs/Odometry", "geometry_msgs/Twist"
 TF = "tf2_msgs/TFMessage"
 
@@ -43,7 +45,7 @@ def found(topics, frames):
     }
 
 
-def test_a_tree_from_map_to_base_link_is_a_robot():
+def test_a_frame_tree_from_map_to_base_link_is_a_robot():
     topics = {"/tf": TF, "/scan": "sensor_msgs/LaserScan"}
     findings = discover(topics, "bob", shared("map odom base_link laser"))
     (robot,) = findings.robots
@@ -55,7 +57,7 @@ def test_a_tree_from_map_to_base_link_is_a_robot():
     assert "its pose comes from its frames, base_link in map" in robot.notes[0]
 
 
-def test_prefixes_of_frames_are_robots_of_their_own():
+def test_each_frame_prefix_is_a_robot():
     frames = shared(
         "map r1/odom r1/base_link r1/arm_base_link",
         "map r2/odom r2/base_footprint r2/base_link",
@@ -69,7 +71,7 @@ def test_prefixes_of_frames_are_robots_of_their_own():
     }
 
 
-def test_a_robot_with_odometry_keeps_it_and_learns_the_name_of_its_base():
+def test_a_robot_with_odometry_keeps_its_odometry_and_gets_its_base_frame():
     topics = {"/tf": TF, "/Bob/odom": ODOM, "/Bob/cmd_vel": TWIST}
     (robot,) = discover(topics, "host", shared("bob/odom bob/base_footprint")).robots
     assert robot.topic("odometry") == "/Bob/odom"
@@ -77,7 +79,7 @@ def test_a_robot_with_odometry_keeps_it_and_learns_the_name_of_its_base():
     assert robot.tf == TfConfig(quiet=True, base_frame="bob/base_footprint")
 
 
-def test_maps_of_one_world_are_drawn_where_they_are_in_it():
+def test_robots_with_maps_in_one_world_frame_are_drawn_in_the_world_frame():
     """As with several robots of ROS 1, each with a map of its own."""
     trees = shared(
         "world bob/map bob/odom bob/base_link", "world ann/map ann/odom ann/base_link"
@@ -88,19 +90,19 @@ def test_maps_of_one_world_are_drawn_where_they_are_in_it():
         assert robot.map_frame == "world"
 
 
-def test_the_map_is_the_one_of_that_name_whatever_it_hangs_from():
+def test_the_frame_named_map_is_used_even_below_another_frame():
     topics = {"/tf": TF, "/odom": ODOM}
     trees = shared("earth map odom base_link")
     (robot,) = discover(topics, "host", trees).robots
     assert robot.tf.map_frame == robot.map_frame == "map"
 
 
-def test_without_a_map_a_robot_is_drawn_from_where_its_odometry_began():
+def test_a_robot_without_a_map_frame_is_drawn_in_its_odom_frame():
     (robot,) = discover({"/tf": TF}, "bob", shared("odom base_link")).robots
     assert robot.tf.map_frame == "odom"
 
 
-def test_namespaces_with_frames_of_their_own_are_robots_even_unheard():
+def test_a_namespace_with_its_own_tf_is_a_robot_even_before_any_message():
     topics = {"/a/tf": TF, "/b/tf": TF, "/b/odom": ODOM, "/b/camera/tf": TF}
     robots = discover(topics).robots
     assert [(robot.name, robot.tf_alone) for robot in robots] == [
@@ -119,27 +121,27 @@ def test_namespaces_with_frames_of_their_own_are_robots_even_unheard():
         ("a b", "b a"),
     ],
 )
-def test_what_does_not_move_in_a_map_is_no_robot(chains):
+def test_frames_without_a_base_below_odom_or_map_are_no_robot(chains):
     assert discover({"/tf": TF}, "bob", shared(*chains)).robots == ()
 
 
-def test_frames_without_a_prefix_are_nobodys_where_several_robots_share_them():
+def test_unprefixed_frames_that_several_robots_share_belong_to_no_robot():
     topics = {"/a/odom": ODOM, "/b/odom": ODOM, "/tf": TF}
     names = found(topics, shared("map odom base_link"))
     assert names == {"a": ("/a", "", ""), "b": ("/b", "", "")}
 
 
-def test_a_part_of_a_robot_is_no_robot():
+def test_a_base_link_below_another_base_link_is_no_second_robot():
     assert [base.frame for base in bases({"base_link": "odom", "base": "base_link"})]
     (base,) = bases({"base_link": "odom", "arm/base_link": "base_link"})
     assert base.frame == "base_link"
 
 
-def test_a_loop_of_frames_ends():
+def test_a_loop_of_frames_does_not_hang_the_search():
     assert list(bases({"map": "base_link", "base_link": "odom", "odom": "map"}))
 
 
-def test_a_flood_of_frames_is_forgotten_and_robots_are_not():
+def test_a_flood_of_frames_does_not_displace_the_frames_of_robots():
     received = shared("map odom base_link laser", "map bob/odom bob/base_link")
     for number in range(3 * MOST_FRAMES):
         received.take("", "map", f"object_{number}")
@@ -151,7 +153,7 @@ def test_a_flood_of_frames_is_forgotten_and_robots_are_not():
     ]
 
 
-def test_a_flood_of_bases_ends_too():
+def test_the_number_of_stored_base_frames_is_limited():
     received = Trees()
     for number in range(2 * MOST_FRAMES):
         received.take("", "map", f"r{number}/base_link")
@@ -159,12 +161,12 @@ def test_a_flood_of_bases_ends_too():
     assert f"r{2 * MOST_FRAMES - 1}/base_link" in received.parents[""]
 
 
-def test_only_topics_with_frames_are_listened_to():
+def test_only_tf_topics_are_subscribed():
     topics = {"/tf": TF, "/a/tf": "tf2_msgs/msg/TFMessage", "/b/tf": "odd", "/c": TF}
     assert frame_topics(topics) == ["/a/tf_static", "/a/tf", "/tf_static", "/tf"]
 
 
-def test_a_bridge_that_is_gone_tells_of_no_frames():
+def test_an_unreachable_bridge_gives_no_frames():
     seen = asyncio.run(receive_frames("ws://127.0.0.1:1", {"/tf": TF}))
     assert seen.bases() == ()
 
@@ -175,7 +177,9 @@ MAP_TO_BASE = [
 ]
 
 
-def test_discover_shows_a_robot_of_frames_and_the_file_keeps_it(tmp_path):
+def test_the_discover_command_shows_a_robot_from_frames_and_writes_a_valid_file(
+    tmp_path,
+):
     with telling({"/tf": MAP_TO_BASE}, "ros2") as url:
         shown, kept = (
             subprocess.run(
@@ -202,7 +206,7 @@ def test_discover_shows_a_robot_of_frames_and_the_file_keeps_it(tmp_path):
     assert "1 robot behind 1 bridge, no mistakes" in checked.stdout, checked
 
 
-def test_what_was_found_is_drawn_where_its_frames_have_it():
+def test_a_robot_found_by_frames_has_the_pose_from_its_frames():
     with telling({"/tf": MAP_TO_BASE}) as url:
 
         async def scenario() -> None:
@@ -223,7 +227,7 @@ def test_what_was_found_is_drawn_where_its_frames_have_it():
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
-def test_ten_namespaces_on_one_bridge_are_ten_robots_by_their_own_frames(dialect):
+def test_ten_namespaces_with_their_own_tf_on_one_bridge_are_ten_robots(dialect):
     received = {
         f"/r{n}/tf": [
             ("map", "odom", Pose(10.0 * n, 0.0, 0.0)),

@@ -79,7 +79,7 @@ def refused(write, text):
     return str(error.value).replace(str(file), "FILE")
 
 
-def test_one_file_describes_robots_of_ros_1_and_ros_2(ready):
+def test_one_fleet_file_describes_robots_of_ros_1_and_ros_2(ready):
     fleet = ready(GOOD)
     assert [bridge.url for bridge in fleet.bridges.values()] == [
         "ws://north:9090",
@@ -107,13 +107,13 @@ def test_one_file_describes_robots_of_ros_1_and_ros_2(ready):
     assert scanner is not None
 
 
-def test_a_robot_that_flies_states_limits_for_its_other_axes(ready):
+def test_the_fleet_file_sets_limits_for_the_other_axes_of_a_flying_robot(ready):
     limits = "z_max = 0.5\nrx_max = 0.2\nry_max = 1"
     spec = ready(changed("w_max = 1", f"w_max = 1\n{limits}")).robots[0].motion.spec()
     assert (spec.z_max, spec.rx_max, spec.ry_max) == (0.5, 0.2, 1.0)
 
 
-def test_the_only_bridge_need_not_be_said_and_a_topic_is_enough(ready):
+def test_robots_use_the_only_bridge_by_default_and_a_topic_may_be_plain_text(ready):
     fleet = ready(
         '[bridges]\nhall = "ws://hall:9090"\n'
         '[[robots]]\nname = "Bob"\ntwist = "/cmd_vel"\nscan = "/scan"\n'
@@ -282,11 +282,11 @@ def changed(old, new):
         ("#" * (2 << 20), "FILE: the file is larger than 512 KiB"),
     ],
 )
-def test_a_mistake_is_named_with_its_line_and_what_was_expected(write, text, said):
+def test_a_mistake_is_reported_with_its_line_and_the_expected_value(write, text, said):
     assert said in refused(write, text)
 
 
-def test_every_mistake_is_named_at_once(write):
+def test_all_mistakes_are_reported_at_once(write):
     text = changed("v_max", "vmax").replace("w_max = 1", "w_max = false")
     said = refused(write, text).splitlines()
     assert len(said) == 2
@@ -294,12 +294,12 @@ def test_every_mistake_is_named_at_once(write):
     assert said[1].startswith("FILE:23: ")
 
 
-def test_control_characters_of_a_file_do_not_reach_the_terminal(write):
+def test_error_messages_escape_control_characters_of_the_fleet_file(write):
     for odd in (changed('"north"', r'"\u001b[2J"'), changed("title", r'"\u001b[2J"')):
         assert "\x1b" not in refused(write, odd)
 
 
-def test_where_there_is_no_bridge_robots_are_not_asked_for_theirs(write):
+def test_a_missing_bridges_table_is_the_only_mistake_reported(write):
     said = refused(write, '[[robots]]\nname = "Bob"\n').splitlines()
     assert len(said) == 1
     assert said[0].startswith(
@@ -310,7 +310,9 @@ def test_where_there_is_no_bridge_robots_are_not_asked_for_theirs(write):
 ONE = '[bridges]\nhall = "ws://hall:9090"\n\n[[robots]]\nname = "Bob"\n'
 
 
-def test_goals_may_name_the_only_bridge(tmp_path):
+def test_goals_may_name_the_bridge_but_with_several_bridges_the_robot_must_too(
+    tmp_path,
+):
     file = tmp_path / "fleet.toml"
     move = (
         'move = { topic = "/goal", bridge = "hall" }\ninitial_pose = "/initialpose"\n'
@@ -332,7 +334,7 @@ def test_goals_may_name_the_only_bridge(tmp_path):
         "[[robots]]\nname = 'Ann'\nscan_assist = { topic = '/scan' }\n",
     ],
 )
-def test_parts_with_a_mistake_are_left_out_behind_a_hundred_others(tmp_path, last):
+def test_at_most_a_hundred_mistakes_are_listed_and_the_rest_are_counted(tmp_path, last):
     file = tmp_path / "fleet.toml"
     wrong = "".join(f"k{number} = 1\n" for number in range(120))
     file.write_text(f"{ONE}{wrong}{last}")
@@ -343,7 +345,7 @@ def test_parts_with_a_mistake_are_left_out_behind_a_hundred_others(tmp_path, las
     assert "more mistakes" in lines[-1]
 
 
-def test_mistakes_in_other_parts_of_a_robot_with_a_mistake_are_named_too(tmp_path):
+def test_all_mistakes_of_one_robot_are_reported(tmp_path):
     file = tmp_path / "fleet.toml"
     parts = (
         'twist = { topic = "/cmd_vel", v_max = "fast" }\n'

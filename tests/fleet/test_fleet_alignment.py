@@ -45,7 +45,7 @@ def refused(ready, text):
     return str(error.value)
 
 
-def test_bridges_and_robots_lie_where_the_file_says(ready):
+def test_bridges_and_robots_get_their_alignments_from_the_fleet_file(ready):
     bob, ann = ready(FILE).robots
     assert bob.pose_source.alignment == Pose(12.5, -3.0, math.pi / 2)
     assert bob.pose_source.own_alignment is None
@@ -61,20 +61,22 @@ def test_bridges_and_robots_lie_where_the_file_says(ready):
         ("[12.5, -3, 90.0]", 3, "bridges.south.alignment"),
     ],
 )
-def test_one_that_makes_no_sense_is_named(ready, value, old, line, place):
+def test_an_invalid_alignment_is_reported_with_its_line_and_key(
+    ready, value, old, line, place
+):
     said = refused(ready, FILE.replace(old, value))
     assert f"fleet.toml:{line}: {place}: got " in said
     assert "expected x and y in metres and an angle in degrees" in said
 
 
-def test_a_bridge_s_table_is_read_strictly(ready):
+def test_a_bridge_table_with_unknown_or_missing_keys_is_refused(ready):
     said = refused(ready, FILE.replace("alignment = [12.5", "aligment = [12.5"))
     assert 'did you mean "alignment"?' in said
     said = refused(ready, FILE.replace('url = "ws://south:9090", ', ""))
     assert 'bridges.south: the key "url" is missing' in said
 
 
-def test_what_people_saved_holds_until_the_file_says_otherwise(
+def test_a_saved_alignment_is_used_until_the_fleet_file_changes(
     ready, tmp_path, monkeypatch
 ):
     store = AlignmentStore(tmp_path / "state")
@@ -89,7 +91,7 @@ def test_what_people_saved_holds_until_the_file_says_otherwise(
         assert alignments.of(robots[0].pose_source.bridge).x == wanted
 
 
-def test_a_robots_alignment_is_plain_data_and_back():
+def test_the_alignment_of_a_robot_survives_to_dict_and_from_dict():
     bob = Robot("Bob")
     assert "alignment" not in bob.to_dict()
     bob.set_alignment(1.5, -2.0, 30.0)

@@ -28,7 +28,7 @@ def prepared(tmp_path, text):
     return prepare(file)
 
 
-def test_the_buttons_of_a_file_are_those_of_the_robot(tmp_path):
+def test_a_robot_gets_its_buttons_from_the_fleet_file(tmp_path):
     more = """
 [[robots.buttons]]
 label = "Slow"
@@ -82,13 +82,13 @@ value = 0.2
         ),
     ],
 )  # fmt: skip
-def test_a_button_that_makes_no_sense_is_named_with_its_line(tmp_path, line, said):
+def test_an_invalid_button_is_reported_with_its_line(tmp_path, line, said):
     with pytest.raises(ConfigError) as error:
         prepared(tmp_path, f"\n[[robots.buttons]]\n{line}\n")
     assert said in str(error.value)
 
 
-def test_buttons_that_are_no_tables_are_refused(tmp_path):
+def test_buttons_that_are_not_tables_are_refused(tmp_path):
     file = tmp_path / "fleet.toml"
     text = HEAD.partition("[[robots.buttons]]")[0]
     file.write_text(f"{text}buttons = 3\n")

@@ -27,14 +27,14 @@ def read(tmp_path):
         robot.destroy()
 
 
-def test_a_topic_or_an_address_is_enough(read):
+def test_a_camera_needs_only_a_topic_or_a_url(read):
     (camera,) = read('"/front/image_raw/compressed"')
     assert (camera.name, camera.topic) == ("Camera", "/front/image_raw/compressed")
     (camera,) = read('"http://bob:8080/stream?topic=/front"')
     assert (camera.name, camera.address) == ("Camera", "http://bob:8080/stream")
 
 
-def test_several_have_names_of_their_own(read):
+def test_several_cameras_get_different_names(read):
     cameras = read(
         '["/front", {url = "https://bob/rear", name = "Rear", throttle = 500}, '
         '{topic = "/arm"}]'
@@ -71,7 +71,7 @@ def test_several_have_names_of_their_own(read):
         ),
     ],
 )
-def test_a_mistake_is_named_with_its_line(read, cameras, said):
+def test_an_invalid_camera_is_reported_with_its_line(read, cameras, said):
     with pytest.raises(ConfigError) as refused:
         read(cameras)
     (line,) = str(refused.value).splitlines()
@@ -79,7 +79,7 @@ def test_a_mistake_is_named_with_its_line(read, cameras, said):
     assert said in line
 
 
-def test_what_is_found_is_written_so_that_each_camera_has_a_name(tmp_path):
+def test_discovered_cameras_in_a_fleet_file_get_different_names(tmp_path):
     image = "sensor_msgs/msg/CompressedImage"
     topics = {f"/cam{n}/image_raw/compressed": image for n in (1, 2)}
     findings = discover({"/odom": "nav_msgs/msg/Odometry"} | topics, "bob")

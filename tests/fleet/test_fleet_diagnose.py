@@ -45,13 +45,13 @@ def looked_at(robots=(), settings=()):
     return {robot.name: robot for robot in findings.robots}
 
 
-def test_where_nothing_is_said_each_bridge_is_looked_at_as_it_is_found():
+def test_without_options_doctor_checks_the_discovered_robots_of_each_bridge():
     found = bridges_of([URL, "ws://Bob"], (), ())
     assert [url for url, _ in found] == ["ws://127.0.0.1:9090", "ws://bob"]
     assert [list(configured(discover(TOPICS))) for _, configured in found] == [[], []]
 
 
-def test_one_topic_is_overruled_and_the_others_stay_with_the_type_that_is_said():
+def test_doctor_applies_settings_and_keeps_the_other_discovered_topics():
     robots = looked_at(
         settings=[
             "a.scan=/a/rear/scan",
@@ -69,7 +69,7 @@ def test_one_topic_is_overruled_and_the_others_stay_with_the_type_that_is_said()
     assert robots["b"].type_of("velocity") == "geometry_msgs/Twist"
 
 
-def test_a_robot_that_is_told_has_what_was_told_and_what_is_drawn_of_it_besides():
+def test_doctor_checks_the_topics_of_a_robot_option_and_its_other_layers():
     robots = looked_at(["Bob:/a/odom:/a/cmd_vel:/a/rear/scan"], ["Bob.camera=/c"])
     assert list(robots) == ["Bob"]
     bob = robots["Bob"]
@@ -79,7 +79,7 @@ def test_a_robot_that_is_told_has_what_was_told_and_what_is_drawn_of_it_besides(
     assert "battery" not in bob.guesses
 
 
-def test_a_fleet_file_says_which_robots_are_behind_which_bridge(tmp_path):
+def test_doctor_takes_bridges_and_their_robots_from_a_fleet_file(tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text(FLEET)
     (hall, at_hall), (yard, at_yard) = bridges_of([str(file)], (), ())
@@ -101,12 +101,12 @@ def test_a_fleet_file_says_which_robots_are_behind_which_bridge(tmp_path):
         (["ws://a", "fleet.toml"], [], [], "leave out --robot, --set and other"),
     ],
 )
-def test_what_cannot_go_together_is_refused(given, robots, settings, words):
+def test_options_that_exclude_each_other_are_refused(given, robots, settings, words):
     with pytest.raises(click.UsageError, match=words):
         bridges_of(given, robots, settings)
 
 
-def test_a_setting_about_nobody_is_refused_when_the_robots_are_known():
+def test_a_setting_for_an_unknown_robot_is_refused():
     ((_, configured),) = bridges_of([URL], (), ["c.scan=/scan"])
     with pytest.raises(ConfigError, match="there is no robot 'c'"):
         configured(discover(TOPICS))

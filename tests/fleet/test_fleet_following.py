@@ -74,7 +74,7 @@ def watched(bridge):
         robot.destroy()
 
 
-def test_a_robot_of_frames_alone_is_drawn_in_the_map_once_that_is_there(
+def test_a_robot_with_only_frames_is_drawn_in_the_map_frame_when_the_frame_appears(
     watched, capsys
 ):
     watched.look(TF, "odom base_link")
@@ -86,7 +86,7 @@ def test_a_robot_of_frames_alone_is_drawn_in_the_map_once_that_is_there(
     assert said == ["host now is drawn by base_link in map"]
 
 
-def test_goals_go_in_the_frame_of_a_map_that_comes_later(watched, capsys):
+def test_goals_use_a_map_frame_that_appears_later(watched, capsys):
     watched.look(TF | ODOM | GOALS, AT_FIRST)
     assert watched.robot.motion.spec().goal_frame == "map"
     capsys.readouterr()
@@ -99,21 +99,21 @@ def test_goals_go_in_the_frame_of_a_map_that_comes_later(watched, capsys):
     ]
 
 
-def test_a_robot_without_goals_is_told_its_place_in_a_map_that_comes_later(watched):
+def test_the_initial_pose_uses_a_map_frame_that_appears_later(watched):
     place = {name: type for name, type in GOALS.items() if "initial" in name}
     watched.look(TF | ODOM | place, AT_FIRST)
     watched.look(TF | ODOM | place, LATER)
     assert watched.robot.motion.spec().goal_frame == "bob/map"
 
 
-def test_goals_that_come_while_frames_are_quiet_go_in_the_frame_that_is_known(watched):
+def test_goal_topics_that_appear_without_frames_use_the_known_map_frame(watched):
     watched.look(TF | ODOM, LATER)
     watched.look(TF | ODOM | GOALS)
     assert watched.robot.motion.spec().goal_frame == "bob/map"
 
 
 @pytest.mark.parametrize("later", ["", AT_FIRST, "bob/map bob/base_link"])
-def test_a_robot_stays_in_its_map_when_that_is_quiet(watched, later, capsys):
+def test_a_robot_keeps_its_map_frame_when_the_frame_disappears(watched, later, capsys):
     watched.look(TF | ODOM, LATER)
     capsys.readouterr()
     watched.look(TF | ODOM, later)
@@ -121,7 +121,7 @@ def test_a_robot_stays_in_its_map_when_that_is_quiet(watched, later, capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_frames_that_a_person_said_stay_as_they_are(bridge, capsys):
+def test_frames_that_the_user_set_do_not_change(bridge, capsys):
     watched = Watched(bridge, "bob.tf=/tf")
     watched.look(TF | ODOM | GOALS, AT_FIRST)
     capsys.readouterr()
@@ -132,7 +132,7 @@ def test_frames_that_a_person_said_stay_as_they_are(bridge, capsys):
     watched.robot.destroy()
 
 
-def test_what_lies_in_the_frame_of_before_is_laid_into_the_new_one(watched, bridge):
+def test_layers_in_the_old_map_frame_move_to_the_new_map_frame(watched, bridge):
     watched.look(TF | ODOM, AT_FIRST)
     robot = watched.robot
     old = {"map_frame": "map", "palette": "costmap"}
@@ -146,7 +146,7 @@ def test_what_lies_in_the_frame_of_before_is_laid_into_the_new_one(watched, brid
     }
 
 
-def test_a_robot_that_is_drawn_by_odometry_in_the_map_has_no_news_of_it(
+def test_a_robot_that_already_uses_the_frame_map_does_not_change_when_map_appears(
     watched, capsys
 ):
     watched.look(TF | ODOM, AT_FIRST)
@@ -160,7 +160,7 @@ def test_a_robot_that_is_drawn_by_odometry_in_the_map_has_no_news_of_it(
 POSE = {"/bob/robot_pose": "geometry_msgs/PoseStamped"}
 
 
-def test_a_robot_without_a_place_is_placed_by_a_pose_that_comes(watched, capsys):
+def test_a_robot_without_a_pose_uses_a_pose_topic_that_appears_later(watched, capsys):
     watched.look(DRIVEN)
     assert watched.robot.feed is None
     watched.look(DRIVEN | POSE)
@@ -169,7 +169,7 @@ def test_a_robot_without_a_place_is_placed_by_a_pose_that_comes(watched, capsys)
     assert said == ["bob has new topics: pose /bob/robot_pose"]
 
 
-def test_a_pose_that_comes_does_not_take_the_place_of_odometry(watched, capsys):
+def test_a_pose_topic_that_appears_later_does_not_replace_odometry(watched, capsys):
     watched.look(DRIVEN | ODOM)
     capsys.readouterr()
     watched.look(DRIVEN | ODOM | POSE)
@@ -177,13 +177,13 @@ def test_a_pose_that_comes_does_not_take_the_place_of_odometry(watched, capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_a_pose_that_comes_does_not_take_the_place_of_frames(watched):
+def test_a_pose_topic_that_appears_later_does_not_replace_frames(watched):
     watched.look(TF | DRIVEN, LATER)
     watched.look(TF | DRIVEN | POSE, LATER)
     assert watched.robot.feed is None
 
 
-def test_a_robot_that_a_person_wants_nowhere_is_not_placed_by_a_pose(bridge):
+def test_a_robot_with_odometry_set_to_nothing_does_not_use_a_later_pose_topic(bridge):
     watched = Watched(bridge, "bob.odometry=")
     watched.look(DRIVEN)
     watched.look(DRIVEN | POSE)
@@ -199,7 +199,7 @@ def test_a_robot_that_a_person_wants_nowhere_is_not_placed_by_a_pose(bridge):
         ({"odometry": "/al/odom"}, ["bob"]),
     ],
 )
-def test_a_told_robot_takes_the_place_of_one_that_comes_later(
+def test_a_robot_option_replaces_a_discovered_robot_with_the_same_topics(
     bridge, said, shown, capsys
 ):
     given = candidate(bridge, **said)
@@ -212,7 +212,9 @@ def test_a_told_robot_takes_the_place_of_one_that_comes_later(
         robot.destroy()
 
 
-def test_a_told_robot_is_drawn_in_a_map_that_comes_later(bridge, monkeypatch, capsys):
+def test_a_robot_option_is_drawn_in_a_map_frame_that_appears_later(
+    bridge, monkeypatch, capsys
+):
     about = candidate(bridge, odometry="/bob/odom", goal="/bob/goal_pose")
     config = about.found.config(bridge.url)
     robot = make_robot(config, [bridge])

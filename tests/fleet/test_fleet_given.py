@@ -81,7 +81,9 @@ def what_of(robot):
     return sorted(made)
 
 
-def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
+def test_a_robot_option_gets_the_layers_of_its_namespace_but_only_its_given_scan(
+    bridge,
+):
     given = described(
         bridge, odometry="/a/odom", velocity="/a/cmd_vel", scan="/a/rear/scan"
     )
@@ -101,7 +103,9 @@ def test_a_told_robot_has_all_that_is_in_its_namespace_and_no_scan_more(bridge):
 
 
 @pytest.mark.parametrize(("said", "drawn_of"), [([], ["Bob"]), (["--only-given"], [])])
-def test_with_as_told_it_stays_with_what_was_told(monkeypatch, said, drawn_of):
+def test_only_given_draws_no_layers_besides_the_given_topics(
+    monkeypatch, said, drawn_of
+):
     asked = []
 
     def looking(bridge, shown, *, given, **options):
@@ -117,7 +121,7 @@ def test_with_as_told_it_stays_with_what_was_told(monkeypatch, said, drawn_of):
     assert (done.exit_code, asked) == (0, drawn_of)
 
 
-def test_a_told_robot_is_drawn_in_the_frame_of_the_map_if_frames_lead_there(bridge):
+def test_a_robot_option_with_odometry_is_drawn_in_the_map_frame(bridge):
     placed = described(bridge, odometry="/a/odom")
     nowhere = described(bridge, name="b", velocity="/b/cmd_vel")
     console = drawn(bridge, TOPICS | FRAMES, placed, nowhere)
@@ -128,7 +132,7 @@ def test_a_told_robot_is_drawn_in_the_frame_of_the_map_if_frames_lead_there(brid
     other.destroy()
 
 
-def test_a_told_robot_that_discovery_does_not_know_has_its_namespace_too(bridge):
+def test_a_robot_option_unknown_to_discovery_gets_the_layers_of_its_namespace(bridge):
     topics = TOPICS | {"/c/where": "geometry_msgs/Pose", "/c/plan": "nav_msgs/Path"}
     given = described(bridge, odometry="/c/where")
     assert offer(given.found, topics, discover(topics)).found is None
@@ -137,7 +141,7 @@ def test_a_told_robot_that_discovery_does_not_know_has_its_namespace_too(bridge)
     console.given[0].destroy()
 
 
-def test_what_is_in_a_namespace_is_drawn_with_the_first_robot_told_there(bridge):
+def test_only_the_first_robot_option_in_a_namespace_gets_its_layers(bridge):
     first = described(bridge, name="Al", odometry="/a/odom")
     second = described(bridge, name="Bo", odometry="/a/ekf/odometry/filtered")
     console = drawn(bridge, TOPICS, first, second)
@@ -151,7 +155,7 @@ def test_what_is_in_a_namespace_is_drawn_with_the_first_robot_told_there(bridge)
         robot.destroy()
 
 
-def test_robots_behind_another_bridge_are_left_alone(bridge):
+def test_a_robot_option_on_another_bridge_gets_no_layers(bridge):
     elsewhere = described(Bridge("ws://al:9090"), odometry="/a/odom")
     console = drawn(bridge, TOPICS, elsewhere)
     assert what_of(console.given[0]) == []
@@ -170,7 +174,7 @@ def test_robots_behind_another_bridge_are_left_alone(bridge):
         ({"odometry": "/none of a topic"}, None),
     ],
 )
-def test_a_told_robot_is_known_by_its_topics_and_then_by_its_name(
+def test_a_robot_option_matches_a_discovered_robot_by_topics_and_then_by_name(
     bridge, given, namespace
 ):
     found = same_robot(described(bridge, **given).found, discover(TOPICS).robots)
@@ -187,7 +191,7 @@ def test_a_told_robot_is_known_by_its_topics_and_then_by_its_name(
         ({"odometry": "/odom", "velocity": "/c/cmd_vel"}, ""),
     ],
 )
-def test_the_namespace_of_a_told_robot_is_what_its_topics_share(
+def test_the_namespace_of_a_robot_option_is_the_common_prefix_of_its_topics(
     bridge, given, namespace
 ):
     assert namespace_of(described(bridge, **given).found) == namespace
@@ -206,13 +210,13 @@ def test_the_namespace_of_a_told_robot_is_what_its_topics_share(
         (["Bob:/a:/c", "Al:/b:c/"], "c/ already drives 'Bob'; expected another topic"),
     ],
 )
-def test_robots_that_are_told_amiss_are_refused_with_what_was_said(bridge, texts, said):
+def test_an_invalid_robot_option_is_refused_with_its_text(bridge, texts, said):
     with pytest.raises(ConfigError) as refused:
         given_robots(texts, [bridge])
     assert said in str(refused.value)
 
 
-def test_robots_of_one_topic_behind_two_bridges_are_two(bridge):
+def test_two_robots_with_equal_topics_on_different_bridges_are_accepted(bridge):
     bridges = [bridge, Bridge("ws://al:9090")]
     given = given_robots(["Bob:/odom:/cmd_vel", "2@Al:/odom:/cmd_vel"], bridges)
     assert [robot.found.name for robot in given] == ["Bob", "Al"]
@@ -221,7 +225,7 @@ def test_robots_of_one_topic_behind_two_bridges_are_two(bridge):
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-1", "x"])
 @pytest.mark.parametrize("option", ["--wait", "--stops-within"])
-def test_seconds_are_a_finite_number(option, number):
+def test_wait_and_stops_within_accept_only_finite_seconds(option, number):
     done = CliRunner().invoke(view, [URL, option, number])
     assert done.exit_code == 2
     assert f"Invalid value for '{option}'" in done.output
@@ -232,37 +236,37 @@ def bridges():
     return [Bridge("ws://localhost:9090"), Bridge("ws://localhost:9091")]
 
 
-def test_a_robot_is_a_name_and_three_topics(bridges):
+def test_a_robot_option_is_a_name_and_three_topics(bridges):
     given = parse_robot("Bob:/odom:/cmd_vel:/scan", bridges)
     assert given == described(
         bridges[0], odometry="/odom", velocity="/cmd_vel", scan="/scan"
     )
 
 
-def test_topics_may_be_empty_or_left_out(bridges):
+def test_topics_of_a_robot_option_may_be_empty_or_left_out(bridges):
     given = parse_robot("Bob:/odom::/scan", bridges)
     assert given == described(bridges[0], odometry="/odom", scan="/scan")
     given = parse_robot("Bob:/odom", bridges)
     assert given == described(bridges[0], odometry="/odom")
 
 
-def test_a_number_says_behind_which_bridge_it_is(bridges):
+def test_a_number_in_a_robot_option_selects_the_bridge(bridges):
     assert parse_robot("2@Bob:/odom", bridges).bridge is bridges[1]
 
 
-def test_an_at_sign_in_a_topic_is_no_number_of_a_bridge(bridges):
+def test_an_at_sign_in_a_topic_does_not_select_a_bridge(bridges):
     assert parse_robot("Bob:/a@b", bridges).found.topic("odometry") == "/a@b"
 
 
 @pytest.mark.parametrize(
     "text", ["", "Bob", ":/odom", "Bob:::", "Bob:/a:/b:/c:/d", "  :/odom"]
 )
-def test_another_form_is_refused_with_the_right_one(bridges, text):
+def test_a_malformed_robot_option_is_refused_with_the_correct_form(bridges, text):
     with pytest.raises(ConfigError, match="NAME:ODOM:CMD_VEL:SCAN"):
         parse_robot(text, bridges)
 
 
 @pytest.mark.parametrize("number", ["0", "3", "-1", "x", "", "²"])
-def test_a_bridge_that_is_not_there_is_refused(bridges, number):
+def test_an_invalid_bridge_number_is_refused(bridges, number):
     with pytest.raises(ConfigError, match="expected 1 to 2"):
         parse_robot(f"{number}@Bob:/odom", bridges)

@@ -20,7 +20,7 @@ def ready(tmp_path, text):
     return prepare(file).robots[0]
 
 
-def test_a_robot_of_a_file_has_its_action_and_its_initial_pose(tmp_path):
+def test_a_robot_gets_its_action_and_initial_pose_from_the_fleet_file(tmp_path):
     robot = ready(
         tmp_path,
         'move.action = "/move_base"\n'
@@ -34,7 +34,7 @@ def test_a_robot_of_a_file_has_its_action_and_its_initial_pose(tmp_path):
     robot.destroy()
 
 
-def test_a_robot_of_a_file_without_goals_is_told_its_place_in_its_own_map(tmp_path):
+def test_a_robot_without_goals_uses_the_initial_pose_frame_of_the_fleet_file(tmp_path):
     text = 'initial_pose = { topic = "/here", frame = "tb1/map" }\n'
     robot = ready(tmp_path, text)
     assert robot.motion.spec().goal_frame == "tb1/map"
@@ -52,6 +52,8 @@ def test_a_robot_of_a_file_without_goals_is_told_its_place_in_its_own_map(tmp_pa
         ("initial_pose = { covariance = [1, 2, 3] }", 'the key "topic" is missing'),
     ],
 )
-def test_a_mistake_says_what_was_expected(tmp_path, text, said):
+def test_an_invalid_goal_or_initial_pose_error_names_the_expected_value(
+    tmp_path, text, said
+):
     with pytest.raises(ConfigError, match=said):
         ready(tmp_path, text)

@@ -26,9 +26,7 @@ twist = { topic = "/robot_1/cmd_vel", stops_within = 0.5 }
 
 
 @pytest.mark.browser
-def test_q_moves_the_robot_sideways_whose_base_can_and_no_other(
-    chromium, ros1, tmp_path
-):
+def test_the_q_key_moves_only_a_holonomic_robot_sideways(chromium, ros1, tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text(FLEET.replace("URL", ros1))
     said, seen = [], []

@@ -18,6 +18,8 @@ from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.found import Findings, FoundRobot, Layers
 from webmap.discovery.tables import report
 
+pytestmark = pytest.mark.slow
+
 EVIL = "\n[[robots]]\r\x1b[2J\x1b]0;mine\x07\x9b31m\u202eevil"
 TOPICS = {
     "/bob/odom": "nav_msgs/Odometry",
@@ -92,17 +94,17 @@ def assert_harmless(said):
     assert [line for line in lines if line.startswith("[[robots]]\\r")] == []
 
 
-def test_names_of_frames_steer_no_terminal_and_forge_no_line():
+def test_doctor_escapes_control_characters_in_frame_names():
     with bridge(knows_topics=True) as url:
         assert_harmless(webmap("doctor", "--seconds", "0.5", url))
 
 
-def test_names_of_robots_that_are_found_steer_no_terminal():
+def test_the_discovery_report_escapes_control_characters_in_robot_names():
     robot = FoundRobot(name=f"Bob{EVIL}", namespace="", notes=(EVIL,))
     assert_harmless(report("ws://127.0.0.1:1", Findings(robots=(robot,))))
 
 
-def test_names_of_fields_that_are_recorded_steer_no_terminal(tmp_path):
+def test_record_escapes_control_characters_in_field_names(tmp_path):
     with bridge(knows_topics=True) as url:
         out = str(tmp_path / "bag")
         assert_harmless(webmap("record", url, "--duration", "1", "--out", out))
@@ -118,19 +120,19 @@ def test_names_of_fields_that_are_recorded_steer_no_terminal(tmp_path):
         ("record", "--duration", "1"),
     ],
 )
-def test_errors_of_a_bridge_steer_no_terminal_and_forge_no_line(command):
+def test_commands_escape_control_characters_in_errors_of_a_bridge(command):
     with bridge(knows_topics=False) as url:
         assert_harmless(webmap(*command, url))
 
 
-def test_names_of_topics_write_nothing_into_a_fleet_file():
+def test_a_robot_name_with_control_characters_adds_no_lines_to_a_fleet_file():
     robot = FoundRobot(name=f"Bob{EVIL}\x7f", namespace="", guesses={}, notes=(EVIL,))
     findings = Findings(robots=(robot,), layers={"": Layers()})
     data = tomllib.loads(fleet_toml([("b", "ws://127.0.0.1:1", findings)]))
     assert [one["name"] for one in data["robots"]] == [f"Bob{EVIL}\x7f"]
 
 
-def test_commands_print_in_one_place():
+def test_commands_print_only_through_the_echo_function():
     package = Path(webmap_cli.__file__).parents[1]
     raw = ("click.echo(", "click.secho(", "print(")
     found = {
@@ -149,7 +151,7 @@ def test_commands_print_in_one_place():
     assert all(line.startswith(allowed[name]) for name, line in found)
 
 
-def test_a_text_that_is_printed_is_one_line_and_is_cut(capsys):
+def test_echo_prints_one_line_of_limited_length(capsys):
     echo(EVIL + "x" * 100_000)
     out = capsys.readouterr().out
     assert out.count("\n") == 1

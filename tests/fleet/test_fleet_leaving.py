@@ -12,6 +12,8 @@ from websockets.sync.client import connect
 
 from webmap_process import simulator
 
+pytestmark = pytest.mark.slow
+
 COMMANDS = {
     "record": ("--duration", "1.5"),
     "doctor": ("--seconds", "1"),
@@ -71,7 +73,7 @@ def lets_in(url):
 
 
 @pytest.mark.parametrize("name", ["record", "doctor", "discover"])
-def test_a_command_is_left_and_the_bridge_still_answers(bridge, name, tmp_path):
+def test_the_bridge_accepts_clients_after_a_command_ends(bridge, name, tmp_path):
     with running(name, bridge, tmp_path) as process:
         _, said = process.communicate(timeout=60)
     assert b"Traceback" not in said
@@ -81,7 +83,7 @@ def test_a_command_is_left_and_the_bridge_still_answers(bridge, name, tmp_path):
 
 @pytest.mark.parametrize("name", COMMANDS)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_a_command_is_ended_and_the_bridge_still_answers(
+def test_the_bridge_accepts_clients_after_a_command_is_ended_by_a_signal(
     bridge, name, number, tmp_path
 ):
     with running(name, bridge, tmp_path) as process:

@@ -66,7 +66,7 @@ class Failing(Looking):
 @pytest.mark.parametrize(
     "error", [BridgeError("no rosapi"), OSError(errno.ENOSPC, "full"), KeyError("x")]
 )
-def test_one_look_that_fails_is_followed_by_others(error, caplog):
+def test_looking_continues_after_a_look_that_fails(error, caplog):
     async def scenario():
         failing = Failing(error, error)
         failing.start(asyncio.get_running_loop())
@@ -80,7 +80,7 @@ def test_one_look_that_fails_is_followed_by_others(error, caplog):
     assert said == ([] if isinstance(error, BridgeError) else [error, error])
 
 
-def test_a_newcomer_that_cannot_be_shown_keeps_no_other_from_it(caplog):
+def test_a_new_robot_that_cannot_be_shown_does_not_hide_other_new_robots(caplog):
     shown = []
 
     def came(news, bridge):
@@ -99,7 +99,7 @@ def test_a_newcomer_that_cannot_be_shown_keeps_no_other_from_it(caplog):
     assert "no such thing" in caplog.text
 
 
-def test_a_newcomer_is_shown_though_nobody_hears_of_it(nobody_hears):
+def test_new_robots_are_shown_even_if_standard_error_is_broken(nobody_hears):
     bridge, late = Bridge(URL), ShownRobots(Console())
     ann, bob = discover(TOPICS, "host").robots
     came = late.came
@@ -112,7 +112,7 @@ def test_a_newcomer_is_shown_though_nobody_hears_of_it(nobody_hears):
             robot.destroy()
 
 
-def test_a_topic_that_cannot_be_used_keeps_no_other_from_it(caplog, capsys):
+def test_a_new_topic_that_fails_does_not_block_other_new_topics(caplog, capsys):
     bridge, late = Bridge(URL), ShownRobots(Console())
     odometry = {"/ann/odom": "nav_msgs/Odometry"}
     more = {
@@ -138,7 +138,7 @@ def test_a_topic_that_cannot_be_used_keeps_no_other_from_it(caplog, capsys):
     assert "ann has new topics: battery /ann/battery_state\n" in capsys.readouterr().err
 
 
-def test_a_layer_that_cannot_be_drawn_is_said_once_and_keeps_no_other_from_it(caplog):
+def test_a_layer_that_fails_is_logged_once_and_does_not_block_other_layers(caplog):
     bridge, late = Bridge(URL), ShownRobots(Console())
     topics = {
         "/ann/odom": "nav_msgs/Odometry",
@@ -165,7 +165,7 @@ def test_a_layer_that_cannot_be_drawn_is_said_once_and_keeps_no_other_from_it(ca
     assert (drawn.count("Range"), drawn.count("Trail")) == (1, 1)
 
 
-def test_what_is_left_out_is_no_obstacle_though_nobody_hears_of_it(nobody_hears):
+def test_layers_are_drawn_even_if_the_notice_about_left_out_topics_fails(nobody_hears):
     many = {f"/ann/cloud{n}": "sensor_msgs/PointCloud2" for n in range(40)}
     late = ShownRobots(Console())
     bridge = Bridge(URL)

@@ -89,11 +89,13 @@ def refused(tmp_path):
         (module("Range", "x = inf"), "FILE:7: robots[0].modules[0]: Range: "),
     ],
 )
-def test_a_wrong_argument_is_named_with_the_line_of_its_key(refused, text, said):
+def test_an_invalid_module_argument_is_reported_with_the_line_of_its_key(
+    refused, text, said
+):
     assert said in refused(text)
 
 
-def test_every_wrong_argument_is_named_at_once(refused):
+def test_all_invalid_module_arguments_are_reported_at_once(refused):
     text = module("LaserScanner", 'x = "1"', 'y = "2"', 'max_dots = "3"')
     assert [line.split(":")[1] for line in refused(text).splitlines()] == [
         "11",
@@ -110,7 +112,7 @@ def test_every_wrong_argument_is_named_at_once(refused):
         ('throttle = "1"', 'options.throttle: got the text "1", expected a whole'),
     ],
 )
-def test_what_comes_with_a_robot_to_maps_is_checked_before_any_map(
+def test_arguments_of_an_on_maps_module_are_checked_before_a_map_exists(
     refused, options, said
 ):
     args = '"OccupancyGrid", { bridge = "hall" }, "/c"'
@@ -120,6 +122,6 @@ def test_what_comes_with_a_robot_to_maps_is_checked_before_any_map(
     assert said in received
 
 
-def test_a_place_in_a_list_of_arguments_is_that_of_the_file(refused):
+def test_an_argument_index_in_an_error_counts_as_in_the_fleet_file(refused):
     args = '"OccupancyGrid", "/c"'
     assert "modules[0].args[1]: got the text" in refused(module("OnMaps", args=args))

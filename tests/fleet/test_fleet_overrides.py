@@ -53,13 +53,13 @@ def found():
         ("robot_1.name=a\tb", "a name is one line of 100 characters at the most"),
     ],
 )
-def test_a_setting_that_makes_no_sense_says_what_was_expected(text, words):
+def test_an_invalid_setting_error_names_the_expected_value(text, words):
     with pytest.raises(ConfigError, match=r"^--set ") as refused:
         parse_setting(text)
     assert words in str(refused.value)
 
 
-def test_one_topic_is_overruled_and_the_others_stay(found):
+def test_a_setting_replaces_one_topic_and_keeps_the_other_topics(found):
     said = overrides("robot_1.scan=/robot_1/rear/scan", "robot_1.battery=")
     robot = said.apply(URL, found)
     config = said.config(URL, robot)
@@ -71,7 +71,7 @@ def test_one_topic_is_overruled_and_the_others_stay(found):
     assert said.fixed(URL, found) == {"scan", "battery"}
 
 
-def test_a_robot_gets_another_name_and_is_known_again_by_its_namespace(found):
+def test_a_renamed_robot_is_recognised_by_its_namespace(found):
     said = overrides("robot_1.name=Bob", "robot_1.base=base_footprint")
     for _ in range(2):
         robot = said.apply(URL, found)
@@ -82,20 +82,22 @@ STAMPED = "geometry_msgs/msg/TwistStamped"
 
 
 @pytest.mark.parametrize("last", ["velocity=/robot_1/drive", "velocity=/drive"])
-def test_the_type_of_velocity_is_overruled_whatever_else_is(found, last):
+def test_the_velocity_type_setting_applies_also_with_another_velocity_topic(
+    found, last
+):
     said = overrides(f"robot_1.velocity_type={STAMPED}", f"robot_1.{last}")
     about = said.apply(URL, found)
     velocity = about.first("velocity")
     assert (velocity.topic, velocity.type) == (last.partition("=")[2], STAMPED)
 
 
-def test_a_robot_that_was_told_is_driven_with_the_type_that_was_said():
+def test_the_velocity_type_setting_applies_to_a_robot_option():
     bob = parse_robot("Bob::/cmd_vel", [Bridge(URL)])
     (given,) = overrides(f"Bob.velocity_type={STAMPED}").apply_to_given([bob])
     assert given.found.type_of("velocity") == STAMPED
 
 
-def test_a_robot_without_odometry_is_not_placed_by_another_pose():
+def test_a_robot_with_odometry_set_to_nothing_does_not_use_another_pose():
     topics = TOPICS | {"/robot_1/amcl_pose": "geometry_msgs/PoseWithCovarianceStamped"}
     (robot,) = discover(topics).robots
     robot = overrides("robot_1.odometry=").apply(URL, robot)
@@ -109,19 +111,19 @@ def test_a_robot_without_odometry_is_not_placed_by_another_pose():
         ("nav_msgs/msg/Odometry", "nav2_msgs/action/NavigateToPose"),
     ],
 )
-def test_the_dialect_says_which_action_it_is(odometry, type):
+def test_the_ros_dialect_determines_the_action_type(odometry, type):
     (robot,) = discover({"/robot_1/odom": odometry}).robots
     robot = overrides("robot_1.action=/robot_1/drive_to").apply(URL, robot)
     assert robot.action == ("/robot_1/drive_to", type)
 
 
-def test_cameras_are_a_list(found):
+def test_the_camera_setting_accepts_a_list_of_topics(found):
     robot = overrides("robot_1.camera=/front/image,/rear/image").apply(URL, found)
     cameras = robot.config(URL).cameras
     assert [camera.topic for camera in cameras] == ["/front/image", "/rear/image"]
 
 
-def test_a_robot_that_was_told_gets_what_its_form_has_no_place_for():
+def test_settings_add_topics_to_a_robot_option():
     bridges = [Bridge(URL)]
     bob, al = (parse_robot(f"{name}:/odom", bridges) for name in ("Bob", "Al"))
     (given,) = overrides("Bob.battery=/battery", "Bob.odometry=/odom2").apply_to_given(
@@ -135,7 +137,7 @@ def test_a_robot_that_was_told_gets_what_its_form_has_no_place_for():
         overrides("Al.name=BOB").apply_to_given([bob, al])
 
 
-def test_a_robot_that_is_not_there_is_refused_unless_it_may_still_come():
+def test_a_setting_for_an_unknown_robot_is_refused_unless_robots_may_still_appear():
     said = overrides("robot_7.scan=/scan")
     with pytest.raises(ConfigError, match="did you mean 'robot_1'"):
         said.check(["robot_1"], all_known=True)
@@ -148,7 +150,7 @@ def view(*arguments):
     return run_inside("view", *arguments)
 
 
-def test_view_shows_what_it_would_use_and_refuses_what_is_not_there(ros1):
+def test_view_show_lists_the_settings_and_refuses_settings_for_unknown_robots(ros1):
     shown = view(
         *(ros1, "--show", "--set", "robot_1.scan=/robot_0/base_scan"),
         *("--set", "robot_1.name=Bob"),
@@ -172,7 +174,7 @@ def test_view_shows_what_it_would_use_and_refuses_what_is_not_there(ros1):
     assert refused.stdout == ""
 
 
-def test_view_shows_what_it_would_draw_of_a_robot_that_is_told(ros1):
+def test_view_show_lists_the_topics_and_layers_of_a_robot_option(ros1):
     given = (ros1, "--show", "--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:/odd")
     shown = view(*given)
     assert shown.returncode == 0, shown.stderr
@@ -190,7 +192,7 @@ def test_view_shows_what_it_would_draw_of_a_robot_that_is_told(ros1):
     assert view(*given, "--only-given").stdout.strip() == bob.strip()
 
 
-def test_view_says_of_a_told_robot_why_no_more_is_known():
+def test_view_show_lists_only_the_given_topics_if_the_bridge_is_unreachable():
     shown = view("ws://127.0.0.1:1", "--show", "--wait", "0", "--robot", "Bob:/odom")
     said = shown.stdout.splitlines()
     assert said == ["Bob (from --robot)", "  odometry    /odom"]

@@ -48,7 +48,7 @@ def write(tmp_path):
     return write_
 
 
-def test_a_robot_has_its_picture_in_its_place(write):
+def test_the_picture_of_a_robot_has_its_position_size_and_angle(write):
     (robot,) = prepare(write(GOOD)).robots
     (image,) = [e for e in robot.svg.walk() if getattr(e, "tag", "") == "image"]
     assert image.attributes["width"] == "2"
@@ -77,7 +77,7 @@ def test_a_robot_has_its_picture_in_its_place(write):
         ("bob.png", "large.png", "has 9000 x 9000 pixels; expected 67108864 at the"),
     ],
 )
-def test_a_mistake_in_a_picture_is_named_with_its_line(write, old, new, said):
+def test_an_invalid_picture_is_reported_with_its_line(write, old, new, said):
     assert old in GOOD
     file = write(GOOD.replace(old, new, 1))
     with pytest.raises(ConfigError) as error:
@@ -85,14 +85,14 @@ def test_a_mistake_in_a_picture_is_named_with_its_line(write, old, new, said):
     assert said in str(error.value).replace(str(file), "FILE")
 
 
-def test_a_picture_that_is_no_table_says_what_was_expected(write):
+def test_a_picture_that_is_not_a_table_is_refused(write):
     text = GOOD.partition("\n[robots.picture]")[0] + 'picture = "bob.png"\n'
     with pytest.raises(ConfigError, match="expected a table of keys and values"):
         prepare(write(text))
 
 
 @pytest.mark.browser
-def test_the_picture_is_on_the_page_where_the_robot_is(chromium, ros2, write):
+def test_the_page_draws_the_picture_at_the_robot(chromium, ros2, write):
     text = GOOD.replace("ws://hall:9090", ros2).replace("angle = 90", "")
     with shown(chromium, "run", str(write(text))) as page:
         image = page.locator(".robot:not(.unplaced) image.picture")

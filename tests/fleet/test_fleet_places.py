@@ -40,7 +40,7 @@ def prepared(tmp_path):
             robot.destroy()
 
 
-def test_tiles_lie_where_the_file_says(prepared, tmp_path):
+def test_tiles_are_placed_as_the_fleet_file_says(prepared, tmp_path):
     assert prepared(TILES).modules == {
         "TileLayer": {
             "source": str(tmp_path / "tiles"),
@@ -50,7 +50,9 @@ def test_tiles_lie_where_the_file_says(prepared, tmp_path):
     }
 
 
-def test_labels_stand_in_the_file_or_in_one_beside_it(prepared, tmp_path):
+def test_labels_are_read_from_the_fleet_file_or_from_a_separate_file(
+    prepared, tmp_path
+):
     label = {"name": "Dock", "x": 1.5, "y": -2}
     table = '[[labels]]\nname = "Dock"\nx = 1.5\ny = -2\n'
     assert prepared(table).modules == {"Labels": {"labels": [label]}}
@@ -97,14 +99,16 @@ def test_labels_stand_in_the_file_or_in_one_beside_it(prepared, tmp_path):
         (TILES.replace('"tiles"', '"no"'), "no such folder and no such file"),
     ],
 )
-def test_what_makes_no_sense_is_named_with_its_line(prepared, text, said):
+def test_invalid_labels_and_tiles_are_reported_with_their_line(prepared, text, said):
     with pytest.raises(ConfigError) as error:
         prepared(text)
     assert said in str(error.value)
 
 
 @pytest.mark.parametrize("key", ["floor", "labels"])
-def test_a_file_beside_it_is_named_with_its_own_line_too(prepared, tmp_path, key):
+def test_a_mistake_in_a_separate_file_is_reported_with_the_line_in_both_files(
+    prepared, tmp_path, key
+):
     (tmp_path / "own.yaml").write_text(
         "image: none.png\nresolution: 0.1\norigin: [0, 0, north]\n"
         if key == "floor"
@@ -116,7 +120,7 @@ def test_a_file_beside_it_is_named_with_its_own_line_too(prepared, tmp_path, key
 
 
 @pytest.mark.parametrize("key", ["floor", "labels"])
-def test_a_pipe_beside_it_is_refused_and_not_waited_for(prepared, tmp_path, key):
+def test_a_pipe_instead_of_a_file_is_refused_at_once(prepared, tmp_path, key):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(ConfigError, match="pipe: expected a file, got a pipe"):
         prepared(f'{key} = "pipe"\n')

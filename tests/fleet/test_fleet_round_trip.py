@@ -86,7 +86,7 @@ def shown(robot):
 
 
 @pytest.mark.parametrize("spaces", [("/a", "/b"), ("",)])
-def test_the_file_that_discover_prints_shows_what_view_shows(tmp_path, spaces):
+def test_the_fleet_file_of_discover_shows_the_same_layers_as_view(tmp_path, spaces):
     found = topics(*spaces)
     file = tmp_path / "fleet.toml"
     file.write_text(fleet_toml([("hall", URL, discover(found, "bob"))]))
@@ -104,7 +104,7 @@ def test_the_file_that_discover_prints_shows_what_view_shows(tmp_path, spaces):
             robot.destroy()
 
 
-def test_what_is_left_out_stands_in_the_file_as_a_remark(tmp_path):
+def test_the_fleet_file_lists_topics_beyond_the_limit_as_comments(tmp_path):
     many = topics("") | {f"/path_{n}": "nav_msgs/Path" for n in range(9)}
     text = fleet_toml([("hall", URL, discover(many, "bob"))])
     assert "# not drawn, beyond the limit for its kind: /path_8\n" in text

@@ -70,7 +70,7 @@ def ready(write):
         robot.destroy()
 
 
-def test_several_maps_pictures_and_modules_of_the_map_are_shown(ready, tmp_path):
+def test_maps_images_and_map_modules_of_the_fleet_file_are_shown(ready, tmp_path):
     console = Console()
     show_scenery(console, ready)
     north, south = ready.bridges.values()
@@ -83,7 +83,7 @@ def test_several_maps_pictures_and_modules_of_the_map_are_shown(ready, tmp_path)
     assert ready.others[1].args == (str(tmp_path / "second.yaml"),)
 
 
-def test_a_page_gets_all_of_it(ready):
+def test_pages_opened_before_and_after_get_all_maps_images_and_map_modules(ready):
     console, page = Console(), FakePage()
     console.opened(page)  # before, and another one after
     show_scenery(console, ready)
@@ -165,7 +165,9 @@ class FakeMap:
         ),
     ],
 )
-def test_a_mistake_is_named_with_its_line_and_key(write, old, new, said):
+def test_an_invalid_map_image_or_module_is_reported_with_its_line_and_key(
+    write, old, new, said
+):
     assert old in GOOD
     file = write(GOOD.replace(old, new, 1))
     with pytest.raises(ConfigError) as error:

@@ -28,7 +28,7 @@ def spec(ready):
     return found
 
 
-def test_stop_hooks_are_told_to_the_gate(tmp_path):
+def test_stop_hooks_of_the_fleet_file_reach_the_gate(tmp_path):
     ready = check(
         tmp_path,
         HEAD
@@ -41,7 +41,7 @@ def test_stop_hooks_are_told_to_the_gate(tmp_path):
     )
 
 
-def test_scan_assist_is_told_to_the_gate(tmp_path):
+def test_scan_assist_settings_of_the_fleet_file_reach_the_gate(tmp_path):
     ready = check(
         tmp_path,
         DRIVEN
@@ -81,7 +81,7 @@ def test_a_footprint_may_be_a_radius(tmp_path):
         ),
     ],
 )
-def test_a_hook_that_makes_no_sense_is_named_with_its_line(tmp_path, hooks, said):
+def test_an_invalid_stop_hook_is_reported_with_its_line(tmp_path, hooks, said):
     twist = f'[robots.twist]\ntopic = "/cmd_vel"\nstop_hooks = {hooks}\n'
     with pytest.raises(ConfigError, match=said) as caught:
         check(tmp_path, HEAD + twist)
@@ -109,7 +109,7 @@ def test_a_hook_that_makes_no_sense_is_named_with_its_line(tmp_path, hooks, said
         ("foot = 1", 'there is no key "foot" here; did you mean "footprint"'),
     ],
 )
-def test_assist_that_makes_no_sense_is_named_with_its_line(tmp_path, line, said):
+def test_an_invalid_scan_assist_setting_is_reported_with_its_line(tmp_path, line, said):
     text = f'{DRIVEN}[robots.scan_assist]\ntopic = "/scan"\n{line}\n'
     if not line.startswith("footprint"):
         text += "footprint = 0.2\n"
@@ -127,14 +127,14 @@ def test_assist_that_makes_no_sense_is_named_with_its_line(tmp_path, line, said)
         ("[[1e-3, 0], [0, 1e-3], [-1e-3, 0]]", "has an area of 1e-06 m²; expected"),
     ],
 )
-def test_a_footprint_that_is_no_outline_is_refused(tmp_path, footprint, said):
+def test_a_footprint_with_an_invalid_outline_is_refused(tmp_path, footprint, said):
     text = f'{DRIVEN}scan_assist = {{ topic = "/scan", footprint = {footprint} }}\n'
     with pytest.raises(ConfigError, match=said) as caught:
         check(tmp_path, text)
     assert "robots[0].scan_assist: " in str(caught.value)
 
 
-def test_assist_needs_its_topic_its_footprint_and_something_to_assist(tmp_path):
+def test_scan_assist_needs_a_topic_a_footprint_and_a_velocity_topic(tmp_path):
     with pytest.raises(ConfigError) as caught:
         check(tmp_path, HEAD + "scan_assist = {}\n")
     for missing in ("twist", "topic", "footprint"):

@@ -23,7 +23,7 @@ TOPICS = SEEN | {
 }
 
 
-def test_a_robot_that_could_be_driven_is_described_as_one_that_is_seen():
+def test_a_robot_of_a_recording_gets_no_motion_settings():
     (found,) = discover(TOPICS, "robot").robots
     assert {"velocity", "goal", "action", "initialpose"} <= set(found.guesses)
     watched = Watched("office")
@@ -32,7 +32,7 @@ def test_a_robot_that_could_be_driven_is_described_as_one_that_is_seen():
     assert config.motion == MotionConfig()
 
 
-def test_topics_that_come_later_do_not_let_it_be_driven_either():
+def test_topics_that_appear_later_give_a_recorded_robot_no_motion_settings():
     bridge, late = Bridge(URL), ShownRobots(Console(), Watched("office"))
     came = late.came
     (bare,) = discover(SEEN, "robot").robots
@@ -46,7 +46,7 @@ def test_topics_that_come_later_do_not_let_it_be_driven_either():
         robot.destroy()
 
 
-def test_a_robot_without_a_name_of_its_own_is_called_as_the_recording():
+def test_a_recorded_robot_without_namespace_is_named_after_the_recording():
     names = {}
     for prefix in ("", "/bob"):
         topics = {f"{prefix}{topic}": type for topic, type in SEEN.items()}

@@ -14,6 +14,8 @@ from webmap.base.geometry import Twist
 from webmap.gate import protocol
 from webmap.gate.display.client import GateClient
 
+pytestmark = pytest.mark.slow
+
 JITTER = 0.15
 """What the machine that runs the tests may add to a bound, in seconds."""
 

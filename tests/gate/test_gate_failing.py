@@ -12,6 +12,8 @@ from webmap.core.runtime import Runtime
 from webmap.gate import protocol
 from webmap.gate.display.client import GateClient
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def broken(tmp_path, monkeypatch):

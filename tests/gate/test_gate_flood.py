@@ -25,6 +25,8 @@ from webmap.gate.lanes import lane as waits
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import open_socket
 
+pytestmark = pytest.mark.slow
+
 CHUNK = 1 << 18
 
 

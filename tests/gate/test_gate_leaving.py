@@ -13,6 +13,8 @@ from webmap.gate.lanes.control import ControlLane
 from webmap.gate.lanes.odometry import OdometryLane
 from webmap.gate.lanes.tasks import Calls, TasksLane
 
+pytestmark = pytest.mark.slow
+
 KEY = Key("ws://x", "/cmd_vel")
 MOVE_BASE = spec(
     action="/move_base", action_type="move_base_msgs/MoveBaseAction", cancel_topic=None

@@ -15,6 +15,8 @@ from webmap.gate.lanes.control import ControlLane
 from webmap.gate.locks import Locks
 from webmap.gate.shell import Shell
 
+pytestmark = pytest.mark.slow
+
 
 class Running:
     """A gate that runs, the display that it talks to, and a page with a hand."""

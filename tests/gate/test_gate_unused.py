@@ -6,6 +6,8 @@ from gate_harness import Bench, spec
 from webmap.gate import commands, protocol
 from webmap.gate.rules import authority
 
+pytestmark = pytest.mark.slow
+
 UNUSED = 15.0
 """Seconds here, since two minutes at 20 Hz take long even on a virtual clock."""
 

@@ -121,7 +121,7 @@ def expect_drawn_where_it_is(tab, ros):
     wait_until(lambda: drawn() == here, what=f"drawing it at {x:.3f}, {y:.3f}")
 
 
-def test_the_robot_and_what_it_scans_are_drawn_where_its_own_nodes_say(opened):
+def test_the_robot_and_its_scan_are_drawn_at_the_positions_from_its_ros_nodes(opened):
     x, y, yaw = START
     cos, sin = math.cos(yaw), math.sin(yaw)
     assert matrix(opened, BOB) == pytest.approx([cos, sin, -sin, cos, x, y], abs=1e-5)
@@ -136,7 +136,7 @@ def test_the_robot_and_what_it_scans_are_drawn_where_its_own_nodes_say(opened):
         assert dot == pytest.approx(place, abs=0.003)
 
 
-def test_keys_reach_the_robot_and_zero_does_when_they_are_released(opened, ros):
+def test_a_held_key_drives_the_robot_and_its_release_sends_zero(opened, ros):
     drive(opened, ros)
     opened.keyboard.up("w")
     released = time.monotonic()
@@ -154,7 +154,7 @@ def test_keys_reach_the_robot_and_zero_does_when_they_are_released(opened, ros):
     assert stands(ros)
 
 
-def test_a_bridge_that_is_killed_under_way_says_zero_first_when_it_is_back(opened, ros):
+def test_after_a_restart_of_the_bridge_the_robot_receives_zero_first(opened, ros):
     drive(opened, ros)
     ros.kill_bridge()
     killed = len(ros.twists())
@@ -205,7 +205,7 @@ def box_in_world(picture):
     )
 
 
-def test_a_list_of_its_topics_makes_a_fleet_with_the_map_that_was_published_before(
+def test_a_fleet_file_from_a_topic_list_shows_the_map_published_earlier(
     ros, tab, tmp_path
 ):
     code, fleet, said = webmap("discover", ros.url, "--toml")
@@ -227,7 +227,7 @@ def test_a_list_of_its_topics_makes_a_fleet_with_the_map_that_was_published_befo
         tab.goto("about:blank")
 
 
-def test_the_readiness_check_says_how_it_stands_with_the_real_robot(ros):
+def test_the_readiness_check_measures_the_real_robot(ros):
     code, said, _ = webmap("doctor", ros.url, "--seconds", "2")
     assert code == 0, said
     assert "The topics come from the given list; robots found: robot_0." in said

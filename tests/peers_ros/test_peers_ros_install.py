@@ -18,14 +18,14 @@ def make_ros(folder, **environment):
     )
 
 
-def test_without_the_python_that_its_wheels_are_for_that_is_named(tmp_path):
+def test_the_error_without_python_3_12_names_the_missing_version(tmp_path):
     nowhere = str(tmp_path)
     done = make_ros(tmp_path / "ros", PATH=nowhere, PYENV_ROOT=nowhere, PYTHON312="")
     assert done.returncode == CANNOT, done.stderr
     assert "for Python 3.12, which is not here; PYTHON312=" in done.stdout
 
 
-def test_what_pip_says_is_passed_on_and_nothing_counts_as_installed(tmp_path):
+def test_a_pip_error_is_printed_and_nothing_is_marked_as_installed(tmp_path):
     folder = tmp_path / "ros"
     done = make_ros(folder, PIP_NO_INDEX="1")
     if "which is not here" in done.stdout or "shared library" in done.stdout:

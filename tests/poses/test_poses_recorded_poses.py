@@ -21,6 +21,8 @@ from pose_script import (
 
 from webmap import align_bridge
 
+pytestmark = pytest.mark.slow
+
 FILE = Path(__file__).with_name("recorded_poses.json")
 MODE = os.environ.get("WEBMAP_POSES", "")
 SEEDS = range(40)

@@ -19,26 +19,26 @@ def section(title: str) -> str:
     return re.split(r"^###? ", DESIGN.partition(f"## {title}\n")[2], flags=re.M)[0]
 
 
-def test_every_file_that_the_design_names_is_there():
+def test_every_file_named_in_the_design_page_exists():
     named = set(re.findall(r"`([a-z_]+/[\w/]+\.(?:py|js))`", DESIGN))
     assert len(named) > 30
     assert sorted(name for name in named if not (PACKAGE / name).is_file()) == []
 
 
 @pytest.mark.parametrize("title", ["The path of a command", "The path of a pose"])
-def test_the_paths_of_the_design_are_lists_of_files(title):
+def test_each_step_of_the_paths_in_the_design_page_names_a_file(title):
     steps = re.findall(r"^\d+\. (.*(?:\n   .*)*)", section(title), re.M)
     assert len(steps) > 5
     assert all(re.search(r"`[a-z_]+/[\w/]+\.(?:py|js)`", step) for step in steps)
 
 
-def test_the_design_describes_every_folder_of_the_package():
+def test_the_design_page_describes_every_folder_of_the_package():
     rows = re.findall(r"^\| `([a-z]+)` \|", section("Folders"), re.M)
     folders = {file.name for file in PACKAGE.iterdir() if file.is_dir()}
     assert set(rows) == folders - {"__pycache__"}
 
 
-def test_the_folders_are_in_the_order_of_the_contract():
+def test_the_import_contract_lists_every_folder_of_the_package():
     contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
     layers = contracts["tool"]["importlinter"]["contracts"][0]["layers"]
     order = [set(re.findall(r"webmap\.([a-z]+)", layer)) for layer in layers]
@@ -48,14 +48,14 @@ def test_the_folders_are_in_the_order_of_the_contract():
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda each: each.name)
-def test_each_folder_opens_with_a_description(folder):
+def test_each_folder_has_a_docstring_in_its_init_file(folder):
     text = ast.get_docstring(ast.parse((folder / "__init__.py").read_text("utf-8")))
     assert text is not None
     assert len(text.split()) >= 12, text
 
 
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda each: each.name)
-def test_no_folder_is_a_heap(folder):
+def test_no_folder_outside_the_gate_has_too_many_files(folder):
     gate_is_last = "gate" in folder.parts
     files = [file for file in folder.iterdir() if file.is_file()]
     assert gate_is_last or len(files) <= MOST_FILES, len(files)

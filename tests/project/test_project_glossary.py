@@ -80,7 +80,7 @@ def test_each_row_has_a_term_a_meaning_and_five_cells() -> None:
 
 
 @pytest.mark.parametrize("name", PYTHON)
-def test_each_python_name_exists(name: str) -> None:
+def test_each_python_name_of_the_glossary_exists(name: str) -> None:
     dotted, _, argument = name.removesuffix("=)").partition("(")
     value = found(dotted)
     if argument:
@@ -101,10 +101,10 @@ def is_shown(word: str) -> bool:
 
 
 @pytest.mark.parametrize("name", JAVASCRIPT)
-def test_each_javascript_name_exists(name: str) -> None:
+def test_each_javascript_name_of_the_glossary_exists(name: str) -> None:
     assert is_identifier(name)
 
 
 @pytest.mark.parametrize("word", PAGE)
-def test_each_word_of_the_page_exists(word: str) -> None:
+def test_each_page_text_of_the_glossary_exists(word: str) -> None:
     assert is_shown(word)

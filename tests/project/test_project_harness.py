@@ -23,15 +23,15 @@ def compared() -> tuple[Comparison, list[str]]:
     return compare("a title", [a, b], rounds=3), calls
 
 
-def test_contenders_run_in_turn_and_every_other_round_backwards() -> None:
+def test_every_other_round_runs_the_contenders_in_reverse_order() -> None:
     assert compared()[1] == ["a", "b", "b", "a", "a", "b"]
 
 
-def test_a_ratio_is_taken_within_a_round_so_that_a_slow_round_does_not_count() -> None:
+def test_ratios_are_taken_within_a_round_so_a_slow_round_does_not_change_them() -> None:
     assert compared()[0].ratios("b", "cpu (us)") == [3.0, 3.0, 3.0]
 
 
-def test_the_median_is_over_the_rounds() -> None:
+def test_the_median_is_taken_over_all_rounds() -> None:
     assert compared()[0].median("a", "cpu (us)") == 2.0
 
 
@@ -39,14 +39,14 @@ def test_the_table_shows_medians_and_ratios() -> None:
     assert "| cpu (us) | 2 | 6 (3.00 x, 3.00 to 3.00) |" in compared()[0].table()
 
 
-def test_no_rounds_are_refused() -> None:
+def test_zero_rounds_are_refused() -> None:
     with pytest.raises(ValueError, match="got 0 rounds"):
         compare("a title", [], rounds=0)
 
 
 @pytest.mark.serial
 @pytest.mark.slow
-def test_a_bench_still_runs_and_measures_every_contender() -> None:
+def test_the_bridge_benchmark_runs_and_measures_every_contender() -> None:
     odometry, scans = bridge.bench(rounds=1, quick=True)
     assert set(odometry.runs) == {"webmap", "roslibpy"}
     assert set(scans.runs) == {"webmap", "roslibpy", "webmap-json"}

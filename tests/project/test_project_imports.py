@@ -21,7 +21,7 @@ def modules_after(statement: str) -> list[str]:
     return done.stdout.split()
 
 
-def test_the_heavy_packages_would_be_seen() -> None:
+def test_the_import_check_detects_heavy_packages() -> None:
     assert {"numpy", "starlette"} <= loaded_by("import numpy, starlette")
 
 
@@ -36,7 +36,7 @@ def test_the_gate_loads_no_heavy_package(module: str) -> None:
     assert not loaded_by(f"import {module}") & HEAVY
 
 
-def test_what_moves_a_robot_is_configured_without_a_display() -> None:
+def test_the_motion_configuration_imports_nothing_of_the_display() -> None:
     loaded = modules_after("import webmap.config.motion")
     ours = {name for name in loaded if name.startswith("webmap.")}
     assert ours == {
@@ -55,7 +55,7 @@ def test_what_moves_a_robot_is_configured_without_a_display() -> None:
     assert not {name.partition(".")[0] for name in loaded} & heavy
 
 
-def test_a_scan_costs_the_gate_cbor_and_nothing_else_that_is_heavy() -> None:
+def test_parsing_a_scan_in_the_gate_loads_cbor2_as_the_only_heavy_package() -> None:
     loaded = loaded_by(
         "import webmap.gate.__main__, cbor2\n"
         "from webmap.gate.lanes.odometry import parse_scan\n"
@@ -68,7 +68,7 @@ def test_a_scan_costs_the_gate_cbor_and_nothing_else_that_is_heavy() -> None:
     assert loaded & HEAVY == {"cbor2"}
 
 
-def test_the_gate_process_loads_nothing_of_the_display() -> None:
+def test_the_gate_process_imports_no_module_of_the_display() -> None:
     loaded = modules_after("import webmap.gate.__main__")
     rooms = {".".join(name.split(".")[:2]) for name in loaded}
     display = {"cli", "console", "core", "modules", "scene", "server", "sim", "wire"}

@@ -44,7 +44,7 @@ def tags(module: ModuleType) -> list[str]:
 
 
 @pytest.mark.parametrize("name", webmap.__all__)
-def test_every_public_name_can_be_had(name: str) -> None:
+def test_every_public_name_can_be_imported(name: str) -> None:
     assert getattr(webmap, name) is not None
 
 
@@ -65,7 +65,9 @@ def test_every_name_for_layers_is_in_the_api_reference(name: str) -> None:
 
 
 @pytest.mark.parametrize("module", [errors, geometry, testing, tf])
-def test_every_name_of_a_module_is_in_the_api_reference(module: ModuleType) -> None:
+def test_the_api_reference_documents_every_member_of_the_public_modules(
+    module: ModuleType,
+) -> None:
     directive = f".. automodule:: {module.__name__}\n   :members:\n"
     assert directive in API
 
@@ -88,26 +90,26 @@ def test_both_groups_of_entry_points_are_in_the_api_reference() -> None:
     assert "`webmap.modules.map` and `webmap.modules.robot`" in API
 
 
-def test_a_name_that_does_not_exist_is_an_attribute_error() -> None:
+def test_an_unknown_name_raises_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no_such_name"):
         _ = webmap.no_such_name
 
 
-def test_every_place_says_the_same_version() -> None:
+def test_package_project_file_and_changelog_have_the_same_version() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     newest = re.search(r"^## (\S+?),", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.M)
     assert newest is not None
     assert {webmap.__version__, version("webmap"), newest[1]} == {project["version"]}
 
 
-def test_the_reference_of_layers_is_made_from_their_declarations() -> None:
+def test_the_layer_reference_is_generated_from_the_declarations() -> None:
     tool = ROOT / "tools" / "make_layers_page.py"
     done = subprocess.run([sys.executable, tool, "--check"], capture_output=True)
     assert done.returncode == 0, done.stderr.decode()
 
 
 @pytest.mark.parametrize("command", ["demo", "play", "record", "run", "sim", "view"])
-def test_every_option_stands_in_the_reference(command: str) -> None:
+def test_every_command_line_option_is_in_the_reference(command: str) -> None:
     context = click.Context(cli)
     found = cli.get_command(context, command)
     assert found is not None

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 TOOL = Path(__file__).parents[2] / "tools/pytest_beside.py"
 
 ONCE = """
@@ -39,7 +41,7 @@ def run(tmp_path):
     return run
 
 
-def test_what_passes_the_second_time_is_named(run):
+def test_a_test_that_passes_the_second_time_is_named(run):
     status, said = run(ONCE)
     assert status == 0
     assert (
@@ -47,27 +49,27 @@ def test_what_passes_the_second_time_is_named(run):
     )
 
 
-def test_what_fails_alone_too_has_failed(run):
+def test_a_test_that_also_fails_the_second_time_fails_the_run(run):
     status, said = run(ONCE + "\ndef test_never():\n    assert not 1\n")
     assert status == 1
     assert "2 failed at first" in said
     assert "correct these tests" not in said
 
 
-def test_a_proof_of_safety_gets_no_second_look(run):
+def test_a_failed_safety_test_is_not_repeated(run):
     status, said = run("import pytest\npytestmark = pytest.mark.safety\n" + ONCE)
     assert status == 1
     assert "Now a second time" not in said
 
 
-def test_many_failures_get_no_second_look(run):
+def test_many_failed_tests_are_not_repeated(run):
     source = "import pytest\n@pytest.mark.parametrize('n', range(11))\n"
     status, said = run(source + "def test_never(n):\n    assert False\n")
     assert status == 1
     assert "Now a second time" not in said
 
 
-def test_what_cannot_be_collected_has_failed(run):
+def test_a_collection_error_fails_the_run(run):
     status, said = run("import nothing_of_that_name\n")
     assert status != 0
     assert "correct these tests" not in said

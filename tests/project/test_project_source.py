@@ -34,7 +34,7 @@ def project_files() -> list[Path]:
     return [path for path in files if path.is_file()]
 
 
-def test_every_source_file_says_what_it_is_for() -> None:
+def test_every_source_file_has_a_module_docstring() -> None:
     silent = [
         str(path.relative_to(ROOT))
         for path in SOURCES
@@ -43,7 +43,7 @@ def test_every_source_file_says_what_it_is_for() -> None:
     assert not silent
 
 
-def test_no_file_names_a_path_of_a_machine() -> None:
+def test_no_file_contains_a_path_of_a_developer_machine() -> None:
     found = []
     for path in project_files():
         try:
@@ -59,7 +59,7 @@ def test_no_file_names_a_path_of_a_machine() -> None:
 
 # In pieces, so that this file names none itself.
 @pytest.mark.parametrize("parts", [("/home", "ann", "x"), ("cd /root", "a")])
-def test_a_path_of_a_machine_would_be_seen(parts: tuple[str, ...]) -> None:
+def test_the_machine_path_pattern_finds_such_paths(parts: tuple[str, ...]) -> None:
     assert MACHINE_PATH.search("/".join(parts))
 
 
@@ -88,7 +88,7 @@ ROSBRIDGE_TEXTS = {
 }
 
 
-def test_rosbridge_is_spoken_in_one_room() -> None:
+def test_only_the_allowed_folders_use_rosbridge_terms() -> None:
     found = []
     for path in SOURCES:
         name = path.relative_to(ROOT / "src/webmap").as_posix()
@@ -100,7 +100,7 @@ def test_rosbridge_is_spoken_in_one_room() -> None:
 
 
 @pytest.mark.parametrize("text", ['"/rosapi/topics"', "'call_service'", "in CBOR"])
-def test_a_word_of_rosbridge_would_be_seen(text: str) -> None:
+def test_the_rosbridge_pattern_finds_rosbridge_terms(text: str) -> None:
     assert ROSBRIDGE_WORDS.search(text)
     assert not ROSBRIDGE_WORDS.search("bridge.call_service(name)")
 
@@ -110,7 +110,7 @@ IMPORTED = re.compile(
 )
 
 
-def test_every_file_that_a_script_or_a_style_sheet_imports_is_served():
+def test_every_file_imported_by_a_script_or_style_sheet_is_served():
     package = ROOT / "src" / "webmap"
     served = {
         file.resolve()

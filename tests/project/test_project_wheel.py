@@ -56,7 +56,7 @@ def run(command: list[str | Path], cwd: Path | None = None) -> str:
     return done.stdout
 
 
-def test_the_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
+def test_the_wheel_contains_every_file_of_the_package(wheel: Path) -> None:
     wanted = {
         path.relative_to(SOURCE).as_posix()
         for path in (SOURCE / "webmap").rglob("*")
@@ -66,7 +66,7 @@ def test_the_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
     assert wanted <= set(zipfile.ZipFile(wheel).namelist())
 
 
-def test_an_installed_wheel_says_its_version(installed: Path, tmp_path: Path) -> None:
+def test_an_installed_wheel_prints_its_version(installed: Path, tmp_path: Path) -> None:
     said = run([installed / "webmap", "--version"], cwd=tmp_path)
     assert webmap.__version__ in said
 
@@ -99,7 +99,7 @@ def load(url: str) -> set[str]:
     return seen
 
 
-def test_an_installed_wheel_shows_the_demo_and_all_that_its_page_loads(
+def test_an_installed_wheel_serves_the_demo_page_and_all_its_files(
     installed: Path, tmp_path: Path
 ) -> None:
     command = [installed / "webmap", "demo", "--port", "0", "--bridge-port", "0"]

@@ -17,6 +17,8 @@ from webmap.ros.messages import OccupancyGridMsg, PathMsg, TFMessage
 from webmap.ros.offload import Offload
 from webmap.ros.rosbridge.events import Publish
 
+pytestmark = pytest.mark.slow
+
 STEP = 0.1
 """Seconds of processor that no step may take: five times what any takes here."""
 

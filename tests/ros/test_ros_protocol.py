@@ -20,6 +20,8 @@ from webmap.ros.rosbridge.events import (
 from webmap.ros.rosbridge.protocol import Fragments, Protocol, topic_in_head
 from webmap.ros.views import ODOMETRY_VIEWS
 
+pytestmark = pytest.mark.slow
+
 SERVERS = ["ros1", "ros2", "rs"]
 VIEWS = (
     *ODOMETRY_VIEWS.values(),

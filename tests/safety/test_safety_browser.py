@@ -16,7 +16,7 @@ PROMISED = 0.3
 """Seconds from the fault to the first zero at the robot (S1)."""
 
 
-def test_a_key_that_is_let_go_stops_the_robot(bench):
+def test_releasing_the_key_stops_the_robot(bench):
     bench.prove("the key is released", bench.let_go, within=0.1, held_after=False)
 
 
@@ -48,7 +48,7 @@ def test_a_killed_browser_stops_the_robot(bench):
     )
 
 
-def test_a_stopped_browser_stops_the_robot(bench):
+def test_a_suspended_browser_stops_the_robot(bench):
     def send(sig):
         os.killpg(bench.browser.process.pid, sig)
 
@@ -78,7 +78,7 @@ def test_a_frozen_page_stops_the_robot(bench):
     )
 
 
-def test_navigation_stops_the_robot(bench):
+def test_opening_another_page_in_the_tab_stops_the_robot(bench):
     def back():
         bench.close_page()
         bench.open_page()
@@ -144,9 +144,7 @@ JUMP = """(() => {
 
 @LONG
 @pytest.mark.parametrize(("hours", "way"), [(1, "ahead"), (-1, "back")])
-def test_clocks_of_the_browser_that_jump_stop_the_robot_and_nothing_else(
-    bench, hours, way
-):
+def test_a_jump_of_the_browser_clocks_stops_the_robot(bench, hours, way):
     # The jump stays, so that all but the first trial drive by clocks that are wrong.
     bench.prove(
         f"the browser's clocks jump an hour {way}",
@@ -156,7 +154,7 @@ def test_clocks_of_the_browser_that_jump_stop_the_robot_and_nothing_else(
     bench.close_page()
 
 
-def test_stop_on_the_keyboard_stops_the_robot_and_the_reset_moves_nothing(bench):
+def test_the_stop_key_stops_the_robot_and_reset_moves_nothing(bench):
     def back():
         bench.space("keyUp")
         pass_time(0.5)
@@ -174,7 +172,7 @@ FRENCH = [("z", "KeyW"), pytest.param("ArrowUp", "ArrowUp", marks=LONG)]
 
 
 @pytest.mark.parametrize(("letter", "place"), FRENCH)
-def test_keys_drive_by_their_place_whatever_letter_is_on_them(bench, letter, place):
+def test_keys_drive_by_their_position_and_not_by_their_letter(bench, letter, place):
     """As on a French keyboard, which has Z where others have W, and W where Z is."""
 
     def say(kind, key, code):

@@ -10,7 +10,7 @@ from safety_run import TRIALS, is_measured
 MACHINE = {"processors": 2, "kernel": "Linux 6.1", "python": "3.11.2"}
 
 
-def test_a_figure_is_a_line_in_milliseconds():
+def test_a_figure_is_one_table_row_in_milliseconds():
     figure = Figure("the page is frozen", "zero", 0.3, 0.0124, 0.0081, 50, "1.0 (a1b)")
     lines = table([figure], [], MACHINE).splitlines()
     assert lines[-3] == (
@@ -19,12 +19,12 @@ def test_a_figure_is_a_line_in_milliseconds():
     assert lines[-1] == "Measured on 2 processors, Linux 6.1, Python 3.11.2."
 
 
-def test_a_stop_by_the_command_timeout_is_shown_as_such():
+def test_a_stop_by_the_base_itself_is_shown_as_command_timeout():
     figure = Figure("the gate is killed", "itself", 0.55, 0.51, 0.0, 1)
     assert "| command timeout | 550 ms |" in table([figure], [], MACHINE)
 
 
-def test_the_table_in_the_documentation_shows_the_kept_figures():
+def test_the_figures_document_shows_the_stored_figures():
     content = json.loads((DOCS / "safety-figures.json").read_text())
     figures = [Figure(**figure) for figure in content["figures"]]
     soaks = [Soak(**soak) for soak in content["soak"]]
@@ -33,16 +33,16 @@ def test_the_table_in_the_documentation_shows_the_kept_figures():
     )
 
 
-def test_the_table_of_promises_shows_the_kept_figures_and_the_faults():
+def test_the_table_of_promises_shows_the_stored_figures_and_their_faults():
     table = promise_table(kept_figures())
     assert BEGIN + table + END in PAGE.read_text()
     doubt = r"another tab comes .*|the tab is closed|an alert is shown|the page is .*"
-    assert re.search(rf"ms: ({doubt}) \| `test_doubt", table)
+    assert re.search(rf"ms: ({doubt}) \| `test_an_input_block", table)
     gate = r"is killed|is stopped \(SIGSTOP\) for 1\.5 s"
     assert re.search(rf"ms: the gate ({gate}) \| `test_a_base", table)
 
 
-def test_the_half_hour_under_full_load_has_its_own_table():
+def test_the_figures_of_the_soak_test_have_their_own_table():
     soaks = [Soak("memory", "%", 10, 1.26, "1.0"), Soak("late", "ms", None, 3.0, "1.0")]
     lines = table([], soaks, MACHINE).splitlines()
     assert lines[-4:-2] == [
@@ -51,7 +51,9 @@ def test_the_half_hour_under_full_load_has_its_own_table():
     ]
 
 
-def test_a_run_that_was_cut_goes_on_with_what_is_missing(tmp_path, monkeypatch):
+def test_a_resumed_run_skips_only_complete_and_passing_figures_of_this_version(
+    tmp_path, monkeypatch
+):
     path = tmp_path / "figures.jsonl"
     monkeypatch.setenv("WEBMAP_SAFETY_FIGURES", str(path))
     monkeypatch.setenv("WEBMAP_SAFETY_RESUME", "1")

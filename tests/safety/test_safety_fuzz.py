@@ -84,13 +84,13 @@ def good(bench, op="drive"):
 
 
 @pytest.mark.parametrize("op", MOTION)
-def test_what_is_spoilt_below_moves_the_robot_if_it_is_whole(op):
+def test_the_valid_commands_of_the_fuzz_tests_move_the_robot(op):
     bench = armed()
     say(bench, json.dumps(good(bench, op)))
     assert moved(bench)
 
 
-def test_what_the_corpus_is_made_from_moves_the_robot_if_nothing_is_wrong():
+def test_the_valid_command_behind_the_corpus_moves_the_robot():
     bench = armed()
     at = bench.now
     stamp = '"epoch":EPOCH,"seq":SEQ,"tick":TICK'
@@ -99,7 +99,7 @@ def test_what_the_corpus_is_made_from_moves_the_robot_if_nothing_is_wrong():
 
 
 @pytest.mark.parametrize("text", CORPUS, ids=range(len(CORPUS)))
-def test_nothing_of_the_corpus_moves_the_robot_or_keeps_it_moving(text):
+def test_no_text_of_the_corpus_moves_the_robot_or_keeps_it_moving(text):
     bench = armed()
     say(bench, filled(bench, text))
     bench.run(0.1)
@@ -131,7 +131,7 @@ values = st.recursive(
 
 @settings(deadline=None, max_examples=150)
 @given(st.lists(st.binary(max_size=200) | st.text(max_size=200), max_size=15))
-def test_bytes_and_texts_never_move_it(texts):
+def test_random_bytes_and_texts_never_move_the_robot(texts):
     bench = armed()
     for text in texts:
         say(bench, text)
@@ -141,7 +141,7 @@ def test_bytes_and_texts_never_move_it(texts):
 
 @settings(deadline=None, max_examples=300)
 @given(st.binary(max_size=1200) | st.text(max_size=200) | values.map(json.dumps))
-def test_whatever_follows_the_beginning_of_a_stop_it_stops(rest):
+def test_a_stop_command_with_any_bytes_after_its_beginning_still_stops_the_robot(rest):
     bench = armed()
     rest = rest if isinstance(rest, bytes) else rest.encode(errors="surrogatepass")
     say(bench, b'{"op":"stop"' + rest)
@@ -151,7 +151,7 @@ def test_whatever_follows_the_beginning_of_a_stop_it_stops(rest):
 
 @settings(deadline=None, max_examples=150)
 @given(st.lists(values, max_size=15))
-def test_json_of_any_form_never_moves_it(whole):
+def test_random_json_never_moves_the_robot(whole):
     bench = armed()
     for value in whole:
         say(bench, json.dumps(value))
@@ -161,7 +161,7 @@ def test_json_of_any_form_never_moves_it(whole):
 
 @settings(deadline=None, max_examples=400)
 @given(st.data())
-def test_a_good_command_with_one_field_spoilt_never_moves_it(data):
+def test_a_command_with_one_invalid_field_never_moves_the_robot(data):
     bench = armed()
     command = good(bench, data.draw(st.sampled_from(sorted(MOTION))))
     name = data.draw(st.sampled_from(sorted(command)))
@@ -191,7 +191,7 @@ def test_a_good_command_with_one_field_spoilt_never_moves_it(data):
 
 @settings(deadline=None, max_examples=100)
 @given(st.lists(st.integers(0, 9), min_size=10, max_size=30))
-def test_one_good_command_among_bad_ones_moves_it_for_200_ms_at_most(kinds):
+def test_a_valid_command_among_invalid_ones_moves_the_robot_for_200_ms_at_most(kinds):
     bench = armed()
     good_at = [bench.now]
 
@@ -254,7 +254,7 @@ FROM_THE_PAGE = """(async () => {
 @pytest.mark.safety
 @pytest.mark.browser
 @pytest.mark.serial
-def test_nothing_of_the_corpus_moves_the_robot_through_all_processes(bench):
+def test_no_text_of_the_corpus_sent_by_a_page_moves_the_robot(bench):
     bench.open_page()
     before = len(bench.robot.log.twists)
     # What is too long is not even read: the server closes the socket.

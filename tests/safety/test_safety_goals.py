@@ -154,7 +154,7 @@ def simulated(folder):
         yield robot, page
 
 
-def test_a_stop_ends_a_goal_that_blocks_its_socket_while_a_stop_hook_hangs(simulated):
+def test_stop_ends_a_goal_that_blocks_its_socket_while_a_stop_hook_hangs(simulated):
     robot, page = simulated
     page.say("stop")
     wait_for(lambda: robot.stands, "standing still", BRAKING)
@@ -163,14 +163,14 @@ def test_a_stop_ends_a_goal_that_blocks_its_socket_while_a_stop_hook_hangs(simul
     assert robot.stays(2.0), "the goal goes on after the reset"
 
 
-def test_a_cancel_ends_a_goal_that_blocks_its_socket(simulated):
+def test_cancel_ends_a_goal_that_blocks_its_socket(simulated):
     robot, page = simulated
     page.say("cancel")
     wait_for(lambda: robot.stands, "standing still", BRAKING)
     assert robot.stays(1.0)
 
 
-def test_a_cancel_gets_through_behind_a_stop_hook_that_hangs(simulated):
+def test_cancel_ends_a_goal_while_a_stop_hook_hangs(simulated):
     robot, page = simulated
     page.say("stop")
     page.reset()
@@ -182,7 +182,7 @@ def test_a_cancel_gets_through_behind_a_stop_hook_that_hangs(simulated):
     assert robot.stays(1.0)
 
 
-def test_zero_is_not_held_up_by_a_goal_and_a_call_that_hang(folder):
+def test_a_hanging_goal_and_service_call_do_not_delay_zero(folder):
     with (
         Sentinel() as sentinel,
         WitnessRobot(goals_block=True) as robot,
@@ -247,7 +247,7 @@ def aim(robot, tab):
 
 
 @pytest.mark.browser
-def test_a_page_ends_goals_that_block_their_socket_by_cancel_and_by_stop(page_of_goals):
+def test_cancel_and_stop_on_the_page_end_goals_that_block_their_socket(page_of_goals):
     robot, tab = page_of_goals
     aim(robot, tab)
     tab.get_by_role("button", name="Cancel goal").first.click()

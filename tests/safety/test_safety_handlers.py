@@ -292,7 +292,7 @@ def drive_off(bench, case):
 
 
 @pytest.mark.parametrize("handler", DELETED)
-def test_without_a_handler_the_robot_still_stops(bench, handler):
+def test_the_robot_stops_when_an_event_handler_of_the_page_is_missing(bench, handler):
     case, log = DELETED[handler], bench.robot.log
     listen_deafly(bench)
     hand = drive_off(bench, case)

@@ -55,7 +55,7 @@ def contended(driven):
     return not FULL and (driven.stolen > MOST_STOLEN or waited > MOST_WAITED)
 
 
-def test_with_nobody_beside_the_good_robot_is_driven_and_stopped(bench):
+def test_a_robot_without_hostile_peers_drives_and_stops(bench):
     with beside(bench):
         check(bench)
 
@@ -67,6 +67,6 @@ FLOODS = [
 
 
 @pytest.mark.parametrize("peers", FLOODS, ids=" ".join)
-def test_beside_three_that_flood_the_good_robot_is_driven_and_stopped(bench, peers):
+def test_a_robot_drives_and_stops_while_three_peers_flood_the_display(bench, peers):
     with beside(bench, *(f"safety_hostile_peers:{peer}" for peer in peers)):
         check(bench)

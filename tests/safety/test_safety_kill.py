@@ -108,7 +108,9 @@ def try_to_drive(driver):
 
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("part", ["gate", "display", "both"])
-def test_after_a_kill_nothing_resumes_and_an_acknowledged_stop_stands(tmp_path, part):
+def test_after_a_kill_no_motion_resumes_and_an_acknowledged_stop_stays_active(
+    tmp_path, part
+):
     name = f"{WHAT[part]} killed after step n of {LAST}; STOP stays"
     if is_measured(name):
         pytest.skip("the run that is resumed has it")
@@ -133,7 +135,7 @@ def test_after_a_kill_nothing_resumes_and_an_acknowledged_stop_stands(tmp_path, 
     )
 
 
-def test_the_full_run_kills_after_every_step_and_the_quick_one_after_twenty():
+def test_the_full_run_kills_after_all_200_steps_and_the_quick_run_after_20_steps():
     assert len(KILLS) == (LAST if FULL else 20)
     assert max(KILLS) * 0.01 > SCRIPT[-1][0], "the last kill comes after all is done"
 

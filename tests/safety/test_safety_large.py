@@ -28,7 +28,7 @@ PEERS = {
 
 
 @pytest.mark.parametrize("peers", PEERS.values(), ids=PEERS)
-def test_large_messages_of_others_delay_no_tick_and_no_stop(bench, peers):
+def test_large_messages_of_other_robots_delay_no_tick_and_no_stop(bench, peers):
     names = [f"safety_large_peers:{name}" for name in peers]
     with beside(bench, *names, shown=True):
         check(bench)

@@ -47,7 +47,7 @@ def test_a_stall_between_browser_and_display_stops_the_robot(bench, way):
 
 @LONG
 @pytest.mark.parametrize("seconds", [0.5, 10.0])
-def test_a_stall_of_any_length_between_browser_and_display_stops_the_robot(
+def test_a_short_or_long_stall_between_browser_and_display_stops_the_robot(
     bench, seconds
 ):
     def back():
@@ -62,7 +62,7 @@ def test_a_stall_of_any_length_between_browser_and_display_stops_the_robot(
     )
 
 
-def test_a_reset_between_browser_and_display_stops_the_robot(bench):
+def test_a_connection_reset_between_browser_and_display_stops_the_robot(bench):
     bench.prove(
         "the browser's link is reset",
         bench.web_hop.reset,
@@ -71,7 +71,7 @@ def test_a_reset_between_browser_and_display_stops_the_robot(bench):
     )
 
 
-def test_a_half_that_the_browser_closes_stops_the_robot(bench):
+def test_a_half_close_by_the_browser_stops_the_robot(bench):
     bench.prove(
         "half of the browser's link is closed",
         lambda: bench.web_hop.half_close("up"),
@@ -110,7 +110,7 @@ HOW = [pytest.param(how, marks=[] if "irregular" in how else LONG) for how in SP
 
 
 @pytest.mark.parametrize("how", HOW)
-def test_a_spoilt_link_between_browser_and_display_stops_the_robot(bench, how):
+def test_a_degraded_link_between_browser_and_display_stops_the_robot(bench, how):
     # What is late by less than the limit may still count, and then the dead-man does.
     bench.prove(
         f"the browser's link {how}",
@@ -123,9 +123,7 @@ def test_a_spoilt_link_between_browser_and_display_stops_the_robot(bench, how):
 @pytest.mark.parametrize(
     "seconds", [1.5, *(pytest.param(each, marks=LONG) for each in (0.7, 3.0, 10.0))]
 )
-def test_a_stall_between_gate_and_robot_ends_with_few_late_words_and_a_zero(
-    bench, seconds
-):
+def test_a_stalled_robot_link_delivers_few_late_velocities_and_a_zero(bench, seconds):
     released = []
 
     def back():
@@ -144,7 +142,7 @@ def test_a_stall_between_gate_and_robot_ends_with_few_late_words_and_a_zero(
     )
 
 
-def test_a_reset_between_gate_and_robot_stops_the_robot(bench):
+def test_a_connection_reset_between_gate_and_robot_stops_the_robot(bench):
     bench.prove(
         "the robot's link is reset",
         bench.robot_hop.reset,
@@ -154,7 +152,7 @@ def test_a_reset_between_gate_and_robot_stops_the_robot(bench):
     )
 
 
-def test_a_half_that_the_gate_closes_stops_the_robot(bench):
+def test_a_half_close_by_the_gate_stops_the_robot(bench):
     bench.prove(
         "half of the robot's link is closed",
         lambda: bench.robot_hop.half_close("up"),
@@ -176,7 +174,7 @@ def test_latency_between_gate_and_robot_stops_the_robot(bench):
 
 
 @pytest.mark.parametrize("how", HOW)
-def test_a_spoilt_link_between_gate_and_robot_stops_the_robot(bench, how):
+def test_a_degraded_link_between_gate_and_robot_stops_the_robot(bench, how):
     # The doubt comes after 300 ms; what was written before it is still on its way: on a
     # narrow link that is the time for six velocities, and for pings and the zero.
     narrow = SPOILT[how].bandwidth is not None
@@ -192,7 +190,7 @@ def test_a_spoilt_link_between_gate_and_robot_stops_the_robot(bench, how):
     )
 
 
-def test_a_rosbridge_that_is_killed_and_restarted_moves_nothing(bench):
+def test_a_killed_rosbridge_stops_the_robot_and_its_restart_moves_nothing(bench):
     def back():
         bench.linger(0.5)
         bench.robot.restart_bridge()
@@ -207,7 +205,7 @@ def test_a_rosbridge_that_is_killed_and_restarted_moves_nothing(bench):
     )
 
 
-def test_a_robot_that_falls_silent_is_stopped(bench):
+def test_a_robot_whose_odometry_ends_is_stopped(bench):
     def fall_silent():
         bench.robot.sends_telemetry = False
 

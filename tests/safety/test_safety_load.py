@@ -17,7 +17,7 @@ def loaded(bench):
         yield bench
 
 
-def test_under_load_letting_go_stops_the_robot_as_quickly(loaded):
+def test_releasing_the_key_under_load_stops_the_robot_within_100_ms(loaded):
     with maps_coming(loaded):
         loaded.prove(
             f"the key is released; {UNDER_LOAD}",
@@ -27,7 +27,7 @@ def test_under_load_letting_go_stops_the_robot_as_quickly(loaded):
         )
 
 
-def test_under_load_the_dead_man_stops_the_robot_as_quickly(loaded):
+def test_the_dead_man_timeout_under_load_stops_the_robot_within_300_ms(loaded):
     def send(sig):
         os.killpg(loaded.browser.process.pid, sig)
 
@@ -44,7 +44,7 @@ def test_under_load_the_dead_man_stops_the_robot_as_quickly(loaded):
         )
 
 
-def test_under_load_stop_stops_the_robot_as_quickly(loaded):
+def test_stop_under_load_stops_the_robot_within_100_ms(loaded):
     def back():
         loaded.space("keyUp")
         pass_time(0.5)

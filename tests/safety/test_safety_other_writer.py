@@ -64,7 +64,9 @@ def is_shown(tab, expression: str, within: float) -> bool:
     return True
 
 
-def test_another_program_is_named_before_driving_while_driving_and_in_the_alarm(bench):
+def test_the_page_names_another_program_before_driving_while_driving_and_in_alarm(
+    bench,
+):
     bench.drive_off()
     bench.let_go()
     bench.tab.wait(f"!{WORDS}.includes('nother program')")

@@ -30,13 +30,13 @@ def functions():
     }
 
 
-def test_every_test_that_the_page_names_exists():
+def test_every_test_named_in_the_safety_document_exists():
     named = set(re.findall(r"`(test_\w+)`", PAGE))
     assert len(named) > 30, "the page names hardly any test"
     assert named - functions() == set()
 
 
-def test_every_file_that_the_page_names_exists():
+def test_every_test_file_named_in_the_safety_document_exists():
     named = set(re.findall(r"`((?:tests/[\w/]+/)?test_\w+\.py)`", PAGE))
     assert named
     there = {path.name for path in TESTS.rglob("test_*.py")}
@@ -46,7 +46,7 @@ def test_every_file_that_the_page_names_exists():
 NUMBERS = list(range(1, 21))
 
 
-def test_every_promise_names_a_test_and_none_is_missing():
+def test_every_promise_names_a_test_and_no_promise_is_missing():
     """Each is a term with its number, a definition, and the names of its tests."""
     begin = PAGE.index("## What is promised")
     promised = PAGE[begin : PAGE.index("## What is not promised", begin)]
@@ -57,7 +57,7 @@ def test_every_promise_names_a_test_and_none_is_missing():
     assert without == []
 
 
-def test_the_table_has_each_promise_its_figure_and_its_test():
+def test_the_table_shows_every_promise_with_its_newest_figure_and_its_test():
     assert sorted({promise.number for promise in PROMISES}) == NUMBERS
     assert {promise.shown_by for promise in PROMISES} - functions() == set()
     assert promise_table(kept_figures()) in PAGE, (
@@ -65,7 +65,7 @@ def test_the_table_has_each_promise_its_figure_and_its_test():
     )
 
 
-def test_the_readme_has_five_of_the_promises_with_the_same_figures():
+def test_the_readme_shows_five_promises_with_the_figures_of_the_table():
     lines = in_short(kept_figures())
     assert lines.count("\n") == 5
     assert lines in README.read_text(), "run python tests/safety/safety_promises.py"
@@ -74,14 +74,14 @@ def test_the_readme_has_five_of_the_promises_with_the_same_figures():
         assert re.search(rf"\| S{number} \| .* \| {re.escape(figure)} \|", rows)
 
 
-def test_every_pattern_of_the_table_finds_a_figure():
+def test_every_figure_pattern_of_a_promise_matches_a_figure():
     names = [figure.name for figure in kept_figures()]
     patterns = [promise.figures for promise in PROMISES if promise.figures]
     found = {p for p in patterns for name in names if re.fullmatch(p, name)}
     assert set(patterns) - found == set()
 
 
-def test_the_table_shows_the_figure_nearest_to_its_limit_and_a_missed_limit():
+def test_the_table_shows_the_worst_figure_and_marks_a_missed_limit():
     stop = next(p for p in PROMISES if p.number == 8)
     figure = Figure("STOP by the space bar while W is held", "zero", 0.1, 0.017, 0, 50)
     assert worst(stop, [figure]) == f"17 of 100 ms: {figure.name}"

@@ -39,7 +39,7 @@ def test_the_end_of_the_display_stops_the_robot(bench, name, sig):
     )
 
 
-def test_a_stopped_display_stops_the_robot(bench):
+def test_a_suspended_display_stops_the_robot(bench):
     def send(sig):
         bench.display.popen.send_signal(sig)
 
@@ -57,7 +57,7 @@ def test_a_stopped_display_stops_the_robot(bench):
 
 
 @LONG
-def test_a_display_whose_user_code_holds_the_interpreter_stops_the_robot(bench):
+def test_user_code_that_holds_the_interpreter_stops_the_robot(bench):
     bench.prove(
         "user code holds the interpreter for 2 s",
         lambda: bench.robot.publish("/hold", {"data": bench.stretch(2.0, 0.6)}),
@@ -67,7 +67,7 @@ def test_a_display_whose_user_code_holds_the_interpreter_stops_the_robot(bench):
     )
 
 
-def test_letting_go_stops_the_robot_while_user_code_blocks(bench):
+def test_releasing_the_key_stops_the_robot_while_user_code_blocks(bench):
     def let_go_while_it_blocks():
         bench.let_go()
 
@@ -86,7 +86,7 @@ def test_letting_go_stops_the_robot_while_user_code_blocks(bench):
     )
 
 
-def test_letting_go_stops_the_robot_while_a_service_call_hangs(bench):
+def test_releasing_the_key_stops_the_robot_while_a_service_call_hangs(bench):
     def call():
         bench.robot.answers_services(False)
         bench.robot.publish("/call", {"data": 1.0})
@@ -108,7 +108,7 @@ def test_letting_go_stops_the_robot_while_a_service_call_hangs(bench):
     )
 
 
-def test_a_robot_stops_by_itself_when_the_gate_is_killed(bench):
+def test_the_command_timeout_stops_the_robot_when_the_gate_is_killed(bench):
     bench.prove(
         "the gate is killed",
         lambda: bench.gate.kill(),
@@ -119,7 +119,7 @@ def test_a_robot_stops_by_itself_when_the_gate_is_killed(bench):
     )
 
 
-def test_a_robot_stops_by_itself_when_the_gate_is_stopped(bench):
+def test_the_command_timeout_stops_the_robot_when_the_gate_is_suspended(bench):
     stopped = []
 
     def stop():

@@ -40,7 +40,7 @@ def nothing_comes(end, seconds):
         end.settimeout(5)
 
 
-def test_bytes_pass_both_ways(ends):
+def test_the_proxy_passes_bytes_in_both_directions(ends):
     _, client, server = ends
     client.sendall(b"hello")
     assert read(server, 5) == b"hello"
@@ -48,7 +48,7 @@ def test_bytes_pass_both_ways(ends):
     assert read(client, 5) == b"there"
 
 
-def test_much_passes_whole(ends):
+def test_the_proxy_passes_five_megabytes_unchanged(ends):
     _, client, server = ends
     data = bytes(range(256)) * 20_000
     sender = threading.Thread(target=client.sendall, args=(data,))
@@ -57,7 +57,7 @@ def test_much_passes_whole(ends):
     sender.join(5)
 
 
-def test_what_is_held_comes_when_it_is_released_and_not_before(ends):
+def test_held_bytes_arrive_only_after_release(ends):
     proxy, client, server = ends
     proxy.hold("up")
     client.sendall(b"late")
@@ -68,7 +68,7 @@ def test_what_is_held_comes_when_it_is_released_and_not_before(ends):
     assert read(server, 4) == b"late"
 
 
-def test_latency_holds_for_each_way(ends):
+def test_latency_applies_to_each_direction(ends):
     proxy, client, server = ends
     proxy.shape(Shape(latency=0.15))
     begin = time.monotonic()
@@ -78,7 +78,7 @@ def test_latency_holds_for_each_way(ends):
     assert time.monotonic() - begin >= 0.3
 
 
-def test_a_slice_cuts_what_was_written_at_once(ends):
+def test_slicing_splits_one_write_into_several_reads(ends):
     proxy, client, server = ends
     proxy.shape(Shape(slice_size=3, slice_gap=1.0), "up")
     client.sendall(b"abcdef")
@@ -86,7 +86,7 @@ def test_a_slice_cuts_what_was_written_at_once(ends):
     assert read(server, 3) == b"def"
 
 
-def test_a_reset_reaches_both_ends_and_new_links_are_taken(ends):
+def test_a_reset_reaches_both_ends_and_the_proxy_accepts_new_links(ends):
     proxy, client, server = ends
     proxy.reset()
     for end in (client, server):
@@ -96,7 +96,7 @@ def test_a_reset_reaches_both_ends_and_new_links_are_taken(ends):
     socket.create_connection(("127.0.0.1", proxy.port), 5).close()
 
 
-def test_a_half_that_is_closed_ends_while_the_other_goes_on(ends):
+def test_a_half_close_ends_one_direction_and_keeps_the_other(ends):
     proxy, client, server = ends
     proxy.half_close("up")
     assert server.recv(1) == b""
@@ -105,14 +105,14 @@ def test_a_half_that_is_closed_ends_while_the_other_goes_on(ends):
     assert read(client, 10) == b"still here"
 
 
-def test_an_end_of_the_bytes_is_passed_on(ends):
+def test_bytes_sent_before_a_shutdown_arrive(ends):
     _, client, server = ends
     client.sendall(b"bye")
     client.shutdown(socket.SHUT_WR)
     assert read(server, 4) == b"bye"
 
 
-def test_links_are_refused_while_that_is_asked(ends):
+def test_a_refusing_proxy_resets_new_links(ends):
     proxy, _, _ = ends
     proxy.refuse()
     with (
@@ -122,7 +122,7 @@ def test_links_are_refused_while_that_is_asked(ends):
         link.recv(1)
 
 
-def test_without_a_server_behind_it_links_are_reset():
+def test_a_proxy_without_a_server_resets_new_links():
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
     with (

@@ -74,7 +74,7 @@ def say_stop(bench):
 
 @pytest.mark.skipif(not MINUTES, reason="takes half an hour: WEBMAP_SAFETY_TRIALS=50")
 @pytest.mark.timeout(5400)
-def test_half_an_hour_of_everything_grows_nothing_and_delays_no_zero(bench):
+def test_half_an_hour_under_full_load_keeps_memory_stable_and_delays_no_zero(bench):
     memory = Memory(bench)
     with under_load(bench), maps_coming(bench):
         say_stop(bench)

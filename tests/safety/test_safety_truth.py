@@ -65,7 +65,7 @@ def stop_and_reset(bench):
     bench.reset_stop()
 
 
-def test_the_page_says_that_a_robot_does_not_obey_until_it_stands(bench):
+def test_the_page_shows_an_alarm_until_a_disobeying_robot_stands_still(bench):
     bench.drive_off()
     bench.robot.obeys = False
     bench.let_go()
@@ -86,7 +86,7 @@ def test_the_page_says_that_a_robot_does_not_obey_until_it_stands(bench):
     bench.tab.wait("document.querySelector('.webmap-alarm') === null")
 
 
-def test_the_page_says_nothing_of_a_robot_that_obeys(bench):
+def test_the_page_shows_no_alarm_for_a_robot_that_obeys(bench):
     bench.drive_off()
     bench.let_go()
     released = time.monotonic()
@@ -95,7 +95,7 @@ def test_the_page_says_nothing_of_a_robot_that_obeys(bench):
 
 
 @pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
-def test_after_a_release_and_its_zeros_nothing_is_said_for_ten_seconds(bench):
+def test_after_release_and_zeros_no_velocity_is_sent_for_ten_seconds(bench):
     bench.drive_off()
     bench.let_go()
     pass_time(1.0)
@@ -104,7 +104,7 @@ def test_after_a_release_and_its_zeros_nothing_is_said_for_ten_seconds(bench):
     assert bench.robot.log.twists[said:] == []
 
 
-def test_a_slow_link_slows_the_robot_down_and_the_page_says_so(bench):
+def test_a_slow_link_lowers_the_speed_limit_and_the_page_shows_the_reason(bench):
     drive_at_full_speed(bench)
     # Latency that comes at once is a gap, which may stop the robot: so from anew.
     bench.let_go()
@@ -127,7 +127,7 @@ def test_a_slow_link_slows_the_robot_down_and_the_page_says_so(bench):
     assert "slow connection: " not in bench.tab.evaluate(WORDS)
 
 
-def test_a_link_slower_than_the_age_limit_moves_nothing(bench):
+def test_a_link_slower_than_the_age_limit_moves_no_robot(bench):
     bench.drive_off()
     bench.web_hop.shape(Shape(latency=0.2))
     wait_for(lambda: bench.robot.log.twists[-1].is_zero, "zero")

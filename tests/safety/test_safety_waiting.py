@@ -37,7 +37,7 @@ def three_busy():
         yield busy
 
 
-def test_of_three_that_share_a_processor_each_waits_for_it():
+def test_three_processes_on_one_processor_wait_for_the_processor():
     with three_busy() as busy:
         one, all_ = Waiting([busy[0].pid]), Waiting([each.pid for each in busy])
         begin = time.monotonic()
@@ -49,7 +49,7 @@ def test_of_three_that_share_a_processor_each_waits_for_it():
         assert all_.seconds() >= 0.1
 
 
-def test_who_has_ended_or_sleeps_waits_for_nothing():
+def test_a_sleeping_or_ended_process_has_no_waiting_time():
     with subprocess.Popen(["sleep", "60"]) as process:
         asleep = Waiting([process.pid])
         time.sleep(0.2)
@@ -60,7 +60,7 @@ def test_who_has_ended_or_sleeps_waits_for_nothing():
         assert Waiting([process.pid]).seconds() == 0
 
 
-def test_the_largest_growth_within_a_window_is_found():
+def test_most_within_returns_the_largest_growth_in_a_time_window():
     counts = [(0.0, 5.0), (0.1, 5.0), (0.2, 5.04), (0.3, 5.1), (0.4, 5.1), (1.0, 5.15)]
     assert most_within(0.25, counts) == pytest.approx(0.1)
     assert most_within(0.25, counts[:2]) == 0

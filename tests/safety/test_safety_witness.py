@@ -40,7 +40,7 @@ def link(robot):
         yield link
 
 
-def test_what_it_is_told_stands_in_its_log_with_the_time(robot, link):
+def test_the_witness_robot_logs_velocities_with_their_arrival_time(robot, link):
     before = time.monotonic()
     link.send(twist(0.5, 0.25))
     received = eventually(lambda: robot.log.twists, "a velocity")[0]
@@ -49,7 +49,7 @@ def test_what_it_is_told_stands_in_its_log_with_the_time(robot, link):
     assert robot.log.of("publish", "/cmd_vel")[0].link == 1
 
 
-def test_it_moves_and_stops_by_itself_after_its_timeout(robot, link):
+def test_the_witness_robot_stops_after_its_command_timeout(robot, link):
     link.send(twist(0.5))
     # It may stand again before this thread looks.
     eventually(lambda: any(m.twist.vx == 0.5 for m in robot.log.moved[:]), "moving")
@@ -59,7 +59,7 @@ def test_it_moves_and_stops_by_itself_after_its_timeout(robot, link):
     assert robot.log.first_zero(0) is None
 
 
-def test_a_bad_one_never_stops_by_itself():
+def test_a_witness_robot_without_command_timeout_moves_until_a_zero_arrives():
     with WitnessRobot(timeout=None) as robot, connect(robot.url) as link:
         link.send(twist(0.5))
         eventually(lambda: robot.velocity.vx == 0.5, "moving")
@@ -70,14 +70,14 @@ def test_a_bad_one_never_stops_by_itself():
         eventually(lambda: robot.velocity.vx == 0.0, "obeying all the same")
 
 
-def test_one_that_does_not_obey_notes_and_stands(robot, link):
+def test_a_disobeying_witness_robot_logs_velocities_but_does_not_move(robot, link):
     robot.obeys = False
     link.send(twist(0.5))
     eventually(lambda: robot.log.twists, "a velocity")
     assert robot.velocity.is_zero
 
 
-def test_odometry_comes_to_who_asks_and_says_how_it_moves(robot, link):
+def test_the_witness_robot_sends_odometry_with_its_velocity_to_subscribers(robot, link):
     link.send(ops.subscribe("/odom", id="1").decode())
     deadline = time.monotonic() + 5
     while time.monotonic() < deadline:
@@ -88,14 +88,14 @@ def test_odometry_comes_to_who_asks_and_says_how_it_moves(robot, link):
     raise AssertionError("odometry never said that it moves")
 
 
-def test_without_telemetry_nothing_comes(robot, link):
+def test_a_witness_robot_without_telemetry_sends_no_odometry(robot, link):
     robot.sends_telemetry = False
     link.send(ops.subscribe("/odom", id="1").decode())
     with pytest.raises(TimeoutError):
         link.recv(timeout=0.3)
 
 
-def test_what_is_published_is_echoed_to_who_subscribed(robot, link):
+def test_a_published_velocity_is_echoed_to_subscribers(robot, link):
     link.send(ops.subscribe("/cmd_vel", id="1").decode())
     link.send(twist(0.5))
     assert json.loads(link.recv(timeout=5))["msg"]["linear"]["x"] == 0.5
@@ -105,7 +105,7 @@ def call(service):
     return ops.call_service(service, {}, id="c").decode()
 
 
-def test_a_service_that_hangs_holds_up_what_comes_behind_it(robot, link):
+def test_a_hanging_service_call_blocks_later_messages_of_the_same_socket(robot, link):
     robot.answers_services(False)
     link.send(call("/e_stop"))
     link.send(twist(0.5))
@@ -120,7 +120,7 @@ def test_a_service_that_hangs_holds_up_what_comes_behind_it(robot, link):
     eventually(lambda: len(robot.log.twists) == 2, "what had to wait")
 
 
-def test_a_goal_can_run_on_the_input_thread():
+def test_a_blocking_goal_delays_later_messages_until_the_goal_ends():
     with WitnessRobot(goals_block=True) as robot, connect(robot.url) as link:
         link.send(json.dumps({"op": "send_action_goal", "action": "/go", "id": "g"}))
         link.send(twist(0.5))
@@ -131,7 +131,7 @@ def test_a_goal_can_run_on_the_input_thread():
         eventually(lambda: robot.log.twists, "what had to wait")
 
 
-def test_rosapi_tells_of_its_topics(robot, link):
+def test_rosapi_lists_the_topics_of_the_witness_robot(robot, link):
     link.send(call("/rosapi/topics"))
     values = json.loads(link.recv(timeout=5))["values"]
     assert dict(zip(values["topics"], values["types"], strict=True)) == {
@@ -140,7 +140,7 @@ def test_rosapi_tells_of_its_topics(robot, link):
     }
 
 
-def test_its_bridge_can_be_killed_and_comes_back_on_the_same_port(robot, link):
+def test_a_killed_witness_bridge_restarts_on_the_same_port(robot, link):
     port = robot.port
     robot.kill_bridge()
     with pytest.raises(OSError, match="refused"):
@@ -152,7 +152,7 @@ def test_its_bridge_can_be_killed_and_comes_back_on_the_same_port(robot, link):
         eventually(lambda: robot.log.twists, "a velocity")
 
 
-def test_junk_is_passed_over(robot, link):
+def test_the_witness_robot_ignores_invalid_messages(robot, link):
     for junk in ("{", "[]", "7", '{"op": "publish", "topic": "/cmd_vel", "msg": 7}'):
         link.send(junk)
     link.send(twist(0.5))
@@ -160,7 +160,7 @@ def test_junk_is_passed_over(robot, link):
     assert received[-1].twist.vx == 0.5
 
 
-def test_the_sentinel_notes_how_late_the_machine_is():
+def test_the_sentinel_measures_how_late_the_computer_runs():
     with Sentinel() as sentinel:
         begin = time.monotonic()
         eventually(lambda: time.monotonic() > begin + 0.1, "a while")

@@ -26,6 +26,8 @@ from webmap.server.connections import STRANGERS
 from webmap.server.outbox import BatchedCallsByLoop, DriveQueue
 from webmap.server.page_socket import DRIVE, PageSocket
 
+pytestmark = pytest.mark.slow
+
 SHORT_S = 0.5
 HEAD = "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 

@@ -28,6 +28,8 @@ from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.server import RosbridgeServer
 from webmap.sim import run_simulator
 
+pytestmark = pytest.mark.slow
+
 REFERENCE = (Path(__file__).parents[2] / "docs/reference/cli.md").read_text()
 
 

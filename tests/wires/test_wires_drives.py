@@ -65,7 +65,7 @@ def recordings(tmp_path_factory, request):
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
-def test_a_script_goes_over_the_wires_as_recorded(recordings, name):
+def test_the_messages_of_each_scripted_drive_match_the_recording(recordings, name):
     text = recordings.get(name, "it was not played")
     assert not text.startswith("it "), text
     compare(name, text)

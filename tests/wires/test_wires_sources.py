@@ -36,14 +36,14 @@ def recordings(tmp_path_factory, request):
 
 
 @pytest.mark.parametrize("name", SOURCES)
-def test_robots_of_a_source_are_as_recorded(recordings, name):
+def test_the_robots_of_each_source_match_the_recording(recordings, name):
     text = recordings[name]
     assert not text.startswith("it failed"), text
     compare(name, text)
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_wrong_is_said_as_recorded(recordings, name):
+def test_error_messages_match_the_recording(recordings, name):
     """A text that is changed on purpose is recorded anew; nothing else is in here."""
     text = recordings[name]
     assert "it failed" not in text, text

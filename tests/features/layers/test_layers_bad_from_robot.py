@@ -20,6 +20,8 @@ from websockets.asyncio.server import serve
 
 from webmap import Bridge, Robot
 
+pytestmark = pytest.mark.slow
+
 DEADLINE = 20.0
 
 

@@ -19,6 +19,8 @@ from webmap.base.map_file import read_map
 from webmap.core.layer import Layer
 from webmap.sim.maps import load_map
 
+pytestmark = pytest.mark.slow
+
 YAML = "image: {image}\nresolution: 0.05\norigin: [-1.25, 2.5, 0]\nnegate: 0\n"
 ENDS = "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
 
