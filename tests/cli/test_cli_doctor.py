@@ -41,7 +41,7 @@ def test_doctor_does_not_crash_the_rosapi_of_ros_2(ros2):
     assert webmap("discover", ros2).returncode == 0, "rosapi is still there"
 
 
-def test_doctor_names_another_client_that_publishes_velocities():
+def test_doctor_reports_another_client_that_advertises_a_velocity_topic():
     from websockets.sync.client import connect
 
     with (
@@ -104,6 +104,6 @@ def test_doctor_checks_robots_as_a_fleet_file_configures_them(ros1, tmp_path):
 
 
 @pytest.mark.serial  # how long an answer takes is measured
-def test_doctor_tries_a_hanging_call_with_try_call(ros1):
+def test_doctor_with_try_call_reports_that_a_hanging_service_blocks_no_socket(ros1):
     said = webmap("doctor", ros1, "--seconds", "0.5", "--try-call")
     assert "A service that hangs blocks no socket (tried)" in said.stdout

@@ -121,7 +121,7 @@ def test_topic_lists_printed_by_ros_or_written_by_hand_are_read(text, types):
         ("\x00\xff" * 100, "line 1"),
     ],
 )
-def test_an_invalid_topic_list_error_names_the_line(text, words):
+def test_the_error_for_an_invalid_topic_list_explains_the_mistake(text, words):
     with pytest.raises(ConfigError) as caught:
         parse_topics(text, "list.txt")
     assert words in str(caught.value)

@@ -86,14 +86,14 @@ def test_restarting_an_ended_replay_prints_a_notice_and_raises_no_error(bag, cap
     assert "The replay has ended" in capfd.readouterr().err
 
 
-def test_the_error_without_rosbags_says_what_to_install(monkeypatch):
+def test_the_error_without_rosbags_names_the_install_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "rosbags", None)
     with pytest.raises(ConfigError) as refused:
         need_rosbags()
     assert str(refused.value).endswith('pip install "webmap[bags]"')
 
 
-def test_play_finds_robots_without_their_velocity_topics(bag):
+def test_play_does_not_use_the_velocity_topic_of_a_recorded_robot(bag):
     with subprocess.Popen(
         [*COMMAND, str(bag), "--loop"],
         stdout=subprocess.PIPE,

@@ -310,7 +310,7 @@ def test_a_missing_bridges_table_is_the_only_mistake_reported(write):
 ONE = '[bridges]\nhall = "ws://hall:9090"\n\n[[robots]]\nname = "Bob"\n'
 
 
-def test_goals_may_name_the_bridge_but_with_several_bridges_the_robot_must_too(
+def test_a_robot_must_name_its_bridge_among_several_even_if_its_goal_names_one(
     tmp_path,
 ):
     file = tmp_path / "fleet.toml"

@@ -52,7 +52,7 @@ def test_a_robot_without_goals_uses_the_initial_pose_frame_of_the_fleet_file(tmp
         ("initial_pose = { covariance = [1, 2, 3] }", 'the key "topic" is missing'),
     ],
 )
-def test_an_invalid_goal_or_initial_pose_error_names_the_expected_value(
+def test_the_error_for_an_invalid_goal_or_initial_pose_explains_the_mistake(
     tmp_path, text, said
 ):
     with pytest.raises(ConfigError, match=said):

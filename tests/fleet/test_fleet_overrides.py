@@ -53,7 +53,7 @@ def found():
         ("robot_1.name=a\tb", "a name is one line of 100 characters at the most"),
     ],
 )
-def test_an_invalid_setting_error_names_the_expected_value(text, words):
+def test_the_error_for_an_invalid_setting_explains_the_mistake(text, words):
     with pytest.raises(ConfigError, match=r"^--set ") as refused:
         parse_setting(text)
     assert words in str(refused.value)

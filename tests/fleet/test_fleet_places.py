@@ -40,7 +40,9 @@ def prepared(tmp_path):
             robot.destroy()
 
 
-def test_tiles_are_placed_as_the_fleet_file_says(prepared, tmp_path):
+def test_the_tile_layer_gets_its_source_and_position_from_the_fleet_file(
+    prepared, tmp_path
+):
     assert prepared(TILES).modules == {
         "TileLayer": {
             "source": str(tmp_path / "tiles"),

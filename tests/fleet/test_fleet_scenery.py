@@ -83,7 +83,7 @@ def test_maps_images_and_map_modules_of_the_fleet_file_are_shown(ready, tmp_path
     assert ready.others[1].args == (str(tmp_path / "second.yaml"),)
 
 
-def test_pages_opened_before_and_after_get_all_maps_images_and_map_modules(ready):
+def test_open_pages_and_later_pages_get_all_maps_images_and_map_modules(ready):
     console, page = Console(), FakePage()
     console.opened(page)  # before, and another one after
     show_scenery(console, ready)

@@ -76,7 +76,9 @@ def test_stored_stop_test_results_are_reported_with_their_dates(reports):
     assert found == TESTED
 
 
-def test_a_reset_deletes_a_stored_stop_file_and_a_new_stop_has_the_same_name(stored):
+def test_a_reset_deletes_a_stored_stop_file_and_a_new_stop_gets_the_same_file_name(
+    stored,
+):
     def stops():
         return {path.name for path in stored.glob("*.stop*")}
 
@@ -111,7 +113,7 @@ class Outbox:
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]"])
-def test_a_driven_robot_gets_zero_first_for_every_spelling_of_this_computer(
+def test_a_machine_marked_as_driven_gets_a_zero_for_every_name_of_localhost(
     stored, monkeypatch, host
 ):
     monkeypatch.setattr(shell, "Links", Links)

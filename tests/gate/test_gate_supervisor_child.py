@@ -74,7 +74,9 @@ def test_a_stopped_process_ends_and_gets_no_more_messages(run):
     assert mirror.on_echo == []
 
 
-def test_the_last_line_of_stderr_is_the_end_reason_and_all_is_passed_on(run, capfd):
+def test_the_last_line_of_stderr_is_the_end_reason_and_all_lines_are_passed_on(
+    run, capfd
+):
     gate = run(*shell("echo first >&2; echo 'no such module' >&2; echo >&2; exit 3"))
     eventually(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
@@ -104,7 +106,7 @@ def test_a_process_that_does_not_end_in_time_is_killed(run, caplog):
     assert "it has not ended within 0.05 s" in caplog.text
 
 
-def test_a_process_that_does_not_read_blocks_nothing_and_is_ended_at_a_limit(
+def test_a_process_that_does_not_read_is_ended_when_its_unsent_data_is_too_large(
     run, caplog, monkeypatch
 ):
     gate = run(*ENDLESS)

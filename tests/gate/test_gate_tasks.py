@@ -302,7 +302,9 @@ class TestMoveBase:
             await until(lambda: noting.of(GoalProgress), "that it is under way")
 
     @in_loop
-    async def test_an_action_goal_of_another_robot_does_not_lose_a_move_base_goal(self):
+    async def test_a_move_base_goal_is_not_lost_when_another_robot_gets_an_action_goal(
+        self,
+    ):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
             noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
             noting.tasks.send(NAVIGATES, goal("g2", "navigate_to_pose", "r2"))

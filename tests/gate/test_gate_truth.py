@@ -131,7 +131,7 @@ class TestAlarm:
         bench.hold(0.3)
         assert bench.report().measured is None
 
-    def test_the_second_before_an_alarm_counts_from_the_first_zero(self):
+    def test_the_one_second_delay_of_an_alarm_starts_at_the_first_zero(self):
         obedience = Obedience()
         obedience.on_written(ZERO, Twist(0.5), 0.0)
         obedience.on_written(ZERO, ZERO, 0.5)

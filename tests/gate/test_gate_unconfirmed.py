@@ -114,7 +114,7 @@ def test_a_ping_answer_confirms_the_velocities_written_before_the_ping():
     assert not unproven.room("/cmd_vel")
 
 
-def test_a_ping_answer_also_counts_for_earlier_pings():
+def test_a_ping_answer_confirms_velocities_although_an_earlier_ping_has_no_answer():
     unproven = UnconfirmedWrites()
     unproven.on_ping(1, 0.0)
     for _ in range(MOST):
@@ -150,7 +150,7 @@ def test_a_new_link_forgets_the_velocities_of_the_old_link():
         max_size=200,
     )
 )
-def test_a_link_of_any_latency_never_holds_more_than_six_moving_velocities(steps):
+def test_a_link_of_any_latency_never_holds_more_than_six_nonzero_velocities(steps):
     """The link takes in order, and answers in order, whenever it likes."""
     unproven, link, back = UnconfirmedWrites(), [], []
     pings = 0

@@ -321,16 +321,16 @@ class RobotHealth:
         modules = [] if robot is None else robot.modules
         # Modules that follow diagnostics.
         found = [m for m in modules if hasattr(m, "parts") and hasattr(m, "hold")]
-        said = _lines([part for module in found for part in module.parts])
-        if found and not said:
-            said = [("note", "No data: ", "no diagnostics of this robot received yet")]
-        if said == self._shown:
+        lines = _lines([part for module in found for part in module.parts])
+        if found and not lines:
+            lines = [("note", "No data: ", "no diagnostics of this robot received yet")]
+        if lines == self._shown:
             return
-        self._shown = said
+        self._shown = lines
         self._list.clear()
-        for level, word, words in said:
-            self._list.append(entry(level, word, words))
-        self.element.set(hidden=not said)
+        for level, word, text in lines:
+            self._list.append(entry(level, word, text))
+        self.element.set(hidden=not lines)
 
 
 def _lines(parts: list[Any]) -> list[tuple[str, str, str]]:

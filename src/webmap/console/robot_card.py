@@ -147,8 +147,8 @@ class RobotCard:
         self._shape.show(shape)
         self._state.text, self._mine.text = state.text, state.mine
         self.element.set("data-state", state.name)
-        said = (report.other_writer, report.reason) if report is not None else ()
-        self._reason.text = " ".join(sentence(each) for each in said if each)
+        reasons = (report.other_writer, report.reason) if report is not None else ()
+        self._reason.text = " ".join(sentence(each) for each in reasons if each)
         self._goal.show(robot)
         self._problems.text = " ".join(map(sentence, robot.problems.values()))
         self.element.set("data-tone", tone or None)

@@ -214,7 +214,7 @@ class Page:
         return self._mount
 
     def on_close(self, fn: Callable[[], object]) -> Removal:
-        """Call ``fn`` when the page is closed for good."""
+        """Call ``fn`` when the page is closed permanently."""
         removal = Removal(fn)
         self.scope.add(removal)
         return removal

@@ -75,7 +75,7 @@ export class Link {
     socket.close();
   }
 
-  /** Close the connection for good. */
+  /** Close the connection permanently. */
   end() {
     const socket = this._socket;
     this._socket = null;

@@ -36,7 +36,7 @@ const LOOKS = /** @type {Record<string, [string, string, string]>} */ ({
 /**
  * The newest log lines of nodes, in a panel that unfolds. The display subscribes only
  * while the panel is unfolded: sends `{open: true}` and `{open: false}`; receives
- * `{bridge, said, total, state}` with the lines that are new or repeated.
+ * `{bridge, lines, total, state}` with the lines that are new or repeated.
  *
  * @param {MapCanvas} map
  * @param {Options} options

@@ -196,7 +196,7 @@ class Lane:
         return link
 
     def close(self) -> None:
-        """Close the lane for good."""
+        """Close the lane permanently."""
         self._task.cancel()
         link, self._socket = self._socket, None
         if link is not None:

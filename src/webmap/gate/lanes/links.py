@@ -89,7 +89,7 @@ class Links:
         await asyncio.gather(*(calls.settle() for calls in self._calls.values()))
 
     def close(self) -> None:
-        """Close every link for good."""
+        """Close every link permanently."""
         for tasks in self._tasks.values():
             tasks.close()
         for calls in self._calls.values():

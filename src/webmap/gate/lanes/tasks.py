@@ -249,7 +249,7 @@ class TasksLane:
             ended(why)
 
     def close(self) -> None:
-        """Close the lane for good, but not the calls that are under way."""
+        """Close the lane permanently, but not the calls that are under way."""
         self.lane.close()
         for link in self._spent:
             link.close()

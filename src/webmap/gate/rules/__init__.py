@@ -4,5 +4,5 @@ A rule that decides about motion belongs here; a socket, a file or a clock does 
 an import contract refuses them. Open ``gate`` first, then ``machine``, which combines
 the rules of one machine: ``authority`` (who has control), ``driving`` (its commands),
 ``motion`` (what is written), ``stop``, ``stop_test``, ``goals`` and ``assist``.
-``report`` says what is shown of a machine.
+``report`` describes a machine to the pages.
 """

@@ -77,25 +77,25 @@ def _without(sweep: Scan, reason: str) -> Scan:
 
 def _folded(sweep: Scan, each: int) -> Scan:
     ranges, near = sweep.ranges, sweep.range_min
-    first, behind, said, asked = [], [], [], []
+    first, behind, known, total = [], [], [], []
     before: list[float] = []
     for start in range(0, len(ranges) + each - 1, each):
         group = ranges[start : start + each]
-        known = _known_count(group, near)
+        answered = _known_count(group, near)
         hits = _hits(group, near)
         nearest, *others = _things([*before, *hits]) or (math.inf,)
-        unknown = nearest == math.inf and 2 * known < len(group)
+        unknown = nearest == math.inf and 2 * answered < len(group)
         first.append(math.nan if unknown else nearest)
         behind.append(others)
-        said.append(known)
-        asked.append(len(group))
+        known.append(answered)
+        total.append(len(group))
         # The beam at the position of the fold's beam is no neighbour of the next one.
         before = hits[1:] if _hits(group[:1], near) else hits
     return msgspec.structs.replace(
         sweep,
         angle_increment=sweep.angle_increment * each,
         ranges=first,
-        fold=ScanFold(each, len(ranges), behind, said, asked),
+        fold=ScanFold(each, len(ranges), behind, known, total),
     )
 
 

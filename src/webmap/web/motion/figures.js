@@ -15,7 +15,7 @@ const UNKNOWN = "unknown";
  */
 
 /** Below this speed a robot counts as not moving, and has no halo; m/s. */
-export const STANDING = 0.02;
+export const AT_REST = 0.02;
 
 /** Assumed if an older gate does not report it: seconds, m/s². */
 const ASSUMED = { reaction: 1, brake: 0.5 };
@@ -49,7 +49,7 @@ export function speedNow({ measured, echoed, sent }) {
  */
 export function stoppingDistance(report) {
   const speed = speedNow(report);
-  if (report.state === "free" || speed < STANDING) return null;
+  if (report.state === "free" || speed < AT_REST) return null;
   const { reaction = ASSUMED.reaction, brake = ASSUMED.brake } = report;
   const distance = speed * reaction + speed ** 2 / (2 * brake);
   return Number.isFinite(distance) ? distance : null;
@@ -85,7 +85,7 @@ export function motions({ sent, echoed, measured }) {
 export function timings(report, loop, motion) {
   const age = report.age ?? loop;
   const distance = stoppingDistance(report);
-  const stands = report.measured !== null && speedNow(report) < STANDING;
+  const atRest = report.measured !== null && speedNow(report) < AT_REST;
   return [
     {
       name: "Round trip",
@@ -98,7 +98,7 @@ export function timings(report, loop, motion) {
     {
       name: "Stopping distance",
       kind: "time",
-      text: distance === null ? (stands ? "not moving" : UNKNOWN) : `${distance.toFixed(2)} m`,
+      text: distance === null ? (atRest ? "not moving" : UNKNOWN) : `${distance.toFixed(2)} m`,
     },
   ];
 }

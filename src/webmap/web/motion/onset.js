@@ -1,4 +1,4 @@
-import { STANDING, speedAlong } from "./figures.js";
+import { AT_REST, speedAlong } from "./figures.js";
 import { angularSpeed } from "./report.js";
 
 /** @typedef {import('./axes.js').Axes} Axes */
@@ -55,7 +55,7 @@ export class Onset {
    */
   report({ robot, measured }, now) {
     const speed = Math.abs(speedAlong(measured) ?? 0);
-    const moves = speed > STANDING || angularSpeed(measured ?? []) > TURNS;
+    const moves = speed > AT_REST || angularSpeed(measured ?? []) > TURNS;
     this._moves.set(robot, moves);
     if (!moves || this._waiting?.robot !== robot) return;
     const delay = now - this._waiting.since;

@@ -6,7 +6,7 @@ import { isLatched, linearSpeed, angularSpeed } from "./report.js";
 const ALL = "*";
 
 /** Below these speeds a robot counts as not moving: m/s and rad/s. */
-const STANDS = { v: 0.02, w: 0.05 };
+const AT_REST = { v: 0.02, w: 0.05 };
 
 /** Above these speeds a robot that must stop does not obey: m/s and rad/s. */
 const MOVES = { v: 0.05, w: 0.1 };
@@ -30,7 +30,7 @@ const SHOWN = 5000;
  * @property {string} text
  */
 
-/** @typedef {{since: number, answered: boolean, stoodAt: number | null}} Watch */
+/** @typedef {{since: number, answered: boolean, stoppedAt: number | null}} Watch */
 
 /**
  * Watches the results of this page's STOPs. Only odometry confirms a STOP: the gate decides
@@ -58,7 +58,7 @@ export class Stopping {
     for (const id of robot === ALL && known.size > 0 ? known.keys() : [robot]) {
       // If a STOP is active already, there may be no new report as an answer.
       const answered = known.get(id)?.latched === true;
-      this._watched.set(id, { since: now, answered, stoodAt: null });
+      this._watched.set(id, { since: now, answered, stoppedAt: null });
       const report = known.get(id);
       if (answered && report) this.report(report, now);
     }
@@ -81,9 +81,9 @@ export class Stopping {
       return;
     }
     if (stopped) watch.answered = true;
-    const stood = report.stop ? report.stop.confirmed === true : stands(report);
-    if (watch.answered && stood) watch.stoodAt ??= now;
-    else watch.stoodAt = null;
+    const atRest = report.stop ? report.stop.confirmed === true : isAtRest(report);
+    if (watch.answered && atRest) watch.stoppedAt ??= now;
+    else watch.stoppedAt = null;
   }
 
   /**
@@ -124,8 +124,8 @@ export class Stopping {
     const verdicts = [];
     for (const [robot, watch] of this._watched) {
       if (robot === ALL && robots.size > 0) continue;
-      const settled = watch.stoodAt !== null && connected;
-      if (settled && now - Number(watch.stoodAt) > SHOWN) this._watched.delete(robot);
+      const settled = watch.stoppedAt !== null && connected;
+      if (settled && now - Number(watch.stoppedAt) > SHOWN) this._watched.delete(robot);
       else verdicts.push(judge(robot, robots.get(robot), watch, connected, now));
     }
     return verdicts;
@@ -157,7 +157,7 @@ export class Obedience {
     const before = this._last.get(report.robot);
     this._last.set(report.robot, report);
     if (!isZero(report)) this._zeroSince.delete(report.robot);
-    else if (stands(report)) this._zeroSince.delete(report.robot);
+    else if (isAtRest(report)) this._zeroSince.delete(report.robot);
     else if (before && !isZero(before)) this._zeroSince.set(report.robot, now);
   }
 
@@ -212,7 +212,7 @@ function judge(robot, report, watch, connected, now) {
   }
   if (report?.stop?.confirmed === false) return unsure(report.stop.why);
   if (report?.link === "down") return unsure("no connection to the robot");
-  if (watch.stoodAt !== null) {
+  if (watch.stoppedAt !== null) {
     const more = [...besides(report?.stop?.why), ...(report?.hooks ?? [])];
     const parts = ["stopped, confirmed by odometry", ...more];
     return { robot, name, state: "confirmed", text: parts.join("; ") };
@@ -273,9 +273,9 @@ export function standingStops(reports) {
 }
 
 /** @param {RobotReport} report */
-function stands({ measured }) {
+function isAtRest({ measured }) {
   if (!measured) return false;
-  return linearSpeed(measured) < STANDS.v && angularSpeed(measured) < STANDS.w;
+  return linearSpeed(measured) < AT_REST.v && angularSpeed(measured) < AT_REST.w;
 }
 
 /** @param {RobotReport} report */
