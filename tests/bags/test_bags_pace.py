@@ -31,14 +31,14 @@ def test_a_stamp_that_would_leave_the_valid_range_is_unchanged(stamp):
     assert Pace(THEN, NOW, 0.1).moved(stamp) == stamp
 
 
-def test_a_pause_delays_playing_without_skipping_messages():
+def test_a_pause_of_three_seconds_delays_playing_by_three_seconds():
     pace = Pace(THEN, NOW, 2.0)
     pace.put_off(3 * SECOND)
     assert pace.at(NOW + 3 * SECOND) == THEN
 
 
 @given(some.floats(0.01, 100.0), some.integers(0, 10**14))
-def test_the_recording_time_played_now_is_the_inverse_of_the_due_time(rate, after):
+def test_the_due_time_converts_back_to_the_time_of_the_recording(rate, after):
     pace = Pace(THEN, NOW, rate)
     assert pace.at(pace.due(THEN + after)) == pytest.approx(THEN + after, abs=1000)
 

@@ -187,7 +187,7 @@ def test_a_truncated_file_is_refused(made, bag, tmp_path, share):
 
 
 @pytest.mark.parametrize("name", ["noise.bag", "noise.mcap", "noise.db3"])
-def test_a_file_with_other_content_is_refused(tmp_path, name):
+def test_a_file_with_a_known_suffix_but_other_content_is_refused(tmp_path, name):
     (tmp_path / name).write_bytes(bytes(range(256)) * 40)
     assert refusal(tmp_path / name).startswith(f"{name} cannot be read as a recording")
 

@@ -148,7 +148,7 @@ def test_playing_from_a_start_time_publishes_the_earlier_map(bag):
     asyncio.run(story())
 
 
-def test_a_recording_ends_without_loop_and_restarts_with_loop(bag):
+def test_playing_ends_without_loop_and_restarts_with_loop(bag):
     async def story():
         async with played(bag, loop=True) as player:
             client = Client(player).listen("/odom")

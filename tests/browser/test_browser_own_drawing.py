@@ -84,7 +84,7 @@ def colour(page, x, y):
     return Image.open(io.BytesIO(shot)).convert("RGB").getpixel((x, y))
 
 
-def test_an_image_file_beside_the_program_is_drawn_as_robot(page):
+def test_an_image_file_beside_the_program_is_drawn_as_the_robot(page):
     # Two metres to each side of the middle, at 50 pixels to the metre.
     wait_until(lambda: colour(page, 230, 200) == BLUE, what="the rear")
     assert colour(page, 370, 200) == RED
@@ -116,7 +116,7 @@ def test_elements_of_the_world_are_drawn_in_metres(page):
     assert (slab["width"], slab["height"]) == pytest.approx((100, 50))
 
 
-def test_a_map_knows_its_position_in_the_window(page):
+def test_get_bounding_rect_returns_the_position_of_the_map_in_the_window(page):
     place = page.locator("svg.webmap").bounding_box()
     assert place["x"] > 20
     expect(page.locator(".words")).to_have_text(f"{place['x']:.0f} {place['y']:.0f}")

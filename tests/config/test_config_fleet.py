@@ -60,13 +60,13 @@ def fleet() -> FleetConfig:
     return found
 
 
-def test_a_fleet_file_is_written_exactly_as_it_was_read():
+def test_dumping_a_fleet_and_its_comments_reproduces_the_fleet_file():
     data = fleet().to_dict()
     data["bridges"]["the yard"] = "ws://yard:9090"
     assert dump(data, remarks=REMARKS, below=BELOW) == FILE
 
 
-def test_a_fleet_file_without_comments_has_the_same_content():
+def test_a_fleet_dumped_without_comments_reads_back_as_the_same_fleet():
     text = dump(fleet().to_dict())
     again = read_fleet(tomllib.loads(text), mistakes := Mistakes())
     assert (again, mistakes.found) == (fleet(), [])

@@ -42,7 +42,7 @@ WHOLE = {
 PICTURE = {"file": "bob.png", "width": 1.0, "height": 0.5}
 
 
-def test_a_configuration_survives_from_dict_and_to_dict():
+def test_to_dict_returns_the_dictionary_given_to_from_dict():
     config = RobotConfig.from_dict(WHOLE)
     assert config.motion.twist.stops_within == 0.25
     assert config.to_dict() == WHOLE

@@ -44,7 +44,7 @@ PROMISES = (
         2,
         "an old command moves nothing",
         "the browser's link (gets|becomes|is cut) .*",
-        "test_a_link_slower_than_the_age_limit_moves_no_robot",
+        "test_a_link_slower_than_the_age_limit_stops_a_robot_despite_a_held_key",
     ),
     Promise(
         3,
@@ -116,7 +116,7 @@ PROMISES = (
         14,
         "the end of WebMap stops the robot",
         r"the display is (ended.*|killed)",
-        "test_the_end_of_the_display_stops_the_robot",
+        "test_a_killed_or_terminated_display_stops_the_robot",
     ),
     Promise(
         15,
@@ -158,7 +158,7 @@ PROMISES = (
         19,
         "the page shows what the robot does",
         "",
-        "test_the_page_shows_an_alarm_until_a_disobeying_robot_stands_still",
+        "test_the_page_shows_an_alarm_until_a_disobeying_robot_stops",
     ),
     Promise(
         20,

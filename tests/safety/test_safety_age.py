@@ -112,7 +112,9 @@ def said_by(bench):
 
 @LONG
 @pytest.mark.parametrize("way", ["up", "down", "both"])
-def test_stalls_before_the_gate_let_no_command_exceed_the_age_limit(driven, way):
+def test_stalls_between_page_and_gate_deliver_no_command_above_the_age_limit(
+    driven, way
+):
     begin, since = len(driven.robot.log.twists), time.monotonic()
     for seconds in (0.2, 0.5, 1.0, 3.0):
         stall(driven, way, seconds)
@@ -123,7 +125,7 @@ def test_stalls_before_the_gate_let_no_command_exceed_the_age_limit(driven, way)
     assert max(found) <= MAX_AGE + ON_THE_WAY + driven.sentinel.worst(since)
 
 
-def test_a_slow_link_with_jitter_lets_no_command_exceed_the_age_limit(driven):
+def test_a_slow_link_with_jitter_delivers_no_command_above_the_age_limit(driven):
     begin, since = len(driven.robot.log.twists), time.monotonic()
     driven.web_hop.shape(Shape(latency=0.03, jitter=0.12))
     pass_time(6.0)

@@ -140,7 +140,7 @@ FLOODS = [
 
 
 @pytest.mark.parametrize("peers", FLOODS, ids=" ".join)
-def test_stop_leaves_the_gate_within_50_ms_while_three_bridges_flood_the_gate(
+def test_stop_reaches_the_robot_within_50_ms_while_three_bridges_flood_the_gate(
     peers, tmp_path, monkeypatch
 ):
     with FloodedGate(tmp_path, monkeypatch, peers) as gate:

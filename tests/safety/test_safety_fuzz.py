@@ -90,7 +90,7 @@ def test_the_valid_commands_of_the_fuzz_tests_move_the_robot(op):
     assert moved(bench)
 
 
-def test_the_valid_command_behind_the_corpus_moves_the_robot():
+def test_the_valid_original_of_the_corpus_commands_moves_the_robot():
     bench = armed()
     at = bench.now
     stamp = '"epoch":EPOCH,"seq":SEQ,"tick":TICK'
@@ -99,7 +99,7 @@ def test_the_valid_command_behind_the_corpus_moves_the_robot():
 
 
 @pytest.mark.parametrize("text", CORPUS, ids=range(len(CORPUS)))
-def test_no_text_of_the_corpus_moves_the_robot_or_keeps_it_moving(text):
+def test_no_text_of_the_corpus_starts_or_continues_motion(text):
     bench = armed()
     say(bench, filled(bench, text))
     bench.run(0.1)

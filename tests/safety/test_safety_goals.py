@@ -182,7 +182,7 @@ def test_cancel_ends_a_goal_while_a_stop_hook_hangs(simulated):
     assert robot.stays(1.0)
 
 
-def test_a_hanging_goal_and_service_call_do_not_delay_zero(folder):
+def test_a_hanging_goal_and_service_call_do_not_delay_the_zero_of_a_stop(folder):
     with (
         Sentinel() as sentinel,
         WitnessRobot(goals_block=True) as robot,

@@ -135,7 +135,7 @@ def test_after_a_kill_no_motion_resumes_and_an_acknowledged_stop_stays_active(
     )
 
 
-def test_the_full_run_kills_after_all_200_steps_and_the_quick_run_after_20_steps():
+def test_the_full_run_has_200_kills_and_the_quick_run_has_20_kills():
     assert len(KILLS) == (LAST if FULL else 20)
     assert max(KILLS) * 0.01 > SCRIPT[-1][0], "the last kill comes after all is done"
 

@@ -80,7 +80,7 @@ def test_a_half_close_by_the_browser_stops_the_robot(bench):
     )
 
 
-def test_latency_between_browser_and_display_stops_the_robot(bench):
+def test_latency_of_400_ms_between_browser_and_display_stops_the_robot(bench):
     bench.prove(
         "the browser's link gets 400 ms of latency each way",
         lambda: bench.web_hop.shape(SLOW),
@@ -162,7 +162,7 @@ def test_a_half_close_by_the_gate_stops_the_robot(bench):
     )
 
 
-def test_latency_between_gate_and_robot_stops_the_robot(bench):
+def test_latency_of_400_ms_between_gate_and_robot_stops_the_robot(bench):
     # What was written before the doubt, 300 ms, is still on its way for 400 ms.
     bench.prove(
         "the robot's link gets 400 ms of latency each way",

@@ -20,7 +20,7 @@ BY_ITSELF = ROBOT_TIMEOUT + 0.05
 @pytest.mark.parametrize(
     ("name", "sig"), [("killed", signal.SIGKILL), ("ended (SIGTERM)", signal.SIGTERM)]
 )
-def test_the_end_of_the_display_stops_the_robot(bench, name, sig):
+def test_a_killed_or_terminated_display_stops_the_robot(bench, name, sig):
     def back():
         bench.end_display()
         bench.start_display()

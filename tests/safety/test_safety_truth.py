@@ -65,7 +65,7 @@ def stop_and_reset(bench):
     bench.reset_stop()
 
 
-def test_the_page_shows_an_alarm_until_a_disobeying_robot_stands_still(bench):
+def test_the_page_shows_an_alarm_until_a_disobeying_robot_stops(bench):
     bench.drive_off()
     bench.robot.obeys = False
     bench.let_go()
@@ -95,7 +95,7 @@ def test_the_page_shows_no_alarm_for_a_robot_that_obeys(bench):
 
 
 @pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
-def test_after_release_and_zeros_no_velocity_is_sent_for_ten_seconds(bench):
+def test_no_velocity_is_sent_for_ten_seconds_after_a_key_release_and_its_zeros(bench):
     bench.drive_off()
     bench.let_go()
     pass_time(1.0)
@@ -127,7 +127,7 @@ def test_a_slow_link_lowers_the_speed_limit_and_the_page_shows_the_reason(bench)
     assert "slow connection: " not in bench.tab.evaluate(WORDS)
 
 
-def test_a_link_slower_than_the_age_limit_moves_no_robot(bench):
+def test_a_link_slower_than_the_age_limit_stops_a_robot_despite_a_held_key(bench):
     bench.drive_off()
     bench.web_hop.shape(Shape(latency=0.2))
     wait_for(lambda: bench.robot.log.twists[-1].is_zero, "zero")
