@@ -66,6 +66,12 @@ contracts: $(DEV)
 	$(PY) tools/make_javascript.py --check
 	$(PY) tools/make_layers_page.py --check
 
+## generated: write the files that are made from others
+.PHONY: generated
+generated: $(DEV)
+	$(PY) tools/make_javascript.py
+	$(PY) tools/make_layers_page.py
+
 ## test-fast: the tests that need neither a browser nor a peer nor a quiet machine
 .PHONY: test-fast
 test-fast: $(DEV)

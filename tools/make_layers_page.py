@@ -143,7 +143,7 @@ def main() -> int:
         PAGE.write_text(text, "utf-8")
     elif not PAGE.exists() or PAGE.read_text("utf-8") != text:
         print(
-            f"{PAGE} is out of date: run python {Path(__file__).name}", file=sys.stderr
+            f"{PAGE} is out of date: run make generated", file=sys.stderr
         )
         return 1
     return 0

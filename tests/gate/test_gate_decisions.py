@@ -10,6 +10,7 @@ from webmap.base.geometry import Twist
 from webmap.gate import actions, commands, events, protocol
 from webmap.gate.events import Key
 from webmap.gate.protocol import PROGRAM
+from webmap.gate.rules.motion import DEADMAN
 
 
 @pytest.fixture
@@ -129,13 +130,13 @@ class TestDriving:
         bench.drive(x=1.0)
         assert bench.written[-1].twist == Twist(1.0)
 
-    def test_zero_is_sent_200_ms_after_the_last_command(self, bench):
+    def test_zero_is_sent_when_the_dead_man_timeout_ends(self, bench):
         bench.drive_off()
         last = bench.now
         bench.drive(x=1.0)
         bench.run(0.5)
         first = next(w for w in bench.since(last) if w.twist == ZERO)
-        assert 0.2 <= first.at - last <= 0.2101
+        assert DEADMAN <= first.at - last <= DEADMAN + 0.0101
 
     def test_after_the_dead_man_timeout_a_held_key_moves_nothing_until_released(
         self, bench
@@ -292,8 +293,8 @@ class TestFreshness:
         seen = driving.tick
         driving.run(0.5, lambda: driving.drive(x=1.0, tick=seen))
         zero = next(w for w in driving.since(self.at) if w.twist == ZERO)
-        # 200 ms from the last command that told of a new tick, which is the first.
-        assert zero.at - self.at <= 0.2 + 2 * 0.01 + 1e-9
+        # The timeout from the last command that told of a new tick, which is the first.
+        assert zero.at - self.at <= DEADMAN + 2 * 0.01 + 1e-9
         assert driving.moving_since(zero.at) == []
 
     def test_a_command_whose_seq_does_not_increase_is_refused(self, driving):

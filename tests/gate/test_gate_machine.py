@@ -41,6 +41,7 @@ from webmap.gate.events import Press
 from webmap.gate.protocol import PROGRAM
 from webmap.gate.rules.connections import Epochs, Ticks
 from webmap.gate.rules.gate import Gate
+from webmap.gate.rules.motion import DEADMAN
 from webmap.gate.shell import STEP
 
 pytestmark = pytest.mark.slow
@@ -523,7 +524,7 @@ class Motion(RuleBasedStateMachine):
         if not attempts or attempts[-1].twist.is_zero:
             return
         newest = next(s.at for s in reversed(self.sent) if s.valid)
-        assert self.bench.now - newest <= 0.2 + LATE or self._stood_still(newest)
+        assert self.bench.now - newest <= DEADMAN + LATE or self._stood_still(newest)
 
     def _stood_still(self, since):
         """Whether the gate has not had its say since the limit passed."""

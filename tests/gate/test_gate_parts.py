@@ -202,7 +202,7 @@ class TestDeadMan:
         for n in range(round(seconds / 0.05) + 1):
             deadman.accept(True, next(self.ticks), since + n * 0.05)
 
-    def test_the_dead_man_expires_after_200_ms(self):
+    def test_the_dead_man_expires_after_its_timeout(self):
         deadman = DeadMan()
         assert deadman.expired(0.0)
         deadman.accept(True, next(self.ticks), 1.0)

@@ -10,6 +10,7 @@ from gate_page import Page
 from gate_robot import eventually
 
 from webmap.gate.display.client import GateClient
+from webmap.gate.rules.motion import DEADMAN
 from webmap.testing import (
     Bounds,
     Sentinel,
@@ -159,10 +160,10 @@ def test_a_slow_page_connection_with_jitter_reduces_the_speed(driven, witness):
     page = driven(kind=lambda client: LatePage(client, 0.12, 0.03))
     page.take()
     press(page, lambda: len(moving(witness)) > 60, "a drive")
-    # A quarter of a metre until anything takes effect: the loop, 200 ms of dead-man
+    # A quarter of a metre until anything takes effect: the loop, the dead-man timeout
     # and 250 ms of the robot's own. The first words are from before it is known.
     fastest = max(received.speed for received in moving(witness)[30:])
-    assert fastest <= 0.25 / (0.2 + 0.25 + 0.15)
+    assert fastest <= 0.25 / (DEADMAN + 0.25 + 0.15)
 
 
 def test_a_page_connection_slower_than_300_ms_does_not_move_the_robot(driven, witness):

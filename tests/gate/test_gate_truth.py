@@ -7,6 +7,7 @@ from webmap.base.geometry import Twist
 from webmap.gate import actions, events
 from webmap.gate.limits import Speed
 from webmap.gate.rules.health import Ages
+from webmap.gate.rules.motion import DEADMAN
 from webmap.gate.rules.obedience import Obedience
 from webmap.gate.rules.speeds import LoopAge, governed, reaction
 
@@ -204,7 +205,7 @@ class TestLoopAge:
     @pytest.mark.parametrize("stop", [None, 0.1, 0.25, 0.5])
     def test_a_slow_link_limits_the_distance_before_a_reaction_to_25_cm(self, ms, stop):
         speed = governed(Speed(5.0, 1.0, ()), ms / 1000, stop)
-        assert speed.v * (ms / 1000 + 0.2 + (stop or 0.5 * (stop is None))) <= 0.25
+        assert speed.v * (ms / 1000 + DEADMAN + (stop or 0.5 * (stop is None))) <= 0.25
         assert speed.w == 1.0
         assert len(speed.why) == 1
 

@@ -22,7 +22,24 @@ def section(title: str) -> str:
 def test_every_file_named_in_the_design_page_exists():
     named = set(re.findall(r"`([a-z_]+/[\w/]+\.(?:py|js))`", DESIGN))
     assert len(named) > 30
-    assert sorted(name for name in named if not (PACKAGE / name).is_file()) == []
+    there = {name for name in named for at in (PACKAGE, ROOT) if (at / name).is_file()}
+    assert sorted(named - there) == []
+
+
+@pytest.mark.parametrize(
+    ("head", "folder"),
+    [
+        ("| part | content |", "gate"),
+        ("| chapter of `rules` | decides |", "gate/rules"),
+    ],
+)
+def test_the_tables_of_the_gate_in_the_design_page_name_every_file(head, folder):
+    rows = DESIGN.partition(f"{head}\n")[2].partition("\n\n")[0].splitlines()
+    named = {name for row in rows for name in re.findall(r"`(\w+)`", row.split("|")[1])}
+    there = PACKAGE / folder
+    files = {file.stem for file in there.glob("*.py")}
+    folders = {file.parent.name for file in there.glob("*/__init__.py")}
+    assert named == (files | folders) - {"__init__", "__main__"}
 
 
 @pytest.mark.parametrize("title", ["The path of a command", "The path of a pose"])

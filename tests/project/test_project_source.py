@@ -70,7 +70,7 @@ ROSBRIDGE_WORDS = re.compile(
     r"[\"'](?:subscribe|unsubscribe|advertise|unadvertise|publish|call_service)[\"']",
     re.IGNORECASE,
 )
-ROSBRIDGE_ROOMS = (
+PROTOCOL_ROOMS = (
     "ros/rosbridge/",
     "gate/",  # it has sockets of its own
     "testing/",  # its peers are rosbridges
@@ -92,11 +92,14 @@ def test_only_the_allowed_folders_use_rosbridge_terms() -> None:
     found = []
     for path in SOURCES:
         name = path.relative_to(ROOT / "src/webmap").as_posix()
-        if name.startswith(ROSBRIDGE_ROOMS):
+        if name.startswith(PROTOCOL_ROOMS):
             continue
         words = {word.lower() for word in ROSBRIDGE_WORDS.findall(path.read_text())}
         found += [f"{name}: {w}" for w in words - ROSBRIDGE_TEXTS.get(name, set())]
-    assert not found, "speak of topics, messages and services; see webmap.ros.bridge"
+    assert not found, (
+        "write topics, messages and services, as webmap.ros.bridge does; the folder of "
+        "another protocol belongs in PROTOCOL_ROOMS"
+    )
 
 
 @pytest.mark.parametrize("text", ['"/rosapi/topics"', "'call_service'", "in CBOR"])

@@ -181,8 +181,8 @@ def layer(
         switch: The name of its switch in the list of layers, or CSS selectors by switch
             name.
         css: The CSS class of the drawing; the name of the layer in lower case if empty.
-        rank: The order in which layers are found and drawn; the built-in ones have 10
-            to 140.
+        rank: The order in which layers are found and drawn; the built-in ones have
+            multiples of 10, and a new one takes the next that is free.
 
     Raises:
         ConfigError: If there is no type or one is no name of a type, if both ``kind``

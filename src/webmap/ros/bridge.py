@@ -32,6 +32,9 @@ from webmap.ros.topic_faults import TopicFaults
 
 log = logging.getLogger("webmap.ros")
 
+LINKS = {"ws": RosbridgeLink, "wss": RosbridgeLink}
+"""The kind of link by the scheme of the URL: *A new kind of link* in the design."""
+
 
 class Bridge:
     """A connection to one ROS system through a rosbridge v2 server.
@@ -66,7 +69,7 @@ class Bridge:
         self._on_error = Callbacks(f"{self.name}: on_error", lambda _error: None)
         self._on_open = Callbacks(f"{self.name}: on_open", self._report)
         self._on_close = Callbacks(f"{self.name}: on_close", self._report)
-        self._link = RosbridgeLink(
+        self._link = LINKS[self.url.partition(":")[0]](
             self.url,
             self.name,
             opened=self._opened,
