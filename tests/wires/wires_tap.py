@@ -99,7 +99,7 @@ class Tap:
                 goal = message["goal"] and goal_number(message["goal"]["id"])
                 if goal is not None:
                     self.names.grow("goal", goal)
-            case {"type": "program", "request": request}:
+            case {"type": "from_program", "request": request}:
                 self.names.grow("request", request)
             case {"type": "take-reply", "epoch": int(epoch)}:
                 self.names.grow("epoch", epoch)
@@ -171,7 +171,7 @@ class Tap:
                 fields["count"] = ANY
             case "declare":
                 return kind, self._declared(fields)
-            case "browser":
+            case "from_page":
                 return self._sent_by_page(fields)
         return kind, lines(kind, self.names.plain(fields))
 
@@ -185,7 +185,7 @@ class Tap:
             said = json.loads(fields["text"])
             op = said.pop("op")
         except (ValueError, AttributeError, KeyError):
-            return "browser", lines("browser", self.names.plain(fields))
+            return "from_page", lines("from_page", self.names.plain(fields))
         who = self.names.text(fields["connection"])
         return op, lines(f"browser {who}: {op}", self.names.plain(said))
 
