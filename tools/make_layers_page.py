@@ -142,9 +142,7 @@ def main() -> int:
     if "--check" not in sys.argv:
         PAGE.write_text(text, "utf-8")
     elif not PAGE.exists() or PAGE.read_text("utf-8") != text:
-        print(
-            f"{PAGE} is out of date: run make generated", file=sys.stderr
-        )
+        print(f"{PAGE} is out of date: run make generated", file=sys.stderr)
         return 1
     return 0
 
