@@ -109,7 +109,7 @@ def test_set_pose_on_the_page_does_not_report_a_jump_of_the_pose(chromium):
             page.get_by_role("button", name="Set pose").click()
             expect(word).to_contain_text("Press where the robot is")
             page.mouse.click(before[0] + 70, before[1] - 70)
-            expect(word).to_have_text(re.compile("^Pose sent|^Not sent"))
+            expect(word).to_have_text(re.compile("^Pose sent|^Pose not sent"))
             if word.inner_text() == "Pose sent.":
                 break
         page.wait_for_function(HAS_GONE, arg=[*before, 60])
