@@ -166,9 +166,9 @@ def test_circular_symbolic_links_are_refused(tmp_path):
 def test_a_too_large_metadata_file_is_refused(tmp_path):
     with (tmp_path / "metadata.yaml").open("wb") as file:
         file.truncate(5 << 20)
-    assert "5242880 bytes are too many for the description of a bag" in refusal(
-        tmp_path
-    )
+    said = refusal(tmp_path)
+    assert "got 5242880 bytes, expected at most" in said
+    assert "for the description of a bag" in said
 
 
 @pytest.mark.parametrize("name", ["empty.bag", "empty.mcap", "empty.db3"])

@@ -83,7 +83,7 @@ def test_the_log_limit_of_one_bridge_does_not_affect_another_bridge(written):
         log.warning("%s says: %s", name, "hello")
     *hostile, good = written.getvalue().splitlines()
     assert len(hostile) == BURST
-    assert hostile[-1].endswith("(more like this is left out, but for one in 5 s)")
+    assert hostile[-1].endswith("(similar lines are left out, except one every 5 s)")
     assert good == "WARNING webmap.ros: good says: hello"
 
 
@@ -111,10 +111,10 @@ def test_a_limited_source_logs_one_line_per_pause_with_the_omitted_count():
     budgets = Budgets(lambda: now[0])
     notes = [budgets.note(("here",), "a") for _ in range(BURST + 7)]
     assert notes[: BURST - 1] == [""] * (BURST - 1)
-    assert notes[BURST - 1].startswith(" (more like this is left out")
+    assert notes[BURST - 1].startswith(" (similar lines are left out")
     assert notes[BURST:] == [None] * 7
     now[0] += PAUSE
-    assert budgets.note(("here",), "a").startswith(" (7 more were left out) (more")
+    assert budgets.note(("here",), "a").startswith(" (7 more were left out) (similar")
     assert budgets.note(("here",), "a") is None
     now[0] += BURST * PAUSE
     assert budgets.note(("here",), "a") == " (1 more were left out)"

@@ -129,7 +129,7 @@ def test_circular_symbolic_links_are_refused_with_a_clear_error(tmp_path):
 
 def test_a_path_with_a_null_character_is_refused_with_a_clear_error(tmp_path):
     for look in (resolved, lambda path: read_file(path, 10)):
-        with pytest.raises(ConfigError, match="is no path: expected a text without"):
+        with pytest.raises(ConfigError, match="is not a path: expected a text without"):
             look(tmp_path / "a\0b")
 
 

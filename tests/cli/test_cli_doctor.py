@@ -36,7 +36,7 @@ def test_doctor_does_not_crash_the_rosapi_of_ros_2(ros2):
     said = webmap("doctor", ros2, "--seconds", "1", "--ask-parameters")
     assert said.returncode == 0, said.stdout
     assert "has the type TwistStamped" in said.stdout
-    assert "may block its whole socket" in said.stdout
+    assert "may block its whole connection" in said.stdout
     assert "Scans come packed as CBOR (/base_scan)" in said.stdout
     assert webmap("discover", ros2).returncode == 0, "rosapi is still there"
 
@@ -106,4 +106,4 @@ def test_doctor_checks_robots_as_a_fleet_file_configures_them(ros1, tmp_path):
 @pytest.mark.serial  # how long an answer takes is measured
 def test_doctor_with_try_call_reports_that_a_hanging_service_blocks_no_socket(ros1):
     said = webmap("doctor", ros1, "--seconds", "0.5", "--try-call")
-    assert "A service that hangs blocks no socket (tried)" in said.stdout
+    assert "A service that hangs blocks no other call (tried)" in said.stdout

@@ -129,7 +129,7 @@ def test_view_without_rosapi_opens_the_page_and_advises_robot_options():
                        '"args":{"type":"nav_msgs/Odometry"}}')  # fmt: skip
         with viewing(url) as view:
             assert re.fullmatch(READY, view.process.stdout.readline())
-            view.wait_for(r"it has no rosapi that lists its topics: .*")
+            view.wait_for(r"the bridge has no rosapi that lists its topics: .*")
             view.wait_for(r"List each robot with --robot NAME:ODOM:CMD_VEL:SCAN")
 
 

@@ -176,7 +176,7 @@ def test_all_mistakes_are_reported_at_once_with_their_keys():
 
 
 def test_the_error_for_a_too_large_number_names_the_maximum():
-    with pytest.raises(ConfigError, match="from 0 on, 1e\\+06 at the most"):
+    with pytest.raises(ConfigError, match="from 0 on, at most 1e\\+06"):
         RobotConfig.from_dict({"name": "Bob", "twist": {"topic": "/c", "v_max": 1e9}})
 
 

@@ -126,7 +126,7 @@ def test_a_slow_call_test_runs_only_on_request_and_its_result_is_reported():
 
     asyncio.run(run())
     assert received == ["Testing what a slow service call delays."]
-    assert "hangs blocks its whole socket (tried)" in checkup.text
+    assert "hangs blocks its whole connection (tried)" in checkup.text
 
 
 @pytest.mark.parametrize("trouble", [None, "nothing listens there"])

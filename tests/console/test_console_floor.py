@@ -212,7 +212,7 @@ def test_a_yaml_file_above_the_size_limit_is_refused(tmp_path):
     draw(tmp_path)
     file = write(tmp_path)
     file.write_text(file.read_text() + "\n# " + "x" * MAX_YAML)
-    with pytest.raises(ConfigError, match="bytes are no map's YAML, which has 16384"):
+    with pytest.raises(ConfigError, match="expected at most 16384 for a map's YAML"):
         load_floor(file, tmp_path)
 
 

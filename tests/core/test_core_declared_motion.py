@@ -45,7 +45,7 @@ def test_a_button_cannot_publish_to_a_topic_that_only_the_gate_publishes(
         getattr(robot, setter)(bridge, *args, **options)
         said = declared_motion(spec, HALL)
         assert said is not None
-        assert said.startswith(f"{topic} carries {carried}, and a button may not write")
+        assert said.startswith(f"{topic} carries {carried}, which only the gate")
         assert declared_motion(spec, "ws://another:9090") is None
     finally:
         robot.destroy()
@@ -61,8 +61,8 @@ def test_adding_a_button_that_publishes_an_initial_pose_is_refused():
         with pytest.raises(webmap.base.errors.ConfigError) as refused:
             robot.add_module("Buttons", bridge, [button])
         assert str(refused.value) == (
-            "button 'Here': /bob/here carries an initial pose, and a button may not "
-            "write that: the gate does"
+            "button 'Here': /bob/here carries an initial pose, which only the gate "
+            "publishes: remove this button"
         )
     finally:
         robot.destroy()

@@ -89,6 +89,6 @@ def test_a_module_argument_that_is_not_plain_data_is_refused():
     namespace.register(lambda robot, bulb: bulb, name="Lamp")
     robot = Robot("Bob", namespace=namespace)
     robot.add_module("Lamp", object())
-    with pytest.raises(ConfigError, match=r"robot 'Bob' is no plain data: .*object"):
+    with pytest.raises(ConfigError, match=r"robot 'Bob' is not plain data: .*object"):
         robot.to_dict()
     robot.destroy()

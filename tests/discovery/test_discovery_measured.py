@@ -253,8 +253,8 @@ def test_the_frames_of_a_robot_with_its_own_map_frame_are_good(dialect):
 @pytest.mark.parametrize(
     ("quirks", "level", "words"),
     [
-        ("polite", "good", "blocks no socket (tried)"),
-        ("polite,blocking_services", "warning", "blocks its whole socket (tried)"),
+        ("polite", "good", "blocks no other call (tried)"),
+        ("polite,blocking_services", "warning", "blocks its whole connection (tried)"),
     ],
 )
 @DIALECTS
@@ -272,13 +272,13 @@ def test_a_bridge_without_client_services_leaves_the_blocking_unknown():
 
     _, findings, seen = looked_at(site("ros2"), deaf, try_call=True)
     assert seen.link.calls_in_threads is None
-    words = "was tried, and is not known: the bridge offers no services of its clients"
+    words = "call gave no result: the bridge offers no services of its clients"
     assert said(findings, words) == "note"
 
 
 def test_without_rosapi_no_trial_call_is_made_and_the_reason_is_reported():
     there, findings, _ = looked_at(site("ros2", rosapi=False), try_call=True)
-    assert said(findings, "is not known: rosapi does not answer") == "note"
+    assert said(findings, "gave no result: rosapi does not answer") == "note"
     assert not any("webmap_doctor" in name for name in there.called)
 
 
@@ -304,7 +304,7 @@ def test_an_unreachable_bridge_resets_the_result_of_an_earlier_trial_call():
     blocking = Observed("ws://127.0.0.1:1", link=facts)
     seen = asyncio.run(tried(blocking))
     assert (seen.link.calls_in_threads, seen.link.tried) == (None, False)
-    assert said(judge(seen), "was tried, and is not known") == "note"
+    assert said(judge(seen), "slow service call gave no result") == "note"
 
 
 TOPICS = {

@@ -48,7 +48,7 @@ def test_a_base_with_a_command_timeout_passes_and_the_result_is_stored(folder):
     with simulator("--port", "0", "--robot-timeout", "0.25") as url:
         said = run(url, "robot_1", "--yes")
     assert said.returncode == 0, said.stdout + said.stderr
-    found = re.search(r"Result of (\S+): it stops by itself in (\S+) s", said.stdout)
+    found = re.search(r"of (\S+): the base stops by itself in (\S+) s", said.stdout)
     assert found, said.stdout
     assert found[1] == TODAY
     assert 0.25 <= float(found[2]) < 0.8
@@ -63,7 +63,7 @@ def test_a_base_without_a_command_timeout_fails_even_after_an_earlier_pass(folde
         said = run(url, "robot_0", "--yes")
     assert said.returncode == 1, said.stdout + said.stderr
     assert "no more commands: waiting until the base stops" in said.stdout
-    assert f"Result of {TODAY}: it does NOT stop by itself" in said.stdout
+    assert f"Result of {TODAY}: the base does NOT stop by itself" in said.stdout
     assert Records(folder).stop_test_of(key).seconds is None
 
 

@@ -235,7 +235,7 @@ def changed(old, new):
         ("x = [1,\n\n", "FILE:2: this is not TOML: expected a value"),
         (changed("v_max = 0.5", 'v_max = "0.5"'), "; write 0.5 without quotes"),
         (changed('"Bob"', "7"), '; write it in quotes: "7"'),
-        (changed('"Bob"', r'"B\nob"'), "expected a text of one line with 100 charac"),
+        (changed('"Bob"', r'"B\nob"'), "expected a text of one line with at most 10"),
         (
             changed("w_max = 1", 'holonomic = "yes"'),
             "expected true or false; write true without quotes",

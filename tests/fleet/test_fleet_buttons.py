@@ -60,8 +60,8 @@ value = 0.2
         (
             'label = "Go"\ntopic = "/go"\ntype = "geometry_msgs/Twist"',
             "fleet.toml:17: robots[0].buttons[1].topic: /go of type geometry_msgs/Twist"
-            " carries a velocity, and a button must not send that: all motion goes "
-            "through the gate",
+            " carries a velocity, which only the gate sends, by driving, by a goal or "
+            "by STOP: remove this button",
         ),
         (
             'label = "Go"\nservice = "/go"\nconfrim = true',

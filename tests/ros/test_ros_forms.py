@@ -138,7 +138,7 @@ def test_comments_and_string_constants_are_parsed_as_in_ros():
     [
         ("int8", "'int8' is no field"),
         ("test_msgs/It it", "nested too deep"),
-        ("int8 x=y", "'y' is no int8"),
+        ("int8 x=y", "'y' is not a value of int8"),
         ("\n".join(f"int8 a{i}" for i in range(401)), "more than 400 fields"),
         ("std_msgs/No no", "the fields of std_msgs/No are not known here"),
     ],

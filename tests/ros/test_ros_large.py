@@ -207,7 +207,7 @@ def test_after_several_lost_links_json_requests_end_and_this_is_reported(quick):
                 server.drop()
                 await until(lambda n=number: bridge.stats.links > n)
             await until(lambda: seen)
-            assert "the connection ended before it came in JSON" in seen[0]
+            assert "the connection ended before one came in JSON" in seen[0]
             assert "max_message_size" in seen[0]
             assert len(server.ops("subscribe", compression="none")) == MOST_LOST
 

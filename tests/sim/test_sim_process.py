@@ -83,7 +83,7 @@ def test_a_port_in_use_is_an_error():
         with socket.socket() as taken:
             taken.bind(("127.0.0.1", 0))
             taken.listen()
-            with pytest.raises(ConfigError, match="in use: end what uses it"):
+            with pytest.raises(ConfigError, match="in use: end the program"):
                 await run_simulator(port=taken.getsockname()[1])
 
     asyncio.run(scenario())

@@ -97,10 +97,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("paths", nargs="+", type=Path, help="a bag of ROS 1 or ROS 2")
-    add("--rate", type=float, default=1.0, help="seconds of it that are played in one")
+    add("--rate", type=float, default=1.0, help="playback rate (1)")
     add("--start", type=float, default=0.0, help="where it begins, in seconds")
-    add("--loop", action="store_true", help="begin anew when it has ended")
-    add("--port", type=int, default=0, help="of the rosbridge; 0: any that is free")
+    add("--loop", action="store_true", help="start again when the recording ends")
+    add("--port", type=int, default=0, help="rosbridge port; 0 lets the system choose")
     add("--with-parent", action="store_true", help="end when standard input does")
     return parser
 

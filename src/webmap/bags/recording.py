@@ -389,8 +389,8 @@ def _refuse_endless(path: Path) -> None:
     size = about.stat().st_size if about.is_file() else 0
     if size > LARGEST_METADATA:
         raise ConfigError(
-            f"{about}: {size} bytes are too many for the description of a "
-            f"bag, which has at most {LARGEST_METADATA}"
+            f"{about}: got {size} bytes, expected at most {LARGEST_METADATA} for the "
+            f"description of a bag"
         )
 
 

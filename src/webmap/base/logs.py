@@ -101,7 +101,7 @@ class Budgets:
             suffix = f" ({budget.left_out} more were left out)" * (budget.left_out > 0)
             budget.left_out = 0
             if budget.lines < 1:
-                suffix += f" (more like this is left out, but for one in {PAUSE:g} s)"
+                suffix += f" (similar lines are left out, except one every {PAUSE:g} s)"
             return suffix
 
     def clear(self) -> None:

@@ -87,8 +87,8 @@ def read_map(file: Path) -> MapImage:
     side = max(cells.shape) * settings.resolution
     if side > FARTHEST:
         raise ConfigError(
-            f"{file}: a map has sides of {FARTHEST:g} m at the most, got {side:g} m: "
-            f"{max(cells.shape)} cells of {settings.resolution:g} m"
+            f"{file}: got a side of {side:g} m ({max(cells.shape)} cells of "
+            f"{settings.resolution:g} m), expected at most {FARTHEST:g} m"
         )
     return MapImage(cells, settings.resolution, settings.origin, settings.image)
 
@@ -97,7 +97,7 @@ def _settings(file: Path) -> _Settings:
     size = file.stat().st_size if file.is_file() else 0
     if size > MAX_YAML:
         raise ConfigError(
-            f"{file}: {size} bytes are no map's YAML, which has {MAX_YAML} at the most"
+            f"{file}: got {size} bytes, expected at most {MAX_YAML} for a map's YAML"
         )
     yaml_file = LinedYaml(file, texts=True)
     table = yaml_file.data
@@ -201,15 +201,15 @@ def _read_image(file: Path, settings: _Settings) -> "NDArray[np.int8]":
         with Image.open(settings.image, formats=FORMATS) as opened:
             if opened.width * opened.height > MAX_PIXELS:
                 raise ConfigError(
-                    f"{file}: the image has {opened.width} x {opened.height} pixels; "
-                    f"{MAX_PIXELS} in all are the limit"
+                    f"{file}: the image has {opened.width} x {opened.height} pixels, "
+                    f"expected at most {MAX_PIXELS} in all"
                 )
             size = opened.width * opened.height * _PIXEL.get(opened.mode, 4)
             if size > MAX_DECODED:
                 raise ConfigError(
                     f"{file}: the image has {opened.width} x {opened.height} pixels, "
-                    f"which take {size >> 20} MiB decoded; {MAX_DECODED >> 20} MiB are "
-                    "the limit: save it in grey, with a byte a pixel"
+                    f"which take {size >> 20} MiB decoded, expected at most "
+                    f"{MAX_DECODED >> 20} MiB: save it in grey, with a byte a pixel"
                 )
             return _cells_of(opened, settings)
     except too_many as error:

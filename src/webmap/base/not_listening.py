@@ -7,11 +7,11 @@ def why_not_listening(host: str, port: int, error: OSError) -> str:
     """Return one sentence for the error of the system, with advice."""
     if error.errno == errno.EADDRINUSE:
         return (
-            f"port {port} on {host} is in use: end what uses it, choose another port, "
-            "or 0 to let the kernel choose"
+            f"port {port} on {host} is in use: end the program that uses it, or choose "
+            "another port; 0 lets the system choose"
         )
     if error.errno == errno.EACCES:
-        return f"port {port} on {host} is not permitted: choose one from 1024 up"
+        return f"port {port} on {host} is not permitted: use one from 1024 to 65535"
     if error.errno == errno.EADDRNOTAVAIL:
         return f"{host} is not an address of this machine"
     return f"cannot listen on {host}, port {port}: {error.strerror}"

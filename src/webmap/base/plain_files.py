@@ -111,4 +111,4 @@ def _kind(mode: int) -> str:
 
 
 def _no_path(path: Path) -> ConfigError:
-    return ConfigError(f"{str(path)!r} is no path: expected a text without a NUL")
+    return ConfigError(f"{str(path)!r} is not a path: expected a text without a NUL")

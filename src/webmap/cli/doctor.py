@@ -44,13 +44,13 @@ from webmap.cli.options import (
     "--ask-parameters",
     is_flag=True,
     help="Read a parameter of rosbridge through rosapi too, which shows whether a slow "
-    "service call blocks its socket.",
+    "service call blocks its connection.",
 )
 @click.option(
     "--try-call",
     is_flag=True,
     help="Offer a service that takes a second and call it, to find out whether a slow "
-    "service call blocks the socket.",
+    "service call blocks its connection.",
 )
 @topics_option
 @click.option(

@@ -62,7 +62,7 @@ def _check_number(value: Any) -> None:
     if isinstance(value, float) and not math.isfinite(value):
         raise ConfigError(f"got {value}, expected a finite number")
     if isinstance(value, int) and abs(value) >= 2**63:
-        raise ConfigError("a whole number has 64 bits")
+        raise ConfigError("expected a whole number that fits in signed 64 bits")
 
 
 class ButtonMistake(ConfigError):
@@ -120,7 +120,7 @@ def read_buttons(data: Iterable[Mapping[str, Any]]) -> list[ButtonSpec]:
     specs: list[ButtonSpec] = []
     for number, each in enumerate(data):
         if len(specs) == MAX_BUTTONS:
-            raise ConfigError(f"a robot has {MAX_BUTTONS} buttons at the most")
+            raise ConfigError(f"expected at most {MAX_BUTTONS} buttons, got more")
         try:
             spec = read_button(each)
         except ButtonMistake as error:
@@ -219,8 +219,8 @@ def motion_of(kind: Kind, name: str, type: str | None) -> str | None:
         return None
     what = f"{name} of type {type}" if by_type else name
     return (
-        f"{what} carries {moved}, and a button must not send that: all motion goes "
-        "through the gate, by driving, by a goal or by STOP"
+        f"{what} carries {moved}, which only the gate sends, by driving, by a goal or "
+        "by STOP: remove this button"
     )
 
 
@@ -289,7 +289,7 @@ def _confirm(data: Mapping[str, Any]) -> str | None:
         raise ButtonMistake(
             "confirm", f"got {confirm!r}, expected true, false or a question"
         )
-    return f"{_label(data)}: really?" if confirm else None
+    return f"Run “{_label(data)}”?" if confirm else None
 
 
 def _timeout(data: Mapping[str, Any]) -> float:

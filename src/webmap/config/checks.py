@@ -181,9 +181,7 @@ def name(value: Any) -> str:
     """Check a name: a text of one line that is not too long."""
     plain = text(value)
     if not is_name(plain):
-        raise ConfigError(
-            f"a text of one line with {LONGEST_NAME} characters at the most"
-        )
+        raise ConfigError(f"a text of one line with at most {LONGEST_NAME} characters")
     return plain
 
 
@@ -223,7 +221,7 @@ def _number(value: Any) -> bool:
 def _most(value: Any) -> str:
     """Return the limit of numbers for an error message, if this one is larger."""
     real = isinstance(value, Real) and not isinstance(value, bool)
-    return f", {LARGEST:g} at the most" if real and LARGEST < value < math.inf else ""
+    return f", at most {LARGEST:g}" if real and LARGEST < value < math.inf else ""
 
 
 def above_zero(unit: str) -> Check:

@@ -114,13 +114,13 @@ class AlignmentStore:
             RecursionError,
             ConfigError,
         ) as error:
-            log.warning("%s cannot be read (%s): as if nothing was saved", path, error)
+            log.warning("%s cannot be read (%s): saved alignment ignored", path, error)
             return None
         self._stated[name] = _of(stated)
         if (None if instead_of is None else tuple(instead_of)) != _of(stated):
             log.warning(
-                "%s: the alignment that was saved on a page is left out, as another "
-                "one was stated since",
+                "%s: the alignment that was saved on a page is no longer used, because "
+                "the configuration now states another one",
                 name,
             )
             with contextlib.suppress(OSError):

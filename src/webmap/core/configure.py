@@ -286,7 +286,7 @@ def robot_to_dict(robot: "Robot") -> dict[str, Any]:
     try:
         return config_of(robot).to_dict()
     except TypeError as error:  # an argument of a module has no form in a file
-        raise ConfigError(f"robot {robot.name!r} is no plain data: {error}") from error
+        raise ConfigError(f"robot {robot.name!r} is not plain data: {error}") from error
 
 
 def _plain(value: Any) -> Any:

@@ -41,7 +41,7 @@ class Found:
         if isinstance(self.trouble, BridgeClosed):
             return f"{self.trouble}."
         if self.trouble is not None:
-            reason = f"it has no rosapi that lists its topics: {self.trouble}"
+            reason = f"the bridge has no rosapi that lists its topics: {self.trouble}"
         else:
             reason = " ".join(self.findings.notes).rstrip(".")
         return f"{self.url}: {reason}. {LIST_ROBOTS}"

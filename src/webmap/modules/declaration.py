@@ -240,7 +240,7 @@ def _check_kinds(declared: Declaration) -> None:
                 re.compile(pattern)
             except re.error as error:
                 raise ConfigError(
-                    f"{where}: {pattern!r} is no regular expression: {error}"
+                    f"{where}: {pattern!r} is not a regular expression: {error}"
                 ) from error
         for option in kind.options:
             if option not in takes:

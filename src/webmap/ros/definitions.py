@@ -316,7 +316,7 @@ def _constant(type: str, text: str) -> Any:
         if type in FLOATS:
             return float(text)
     except ValueError:
-        raise ConfigError(f"{text!r} is no {type}") from None
+        raise ConfigError(f"{text!r} is not a value of {type}") from None
     if type == "bool":
         return text.strip().lower() in ("true", "1")
     if type in ("string", "wstring"):

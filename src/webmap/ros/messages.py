@@ -324,11 +324,11 @@ def cells_of(data: Int8s, width: int, height: int) -> "NDArray[np.int8]":
     """
     size = f"a grid of {width} x {height} cells"
     if width < 1 or height < 1:
-        raise ProtocolError(f"{size} has none")
+        raise ProtocolError(f"got {size}, expected at least 1 x 1")
     if width * height > MAX_CELLS:
-        raise ProtocolError(f"{size} is too large: {MAX_CELLS} in all are the limit")
+        raise ProtocolError(f"got {size}, expected at most {MAX_CELLS} in all")
     if width * height != len(data):
-        raise ProtocolError(f"{size} came with {len(data)} of them")
+        raise ProtocolError(f"got {len(data)} cells for {size}")
     return data.array().reshape(height, width)
 
 

@@ -129,7 +129,7 @@ async def _answer_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     texts = {
         404: "There is nothing at this address.",
-        405: "This address can only be read.",
+        405: "This address does not accept this HTTP method.",
     }
     answer = plain(error.status_code, texts.get(error.status_code, error.detail))
     answer.headers.update(error.headers or {})

@@ -313,7 +313,7 @@ class OpenSockets:
             return False
         self._sockets[key] = socket
         if before is not None:
-            before.end(REPLACED, "this page has been opened again")
+            before.end(REPLACED, "this page was opened again in another tab")
         return True
 
     def remove(self, key: Key, socket: PageSocket) -> None:

@@ -184,7 +184,7 @@ class Security:
         viewer = self._authenticate(scope)
         if inspect.isawaitable(viewer):
             viewer = await viewer
-        return viewer or Refusal(403, "Your account may not use WebMap.")
+        return viewer or Refusal(403, "Your account has no access to WebMap.")
 
 
 async def _deny(answer: Response, scope: Scope, receive: Receive, send: Send) -> None:

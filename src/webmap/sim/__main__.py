@@ -51,10 +51,10 @@ def _parser() -> argparse.ArgumentParser:
         "--port",
         type=int,
         default=0,
-        help="port to listen on; 0 lets the kernel choose",
+        help="port to listen on; 0 lets the system choose",
     )
     add("--host", default="127.0.0.1", help="address to listen on")
-    add("--seed", type=int, default=1, help="of everything random (1)")
+    add("--seed", type=int, default=1, help="random seed (1)")
     add("--map", help="map_server YAML file; by default a floor made for this")
     add("--dialect", choices=("ros1", "ros2"), default="ros1")
     add("--twist", choices=("Twist", "TwistStamped"), default="Twist")

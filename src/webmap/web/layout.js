@@ -202,7 +202,7 @@ export function readLayout(text) {
   const { version, ...parts } = given;
   if (version === undefined) {
     throw new LayoutRefused(
-      `The file is no layout: expected "version": ${VERSION}, got none. Choose a file that Save made.`,
+      `Not a layout file: expected "version": ${VERSION}, got none. Choose a file that Save made.`,
     );
   }
   if (version !== VERSION) {
@@ -231,7 +231,7 @@ function parsed(text) {
   } catch {
     const start = text.trim() === "" ? "an empty file" : shown(text.trim());
     throw new LayoutRefused(
-      `The file is no layout: expected JSON, got ${start}. Choose a file that Save made.`,
+      `Not a layout file: expected JSON, got ${start}. Choose a file that Save made.`,
     );
   }
 }

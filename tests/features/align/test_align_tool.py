@@ -118,7 +118,7 @@ def test_a_changed_configuration_overrides_the_saved_alignment(
         AlignmentStore(store._folder).restore(bob)
     assert same.pose_source.own_alignment == Pose(1.0, 2.0, math.pi / 2)
     assert other.pose_source.own_alignment == Pose(6.0, 0.0, 0.0)
-    assert "another one was stated since" in caplog.text
+    assert "now states another one" in caplog.text
     assert not store.path(NAME).exists()
     for bob in (same, other):
         bob.destroy()
@@ -197,9 +197,8 @@ def test_an_alignment_that_cannot_be_saved_is_applied_with_a_warning(
     store._folder.write_text("a file where the folder should be")
     save(tool, robot)
     said = answer(channel, "saved")
-    assert said["lost"].startswith(
-        "The alignment is lost when WebMap ends: cannot save it"
-    )
+    assert said["lost"].startswith("Cannot save the alignment: ")
+    assert said["lost"].endswith(". It is lost when WebMap ends.")
     assert robot.pose_source.own_alignment is not None
 
 
@@ -249,4 +248,4 @@ def test_a_deeply_nested_alignment_file_or_a_pipe_is_logged(store, robot, caplog
     else:
         file.write_bytes(b"[" * 100_000)
     AlignmentStore(store._folder).restore(robot)
-    assert "as if nothing was saved" in caplog.text
+    assert "saved alignment ignored" in caplog.text

@@ -197,7 +197,7 @@ def test_an_image_that_cannot_be_loaded_is_left_out_with_a_notice(tab, tmp_path)
     tab.allowed.append("404")
     root = ElementTree.parse(saved(tab, "svg", tmp_path))
     assert len(list(root.iter(f"{SVG}image"))) == 2
-    expect(tab.locator(".webmap-notice")).to_contain_text("without 1 of its images")
+    expect(tab.locator(".webmap-notice")).to_contain_text("without 1 image that")
 
 
 FLEET = """\

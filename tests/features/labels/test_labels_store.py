@@ -56,7 +56,7 @@ def test_data_other_than_a_list_of_tables_is_refused(data):
 
 
 def test_more_than_2000_labels_are_refused():
-    with pytest.raises(ConfigError, match="2000 labels are the most"):
+    with pytest.raises(ConfigError, match="expected at most 2000 labels"):
         read_labels([DOCK] * 2001, "it")
 
 

@@ -155,11 +155,11 @@ SAID = {
     "braces without end": (None, "{" * 800 + "}" * 800, "not rosbridge"),
     "a cut frame of braces": (None, '{"op":' * 1500, "not rosbridge"),
     "bytes that are nothing": (None, b"\xa1\xff\x00", "not rosbridge"),
-    "cells that are missing": ("/map", grid(1, data=[0]), "came with 1 of them"),
+    "cells that are missing": ("/map", grid(1, data=[0]), "got 1 cells for a grid"),
     "two to the 31st cells a side": (
         "/map",
         grid(1, width=2**31, height=2**31),
-        "too large",
+        "expected at most",
     ),
     "a resolution of zero": ("/map", grid(1, resolution=0), "above 0, got 0"),
     "a resolution below zero": ("/map", grid(1, resolution=-1), "above 0, got -1"),

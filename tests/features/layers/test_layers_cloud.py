@@ -170,8 +170,8 @@ BAD = {
     "came with 48 bytes": cloud(POINTS, height=2),
     "does not fit into rows": cloud(POINTS, width=5),
     "of 0 bytes does not fit": cloud(POINTS, point_step=0),
-    "less than none": cloud(POINTS, width=-1),
-    "is too large": cloud(POINTS, width=2**31, height=2**31),
+    "-1 x 1 points, expected 0 or more": cloud(POINTS, width=-1),
+    "points, expected at most": cloud(POINTS, width=2**31, height=2**31),
     "no field 'x'; they have none": cloud(POINTS, fields=[]),
     "do not fit into points of 4 bytes": cloud(POINTS, point_step=4),
     "datatypes are 1 to 8": cloud(

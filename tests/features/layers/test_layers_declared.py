@@ -51,7 +51,7 @@ def made(name="Own", base=webmap.RobotLayer, **members):
             {"kind": "a", "kinds": [webmap.TopicKind("b")]},
             "kind or kinds",
         ),
-        (("my_msgs/X",), {"kind": "a", "names": "["}, "no regular expression"),
+        (("my_msgs/X",), {"kind": "a", "names": "["}, "not a regular expression"),
         (
             ("my_msgs/X",),
             {"kinds": [webmap.TopicKind("a", options={"sizes": 1.0})]},

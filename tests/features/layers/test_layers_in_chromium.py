@@ -130,6 +130,6 @@ def test_a_path_stays_while_a_cloud_and_a_footprint_move_with_the_robot(tab):
 def test_an_invalid_costmap_gives_one_notice_and_the_last_costmap_stays(tab):
     tab.goto(tab.url + "broken")
     notice = tab.locator(".webmap-notice")
-    expect(notice).to_contain_text("/costs: a grid of 10 x 1 cells came with 3 of them")
+    expect(notice).to_contain_text("/costs: got 3 cells for a grid of 10 x 1 cells")
     expect(notice).to_have_count(1)
     await_colours(tab, [LETHAL], (-0.5, 1.1))

@@ -79,8 +79,9 @@ def test_a_scan_an_hour_off_is_drawn_with_one_notice(map, channel, monkeypatch, 
         await until(lambda: channel.problems == {})
         (line,) = scene.errors
         assert line.startswith("Bob: laserscan: ")
-        than = "later" if way == "ahead" else "earlier"
-        assert f"3600.000 s {than}; are the clocks of the sensor and of the" in line
+        side = "before" if way == "ahead" else "after"
+        assert f"3600.000 s {side} the requested" in line
+        assert "; are the clocks of the sensor and of the" in line
 
     with_scene(map, channel, scenario)
 

@@ -59,7 +59,7 @@ def test_invalid_tiles_give_one_notice_and_the_others_are_drawn(map, channel, tm
     assert len(drawn) > 3
     (said,) = channel.errors
     assert "a tile is not shown" in said
-    assert "is no PNG, JPEG or WebP" in said
+    assert "is not a PNG, JPEG or WebP" in said
 
 
 class Slow:

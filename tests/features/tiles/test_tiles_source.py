@@ -179,19 +179,19 @@ def test_a_symbolic_link_loop_a_folder_or_a_pipe_is_not_a_tile(folder):
     source = FolderTiles(folder)
     assert source.read(Tile(3, 4, 7)) is None
     for row in (8, 9):
-        with pytest.raises(ConfigError, match="is no file"):
+        with pytest.raises(ConfigError, match="is not a file"):
             source.read(Tile(3, 4, row))
 
 
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"<svg xmlns='http://www.w3.org/2000/svg'/>", "is no PNG, JPEG or WebP"),
-        (b"", "is no PNG"),
-        (png()[:20], "is no PNG"),
+        (b"<svg xmlns='http://www.w3.org/2000/svg'/>", "is not a PNG, JPEG or WebP"),
+        (b"", "is not a PNG"),
+        (png()[:20], "is not a PNG"),
         (png(size=(2000, 10)), "has 2000 x 10 pixels, expected 1024"),
         (b"\x89PNG" + bytes(5 << 20), "more than 4 MiB"),
-        (png(form="GIF"), "is no PNG, JPEG or WebP"),
+        (png(form="GIF"), "is not a PNG, JPEG or WebP"),
     ],
 )
 def test_an_invalid_tile_picture_in_a_folder_is_refused(folder, data, words):
@@ -214,7 +214,7 @@ def test_a_missing_empty_or_invalid_tile_source_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="no folder of a level"):
         open_tiles(tmp_path)
     (tmp_path / "x.mbtiles").write_bytes(b"GIF89a")
-    with pytest.raises(ConfigError, match="this is no MBTiles file"):
+    with pytest.raises(ConfigError, match="this is not an MBTiles file"):
         open_tiles(tmp_path / "x.mbtiles")
 
 
@@ -317,7 +317,7 @@ def test_an_empty_or_missing_tiles_table_is_refused(mbtiles, tmp_path):
 
 @pytest.mark.parametrize(
     ("data", "words"),
-    [("text", "got str, expected a picture"), (7, "got int"), (b"MZ", "is no PNG")],
+    [("text", "got str, expected a picture"), (7, "got int"), (b"MZ", "is not a PNG")],
 )
 def test_an_invalid_tile_picture_in_an_mbtiles_file_is_refused(mbtiles, data, words):
     with pytest.raises(ConfigError, match=words):

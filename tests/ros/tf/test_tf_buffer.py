@@ -81,8 +81,8 @@ def test_an_upside_down_sensor_has_its_left_side_on_the_right_of_the_base():
 @pytest.mark.parametrize(
     ("time", "words"),
     [
-        (12.5, "'odom' -> 'base_link': the newest is of 12.000 s, and 12.500 s is 0.5"),
-        (9.0, "the oldest is of 10.000 s, and 9.000 s is 1.000 s earlier"),
+        (12.5, "'odom' -> 'base_link': the newest stamp is 12.000 s, 0.500 s before"),
+        (9.0, "the oldest stamp is 10.000 s, 1.000 s after the requested 9.000 s"),
     ],
 )
 def test_a_lookup_outside_the_known_times_names_the_nearest_known_time(
@@ -152,7 +152,7 @@ def test_a_buffer_keeps_ten_seconds_of_transforms():
     buffer = Buffer()
     for step in range(300):
         buffer.add("odom", "base", at(step), step / 10)
-    with pytest.raises(NotKnownThen, match=r"the oldest is of 19\.900 s"):
+    with pytest.raises(NotKnownThen, match=r"the oldest stamp is 19\.900 s"):
         buffer.lookup("odom", "base", 19.0)
 
 
@@ -344,7 +344,7 @@ def test_the_reverse_lookup_gives_the_inverse_transform(tree, target, source, ti
 
 def test_a_moving_frame_is_extrapolated_for_a_limited_time(robot):
     assert place(robot.lookup("odom", "base_link", 12.15, ahead=0.2)) == (2.15, 0.0)
-    with pytest.raises(NotKnownThen, match="later"):
+    with pytest.raises(NotKnownThen, match="before the requested"):
         robot.lookup("odom", "base_link", 12.25, ahead=0.2)
 
 

@@ -70,7 +70,7 @@ def rate_finding(name: str, guess: Guess, seen: Observed, *, needed: bool) -> Fi
         return Finding(
             "warning",
             name,
-            f"{text}: too few, so it moves in jumps on the map.",
+            f"{text}: too few for smooth motion on the map.",
             "Publish it at 10 Hz or more.",
         )
     old = "" if age is None else f", {max(age, 0.0) * 1000:.0f} ms old"

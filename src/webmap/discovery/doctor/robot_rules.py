@@ -40,8 +40,8 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
             robot.name,
             "This check does not find out whether the base stops by itself when "
             "commands end.",
-            "Set its command timeout, and run the stop test where the robot may creep "
-            f"for three seconds: {command}the button on its card.",
+            "Set its command timeout, then run the stop test (up to 5 s) with half a "
+            f"metre free in front of the robot: {command}the button on its card.",
         )
 
 
@@ -124,7 +124,7 @@ def _frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         yield Finding(
             "warning",
             robot.name,
-            f"A frame is odd: {oddity}.",
+            f"Error in the frames: {oddity}.",
             "Check which node publishes it, and whether two nodes do.",
         )
 

@@ -131,12 +131,14 @@ class StopTestClient:
         if seconds is None:
             self.code = GOES_ON
             self.news.append(
-                f"Result of {day}: it does NOT stop by itself, so it is driven at 0.3 "
-                "m/s at most. Set a command timeout in the robot's base."
+                f"Result of {day}: the base does NOT stop by itself, so WebMap drives "
+                "it at 0.3 m/s at most. Set a command timeout in the robot's base."
             )
         else:
             self.code = STOPS
-            self.news.append(f"Result of {day}: it stops by itself in {seconds:.2f} s.")
+            self.news.append(
+                f"Result of {day}: the base stops by itself in {seconds:.2f} s."
+            )
 
     def _may_ask(self, now: float) -> bool:
         if now < self._asked_at + AGAIN:
@@ -213,8 +215,8 @@ def _spec(url: str, name: str, robots: tuple[FoundRobot, ...]) -> RobotSpec:
     """Return the robot's specification for the gate, without a command timeout."""
     robot = next((one for one in robots if one.name == name), None)
     if robot is None:
-        there = ", ".join(one.name for one in robots) or "no robot at all"
-        raise ConfigError(f"no robot {name!r} behind {url}; there is: {there}")
+        there = ", ".join(one.name for one in robots) or "none"
+        raise ConfigError(f"no robot {name!r} behind {url}; the robots are: {there}")
     velocity, odometry = robot.first("velocity"), robot.first("odometry")
     if velocity is None or odometry is None:
         missing = "velocity topic" if velocity is None else "odometry"

@@ -94,7 +94,7 @@ class AlignTool:
         whole = wanted.get("whole") is True
         why = self._barred(robot, whole=whole)
         if robot is None or why is not None:
-            raise ConfigError(why or "it is not on this map any more")
+            raise ConfigError(why or "The robot is no longer on this map.")
         bridge = robot.pose_source.bridge
         assert bridge is not None  # else it is barred
         before: Pose | None
@@ -115,7 +115,7 @@ class AlignTool:
             path = await asyncio.to_thread(store.save, name, before, pose, by)
         except OSError as error:
             log.error("%s: the alignment cannot be kept: %s", name, error)
-            lost = f"The alignment is lost when WebMap ends: cannot save it: {error}."
+            lost = f"Cannot save the alignment: {error}. It is lost when WebMap ends."
         else:
             log.info("%s is aligned by %s: %s", name, by, path)
             lost = ""

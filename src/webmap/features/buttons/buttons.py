@@ -143,7 +143,7 @@ class ButtonView:
     def _unknown(self, error: UnknownType) -> list[Element]:
         return [
             html.p(text=f"The fields of {error.type} are unknown."),
-            self._buttons("Ask the robot", self._ask_robot),
+            self._buttons("Get from the robot", self._ask_robot),
         ]
 
     def _buttons(self, label: str, act: Any) -> Element:
@@ -183,7 +183,7 @@ class ButtonView:
 def _result_text(button: RobotButton, why: str | None) -> str:
     """Return the text under a button that cannot be pressed because of ``why``."""
     if button.state == "running":
-        return f"Running for {button.by}"
+        return f"Running, started by {button.by}"
     return button.result or (f"Not available: {why}" if why else "")
 
 

@@ -59,7 +59,7 @@ class RobotButton:
     def barred(self) -> str | None:
         """Why the button cannot be pressed now, as text; None if it can."""
         if self.state == "running":
-            return f"already running for {self.by}"
+            return f"already running, started by {self.by}"
         report = self.robot.report
         if report is not None and report.latched and not self.spec.during_stop:
             return "STOP is active: reset it first"
@@ -187,8 +187,8 @@ def declared_motion(spec: ButtonSpec, url: str) -> str | None:
         carried = motion.writes(url).get(spec.name)
         if carried is not None:
             return (
-                f"{spec.name} carries {carried}, and a button may not write that: "
-                "the gate does"
+                f"{spec.name} carries {carried}, which only the gate publishes: "
+                "remove this button"
             )
     return None
 
@@ -264,7 +264,7 @@ async def _set_ros1(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
     now = await bridge.set_parameter(name, value, timeout=spec.timeout)
     if now != value:
         raise NotDone(
-            f"{name} was to be {shown(value)}, but the robot reports {shown(now)}"
+            f"got {shown(now)} for {name} from the robot, expected {shown(value)}"
         )
     return f"{name} is {shown(value)}"
 

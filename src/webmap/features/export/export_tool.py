@@ -40,6 +40,6 @@ class ExportTool:
             self.map.report_error(f"the view was not saved: {failed[:MAX_TEXT]}")
         elif isinstance(missing, int):
             self.map.report_error(
-                f"the view was saved without {missing} of its images: the display "
-                "no longer has them"
+                f"the view was saved without {missing} image{'s' * (missing != 1)} "
+                "that could not be loaded"
             )

@@ -80,7 +80,7 @@ def read_labels(data: Any, of: str) -> tuple[Label, ...]:
     found: list[Label] = []
     for number, each in enumerate(data):
         if len(found) == MAX_LABELS:
-            raise ConfigError(f"{of}: {MAX_LABELS} labels are the most")
+            raise ConfigError(f"{of}: expected at most {MAX_LABELS} labels, got more")
         if isinstance(each, Label):
             each = msgspec.structs.asdict(each)
             each = {key: each[key] for key in _KEYS}

@@ -61,7 +61,7 @@ class LabelLayer(Layer):
             ConfigError: If the label cannot be stored.
         """
         if len(self._drawn) >= MAX_LABELS:
-            raise ConfigError(f"{MAX_LABELS} labels are the most")
+            raise ConfigError(f"already {MAX_LABELS} labels: delete one first")
         self.added.add(label)
 
     def remove(self, id: str) -> None:

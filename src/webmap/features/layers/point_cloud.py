@@ -187,9 +187,9 @@ class PointCloud2Msg(Stamped, frozen=True, kw_only=True):
     def _check_sizes(self, row_step: int) -> None:
         size = f"a cloud of {self.width} x {self.height} points"
         if self.width < 0 or self.height < 0:
-            raise ProtocolError(f"{size} has less than none")
+            raise ProtocolError(f"got {size}, expected 0 or more each way")
         if self.width * self.height > MAX_POINTS:
-            raise ProtocolError(f"{size} is too large: {MAX_POINTS} are the limit")
+            raise ProtocolError(f"got {size}, expected at most {MAX_POINTS} in all")
         if self.point_step < 1 or row_step < self.width * self.point_step:
             raise ProtocolError(
                 f"{size} of {self.point_step} bytes does not fit into rows of "

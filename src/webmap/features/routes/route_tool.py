@@ -81,7 +81,7 @@ def read_route(value: Any) -> Route:
     for point in route.points:
         # Written so that NaN is refused too.
         if not all(abs(n) <= FARTHEST for n in (point.x, point.y, point.yaw)):
-            raise ConfigError(f"this is no point to go to: {point}")
+            raise ConfigError(f"expected x, y, heading up to {FARTHEST:g}, got {point}")
     return route
 
 

@@ -117,7 +117,7 @@ class FolderTiles:
             if not real.is_relative_to(self.folder):
                 raise ConfigError(f"{file} leads out of {self.folder}")
             if not real.is_file():
-                raise ConfigError(f"{file} is no file")
+                raise ConfigError(f"{file} is not a file")
             with real.open("rb") as stream:
                 data = stream.read(LARGEST + 1)
             return data, media_type(data, str(file))
@@ -141,7 +141,7 @@ class MBTiles:
             raise ConfigError(f"tiles {str(file)!r}: expected a folder or a file")
         with file.open("rb") as stream:
             if stream.read(len(_HEADER)) != _HEADER:
-                raise ConfigError(f"tiles {str(file)!r}: this is no MBTiles file")
+                raise ConfigError(f"tiles {str(file)!r}: this is not an MBTiles file")
         # Read only, and never with another process's journal or log.
         address = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
         self._database = sqlite3.connect(address, uri=True, check_same_thread=False)
@@ -229,7 +229,7 @@ def media_type(data: bytes, name: str) -> str:
         with Image.open(io.BytesIO(data), formats=["PNG", "JPEG", "WEBP"]) as image:
             form, (width, height) = str(image.format).lower(), image.size
     except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError):
-        raise ConfigError(f"{name} is no PNG, JPEG or WebP") from None
+        raise ConfigError(f"{name} is not a PNG, JPEG or WebP") from None
     if max(width, height) > WIDEST:
         raise ConfigError(
             f"{name} has {width} x {height} pixels, expected {WIDEST} on a side at most"

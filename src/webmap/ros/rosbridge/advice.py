@@ -125,39 +125,40 @@ def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
     """
     advice = (
         "Set call_services_in_new_thread: true on rosbridge_websocket. WebMap sends "
-        "velocity and calls over different sockets in any case."
+        "velocity and calls over different connections in any case."
     )
     how = " (tried)" if facts.tried else ", by its parameter"
     if facts.calls_in_threads is True:
-        return Finding("good", BRIDGE, f"A service that hangs blocks no socket{how}.")
+        return Finding(
+            "good", BRIDGE, f"A service that hangs blocks no other call{how}."
+        )
     if facts.calls_in_threads is False:
         return Finding(
             "warning",
             BRIDGE,
-            f"A service that hangs blocks its whole socket{how}.",
+            f"A service that hangs blocks its whole connection{how}.",
             advice,
         )
     if facts.no_result:
         return Finding(
             "note",
             BRIDGE,
-            f"Whether a service that hangs blocks its socket was tried, and is not "
-            f"known: {facts.no_result}.",
+            f"The test of a slow service call gave no result: {facts.no_result}.",
         )
     if dialect is None:
         return Finding(
             "note",
             BRIDGE,
-            "Whether a service that hangs blocks its socket is not known.",
+            "It is not known whether a service that hangs blocks its connection.",
         )
     if dialect == "ros2":
         return Finding(
             "note",
             BRIDGE,
-            "A service that hangs may block its whole socket, as rosbridge for ROS 2 "
-            "does by default; it was not tried.",
-            f"The button Try a call of the console's report finds out, or webmap "
-            f"doctor {url} --try-call. {advice}",
+            "A service that hangs may block its whole connection, as rosbridge for "
+            "ROS 2 does by default; it was not tried.",
+            f"Press Test slow call in the report on the page, or run webmap doctor "
+            f"{url} --try-call. {advice}",
         )
     return Finding(
         "good",
@@ -205,8 +206,8 @@ def too_large(robot: str, topic: str, size: int) -> Finding:
 
 
 MAYBE_TOO_LARGE = (
-    "If it is larger than max_message_size of rosbridge_websocket (10 MB unless set), "
-    "set that higher."
+    "If a message is larger than max_message_size of rosbridge_websocket (10 MB by "
+    "default), increase that parameter."
 )
 """Advice if a large message does not come."""
 

@@ -274,9 +274,10 @@ class RosbridgeLink:
         # A page shows three lines: the advice comes before the details.
         if size is None:
             text = (
-                f"{topic.name}: nothing came in CBOR for {IN_CBOR:g} s, though it is "
-                f"published, and the connection ended before it came in JSON. If it is "
-                f"larger than max_message_size of rosbridge_websocket, set that higher"
+                f"{topic.name}: no message came in CBOR for {IN_CBOR:g} s although "
+                f"the topic is published, and the connection ended before one came in "
+                f"JSON. If messages are too large, increase max_message_size of "
+                f"rosbridge_websocket"
             )
         else:
             text = (

@@ -173,8 +173,8 @@ class Buffer:
         newest = track.newest
         if newest is not None and stamp < newest - JUMP:
             note = (
-                f"{names}: time jumped back by {newest - stamp:.3f} s; what was known "
-                f"of it is forgotten"
+                f"{names}: time jumped back by {newest - stamp:.3f} s; the previous "
+                f"transforms of this frame were discarded"
             )
             track.clear()
         track.add(transform, stamp, self.history)

@@ -95,21 +95,21 @@ class Track:
             if time <= self._stamps[-1] + ahead:
                 return self._going_on(time)
             raise NotKnownThen(
-                f"the newest is of {self._stamps[-1]:.3f} s, and {time:.3f} s is "
-                f"{time - self._stamps[-1]:.3f} s later"
+                f"the newest stamp is {self._stamps[-1]:.3f} s, "
+                f"{time - self._stamps[-1]:.3f} s before the requested {time:.3f} s"
             )
         if self._stamps[place] == time:
             return self._transforms[place]
         if place == 0:
             raise NotKnownThen(
-                f"the oldest is of {self._stamps[0]:.3f} s, and {time:.3f} s is "
-                f"{self._stamps[0] - time:.3f} s earlier"
+                f"the oldest stamp is {self._stamps[0]:.3f} s, "
+                f"{self._stamps[0] - time:.3f} s after the requested {time:.3f} s"
             )
         before, after = self._stamps[place - 1], self._stamps[place]
         if after - before > gap:
             raise NotKnownThen(
                 f"there is a gap of {after - before:.3f} s from {before:.3f} s on, and "
-                f"{time:.3f} s is in it"
+                f"the requested {time:.3f} s is in it"
             )
         share = (time - before) / (after - before)
         return between(self._transforms[place - 1], self._transforms[place], share)
