@@ -130,7 +130,7 @@ def test_record_stores_only_the_named_topics_until_a_signal(ros2, tmp_path):
     with AnyReader([bag]) as reader:
         assert {c.topic for c in reader.connections} == {"/odom"}
         assert reader.message_count > 3
-    assert re.search(r"Recorded \d+ messages of 1 topics in \d+\.\d s to ", said)
+    assert re.search(r"Recorded \d+ messages of 1 topic in \d+\.\d s to ", said)
 
 
 def run(*arguments):

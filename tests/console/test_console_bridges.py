@@ -21,7 +21,7 @@ def bridge(state="open", lag=0.0, trouble=None):
     [
         (bridge(), "open", "open"),
         (bridge(lag=0.4), "open", "open"),
-        (bridge(lag=1.44), "late", "open, 1.4 s late"),
+        (bridge(lag=1.44), "late", "slow connection, 1.4 s"),
         (bridge("connecting"), "connecting", "connecting"),
         (
             bridge("connecting", trouble="no answer within 5 s", lag=9.0),
@@ -38,12 +38,12 @@ def test_a_bridge_is_open_late_connecting_or_lost(bridge, link, text):
     ("links", "text"),
     [
         (["open"], "Bridge open"),
-        (["late"], "Bridge late"),
+        (["late"], "Bridge slow"),
         (["lost"], "No connection to the bridge"),
         (["connecting"], "Connecting to the bridge"),
         (["open", "open"], "2 bridges open"),
         (["open", "lost"], "1 of 2 bridges open"),
-        (["open", "late", "lost"], "2 of 3 bridges open, 1 late"),
+        (["open", "late", "lost"], "2 of 3 bridges open, 1 slow"),
     ],
 )
 def test_the_states_of_all_bridges_are_summarized_in_one_text(links, text):

@@ -43,7 +43,7 @@ def test_the_result_of_a_stop_test_is_shown_with_its_date():
 
 @pytest.mark.parametrize(
     ("source", "text"),
-    [(None, NOBODY_KNOWS), ("tested", "The base does not stop.")],
+    [(None, NOBODY_KNOWS), ("tested", "does not stop")],
 )
 def test_a_robot_without_a_command_timeout_is_shown_without_a_bound(source, text):
     said = words(report(stop_time=None, stop_source=source, stop_date="2026-11-21"))

@@ -213,7 +213,7 @@ def test_the_round_trip_is_the_only_latency_shown_and_has_an_explanation(open_co
     expect(page.locator("#link")).to_have_text("Connected", use_inner_text=True)
     loop = page.locator(".webmap-teleop-figures .time").first
     expect(loop).to_have_attribute(
-        "title", re.compile("Round trip from this page to WebMap: ")
+        "title", re.compile("From this page to WebMap and back: ")
     )
 
 

@@ -199,8 +199,8 @@ def test_the_client_sends_only_released_inputs():
         ({"op": "hello", "connection": "c2"}, "the gate restarted in the meantime"),
         ({"op": "refused", "what": "lease", "why": "STOP by Ann"}, "STOP by Ann"),
         (
-            {**MINE, "test": {"state": "failed", "text": "a key was pressed"}},
-            "a key was pressed",
+            {**MINE, "test": {"state": "failed", "text": "an input was used"}},
+            "an input was used",
         ),
     ],
 )

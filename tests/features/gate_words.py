@@ -3,7 +3,7 @@
 import re
 
 TOO_LATE = re.compile(
-    "older than|too old|does not respond|take control first|held up|"
+    "older than|too old|does not respond|take control first|too slow|"
     "control of the robot"
 )
 """Why a goal was not taken that is taken when it is sent again."""

@@ -242,7 +242,7 @@ class TestFreshness:
 
     @pytest.mark.parametrize("x", [0.5, 0.0])
     @pytest.mark.parametrize(
-        ("tick", "why"), [(-7, "over 300 ms"), (-4000, "another session")]
+        ("tick", "why"), [(-7, "over 300 ms"), (-4000, "gate restart")]
     )
     def test_a_command_with_an_old_tick_is_refused_and_zero_is_sent_at_once(
         self, driving, x, tick, why
@@ -585,7 +585,7 @@ class TestLinks:
         bench.hold(0.5, x=1.0)
         assert bench.moving_since(at) == []
         assert bench.dropped
-        assert "held up" in bench.refusals()[-1].why
+        assert "too slow" in bench.refusals()[-1].why
         bench.clear = True
         bench.hold(0.1, x=1.0)
         assert len(bench.moving_since(at)) <= 2

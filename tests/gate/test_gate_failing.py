@@ -146,4 +146,4 @@ def test_a_viewer_receives_the_reason_why_the_gate_does_not_start(broken):
     finally:
         runtime.stop()
     assert received[0].startswith("The gate does not start: ModuleNotFoundError: ")
-    assert "no robot can be driven" in received[0]
+    assert "WebMap cannot drive robots" in received[0]

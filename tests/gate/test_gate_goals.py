@@ -41,7 +41,7 @@ def test_the_holder_of_the_lease_sends_a_goal(bench):
 
 @pytest.mark.parametrize(
     ("changes", "why"),
-    [({"epoch": 0}, "epoch"), ({"tick": 1}, "tick"), ({"seq": 0}, "seq")],
+    [({"epoch": 0}, "epoch"), ({"tick": 1}, "too old"), ({"seq": 0}, "seq")],
 )
 def test_a_goal_needs_the_lease_the_epoch_a_new_seq_and_a_recent_tick(
     bench, changes, why
@@ -163,7 +163,7 @@ def test_a_goal_is_not_sent_after_a_pause_of_the_gate(bench):
     bench.take()
     bench.held_up = 1.0
     bench.goal()
-    assert "held up" in bench.refusals()[-1].why
+    assert "too slow" in bench.refusals()[-1].why
     assert bench.of(protocol.SentGoal) == []
 
 
@@ -171,7 +171,7 @@ def test_a_goal_that_could_not_be_sent_is_reported(bench):
     bench.take()
     bench.clear = False
     bench.goal()
-    assert "held up" in bench.refusals()[-1].why
+    assert "too slow" in bench.refusals()[-1].why
     assert bench.of(protocol.SentGoal) == []
     bench.tell(protocol.Disconnect("a"))
     bench.tell(events.GoalWritten("r1", "g", 0, 0, 0, "a", False))
@@ -620,11 +620,11 @@ class TestInitialPose:
             protocol.SentPose("r1", 1.0, 2.0, 0.5, "a")
         ]
         bench.tell(events.PoseWritten("r1", 1.0, 2.0, 0.5, "a", done=False))
-        assert "dropped" in self.why(bench)
+        assert "too slow" in self.why(bench)
 
     @pytest.mark.parametrize(
         ("changes", "why"),
-        [({"epoch": 0}, "epoch"), ({"tick": 1}, "tick"), ({"seq": 0}, "seq")],
+        [({"epoch": 0}, "epoch"), ({"tick": 1}, "too old"), ({"seq": 0}, "seq")],
     )
     def test_setting_the_pose_needs_lease_epoch_new_seq_and_recent_tick(
         self, bench, changes, why

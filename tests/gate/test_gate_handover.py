@@ -161,8 +161,10 @@ class TestTransfer:
         assert bench.written[before].twist == ZERO
         report = bench.report()
         assert (report.changing, report.holder, report.armable) == (True, None, False)
-        assert report.reason == "control goes to B when the robot has stopped"
-        assert bench.refusals("a")[-1].why == "control goes to B"
+        assert report.reason == (
+            "control is being handed over to B; the robot stops first"
+        )
+        assert bench.refusals("a")[-1].why == "control is handed over to B"
         at = bench.now
         bench.run(1.1, lambda: bench.drive("a", x=1.0, epoch=first))
         assert bench.moving_since(at) == []
@@ -218,10 +220,10 @@ class TestTransfer:
         bench.take("c")
         assert (
             bench.refusals("c")[-1].why
-            == "control goes to B when the robot has stopped"
+            == "control is being handed over to B; the robot stops first"
         )
         ask(bench, "c")
-        assert "control goes to B" in bench.refusals("c")[-1].why
+        assert "control is being handed over to B" in bench.refusals("c")[-1].why
         bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
         assert bench.of(protocol.TakeReply)[-1].epoch is None
 

@@ -30,7 +30,7 @@ def test_the_first_gate_has_the_lock_of_a_machine_until_release(locks, folder):
     assert locks.acquire(KEY).held
     other = Locks(folder).acquire(KEY)
     assert (other.held, other.elsewhere) == (False, True)
-    assert other.why == "another WebMap on this computer drives it"
+    assert other.why == "another WebMap on this computer uses this robot"
     locks.release(KEY)
     second = Locks(folder)
     assert second.acquire(KEY).held
@@ -43,9 +43,7 @@ def test_all_spellings_of_this_computer_share_one_lock(locks):
     assert locks.acquire(one).held
     other = locks.acquire(two)
     assert (other.held, other.elsewhere) == (False, True)
-    assert (
-        other.why == "this WebMap already drives it as /cmd_vel of ws://127.0.0.1:9090"
-    )
+    assert other.why == "this WebMap already uses it as /cmd_vel of ws://127.0.0.1:9090"
     locks.release(two)
     assert not locks.acquire(two).held, "who does not have it lets nothing go"
     locks.release(one)

@@ -75,7 +75,7 @@ class TestDeclaration:
         bench.tell(spec(v_max=0.5))
         assert bench.written[-1].twist == ZERO
         assert bench.report().holder is None
-        assert bench.refusals()[-1].why == "the robot was declared again"
+        assert bench.refusals()[-1].why == "the configuration of the robot was changed"
         bench.drive_off()
         assert bench.written[-1].twist == Twist(0.5)
 
@@ -226,8 +226,8 @@ class TestTypes:
         sure = [not it.spec.twist_type_assumed for it in bench.did(actions.Attach)]
         assert sure == [True, False]
         assert (
-            f"robot 'Al': /cmd_vel carries {self.STAMPED}, but robot 'Bob' has "
-            "geometry_msgs/Twist there"
+            f"robot 'Al': got {self.STAMPED} for /cmd_vel, but robot 'Bob' uses "
+            "geometry_msgs/Twist for this topic; WebMap uses that type for both"
         ) in caplog.text
         # All else that it says holds for it, then and later.
         bench.tell(spec(id="r2", name="Al", twist_type=self.STAMPED, v_max=0.2))

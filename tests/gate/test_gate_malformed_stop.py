@@ -118,7 +118,7 @@ def test_a_malformed_stop_stops_the_robot_that_it_names(two, frame):
     (refused,) = two.refusals("b")
     assert (refused.robot, refused.what) == (None, "stop")
     assert refused.why.startswith("this STOP is not valid (")
-    assert refused.why.endswith("): 'r1' is stopped")
+    assert refused.why.endswith("): STOP is active for 'r1'")
 
 
 @pytest.mark.parametrize("frame", NAMES_NONE, ids=range(len(NAMES_NONE)))
@@ -126,7 +126,7 @@ def test_a_malformed_stop_without_a_known_robot_stops_all_robots(two, frame):
     send(two, frame)
     assert two.report("r1").latched
     assert two.report("r2").latched
-    assert two.refusals("b")[-1].why.endswith("): all robots are stopped")
+    assert two.refusals("b")[-1].why.endswith("): STOP is active for all robots")
     at = two.now
     two.hold(1.0, x=1.0)
     assert [w for w in two.moving_since(at) if w.at > at] == []

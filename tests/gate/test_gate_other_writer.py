@@ -267,7 +267,7 @@ class TestReport:
         assert bench.report().other_writer == SAID
 
     def test_velocities_of_another_gate_on_this_computer_are_not_reported(self, bench):
-        why = "another WebMap on this computer drives it"
+        why = "another WebMap on this computer uses this robot"
         bench.tell(LockState(KEY, held=False, why=why, elsewhere=True))
         publish(bench, 5.0)
         assert bench.report().other_writer is None

@@ -53,7 +53,7 @@ class TestTicks:
         ticks = Ticks(7)
         issue(ticks, 10.0, 10.05)
         assert ticks.age(tick, 10.1) is None
-        with pytest.raises(Refusal, match="unknown"):
+        with pytest.raises(Refusal, match="gate restart"):
             ticks.check(tick, 10.1)
 
     def test_ticks_older_than_300_ms_are_refused(self):

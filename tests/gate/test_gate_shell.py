@@ -205,7 +205,7 @@ async def test_an_error_while_sending_one_last_zero_does_not_prevent_the_others(
         async with asyncio.timeout(5):
             await gate.work
         assert broken
-        assert "a link takes no zero" in caplog.text
+        assert "zero not sent to all robots" in caplog.text
         zeros = await until(lambda: bridge.of("publish", "/second")[before:], "zero")
         assert zeros[0].message["msg"]["linear"]["x"] == 0.0
 
@@ -355,8 +355,7 @@ async def test_all_spellings_of_this_computer_name_the_same_machine(tmp_path):
         )
         assert not second.armable
         assert (
-            second.reason
-            == f"this WebMap already drives it as /cmd_vel of {bridge.url}"
+            second.reason == f"this WebMap already uses it as /cmd_vel of {bridge.url}"
         )
 
 

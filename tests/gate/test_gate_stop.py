@@ -439,7 +439,7 @@ class TestConfirmation:
         received = seen.report().stop
         assert (received.confirmed, received.why) == (
             False,
-            f"it stopped, but since then: no connection to {URL}",
+            f"the robot stopped, but now: no connection to {URL}",
         )
         seen.connect_links()
         watch_it(seen, 0.4, 0.0)
@@ -475,7 +475,7 @@ class TestConfirmation:
         watch_it(seen, 0.4, 0.0)
         seen.run(60.0)
         assert seen.did(actions.Watch)[-1] == actions.Watch(KEY, True)
-        since = "it stopped, but since then: no odometry"
+        since = "the robot stopped, but now: no odometry"
         assert verdict(seen) == ("B", False, since)
         watch_it(seen, 0.2, 0.4)
         assert verdict(seen) == ("B", False, "still moving at 0.40 m/s")

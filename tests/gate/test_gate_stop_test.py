@@ -215,7 +215,7 @@ class TestAbort:
     @pytest.mark.parametrize(
         ("doubt", "text"),
         [
-            ("key", "a key was pressed"),
+            ("key", "an input was used"),
             ("silence", "the page stopped sending commands"),
             ("stop", "STOP by B"),
             ("release", "control was released"),

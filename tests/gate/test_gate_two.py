@@ -27,7 +27,7 @@ def owner():
 def onlooker():
     """One that does not."""
     bench = Bench().begin()
-    why = "another WebMap on this computer drives it"
+    why = "another WebMap on this computer uses this robot"
     bench.tell(LockState(KEY, held=False, why=why, elsewhere=True))
     return bench
 
@@ -93,7 +93,7 @@ class TestSecondGate:
         assert onlooker.written[-1].twist == ZERO
         onlooker.say("a", op="reset", robot="r1")
         assert onlooker.refusals()[-1].why == (
-            "another WebMap on this computer drives it: reset its STOP there"
+            "another WebMap on this computer uses this robot: reset the STOP there"
         )
         assert onlooker.stops == {KEY: "A"}
 
@@ -198,7 +198,7 @@ def test_a_stop_on_another_gate_stops_the_driven_robot(client, page, robot_spec,
     second.start()
     second.declare(robot_spec)
     other = Page(second, name="Ben")
-    reason = "another WebMap on this computer drives it"
+    reason = "another WebMap on this computer uses this robot"
     eventually(lambda: other.robot().get("reason") == reason, "the other's reason")
     other.say(op="stop", robot="r1")
     at = time.monotonic()

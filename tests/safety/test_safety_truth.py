@@ -77,7 +77,7 @@ def test_the_page_shows_an_alarm_until_a_disobeying_robot_stops(bench):
     # The page has to wait for a processor as well, and at a lower priority.
     assert said_after < 1.6 + 3 * bench.sentinel.stolen(released)
     said = bench.tab.evaluate(ALARM)
-    assert "Use the hardware stop." in said
+    assert "Use the emergency stop of the robot." in said
     assert "Bob" in said
     assert "zero sent, still moving at" in said
     assert bench.tab.evaluate(COVERED), "the alarm does not cover the page"

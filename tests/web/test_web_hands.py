@@ -608,7 +608,7 @@ def test_stop_all_is_shown_as_not_confirmed_before_a_robot_is_known(
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.page.get_by_role("button", name="STOP ALL").click()
     verdicts = bench.page.locator(".webmap-stop-verdict")
-    bench.until(lambda: "All robots: STOP NOT CONFIRMED" in verdicts.inner_text())
+    bench.until(lambda: "All robots: NOT CONFIRMED" in verdicts.inner_text())
     gate.robots |= robots
     gate.change("r1", **STANDS)
     words = "Robot r1: stopped, confirmed by odometry"
@@ -646,7 +646,7 @@ def test_a_stop_without_an_answer_is_shown_as_not_confirmed(open_bench) -> None:
     words = bench.page.inner_text(".webmap-teleop-state")
     assert words == "STOP NOT CONFIRMED No answer from the gate."
     listed = bench.page.inner_text(".webmap-stop-verdict")
-    assert "Robot r1: STOP NOT CONFIRMED" in listed
+    assert "Robot r1: NOT CONFIRMED" in listed
 
 
 def test_a_robot_that_moves_after_zero_was_sent_raises_an_alarm(open_bench) -> None:

@@ -118,7 +118,7 @@ def test_an_alarm_of_the_gate_covers_the_page_and_stop_still_works(open_bench) -
     alarm.wait_for(timeout=5000)
     said = alarm.inner_text()
     assert "ROBOT NOT OBEYING" in said
-    assert "Use the hardware stop." in said
+    assert "Use the emergency stop of the robot." in said
     assert "Robot r1: zero sent, still moving at 0.31 m/s" in said
     alarm.get_by_role("button", name="STOP ALL").click()
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])

@@ -55,7 +55,7 @@ def test_the_driving_hint_on_a_touch_screen_names_no_keys(
     bench.page.locator(".webmap-teleop-lease").tap()
     bench.until(lambda: bench.shown() == "ready")
     words = bench.page.locator(".webmap-teleop-detail")
-    assert words.inner_text() == "Hold the stick to drive, let go to stop."
+    assert words.inner_text() == "Hold the stick to drive. Release to stop."
 
 
 @pytest.mark.parametrize("width", [360, 800])

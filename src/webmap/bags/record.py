@@ -112,8 +112,10 @@ async def record_to(
             failure = failure or error
     if failure is not None:
         line.show_text(f"Error: {bag.path} cannot be written: {failure}")
+    messages, topics = recorder.messages, recorder.topics
     line.show_text(
-        f"Recorded {recorder.messages} messages of {recorder.topics} topics in "
+        f"Recorded {messages} message{'s' * (messages != 1)} of "
+        f"{topics} topic{'s' * (topics != 1)} in "
         f"{lasted:.1f} s to {bag.path}: {megabytes(recorder)}, "
         f"{recorder.dropped} dropped"
     )

@@ -15,7 +15,7 @@ WORST = ("lost", "connecting", "late")
 """States that are not well, the worst first."""
 
 LATE = 0.5
-"""Seconds of delay from which a bridge's data is shown as late."""
+"""Seconds of delay from which a bridge's connection is shown as slow."""
 
 
 class BridgeList:
@@ -76,7 +76,7 @@ class BridgeList:
 def describe_link(bridge: "Bridge") -> tuple[str, str]:
     """Return the page's name for a bridge's state, and a sentence that describes it."""
     if bridge.state == "open" and bridge.lag >= LATE:
-        return "late", f"open, {bridge.lag:.1f} s late"
+        return "late", f"slow connection, {bridge.lag:.1f} s"
     if bridge.state == "open":
         return "open", "open"
     if bridge.lost:
@@ -93,10 +93,10 @@ def summary(links: Sequence[str]) -> str:
         return {
             "open": "Bridge open",
             "lost": "No connection to the bridge",
-            "late": "Bridge late",
+            "late": "Bridge slow",
         }.get(links[0], "Connecting to the bridge")
     if late:
-        return f"{open_} of {total} bridges open, {late} late"
+        return f"{open_} of {total} bridges open, {late} slow"
     if open_ == total:
         return f"{total} bridges open"
     return f"{open_} of {total} bridges open"
@@ -123,7 +123,7 @@ class RefusedList:
         self._list = html.ul(class_="bridge-list refused-list")
         summary = html.summary(self._text, self._newest, icon("icon-chevron"))
         summary.set(
-            "title", "Messages of pages that WebMap refused. They moved no robot."
+            "title", "Refused messages from pages. They did not move any robot."
         )
         self._details = html.details(summary, self._list).set(hidden=True)
         self._details.set("data-webmap-menu", "")
@@ -138,7 +138,8 @@ class RefusedList:
             return
         self._shown = rows
         self._details.set(hidden=not rows)
-        self._text.text = f"{refusals.total} refused"
+        total = refusals.total
+        self._text.text = f"{total} message{'s' * (total != 1)} refused"
         self._newest.text = rows[0].last if rows else ""
         self._list.clear()
         for row in rows[:SHOWN]:
@@ -147,8 +148,11 @@ class RefusedList:
 
 def line(by: str, count: int, last: str, at: "datetime") -> "Element":
     """Return the number of one person's refused messages, and the last of them."""
+    messages = f"{count} message{'s' * (count != 1)}"
     return html.li(
         html.span(text=by, class_="url"),
-        html.span(text=f"{count}, last at {at.astimezone():%H:%M:%S}", class_="word"),
+        html.span(
+            text=f"{messages}, the last at {at.astimezone():%H:%M:%S}", class_="word"
+        ),
         html.span(text=last, class_="refused-last"),
     )

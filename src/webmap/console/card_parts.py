@@ -17,7 +17,7 @@ COLUMNS = ("Sent", "Echoed", "Measured")
 OF_THE_PAGE = "limit of the page"
 """Why a robot is driven slower than its own limits allow."""
 
-NOBODY_KNOWS = "Command timeout of the base: unknown."
+NOBODY_KNOWS = "unknown"
 
 
 class SpeedTable:
@@ -170,8 +170,8 @@ def bound(
     """
     if stop_time is None:
         if source is None:
-            return NOBODY_KNOWS, ""
-        return "The base does not stop.", f" {sentence(source)}"
+            return NOBODY_KNOWS, " The command timeout of the base is unknown."
+        return "does not stop", f" {sentence(source)}"
     braking = v / brake
     return (
         f"stops within {number(stop_time + braking)} s",

@@ -119,8 +119,8 @@ class Row:
         self._button.set("aria-pressed", "false")
         self._button.on("click", lambda event: map.pick(robot, event))
         self._besides = html.input(type="checkbox")
-        self._besides.set("aria-label", f"{robot.name} besides")
-        self._besides.set("title", "Select it besides, for goals")
+        self._besides.set("aria-label", f"Also select {robot.name}")
+        self._besides.set("title", "Also select this robot for goals")
         self._besides.on(
             "change", lambda event: map.set_marked(robot, bool(event.checked))
         )

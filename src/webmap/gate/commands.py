@@ -287,7 +287,7 @@ def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _no_constant(name: str) -> NoReturn:
-    _refuse(f"{name} is not a number that anything can be driven by")
+    _refuse(f"got {name}, expected a finite number")
 
 
 class _Fields:
@@ -341,7 +341,7 @@ class _Fields:
     def coordinate(self, name: str) -> float:
         value = self.number(name)
         if abs(value) > MAX_COORDINATE:
-            _refuse(f"{name!r} is {value:g} m, farther than any goal")
+            _refuse(f"{name!r} is {value:g} m, expected within ±{MAX_COORDINATE:.0f} m")
         return value
 
 

@@ -105,8 +105,8 @@ class Locks:
         path = self._path(key)
         for other in self._held:
             if self._path(other) == path:
-                return f"this WebMap already drives it as {other.topic} of {other.url}"
-        return "another WebMap on this computer drives it"
+                return f"this WebMap already uses it as {other.topic} of {other.url}"
+        return "another WebMap on this computer uses this robot"
 
     def _path(self, key: Key) -> Path:
         return path_of(self._folder, key, "lock")

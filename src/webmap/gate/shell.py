@@ -173,7 +173,7 @@ class Shell:
         try:
             self._links.zero_all()
         except Exception:
-            log.exception("a link takes no zero; the others get theirs one by one")
+            log.exception("zero not sent to all robots; sending it to each separately")
             for key in self._watched:
                 with contextlib.suppress(Exception):
                     self._links.perform(actions.WriteTwist(key, ZERO, None, None))

@@ -261,8 +261,8 @@ def check_twist_type(spec: RobotSpec, others: Iterable[RobotSpec]) -> None:
             and not same_type(other.twist_type, spec.twist_type)
         ):
             raise ConfigError(
-                f"robot {spec.name!r}: {spec.twist_topic} carries {spec.twist_type}, "
-                f"but robot {other.name!r} has {other.twist_type} there"
+                f"robot {spec.name!r}: got {spec.twist_type} for {spec.twist_topic}, "
+                f"but robot {other.name!r} uses {other.twist_type} for this topic"
             )
 
 

@@ -9,7 +9,7 @@ const FINGERS = { touch: true, stick: true };
 test("the hint for driving by touch names no keys", () => {
   assert.deepEqual(withoutKeys(READY, FINGERS, "the stick"), {
     ...READY,
-    detail: "Hold the stick to drive, let go to stop.",
+    detail: "Hold the stick to drive. Release to stop.",
   });
 });
 
@@ -19,6 +19,6 @@ test("the hint is unchanged without touch or without a stick", () => {
 });
 
 test("the text of another state is unchanged for driving by touch", () => {
-  const lost = { state: "lost", title: "Connection lost", detail: "Reconnecting…" };
+  const lost = { state: "lost", title: "No connection to WebMap", detail: "Reconnecting…" };
   assert.equal(withoutKeys(lost, FINGERS, "the stick"), lost);
 });

@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { RETRY, sendGoal, TRIES } from "../../../src/webmap/web/tools/goal_texts.js";
 import { holdTimeouts, settle } from "../../web/tools/held_timeouts.js";
 
-const LINKLESS = "no connection to the bridge of its goals";
+const LINKLESS = "no connection to the bridge that takes goals";
 
 const pass = holdTimeouts();
 

@@ -5,7 +5,7 @@ import { RouteRobots } from "../../../src/webmap/features/routes/route_run.js";
 import { TRIES } from "../../../src/webmap/web/tools/goal_texts.js";
 import { holdTimeouts, settle } from "../../web/tools/held_timeouts.js";
 
-const LINKLESS = "no connection to the bridge of its goals";
+const LINKLESS = "no connection to the bridge that takes goals";
 const POINTS = [1, 2, 3].map((x) => ({ x, y: 0, yaw: 0 }));
 
 const pass = holdTimeouts();

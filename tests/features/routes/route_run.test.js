@@ -96,7 +96,7 @@ test("a failed goal halts the route until the operator resumes or skips", () => 
 test("STOP, a lost lease, another goal and a cancel halt the route", () => {
   const cases = [
     [goal("g1"), { latched: true }, /STOP/],
-    [goal("g1"), { mine: false }, /has no control of the robot/],
+    [goal("g1"), { mine: false }, /no longer has control of the robot/],
     [goal("g9"), {}, /another goal/],
     [goal("g1", "cancelled", { why: "STOP" }), {}, /cancelled: STOP/],
     [goal("g1", "cancelling"), {}, /cancelled/],

@@ -87,7 +87,7 @@ describe("a STOP", () => {
   });
 
   test("of a robot without a connection is shown as such at once", () => {
-    assert.match(verdict(report({ link: "down" }), 10, 20).text, /no connection to the robot/);
+    assert.match(verdict(report({ link: "down" }), 10, 20).text, /no connection to the bridge/);
     assert.match(verdict(null, 0, 1, false).text, /no connection/);
   });
 
@@ -131,7 +131,7 @@ describe("a STOP for all robots before any robot is known", () => {
     assert.equal(unheard.name, "All robots");
     assert.match(unheard.text, /^NOT CONFIRMED: no connection/);
     const [silent] = verdicts([], ANSWER_PATIENCE + 1);
-    assert.equal(silent.text, "STOP NOT CONFIRMED: no answer from the gate");
+    assert.equal(silent.text, "NOT CONFIRMED: no answer from the gate");
   });
 
   test("applies to robots that are reported before the answer", () => {
@@ -184,7 +184,7 @@ describe("a latched STOP", () => {
 
   test("is not answered by a report that is not latched", () => {
     const free = report({ state: "free", latched: false });
-    assert.match(verdict(free, 100, ANSWER_PATIENCE + 1).text, /^STOP NOT CONFIRMED/);
+    assert.match(verdict(free, 100, ANSWER_PATIENCE + 1).text, /^NOT CONFIRMED/);
   });
 
   test("sent again needs no new answer", () => {

@@ -290,5 +290,5 @@ function placeOf(map, robot) {
  */
 export function withoutKeys(description, { touch, stick }, inputs) {
   if (!touch || !stick || description.state !== "ready") return description;
-  return { ...description, detail: `Hold ${inputs} to drive, let go to stop.` };
+  return { ...description, detail: `Hold ${inputs} to drive. Release to stop.` };
 }

@@ -151,7 +151,7 @@ class RosoutPanel {
       book.showState();
     }
     setText(this._badge, bad > 0 ? `${bad}` : "");
-    this._badge.title = bad > 0 ? `${bad} errors in the newest lines` : "";
+    this._badge.title = bad > 0 ? `${bad} error${bad === 1 ? "" : "s"} in the newest lines` : "";
     const total = this._books.reduce((sum, book) => sum + book.total, 0);
     const lines = (/** @type {number} */ n) =>
       `${n.toLocaleString("en")} ${n === 1 ? "line" : "lines"}`;

@@ -112,7 +112,8 @@ export class RouteArea {
     if (this.draws) return this._refused || this._drawingText();
     if (!this._closed) return "";
     const { problem, points, sweeps } = this._plan;
-    return problem || `${points.length} points, ${sweeps.length} sweeps.`;
+    const count = sweeps.length === 1 ? "1 sweep" : `${sweeps.length} sweeps`;
+    return problem || `${points.length} points, ${count}.`;
   }
 
   /** Whether the text is the reason of a refusal. */
@@ -141,7 +142,7 @@ export class RouteArea {
   _drawingText() {
     const count = this._corners.length;
     if (count < 3) return "Press each corner of the area on the map.";
-    return `${count} corners. Press the first again, or Done.`;
+    return `${count} corners. Press the first corner again, or press Done.`;
   }
 
   /** @param {boolean} active */

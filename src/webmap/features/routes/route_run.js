@@ -143,7 +143,7 @@ export class RouteRun {
     // Until the gate has accepted the goal, control may not be granted yet.
     if (this.state !== "going" || this._acceptedAt === null) return null;
     if (latched) return this._halted("STOP was pressed");
-    if (!mine) return this._halted("this page has no control of the robot any more");
+    if (!mine) return this._halted("this page no longer has control of the robot");
     if (!goal || goal.id === this._before) {
       const late = now - this._acceptedAt > PATIENCE;
       return late ? this._halted("the goal was not sent") : null;
@@ -153,7 +153,7 @@ export class RouteRun {
     const since = now - this._acceptedAt;
     if (goal.state === "reached") return this._arrived(goal.id, since);
     if (look(goal).over || goal.state === "cancelling") {
-      const what = goal.state === "failed" ? "failed" : "its goal was cancelled";
+      const what = goal.state === "failed" ? "the goal failed" : "the goal was cancelled";
       return this._halted(goal.why ? `${what}: ${goal.why}` : what);
     }
     const silent = goal.method === "topic" && away !== null && away < THERE;

@@ -204,9 +204,7 @@ class RouteTool:
         elif op not in ("save", "delete"):
             log.warning("%r: an unknown message of the page was ignored", self.map)
         elif self.map.page.viewer.role == "viewer":
-            self.browser_part.send(
-                {"problem": "Who may not drive may not change routes."}
-            )
+            self.browser_part.send({"problem": "Only operators can change routes."})
         elif op == "save":
             self._do(lambda: self._save(message))
         else:

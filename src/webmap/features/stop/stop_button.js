@@ -208,7 +208,7 @@ class Alarm {
       { role: "alert", "aria-atomic": "false", popover: "manual" },
       this._twins.element,
       html("p", "webmap-alarm-title", {}, "ROBOT NOT OBEYING"),
-      html("p", "webmap-alarm-act", {}, "Use the hardware stop."),
+      html("p", "webmap-alarm-act", {}, "Use the emergency stop of the robot."),
       this._names,
       this._stop,
       button("webmap-alarm-seen", "Acknowledge", () => {

@@ -76,8 +76,8 @@ def in_words(reason: str, *, spoke: bool) -> str:
     """
     what = "ended repeatedly" if spoke else "does not start"
     return (
-        f"The gate {what}: {reason}. WebMap starts it again. Until then no robot "
-        "can be driven from here; a STOP is kept and sent then."
+        f"The gate {what}: {reason}. WebMap restarts the gate. Until it runs, WebMap "
+        "cannot drive robots; WebMap keeps a STOP and sends it after the restart."
     )
 
 
@@ -171,7 +171,7 @@ class GateProcess:
                     del self._unsent[: os.write(self._in, self._unsent)]
             except BlockingIOError:
                 if len(self._unsent) > MAX_UNSENT:
-                    self.kill("it does not read")
+                    self.kill("it does not read its pipe")
             except OSError:
                 self._unsent.clear()  # the gate has ended; the reader reports it
 

@@ -83,7 +83,7 @@ def assist(
     allowed = math.sqrt(2 * spec.brake * room) if room > 0 else 0.0
     if allowed >= speed:
         return FREE
-    return AllowedShare(allowed / speed, f"scan assist: obstacle {gap:.1f} m ahead")
+    return AllowedShare(allowed / speed, f"scan assist: obstacle {gap:.1f} m away")
 
 
 def points_of(spec: AssistSpec, sweep: Scan, within: float = math.inf) -> list[Point]:

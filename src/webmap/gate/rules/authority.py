@@ -79,7 +79,7 @@ class MotionConditions:
         goals = self._robots.goals[self._robots.newest.id]
         if not goals.can_send:
             return "the robot has no velocity topic and no goal topic"
-        return None if goals.link.up else "no connection to the bridge of its goals"
+        return None if goals.link.up else "no connection to the bridge that takes goals"
 
     def why_blocked(self, now: float) -> str | None:
         """Return why the machine must not be driven now, or ``None``."""
@@ -217,7 +217,7 @@ class Authority:
         successor = self.handover.successor
         if successor is not None and not self._conditions.stopped:
             name = successor.name or successor.id
-            return f"control goes to {name} when the robot has stopped"
+            return f"control is being handed over to {name}; the robot stops first"
         return self._conditions.why_unavailable(now)
 
     def is_held_by(self, connection: str) -> bool:
@@ -304,7 +304,7 @@ class Authority:
 
     def hand_over(self, successor: Connection, now: float) -> None:
         """Write zero; ``successor`` gets control when the machine has stopped (S5)."""
-        self._end(f"control goes to {successor.name or successor.id}", now)
+        self._end(f"control is handed over to {successor.name or successor.id}", now)
         if self._robots.drivable:
             self._motion.zero(now)
         # A robot that follows a goal would not stop.

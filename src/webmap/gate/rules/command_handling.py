@@ -129,7 +129,7 @@ class CommandHandler:
             now: Seconds, monotonic.
 
         Returns:
-            What is stopped, as text for people.
+            For what STOP is active, as text for people.
 
         """
         try:
@@ -137,7 +137,7 @@ class CommandHandler:
         except Refusal:
             robot = None
         self.stop(robot, by, now)
-        return "all robots are stopped" if robot is None else f"{robot!r} is stopped"
+        return f"STOP is active for {'all robots' if robot is None else repr(robot)}"
 
     def reset(self, robot: str, stop: str, by: Connection, now: float) -> None:
         """End the STOP with the identity ``stop`` of a robot."""

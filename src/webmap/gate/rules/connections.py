@@ -76,7 +76,7 @@ class Ticks:
         """
         age = self.age(tick, now)
         if age is None:
-            raise Refusal("unknown tick: too old, or from another session")
+            raise Refusal("command too old, or from before a gate restart: ignored")
         if age > MAX_AGE:
             raise Refusal(f"command too old (over {MAX_AGE * 1000:.0f} ms): ignored")
         return age
@@ -143,7 +143,7 @@ def check_lease(lease: Lease | None, connection: str, epoch: int) -> None:
         raise Refusal(f"{lease.name or lease.connection} has control")
     if lease.epoch != epoch:
         raise Refusal(
-            f"got epoch {epoch}, expected {lease.epoch}, the epoch of the lease"
+            f"control of the robot changed: got epoch {epoch}, expected {lease.epoch}"
         )
 
 

@@ -56,8 +56,8 @@ class Driving:
             return None if neutral else reason
         self._authority.deadman.accept(neutral, tick, now)
         if self._authority.deadman.expired(now):
-            self._disarm_and_halt("the page receives no ticks", now)
-            return None if neutral else "the page received no new tick"
+            self._disarm_and_halt("the page received no message from the gate", now)
+            return None if neutral else "no message from the gate: release all inputs"
         if self._tests.running is not None:
             return self._go_on_with_test(self._tests.running, lease, neutral, now)
         if neutral or not self._authority.deadman.armed:
@@ -101,7 +101,7 @@ class Driving:
         self, test: StopTest, lease: Lease, neutral: bool, now: float
     ) -> str | None:
         if not neutral:
-            self._disarm_and_halt("a key was pressed", now)
+            self._disarm_and_halt("an input was used", now)
             return "a stop test was running: release all inputs first"
         if not self._authority.deadman.armed:
             self._disarm_and_halt("the page stopped sending commands", now)

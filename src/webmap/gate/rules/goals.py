@@ -30,7 +30,7 @@ BRAKES = 2.0
 OVER = ("reached", "failed", "cancelled")
 """The final states of a goal."""
 
-ELSEWHERE = "goals now go elsewhere: the state of this goal is unknown"
+ELSEWHERE = "the goal settings were changed: the result of this goal is unknown"
 
 
 class Goals:
@@ -117,7 +117,7 @@ class Goals:
         if method is None:
             raise Refusal("no goal topic and no action is set")
         if not self.link.up:
-            raise Refusal("no connection to the bridge of its goals")
+            raise Refusal("no connection to the bridge that takes goals")
         id, until = generate_id(), now + WAIT_LIMIT
         self._emit(SendGoal(self._key, self.spec.id, id, x, y, yaw, by, method, until))
 
@@ -135,7 +135,7 @@ class Goals:
         if self.following and (self.can_cancel or self.method != "topic"):
             raise Refusal("the robot is navigating: cancel the goal first")
         if not self.link.up:
-            raise Refusal("no connection to the bridge of its initial pose")
+            raise Refusal("no connection to the bridge that takes the initial pose")
         until = now + WAIT_LIMIT
         self._emit(SendPose(self._key, self.spec.id, x, y, yaw, by, until))
 

@@ -142,7 +142,7 @@ class Machine:
         self, spec: RobotSpec, tasks: LinkHealth, hooks: LinkHealth, now: float
     ) -> None:
         """Add a robot or update its declaration; both end the lease."""
-        self.authority.end("the robot was declared again", now)
+        self.authority.end("the configuration of the robot was changed", now)
         self.robots.declare(spec, tasks, hooks, now)
 
     def attached(self, now: float) -> None:
@@ -155,7 +155,7 @@ class Machine:
         self.robots.leaving.add(robot)
         if not self.robots.holds_without(robot):
             self.authority.end(
-                "the robot, or one on the same velocity topic, was removed", now
+                "the robot, or another with the same velocity topic, was removed", now
             )
         self.robots.goals[robot].lost(now)
         self._left_at = now
@@ -218,7 +218,7 @@ class Machine:
 
         """
         if self.conditions.lock.elsewhere:
-            raise Refusal(f"{self.conditions.lock.why}: reset its STOP there")
+            raise Refusal(f"{self.conditions.lock.why}: reset the STOP there")
         self.active_stop.reset(stop)
         self._update_watch(now)
 

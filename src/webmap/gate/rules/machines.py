@@ -232,7 +232,7 @@ class Machines:
         try:
             check_twist_type(spec, self._staying())
         except ConfigError as error:
-            log.error("%s; that one counts", error)
+            log.error("%s; WebMap uses that type for both", error)
             return _assumed(spec, True)
         return spec
 
@@ -297,7 +297,7 @@ class Machines:
             return
         machine.on_written(event, now)
         if event.by is not None and not event.done:
-            why = "a command was dropped: the connection or the gate was held up"
+            why = "the command was not sent: the connection or the gate was too slow"
             self._refuse(event.by, machine.robots.newest.id, "drive", why, now)
 
     def _goal_written(self, event: events.GoalWritten, now: float) -> None:
@@ -310,7 +310,7 @@ class Machines:
             sent = SentGoal(event.robot, event.x, event.y, event.yaw, event.by)
             self._emit(SendToDisplay(sent))
         else:
-            why = "the goal was dropped: the connection or the gate was held up"
+            why = "the goal was not sent: the connection or the gate was too slow"
             self._refuse(event.by, event.robot, "goal", why, now)
 
     def _pose_written(self, event: events.PoseWritten, now: float) -> None:
@@ -318,7 +318,7 @@ class Machines:
             sent = SentPose(event.robot, event.x, event.y, event.yaw, event.by)
             self._emit(SendToDisplay(sent))
         else:
-            why = "the pose was dropped: the connection or the gate was held up"
+            why = "the pose was not sent: the connection or the gate was too slow"
             self._refuse(event.by, event.robot, "locate", why, now)
 
     def _goal_progress(self, event: events.GoalProgress, now: float) -> None:

@@ -230,7 +230,7 @@ class Confirmation:
         return self._moving()
 
     def _since_then(self, trouble: str) -> str:
-        return f"it stopped, but since then: {trouble}" if self._stopped else trouble
+        return f"the robot stopped, but now: {trouble}" if self._stopped else trouble
 
     def _moving(self) -> str:
         speed = self._still.speed or 0.0

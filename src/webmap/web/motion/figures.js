@@ -91,8 +91,8 @@ export function timings(report, loop, motion) {
       name: "Round trip",
       kind: "time",
       text: duration(age),
-      title: "From your input to the robot's bridge and back: 95 % of commands take less. "
-        + `Round trip from this page to WebMap: ${duration(loop)}.`,
+      title: "From this page to the robot's bridge and back: 95 % of commands take less. "
+        + `From this page to WebMap and back: ${duration(loop)}.`,
     },
     { name: "Command to motion", kind: "time", text: duration(motion) },
     {

@@ -104,7 +104,7 @@ export class LeaseRequests {
     const { choice } = this;
     if (this._asked) {
       if (now - this._asked.since > TAKE_PATIENCE) {
-        this.refusal = "no answer";
+        this.refusal = "no answer from the gate";
         this._giveUp(now);
       }
       return [];

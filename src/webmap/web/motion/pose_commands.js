@@ -81,7 +81,7 @@ export class PoseCommands {
   step(now) {
     for (const operation of this._pending) {
       if (operation.reached()) operation.end(null);
-      else if (now - operation.since > TAKE_PATIENCE) operation.end("No answer from the gate.");
+      else if (now - operation.since > TAKE_PATIENCE) operation.end("no answer from the gate");
     }
   }
 

@@ -152,7 +152,7 @@ function ofLink({ link }) {
   if (link === "lost") {
     return description(
       "lost",
-      "Connection lost",
+      "No connection to WebMap",
       "No robot can be driven from this page. Reconnecting…",
     );
   }

@@ -207,11 +207,11 @@ function judge(robot, report, watch, connected, now) {
   const waited = now - watch.since;
   if (!connected) return unsure("no connection to WebMap; STOP is sent again after reconnecting");
   if (!watch.answered && waited > ANSWER_PATIENCE) {
-    const text = "STOP NOT CONFIRMED: no answer from the gate";
+    const text = "NOT CONFIRMED: no answer from the gate";
     return { robot, name, state: "unconfirmed", text };
   }
   if (report?.stop?.confirmed === false) return unsure(report.stop.why);
-  if (report?.link === "down") return unsure("no connection to the robot");
+  if (report?.link === "down") return unsure("no connection to the bridge");
   if (watch.stoppedAt !== null) {
     const more = [...besides(report?.stop?.why), ...(report?.hooks ?? [])];
     const parts = ["stopped, confirmed by odometry", ...more];
