@@ -85,7 +85,7 @@ test("a failed goal halts the route until the operator resumes or skips", () => 
   const run = underWay();
   assert.equal(say(run, goal("g1", "failed", { why: "no path" })), null);
   assert.equal(run.state, "halted");
-  assert.equal(run.why, "failed: no path");
+  assert.equal(run.why, "the goal failed: no path");
   assert.equal(say(run, goal("g1", "failed")), null);
   assert.deepEqual(run.go("g1"), { send: POINTS[0] });
   run.accepted(0);
