@@ -322,7 +322,7 @@ def scan_assist(b):
     ann.drive(bob, x=1.0, until=driven(site, FULL))
     site.repeated["/scan"] = scan_of(0.44)
     ann.drive(bob, x=1.0, until=lambda: CREEP < site.speeds[-1] < FULL)
-    b.shows("near a wall", ann, bob, lambda r: "ahead" in str(r["why"]))
+    b.shows("near a wall", ann, bob, lambda r: "away" in str(r["why"]))
     ann.release_inputs(bob)
     b.model(robots.no_assist, bob)
     b.until(lambda: not ann.report(bob)["mine"], "the robot, declared anew")
