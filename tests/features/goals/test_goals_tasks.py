@@ -185,7 +185,7 @@ class TestRoutes:
             role="viewer",
         )
         assert "loaded" in answers[0]
-        assert all("may not drive" in answer["problem"] for answer in answers[1:])
+        assert all("Only operators" in answer["problem"] for answer in answers[1:])
 
     def test_an_invalid_route_command_gets_a_problem_and_changes_nothing(self, ask):
         answers = ask(
