@@ -112,10 +112,10 @@ async def record_to(
             failure = failure or error
     if failure is not None:
         line.show_text(f"Error: {bag.path} cannot be written: {failure}")
-    messages, topics = recorder.messages, recorder.topics
+    n_messages, n_topics = recorder.messages, recorder.topics
     line.show_text(
-        f"Recorded {messages} message{'s' * (messages != 1)} of "
-        f"{topics} topic{'s' * (topics != 1)} in "
+        f"Recorded {n_messages} message{'s' * (n_messages != 1)} of "
+        f"{n_topics} topic{'s' * (n_topics != 1)} in "
         f"{lasted:.1f} s to {bag.path}: {megabytes(recorder)}, "
         f"{recorder.dropped} dropped"
     )
