@@ -274,7 +274,7 @@ def changed(old, new):
         ),
         (GOOD.encode("utf-16"), "byte order mark"),
         (b'title = "ok"\nfloor = "\xff"\n', "FILE:2: this is not UTF-8"),
-        ("x = " + "[" * 5000, "FILE:1: keys and values are nested 20 deep at the most"),
+        ("x = " + "[" * 5000, "FILE:1: keys and values are nested at most 20 deep"),
         (
             "x = " + "9" * 5000,
             "FILE:1: this is not TOML: a whole number of far too many digits",

@@ -205,8 +205,8 @@ def test_the_namespace_of_a_robot_option_is_the_common_prefix_of_its_topics(
             "robot 'bob:/odom2': another robot is called 'Bob'",
         ),
         (["Bob:/a b"], "robot 'Bob:/a b': '/a b' is not the name of a topic: expected"),
-        (["B\nob:/a"], "a name is one line of 100 characters at the most"),
-        (["b" * 101 + ":/a"], "a name is one line of 100 characters at the most"),
+        (["B\nob:/a"], "a name is one line of at most 100 characters"),
+        (["b" * 101 + ":/a"], "a name is one line of at most 100 characters"),
         (["Bob:/a:/c", "Al:/b:c/"], "c/ already drives 'Bob'; expected another topic"),
     ],
 )

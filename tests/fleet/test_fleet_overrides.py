@@ -50,7 +50,7 @@ def found():
             "got the type 'std_msgs/String', expected "
             "geometry_msgs/Twist or geometry_msgs/TwistStamped",
         ),
-        ("robot_1.name=a\tb", "a name is one line of 100 characters at the most"),
+        ("robot_1.name=a\tb", "a name is one line of at most 100 characters"),
     ],
 )
 def test_the_error_for_an_invalid_setting_explains_the_mistake(text, words):

@@ -41,7 +41,7 @@ TOLD = f"Bob:{ROBOT}/odom:{ROBOT}/cmd_vel:{ROBOT}/scan"
 BOB = '.robot[data-name="Bob"]'
 
 SOON = 1.0
-"""Seconds; the gate takes 0.25 at the most, and the machine may be busy."""
+"""Seconds; the gate takes at most 0.25, and the machine may be busy."""
 
 
 @pytest.fixture(scope="module")

@@ -286,7 +286,7 @@ def test_a_reader_that_reads_nothing_is_disconnected(monkeypatch):
     [
         (b"GET /stream HTTP/1.1\r\n\r\n", 400, "the topic of the camera is missing"),
         (b"PUT / HTTP/1.1\r\n\r\n", 405, "use GET for pictures, got 'PUT'"),
-        (b"GET /" + b"x" * 100_000, 431, "8192 bytes at the most"),
+        (b"GET /" + b"x" * 100_000, 431, "at most 8192 bytes"),
         (b"GET / HTTP/1.1\r\n", 408, "no complete request came within 0.1 s"),
         (
             b"GET /stream?topic=/robot_7/camera/image_raw HTTP/1.0\r\n\r\n",

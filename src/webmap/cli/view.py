@@ -44,7 +44,7 @@ from webmap.cli.options import Finite, one_bridge, topics_option, web_options
     "--stops-within",
     type=Finite(0.0, min_open=True),
     help="Command timeout: seconds after which every base stops by itself when "
-    "commands end. Without it, robots are driven at 0.3 m/s and 0.6 rad/s at the most.",
+    "commands end. Without it, the limits are 0.3 m/s and 0.6 rad/s.",
 )
 @click.option(
     "--floor",

@@ -89,8 +89,8 @@ class FleetText:
         line = too_deep(text)
         if line is not None:
             raise ConfigError(
-                f"{name}:{line}: keys and values are nested {DEEPEST} deep at the "
-                f"most; {EXPECTED}"
+                f"{name}:{line}: keys and values are nested at most {DEEPEST} "
+                f"deep; {EXPECTED}"
             )
         try:
             self.data = tomllib.loads(text)

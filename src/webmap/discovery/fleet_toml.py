@@ -16,8 +16,8 @@ HEAD = """\
 
 UNSURE = (
     "Set the command timeout, if you know it: the time in seconds after which the base",
-    "stops by itself when commands end. Without it the robot is driven at 0.3 m/s and",
-    "0.6 rad/s at the most.",
+    "stops by itself when commands end. Without it, the limits are 0.3 m/s and",
+    "0.6 rad/s.",
     "twist.stops_within = 0.25",
 )
 

@@ -87,7 +87,7 @@ def check_name(name: str, where: str) -> None:
     """
     if not is_name(name):
         raise ConfigError(
-            f"{where}: a name is one line of {LONGEST_NAME} characters at the most"
+            f"{where}: a name is one line of at most {LONGEST_NAME} characters"
         )
 
 

@@ -135,6 +135,5 @@ def check_items(field: str, count: int) -> None:
     most, _ = ITEMS.get(field, (MAX_VALUES, ""))
     if count > most:
         raise TooLarge(
-            f"got a message with {count} {field}; {most} are the limit: "
-            f"{GENERAL.advice}"
+            f"got a message with {count} {field}; the limit is {most}: {GENERAL.advice}"
         )

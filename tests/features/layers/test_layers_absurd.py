@@ -97,7 +97,7 @@ def high(z: float) -> dict:
         (
             "Range",
             sonar(1e30, high=3.4e38),
-            "a cone is 1e+07 m long at the most, got a max_range of 3.4e+38 m with",
+            "a cone is at most 1e+07 m long, got a max_range of 3.4e+38 m with",
         ),
         (
             "LaserScanner",
@@ -141,9 +141,9 @@ def test_robot_messages_with_absurdly_large_values_are_refused(
         (marker(STRIP, [(0, 0, FAR), (0, 1)]), "got a height of 1e+300"),
         (marker(CUBE, pose=high(FAR)["pose"]), "got a height of 1e+300"),
         (marker(TEXT, pose=high(FAR)["pose"]), "got a height of 1e+300"),
-        (marker(CUBE, scale=(1, FAR, 1)), "scale.y must be 1e+07 m at the most, got 1"),
-        (marker(SPHERE, scale=(2e7, 1, 1)), "scale.x must be 1e+07 m at the most"),
-        (marker(ARROW, scale=(FAR, 1, 1)), "scale.x must be 1e+07 m at the most"),
+        (marker(CUBE, scale=(1, FAR, 1)), "scale.y must be at most 1e+07 m, got 1"),
+        (marker(SPHERE, scale=(2e7, 1, 1)), "scale.x must be at most 1e+07 m"),
+        (marker(ARROW, scale=(FAR, 1, 1)), "scale.x must be at most 1e+07 m"),
         (marker(TEXT, text="a", scale=(1, 1, FAR)), "scale.z must be 1e+07 m"),
         *(
             (marker(type, [(0, 0), (1, 1)], scale=(FAR, 1, 1)), "scale.x must be 1e+07")
@@ -166,7 +166,7 @@ def test_markers_with_absurdly_large_values_are_refused(
 @pytest.mark.parametrize(
     ("message", "said"),
     [
-        (grid(CORNERS, 1e308), "sides of 1e+07 m at the most, got 3 x 2 cells of 1e+"),
+        (grid(CORNERS, 1e308), "sides of at most 1e+07 m, got 3 x 2 cells of 1e+"),
         (grid(CORNERS, 3.4e6), "3 x 2 cells of 3.4e+06 m"),
         (grid(CORNERS, origin=pose(FAR, 0)), "within 1e+07 m of the origin"),
     ],

@@ -205,7 +205,7 @@ def test_the_number_of_parts_is_limited(link, module, robot, monkeypatch):
     monkeypatch.setattr(room, "MAX_PARTS", 3)
     link.say("/diagnostics", array(*(status(f"p{i}", 0) for i in range(5))))
     assert len(module.parts) == 3
-    assert "3 parts are the limit" in next(iter(robot.problems.values()))
+    assert "the limit is 3 parts" in next(iter(robot.problems.values()))
 
 
 def test_an_update_triggers_other_modules_and_removal_removes_the_badge(

@@ -304,7 +304,7 @@ def test_markers_beyond_the_limit_are_left_out_and_counted_in_a_notice(
         assert len(layer.svg.children) == 10
         await until(lambda: channel.problems)
         (said,) = channel.problems.values()
-        assert said == "/markers: 2 markers are left out: 10 are drawn at the most"
+        assert said == "/markers: 2 markers are left out: at most 10 are drawn"
         say(link, marker(CUBE, id=0, action=3))  # delete all
         assert not channel.problems
         say(link, *(marker(CUBE, id=i) for i in range(11)))
@@ -321,7 +321,7 @@ def test_a_marker_with_a_very_long_namespace_is_left_out_with_a_short_notice(
     say(link, marker(CUBE, ns="n" * 100_000), marker(CUBE, id=2))
     assert len(layer.svg.children) == 1
     (said,) = channel.problems.values()
-    assert "a namespace of 100000 characters; 256 are the limit" in said
+    assert "a namespace of 100000 characters; the limit is 256" in said
     assert len(said) < 1100
 
 

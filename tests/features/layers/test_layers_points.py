@@ -228,7 +228,7 @@ def test_cells_beyond_max_cells_are_thinned_with_a_problem(link, robot):
         (cells([(1, 1)], width=FAR), "got 1e+300"),
         (
             cells([]) | {"cells": [at(0, 0)] * 100_001},
-            "100001 cells; 100000 are the limit",
+            "100001 cells; the limit is 100000",
         ),
         (cells([(5, 5)]) | {"header": ENDLESS}, "seconds of hundreds of digits"),
     ],

@@ -338,7 +338,7 @@ class Diagnostics:
     def _take(self, status: DiagnosticStatusMsg) -> None:
         name = status.name[:LONGEST_NAME]
         if name not in self._parts and len(self._parts) >= MAX_PARTS:
-            raise ProtocolError(f"{MAX_PARTS} parts are the limit")
+            raise ProtocolError(f"the limit is {MAX_PARTS} parts")
         health = Health(
             name,
             LEVELS[status.level],

@@ -138,7 +138,7 @@ class GridCells(RobotLayer):
         """
         given = message.cells
         if len(given) > MAX_CELLS:
-            raise ProtocolError(f"{len(given)} cells; {MAX_CELLS} are the limit")
+            raise ProtocolError(f"{len(given)} cells; the limit is {MAX_CELLS}")
         # Only these are checked: 100,000 would delay the other robots by 0.1 s.
         chosen = [given[index] for index in thinned(len(given), self.max_cells)]
         width, height = message.size if chosen else (1.0, 1.0)

@@ -155,7 +155,7 @@ def check_rays(scan: LaserScanMsg) -> None:
             raise ProtocolError(f"{name} must be finite radians, got {angle}")
     count = len(scan.ranges)
     if count > MAX_RAYS:
-        raise ProtocolError(f"a scan of {count} rays; {MAX_RAYS} are the limit")
+        raise ProtocolError(f"a scan of {count} rays; the limit is {MAX_RAYS}")
     if count > 1 and scan.angle_increment == 0:
         raise ProtocolError(
             f"angle_increment must not be 0 for a scan of {count} rays, which would "

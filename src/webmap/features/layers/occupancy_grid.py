@@ -195,7 +195,7 @@ class OccupancyGrid(MapLayer):
         side = resolution * max(info.width, info.height)
         if side > FARTHEST:
             raise ProtocolError(
-                f"a grid has sides of {FARTHEST:g} m at the most, got "
+                f"a grid has sides of at most {FARTHEST:g} m, got "
                 f"{info.width} x {info.height} cells of {resolution:g} m"
             )
         check_values(cells, self.palette)

@@ -98,7 +98,7 @@ class Polygon(RobotLayer):
         points = [(point.x, point.y) for point in message.polygon.points]
         if len(points) > MAX_POINTS:
             raise ProtocolError(
-                f"a polygon of {len(points)} points; {MAX_POINTS} are the limit"
+                f"a polygon of {len(points)} points; the limit is {MAX_POINTS}"
             )
         check_finite(points, "a polygon")
         return in_space(message.polygon.points)

@@ -103,7 +103,7 @@ class Range(RobotLayer):
         drawn = 0.0 if distance is None else min(distance, reach)
         if drawn > FARTHEST:
             raise ProtocolError(
-                f"a cone is {FARTHEST:g} m long at the most, got a max_range of "
+                f"a cone is at most {FARTHEST:g} m long, got a max_range of "
                 f"{reach:g} m with nothing nearer"
             )
         return distance, drawn, view / 2

@@ -47,7 +47,7 @@ def _brackets(text: bytes | bytearray) -> int:
 def _too_many(count: int, most: int) -> TooLarge:
     what = "objects and lists" if most == MAX_VALUES else "items of CBOR"
     return TooLarge(
-        f"got a message with {count} or more {what}; {most} are the limit: "
+        f"got a message with {count} or more {what}; the limit is {most}: "
         f"{GENERAL.advice}"
     )
 

@@ -54,7 +54,7 @@ def _pixels(packed: bytes, max_bytes: int) -> bytes:
     if width * height * 3 > max_bytes:
         raise ProtocolError(
             f"a PNG of {width} x {height}, which is too large: it holds "
-            f"{width * height * 3} bytes, and {max_bytes} are the limit; subscribe "
+            f"{width * height * 3} bytes, and the limit is {max_bytes}; subscribe "
             "with compression='cbor'"
         )
     try:

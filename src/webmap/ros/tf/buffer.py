@@ -309,7 +309,7 @@ class Buffer:
         if len(name) > LONGEST_NAME:
             raise FrameMissing(
                 f"there is no frame with a name of {len(name)} characters; "
-                f"{LONGEST_NAME} are the limit: {name[:40]!r}..."
+                f"the limit is {LONGEST_NAME}: {name[:40]!r}..."
             )
         sentence = self._missing.get(name)
         if sentence is None:  # asked for at each message

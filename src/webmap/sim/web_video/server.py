@@ -182,7 +182,7 @@ class WebVideoServer:
                 408, f"no complete request came within {PATIENCE:g} s"
             ) from None
         except asyncio.LimitOverrunError:
-            raise Refusal(431, f"a request has {MOST_HEAD} bytes at the most") from None
+            raise Refusal(431, f"a request has at most {MOST_HEAD} bytes") from None
         except asyncio.IncompleteReadError:
             raise ConnectionError(
                 "the client closed the connection before the end of its request"

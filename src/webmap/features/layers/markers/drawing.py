@@ -131,7 +131,7 @@ def sizes(marker: MarkerMsg, *axes: str) -> list[float]:
 def _check_size(axis: str, size: float) -> None:
     if size > FARTHEST:
         raise ProtocolError(
-            f"scale.{axis} must be {FARTHEST:g} m at the most, got {size:g}"
+            f"scale.{axis} must be at most {FARTHEST:g} m, got {size:g}"
         )
 
 

@@ -292,8 +292,8 @@ class Markers(MapLayer):
             more = " or more" * (count == MOST_COUNTED)
             self.set_problem(
                 _LEFT_OUT,
-                f"{self.topic}: {count}{more} markers are left out: {MAX_MARKERS} are "
-                "drawn at the most",
+                f"{self.topic}: {count}{more} markers are left out: at most "
+                f"{MAX_MARKERS} are drawn",
             )
         else:
             self.clear_problem(_LEFT_OUT)

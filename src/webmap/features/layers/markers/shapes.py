@@ -50,7 +50,7 @@ def shape_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> Element:
         raise ProtocolError(f"markers of type {marker.type} are not drawn")
     if len(marker.points) > MAX_POINTS:
         raise ProtocolError(
-            f"it has {len(marker.points)} points; {MAX_POINTS} are the limit"
+            f"it has {len(marker.points)} points; the limit is {MAX_POINTS}"
         )
     if marker.colors and len(marker.colors) != len(marker.points):
         raise ProtocolError(
