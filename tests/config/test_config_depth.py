@@ -38,7 +38,7 @@ def test_too_deeply_nested_toml_is_refused_quickly_with_its_line(tmp_path, line)
     with pytest.raises(ConfigError) as refused:
         prepare(file)
     assert time.process_time() - began < 0.5
-    assert f"fleet.toml:4: keys and values are nested {DEEPEST} deep" in str(
+    assert f"fleet.toml:4: keys and values are nested at most {DEEPEST} deep" in str(
         refused.value
     )
 

@@ -230,7 +230,7 @@ BAD = {
     "4 corners, not three": marker(TRIANGLES, [(0, 0)] * 4),
     "no points, or two of them, got 3": marker(ARROW, [(0, 0)] * 3),
     "1 colours for 2 points": marker(POINTS, [(0, 0)] * 2, colors=[RED]),
-    "20001 points; 20000 are": marker(POINTS, [(0, 0)] * 20_001),
+    "20001 points; the limit is 20000": marker(POINTS, [(0, 0)] * 20_001),
     "type 10 are not drawn": marker(MESH),
     "type 99 are not drawn": marker(99),
     "got 7": marker(CUBE, action=7),

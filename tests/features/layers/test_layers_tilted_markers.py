@@ -197,7 +197,7 @@ def test_a_frame_locked_marker_with_an_absurd_height_is_refused_while_flat(
     tall = {"scale": (1.0, 1.0, 1e9), "header": header, "frame_locked": True}
     say(link, marker(type, [(0, 0)], **tall))
     assert layer.shapes == {}
-    assert any("scale.z must be 1e+07 m" in said for said in layer.problems.values())
+    assert any("scale.z must be at most" in said for said in layer.problems.values())
 
 
 def test_a_frame_locked_marker_that_only_moves_is_not_redrawn(link, layer):

@@ -157,8 +157,8 @@ class Buffer:
         longest = max(len(parent), len(child))
         if longest > LONGEST_NAME:
             raise TransformError(
-                f"a frame has a name of {longest} characters; {LONGEST_NAME} are the "
-                f"limit: {max(parent, child, key=len)[:40]!r}..."
+                f"a frame has a name of {longest} characters; the limit is "
+                f"{LONGEST_NAME}: {max(parent, child, key=len)[:40]!r}..."
             )
         names = f"{parent!r} -> {child!r}"
         if not parent or not child:

@@ -230,8 +230,8 @@ class Markers(MapLayer):
         key = (marker.ns, marker.id)
         if len(marker.ns) > LONGEST_NAME:
             raise ProtocolError(
-                f"a namespace of {len(marker.ns)} characters; {LONGEST_NAME} are the "
-                "limit"
+                f"a namespace of {len(marker.ns)} characters; the limit is "
+                f"{LONGEST_NAME}"
             )
         if marker.action == ADD:
             self._put(key, marker)
