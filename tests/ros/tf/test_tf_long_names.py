@@ -12,9 +12,7 @@ LONG = "f" * 1_000_000
 @pytest.mark.parametrize("names", [(LONG, "a"), ("a", LONG)])
 def test_a_frame_with_a_too_long_name_is_refused(names):
     buffer = Buffer()
-    with pytest.raises(
-        TransformError, match="name of 1000000 characters; the limit is 256"
-    ) as said:
+    with pytest.raises(TransformError, match="characters; the limit is 256") as said:
         buffer.add(*names, Transform(), 1.0)
     assert len(str(said.value)) < 200
     assert buffer.frames == []
