@@ -374,7 +374,7 @@ def test_a_route_can_be_drawn_saved_run_skipped_paused_and_interrupted(tab):
     pick(tab, "New 1")
     tab.locator(".webmap-route-run").click()
     expect(word).to_have_text(
-        "Interrupted before point 1 of 1: failed: no path to the goal."
+        "Interrupted before point 1 of 1: the goal failed: no path to the goal."
     )
     tab.locator(".webmap-route-skip").click()
     expect(word).to_have_text("Route of New 1 ended.")
