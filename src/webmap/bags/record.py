@@ -12,6 +12,7 @@ from webmap.bags.bag_file import new_bag
 from webmap.bags.listening import Listening
 from webmap.bags.recorder import Recorder
 from webmap.bags.types import Types
+from webmap.base.counted import counted
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeError, ConfigError, ServiceError
 from webmap.ros.asking import ask_topics
@@ -112,10 +113,9 @@ async def record_to(
             failure = failure or error
     if failure is not None:
         line.show_text(f"Error: {bag.path} cannot be written: {failure}")
-    n_messages, n_topics = recorder.messages, recorder.topics
     line.show_text(
-        f"Recorded {n_messages} message{'s' * (n_messages != 1)} of "
-        f"{n_topics} topic{'s' * (n_topics != 1)} in "
+        f"Recorded {counted(recorder.messages, 'message')} of "
+        f"{counted(recorder.topics, 'topic')} in "
         f"{lasted:.1f} s to {bag.path}: {megabytes(recorder)}, "
         f"{recorder.dropped} dropped"
     )

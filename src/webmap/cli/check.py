@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from webmap.base.counted import counted
 from webmap.base.echo import echo
 from webmap.cli.options import verbose_option
 
@@ -20,8 +21,6 @@ def check(file: Path) -> None:
     from webmap.fleet.made import prepare
 
     ready = prepare(file)
-    robots, bridges = len(ready.robots), len(ready.bridges)
-    echo(
-        f"{file}: {robots} robot{'s' * (robots != 1)} behind "
-        f"{bridges} bridge{'s' * (bridges != 1)}, no mistakes"
-    )
+    robots = counted(len(ready.robots), "robot")
+    bridges = counted(len(ready.bridges), "bridge")
+    echo(f"{file}: {robots} behind {bridges}, no mistakes")

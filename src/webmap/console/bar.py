@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from webmap import html, refusals
+from webmap.base.counted import counted
 from webmap.console.texts import icon
 
 if TYPE_CHECKING:
@@ -138,8 +139,7 @@ class RefusedList:
             return
         self._shown = rows
         self._details.set(hidden=not rows)
-        total = refusals.total
-        self._text.text = f"{total} message{'s' * (total != 1)} refused"
+        self._text.text = f"{counted(refusals.total, 'message')} refused"
         self._newest.text = rows[0].last if rows else ""
         self._list.clear()
         for row in rows[:SHOWN]:
@@ -148,7 +148,7 @@ class RefusedList:
 
 def line(by: str, count: int, last: str, at: "datetime") -> "Element":
     """Return the number of one person's refused messages, and the last of them."""
-    messages = f"{count} message{'s' * (count != 1)}"
+    messages = counted(count, "message")
     return html.li(
         html.span(text=by, class_="url"),
         html.span(

@@ -5,6 +5,7 @@ import time
 from typing import TYPE_CHECKING, Any, Protocol
 
 from webmap import html, svg
+from webmap.base.counted import counted
 from webmap.base.geometry import Twist
 from webmap.console.texts import UNKNOWN, number, sentence
 from webmap.features.doctor.doctor_panel import entry
@@ -344,9 +345,8 @@ def _lines(parts: list[Any]) -> list[tuple[str, str, str]]:
         whose = " (robot unknown)" if part.shared else ""
         lines.append((level, f"{word}: ", f"{part.name}{whose}{words}"))
     if len(bad) > MOST:
-        lines.append(("note", "", f"and {len(bad) - MOST} more parts"))
+        lines.append(("note", "", f"and {counted(len(bad) - MOST, 'more part')}"))
     # Good parts that belong to no known robot do not show that this robot is well.
     if not bad and any(not part.shared for part in parts):
-        count = f"{len(parts)} part{'' if len(parts) == 1 else 's'}"
-        lines.append(("good", "All OK: ", count))
+        lines.append(("good", "All OK: ", counted(len(parts), "part")))
     return lines

@@ -1,5 +1,6 @@
 """The findings as a table for a terminal."""
 
+from webmap.base.counted import counted
 from webmap.base.outside_text import escaped
 from webmap.discovery.found import ROLES, Findings, FoundRobot, Layers, Role
 from webmap.discovery.layers import drawing
@@ -39,10 +40,8 @@ OVERRULE = (
 def report(url: str, findings: Findings) -> str:
     """Return all findings of a bridge, for people."""
     number = len(findings.robots)
-    lines = [
-        f"{url}: {DIALECTS[findings.dialect]}, "
-        f"{number or 'no'} robot{'' if number == 1 else 's'}"
-    ]
+    robots = counted(number, "robot") if number else "no robots"
+    lines = [f"{url}: {DIALECTS[findings.dialect]}, {robots}"]
     for robot in findings.robots:
         lines += ["", *robot_table(robot), *layer_table(robot, findings)]
     lines += ["", *findings.notes]

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+from webmap.base.counted import counted
 from webmap.discovery.doctor.observed import Measurement, Observed
 from webmap.discovery.doctor.rate_rules import age_of, silence
 from webmap.discovery.found import FoundRobot, Role
@@ -56,7 +57,7 @@ def shown_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
 def _came(
     kind: str, name: str, topic: str, measured: Measurement, age: float | None
 ) -> Finding:
-    text = f"{topic}: {measured.count} message{'s' * (measured.count != 1)}"
+    text = f"{topic}: {counted(measured.count, 'message')}"
     if measured.every:
         text = f"{topic}: {1 / measured.every:.1f} messages a second"
     if age is not None:

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from webmap.base.counted import counted
 from webmap.core.registry import map_modules
 
 if TYPE_CHECKING:
@@ -40,6 +41,6 @@ class ExportTool:
             self.map.report_error(f"the view was not saved: {failed[:MAX_TEXT]}")
         elif isinstance(missing, int):
             self.map.report_error(
-                f"the view was saved without {missing} image{'s' * (missing != 1)} "
-                "that could not be loaded"
+                f"the view was saved without {counted(missing, 'image')} that could "
+                "not be loaded"
             )

@@ -37,10 +37,10 @@ class Quirks:
     """NaN, Infinity and 1e999 from a client reach the robot."""
 
     blocking_services: bool = False
-    """A service call blocks its socket's other messages until it is answered."""
+    """A service call blocks other messages of its connection until it is answered."""
 
     blocking_goals: bool = False
-    """An action goal blocks its socket's other messages until it ends."""
+    """An action goal blocks other messages of its connection until it ends."""
 
     hanging_param_names: bool = False
     """``/rosapi/get_param_names`` never answers; afterwards rosapi never answers."""
