@@ -1,6 +1,8 @@
 import { listenToActions } from "./card_actions.js";
+import { listenToPalette } from "./palette.js";
+import { listenToPanel } from "./side_panel.js";
 import { byId, listenToSheet, nameSheet, setText, typing } from "../web/tools/dom.js";
-import { keepSizes, listenToList, listenToTools } from "./view_tools.js";
+import { keepInView, keepSizes, listenToList, listenToTools } from "./view_tools.js";
 
 /**
  * The parts of the console that run in the browser, because they must be quick or work
@@ -29,6 +31,9 @@ export default function attach(map, options, send) {
     nameSheet(map),
     spreadNames(map),
     listenToHelp(map.drive, signal),
+    listenToPalette(map.drive, signal),
+    listenToPanel(map, signal),
+    keepInView(map),
   ];
   listenToTools(map, options, signal);
   listenToSearch(signal);

@@ -102,7 +102,7 @@ def build(
     map.add_module("AlignTool")
     map.add_module("RouteTool", title)
     map.add_module("RosoutPanel", bridges)
-    saving = {"place": ".map-tools", "classes": "button square"}
+    saving = {"place": ".tools", "classes": "webmap-button"}
     map.add_module("ExportTool", **saving)
     map.add_module(Layout, of=kept_under, **saving)
     map.add_module("ScaleBar")

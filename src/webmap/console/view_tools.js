@@ -1,4 +1,5 @@
 import { byId } from "../web/tools/dom.js";
+import { rotate } from "../web/view.js";
 
 /** @typedef {import('../web/view.js').Matrix} Matrix */
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -27,11 +28,15 @@ export function keepSizes(map) {
   const keep = () => {
     const { a, b, c, d } = map.view;
     const size = (1 / Math.sqrt(Math.abs(a * d - b * c))).toPrecision(4);
-    const turn = Math.atan2(b, a).toFixed(4);
-    if (shown === size + turn) return;
-    shown = size + turn;
+    const turn = Number(Math.atan2(b, a).toFixed(4));
+    if (shown === `${size} ${turn}`) return;
+    shown = `${size} ${turn}`;
     map.svg.style.setProperty("--metre-per-pixel", size);
     map.svg.style.setProperty("--turn", `${turn}rad`);
+    byId("north-up").style.setProperty("--turn", `${turn}rad`);
+    const degrees = Math.round((-turn * 180) / Math.PI) || 0;
+    byId("north-up").title = `Turn north up (map turned by ${degrees}°)`;
+    byId("north-up").classList.toggle("turned", degrees !== 0);
   };
   keep();
   return map.onView(keep);
@@ -55,6 +60,7 @@ export function listenToTools(map, options, signal) {
   on("zoom-in", () => zoom(map, STEP));
   on("zoom-out", () => zoom(map, 1 / STEP));
   on("show-all", () => showAll(map, options.bounds));
+  on("north-up", () => northUp(map));
   // Before the module that moves the view, which does not know the floor.
   map.svg.addEventListener(
     "keydown",
@@ -92,34 +98,29 @@ function zoom(map, factor) {
 
 /**
  * @param {MapCanvas} map
+ * @returns {Matrix} The view without its rotation, about the middle.
+ */
+function northUp({ view, width, height }) {
+  const degrees = (Math.atan2(view.b, view.a) * 180) / Math.PI;
+  return rotate(view, degrees, width / 2, height / 2);
+}
+
+/**
+ * @param {MapCanvas} map
  * @param {Box | null} bounds
  * @returns {Matrix | null} The view of the floor and of every robot, or of all drawn
  *     things where there is no floor, north up; null if there is nothing yet.
  */
-function showAll({ svg, world, width, height }, bounds) {
+function showAll({ world, width, height }, bounds) {
   const box = world.getBBox();
-  const free = besideCard(svg, width);
   const all = bounds ?? [box.x, box.y, box.width, box.height];
   const [x, y, across, up] = placesOfRobots(world).reduce(withPlace, all);
-  const room = [free - 2 * MARGIN, height - 2 * MARGIN];
+  const room = [width - 2 * MARGIN, height - 2 * MARGIN];
   const scale = Math.min(room[0] / across, room[1] / up);
   if (!(scale > 0) || !Number.isFinite(scale)) return null;
-  const e = free / 2 - scale * (x + across / 2);
+  const e = width / 2 - scale * (x + across / 2);
   const f = height / 2 + scale * (y + up / 2);
   return { a: scale, b: 0, c: 0, d: -scale, e, f };
-}
-
-/**
- * @param {SVGSVGElement} svg
- * @param {number} width
- * @returns {number} The part of the map's width that the card leaves free, in pixels;
- *     the whole width where little would be left, as on a phone, where the card is in
- *     the sheet.
- */
-function besideCard(svg, width) {
-  const card = byId("card").getBoundingClientRect();
-  const left = card.left - svg.getBoundingClientRect().left;
-  return card.width > 0 && left > width / 2 && left < width ? left : width;
 }
 
 /**
@@ -175,6 +176,25 @@ const PLACES = 600;
 
 /** Longest wait for a robot's card to appear, in milliseconds. */
 const PATIENCE = 1500;
+
+/**
+ * Keep the selected robot in view when the map's place on the page becomes smaller,
+ * as when a list is opened in the dock.
+ *
+ * @param {MapCanvas} map
+ * @returns {() => void} Ends it.
+ */
+export function keepInView(map) {
+  let area = 0;
+  const observer = new ResizeObserver(() => {
+    const before = area;
+    area = map.width * map.height;
+    const smaller = area < before;
+    if (smaller && map.selected) show(map, map.selected);
+  });
+  observer.observe(map.svg);
+  return () => observer.disconnect();
+}
 
 /**
  * Move the map so that a robot selected in the list is where nothing covers the map.

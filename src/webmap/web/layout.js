@@ -24,12 +24,14 @@ import {
  *
  * @typedef {{open: boolean, shown: Record<string, boolean>}} Layers
  * @typedef {{open: boolean, least: string}} Log
+ * @typedef {{open: boolean, width: number}} Panel Width in pixels.
  * @typedef {{dock: 'side' | 'below' | 'float', x: number, y: number}} Camera
  *
  * @typedef {object} Layout A missing part is left unchanged.
  * @property {Place} [view]
  * @property {Layers} [layers]
  * @property {Log} [log]
+ * @property {Panel} [panel]
  * @property {Camera} [camera]
  */
 
@@ -158,6 +160,7 @@ const PARTS = {
   view: checkedPlace,
   layers: whole({ open: truth, shown: switches }),
   log: whole({ open: truth, least: oneOf([...LEVELS]) }),
+  panel: whole({ open: truth, width: number(0, 10_000) }),
   camera: whole({
     dock: oneOf(["side", "below", "float"]),
     x: number(0, 1),

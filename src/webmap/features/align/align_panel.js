@@ -1,4 +1,5 @@
 import { button, html, setText } from "../../web/tools/elements.js";
+import { tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('./align_drawing.js').Alignment} Alignment */
 /** @typedef {import('./align_tool.js').Subject} Subject */
@@ -29,7 +30,9 @@ export class AlignPanel {
   /** @param {AlignActions} actions */
   constructor(actions) {
     this._actions = actions;
-    this._go = button("webmap-align-go", "Align maps", () => actions.toggle());
+    this._go = button("webmap-align-go", "", () => actions.toggle());
+    this._go.append(...toolName("align", "Align maps"));
+    this._go.title = "Align maps";
     this._what = html("select", "webmap-align-what", { "aria-label": "What to align" });
     this._what.addEventListener("change", () => actions.choose(this._what.value === "whole"));
     /** @type {Map<Field, HTMLInputElement>} */
@@ -61,39 +64,14 @@ export class AlignPanel {
     });
     this._message = html("span", "webmap-align-word", { role: "status" });
     this._line = html("code", "webmap-align-line", { hidden: "" });
-    /** The button and the text; they share the room with those of other tools. */
-    this.element = html(
-      "section",
-      "webmap-panel webmap-align",
-      { "aria-label": "Alignment" },
-      this._go,
-    );
-    /** Open during an alignment; shows the result. */
-    this.form = html(
-      "section",
-      "webmap-panel webmap-align-form",
-      { "aria-label": "Alignment in numbers", hidden: "" },
-      this._body,
-      this._message,
-      this._line,
-    );
+    const content = [this._body, this._message, this._line];
+    this.element = tool("webmap-align", "Alignment", this._go, ...content);
   }
 
   /** @param {string} text */
   showMessage(text) {
     setText(this._message, text);
     this._line.toggleAttribute("hidden", true);
-    this._showForm();
-  }
-
-  _showForm() {
-    const empty = this._body.hidden && this._message.textContent === "";
-    this.form.toggleAttribute("hidden", empty);
-    if (empty) return;
-    // Below the buttons, which may take several rows.
-    const buttons = (this.element.parentElement ?? this.element).getBoundingClientRect();
-    const around = this.form.parentElement?.getBoundingClientRect();
-    if (around) this.form.style.top = `${Math.max(0, buttons.bottom - around.top) + 8}px`;
   }
 
   /** @param {Subject} subject */
@@ -130,7 +108,6 @@ export class AlignPanel {
     setText(this._message, lost || "Saved. The line for a fleet file:");
     this._line.textContent = line;
     this._line.toggleAttribute("hidden", false);
-    this._showForm();
   }
 
   /**

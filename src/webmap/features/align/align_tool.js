@@ -95,7 +95,6 @@ class AlignTool {
     this._offs = [
       lay(map, this._drawing.element),
       lay(map, this._panel.element, "top-left"),
-      lay(map, this._panel.form),
       devicesOf(map.drive).claimEscape(() => this._leave()),
       map.onSelect(() => {
         this._leave();
@@ -136,7 +135,8 @@ class AlignTool {
       target.addEventListener("pointercancel", () => this._giveUp(), first);
     }
     handle.addEventListener("keydown", (event) => this._key(event), { signal });
-    for (const part of [this._panel.element, this._panel.form]) {
+    {
+      const part = this._panel.element;
       part.addEventListener("keydown", (event) => this._escape(event), { signal });
     }
   }

@@ -3,7 +3,7 @@ import { stoppingDistance } from "../../web/motion/figures.js";
 import { heldByAnother, isLatched, mayTake, stopOf } from "../../web/motion/report.js";
 import { describe, inputsOf } from "../../web/motion/status.js";
 import { svg } from "../../web/tools/elements.js";
-import { lay, overlayOf, ownPlace } from "../../web/tools/overlay.js";
+import { lay, overlayOf, ownCorners, ownPlace } from "../../web/tools/overlay.js";
 import { Panel, Requests, StickPad } from "./teleop_panel.js";
 
 /** @typedef {import('../../web/drive.js').Drive} Drive */
@@ -79,7 +79,7 @@ class Teleop {
     };
     this._ending = new AbortController();
     const touched = { capture: true, signal: this._ending.signal };
-    for (const part of [map.svg, overlayOf(map)]) {
+    for (const part of [map.svg, overlayOf(map), ...ownCorners()]) {
       for (const kind of ["pointerdown", "focusin"]) {
         part?.addEventListener(kind, () => this._devices.activate(this._drivingMap), touched);
       }

@@ -1,5 +1,5 @@
 import { Stick } from "../../web/inputs/stick.js";
-import { isTested, motions, ownStop, stopTestText, timings } from "../../web/motion/figures.js";
+import { isTested, motions, ownStop, speedText, stopTestText, timings } from "../../web/motion/figures.js";
 import { heldByProgram, isLatched, stopKey } from "../../web/motion/report.js";
 import { capOf } from "../../web/motion/status.js";
 import { button, html, setText, stopButton, TwiceButton } from "../../web/tools/elements.js";
@@ -24,6 +24,7 @@ export class Panel {
     this._title = html("strong", "webmap-teleop-title");
     this._detail = html("span", "webmap-teleop-detail");
     this._cap = html("p", "webmap-teleop-cap");
+    this._speed = html("p", "webmap-teleop-speed", { title: "Measured velocity" });
     this._own = html("p", "webmap-teleop-own");
     this._test = html("p", "webmap-teleop-test", { role: "status" });
     this._figures = html("dl", "webmap-teleop-figures");
@@ -56,14 +57,22 @@ export class Panel {
       " ",
       this._detail,
     );
+    this._fold = button("webmap-teleop-fold", "Figures", () => this._turn());
+    this._fold.title = "Show sent, echoed and measured velocities, delays and distances";
+    this._fold.setAttribute("aria-expanded", "false");
     const confirmed = [this._reset.element, this._tester.element];
-    const buttons = [this._lease, ...confirmed, this._stick];
+    const buttons = [this._lease, ...confirmed, this._stick, this._fold];
     this.element = html(
       "section",
       "webmap-panel webmap-teleop",
       { "aria-label": "Driving" },
       this._mark,
-      html("div", "webmap-teleop-words", {}, state, this._test, this._cap, this._own),
+      html(
+        "div",
+        "webmap-teleop-words",
+        {},
+        ...[state, this._test, this._speed, this._cap, this._own],
+      ),
       html("div", "webmap-teleop-acts", {}, ...buttons),
       this.stop,
       this._figures,
@@ -84,6 +93,12 @@ export class Panel {
     setText(this._cap, report ? capOf(report) + (stated ? "" : slowness(age)) : "");
   }
 
+  /** Fold the figures out or in, on a page where the panel is one line. */
+  _turn() {
+    const open = this.element.classList.toggle("unfolded");
+    this._fold.setAttribute("aria-expanded", `${open}`);
+  }
+
   /**
    * @param {RobotReport | null} report
    * @param {number | null} loop
@@ -91,6 +106,8 @@ export class Panel {
    */
   showFigures(report, loop, moving) {
     setText(this._own, report ? ownStop(report) : "");
+    setText(this._speed, report ? speedText(report) : "");
+    this._fold.hidden = report === null || isLatched(report);
     setText(this._test, report ? stopTestText(report) : "");
     this._figures.hidden = report === null || isLatched(report);
     this._figures.classList.toggle("idle", !report?.mine);

@@ -4,6 +4,7 @@ import { button, html, setText } from "../../web/tools/elements.js";
 import { GoalMarks } from "./goal_marks.js";
 import { look, sendGoal, ShownGoals } from "../../web/tools/goal_texts.js";
 import { lay } from "../../web/tools/overlay.js";
+import { tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -61,8 +62,9 @@ class GoalTool {
       done: (pose) => this._done(pose),
     });
     this._wanted = false;
-    this._go = button("webmap-aim-go webmap-goal-go", "Send goal", () => this._toggle());
-    this._go.title = `Key ${key}`;
+    this._go = button("webmap-aim-go webmap-goal-go", "", () => this._toggle());
+    this._go.append(...toolName("goal", "Send goal"));
+    this._go.title = `Send goal (${key.toUpperCase()})`;
     this._cancel = button("webmap-goal-cancel", "Cancel goal", () => this._callOff());
     this._message = html("span", "webmap-aim-word webmap-goal-word", { role: "status" });
     this._spacing = html("input", "webmap-goal-spacing-value", {
@@ -79,15 +81,8 @@ class GoalTool {
       "Spacing in m ",
       this._spacing,
     );
-    this._panel = html(
-      "section",
-      "webmap-panel webmap-aim webmap-goal",
-      { "aria-label": "Goals" },
-      this._go,
-      this._apart,
-      this._cancel,
-      this._message,
-    );
+    const content = [this._apart, this._cancel, this._message];
+    this._panel = tool("webmap-aim webmap-goal", "Goals", this._go, ...content);
     this._marks = new GoalMarks(map, (robot) => this._end(robot));
     this._marking = new Marking(map, (robot) => send({ mark: robot }));
     this._offs = [
@@ -281,7 +276,7 @@ class GoalTool {
     const way = robots.some((robot) => this._drive.robots.get(robot)?.method !== null);
     this._go.disabled = robots.length === 0 || !way;
     const words = robots.length > 1 ? `Send goal to ${robots.length} robots` : "Send goal";
-    setText(this._go, words);
+    setText(/** @type {Element} */ (this._go.lastElementChild), words);
     this._go.setAttribute("aria-pressed", String(this._aim.active));
     this._apart.hidden = robots.length < 2;
     this._cancel.hidden = !robots.some((robot) => this._mayCancel(robot));

@@ -2,6 +2,7 @@ import { scaleOf } from "../../web/view.js";
 import { onScreen, PressAim } from "../../web/tools/aim.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
+import { tool } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -60,15 +61,9 @@ class InitialPoseTool {
       done: (pose) => this._done(pose),
     });
     this._go = button("webmap-aim-go webmap-locate-go", "Set pose", () => this._aim.toggle());
-    this._go.title = `Key ${key}`;
+    this._go.title = `Set pose (${key.toUpperCase()})`;
     this._message = html("span", "webmap-aim-word webmap-locate-word", { role: "status" });
-    this._panel = html(
-      "section",
-      "webmap-panel webmap-aim webmap-locate",
-      { "aria-label": "Initial pose" },
-      this._go,
-      this._message,
-    );
+    this._panel = tool("webmap-aim webmap-locate", "Initial pose", this._go, this._message);
     this._uncertainty = new PoseUncertainty();
     this._outline = svg("path", { d: OUTLINE, class: "webmap-locate-arrow" });
     this._drawing = svg(

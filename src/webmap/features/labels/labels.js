@@ -4,6 +4,7 @@ import { scaleOf, unapply } from "../../web/view.js";
 import { button, html, setText } from "../../web/tools/elements.js";
 import { LabelMove } from "./labels_move.js";
 import { lay } from "../../web/tools/overlay.js";
+import { tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -49,19 +50,13 @@ class Labels {
     this._chosen = null;
     /** @type {LabelMove | null} */
     this._move = null;
-    this._go = button("webmap-labels-go", "Label", () => this._activate(!this._active));
-    this._go.title = `Key ${key}`;
+    this._go = button("webmap-labels-go", "", () => this._activate(!this._active));
+    this._go.append(...toolName("label", "Label"));
+    this._go.title = `Add a label (${key.toUpperCase()})`;
     this._go.hidden = !editable;
     this._message = html("span", "webmap-labels-word", { role: "status" });
     this._sheet = html("div", "webmap-labels-sheet");
-    this._panel = html(
-      "section",
-      "webmap-panel webmap-labels",
-      { "aria-label": "Labels" },
-      this._go,
-      this._message,
-      this._sheet,
-    );
+    this._panel = tool("webmap-labels", "Labels", this._go, this._message, this._sheet);
     this._ending = new AbortController();
     this._listen();
     this._offs = [

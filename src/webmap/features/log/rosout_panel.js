@@ -1,5 +1,6 @@
 import { html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
+import { foldedTool } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -91,15 +92,16 @@ class RosoutPanel {
     });
     this._count = html("p", "webmap-rosout-count", { role: "status" });
     this._badge = html("span", "webmap-rosout-badge");
-    this._details = html(
-      "details",
-      "webmap-panel webmap-rosout",
+    this._details = foldedTool(
+      "webmap-rosout",
+      "log",
+      "Log",
       { "data-webmap-menu": "" },
-      html("summary", "", {}, "Log", this._badge),
       html("label", "webmap-rosout-level", {}, "Show", this._choice),
       this._count,
       ...this._books.map(({ element }) => element),
     );
+    this._details.querySelector("summary")?.append(this._badge);
     this._details.open = open;
     this._details.addEventListener("toggle", () => this._toggled());
     this._timer = setInterval(() => this._age(), PERIOD);

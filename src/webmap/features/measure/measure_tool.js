@@ -3,6 +3,7 @@ import { attentive } from "../../web/motion/attention.js";
 import { apply, unapply } from "../../web/view.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
+import { tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/view.js').Point} Point */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -49,16 +50,11 @@ class MeasureTool {
     this._pointer = null;
     /** The measured line, in metres. @type {{from: Point, to: Point} | null} */
     this._line = null;
-    this._button = button("webmap-measure-go", "Measure", () => this._toggle());
-    this._button.title = `Key ${key}`;
+    this._button = button("webmap-measure-go", "", () => this._toggle());
+    this._button.append(...toolName("measure", "Measure"));
+    this._button.title = `Measure (${key.toUpperCase()})`;
     this._message = html("span", "webmap-measure-word", { role: "status" });
-    const panel = html(
-      "section",
-      "webmap-panel webmap-measure",
-      { "aria-label": "Measure" },
-      this._button,
-      this._message,
-    );
+    const panel = tool("webmap-measure", "Measure", this._button, this._message);
     this._path = svg("path", { class: "webmap-measure-line" });
     this._drawing = svg(
       "svg",

@@ -2,6 +2,7 @@ import { MOST_POINTS } from "../../web/constants.js";
 import { poseOf, PressAim } from "../../web/tools/aim.js";
 import { button, html, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
+import { foldedTool } from "../../web/tools/tool.js";
 import { RouteArea } from "./route_area.js";
 import { RoutePoints, SavedRoutes } from "./route_points.js";
 import { keepRoute, keptRoute, LEAST_LOOP, RouteRobots } from "./route_run.js";
@@ -100,11 +101,11 @@ class RouteTool {
       points: this._points,
       loop: this._loops,
     }));
-    this._details = html(
-      "details",
-      "webmap-panel webmap-route",
+    this._details = foldedTool(
+      "webmap-route",
+      "route",
+      "Route",
       {},
-      html("summary", "", {}, "Route"),
       html(
         "div",
         "webmap-route-row begin",

@@ -1,5 +1,6 @@
 import { html, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
+import { foldedTool } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -84,14 +85,9 @@ class LayerSwitches {
     this._list = html("div", "webmap-layers-list", { role: "group" });
     this._list.setAttribute("aria-label", "Layers");
     this._none = html("p", "webmap-layers-none");
-    this._details = html(
-      "details",
-      "webmap-panel webmap-layers",
-      { "data-webmap-menu": "" },
-      html("summary", "", {}, "Layers"),
-      this._list,
-      this._none,
-    );
+    const menu = { "data-webmap-menu": "" };
+    const content = [this._list, this._none];
+    this._details = foldedTool("webmap-layers", "layers", "Layers", menu, ...content);
     this._details.addEventListener("toggle", () => this._look());
     this._timer = setInterval(() => this._look(), PERIOD);
     this._take = lay(map, this._details, "top-left");

@@ -11,17 +11,18 @@ const overlays = new WeakMap();
 const CORNERS = ["top-left", "top-right", "bottom-left", "bottom-right"];
 
 /**
- * Put an element over a map.
+ * Put an element over a map, or beside it: a page that has its own element with
+ * `data-webmap-corner="top-left"` gets there what would be in that corner of the map.
  *
  * @param {MapCanvas} map
  * @param {Element} panel
  * @param {Corner} [corner] The corner for it; without one it covers the map.
  * @param {string} [place] A selector of the page's own element, which contains it
- *     instead. If the page has no such element, it is over the map.
+ *     instead. If the page has no such element, it is in its corner.
  * @returns {() => void} Removes it.
  */
 export function lay(map, panel, corner, place = "") {
-  const own = ownPlace(place);
+  const own = ownPlace(place) ?? (corner ? ownCorner(corner) : null);
   if (own) {
     own.append(panel);
     return () => panel.remove();
@@ -46,11 +47,29 @@ export function ownPlace(place) {
 }
 
 /**
+ * @param {Corner} corner
+ * @returns {Element | null} The page's own element for a corner of its map.
+ */
+function ownCorner(corner) {
+  const own = document.querySelector(`[data-webmap-corner="${corner}"]`);
+  if (own instanceof HTMLElement && !own.dataset.webmapListens) {
+    own.dataset.webmapListens = "";
+    own.addEventListener("toggle", makeRoom, { capture: true });
+  }
+  return own;
+}
+
+/**
  * @param {MapCanvas} map
  * @returns {HTMLElement | null} The overlay of the map, if there is one.
  */
 export function overlayOf(map) {
   return overlays.get(map)?.element ?? null;
+}
+
+/** @returns {Element[]} The page's own elements for corners of its map. */
+export function ownCorners() {
+  return [...document.querySelectorAll("[data-webmap-corner]")];
 }
 
 /**
@@ -73,9 +92,7 @@ class Overlay {
       host.style.position = "relative";
     }
     svg.after(this.element);
-    this._frame.addEventListener("toggle", ({ target }) => this._makeRoom(target), {
-      capture: true,
-    });
+    this._frame.addEventListener("toggle", makeRoom, { capture: true });
     this._observer = new ResizeObserver(() => this._place());
     this._observer.observe(svg);
     if (host) this._observer.observe(host);
@@ -105,20 +122,6 @@ class Overlay {
     this.element.remove();
   }
 
-  /**
-   * Close the panels under a panel that was opened, if the style puts panels over one
-   * another for lack of space.
-   *
-   * @param {EventTarget | null} opened
-   */
-  _makeRoom(opened) {
-    if (!(opened instanceof HTMLDetailsElement) || !opened.open || !isLoose(opened)) return;
-    for (const other of opened.parentElement?.children ?? []) {
-      if (other === opened || !(other instanceof HTMLDetailsElement)) continue;
-      if (other.open && isLoose(other)) other.open = false;
-    }
-  }
-
   _place() {
     const { style } = this.element;
     const map = this._svg.getBoundingClientRect();
@@ -130,9 +133,23 @@ class Overlay {
   }
 }
 
-/** @param {Element} element */
-function isLoose(element) {
-  return [null, "::details-content"].some((part) =>
-    ["absolute", "fixed"].includes(getComputedStyle(element, part).position),
+/**
+ * Close the other panels when one is opened, if the style puts panels over one another
+ * for lack of space.
+ *
+ * @param {Event} event
+ */
+function makeRoom({ target: opened }) {
+  if (!(opened instanceof HTMLDetailsElement) || !opened.open || !isLoose(opened)) return;
+  for (const other of opened.parentElement?.children ?? []) {
+    if (other === opened || !(other instanceof HTMLDetailsElement)) continue;
+    if (other.open && isLoose(other)) other.open = false;
+  }
+}
+
+/** @param {Element} details */
+function isLoose(details) {
+  return [details, ...details.children].some((element) =>
+    ["absolute", "fixed"].includes(getComputedStyle(element).position),
   );
 }

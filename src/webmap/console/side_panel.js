@@ -1,0 +1,104 @@
+import { byId } from "../web/tools/dom.js";
+
+/**
+ * The docked list of robots with the card: its width, and whether it is open. Both are
+ * a part of the layout, and stored in the browser.
+ */
+
+/** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {{open: boolean, width: number}} Shown Width in pixels. */
+
+/** The key of the state in this browser's storage. */
+const KEPT = "webmap.panel";
+
+/** Smallest, usual and greatest width in pixels, and the change for one arrow key. */
+const NARROWEST = 240;
+const USUAL = 296;
+const WIDEST = 480;
+const STEP = 16;
+
+/**
+ * Open, close and resize the panel.
+ *
+ * @param {MapCanvas} map
+ * @param {AbortSignal} signal
+ * @returns {() => void} Leaves the layout.
+ */
+export function listenToPanel(map, signal) {
+  const [edge, turn] = [byId("panel-edge"), byId("panel-turn")];
+  let shown = kept();
+  const show = (/** @type {Shown} */ next) => {
+    const width = Math.round(Math.min(Math.max(next.width, NARROWEST), WIDEST));
+    shown = { open: next.open, width };
+    document.body.dataset.panel = shown.open ? "open" : "closed";
+    if (width === USUAL) document.documentElement.style.removeProperty("--panel");
+    else document.documentElement.style.setProperty("--panel", `${width}px`);
+    turn.setAttribute("aria-expanded", `${shown.open}`);
+    edge.setAttribute("aria-valuenow", `${width}`);
+  };
+  const change = (/** @type {Partial<Shown>} */ part) => {
+    show({ ...shown, ...part });
+    keep(shown);
+  };
+  edge.setAttribute("aria-valuemin", `${NARROWEST}`);
+  edge.setAttribute("aria-valuemax", `${WIDEST}`);
+  show(shown);
+  turn.addEventListener("click", () => change({ open: !shown.open }), { signal });
+  const key = (/** @type {KeyboardEvent} */ event) => {
+    const by = { ArrowLeft: -STEP, ArrowRight: STEP }[event.key];
+    if (by === undefined) return;
+    // The arrow keys drive the robot everywhere else.
+    event.preventDefault();
+    event.stopPropagation();
+    change({ width: shown.width + by });
+  };
+  edge.addEventListener("keydown", key, { signal });
+  listenToEdge(edge, (x) => change({ width: x }), signal);
+  edge.addEventListener("dblclick", () => change({ width: USUAL }), { signal });
+  return map.layout.add("panel", {
+    read: () => shown,
+    write: change,
+    reset: () => change({ open: true, width: USUAL }),
+  });
+}
+
+/**
+ * @param {HTMLElement} edge
+ * @param {(x: number) => void} moved Called with the pointer's place in the window.
+ * @param {AbortSignal} signal
+ */
+function listenToEdge(edge, moved, signal) {
+  const down = (/** @type {PointerEvent} */ event) => {
+    if (event.button !== 0) return;
+    event.preventDefault();
+    edge.setPointerCapture(event.pointerId);
+    edge.classList.add("dragged");
+  };
+  const move = (/** @type {PointerEvent} */ event) => {
+    if (edge.classList.contains("dragged")) moved(event.clientX);
+  };
+  const up = () => edge.classList.remove("dragged");
+  edge.addEventListener("pointerdown", down, { signal });
+  edge.addEventListener("pointermove", move, { signal });
+  edge.addEventListener("pointerup", up, { signal });
+  edge.addEventListener("pointercancel", up, { signal });
+}
+
+/** @returns {Shown} */
+function kept() {
+  try {
+    const { open, width } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
+    return { open: open !== false, width: Number.isFinite(width) ? width : USUAL };
+  } catch {
+    return { open: true, width: USUAL };
+  }
+}
+
+/** @param {Shown} shown */
+function keep(shown) {
+  try {
+    localStorage.setItem(KEPT, JSON.stringify(shown));
+  } catch {
+    // A browser without storage opens the page with the usual panel.
+  }
+}

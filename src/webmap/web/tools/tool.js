@@ -1,0 +1,80 @@
+import { button, html, svg } from "./elements.js";
+
+/** Symbols of tools, as SVG paths in a square of 24. */
+const SYMBOLS = {
+  align: "M4 8h9v9H4zM11 4h9v9h-4M8 12.5h.1",
+  area: "M5 6l9-2 6 6-4 9-11-1z",
+  goal: "M6 21V4h11l-2.5 4L17 12H6",
+  label: "M4 4h8l8.5 8.5-8 8L4 12zM8 8h.1",
+  layers: "M12 3.5l9 5-9 5-9-5zM4 13l8 4.5 8-4.5",
+  log: "M4 5h16M4 10h16M4 15h10M4 20h7",
+  measure: "M3 15.5L15.5 3 21 8.5 8.5 21zM7 11.5l2 2M10.5 8l2 2M14 4.5l2 2",
+  route: "M6 19.5a2.5 2.5 0 1 0 .01 0zM6 17h8a3.5 3.5 0 0 0 0-7h-4a3.5 3.5 0 0 1 0-7h8",
+};
+
+/** @typedef {keyof typeof SYMBOLS} Symbol */
+
+/**
+ * The content of a tool's button: a symbol and the name. A page with little room may
+ * hide the name with CSS; screen readers still read it.
+ *
+ * @param {Symbol} symbol
+ * @param {string} name
+ * @returns {Node[]}
+ */
+export function toolName(symbol, name) {
+  const icon = svg(
+    "svg",
+    { class: "webmap-tool-icon", viewBox: "0 0 24 24", "aria-hidden": "true" },
+    svg("path", { d: SYMBOLS[symbol] }),
+  );
+  return [icon, html("span", "webmap-tool-name", {}, name)];
+}
+
+/**
+ * A tool: its button, and a body with everything that it shows while it is used. Every
+ * page decides with CSS where the body is.
+ *
+ * @param {string} className
+ * @param {string} label What the tool is for, for screen readers.
+ * @param {HTMLElement} go The button that begins and ends the tool.
+ * @param {...Node} content
+ */
+export function tool(className, label, go, ...content) {
+  go.classList.add("webmap-tool-go");
+  return html(
+    "section",
+    `webmap-panel webmap-tool ${className}`,
+    { "aria-label": label },
+    go,
+    html("div", "webmap-tool-body", {}, ...content),
+  );
+}
+
+/**
+ * A tool that is a list or a form: the button opens and closes the body.
+ *
+ * @param {string} className
+ * @param {Symbol} symbol
+ * @param {string} name
+ * @param {Record<string, string>} attributes
+ * @param {...Node} content
+ */
+export function foldedTool(className, symbol, name, attributes, ...content) {
+  const close = button("webmap-tool-close", "×", () => {
+    details.open = false;
+    summary.focus();
+  });
+  close.setAttribute("aria-label", `Close ${name}`);
+  const head = html("p", "webmap-tool-head", {}, html("strong", "", {}, name), close);
+  const summary = html("summary", "webmap-tool-go", { title: name }, ...toolName(symbol, name));
+  const body = html("div", "webmap-tool-body", {}, head, ...content);
+  const details = html(
+    "details",
+    `webmap-panel webmap-tool ${className}`,
+    attributes,
+    summary,
+    body,
+  );
+  return details;
+}
