@@ -31,10 +31,10 @@ import { tool, toolName } from "../../web/tools/tool.js";
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const tool = new GoalTool(map, options, send);
+  const attached = new GoalTool(map, options, send);
   return {
-    receive: (message) => tool.receive(message),
-    destroy: () => tool.destroy(),
+    receive: (message) => attached.receive(message),
+    destroy: () => attached.destroy(),
   };
 }
 

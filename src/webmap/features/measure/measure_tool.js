@@ -22,8 +22,8 @@ import { tool, toolName } from "../../web/tools/tool.js";
  * @returns {BrowserPart}
  */
 export default function attach(map, options) {
-  const tool = new MeasureTool(map, options);
-  return { destroy: () => tool.destroy() };
+  const attached = new MeasureTool(map, options);
+  return { destroy: () => attached.destroy() };
 }
 
 /**
