@@ -198,6 +198,8 @@ symbol ``goal-SHAPE`` for each shape.
 """
 
 
+NO_GOAL = "No goal"
+
 LINGER = 30.0
 """Seconds for which a reached or canceled goal is shown.
 
@@ -235,21 +237,21 @@ class GoalLine:
     def __init__(self) -> None:
         self._use = svg.use(href="#goal-sent")
         shape = svg.svg(self._use, class_="shape").set("aria-hidden", "true")
-        self._words = html.span()
+        self._words = html.span(text=NO_GOAL)
         self._figures = html.span(class_="figures")
         self.element = html.p(
-            shape, html.span(self._words, self._figures), class_="goal", hidden=True
+            shape, html.span(self._words, self._figures), class_="goal"
         )
 
     def show(self, robot: "Robot") -> None:
-        """Show the state of a robot's goal; nothing if the robot has none."""
+        """Show the state of a robot's goal; the line keeps its place without one."""
         goal = None if robot.report is None else robot.report.goal
         ended = robot.goal_ended_at
         past = ended is not None and time.monotonic() - ended > LINGER
         if goal is None or (past and goal.state != "failed"):
-            self.element.set(hidden=True)
+            self.element.set("data-tone", "none")
+            self._words.text, self._figures.text = NO_GOAL, ""
             return
-        self.element.set(hidden=False)
         words, shape, tone = GOALS[goal.state]
         self._use.set(href=f"#goal-{shape}")
         self.element.set("data-tone", tone or None)

@@ -15,17 +15,13 @@ if TYPE_CHECKING:
     from webmap import Element, Map, Robot
 
 ACTIONS = (
-    ("follow", "icon-follow", "Follow"),
     ("send", "icon-send", "Send goal…"),
     ("cancel", "icon-cancel", "Cancel goal"),
-    ("locate", "icon-locate", "Set pose…"),
-    ("release", "icon-release", "Release control"),
     ("remove", "icon-close", "Remove from page"),
 )
-"""``data-act``, the symbol and the text of each button.
+"""``data-act``, the symbol and the text of each button that is always visible.
 
-console.js handles follow, cancel and release, because they must work over a bad
-connection too.
+console.js handles follow and cancel, because they must work over a bad connection too.
 """
 
 UNABLE = {
@@ -55,6 +51,10 @@ class RobotCard:
         aim_pose: Called to make the next press on the map the robot's pose.
         most: The greatest speeds at which this page drives a robot, in m/s and rad/s.
         remove: Called to remove a robot without poses from all pages.
+
+    Attributes:
+        notes: What needs attention, below the camera; other modules append to it.
+        more: What is folded in; other modules append to it.
     """
 
     def __init__(
@@ -74,6 +74,8 @@ class RobotCard:
         self._aim_goal = aim_goal
         self._take_arrow = forget_goal
         self._aim_pose = aim_pose
+        self.notes: Element = html.div(class_="notes")
+        self.more: Element = html.details(class_="more")
         self._robot: Robot | None = None
         self._feed: Feed | None = None
         self._shape = StateShape()
@@ -184,15 +186,14 @@ class RobotCard:
         )
         close.set("aria-label", "Deselect the robot")
         close.on("click", lambda event: self.map.set_selected(None))
-        facts = html.dl(
-            fact("x", self._x, " m"),
-            fact("y", self._y, " m"),
-            fact("Heading", self._heading, "°"),
-            html.div(html.dt(text="Pose age"), self._age, class_="wide"),
-            html.div(html.dt(text="Battery"), self._battery, class_="wide"),
-            class_="facts",
+        follow = html.button(
+            icon("icon-follow"), type="button", class_="button square quiet"
         )
-        head = html.div(*self._shape.elements, self._name, close, class_="card-head")
+        follow.set("data-act", "follow").set("title", "Keep the robot in the middle")
+        follow.set("aria-label", "Follow")
+        head = html.div(
+            *self._shape.elements, self._name, follow, close, class_="card-head"
+        )
         state = html.p(
             html.span(text="Stale data", class_="old"),
             self._state,
@@ -200,28 +201,45 @@ class RobotCard:
             class_="state",
         )
         state.set("role", "status")
+        locate = action("locate", "icon-locate", "Set pose…")
         buttons = self._buttons = {about[0]: action(*about) for about in ACTIONS}
+        actions = html.div(*buttons.values(), class_="actions")
+        buttons["locate"] = locate
         buttons["send"].on("click", lambda event: self._aim_goal())
-        buttons["locate"].on("click", lambda event: self._aim_pose())
+        locate.on("click", lambda event: self._aim_pose())
         buttons["cancel"].on("click", lambda event: self._forget_goal())
         buttons["remove"].on("click", lambda event: self._remove_robot())
         buttons["remove"].set(
             "title",
             "No data comes from this robot. The robot is shown again when data comes.",
         )
-        actions = html.div(*buttons.values(), stop_test(), class_="actions")
+        self.notes.append(self._reason, self._problems)
+        self.more.append(
+            html.summary(text="More"),
+            html.div(locate, stop_test(), class_="actions"),
+            self._facts(),
+            *self._speeds.elements,
+            *self._own_stop.elements,
+        )
         return [
             head,
             state,
-            self._reason,
             self._goal.element,
-            self._problems,
             actions,
             self._cameras.element,
-            facts,
-            *self._speeds.elements,
-            *self._own_stop.elements,
+            self.notes,
+            self.more,
         ]
+
+    def _facts(self) -> "Element":
+        return html.dl(
+            fact("x", self._x, " m"),
+            fact("y", self._y, " m"),
+            fact("Heading", self._heading, "°"),
+            html.div(html.dt(text="Pose age"), self._age, class_="wide"),
+            html.div(html.dt(text="Battery"), self._battery, class_="wide"),
+            class_="facts",
+        )
 
     def _remove_robot(self) -> None:
         robot, may = self._robot, self.map.page.viewer.role != "viewer"

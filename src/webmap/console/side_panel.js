@@ -1,12 +1,12 @@
 import { byId } from "../web/tools/dom.js";
 
 /**
- * The docked list of robots with the card: its width, and whether it is open. Both are
- * a part of the layout, and stored in the browser.
+ * The docked list of robots with the card: its width, whether it is open, and whether
+ * the card shows more. They are a part of the layout, and stored in the browser.
  */
 
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {{open: boolean, width: number}} Shown Width in pixels. */
+/** @typedef {{open: boolean, width: number, more: boolean}} Shown Width in pixels. */
 
 /** The key of the state in this browser's storage. */
 const KEPT = "webmap.panel";
@@ -16,6 +16,9 @@ const NARROWEST = 240;
 const USUAL = 296;
 const WIDEST = 480;
 const STEP = 16;
+
+/** @type {Shown} */
+const AT_FIRST = { open: true, width: USUAL, more: false };
 
 /**
  * Open, close and resize the panel.
@@ -29,12 +32,14 @@ export function listenToPanel(map, signal) {
   let shown = kept();
   const show = (/** @type {Shown} */ next) => {
     const width = Math.round(Math.min(Math.max(next.width, NARROWEST), WIDEST));
-    shown = { open: next.open, width };
+    shown = { ...next, width };
     document.body.dataset.panel = shown.open ? "open" : "closed";
     if (width === USUAL) document.documentElement.style.removeProperty("--panel");
     else document.documentElement.style.setProperty("--panel", `${width}px`);
     turn.setAttribute("aria-expanded", `${shown.open}`);
     edge.setAttribute("aria-valuenow", `${width}`);
+    const more = moreOfCard();
+    if (more && more.open !== shown.more) more.open = shown.more;
   };
   const change = (/** @type {Partial<Shown>} */ part) => {
     show({ ...shown, ...part });
@@ -43,6 +48,10 @@ export function listenToPanel(map, signal) {
   edge.setAttribute("aria-valuemin", `${NARROWEST}`);
   edge.setAttribute("aria-valuemax", `${WIDEST}`);
   show(shown);
+  const folded = (/** @type {Event} */ { target }) => {
+    if (target === moreOfCard()) change({ more: moreOfCard()?.open });
+  };
+  byId("card").addEventListener("toggle", folded, { signal, capture: true });
   turn.addEventListener("click", () => change({ open: !shown.open }), { signal });
   const key = (/** @type {KeyboardEvent} */ event) => {
     const by = { ArrowLeft: -STEP, ArrowRight: STEP }[event.key];
@@ -58,7 +67,7 @@ export function listenToPanel(map, signal) {
   return map.layout.add("panel", {
     read: () => shown,
     write: change,
-    reset: () => change({ open: true, width: USUAL }),
+    reset: () => change(AT_FIRST),
   });
 }
 
@@ -84,13 +93,22 @@ function listenToEdge(edge, moved, signal) {
   edge.addEventListener("pointercancel", up, { signal });
 }
 
+/** @returns {HTMLDetailsElement | null} */
+function moreOfCard() {
+  return document.querySelector("#card > details.more");
+}
+
 /** @returns {Shown} */
 function kept() {
   try {
-    const { open, width } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-    return { open: open !== false, width: Number.isFinite(width) ? width : USUAL };
+    const { open, width, more } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
+    return {
+      open: open !== false,
+      width: Number.isFinite(width) ? width : USUAL,
+      more: more === true,
+    };
   } catch {
-    return { open: true, width: USUAL };
+    return AT_FIRST;
   }
 }
 

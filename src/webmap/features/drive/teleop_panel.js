@@ -1,7 +1,7 @@
 import { Stick } from "../../web/inputs/stick.js";
-import { isTested, motions, ownStop, speedText, stopTestText, timings } from "../../web/motion/figures.js";
+import { isTested, motions, ownStop, stopTestText, timings } from "../../web/motion/figures.js";
 import { heldByProgram, isLatched, stopKey } from "../../web/motion/report.js";
-import { capOf } from "../../web/motion/status.js";
+import { capOf, speedOf } from "../../web/motion/status.js";
 import { button, html, setText, stopButton, TwiceButton } from "../../web/tools/elements.js";
 
 /** @typedef {import('../../web/drive.js').Drive} Drive */
@@ -106,7 +106,7 @@ export class Panel {
    */
   showFigures(report, loop, moving) {
     setText(this._own, report ? ownStop(report) : "");
-    setText(this._speed, report ? speedText(report) : "");
+    setText(this._speed, report ? speedOf(report) : "");
     this._fold.hidden = report === null || isLatched(report);
     setText(this._test, report ? stopTestText(report) : "");
     this._figures.hidden = report === null || isLatched(report);

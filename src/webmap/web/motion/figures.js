@@ -75,15 +75,6 @@ export function motions({ sent, echoed, measured }) {
 }
 
 /**
- * @param {RobotReport} report
- * @returns {string} The measured speed, to be read at a glance.
- */
-export function speedText({ measured }) {
-  const speed = speedAlong(measured);
-  return speed === null ? UNKNOWN : `${signed(speed)} m/s`;
-}
-
-/**
  * Return the delays and the stopping distance.
  *
  * @param {RobotReport} report
