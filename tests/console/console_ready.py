@@ -69,6 +69,12 @@ def select(page: Page, name: str) -> None:
     expect(page.locator("#card h2")).to_have_text(name)
 
 
+def unfold(page: Page) -> None:
+    """Show the part of the card that is folded under More."""
+    page.locator("#card .more > summary").click()
+    expect(page.locator("#card .more[open]")).to_be_visible()
+
+
 def title(page: Page):
     return page.locator(".webmap-teleop-title")
 

@@ -4,7 +4,7 @@ import re
 from contextlib import contextmanager, suppress
 
 import pytest
-from console_ready import send_away
+from console_ready import send_away, unfold
 from playwright.sync_api import Page, TimeoutError, expect
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -56,7 +56,7 @@ def test_the_operator_sees_you_have_control_and_another_page_sees_has_control(
     other = theirs.locator('#robots [aria-pressed]:has-text("Robot 2") .holder')
     expect(other).to_contain_text("has control")
     expect(other).to_be_visible()
-    mine.get_by_role("button", name="Release control", exact=True).click()
+    mine.get_by_role("button", name="Release control of Robot 2").click()
     expect(mine.locator("#card .state .holder")).to_have_text("Free")
 
 
@@ -166,7 +166,8 @@ def test_show_everything_fits_the_floor_and_all_robots_beside_the_card(
         page.keyboard.press("0")
     else:
         page.get_by_role("button", name="Show everything").click()
-    free = page.locator("#card").bounding_box()["x"]
+    card = page.locator("#card").bounding_box()
+    free = card["x"] + card["width"]
     top = page.locator("svg.webmap").bounding_box()["y"]
     for name in ("#far", ".floor.day"):
         box = page.locator(name).evaluate(
@@ -178,7 +179,7 @@ def test_show_everything_fits_the_floor_and_all_robots_beside_the_card(
             }"""
         )
         for x, y in box:
-            assert 0 < x < free
+            assert free < x < page.viewport_size["width"]
             assert top < y < page.viewport_size["height"]
 
 
@@ -361,8 +362,9 @@ def test_route_points_can_be_added_by_touch_after_set_pose_in_between(
     tap_floor(1)
     expect(points).to_have_count(1)
     page.locator("#sheet").tap()
+    unfold(page)
     page.get_by_role("button", name="Set pose").tap()
-    expect(page.locator(".webmap-route > .webmap-route-word")).to_have_text(
+    expect(page.locator(".webmap-route .webmap-route-word")).to_have_text(
         "Waiting: finish the other tool, then add more points."
     )
     tap_floor(2)

@@ -4,7 +4,7 @@ import re
 from contextlib import suppress
 
 import pytest
-from console_ready import assert_free, same_word, select, title
+from console_ready import assert_free, same_word, select, title, unfold
 from playwright.sync_api import expect
 
 from real_browser import hold
@@ -26,7 +26,7 @@ def test_the_bar_the_card_and_the_list_show_the_same_state(open_console):
     same_word(page, "You are driving")
     page.keyboard.up("a")
     same_word(page, "You have control")
-    back = page.get_by_role("button", name="Release control", exact=True)
+    back = page.get_by_role("button", name="Release control of Robot 1")
     back.evaluate("e => e.click()")  # it moves while the words beside it change
     same_word(page, "Free")
 
@@ -36,6 +36,7 @@ def test_the_card_runs_a_stop_test_of_a_robot_with_a_stated_command_timeout(
 ):
     page = open_console()
     page.locator("#robots .row", has_text="Robot 2").locator("button").first.click()
+    unfold(page)
     test = page.locator("[data-act=stop-test]")
     expect(test).to_have_text(re.compile("Stop test: take control"))
     expect(test).to_be_disabled()
@@ -43,13 +44,14 @@ def test_the_card_runs_a_stop_test_of_a_robot_with_a_stated_command_timeout(
     expect(bound).to_contain_text(re.compile(r"stops within \d\.\d\d s"))
     expect(bound).to_contain_text("(stated)")
     page.get_by_role("button", name="Take control of Robot 2").click()
-    # With a camera above them the figures would lie below the edge of the card.
     expect(page.get_by_role("img", name="Camera of Robot 2")).to_be_visible()
     page.wait_for_function(
         "document.querySelector('.cameras img').naturalWidth === 320"
     )
+    # The figures are below the camera, where the card has to be scrolled.
     figures = page.locator("#card .speeds")
     assert page.locator("#card").evaluate("e => e.scrollHeight > e.clientHeight + 40")
+    figures.scroll_into_view_if_needed()
     assert_free(figures)
     tested = re.compile(r"\(tested \d{4}-\d\d-\d\d\)")
     for _ in range(8):
@@ -67,7 +69,7 @@ def test_the_card_runs_a_stop_test_of_a_robot_with_a_stated_command_timeout(
             break
     expect(bound).to_contain_text(tested)
     expect(page.get_by_role("button", name="Run stop test", exact=True)).to_be_enabled()
-    page.get_by_role("button", name="Release control", exact=True).last.click()
+    page.get_by_role("button", name="Release control of Robot 2").click()
 
 
 def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):
@@ -93,4 +95,4 @@ def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):
     page.keyboard.up("w")
     hold(page.keyboard, "s", lambda: "-" in MINUS.sub("-", detail.text_content()))
     page.keyboard.up("s")
-    page.get_by_role("button", name="Release control", exact=True).click()
+    page.get_by_role("button", name="Release control of Robot 2").click()

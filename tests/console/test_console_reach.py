@@ -12,10 +12,10 @@ ROBOTS = 10
 """So many that the list of stopped robots is long."""
 
 PANELS = """() => [...document.querySelectorAll("details")]
-  .filter((e) => e.checkVisibility()).length"""
+  .filter((e) => e.querySelector("summary").checkVisibility()).length"""
 
 OPEN_PANEL = """(index) => [...document.querySelectorAll("details")]
-  .filter((e) => e.checkVisibility())
+  .filter((e) => e.querySelector("summary").checkVisibility())
   .forEach((e, i) => { e.open = index === null || i === index; })"""
 
 

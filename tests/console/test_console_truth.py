@@ -10,6 +10,7 @@ from console_ready import (
     send_away,
     shown_state,
     title,
+    unfold,
     wait_until_ready,
 )
 from playwright.sync_api import expect
@@ -103,6 +104,7 @@ def test_set_pose_on_the_page_does_not_report_a_jump_of_the_pose(chromium):
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(2)
         wait_until_ready(page)
         select(page, "robot_0")
+        unfold(page)
         word = page.locator(".webmap-locate-word")
         before = page.evaluate(PLACE)
         for _ in range(5):  # a page that is too busy sends nothing

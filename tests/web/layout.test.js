@@ -26,6 +26,7 @@ const LAYOUT = {
   view: VIEW,
   layers: { open: true, shown: { Costmaps: false, "Scans\n/scan": true } },
   log: { open: false, least: "warn" },
+  panel: { open: true, width: 320, more: false },
   camera: { dock: "float", x: 0.25, y: 1 },
 };
 
@@ -96,6 +97,8 @@ describe("a layout file", () => {
       [(l) => (l.layers.shown.Maps = "no"), 'layers.shown["Maps"]', 'got "no"'],
       [(l) => (l.layers.shown["a".repeat(301)] = true), "300 characters"],
       [(l) => (l.log.least = "loud"), 'log.least: expected "debug", "info"', 'got "loud"'],
+      [(l) => (l.panel.width = -1), "panel.width: expected a number from 0", "got -1"],
+      [(l) => (l.panel.open = "yes"), "panel.open", 'got "yes"'],
       [(l) => (l.camera.dock = "left"), 'camera.dock: expected "side"', 'got "left"'],
       [(l) => (l.camera.x = 2), "camera.x: expected a number from 0 to 1, got 2"],
     ]);

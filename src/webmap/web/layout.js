@@ -24,7 +24,8 @@ import {
  *
  * @typedef {{open: boolean, shown: Record<string, boolean>}} Layers
  * @typedef {{open: boolean, least: string}} Log
- * @typedef {{open: boolean, width: number}} Panel Width in pixels.
+ * @typedef {{open: boolean, width: number, more: boolean}} Panel Width in pixels; whether
+ *     the card shows more.
  * @typedef {{dock: 'side' | 'below' | 'float', x: number, y: number}} Camera
  *
  * @typedef {object} Layout A missing part is left unchanged.
@@ -160,7 +161,7 @@ const PARTS = {
   view: checkedPlace,
   layers: whole({ open: truth, shown: switches }),
   log: whole({ open: truth, least: oneOf([...LEVELS]) }),
-  panel: whole({ open: truth, width: number(0, 10_000) }),
+  panel: whole({ open: truth, width: number(0, 10_000), more: truth }),
   camera: whole({
     dock: oneOf(["side", "below", "float"]),
     x: number(0, 1),

@@ -184,7 +184,7 @@ test("the speed limit is shown with its reason", () => {
   const why = ["stop not verified"];
   assert.equal(
     capOf({ ...REPORT, why }),
-    "Speed limit 0.30 m/s (stop not verified), turn limit 0.60 rad/s",
+    "Speed limit 0.30 m/s, 0.60 rad/s (stop not verified)",
   );
 });
 

@@ -90,7 +90,9 @@ export class Panel {
     setText(this._detail, detail);
     const stated = report?.why.some((why) => why.startsWith("slow connection"));
     const age = report?.age ?? delay;
-    setText(this._cap, report ? capOf(report) + (stated ? "" : slowness(age)) : "");
+    const cap = report ? capOf(report) + (stated ? "" : slowness(age)) : "";
+    setText(this._cap, cap);
+    set(this._cap, "title", cap);
   }
 
   /** Fold the figures out or in, on a page where the panel is one line. */
@@ -106,7 +108,7 @@ export class Panel {
    */
   showFigures(report, loop, moving) {
     setText(this._own, report ? ownStop(report) : "");
-    setText(this._speed, report ? speedOf(report) : "");
+    setText(this._speed, report?.measured ? speedOf(report) : "");
     this._fold.hidden = report === null || isLatched(report);
     setText(this._test, report ? stopTestText(report) : "");
     this._figures.hidden = report === null || isLatched(report);

@@ -184,7 +184,7 @@ function closesMenu() {
   /** @type {NodeListOf<HTMLElement>} */
   const found = document.querySelectorAll(MENUS);
   const open = [...found].filter((one) => one.matches("[open], :popover-open"));
-  const menu = open.find((one) => one.getClientRects().length > 0);
+  const menu = open.find(isShown);
   if (!menu) return false;
   const inside = menu.contains(document.activeElement);
   if (menu instanceof HTMLDialogElement) menu.close();
@@ -194,6 +194,15 @@ function closesMenu() {
   const map = /** @type {SVGElement | null} */ (document.querySelector("svg.webmap"));
   if (inside) map?.focus();
   return true;
+}
+
+/**
+ * @param {Element} menu
+ * @returns {boolean} Whether a part of the menu is on the page; the menu itself has no
+ *     box where its parts are laid out one by one (`display: contents`).
+ */
+function isShown(menu) {
+  return [menu, ...menu.children].some((one) => one.getClientRects().length > 0);
 }
 
 /**

@@ -123,9 +123,8 @@ function wordsOf(name, { report, since = "" }) {
  * @param {RobotReport} report
  */
 export function capOf(report) {
-  const turn = limit(report.w, "rad/s");
   const why = report.why.length > 0 ? ` (${report.why.join(", ")})` : "";
-  return `Speed limit ${limit(report.v, "m/s")}${why}, turn limit ${turn}`;
+  return `Speed limit ${limit(report.v, "m/s")}, ${limit(report.w, "rad/s")}${why}`;
 }
 
 /**

@@ -1,0 +1,159 @@
+"""The frame of the console: how much of the map is uncovered, the docked panels, the
+palette, and north up."""
+
+import re
+
+import pytest
+from console_ready import select, title
+from playwright.sync_api import Page, expect
+
+from real_browser import hold
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+ROBOTS = 10
+
+WIDE = {"width": 1440, "height": 900}
+
+UNCOVERED = """() => {
+  const step = 10;
+  let [seen, all] = [0, 0];
+  for (let x = step / 2; x < innerWidth; x += step) {
+    for (let y = step / 2; y < innerHeight; y += step) {
+      all += 1;
+      if (document.elementFromPoint(x, y)?.closest("svg.webmap")) seen += 1;
+    }
+  }
+  return seen / all;
+}"""
+"""The share of the window in which the map is visible."""
+
+SIZE = """name => {
+  const { width, height } = document.querySelector(name).getBoundingClientRect();
+  return [width, height];
+}"""
+
+ROBOT = """() => {
+  const { e, f } = document.querySelector(".robot.selected").getScreenCTM();
+  return document.elementFromPoint(e, f)?.closest("svg.webmap") ? "free" : "covered";
+}"""
+"""Whether something covers the selected robot."""
+
+
+@pytest.mark.serial  # a late command stops the robot
+def test_seven_tenths_of_the_window_are_map_while_a_robot_is_driven(open_console):
+    page = open_console()
+    page.set_viewport_size(WIDE)
+    select(page, "Robot 1")
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
+    share = page.evaluate(UNCOVERED)
+    page.keyboard.up("a")
+    assert share >= 0.7
+    heights = [page.evaluate(SIZE, name)[1] for name in (".bar", ".drive-bar")]
+    assert sum(heights) <= 90
+    assert page.evaluate(SIZE, "#panel")[0] <= 320
+
+
+@pytest.mark.parametrize("width", [1024, 1440])
+def test_an_open_list_in_the_dock_does_not_cover_the_selected_robot(
+    open_console, width
+):
+    page = open_console()
+    page.set_viewport_size({"width": width, "height": 600})
+    for name in ("Robot 1", "Robot 4", "Robot 7"):
+        select(page, name)
+        for tool in ("Layers", "Log", "Route"):
+            summary = page.locator(".tools summary", has_text=tool)
+            summary.click()
+            page.wait_for_timeout(300)
+            assert page.evaluate(ROBOT) == "free", (name, tool)
+            summary.click()
+
+
+def width_of_panel(page: Page) -> float:
+    return page.evaluate(SIZE, "#panel")[0]
+
+
+def test_the_list_is_resized_and_collapsed_and_the_page_remembers_both(open_console):
+    page = open_console()
+    usual = width_of_panel(page)
+    edge = page.get_by_role("separator", name="Width of the list")
+    box = edge.bounding_box()
+    page.mouse.move(box["x"] + 4, 300)
+    page.mouse.down()
+    page.mouse.move(400, 300, steps=4)
+    page.mouse.up()
+    assert width_of_panel(page) == pytest.approx(400, abs=2)
+    edge.focus()
+    page.keyboard.press("ArrowRight")
+    wider = width_of_panel(page)
+    assert wider == pytest.approx(416, abs=2)
+    page.reload()
+    expect(page.locator("#robots .row").first).to_be_visible()
+    page.wait_for_function(
+        "w => document.querySelector('#panel').clientWidth > w", arg=usual + 50
+    )
+    page.locator("#panel-edge").dblclick(position={"x": 4, "y": 300})
+    assert width_of_panel(page) == usual
+    turn = page.get_by_role("button", name="List of robots")
+    turn.click()
+    expect(page.locator("#panel")).to_be_hidden()
+    expect(turn).to_have_attribute("aria-expanded", "false")
+    page.reload()
+    expect(turn).to_have_attribute("aria-expanded", "false")
+    expect(page.locator("#panel")).to_be_hidden()
+    turn.click()
+    expect(page.locator("#panel")).to_be_visible()
+
+
+def test_the_palette_finds_robots_tools_and_layers_by_keyboard(open_console):
+    page = open_console()
+    palette = page.get_by_role("dialog", name="Find")
+
+    def find(text: str) -> None:
+        page.keyboard.press("Control+k")
+        expect(palette).to_be_visible()
+        page.keyboard.type(text)
+        page.keyboard.press("Enter")
+        expect(palette).to_be_hidden()
+
+    find("robot 7")
+    expect(page.locator("#card h2")).to_have_text("Robot 7")
+    scans = page.get_by_role("checkbox", name="Scans", exact=True)
+    find("layer scans")
+    expect(scans).not_to_be_checked()
+    find("measure")
+    expect(page.locator(".webmap-measure-word")).to_contain_text("Press")
+    page.keyboard.press("Control+k")
+    page.keyboard.type("no such thing")
+    expect(palette).to_contain_text("Nothing on this page has this name.")
+    page.keyboard.press("Escape")
+    expect(palette).to_be_hidden()
+    expect(title(page)).to_have_text("Free")
+
+
+@pytest.mark.serial  # a late command stops the robot
+def test_the_open_palette_lets_no_key_drive_and_stop_closes_it(open_console):
+    page = open_console()
+    select(page, "Robot 1")
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
+    page.keyboard.press("Control+k")
+    expect(page.get_by_role("dialog", name="Find")).to_be_visible()
+    expect(title(page)).to_have_text(re.compile("You have control|Stopping"))
+    page.keyboard.up("a")
+    page.get_by_role("button", name="STOP ALL").click()
+    expect(page.get_by_role("dialog", name="Find")).to_be_hidden()
+    page.get_by_role("button", name="Reset all").click()
+    page.wait_for_timeout(400)
+    page.get_by_role("button", name="Press again").click()
+
+
+def test_the_needle_shows_the_rotation_and_turns_north_up(open_console):
+    page = open_console()
+    north = page.get_by_role("button", name="Turn north up")
+    expect(north).to_have_attribute("title", re.compile(r"turned by 0°"))
+    page.locator("svg.webmap").focus()
+    page.keyboard.press("]")
+    expect(north).not_to_have_attribute("title", re.compile(r"turned by 0°"))
+    north.click()
+    expect(north).to_have_attribute("title", re.compile(r"turned by 0°"))
