@@ -119,7 +119,7 @@ def test_the_palette_finds_robots_tools_and_layers_by_keyboard(open_console):
 
     find("robot 7")
     expect(page.locator("#card h2")).to_have_text("Robot 7")
-    scans = page.get_by_role("checkbox", name="Scans", exact=True)
+    scans = page.locator(".webmap-layers-row", has_text="Scans").locator("input")
     find("layer scans")
     expect(scans).not_to_be_checked()
     find("measure")

@@ -83,6 +83,7 @@ def test_a_layout_is_saved_reset_and_loaded_and_the_last_view_is_restored(
         page.keyboard.press(key)
     log = page.locator(".webmap-rosout")
     log.evaluate("e => { e.open = true; }")
+    page.wait_for_timeout(300)  # the open log makes the map narrower
     left = view_of(page)
     assert left != found
 

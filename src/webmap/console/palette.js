@@ -73,6 +73,7 @@ class Palette {
   _open() {
     this._drive.goNeutral();
     this._from = document.activeElement;
+    document.dispatchEvent(new Event("webmap-find"));
     this._entries = entries();
     this._field.value = "";
     this._dialog.show();

@@ -178,19 +178,22 @@ const PLACES = 600;
 const PATIENCE = 1500;
 
 /**
- * Keep the selected robot in view when the map's place on the page becomes smaller,
- * as when a list is opened in the dock.
+ * Keep a visible selected robot in view when the map's place on the page becomes
+ * smaller, as when a list is opened in the dock. A map keeps its middle when its size
+ * changes.
  *
  * @param {MapCanvas} map
  * @returns {() => void} Ends it.
  */
 export function keepInView(map) {
-  let area = 0;
+  let [width, height] = [map.width, map.height];
   const observer = new ResizeObserver(() => {
-    const before = area;
-    area = map.width * map.height;
-    const smaller = area < before;
-    if (smaller && map.selected) show(map, map.selected);
+    const [x, y] = placeOfSelected(map) ?? [Number.NaN, Number.NaN];
+    const wasSeen =
+      Math.abs(x - map.width / 2) < width / 2 && Math.abs(y - map.height / 2) < height / 2;
+    const smaller = map.width < width || map.height < height;
+    [width, height] = [map.width, map.height];
+    if (smaller && wasSeen && map.selected) show(map, map.selected);
   });
   observer.observe(map.svg);
   return () => observer.disconnect();

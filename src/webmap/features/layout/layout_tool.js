@@ -177,6 +177,8 @@ class LayoutTool {
       const layout = readLayout(await file.text());
       this._map.layout.write(layout);
       if (layout.view) {
+        // The map first gets its size beside the panels that were opened or closed.
+        await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
         this._map.follow(0);
         this._map.setView(viewOf(layout.view, this._map));
       }

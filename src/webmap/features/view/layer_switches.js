@@ -90,6 +90,10 @@ class LayerSwitches {
     this._details = foldedTool("webmap-layers", "layers", "Layers", menu, ...content);
     this._details.addEventListener("toggle", () => this._look());
     this._timer = setInterval(() => this._look(), PERIOD);
+    // A page that finds things by name needs the list while it is closed too.
+    this._ending = new AbortController();
+    const { signal } = this._ending;
+    document.addEventListener("webmap-find", () => this._update(), { signal });
     this._take = lay(map, this._details, "top-left");
     /** @type {Map<string, HTMLElement>} */
     this._rows = new Map();
@@ -106,6 +110,7 @@ class LayerSwitches {
 
   destroy() {
     clearInterval(this._timer);
+    this._ending.abort();
     this._leave();
     this._take();
     delete this._map.svg.dataset.layers;
@@ -113,9 +118,12 @@ class LayerSwitches {
     document.adoptedStyleSheets = sheets.filter((sheet) => sheet !== this._sheet);
   }
 
-  /** List the present layers of the map. */
   _look() {
-    if (!this._details.open) return;
+    if (this._details.open) this._update();
+  }
+
+  /** List the present layers of the map. */
+  _update() {
     const there = new Set();
     for (const [name, selector] of this._layers) {
       /** @type {NodeListOf<SVGElement>} */
