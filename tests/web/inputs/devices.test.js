@@ -63,3 +63,50 @@ test("a tool that throws does not prevent Escape for another tool", () => {
   assert.deepEqual(escapeAt(fails, leaves), []);
   assert.equal(left, 1);
 });
+
+/**
+ * Press a key of a page with this status, and return what the page's inputs are then.
+ *
+ * @param {object} status
+ * @param {(event: Event) => boolean} use What a tool does with the key.
+ */
+function keyAt(status, use) {
+  const inputs = [];
+  const desk = devicesOf({
+    status: { driven: null, taking: false, choice: "r1", ...status },
+    robots: new Map(),
+    on: () => () => {},
+    stop() {},
+    choose() {},
+    goNeutral() {},
+    setInput: (name, axes) => inputs.push(axes),
+  });
+  Object.assign(document, { visibilityState: "visible", hasFocus: () => true, activeElement: null });
+  const remove = desk.addMap({ map: {}, robot: () => "r1", holonomic: false, onActive() {} });
+  desk.claimKeys(use);
+  const key = { code: "ArrowUp", key: "ArrowUp" };
+  window.dispatchEvent(Object.assign(new Event("keydown"), key));
+  const held = inputs.at(-1);
+  remove();
+  return held ?? null;
+}
+
+test("a key that a tool uses drives no robot", () => {
+  assert.equal(
+    keyAt({}, () => true),
+    null,
+  );
+  assert.equal(keyAt({}, () => false)?.x, 1);
+});
+
+test("no tool uses a key while a robot is driven or taken", () => {
+  const never = () => assert.fail("the tool was asked");
+  assert.equal(keyAt({ driven: "r1" }, never)?.x, 1);
+  assert.equal(keyAt({ taking: true }, never)?.x, 1);
+  assert.deepEqual(reported, []);
+});
+
+test("a key drives although a tool fails", () => {
+  assert.equal(keyAt({}, fails)?.x, 1);
+  assert.equal(reported.length, 1);
+});

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { aim, onScreen } from "../../../src/webmap/web/tools/aim.js";
+import { aim, moved, onScreen } from "../../../src/webmap/web/tools/aim.js";
 import { rotate } from "../../../src/webmap/web/view.js";
 
 const VIEW = { a: 50, b: 0, c: 0, d: -50, e: 100, f: 200 };
@@ -36,4 +36,26 @@ test("an arrow points in the direction of the drag at any rotation of the view",
     near(arrow.y, 20);
     near(arrow.degrees, 45);
   }
+});
+
+test("an arrow key moves the mark on the screen at any rotation of the view", () => {
+  for (const degrees of [0, 30, -160]) {
+    const view = rotate(VIEW, degrees, 77, 33);
+    const pose = { x: 1, y: 2, yaw: 0.5 };
+    const before = onScreen(view, pose);
+    const after = onScreen(view, moved(view, pose, "ArrowUp", false));
+    near(after.x, before.x);
+    near(after.y, before.y - 10);
+    near(after.degrees, before.degrees);
+  }
+});
+
+test("Shift with an arrow key turns the mark, and other keys do nothing", () => {
+  const pose = { x: 1, y: 2, yaw: Math.PI - 0.1 };
+  const turned = moved(VIEW, pose, "ArrowLeft", true);
+  near(turned.yaw, -Math.PI - 0.1 + Math.PI / 12);
+  near(turned.x, 1);
+  near(moved(VIEW, pose, "ArrowRight", true).yaw, pose.yaw - Math.PI / 12);
+  near(moved(VIEW, pose, "ArrowUp", true).yaw, pose.yaw);
+  assert.equal(moved(VIEW, pose, "w", false), null);
 });

@@ -15,7 +15,8 @@ import { tool, toolName } from "../../web/tools/tool.js";
 /** @typedef {{button?: boolean, key?: string, spacing?: number}} Options */
 
 /**
- * Send the selected robots to a place: press there, drag for the heading, release.
+ * Send the selected robots to a place: press there, drag for the heading, release. Or
+ * move the mark with the arrow keys, turn it with Shift, and press Enter.
  *
  * The tool begins with its button, with `g`, or with a message `{active: true}`; Escape
  * ends it. It takes control where needed. A message `{reached: id}` removes the goal of
@@ -126,7 +127,7 @@ class GoalTool {
     if (this._wanted && !active && this._map.selected === null) {
       setText(this._message, "Select a robot first.");
     } else {
-      setText(this._message, active ? "Press on the map and drag for the heading." : "");
+      setText(this._message, active ? AIMING : "");
     }
     this._wanted = false;
     this._show();
@@ -300,6 +301,9 @@ class GoalTool {
     this._marks.show(goals);
   }
 }
+
+const AIMING =
+  "Press on the map and drag for the heading. Or use the keys: arrows move, Shift turns, Enter sends.";
 
 /** Duration of a long press on a robot, in ms. */
 const LONG = 500;

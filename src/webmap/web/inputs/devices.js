@@ -51,6 +51,8 @@ export class Devices {
     this.active = null;
     /** @type {Set<() => boolean>} */
     this._escapes = new Set();
+    /** @type {Set<(event: KeyboardEvent) => boolean>} */
+    this._keyUsers = new Set();
     this._uses = 0;
     /** @type {Keys | null} */
     this._keys = null;
@@ -83,6 +85,7 @@ export class Devices {
     this._keys ??= new Keys(this._drive, {
       ...owner,
       stop: (all, event) => this._stop(all, event),
+      used: (event) => this._used(event),
     });
     let ended = false;
     return () => {
@@ -146,6 +149,30 @@ export class Devices {
   }
 
   /**
+   * Let a tool use keys that would drive a robot, unless a robot is driven. A STOP key
+   * is never used.
+   *
+   * @param {(event: KeyboardEvent) => boolean} use Returns whether it used the key.
+   * @returns {() => void} Removes this use of keys.
+   */
+  claimKeys(use) {
+    this._keyUsers.add(use);
+    return () => {
+      this._keyUsers.delete(use);
+    };
+  }
+
+  /**
+   * @param {KeyboardEvent} event
+   * @returns {boolean} Whether a tool used the key, which then drives no robot.
+   */
+  _used(event) {
+    const { driven, taking } = this._drive.status;
+    if (driven !== null || taking) return false;
+    return [...this._keyUsers].some((use) => uses(() => use(event)));
+  }
+
+  /**
    * @param {boolean} all
    * @param {KeyboardEvent} event
    */
@@ -159,8 +186,8 @@ export class Devices {
     if (!drives && keepsKey(event)) return false;
     if (!drives && event.code === "Escape") {
       const held = choice !== null && this._drive.robots.get(choice)?.mine;
-      if (!held && leaves(closesMenu)) return true;
-      for (const leave of this._escapes) if (leaves(leave)) return true;
+      if (!held && uses(closesMenu)) return true;
+      for (const leave of this._escapes) if (uses(leave)) return true;
     }
     // Without a robot the key means all: an unnecessary STOP is harmless.
     this._drive.stop(driven ?? choice ?? "*");
@@ -206,13 +233,13 @@ function isShown(menu) {
 }
 
 /**
- * @param {() => boolean} leave
- * @returns {boolean} Whether it ended something; false after an error, which must never prevent
- *     a STOP.
+ * @param {() => boolean} use
+ * @returns {boolean} Whether it used the key; false after an error, which must never
+ *     prevent a STOP.
  */
-function leaves(leave) {
+function uses(use) {
   try {
-    return leave();
+    return use();
   } catch (error) {
     reportError(error);
     return false;

@@ -62,6 +62,8 @@ export class Keys {
    * @param {() => boolean} owner.holonomic Whether it can move sideways.
    * @param {(all: boolean, event: KeyboardEvent) => boolean} owner.stop Called for a
    *     STOP key; returns whether it used the key.
+   * @param {(event: KeyboardEvent) => boolean} [owner.used] Called for any other key;
+   *     returns whether a tool used the key, which then drives nothing.
    */
   constructor(drive, owner) {
     this._drive = drive;
@@ -87,6 +89,11 @@ export class Keys {
     if (this._isStop(event)) return;
     if (MODIFIERS.has(event.key)) {
       this._drive.goNeutral();
+      return;
+    }
+    if (!this._held.has(event.code) && attentive() && this._owner.used?.(event)) {
+      event.preventDefault();
+      event.stopImmediatePropagation();
       return;
     }
     if (!this._drives(event)) return;

@@ -23,7 +23,7 @@ export function takesKeys(target) {
   if (target instanceof HTMLInputElement) return !BUTTON_LIKE.has(target.type);
   if (target instanceof HTMLElement && target.isContentEditable) return true;
   return target.matches(
-    "textarea, select, [role=textbox], [role=slider], [role=listbox]",
+    "textarea, select, [role=textbox], [role=slider], [role=listbox], [role=separator]",
   );
 }
 

@@ -43,6 +43,41 @@ export function onScreen(view, { x, y, yaw }) {
   return { ...place, degrees: (angle * 180) / Math.PI };
 }
 
+/** Distance of one press of an arrow key in pixels, and its rotation in radians. */
+const KEY_MOVE = 10;
+const KEY_TURN = Math.PI / 12;
+
+/** @type {Record<string, [number, number]>} Right and down on the screen. */
+const ARROWS = {
+  ArrowRight: [1, 0],
+  ArrowLeft: [-1, 0],
+  ArrowDown: [0, 1],
+  ArrowUp: [0, -1],
+};
+
+/**
+ * Return a pose after the press of an arrow key: it moves on the screen, and with Shift
+ * turns to the left or the right.
+ *
+ * @param {Matrix} view
+ * @param {Pose} pose
+ * @param {string} key
+ * @param {boolean} turns Whether Shift is held.
+ * @returns {Pose | null} null for any other key.
+ */
+export function moved(view, pose, key, turns) {
+  const arrow = ARROWS[key];
+  if (!arrow) return null;
+  if (turns) {
+    const by = { ArrowLeft: KEY_TURN, ArrowRight: -KEY_TURN }[key] ?? 0;
+    const yaw = pose.yaw + by;
+    return { ...pose, yaw: Math.atan2(Math.sin(yaw), Math.cos(yaw)) };
+  }
+  const { x, y } = apply(view, pose.x, pose.y);
+  const place = unapply(view, x + KEY_MOVE * arrow[0], y + KEY_MOVE * arrow[1]);
+  return { ...place, yaw: pose.yaw };
+}
+
 /**
  * @param {Point} from
  * @param {Point} to
@@ -72,7 +107,9 @@ function heading(from, to, otherwise) {
 const active = new WeakMap();
 
 /**
- * Aims a pose on a map: press for the position, drag for the heading, release.
+ * Aims a pose on a map: press for the position, drag for the heading, release. On the
+ * keyboard, arrow keys move a mark that begins at the robot, Shift with left or right
+ * turns the mark, and Enter ends; see {@link moved}.
  *
  * Starts with a key or {@link PressAim#activate}; Escape ends it. One tool of a map
  * aims at a time; a lasting tool continues after another has aimed in between.
@@ -92,16 +129,21 @@ export class PressAim {
     this._interrupted = null;
     /** @type {{id: number, from: Point, robot: string | null} | null} */
     this._press = null;
+    /** @type {Pose | null} The mark that the keyboard moves. */
+    this._mark = null;
     this._ending = new AbortController();
     this._listen();
-    this._offEscape = devicesOf(map.drive).claimEscape(() => this.leave());
+    this._offs = [
+      devicesOf(map.drive).claimEscape(() => this.leave()),
+      devicesOf(map.drive).claimKeys((event) => this._keyed(event)),
+    ];
   }
 
   destroy() {
     this._interrupted = null;
     this.leave();
     this._ending.abort();
-    this._offEscape();
+    for (const off of this._offs) off();
   }
 
   toggle() {
@@ -155,8 +197,9 @@ export class PressAim {
 
   /** Cancel the current press, if there is one. */
   drop() {
-    if (!this._press) return;
+    if (!this._press && !this._mark) return;
     this._press = null;
+    this._mark = null;
     this._aims.preview(null);
   }
 
@@ -182,9 +225,37 @@ export class PressAim {
     this.toggle();
   }
 
+  /**
+   * @param {KeyboardEvent} event
+   * @returns {boolean} Whether the key moved the mark, or ended with it.
+   */
+  _keyed({ key, shiftKey, ctrlKey, altKey, metaKey, isComposing }) {
+    if (!this.active || this._press) return false;
+    if (ctrlKey || altKey || metaKey || isComposing) return false;
+    const mark = this._mark;
+    if (key === "Enter" && mark) {
+      this._mark = null;
+      this._aims.done(mark);
+      return true;
+    }
+    const next = moved(this._map.view, mark ?? this._beginning(), key, shiftKey);
+    if (!next) return false;
+    this._mark = next;
+    this._aims.preview(next);
+    return true;
+  }
+
+  /** @returns {Pose} Where the mark begins: at the robot, or in the middle of the map. */
+  _beginning() {
+    const { view, width, height, selected } = this._map;
+    const origin = this._aims.origin?.() ?? (selected === null ? null : poseOf(this._map, selected));
+    return origin ?? { ...unapply(view, width / 2, height / 2), yaw: 0 };
+  }
+
   /** @param {PointerEvent} event */
   _down(event) {
     if (!this.active) return;
+    this._mark = null;
     event.stopImmediatePropagation();
     event.preventDefault();
     if (this._press || event.button !== 0) {

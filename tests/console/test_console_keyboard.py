@@ -1,0 +1,131 @@
+"""Each task of the operator's manual, done with the keyboard alone."""
+
+import re
+
+import pytest
+from console_ready import same_word, shown_state, title
+from playwright.sync_api import Page, expect
+
+from real_browser import hold
+
+# A page or a robot that waits for a processor stops.
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
+
+ROBOTS = 3
+
+GOAL_MARK = ".webmap-goal-mark"
+
+
+def find(page: Page, text: str) -> None:
+    """Press what the palette finds first."""
+    page.keyboard.press("Control+k")
+    expect(page.get_by_role("dialog", name="Find")).to_be_visible()
+    page.keyboard.type(text)
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("dialog", name="Find")).to_be_hidden()
+
+
+def reset(page: Page) -> None:
+    """End a STOP; the button needs two deliberate presses."""
+    find(page, "control reset")
+    page.wait_for_timeout(500)
+    page.keyboard.press("Enter")
+
+
+def test_a_robot_is_selected_driven_stopped_and_released(open_console):
+    page = open_console()
+    find(page, "robot 1")
+    expect(page.locator("#card h2")).to_have_text("Robot 1")
+    find(page, "take control")
+    same_word(page, "You have control")
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
+    page.keyboard.up("a")
+    same_word(page, "You have control")
+    page.keyboard.press("Space")
+    same_word(page, "STOP active")
+    reset(page)
+    same_word(page, "Free")
+    page.keyboard.press("Shift+Escape")
+    same_word(page, "STOP active")
+    expect(page.locator(".webmap-stop-standing")).to_contain_text("3 robots")
+    all_ = page.get_by_role("button", name="Reset all")
+    all_.focus()
+    page.keyboard.press("Enter")
+    page.wait_for_timeout(500)
+    page.keyboard.press("Enter")
+    same_word(page, "Free")
+    find(page, "take control")
+    same_word(page, "You have control")
+    find(page, "release control")
+    same_word(page, "Free")
+
+
+def test_a_goal_is_placed_with_arrow_keys_turned_sent_and_cancelled(open_console):
+    page = open_console()
+    find(page, "robot 1")
+    before = page.locator(".robot.selected").get_attribute("transform")
+    for _ in range(5):  # a page that is too busy sends nothing
+        page.keyboard.press("g")
+        expect(page.locator(".webmap-goal-word")).to_contain_text("arrows move")
+        for _ in range(8):
+            page.keyboard.press("ArrowDown")
+        page.keyboard.press("Shift+ArrowLeft")
+        assert page.locator(".robot.selected").get_attribute("transform") == before
+        expect(shown_state(page)).to_have_text("Free")
+        page.keyboard.press("Enter")
+        goal = page.locator("#card .goal")
+        try:
+            expect(goal).to_contain_text(re.compile("Goal|Navigating"), timeout=5000)
+            break
+        except AssertionError:
+            continue
+    expect(goal).to_contain_text(re.compile("Navigating|reached"))
+    find(page, "cancel goal")
+    expect(goal).to_contain_text(re.compile("cancelled|reached"))
+
+
+def test_a_place_is_found_by_name_and_a_robot_is_sent_there(open_console):
+    page = open_console()
+    find(page, "robot 2")
+    page.keyboard.press("l")
+    where = page.locator("svg.webmap").bounding_box()
+    # The position of a new label needs the pointer once; the task is to send there.
+    page.mouse.click(where["x"] + where["width"] * 0.5, where["y"] + where["height"] * 0.5)
+    page.get_by_label("Name", exact=True).fill("Charging dock")
+    page.keyboard.press("Enter")
+    expect(page.locator(".labels > .label")).to_have_count(1)
+    find(page, "charging dock")
+    send = page.get_by_role("button", name="Send goal here")
+    expect(send).to_be_focused()
+    for _ in range(5):  # a page that is too busy sends nothing
+        page.keyboard.press("Enter")
+        try:
+            expect(page.locator("#card .goal")).to_contain_text(
+                re.compile("Goal|Navigating"), timeout=5000
+            )
+            break
+        except AssertionError:
+            find(page, "charging dock")
+    page.keyboard.press("Escape")
+    same_word(page, "STOP active")
+    reset(page)
+    same_word(page, "Free")
+
+
+def test_the_view_the_layers_and_the_help_need_no_mouse(open_console):
+    page = open_console()
+    find(page, "zoom in")
+    find(page, "show everything")
+    find(page, "layer scans")
+    scans = page.locator(".webmap-layers-row", has_text="Scans").locator("input")
+    expect(scans.first).not_to_be_checked()
+    find(page, "layer scans")
+    expect(scans.first).to_be_checked()
+    find(page, "help")
+    expect(page.get_by_role("dialog", name="Keys and gestures")).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("dialog", name="Keys and gestures")).to_be_hidden()
+    find(page, "list of robots")
+    expect(page.locator("#panel")).to_be_hidden()
+    find(page, "list of robots")
+    expect(page.locator("#panel")).to_be_visible()
