@@ -160,3 +160,11 @@ def test_a_page_without_a_key_explains_the_sign_in_and_resumes_afterwards(
         second.goto(process.url)
         shows_its_map(second)
         shows_its_map(tab)
+
+
+def test_the_sign_in_page_has_its_style_and_a_focused_field(tab, script):
+    with running("run", script, "--port", 0, "--no-browser", pattern=WEB) as process:
+        tab.goto(process.url.partition("?")[0])
+        expect(tab.get_by_label("Token")).to_be_focused()
+        expect(tab.locator("main")).to_have_css("border-radius", "12px")
+        expect(tab.get_by_text("Sign in first.")).to_be_visible()

@@ -5,10 +5,9 @@ import inspect
 import logging
 import time
 from collections.abc import Callable
-from html import escape
 from http import HTTPStatus
 
-from starlette.responses import HTMLResponse, PlainTextResponse, Response
+from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from webmap.core.page import Viewer
@@ -22,6 +21,7 @@ from webmap.server.access import (
     redact,
 )
 from webmap.server.connections import connection_of
+from webmap.server.sign_in import sign_in_page
 
 log = logging.getLogger("webmap.server")
 
@@ -74,26 +74,6 @@ def with_headers(send: Send, cookie: str | None = None) -> Send:
     return send_with_headers
 
 
-_SIGN_IN = """<!doctype html>
-<html lang="en">
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width">
-<meta name="color-scheme" content="light dark">
-<title>Sign in - WebMap</title>
-<main>
-<h1>Sign in to WebMap</h1>
-<p>{text}</p>
-<p>Open the address that WebMap printed at its start, or enter its token:</p>
-<form>
-<label>Token <input name="token" type="password" autocomplete="off" required></label>
-<button>Sign in</button>
-</form>
-<p>If you have just signed in through another site, <a href="?">continue</a>.</p>
-</main>
-</html>
-"""
-
-
 def plain(status: int, text: str) -> Response:
     """Return a refusal as a heading and a sentence of plain text."""
     phrase = HTTPStatus(status).phrase
@@ -103,7 +83,7 @@ def plain(status: int, text: str) -> Response:
 def refuse(refusal: Refusal, *, wants_html: bool) -> Response:
     """Return the answer to a refused request."""
     if refusal.status == HTTPStatus.UNAUTHORIZED and wants_html:
-        return HTMLResponse(_SIGN_IN.format(text=escape(refusal.text)), refusal.status)
+        return sign_in_page(refusal.text, refusal.status)
     response = plain(refusal.status, refusal.text)
     if refusal.retry_after:
         response.headers["retry-after"] = str(refusal.retry_after)
