@@ -146,6 +146,11 @@ docs: $(DEV)
 bench: $(DEV) $(NODE)
 	$(PY) -m benchmarks $(ARGS)
 
+## screenshots: contact sheets of every state of the console, in test-results/screenshots
+.PHONY: screenshots
+screenshots: $(DEV) $(NODE)
+	$(PY) tools/contact_sheet.py $(ARGS)
+
 ## format: format the Python files with ruff
 .PHONY: format
 format: $(DEV)

@@ -364,9 +364,9 @@ def test_route_points_can_be_added_by_touch_after_set_pose_in_between(
     page.locator("#sheet").tap()
     unfold(page)
     page.get_by_role("button", name="Set pose").tap()
-    expect(page.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")).to_have_text(
-        "Waiting: finish the other tool, then add more points."
-    )
+    expect(
+        page.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
+    ).to_have_text("Waiting: finish the other tool, then add more points.")
     tap_floor(2)
     expect(page.locator(".webmap-locate-word")).to_contain_text(
         re.compile("^Pose sent|^Not sent")

@@ -90,7 +90,9 @@ def test_a_place_is_found_by_name_and_a_robot_is_sent_there(open_console):
     page.keyboard.press("l")
     where = page.locator("svg.webmap").bounding_box()
     # The position of a new label needs the pointer once; the task is to send there.
-    page.mouse.click(where["x"] + where["width"] * 0.5, where["y"] + where["height"] * 0.5)
+    page.mouse.click(
+        where["x"] + where["width"] * 0.5, where["y"] + where["height"] * 0.5
+    )
     page.get_by_label("Name", exact=True).fill("Charging dock")
     page.keyboard.press("Enter")
     expect(page.locator(".labels > .label")).to_have_count(1)

@@ -187,14 +187,32 @@ function entries() {
  */
 function nameOf(element, part) {
   const named = part === "" ? element : element.querySelector(part);
-  const shown = named instanceof HTMLElement ? named.innerText.trim() : "";
   const label = element.getAttribute("aria-label");
-  return (part !== "" && shown) || label || shown || element.textContent?.trim() || "";
+  return (part === "" && label) || (named && textOf(named).trim()) || label || "";
+}
+
+/**
+ * @param {Element} element
+ * @returns {string} Its text without parts that are switched off, also where a folded
+ *     panel contains it.
+ */
+function textOf(element) {
+  const texts = [...element.childNodes].map((node) => {
+    if (!(node instanceof Element)) return node.textContent ?? "";
+    return isOff(node) ? "" : textOf(node);
+  });
+  return texts.join("");
+}
+
+/** @param {Element} element */
+function isOff(element) {
+  return getComputedStyle(element).display === "none";
 }
 
 /** @param {Element} element */
 function usable(element) {
   if (element instanceof HTMLButtonElement && element.disabled) return false;
+  if (isOff(element)) return false;
   return element.closest("[hidden]:not(.webmap-export-menu)") === null;
 }
 
