@@ -22,6 +22,7 @@ from webmap.features.alerts.alert_panel import AlertPanel
 from webmap.features.alerts.alert_watch import LOW
 from webmap.features.cameras.camera_panel import CameraPanel
 from webmap.features.doctor.doctor_panel import DoctorReports
+from webmap.features.selection.several_robots import SeveralRobots
 
 if TYPE_CHECKING:
     from webmap import Bridge, Map, Page, RobotConfig
@@ -112,6 +113,12 @@ def build(
     saving = {"place": ".tools", "classes": "webmap-button"}
     map.add_module("ExportTool", **saving)
     map.add_module(Layout, of=kept_under, **saving)
+    map.add_module(
+        SeveralRobots,
+        goals.aim,
+        rows="#robots > .row:not(.filtered)",
+        button="#select-shown",
+    )
     map.add_module("ScaleBar")
     map.add_module("PointerReadout")
     frame = map.add_module(Frame, title, floor)
