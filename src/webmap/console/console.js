@@ -202,7 +202,9 @@ function listenToSearch(signal) {
       const name = row.querySelector(".name")?.textContent?.toLowerCase() ?? "";
       row.classList.toggle("filtered", !name.includes(wanted));
     }
-    const none = wanted !== "" && hits().length === 0;
+    const found = hits().length;
+    byId("select-shown").hidden = wanted === "" || found < 2;
+    const none = wanted !== "" && found === 0;
     setText(byId("not-found"), none ? `No robot has “${input.value.trim()}” in its name.` : "");
   };
   input.addEventListener("input", filter, { signal });

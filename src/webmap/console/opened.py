@@ -5,6 +5,9 @@ import weakref
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from webmap.features.alerts.alert_watch import LOW, AlertWatch
+from webmap.features.alerts.alerts import Alerts
+
 if TYPE_CHECKING:
     from webmap import Bridge, Page, Robot
 
@@ -20,9 +23,15 @@ class Console:
 
     Args:
         given: The robots that the console was opened with.
+        low_battery: The charge, from 0 to 1, below which a battery makes an alert.
+
+    Raises:
+        ConfigError: If ``low_battery`` is not from 0 to 1.
     """
 
-    def __init__(self, given: "Sequence[Robot]" = ()) -> None:
+    def __init__(
+        self, given: "Sequence[Robot]" = (), *, low_battery: float = LOW
+    ) -> None:
         self.given = tuple(given)
         """The robots that the console was opened with, in that order."""
         self.robots: list[Robot] = []
@@ -36,6 +45,14 @@ class Console:
         self._pages: weakref.WeakSet[Page] = weakref.WeakSet()
         self._removed: dict[Robot, float] = {}
         """The robots that were removed from the pages, and the times."""
+        self.alerts = Alerts()
+        """The alerts of all robots, shared by all pages."""
+        self.alert_watch = AlertWatch(self.alerts, self.shown_robots, low_battery)
+
+    def shown_robots(self) -> "list[Robot]":
+        """Return the robots that the pages show."""
+        every = (*self.given, *self.robots)
+        return [robot for robot in every if robot not in self._removed]
 
     def add(self, robot: "Robot") -> None:
         """Show a robot on all open and future pages."""
@@ -144,9 +161,8 @@ class Console:
         for image in self.images:
             _show_image(image, page)
         self._show_grids(page)
-        for robot in (*self.given, *self.robots):
-            if robot not in self._removed:
-                _show(robot, page)
+        for robot in self.shown_robots():
+            _show(robot, page)
 
     def _show_grids(
         self, page: "Page", *, only: "tuple[Bridge, str] | None" = None

@@ -18,8 +18,11 @@ from webmap.console.floor import Floor, load_floor
 from webmap.console.opened import Console
 from webmap.console.robot_card import RobotButtons, RobotCard
 from webmap.console.robot_list import RobotList
+from webmap.features.alerts.alert_panel import AlertPanel
+from webmap.features.alerts.alert_watch import LOW
 from webmap.features.cameras.camera_panel import CameraPanel
 from webmap.features.doctor.doctor_panel import DoctorReports
+from webmap.features.selection.several_robots import SeveralRobots
 
 if TYPE_CHECKING:
     from webmap import Bridge, Map, Page, RobotConfig
@@ -44,6 +47,7 @@ def open_console(
     floor: Path | None = None,
     title: str = PRODUCT,
     place: str | None = None,
+    low_battery: float = LOW,
 ) -> Console:
     """Make the console the page at ``/``.
 
@@ -55,16 +59,19 @@ def open_console(
         title: The name of this installation.
         place: The name under which labels and views are stored; by default the URLs of
             the bridges. Use it for bridges whose port changes at each start.
+        low_battery: The charge, from 0 to 1, below which a battery makes an alert.
 
     Returns:
         The console, to add robots later.
 
     Raises:
-        ConfigError: If the floor plan cannot be read.
+        ConfigError: If the floor plan cannot be read, or ``low_battery`` is not from 0
+            to 1.
     """
     plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(config, bridges) for config in robots]
-    opened = Console(fleet)
+    opened = Console(fleet, low_battery=low_battery)
+    opened.alert_watch.begin()
     if place is None:
         place = "\n".join(sorted(bridge.url for bridge in bridges))
     kept_under = f"console-{hashlib.sha256(place.encode()).hexdigest()[:16]}"
@@ -102,9 +109,16 @@ def build(
     map.add_module("AlignTool")
     map.add_module("RouteTool", title)
     map.add_module("RosoutPanel", bridges)
+    alerts = map.add_module(AlertPanel, opened.alerts)
     saving = {"place": ".tools", "classes": "webmap-button"}
     map.add_module("ExportTool", **saving)
     map.add_module(Layout, of=kept_under, **saving)
+    map.add_module(
+        SeveralRobots,
+        goals.aim,
+        rows="#robots > .row:not(.filtered)",
+        button="#select-shown",
+    )
     map.add_module("ScaleBar")
     map.add_module("PointerReadout")
     frame = map.add_module(Frame, title, floor)
@@ -129,6 +143,7 @@ def build(
     refused = RefusedList(page.element("refused"), page.viewer.role)
     polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
     polls += [opened.bring_back, links.poll, refused.poll, doctor.poll, costmaps.poll]
+    polls.append(alerts.poll)
     task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)
 

@@ -162,8 +162,15 @@ class Map(WorldView):
         A robot that is out of sight is first brought to the centre.
         """
         if robot is not None:
-            self._bring_into_sight(robot)
+            self.bring_into_sight(robot)
         self._operate("follow", 0 if robot is None else robot.svg.id)
+
+    def bring_into_sight(self, robot: Robot) -> None:
+        """Move the view so that a robot out of sight is in its centre."""
+        x, y = self.world.tf.apply(robot.position.x, robot.position.y)
+        width, height = self.canvas_width, self.canvas_height
+        if not (0 <= x <= width and 0 <= y <= height):
+            self.translate(width / 2 - x, height / 2 - y)
 
     # Removal.
 
@@ -178,12 +185,6 @@ class Map(WorldView):
         self.unmount(self._robots)
         self.page.maps.remove(self)
         self.leave_page()
-
-    def _bring_into_sight(self, robot: Robot) -> None:
-        x, y = self.world.tf.apply(robot.position.x, robot.position.y)
-        width, height = self.canvas_width, self.canvas_height
-        if not (0 <= x <= width and 0 <= y <= height):
-            self.translate(width / 2 - x, height / 2 - y)
 
 
 def robot_and_pose(map: Map, given: Any) -> tuple[Robot, float, float, float] | None:

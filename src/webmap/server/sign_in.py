@@ -1,4 +1,4 @@
-"""The page that asks for the token; a visitor who is not signed in gets no other file."""
+"""The page that asks for the token, the only one before a visitor has signed in."""
 
 import base64
 import hashlib

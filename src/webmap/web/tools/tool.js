@@ -2,6 +2,7 @@ import { button, html, svg } from "./elements.js";
 
 /** Symbols of tools, as SVG paths in a square of 24. */
 const SYMBOLS = {
+  alerts: "M6 17v-6a6 6 0 0 1 12 0v6l2 2H4zM10 22h4M12 5V3",
   align: "M4 8h9v9H4zM11 4h9v9h-4M8 12.5h.1",
   area: "M5 6l9-2 6 6-4 9-11-1z",
   goal: "M6 21V4h11l-2.5 4L17 12H6",

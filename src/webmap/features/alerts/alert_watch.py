@@ -1,0 +1,155 @@
+"""What makes an alert, and the watch over all robots."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
+
+from webmap.base.errors import ConfigError
+from webmap.base.lifecycle import lifecycle
+from webmap.features.alerts.alerts import KINDS, Alerts
+from webmap.poses.silence import PERIODS
+
+if TYPE_CHECKING:
+    from webmap.core.robot import Robot
+
+log = logging.getLogger("webmap.modules.alerts")
+
+PERIOD = 0.5
+"""Seconds between two looks at all robots."""
+
+LOST = 3.0
+"""Seconds without a pose or a connection after which a robot is lost."""
+
+LOW = 0.2
+"""The charge, from 0 to 1, below which a battery makes an alert by default."""
+
+
+def conditions(robot: "Robot", low: float = LOW) -> dict[str, str]:
+    """Return what is wrong with a robot now: a text for each kind of alert.
+
+    Nothing is wrong with a robot of a recording.
+
+    Args:
+        robot: The robot.
+        low: The charge, from 0 to 1, below which a battery is low.
+    """
+    bridge = robot.pose_source.bridge
+    if bridge is not None and bridge.replays:
+        return {}
+    found = _reported(robot)
+    if bridge is not None and bridge.lost:
+        found["lost"] = "No connection to the bridge"
+    elif bridge is None or bridge.state == "open":
+        period = 0.0 if robot.feed is None else robot.feed.throttle / 1000
+        silent = robot.silent_for
+        if silent is not None and silent > max(LOST, PERIODS * period):
+            found["lost"] = "No pose received"
+    for module in robot.modules:
+        charge = getattr(module, "charge", None)
+        if charge is not None and charge < low:
+            found["battery"] = f"Battery at {round(100 * charge)} %"
+        if hasattr(module, "parts") and hasattr(module, "hold"):
+            bad = [part for part in module.parts if part.level == "error"]
+            if bad:
+                more = f" and {len(bad) - 1} more" if len(bad) > 1 else ""
+                found["health"] = f"{bad[0].name}: {bad[0].message}{more}"
+    return found
+
+
+def _reported(robot: "Robot") -> dict[str, str]:
+    """Return the conditions that the gate reports."""
+    report = robot.report
+    if report is None:
+        return {}
+    found = {}
+    if report.alarm is not None:
+        others = [report.other_writer] if report.other_writer else []
+        found["disobeys"] = f"Not obeying: {'; '.join([report.alarm, *others])}"
+    if report.doing == "unconfirmed":
+        why = report.stop.why if report.stop is not None else ""
+        found["unconfirmed"] = f"STOP not confirmed: {why}".removesuffix(": ")
+    if report.link == "down":
+        found["commands"] = "No connection for commands"
+    if report.doing == "blocked":
+        found["blocked"] = "Driven, but not moving"
+    if report.goal is not None and report.goal.state == "failed":
+        found["goal"] = f"Goal failed: {report.goal.why}".removesuffix(": ")
+    return found
+
+
+class AlertWatch:
+    """Looks at all robots twice a second, also while no page is open.
+
+    Args:
+        alerts: The list to fill.
+        robots: Returns the robots that are shown now.
+        low: The charge, from 0 to 1, below which a battery is low.
+
+    Raises:
+        ConfigError: If ``low`` is not from 0 to 1.
+    """
+
+    def __init__(
+        self,
+        alerts: Alerts,
+        robots: "Callable[[], Iterable[Robot]]",
+        low: float = LOW,
+    ) -> None:
+        if not 0 <= low <= 1:
+            raise ConfigError(
+                f"the charge of a low battery is 0 to 1, got {low!r}: give 0.2 for 20 %"
+            )
+        self.alerts = alerts
+        self.low = low
+        self._robots = robots
+        self._unlinked: dict[str, float] = {}
+        """When the gate lost each robot without a connection, by id."""
+        self._task: asyncio.Task[None] | None = None
+
+    def begin(self) -> None:
+        """Watch while the process runs."""
+        lifecycle.add(self)
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begin the periodic looks; called in the loop's thread."""
+        self._task = loop.create_task(self._look_on())
+
+    async def stop(self) -> None:
+        """End the periodic looks."""
+        if self._task is not None:
+            self._task.cancel()
+            self._task = None
+
+    def look(self, now: float) -> None:
+        """Report the conditions of all robots, at ``now`` in Unix seconds."""
+        robots = list(self._robots())
+        for robot in robots:
+            found = conditions(robot, self.low)
+            if not self._is_unlinked(robot.id, "commands" in found, now):
+                found.pop("commands", None)
+            for kind in KINDS:
+                text = found.get(kind)
+                self.alerts.report(
+                    robot.id, robot.name, kind, text or "", text is not None, now
+                )
+        self.alerts.end_others({robot.id for robot in robots}, now)
+
+    def _is_unlinked(self, robot: str, down: bool, now: float) -> bool:
+        """Return whether the gate has had no connection to a robot for a while.
+
+        Every connection is down at first.
+        """
+        if not down:
+            self._unlinked.pop(robot, None)
+            return False
+        return now - self._unlinked.setdefault(robot, now) >= LOST
+
+    async def _look_on(self) -> None:
+        while True:
+            try:
+                self.look(time.time())
+            except Exception:
+                log.exception("the alerts were not updated")
+            await asyncio.sleep(PERIOD)

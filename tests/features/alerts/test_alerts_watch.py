@@ -1,0 +1,162 @@
+"""What makes an alert: from the gate's report, the connection, and the modules."""
+
+import asyncio
+from types import SimpleNamespace
+
+import pytest
+
+from webmap.base.errors import ConfigError
+from webmap.features.alerts.alert_watch import LOST, AlertWatch, conditions
+from webmap.features.alerts.alerts import KINDS, Alerts
+
+
+def bridge(**changes):
+    return SimpleNamespace(
+        **{"state": "open", "lost": False, "replays": False} | changes
+    )
+
+
+def report(**changes):
+    known = {
+        "alarm": None,
+        "other_writer": None,
+        "doing": "free",
+        "stop": None,
+        "link": "up",
+        "goal": None,
+    }
+    return SimpleNamespace(**known | changes)
+
+
+def robot(*, link=None, told=None, silent=0.1, throttle=100, modules=()):
+    return SimpleNamespace(
+        id="r1",
+        name="Bob",
+        pose_source=SimpleNamespace(bridge=bridge() if link is None else link),
+        feed=SimpleNamespace(throttle=throttle),
+        silent_for=silent,
+        report=report() if told is None else told,
+        modules=modules,
+    )
+
+
+def battery(charge):
+    return SimpleNamespace(charge=charge)
+
+
+def health(*levels):
+    parts = [
+        SimpleNamespace(name=f"part {n}", message="too hot", level=level)
+        for n, level in enumerate(levels)
+    ]
+    return SimpleNamespace(parts=parts, hold=10.0)
+
+
+FAILED = SimpleNamespace(state="failed", why="no path")
+
+
+@pytest.mark.parametrize(
+    ("bob", "found"),
+    [
+        (robot(), {}),
+        (
+            robot(told=report(alarm="still moving", other_writer="/joy sends")),
+            {"disobeys": "Not obeying: still moving; /joy sends"},
+        ),
+        (
+            robot(
+                told=report(
+                    doing="unconfirmed", stop=SimpleNamespace(why="no odometry")
+                )
+            ),
+            {"unconfirmed": "STOP not confirmed: no odometry"},
+        ),
+        (robot(told=report(doing="blocked")), {"blocked": "Driven, but not moving"}),
+        (robot(told=report(goal=FAILED)), {"goal": "Goal failed: no path"}),
+        (
+            robot(told=report(goal=SimpleNamespace(state="failed", why=""))),
+            {"goal": "Goal failed"},
+        ),
+        (robot(told=report(link="down")), {"commands": "No connection for commands"}),
+        (robot(silent=LOST + 0.1), {"lost": "No pose received"}),
+        (robot(silent=LOST + 0.1, throttle=2000), {}),
+        (robot(silent=None), {}),
+        (
+            robot(link=bridge(state="closed", lost=True)),
+            {"lost": "No connection to the bridge"},
+        ),
+        (robot(link=bridge(state="connecting"), silent=9), {}),
+        (robot(modules=[battery(0.199)]), {"battery": "Battery at 20 %"}),
+        (robot(modules=[battery(0.2), battery(None)]), {}),
+        (robot(modules=[health("error", "warn")]), {"health": "part 0: too hot"}),
+        (
+            robot(modules=[health("error", "error", "error")]),
+            {"health": "part 0: too hot and 2 more"},
+        ),
+        (robot(modules=[health("warn", "stale", "ok")]), {}),
+    ],
+)
+def test_the_conditions_of_a_robot_that_make_an_alert(bob, found):
+    assert conditions(bob) == found
+    assert set(found) <= set(KINDS)
+
+
+def test_a_recording_makes_no_alert():
+    link = bridge(replays=True, lost=True, state="closed")
+    bob = robot(link=link, silent=99, modules=[battery(0.0), health("error")])
+    assert conditions(bob) == {}
+
+
+def test_the_charge_of_a_low_battery_is_settable():
+    alerts = Alerts()
+    watch = AlertWatch(alerts, lambda: [robot(modules=[battery(0.4)])], 0.5)
+    watch.look(1.0)
+    assert [alert.text for alert in alerts.listed.values()] == ["Battery at 40 %"]
+
+
+@pytest.mark.parametrize("low", [-0.1, 20, float("nan")])
+def test_a_charge_that_is_not_from_0_to_1_is_refused(low):
+    with pytest.raises(ConfigError, match=r"0 to 1, got .*: give 0.2 for 20 %"):
+        AlertWatch(Alerts(), list, low)
+
+
+def test_a_new_connection_for_commands_makes_no_alert():
+    alerts, told = Alerts(), report(link="down")
+    watch = AlertWatch(alerts, lambda: [robot(told=told)])
+    watch.look(1.0)
+    watch.look(1.0 + LOST - 0.5)
+    assert not alerts.listed
+    watch.look(1.0 + LOST)
+    assert [alert.kind for alert in alerts.listed.values()] == ["commands"]
+    told.link = "up"
+    watch.look(5.0)
+    assert [alert.ended for alert in alerts.listed.values()] == [5.0]
+
+
+def test_the_alerts_of_a_removed_robot_end():
+    alerts, shown = Alerts(), [robot(silent=9)]
+    watch = AlertWatch(alerts, lambda: shown)
+    watch.look(1.0)
+    shown.clear()
+    watch.look(2.0)
+    assert [alert.ended for alert in alerts.listed.values()] == [2.0]
+
+
+def test_the_watch_looks_without_a_page_and_survives_a_faulty_robot(caplog):
+    looks = []
+
+    def robots():
+        looks.append(None)
+        raise RuntimeError("faulty")
+
+    async def scenario():
+        watch = AlertWatch(Alerts(), robots)
+        watch.start(asyncio.get_running_loop())
+        async with asyncio.timeout(10):
+            while len(looks) < 2:
+                await asyncio.sleep(0.01)
+        await watch.stop()
+        await watch.stop()
+
+    asyncio.run(scenario())
+    assert "the alerts were not updated" in caplog.text
