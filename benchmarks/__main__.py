@@ -6,7 +6,7 @@ import click
 
 from benchmarks.harness import report
 
-BENCHES = ["bridge", "viewers", "drawing"]
+BENCHES = ["bridge", "viewers", "drawing", "console"]
 
 
 @click.command()

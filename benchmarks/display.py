@@ -31,13 +31,14 @@ class Display:
 
 
 @contextmanager
-def display(robots: int, beams: int) -> Iterator[Display]:
-    """Start the fleet on a free port, and end it afterwards."""
+def display(robots: int, beams: int, *, console: bool = False) -> Iterator[Display]:
+    """Start the fleet on a free port, on a plain map or in the console; end it later."""
     with tempfile.TemporaryDirectory() as state:
         environment = os.environ | {
             "FLEET_ROBOTS": str(robots),
             "FLEET_BEAMS": str(beams),
             "WEBMAP_STATE_DIR": state,
+            "FLEET_CONSOLE": "1" if console else "",
         }
         command = [sys.executable, "-m", "webmap", "run", str(FLEET)]
         with subprocess.Popen(

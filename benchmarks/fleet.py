@@ -1,7 +1,8 @@
 """A program for ``webmap run``: robots that move and scan, without ROS.
 
 Their data is computed in advance, so that only the scene, the wire and the sockets are
-measured. ``FLEET_ROBOTS`` and ``FLEET_BEAMS`` are the numbers of robots and beams.
+measured. ``FLEET_ROBOTS`` and ``FLEET_BEAMS`` are the numbers of robots and beams. The
+page is a plain map, or the console if ``FLEET_CONSOLE`` is set.
 """
 
 import math
@@ -12,9 +13,14 @@ import time
 import numpy as np
 
 import webmap
+import webmap.console
+from webmap.base.geometry import Quaternion, Vector3
+from webmap.poses.placing import PoseReading
 
 ROBOTS = int(os.environ.get("FLEET_ROBOTS", "200"))
 BEAMS = int(os.environ.get("FLEET_BEAMS", "360"))
+
+CONSOLE = bool(os.environ.get("FLEET_CONSOLE"))
 
 TICK = 0.05
 """Seconds between two poses of a robot; scans come half as often."""
@@ -46,7 +52,12 @@ class Mover:
         """Show the state of one tick."""
         turn = self.phase + number % STEPS * math.tau / STEPS
         x, y = self.x + math.cos(turn), self.y + math.sin(turn)
-        self.robot.svg.set_pose(x, y, turn + math.pi / 2)
+        if CONSOLE:  # whose list and card show the age of the pose too
+            turned = Quaternion.from_yaw(turn + math.pi / 2)
+            pose = PoseReading(Vector3(x, y, 0.0), turned)
+            self.robot.show_pose(pose, time.monotonic())
+        else:
+            self.robot.svg.set_pose(x, y, turn + math.pi / 2)
         if number % 2 == 0:
             self.dots.set_dots(self.scans[number % STEPS // 2], 0.001)
 
@@ -74,7 +85,6 @@ def drive() -> None:
             continue  # not started yet
 
 
-@webmap.page("/")
 def main(page: webmap.Page) -> None:
     """Show all robots in the window."""
     side = math.ceil(math.sqrt(ROBOTS)) * 4.0
@@ -84,5 +94,11 @@ def main(page: webmap.Page) -> None:
         map.add_robot(mover.robot)
 
 
+if CONSOLE:
+    opened = webmap.console.open_console([], [], title="Benchmark")
+    for each in fleet:
+        opened.add(each.robot)
+else:
+    webmap.page("/")(main)
 threading.Thread(target=drive, daemon=True).start()
 webmap.run()
