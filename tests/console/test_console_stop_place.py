@@ -15,6 +15,8 @@ ROBOTS = 10
 SIZES = [
     (320, 480),
     (390, 844),
+    (512, 300),
+    (720, 450),
     (768, 1024),
     (844, 390),
     (897, 600),
@@ -24,7 +26,8 @@ SIZES = [
     (1440, 900),
     (3840, 2160),
 ]
-"""Width and height in pixels: both sides of the steps of the layout."""
+"""Width and height in pixels: both sides of the steps of the layout, and 1024x600 and
+1440x900 at a zoom of 200 %."""
 
 LOOK = """async () => {
   await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));

@@ -1,4 +1,4 @@
-import { byId } from "../web/tools/dom.js";
+import { byId, setText } from "../web/tools/dom.js";
 import { html } from "../web/tools/elements.js";
 
 /**
@@ -101,8 +101,9 @@ class Palette {
       line.addEventListener("click", () => this._do(entry));
       return line;
     });
-    const none = html("li", "palette-none", {}, "Nothing on this page has this name.");
-    this._list.replaceChildren(...(lines.length > 0 ? lines : [none]));
+    this._list.replaceChildren(...lines);
+    this._list.hidden = lines.length === 0;
+    setText(byId("palette-none"), lines.length > 0 ? "" : "Nothing on this page has this name.");
     this._mark();
   }
 
