@@ -79,7 +79,7 @@ def begin(tab) -> None:
 
 def numbers(tab) -> list[float]:
     fields = (
-        tab.locator(f".webmap-align-form [name={n}]") for n in ("x", "y", "angle")
+        tab.locator(f".webmap-align [name={n}]") for n in ("x", "y", "angle")
     )
     return [float(field.input_value()) for field in fields]
 
@@ -150,7 +150,7 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
             # Numbers are typed exactly; saved, all behind the bridge go there.
             begin(tab)
             for name, value in (("x", "10"), ("y", "-2.5"), ("angle", "90")):
-                tab.locator(f".webmap-align-form [name={name}]").fill(value)
+                tab.locator(f".webmap-align [name={name}]").fill(value)
             line = save(tab)
             assert line == "alignment = [10.0, -2.5, 90.0] # metres, metres, degrees"
             for name, (x, y, angle) in before.items():
@@ -187,7 +187,7 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
             tab.locator(".webmap-align-what").select_option("own")
             assert numbers(tab) == [10.0, -2.5, 90.0]
             assert tab.locator(".webmap-align-shadow use").count() == 1
-            tab.locator(".webmap-align-form [name=angle]").fill("0")
+            tab.locator(".webmap-align [name=angle]").fill("0")
             save(tab)
             until(
                 tab,

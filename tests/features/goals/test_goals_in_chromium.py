@@ -26,7 +26,10 @@ HERE = Path(__file__).parents[1]
 OUTSIDE = (1180, 400)
 """A place on the screen that is outside of the house."""
 
-WORDS = ".webmap-goal-word, .webmap-locate-word, .webmap-route > .webmap-route-word"
+WORDS = (
+    ".webmap-goal-word, .webmap-locate-word, "
+    ".webmap-route > .webmap-tool-body > .webmap-route-word"
+)
 
 PLACE = """name => {
   const robot = document.querySelector(`.robot[data-name="${name}"]`);
@@ -341,7 +344,7 @@ def test_a_route_can_be_drawn_saved_run_skipped_paused_and_interrupted(tab):
     tab.locator(".webmap-route-name").fill("Round")
     tab.locator(".webmap-route-save").click()
     expect(tab.locator(".webmap-route-saved")).to_contain_text("Saved as Round.")
-    word = tab.locator(".webmap-route > .webmap-route-word")
+    word = tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
     taken(tab, tab.locator(".webmap-route-run").click, word)
     for _ in range(10):
         expect(word).to_have_text(re.compile("point 2 of 3|^Halted"), timeout=15_000)
@@ -393,7 +396,7 @@ def drawn_route(tab: Page) -> list[tuple[str, float]]:
 
 def next_goal(tab: Page, robot: ClientConnection) -> float:
     """Return x of the next goal that move_base hears, in metres."""
-    word = tab.locator(".webmap-route > .webmap-route-word")
+    word = tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
     for _ in range(30):
         try:
             message = json.loads(robot.recv(timeout=1))["msg"]
@@ -409,7 +412,7 @@ def next_goal(tab: Page, robot: ClientConnection) -> float:
 def test_a_reordered_route_with_a_loop_sends_its_goals_in_order(tab, bridges):
     pick(tab, "Old 0")
     tab.locator(".webmap-route > summary").click()
-    word = tab.locator(".webmap-route > .webmap-route-word")
+    word = tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
     loop = tab.locator(".webmap-route-loop")
     loop.click()
     expect(word).to_have_text("A loop needs at least 2 points.")

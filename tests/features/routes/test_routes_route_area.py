@@ -53,7 +53,7 @@ def press(tab: Page, *corners: tuple[float, float]) -> None:
 
 
 def word(tab: Page):
-    return tab.locator(".webmap-route > .webmap-route-word")
+    return tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
 
 
 def swept(tab: Page) -> list[float]:
