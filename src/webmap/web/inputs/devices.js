@@ -249,7 +249,8 @@ function uses(use) {
 /**
  * @param {KeyboardEvent} event
  * @returns {boolean} Whether the focused element uses the key itself, and no other input (Enter,
- *     a click) does the same.
+ *     a click) does the same; or a button that everybody presses with Space, of a recording,
+ *     in which no robot can be driven (`data-webmap-keeps-space`).
  */
 function keepsKey(event) {
   const target = event.target;
@@ -259,5 +260,7 @@ function keepsKey(event) {
     const closes = "dialog:modal, [popover]:not([popover=manual]), textarea, select";
     return target.closest(closes) !== null || target.matches(TYPED);
   }
-  return target.matches("input[type=checkbox], input[type=radio], select, summary");
+  return target.matches(
+    "input[type=checkbox], input[type=radio], select, summary, [data-webmap-keeps-space]",
+  );
 }
