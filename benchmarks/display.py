@@ -32,7 +32,7 @@ class Display:
 
 @contextmanager
 def display(robots: int, beams: int, *, console: bool = False) -> Iterator[Display]:
-    """Start the fleet on a free port, on a plain map or in the console; end it later."""
+    """Start the fleet on a free port, on a plain map or in the console, and end it."""
     with tempfile.TemporaryDirectory() as state:
         environment = os.environ | {
             "FLEET_ROBOTS": str(robots),

@@ -230,7 +230,7 @@ def test_a_damaged_recording_shows_where_and_why_it_ends(chromium, tmp_path):
     data = bytearray(bag.read_bytes())
     data[len(data) // 2 : len(data) // 2 + 2000] = bytes(2000)
     bag.write_bytes(data)
-    with opened(chromium, bag, "--rate", "8") as (page, bar):
+    with opened(chromium, bag, "--rate", "8") as (_page, bar):
         expect(bar.text).to_contain_text("The recording is damaged: broken.bag cannot")
         assert 5 < bar.at < 15
         bar.play.click()
