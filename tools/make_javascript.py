@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from webmap.console.card_parts import GOALS
-from webmap.core.robot_state import STATE_TEXTS
+from webmap.core.robot_state import SEEN, STATE_TEXTS
 from webmap.features.goals.goal_tool import SPACING
 from webmap.features.routes.route_tool import LONGEST_NAME, MOST_POINTS
 from webmap.ros.messages_log import LEVELS
@@ -91,12 +91,20 @@ def state_words_js() -> str:
     """Return the text of ``state_words.js``."""
     texts = STATE_TEXTS.items()
     rows = "".join(f"  {name}: {json.dumps(text)},\n" for name, text in texts)
+    seen = "".join(f"  {json.dumps(name)},\n" for name in SEEN)
     return (
         "// Made by tools/make_javascript.py from webmap/core/robot_state.py: do not "
         "edit.\n"
         "\n"
-        "/** The text for each state of a robot; `{who}` is its operator. */\n"
+        "/**\n"
+        " * The text for each state of a robot; `{who}` is its operator. Of several "
+        "that are\n"
+        " * true the first one is shown.\n"
+        " */\n"
         f"export const WORDS = Object.freeze({{\n{rows}}});\n"
+        "\n"
+        "/** The states that the display finds besides that of the gate. */\n"
+        f"export const SEEN = Object.freeze([\n{seen}]);\n"
     )
 
 

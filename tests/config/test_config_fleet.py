@@ -76,13 +76,3 @@ def test_a_line_break_in_a_comment_is_escaped():
     data = {"bridges": {"hall": "ws://hall:9090"}}
     text = dump(data, remarks={("bridges", "hall"): "a\n[robots]"})
     assert text == '[bridges]\nhall = "ws://hall:9090" # a\\n[robots]\n'
-
-
-def test_the_charge_of_a_low_battery_is_from_0_to_1():
-    assert read_fleet({}, Mistakes()).low_battery == 0.2
-    assert read_fleet({"low_battery": 0.35}, Mistakes()).low_battery == 0.35
-    mistakes = Mistakes()
-    read_fleet({"low_battery": 20}, mistakes)
-    texts = [text for path, text in mistakes.found if path == ("low_battery",)]
-    assert len(texts) == 1
-    assert "from 0 to 1" in texts[0]

@@ -23,6 +23,8 @@ WHOLE = {
     "alignment": (1.0, 2.0, 3.0),
     "scan": ["/front", "/rear"],
     "battery": "/battery",
+    "battery_low": 0.3,
+    "tags": ["bay 3", "new"],
     "cameras": [{"topic": "/camera"}, {"url": "http://bob/", "throttle": 200}],
     "twist": {
         "topic": "/cmd_vel",

@@ -26,7 +26,7 @@ def test_a_configured_robot_has_the_modules_and_the_spec_of_its_topics(bridge):
         move={"topic": "/goal", "cancel_topic": "/cancel"},
     )
     names = [type(module).__name__ for module in robot.modules]
-    assert names == ["LaserScanner", "Battery", "NameLabel"]
+    assert names == ["LaserScanner", "Battery", "StateMark"]
     spec = robot.motion.spec()
     assert (spec.twist_topic, spec.goal_topic) == ("/cmd_vel", "/goal")
     assert spec.cancel_topic == "/cancel"

@@ -1,7 +1,6 @@
 """What the console says of a robot."""
 
 import math
-from types import SimpleNamespace
 
 import pytest
 
@@ -12,7 +11,6 @@ from webmap.console.texts import (
     LOOKS,
     battery_tone,
     heading,
-    look_of,
     number,
     sentence,
 )
@@ -66,23 +64,22 @@ def test_every_state_of_a_robot_has_a_look():
 
 
 def test_states_shown_together_in_a_list_have_different_shapes():
-    states = ["free", "held", "driven", "stopping", "stopped", "navigating"]
-    assert len({LOOKS[state][0] for state in states}) == len(states)
-
-
-def test_another_program_makes_the_look_bad_except_in_the_state_other():
-    report = SimpleNamespace(other_writer="another program")
-    one = SimpleNamespace(state=SimpleNamespace(name="held"), report=report)
-    assert look_of(one) == ("state-held", "bad")
-    one.state.name = "other"
-    assert look_of(one) == ("state-driving", "warn")
+    shapes: dict[str, set[str]] = {}
+    for look in LOOKS.values():
+        shapes.setdefault(look.symbol, set()).add(look.group)
+    assert all(len(groups) == 1 for groups in shapes.values())
 
 
 @pytest.mark.parametrize(
     ("charge", "tone"), [(0.5, ""), (0.2, ""), (0.15, "warn"), (0.05, "bad")]
 )
 def test_a_low_battery_has_a_warning_tone(charge, tone):
-    assert battery_tone(charge) == tone
+    assert battery_tone(charge, 0.2) == tone
+
+
+def test_a_battery_above_its_own_limit_has_no_tone():
+    assert battery_tone(0.08, 0.05) == ""
+    assert battery_tone(0.25, 0.3) == "warn"
 
 
 def test_an_unknown_charge_is_not_shown():

@@ -1,5 +1,6 @@
 """What a robot is doing, in words."""
 
+import itertools
 from datetime import datetime, timedelta
 from types import SimpleNamespace
 from typing import get_args
@@ -7,7 +8,7 @@ from typing import get_args
 import pytest
 
 from webmap.base.geometry import Twist
-from webmap.console.texts import LOOKS
+from webmap.console.texts import GROUPS, LOOKS
 from webmap.core.robot_state import STATE_TEXTS, Facts, state_of
 from webmap.gate.protocol import Activity
 
@@ -15,12 +16,21 @@ MOVES = (0.4, 0.0, 0.0)
 ANN = SimpleNamespace(connection="c2", name="Ann")
 
 
+REPORT = {
+    "holder": None,
+    "goal": None,
+    "measured": None,
+    "alarm": None,
+    "link": "up",
+    "other_writer": None,
+}
+
+
 def robot(doing="free", *, seen=None, age=0.1, silent=0.1, over=None, **changes):
     """Return what is known of a robot: its report, and what the display has seen."""
     report = None
     if doing is not None:
-        changes = {"holder": None, "goal": None, "measured": None, **changes}
-        report = SimpleNamespace(doing=doing, **changes)
+        report = SimpleNamespace(doing=doing, **{**REPORT, **changes})
     return Facts(
         report=report,
         bridge=SimpleNamespace(state="open", lost=False, replays=False),
@@ -75,7 +85,7 @@ def test_an_operator_without_a_name_is_named_after_the_connection():
         ({"seen": MOVES, "age": None}, "Free"),
         ({"seen": MOVES, "measured": (0.0,) * 6}, "Free"),
         ({"seen": MOVES, "doing": "barred"}, "Moving, not by WebMap"),
-        ({"seen": MOVES, "doing": "down"}, "No connection for commands"),
+        ({"seen": MOVES, "link": "down"}, "No connection for commands"),
         ({"seen": MOVES, "doing": "held", "holder": ANN}, "Ann has control"),
         ({"seen": MOVES, "goal": SimpleNamespace(state="sent")}, "Navigating"),
         ({"seen": MOVES, "goal": SimpleNamespace(state="reached")}, "Moving, not by"),
@@ -107,8 +117,12 @@ def test_a_robot_without_new_poses_is_gone_since_its_last_pose():
     assert state_of(one).text in {
         f"No pose since {then + timedelta(seconds=s):%H:%M}" for s in (0, 1)
     }
-    assert state_of(robot(silent=29.0)).text == "Free"
     assert state_of(robot(None, silent=31.0)).name == "gone"
+
+
+def test_a_robot_without_new_poses_is_lost_after_three_seconds_and_later_gone():
+    found = [state_of(robot(silent=silent)).name for silent in (2.9, 3.1, 29.0, 31.0)]
+    assert found == ["free", "lost", "lost", "gone"]
 
 
 def test_a_robot_that_sends_poses_rarely_or_only_in_motion_is_not_gone():
@@ -125,5 +139,95 @@ def test_a_robot_of_a_recording_that_ended_is_not_gone():
 
 
 @pytest.mark.parametrize("doing", ["held", "driven", "stopping", "stopped"])
-def test_a_robot_with_an_operator_or_an_active_stop_is_not_gone(doing):
-    assert state_of(robot(doing, holder=ANN, silent=31.0)).name == doing
+def test_a_robot_with_an_operator_or_an_active_stop_is_lost_but_never_gone(doing):
+    assert state_of(robot(doing, holder=ANN, silent=31.0)).name == "lost"
+
+
+@pytest.mark.parametrize("doing", ["stopped", "unconfirmed"])
+def test_a_worse_state_does_not_hide_an_active_stop(doing):
+    found = state_of(robot(doing, link="down"))
+    assert found.text == f"No connection for commands, {STATE_TEXTS[doing]}"
+    assert state_of(robot(doing, link="down", silent=4.0)).mine == (
+        f"Lost: no new pose, {STATE_TEXTS[doing]}"
+    )
+
+
+def test_the_battery_is_low_below_its_limit():
+    one = robot()._replace(charge=0.25)
+    assert state_of(one).name == "free"
+    assert state_of(one._replace(charge=0.19)).name == "battery_low"
+    assert state_of(one._replace(battery_low=0.3)).name == "battery_low"
+    assert state_of(one._replace(charge=0.0, battery_low=0.0)).name == "free"
+
+
+def no_link(facts):
+    return facts._replace(
+        bridge=SimpleNamespace(state="closed", lost=True, replays=False)
+    )
+
+
+def report(**changes):
+    """Return a change of the gate's report on a robot."""
+
+    def change(facts):
+        seen = SimpleNamespace(**{**vars(facts.report), **changes})
+        return facts._replace(report=seen)
+
+    return change
+
+
+def seen(**changes):
+    """Return a change of what the display knows of a robot."""
+    return lambda facts: facts._replace(**changes)
+
+
+BY_PRECEDENCE = {
+    "disobeying": report(alarm="zero sent, still moving at 0.30 m/s"),
+    "no_bridge": no_link,
+    "lost": seen(silent_for=4.0),
+    "down": report(link="down"),
+    "unconfirmed": report(doing="unconfirmed"),
+    "stopped": report(doing="stopped"),
+    "blocked": report(doing="blocked"),
+    "goal_failed": seen(goal_failed=True),
+    "battery_low": seen(charge=0.1),
+    "other": report(other_writer="another program publishes"),
+    "moving": report(doing="moving"),
+    "changing": report(doing="changing"),
+    "stopping": report(doing="stopping"),
+    "driven": report(doing="driven", holder=ANN),
+    "settling": report(doing="settling"),
+    "navigating": report(doing="navigating"),
+    "navigating_held": report(doing="navigating_held", holder=ANN),
+    "barred": report(doing="barred"),
+    "barred_held": report(doing="barred_held", holder=ANN),
+    "held": report(doing="held", holder=ANN),
+    "free": report(doing="free"),
+}
+"""A fact for each state, the state with the highest precedence first."""
+
+OF_THE_GATE = set(get_args(Activity)) - {"down", "other"}
+"""States of which the gate reports one, so that no two of them are true."""
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), list(itertools.combinations(BY_PRECEDENCE, 2))
+)
+def test_of_two_states_that_are_true_the_one_with_the_higher_precedence_is_shown(
+    first, second
+):
+    if {first, second} <= OF_THE_GATE:
+        assert list(STATE_TEXTS).index(first) < list(STATE_TEXTS).index(second)
+        return
+    one = BY_PRECEDENCE[first](BY_PRECEDENCE[second](robot()))
+    other = BY_PRECEDENCE[second](BY_PRECEDENCE[first](robot()))
+    assert (state_of(one).name, state_of(other).name) == (first, first)
+
+
+def test_the_looks_and_their_groups_have_the_order_of_the_states():
+    states = [name for name in STATE_TEXTS if not name.endswith("_by_you")]
+    assert list(LOOKS) == states
+    assert GROUPS[:3] == ("not obeying", "lost", "connecting")
+    assert GROUPS[3:7] == ("stopped", "blocked", "goal failed", "battery low")
+    assert GROUPS[7:10] == ("moving, not by WebMap", "driven", "navigating")
+    assert GROUPS[-1] == "free"

@@ -82,7 +82,14 @@ def test_stop_and_reset_stop_are_sent_to_the_gate(robot, gate):
     stop = StopReport("Ann", True, "", "s1")
     robot.on_gate_report(
         SimpleNamespace(
-            stop=stop, other_writer=None, doing="stopped", holder=None, goal=None
+            stop=stop,
+            state="stopped",
+            alarm=None,
+            link="up",
+            other_writer=None,
+            doing="stopped",
+            holder=None,
+            goal=None,
         )
     )
     robot.reset_stop()
@@ -107,6 +114,9 @@ def test_acquire_lease_waits_for_the_first_report_of_a_restarted_gate(robot, gat
         holder=None,
         epoch=7,
         reason=None,
+        state="held",
+        alarm=None,
+        link="up",
         other_writer=None,
         doing="held",
         goal=None,

@@ -77,6 +77,21 @@ def test_a_driven_robot_that_does_not_move_for_a_second_is_blocked(bench):
     assert run(bench, 0.6, 0.0, x=0.0) == "held"
 
 
+@pytest.mark.parametrize(
+    ("sent", "measured", "doing"),
+    [
+        (0.1, 0.019, "blocked"),
+        (0.1, 0.02, "driven"),
+        (0.09, 0.0, "driven"),
+    ],
+)
+def test_a_robot_is_blocked_from_0_1_m_s_sent_and_below_0_02_m_s_measured(
+    bench, sent, measured, doing
+):
+    drive_off(bench)
+    assert run(bench, 1.3, measured, x=sent) == doing
+
+
 def test_a_robot_without_odometry_is_not_reported_as_blocked(bench):
     drive_off(bench)
     assert run(bench, 1.2, 0.0, x=0.5) == "blocked"

@@ -28,6 +28,7 @@ const LAYOUT = {
   log: { open: false, least: "warn" },
   panel: { open: true, width: 320, more: false },
   camera: { dock: "float", x: 0.25, y: 1 },
+  list: { order: "state", group: "tag", states: ["stopped"] },
 };
 
 /** @param {(layout: any) => void} change */
@@ -55,6 +56,13 @@ function assertRefused(text, ...words) {
 describe("a layout file", () => {
   test("has the same content after writing and reading", () => {
     assert.deepEqual(readLayout(writeLayout(LAYOUT)), LAYOUT);
+  });
+
+  test("with a wrong part for the list is refused", () => {
+    assertRefused(changed((layout) => (layout.list.order = "best")), "list.order", "best");
+    assertRefused(changed((layout) => (layout.list.states = "stopped")), "list.states");
+    assertRefused(changed((layout) => (layout.list.states = [1])), "list.states");
+    assertRefused(changed((layout) => (layout.list.states = Array(31).fill(""))), "30");
   });
 
   test("may contain only some parts", () => {

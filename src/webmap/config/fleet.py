@@ -127,8 +127,6 @@ class FleetConfig(Config, kw_only=True, frozen=True):
 
     title: Annotated[str, checks.name] = ""
     floor: Annotated[str, checks.text] = ""
-    low_battery: Annotated[float, checks.between(0, 1, "charge")] = 0.2
-    """The charge below which a battery makes an alert."""
     map: Annotated[list[MapConfig], ONE_OR_MORE] = []
     image: Annotated[list[ImageConfig], ONE_OR_MORE] = []
     modules: list[ModuleConfig] = []

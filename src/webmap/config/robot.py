@@ -179,6 +179,17 @@ OWN_CLASSES = ("robot", "unplaced", "selected", "stale")
 """CSS classes that WebMap itself gives to a robot."""
 
 
+BATTERY_LOW = 0.2
+"""The usual charge below which a battery is low."""
+
+
+def _charge(value: Any) -> float:
+    try:
+        return float(checks.between(0, 1, "")(value))
+    except ConfigError:
+        raise ConfigError("a charge from 0 to 1, such as 0.2 for 20 %") from None
+
+
 def _css_class(value: Any) -> str:
     plain = checks.text(value)
     if plain.split() != [plain] or plain in OWN_CLASSES:
@@ -211,6 +222,10 @@ class RobotConfig(Config, kw_only=True, frozen=True):
     """Topics of type ``sensor_msgs/LaserScan``, drawn under the robot's body."""
     battery: Annotated[str, checks.topic] = ""
     """A topic of type ``sensor_msgs/BatteryState``."""
+    battery_low: Annotated[float, _charge] = BATTERY_LOW
+    """The charge below which the battery is low, from 0 to 1."""
+    tags: Annotated[list[Annotated[str, checks.name]], ONE_OR_MORE] = []
+    """Words by which the list of robots is grouped; the first one is the group."""
     cameras: Annotated[list[CameraConfig], ONE_OR_MORE] = []
     motion: MotionConfig = MotionConfig()
     buttons: Annotated[list[dict[str, Any]], ReadBy(_buttons)] = []

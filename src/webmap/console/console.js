@@ -1,6 +1,8 @@
 import { listenToActions } from "./card_actions.js";
 import { listenToPalette } from "./palette.js";
 import { listenToPanel } from "./side_panel.js";
+import { listenToRobots } from "./robots/robot_list.js";
+import { markRobots } from "./robots/robot_marks.js";
 import { byId, listenToSheet, nameSheet, setText, typing } from "../web/tools/dom.js";
 import { keepInView, keepSizes, listenToList, listenToTools } from "./view_tools.js";
 
@@ -29,14 +31,14 @@ export default function attach(map, options, send) {
     showConnection(map.drive),
     listenToActions(map, send, signal),
     nameSheet(map),
-    spreadNames(map),
+    markRobots(map),
+    listenToRobots(map, signal),
     listenToHelp(map.drive, signal),
     listenToPalette(map.drive, signal),
     listenToPanel(map, signal),
     keepInView(map),
   ];
   listenToTools(map, options, signal);
-  listenToSearch(signal);
   listenToList(map, signal);
   listenToSheet(signal);
   return {
@@ -95,140 +97,6 @@ function count() {
 function toggle(element, name, on) {
   if (on) element.dataset[name] = "";
   else delete element.dataset[name];
-}
-
-/** Milliseconds between two checks which names have room. */
-const PERIOD = 300;
-
-/**
- * Size of a name on the screen, in pixels: about the width of a letter, and the height
- * of a line.
- */
-const LETTER = 8;
-const LINE = 18;
-
-/** With more visible robots than this, only the selected robot has its name. */
-const MOST = 150;
-
-/**
- * A name on the screen: its middle and its size, in pixels.
- *
- * @typedef {object} Name
- * @property {number} x
- * @property {number} y
- * @property {number} width
- * @property {boolean} first Whether this name takes priority over the others.
- */
-
-/**
- * Return which names can be shown without covering one another.
- *
- * @param {Name[]} names
- * @returns {boolean[]} For each name, whether there is room.
- */
-export function roomFor(names) {
-  const order = names.map((_, index) => index);
-  order.sort((a, b) => Number(names[b].first) - Number(names[a].first) || a - b);
-  const shown = names.map(() => false);
-  /** @type {Name[]} */
-  const placed = [];
-  for (const index of order) {
-    const name = names[index];
-    const free = placed.every(
-      (other) =>
-        Math.abs(other.y - name.y) >= LINE ||
-        Math.abs(other.x - name.x) >= (other.width + name.width) / 2,
-    );
-    if (!free && !name.first) continue;
-    shown[index] = true;
-    placed.push(name);
-  }
-  return shown;
-}
-
-/**
- * Keep the robots' names on the map from covering one another.
- *
- * @param {MapCanvas} map
- * @returns {() => void} Ends the updates.
- */
-function spreadNames(map) {
-  const spread = () => {
-    const robots = [...map.world.querySelectorAll(".robot:not(.unplaced)")];
-    const names = robots.map((robot) => nameOf(map, robot));
-    const shown =
-      robots.length > MOST ? names.map(({ first }) => first) : roomFor(names);
-    robots.forEach((robot, index) => {
-      if (robot.classList.contains("nameless") !== shown[index]) return;
-      robot.classList.toggle("nameless", !shown[index]);
-    });
-  };
-  const timer = setInterval(spread, PERIOD);
-  const off = map.onSelect(spread);
-  spread();
-  return () => {
-    clearInterval(timer);
-    off();
-  };
-}
-
-/**
- * @param {MapCanvas} map
- * @param {Element} robot
- * @returns {Name}
- */
-function nameOf({ view, selected }, robot) {
-  const list = robot instanceof SVGGraphicsElement ? robot.transform.baseVal : null;
-  const { e: x, f: y } = list?.numberOfItems ? list.getItem(0).matrix : { e: 0, f: 0 };
-  return {
-    x: view.a * x + view.c * y + view.e,
-    y: view.b * x + view.d * y + view.f,
-    width: (robot.getAttribute("data-name")?.length ?? 0) * LETTER,
-    first: robot.getAttribute("data-robot") === selected,
-  };
-}
-
-/**
- * Hide the robots whose name does not contain the search text. Enter selects the robot
- * if only one is left.
- *
- * @param {AbortSignal} signal
- */
-function listenToSearch(signal) {
-  const input = /** @type {HTMLInputElement} */ (byId("search"));
-  const filter = () => {
-    const wanted = input.value.trim().toLowerCase();
-    for (const row of document.querySelectorAll("#robots > .row")) {
-      const name = row.querySelector(".name")?.textContent?.toLowerCase() ?? "";
-      row.classList.toggle("filtered", !name.includes(wanted));
-    }
-    const found = hits().length;
-    byId("select-shown").hidden = wanted === "" || found < 2;
-    const none = wanted !== "" && found === 0;
-    setText(byId("not-found"), none ? `No robot has “${input.value.trim()}” in its name.` : "");
-  };
-  input.addEventListener("input", filter, { signal });
-  const newcomers = new MutationObserver(filter);
-  newcomers.observe(byId("robots"), { childList: true });
-  signal.addEventListener("abort", () => newcomers.disconnect());
-  const choose = (/** @type {KeyboardEvent} */ event) => {
-    const [only, ...more] = event.key === "Enter" ? hits() : [];
-    if (only && more.length === 0) only.click();
-  };
-  input.addEventListener("keydown", choose, { signal });
-  const key = (/** @type {KeyboardEvent} */ event) => {
-    if (event.key !== "/" || event.ctrlKey || event.metaKey || typing(event)) return;
-    event.preventDefault();
-    input.focus();
-  };
-  document.addEventListener("keydown", key, { signal });
-}
-
-/** @returns {HTMLElement[]} The buttons that select the listed robots. */
-function hits() {
-  return [...document.querySelectorAll("#robots > .row:not(.filtered) [aria-pressed]")].filter(
-    (button) => button instanceof HTMLElement,
-  );
 }
 
 /**

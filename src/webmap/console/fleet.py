@@ -1,6 +1,6 @@
-"""How the console shows a robot: its configured modules, its picture, its name.
+"""How the console shows a robot: its configured modules, its picture, name and state.
 
-``map.css`` has the colours.
+``map.css`` and ``robots/robot_marks.css`` have the colours.
 """
 
 import math
@@ -8,11 +8,12 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 import webmap
-from webmap import svg
+from webmap import Element, svg
 from webmap.base import geometry
+from webmap.console.texts import NEED_A_PERSON, look_of
 
 if TYPE_CHECKING:
-    from webmap import Bridge, Element, Robot, RobotConfig
+    from webmap import Bridge, Robot, RobotConfig
     from webmap.config.robot import PictureConfig
 
 
@@ -41,7 +42,7 @@ def make_robot(
     robot = webmap.Robot.from_config(config, bridges, model=model)
     if pictured is not None:  # the name is below the picture
         robot.svg.set_style("--reach", picture_reach(pictured))
-    robot.add_module(NameLabel)
+    robot.add_module(StateMark)
     return robot
 
 
@@ -56,7 +57,7 @@ HATCH = (
 )
 
 
-def robot_model() -> "Element":
+def robot_model() -> Element:
     """Return a rounded body of half a metre with an arrow that shows the heading."""
     return svg.g(
         svg.circle(r=0.35, class_="hit"),
@@ -76,7 +77,7 @@ def picture_reach(picture: "PictureConfig") -> float:
     return half + math.hypot(picture.x, picture.y)
 
 
-def picture_model(picture: "PictureConfig", href: str) -> "Element":
+def picture_model(picture: "PictureConfig", href: str) -> Element:
     """Return a model made of a picture, with the same marks as any other robot.
 
     Args:
@@ -102,20 +103,59 @@ def picture_model(picture: "PictureConfig", href: str) -> "Element":
     return svg.g(svg.circle(r=0.35, class_="hit"), reach, model)
 
 
-class NameLabel:
-    """The robot's name below the robot, always upright; a module of robots."""
+LONGEST = 24
+"""The most characters of a name on the map; the title has the whole name."""
+
+ACROSS = 16
+"""Size of the symbol in pixels."""
+
+
+def shortened(name: str) -> str:
+    """Return a name that fits on the map, of one line."""
+    name = " ".join(name.split())
+    if len(name) <= LONGEST:
+        return name
+    # A joiner or a variation of a character that was cut off would join the dots.
+    return name[: LONGEST - 1].rstrip("\u200d\ufe0f ") + "…"
+
+
+class StateMark:
+    """A robot's badge, name and words on the map, always upright; a module of robots.
+
+    ``robot_marks.css`` has sizes and places, in pixels.
+    """
 
     def __init__(self, robot: "Robot") -> None:
         self.robot = robot
-        self.svg = svg.g(svg.text(text=robot.name, class_="label"), class_="upright")
+        half = -ACROSS / 2
+        self._use = svg.use(x=half, y=half, width=ACROSS, height=ACROSS)
+        self._words = svg.text(class_="words")
+        self.svg = svg.g(
+            svg.text(text=shortened(robot.name), class_="label"),
+            self._words,
+            svg.g(svg.circle(r=ACROSS / 2 + 3), self._use, class_="state-mark"),
+            class_="upright",
+        )
         # Above the body, and below what other modules draw.
         robot.svg.insert(list(robot.svg.children).index(robot.model) + 1, self.svg)
         self.on_odometry_update()
+        self.on_state()
 
     def destroy(self) -> None:
-        """Remove the name."""
+        """Remove badge, name and words."""
         self.svg.remove()
 
     def on_odometry_update(self) -> None:
-        """Turn against the robot's heading, so that the name stays upright."""
+        """Turn against the robot's heading, so that everything stays upright."""
         self.svg.set_pose(0.0, 0.0, -self.robot.yaw)
+
+    def on_state(self, state: object = None) -> None:
+        """Show the state."""
+        robot, look = self.robot, look_of(self.robot)
+        self._use.set(href=f"#{look.symbol}")
+        self._words.text = robot.state.text if look.group in NEED_A_PERSON else ""
+        robot.svg.set("data-tone", look.tone or None)
+        robot.svg.set("data-group", look.group)
+        title = robot.svg.children[0]
+        assert isinstance(title, Element), "a robot's group begins with its title"
+        title.text = f"{robot.name}: {robot.state.text}"

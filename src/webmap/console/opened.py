@@ -5,7 +5,7 @@ import weakref
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from webmap.features.alerts.alert_watch import LOW, AlertWatch
+from webmap.features.alerts.alert_watch import AlertWatch
 from webmap.features.alerts.alerts import Alerts
 
 if TYPE_CHECKING:
@@ -23,15 +23,9 @@ class Console:
 
     Args:
         given: The robots that the console was opened with.
-        low_battery: The charge, from 0 to 1, below which a battery makes an alert.
-
-    Raises:
-        ConfigError: If ``low_battery`` is not from 0 to 1.
     """
 
-    def __init__(
-        self, given: "Sequence[Robot]" = (), *, low_battery: float = LOW
-    ) -> None:
+    def __init__(self, given: "Sequence[Robot]" = ()) -> None:
         self.given = tuple(given)
         """The robots that the console was opened with, in that order."""
         self.robots: list[Robot] = []
@@ -47,7 +41,7 @@ class Console:
         """The robots that were removed from the pages, and the times."""
         self.alerts = Alerts()
         """The alerts of all robots, shared by all pages."""
-        self.alert_watch = AlertWatch(self.alerts, self.shown_robots, low_battery)
+        self.alert_watch = AlertWatch(self.alerts, self.shown_robots)
 
     def shown_robots(self) -> "list[Robot]":
         """Return the robots that the pages show."""

@@ -19,7 +19,6 @@ from webmap.console.opened import Console
 from webmap.console.robot_card import RobotButtons, RobotCard
 from webmap.console.robot_list import RobotList
 from webmap.features.alerts.alert_panel import AlertPanel
-from webmap.features.alerts.alert_watch import LOW
 from webmap.features.cameras.camera_panel import CameraPanel
 from webmap.features.doctor.doctor_panel import DoctorReports
 from webmap.features.selection.several_robots import SeveralRobots
@@ -47,7 +46,6 @@ def open_console(
     floor: Path | None = None,
     title: str = PRODUCT,
     place: str | None = None,
-    low_battery: float = LOW,
 ) -> Console:
     """Make the console the page at ``/``.
 
@@ -59,18 +57,16 @@ def open_console(
         title: The name of this installation.
         place: The name under which labels and views are stored; by default the URLs of
             the bridges. Use it for bridges whose port changes at each start.
-        low_battery: The charge, from 0 to 1, below which a battery makes an alert.
 
     Returns:
         The console, to add robots later.
 
     Raises:
-        ConfigError: If the floor plan cannot be read, or ``low_battery`` is not from 0
-            to 1.
+        ConfigError: If the floor plan cannot be read.
     """
     plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(config, bridges) for config in robots]
-    opened = Console(fleet, low_battery=low_battery)
+    opened = Console(fleet)
     opened.alert_watch.begin()
     if place is None:
         place = "\n".join(sorted(bridge.url for bridge in bridges))

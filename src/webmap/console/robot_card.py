@@ -79,7 +79,7 @@ class RobotCard:
         self._robot: Robot | None = None
         self._feed: Feed | None = None
         self._shape = StateShape()
-        self._name = html.h2()
+        self._name = html.h2(dir="auto")
         self._state = html.span(class_="holder")
         self._mine = html.span(class_="you")
         self._reason = html.p(class_="reason")
@@ -110,7 +110,7 @@ class RobotCard:
             self.element.unset("data-robot")
             return
         self.element.set("data-robot", robot.id)
-        self._name.text = robot.name
+        self._name.set("title", robot.name).text = robot.name
         self._battery.text = "unknown"
         self._age.set_age(math.inf)
         self._feed = robot.add_module(lambda owner: Feed(owner, self))
@@ -145,7 +145,7 @@ class RobotCard:
         robot = self._robot
         assert robot is not None
         state, report = robot.state, robot.report
-        shape, tone = look_of(robot)
+        shape, tone, _ = look_of(robot)
         self._shape.show(shape)
         self._state.text, self._mine.text = state.text, state.mine
         self.element.set("data-state", state.name)

@@ -4,7 +4,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from webmap import html, svg
-from webmap.console.texts import battery_tone, look_of
+from webmap.config.robot import BATTERY_LOW
+from webmap.console.texts import GROUPS, battery_tone, look_of
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
@@ -34,14 +35,14 @@ class BatteryMark:
             picture, name, self._text, class_="battery", hidden=True
         )
 
-    def show(self, charge: float | None) -> None:
-        """Show a charge from 0 to 1; hide the symbol if the charge is unknown."""
+    def show(self, charge: float | None, low: float = BATTERY_LOW) -> None:
+        """Show a charge from 0 to 1, low below ``low``; hide an unknown charge."""
         self.element.set(hidden=charge is None)
         if charge is None:
             return
         self._fill.set(width=round(FULL * charge, 1))
         self._text.text = f"{round(100 * charge)} %"
-        self.element.set("data-tone", battery_tone(charge) or None)
+        self.element.set("data-tone", battery_tone(charge, low) or None)
 
 
 class RobotList:
@@ -69,7 +70,7 @@ class RobotList:
         row = robot.add_module(Row, self.map)
         self._rows[id(robot)] = row
         self.element.append(row.element)
-        row.on_report()
+        row.on_state()
 
     def on_remove_robot(self, robot: "Robot") -> None:
         """Remove the robot's line."""
@@ -101,17 +102,18 @@ class Row:
         self._shape = StateShape()
         self._state = html.span(class_="holder")
         self._mine = html.span(class_="you")
+        self._words = html.span(
+            html.span(text="Stale data", class_="old"),
+            self._state,
+            self._mine,
+            class_="state",
+        )
         self._battery = BatteryMark()
         self._age = html.span(class_="age")
         self._button = html.button(
             *self._shape.elements,
-            html.span(text=robot.name, class_="name"),
-            html.span(
-                html.span(text="Stale data", class_="old"),
-                self._state,
-                self._mine,
-                class_="state",
-            ),
+            html.span(text=robot.name, class_="name", dir="auto", title=robot.name),
+            self._words,
             self._battery.element,
             self._age,
             type="button",
@@ -128,26 +130,38 @@ class Row:
         self.element = html.li(self._button, label, class_="row")
         self.element.set("data-robot", robot.id)
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
-        for module in robot.modules:
-            if hasattr(module, "charge"):
-                self._battery.show(module.charge)
 
     def destroy(self) -> None:
         """Remove the line."""
         self.element.remove()
 
+    def on_state(self, state: object = None) -> None:
+        """Show the state, and what the list is ordered and grouped by."""
+        robot = self.robot
+        now, look = robot.state, look_of(robot)
+        self._shape.show(look.symbol)
+        self._state.text, self._mine.text = now.text, now.mine
+        self._words.set("title", now.text)
+        charge, bridge = robot.charge, robot.pose_source.bridge
+        self._battery.show(charge, robot.battery_low)
+        for name, value in {
+            "tone": look.tone,
+            "state": now.name,
+            "group": look.group,
+            "rank": str(GROUPS.index(look.group)),
+            "tag": next(iter(robot.tags), ""),
+            "bridge": "" if bridge is None else bridge.name or bridge.url,
+            "charge": "" if charge is None else str(round(100 * charge)),
+        }.items():
+            self.element.set(f"data-{name}", value or None)
+
     def on_report(self, report: object = None) -> None:
         """Show who has control."""
-        state = self.robot.state
-        shape, tone = look_of(self.robot)
-        self._shape.show(shape)
-        self._state.text, self._mine.text = state.text, state.mine
-        self.element.set("data-tone", tone or None)
-        self.element.set("data-state", state.name)
+        self.on_state()
 
     def on_battery_update(self, battery: Any) -> None:
         """Show the charge."""
-        self._battery.show(battery.charge)
+        self.on_state()
 
     def show_selected(self, selected: bool) -> None:
         """Mark the line if its robot is selected."""
@@ -162,7 +176,7 @@ class Row:
         age = self.robot.pose_age
         if age is not None:
             self._age.set_age(age)
-        self.on_report()
+        self.on_state()
 
 
 class StateShape:

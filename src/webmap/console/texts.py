@@ -2,7 +2,7 @@
 
 import math
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from webmap import svg
 
@@ -12,35 +12,66 @@ if TYPE_CHECKING:
 UNKNOWN = "\N{EN DASH}"
 """Shown in place of an unknown number."""
 
-LOW, EMPTY = 0.2, 0.1
-"""Charges below which a battery is low or nearly empty."""
+EMPTY = 0.1
+"""The charge below which a low battery is nearly empty."""
 
 NAME = re.compile(r"[\d/_:.]")
 """Characters that occur in a URL, topic or robot name, but not in plain words."""
 
+
+class Look(NamedTuple):
+    """How a state of a robot is shown, besides its text."""
+
+    symbol: str
+    """The symbol of console.html."""
+
+    tone: str
+    """``bad``, ``warn``, ``active``, or empty: the colour."""
+
+    group: str
+    """The words under which the list counts the robots: 2 *lost*."""
+
+
 LOOKS = {
-    "no_bridge": ("state-down", "bad"),
-    "connecting": ("state-waiting", ""),
-    "gone": ("state-old", ""),
-    "watched": ("state-watched", ""),
-    "stopped": ("state-stopped", "bad"),
-    "unconfirmed": ("state-stopped", "bad"),
-    "down": ("state-down", "bad"),
-    "changing": ("state-stopping", "warn"),
-    "stopping": ("state-stopping", "warn"),
-    "blocked": ("state-driving", "warn"),
-    "driven": ("state-driving", "active"),
-    "navigating": ("goal-way", "active"),
-    "navigating_held": ("goal-way", "active"),
-    "settling": ("state-stopping", "warn"),
-    "moving": ("goal-way", "active"),
-    "barred": ("state-down", "warn"),
-    "barred_held": ("state-down", "warn"),
-    "other": ("state-driving", "warn"),
-    "held": ("state-held", "active"),
-    "free": ("state-free", ""),
+    "disobeying": Look("state-disobeying", "bad", "not obeying"),
+    "no_bridge": Look("state-down", "bad", "lost"),
+    "connecting": Look("state-waiting", "", "connecting"),
+    "gone": Look("state-old", "", "lost"),
+    "lost": Look("state-down", "bad", "lost"),
+    "down": Look("state-down", "bad", "lost"),
+    "unconfirmed": Look("state-stopped", "bad", "stopped"),
+    "stopped": Look("state-stopped", "bad", "stopped"),
+    "blocked": Look("state-blocked", "warn", "blocked"),
+    "goal_failed": Look("goal-failed", "warn", "goal failed"),
+    "battery_low": Look("state-battery", "warn", "battery low"),
+    "other": Look("state-moving", "warn", "moving, not by WebMap"),
+    "moving": Look("state-moving", "active", "moving, not by WebMap"),
+    "changing": Look("state-stopping", "warn", "driven"),
+    "stopping": Look("state-stopping", "warn", "driven"),
+    "driven": Look("state-driving", "active", "driven"),
+    "settling": Look("state-stopping", "warn", "driven"),
+    "navigating": Look("goal-way", "active", "navigating"),
+    "navigating_held": Look("goal-way", "active", "navigating"),
+    "barred": Look("state-barred", "warn", "cannot be driven"),
+    "barred_held": Look("state-barred", "warn", "cannot be driven"),
+    "watched": Look("state-watched", "", "view only"),
+    "held": Look("state-held", "active", "in control"),
+    "free": Look("state-free", "", "free"),
 }
-"""The symbol of console.html and the tone of each state of a robot."""
+"""The look of each state of a robot, in the order of ``STATE_TEXTS``."""
+
+GROUPS = tuple(dict.fromkeys(look.group for look in LOOKS.values()))
+"""The groups, the worst first."""
+
+NEED_A_PERSON = (
+    "not obeying",
+    "lost",
+    "stopped",
+    "blocked",
+    "goal failed",
+    "battery low",
+)
+"""Groups of states that end only when a person does something."""
 
 
 def icon(symbol: str) -> "Element":
@@ -48,20 +79,16 @@ def icon(symbol: str) -> "Element":
     return svg.svg(svg.use(href=f"#{symbol}"), class_="icon").set("aria-hidden", "true")
 
 
-def look_of(robot: "Robot") -> tuple[str, str]:
-    """Return the symbol and the tone of a robot's state."""
-    shape, tone = LOOKS[robot.state.name]
-    another = robot.report is not None and robot.report.other_writer is not None
-    if another and robot.state.name not in ("no_bridge", "connecting", "other"):
-        tone = "bad"
-    return shape, tone
+def look_of(robot: "Robot") -> Look:
+    """Return the look of a robot's state."""
+    return LOOKS[robot.state.name]
 
 
-def battery_tone(charge: float) -> str:
-    """Return the tone of a charge between 0 and 1."""
-    if charge < EMPTY:
-        return "bad"
-    return "warn" if charge < LOW else ""
+def battery_tone(charge: float, low: float) -> str:
+    """Return the tone of a charge that is low below ``low``; both from 0 to 1."""
+    if charge >= low:
+        return ""
+    return "bad" if charge < EMPTY else "warn"
 
 
 def number(value: float, digits: int = 2) -> str:

@@ -106,6 +106,10 @@ def apply(
             robot.svg.classes.remove(name)
     for name in new.classes:
         robot.svg.classes.add(name)
+    if old.tags != new.tags:
+        robot.set_tags(new.tags)
+    if old.battery_low != new.battery_low:
+        robot.set_battery_low(new.battery_low)
     if _changes_bridge_of_goals(old.resolved(), new.resolved()):
         robot.configure("initial_pose", None)  # both must always use the same bridge
     for key in ("odometry", "tf", "alignment", *MOTION):
@@ -269,6 +273,8 @@ def config_of(robot: "Robot") -> RobotConfig:
         odometry=odometry,
         tf=frames,
         alignment=None if own is None else numbers(own),
+        battery_low=robot.battery_low,
+        tags=list(robot.tags),
         motion=robot.motion.config,
         modules=[
             ModuleConfig(

@@ -82,6 +82,10 @@ class Driven(Extendable):
         self.goal_ended_at: float | None = None
         """When the newest goal ended, in seconds of ``time.monotonic()``; None if there
         is no goal or it has not ended."""
+        self.goal_failed = False
+        """Whether the newest goal failed, and the robot was neither driven nor stopped
+        since."""
+        self._failed_goal = ""
         self._report_is_old = False
 
     @property
@@ -451,8 +455,18 @@ class Driven(Extendable):
             self.goal_ended_at = None
         elif self.goal_ended_at is None:
             self.goal_ended_at = time.monotonic()
+        self._note_failure(report)
         self.motion.on_report(report)
         self.notify_modules("on_report", report)
+
+    def _note_failure(self, report: RobotReport) -> None:
+        goal = report.goal
+        if goal is None or goal.state != "failed":
+            self.goal_failed = False
+        elif goal.id != self._failed_goal:
+            self._failed_goal, self.goal_failed = goal.id, True
+        elif report.state not in ("free", "held"):
+            self.goal_failed = False
 
     def expect_jump(self) -> None:
         """Accept that the robot's pose jumps from here on."""

@@ -14,7 +14,8 @@ from webmap.base.geometry import Quaternion, Twist, Vector3
 from webmap.base.scope import Removal, keep
 from webmap.config.reading import read_part
 from webmap.config.robot import OdometryConfig, RobotConfig, TfConfig
-from webmap.core.driven import Driven, sets_part
+from webmap.core.driven import sets_part
+from webmap.core.listed import Listed
 from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
 from webmap.core.registry import Namespace, robot_modules
@@ -44,7 +45,7 @@ robots: "weakref.WeakValueDictionary[str, Robot]" = weakref.WeakValueDictionary(
 """All robots that were created and not destroyed, by their id."""
 
 
-class Robot(Driven):
+class Robot(Listed):
     """One robot: its name, its pose, its drawing and its motion.
 
     A robot may be shown on any number of maps, and used without any.
@@ -84,7 +85,7 @@ class Robot(Driven):
         self.orientation = Quaternion()
         self.measured_twist: Twist | None = None
         self.valid = False
-        self._state_shown = ""
+        self._state_shown: RobotState | None = None
         self._state_timer: asyncio.TimerHandle | None = None
         self.pose_stamp: float | None = None
         """When the newest pose was sent, in seconds of ``time.monotonic()``; None
@@ -121,6 +122,9 @@ class Robot(Driven):
                 self.pose_age,
                 self.motion.axes.seen(self.measured_twist),
                 None if ended is None else time.monotonic() - ended,
+                self.goal_failed,
+                self.charge,
+                self.battery_low,
             )
         )
 
@@ -413,12 +417,16 @@ class Robot(Driven):
             self._state_timer = loop.call_later(STATE_EVERY, self._watch_state)
 
     def _show_state(self) -> None:
-        name = self.state.name
-        if name != self._state_shown:
-            self._state_shown = name
-            self.svg.set("data-state", name)
-            since = since_when(self.silent_for) if name == "gone" else None
-            self.svg.set("data-since", since)
+        state, shown = self.state, self._state_shown
+        if state == shown:
+            return
+        if shown is not None and shown.name == state.name == "gone":
+            return  # since the same time, however it is rounded
+        self._state_shown = state
+        self.svg.set("data-state", state.name)
+        since = since_when(self.silent_for) if state.name == "gone" else None
+        self.svg.set("data-since", since)
+        self.notify_modules("on_state", state)
 
     def show_pose(self, pose: PoseReading, stamp: float | None = None) -> None:
         """Draw the robot at a pose on the common map, and fire ``on_odometry_update``.

@@ -4,50 +4,78 @@ from datetime import datetime, timedelta
 from typing import NamedTuple
 
 from webmap.base.geometry import Twist
+from webmap.config.robot import BATTERY_LOW
 from webmap.gate.protocol import RobotReport
 from webmap.gate.rules.goals import BRAKES, OVER
 from webmap.gate.rules.health import moves
 from webmap.gate.rules.obedience import MOVES, TURNS
-from webmap.poses.silence import PERIODS
+from webmap.poses.silence import LIMIT, PERIODS
 from webmap.ros.bridge import Bridge
 
 STATE_TEXTS = {
+    "disobeying": "Does not obey: still moving",
     "no_bridge": "No connection to the bridge",
     "connecting": "Connecting",
     "gone": "No pose since {since}",
-    "watched": "View only",
-    "stopped": "STOP active",
-    "unconfirmed": "STOP NOT CONFIRMED",
+    "lost": "Lost: no new pose",
     "down": "No connection for commands",
+    "unconfirmed": "STOP NOT CONFIRMED",
+    "stopped": "STOP active",
+    "blocked": "Not moving: blocked?",
+    "goal_failed": "Goal failed",
+    "battery_low": "Battery low",
+    "other": "Another program is driving",
+    "moving": "Moving, not by WebMap",
     "changing": "Handing over",
     "stopping": "Stopping",
-    "blocked": "Not moving: blocked?",
     "driven": "{who} is driving",
     "driven_by_you": "You are driving",
+    "settling": "Still moving",
     "navigating": "Navigating",
     "navigating_held": "Navigating ({who} has control)",
     "navigating_held_by_you": "Navigating (you have control)",
-    "settling": "Still moving",
-    "moving": "Moving, not by WebMap",
     "barred": "Cannot be driven",
     "barred_held": "Cannot be driven ({who} has control)",
     "barred_held_by_you": "Cannot be driven (you have control)",
-    "other": "Another program is driving",
+    "watched": "View only",
     "held": "{who} has control",
     "held_by_you": "You have control",
     "free": "Free",
 }
-"""The text of each state. The page has the same table, generated from this one."""
+"""The text of each state. Of the states that are true at once, the first one here is
+shown. The page has the same table, generated from this one."""
+
+PRECEDENCE = {name: place for place, name in enumerate(STATE_TEXTS)}
+"""The place of each state in the table; the least one has priority."""
+
+SEEN = (
+    "disobeying",
+    "no_bridge",
+    "connecting",
+    "gone",
+    "lost",
+    "down",
+    "goal_failed",
+    "battery_low",
+    "other",
+    "moving",
+    "settling",
+    "navigating",
+)
+"""States that the display finds besides the one that the gate reports. The page has the
+same list, generated from this one."""
+
+LOST = LIMIT
+"""Seconds without a pose, over an open connection, after which a robot is lost."""
 
 GONE = 30.0
-"""Seconds without a pose, over an open connection, after which a robot is gone."""
+"""Seconds after which a lost robot that no operator has control of is gone."""
 
 FRESH = 1.0
 """Seconds for which the velocity of a pose is used."""
 
 QUIET = ("free", "barred", "down")
-"""States of the gate that the display may replace by its own. The page has the same
-rule (``doingOf`` of web/motion/report.js)."""
+"""States of a robot that nobody has control of and that the gate does not move."""
 
 
 class RobotState(NamedTuple):
@@ -89,20 +117,31 @@ class Facts(NamedTuple):
     """Seconds since the newest goal ended; None if there is no goal or it has not
     ended."""
 
+    goal_failed: bool = False
+    """Whether the newest goal failed and nobody has driven the robot since."""
+
+    charge: float | None = None
+    """The charge of the battery, from 0 to 1; None if unknown."""
+
+    battery_low: float = BATTERY_LOW
+    """The charge below which the battery is low."""
+
 
 def state_of(facts: Facts) -> RobotState:
-    """Return what a robot is doing.
+    """Return what a robot is doing: the first state of the table that is true.
 
-    The gate's report decides. The display adds what the gate does not know: the bridge
-    and the poses of a robot whose odometry the gate does not receive. Stale data is
-    left out: the page detects it by itself, even when it cannot reach this process.
+    Stale data is left out: the page detects it by itself, even when it cannot reach
+    this process.
     """
-    if facts.report is None:
-        return _state(_seen(facts) or "watched", facts)
-    name: str = facts.report.doing
-    if name in QUIET:
-        name = _seen(facts, may_move=name != "down") or name
-    return _state(name, facts)
+    names = (
+        "watched" if facts.report is None else facts.report.doing,
+        _link_state(facts),
+        _pose_state(facts),
+        _own_motion(facts),
+        *_reported(facts),
+    )
+    true = (name for name in names if name is not None)
+    return _state(min(true, key=PRECEDENCE.__getitem__), facts)
 
 
 def since_when(silent_for: float | None) -> str:
@@ -115,16 +154,51 @@ def since_when(silent_for: float | None) -> str:
     return f"{datetime.now() - timedelta(seconds=silent_for or 0.0):%H:%M}"
 
 
-def _seen(facts: Facts, *, may_move: bool = False) -> str | None:
-    """Return the state that the display sees for a robot without an operator."""
-    bridge, report = facts.bridge, facts.report
-    if bridge is not None and bridge.state != "open":
-        return "no_bridge" if bridge.lost else "connecting"
-    if _is_gone(facts):
-        return "gone"
-    if not may_move or report is None or report.measured is not None:
-        return None  # the gate receives the same odometry
-    if not _moves(facts):
+def _link_state(facts: Facts) -> str | None:
+    """Return the state of a robot without a connection to the bridge of its poses."""
+    bridge = facts.bridge
+    if bridge is None or bridge.state == "open":
+        return None
+    return "no_bridge" if bridge.lost else "connecting"
+
+
+def _pose_state(facts: Facts) -> str | None:
+    """Return the state of a robot whose expected poses are missing."""
+    silent, bridge = facts.silent_for, facts.bridge
+    if silent is None or silent <= LOST:
+        return None
+    if bridge is not None and (
+        bridge.replays or silent <= PERIODS * facts.period or bridge.state != "open"
+    ):
+        return None
+    return "gone" if silent > GONE and _is_quiet(facts) else "lost"
+
+
+def _reported(facts: Facts) -> list[str]:
+    """Return the states that are true by facts beside the gate's own state."""
+    names = []
+    if facts.goal_failed:
+        names.append("goal_failed")
+    if facts.charge is not None and facts.charge < facts.battery_low:
+        names.append("battery_low")
+    report = facts.report
+    if report is None:
+        return names
+    if report.alarm is not None:
+        names.append("disobeying")
+    if report.link == "down":
+        names.append("down")
+    if report.other_writer is not None:
+        names.append("other")
+    return names
+
+
+def _own_motion(facts: Facts) -> str | None:
+    """Return the state of a moving robot whose odometry the gate does not receive."""
+    report = facts.report
+    if report is None or not _is_quiet(facts) or report.measured is not None:
+        return None
+    if report.link == "down" or not _moves(facts):
         return None
     if report.goal is not None and report.goal.state not in OVER:
         return "navigating"
@@ -133,20 +207,23 @@ def _seen(facts: Facts, *, may_move: bool = False) -> str | None:
 
 
 def _state(name: str, facts: Facts) -> RobotState:
-    holder = facts.report.holder if facts.report is not None else None
+    report = facts.report
+    holder = report.holder if report is not None else None
     who = holder.name or holder.connection if holder is not None else "Another operator"
     text = STATE_TEXTS[name].format(who=who, since=since_when(facts.silent_for))
-    return RobotState(name, text, STATE_TEXTS.get(f"{name}_by_you", text))
+    mine = STATE_TEXTS.get(f"{name}_by_you", text)
+    if (
+        report is not None
+        and report.doing in ("stopped", "unconfirmed")
+        and PRECEDENCE[name] < PRECEDENCE["unconfirmed"]
+    ):  # a worse state does not hide that STOP is active
+        text = mine = f"{text}, {STATE_TEXTS[report.doing]}"
+    return RobotState(name, text, mine)
 
 
-def _is_gone(facts: Facts) -> bool:
-    """Return whether expected poses have been missing for a long time."""
-    silent = facts.silent_for
-    if silent is None or silent <= GONE:
-        return False
-    if facts.bridge is None:
-        return True
-    return silent > PERIODS * facts.period and not facts.bridge.replays
+def _is_quiet(facts: Facts) -> bool:
+    """Return whether nobody has control of the robot."""
+    return facts.report is None or facts.report.doing in QUIET
 
 
 def _moves(facts: Facts) -> bool:

@@ -211,13 +211,7 @@ def open_fleet(ready: ReadyFleet) -> None:
     """Serve the console with these robots at ``/``."""
     options = {"title": ready.fleet.title} if ready.fleet.title else {}
     bridges = list(ready.bridges.values())
-    shown = console.open_console(
-        bridges,
-        [],
-        floor=ready.floor,
-        low_battery=ready.fleet.low_battery,
-        **options,
-    )
+    shown = console.open_console(bridges, [], floor=ready.floor, **options)
     for name, arguments in ready.modules.items():
         shown.set_module(name, **arguments)
     show_scenery(shown, ready)

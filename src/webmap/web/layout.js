@@ -28,12 +28,20 @@ import {
  *     the card shows more.
  * @typedef {{dock: 'side' | 'below' | 'float', x: number, y: number}} Camera
  *
+ * @typedef {object} List The list of robots.
+ * @property {'auto' | 'state' | 'name' | 'battery' | 'added'} order `auto`: the worst
+ *     first in a long list, else as added.
+ * @property {'none' | 'bridge' | 'tag'} group
+ * @property {string[]} states Only robots in these groups of states are shown; all if
+ *     it is empty.
+ *
  * @typedef {object} Layout A missing part is left unchanged.
  * @property {Place} [view]
  * @property {Layers} [layers]
  * @property {Log} [log]
  * @property {Panel} [panel]
  * @property {Camera} [camera]
+ * @property {List} [list]
  */
 
 /** The version that this program writes, and the only one that it reads. */
@@ -156,6 +164,23 @@ const checkedPlace = whole({
   turn_rad: number(-7, 7),
 });
 
+/** Most groups of states that the list of robots is filtered by. */
+const MOST_STATES = 30;
+
+/** @type {Check} */
+const states = (value, path) => {
+  const each = Array.isArray(value) ? value : [null];
+  const valid = each.every((one) => typeof one === "string" && one.length <= LONGEST_NAME);
+  if (valid && each.length <= MOST_STATES) return [...each];
+  throw refuse(path, `a list of ${MOST_STATES} texts at most`, value);
+};
+
+export const checkedList = whole({
+  order: oneOf(["auto", "state", "name", "battery", "added"]),
+  group: oneOf(["none", "bridge", "tag"]),
+  states,
+});
+
 /** @type {Record<keyof Layout, Check>} */
 const PARTS = {
   view: checkedPlace,
@@ -167,6 +192,7 @@ const PARTS = {
     x: number(0, 1),
     y: number(0, 1),
   }),
+  list: checkedList,
 };
 
 /**

@@ -78,9 +78,7 @@ def begin(tab) -> None:
 
 
 def numbers(tab) -> list[float]:
-    fields = (
-        tab.locator(f".webmap-align [name={n}]") for n in ("x", "y", "angle")
-    )
+    fields = (tab.locator(f".webmap-align [name={n}]") for n in ("x", "y", "angle"))
     return [float(field.input_value()) for field in fields]
 
 

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
-from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import lifecycle
 from webmap.features.alerts.alerts import KINDS, Alerts
 from webmap.poses.silence import PERIODS
@@ -22,18 +21,11 @@ PERIOD = 0.5
 LOST = 3.0
 """Seconds without a pose or a connection after which a robot is lost."""
 
-LOW = 0.2
-"""The charge, from 0 to 1, below which a battery makes an alert by default."""
 
-
-def conditions(robot: "Robot", low: float = LOW) -> dict[str, str]:
+def conditions(robot: "Robot") -> dict[str, str]:
     """Return what is wrong with a robot now: a text for each kind of alert.
 
     Nothing is wrong with a robot of a recording.
-
-    Args:
-        robot: The robot.
-        low: The charge, from 0 to 1, below which a battery is low.
     """
     bridge = robot.pose_source.bridge
     if bridge is not None and bridge.replays:
@@ -46,10 +38,10 @@ def conditions(robot: "Robot", low: float = LOW) -> dict[str, str]:
         silent = robot.silent_for
         if silent is not None and silent > max(LOST, PERIODS * period):
             found["lost"] = "No pose received"
+    charge = robot.charge
+    if charge is not None and charge < robot.battery_low:
+        found["battery"] = f"Battery at {round(100 * charge)} %"
     for module in robot.modules:
-        charge = getattr(module, "charge", None)
-        if charge is not None and charge < low:
-            found["battery"] = f"Battery at {round(100 * charge)} %"
         if hasattr(module, "parts") and hasattr(module, "hold"):
             bad = [part for part in module.parts if part.level == "error"]
             if bad:
@@ -85,24 +77,14 @@ class AlertWatch:
     Args:
         alerts: The list to fill.
         robots: Returns the robots that are shown now.
-        low: The charge, from 0 to 1, below which a battery is low.
-
-    Raises:
-        ConfigError: If ``low`` is not from 0 to 1.
     """
 
     def __init__(
         self,
         alerts: Alerts,
         robots: "Callable[[], Iterable[Robot]]",
-        low: float = LOW,
     ) -> None:
-        if not 0 <= low <= 1:
-            raise ConfigError(
-                f"the charge of a low battery is 0 to 1, got {low!r}: give 0.2 for 20 %"
-            )
         self.alerts = alerts
-        self.low = low
         self._robots = robots
         self._unlinked: dict[str, float] = {}
         """When the gate lost each robot without a connection, by id."""
@@ -126,7 +108,7 @@ class AlertWatch:
         """Report the conditions of all robots, at ``now`` in Unix seconds."""
         robots = list(self._robots())
         for robot in robots:
-            found = conditions(robot, self.low)
+            found = conditions(robot)
             if not self._is_unlinked(robot.id, "commands" in found, now):
                 found.pop("commands", None)
             for kind in KINDS:

@@ -17,6 +17,9 @@ MOVES = 0.05
 TURNS = 0.1
 """Radians per second above which a machine still turns."""
 
+SENT = 0.1
+"""Metres per second sent from which a machine that does not move is blocked."""
+
 BLOCKED_AFTER = 1.0
 """Seconds without motion after which a driven machine is blocked."""
 
@@ -46,7 +49,7 @@ class Obedience:
 
     def on_written(self, twist: Twist, last: Twist, now: float) -> None:
         """Note that ``twist`` was written after ``last``."""
-        self._driven = moves(twist, MOVES, TURNS)
+        self._driven = moves(twist, SENT, TURNS)
         if not self._driven:
             self._stuck = None
         if not twist.is_zero:

@@ -1,3 +1,5 @@
+import { SEEN } from "./state_words.js";
+
 /**
  * The gate's report on one robot.
  *
@@ -137,26 +139,18 @@ export function mayTake(report) {
   return report.armable && (!heldByAnother(report) || heldByProgram(report));
 }
 
-/** States of the gate that the display may replace by what it knows. */
+/** States of the gate while nobody has control and nothing stops the robot. */
 const QUIET = new Set(["free", "barred", "down"]);
 
-/** States that the display derives from the bridge and the poses of a robot. */
-const SEEN = new Set([
-  "no_bridge",
-  "connecting",
-  "gone",
-  "navigating",
-  "settling",
-  "moving",
-]);
-
 /**
- * Return what a robot is doing. Python has the same rule (`state_of`).
+ * Return what the driving panel shows of a robot: the gate's state while an operator or
+ * a STOP has the robot, else that of the display, which has the whole precedence
+ * (`state_of` in Python).
  *
  * @param {RobotReport} report
  * @param {string} seen The state that the display shows.
  * @returns {string} A name of `WORDS`.
  */
 export function doingOf({ doing }, seen) {
-  return QUIET.has(doing) && SEEN.has(seen) ? seen : doing;
+  return QUIET.has(doing) && SEEN.includes(seen) ? seen : doing;
 }

@@ -255,6 +255,7 @@ function ofDoing(name, title, report, inputs) {
     case "stopping":
     case "settling":
       return description("stopping", title, speedOf(report));
+    case "disobeying":
     case "moving":
     case "other":
       return description("moving", title, report.measured ? speedOf(report) : "");

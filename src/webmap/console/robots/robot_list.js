@@ -1,0 +1,290 @@
+import { checkedList } from "../../web/layout.js";
+import { byId, setText, typing } from "../../web/tools/dom.js";
+import { html, svg } from "../../web/tools/elements.js";
+import { arranged, AT_FIRST, countsOf, isShown, MANY, orderFor } from "./robot_order.js";
+
+/**
+ * The list of robots: search, order, groups, counts by state that filter, and keys.
+ * The choice is a part of the layout, and stored in the browser.
+ */
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('./robot_order.js').Choice} Choice */
+/** @typedef {import('./robot_order.js').Listed & {row: HTMLElement}} Row */
+
+/** The key of the choice in this browser's storage. */
+const KEPT = "webmap.list";
+
+/** Milliseconds between two counts, and between two changes of the order. */
+const COUNT_EVERY = 500;
+const ORDER_EVERY = 2000;
+
+/**
+ * @param {MapCanvas} map
+ * @param {AbortSignal} signal
+ * @returns {() => void} Leaves the layout.
+ */
+export function listenToRobots(map, signal) {
+  const list = new RobotList(signal);
+  return map.layout.add("list", {
+    read: () => list.choice,
+    write: (choice) => list.choose(choice),
+    reset: () => list.choose(AT_FIRST),
+  });
+}
+
+class RobotList {
+  /** @param {AbortSignal} signal */
+  constructor(signal) {
+    this._list = byId("robots");
+    this._search = /** @type {HTMLInputElement} */ (byId("search"));
+    this._order = /** @type {HTMLSelectElement} */ (byId("robot-order"));
+    this._group = /** @type {HTMLSelectElement} */ (byId("robot-group"));
+    /** @type {Choice} */
+    this.choice = kept();
+    /** @type {WeakMap<HTMLElement, number>} When each row was seen first. */
+    this._added = new WeakMap();
+    this._count = 0;
+    /** @type {Map<string, HTMLButtonElement>} */
+    this._chips = new Map();
+    /** Whether a mouse is over the list; a finger leaves no trace. */
+    this._over = false;
+    this._listen(signal);
+    this._listenToSearch(signal);
+    this._listenToKeys(signal);
+    this._update();
+    this._arrange();
+  }
+
+  /** @param {Partial<Choice>} part */
+  choose(part) {
+    this.choice = { ...this.choice, ...part };
+    keep(this.choice);
+    this._update();
+    this._arrange();
+  }
+
+  /** @param {AbortSignal} signal */
+  _listen(signal) {
+    const over = (/** @type {PointerEvent} */ { type, pointerType }) => {
+      this._over = type === "pointerenter" && pointerType !== "touch";
+    };
+    this._list.addEventListener("pointerenter", over, { signal });
+    this._list.addEventListener("pointerleave", over, { signal });
+    const chosen = () => {
+      const { value: order } = this._order;
+      const { value: group } = this._group;
+      this.choose(/** @type {Partial<Choice>} */ ({ order, group }));
+    };
+    this._order.addEventListener("change", chosen, { signal });
+    this._group.addEventListener("change", chosen, { signal });
+    const arrange = () => {
+      const used = this._over || this._list.contains(document.activeElement);
+      if (!used) this._arrange();
+    };
+    const newcomers = new MutationObserver(() => {
+      this._update();
+      arrange();
+    });
+    newcomers.observe(this._list, { childList: true });
+    const counts = setInterval(() => this._update(), COUNT_EVERY);
+    const orders = setInterval(arrange, ORDER_EVERY);
+    signal.addEventListener("abort", () => {
+      newcomers.disconnect();
+      clearInterval(counts);
+      clearInterval(orders);
+    });
+  }
+
+  /** @returns {Row[]} In the order of the page. */
+  _rows() {
+    return [...this._list.querySelectorAll(":scope > .row")].flatMap((row) => {
+      if (!(row instanceof HTMLElement)) return [];
+      const added = this._added.get(row) ?? this._count++;
+      this._added.set(row, added);
+      const { group = "", rank, tag = "", bridge = "", charge } = row.dataset;
+      const name = row.querySelector(".name")?.textContent ?? "";
+      return [
+        {
+          row,
+          name,
+          group,
+          rank: Number(rank ?? Infinity),
+          tag,
+          bridge,
+          charge: charge === undefined ? null : Number(charge),
+          added,
+        },
+      ];
+    });
+  }
+
+  /** Show the tools of a long list, the counts, and the robots that the filter leaves. */
+  _update() {
+    const rows = this._rows();
+    const long = rows.length > MANY || rows.some(({ tag }) => tag);
+    byId("robot-tools").hidden = !long;
+    this._order.value = orderFor(this.choice.order, rows.length);
+    this._group.value = this.choice.group;
+    const states = long ? this.choice.states : [];
+    this._showChips(rows);
+    const wanted = this._search.value.trim();
+    for (const robot of rows) {
+      robot.row.classList.toggle("filtered", !isShown(robot, wanted, states));
+    }
+    for (const title of this._list.querySelectorAll(":scope > .group-name")) {
+      let next = title.nextElementSibling;
+      while (next?.classList.contains("filtered")) next = next.nextElementSibling;
+      title.classList.toggle("filtered", !next?.classList.contains("row"));
+    }
+    const found = this._buttons().length;
+    const filtered = wanted !== "" || states.length > 0;
+    byId("select-shown").hidden = !filtered || found < 2;
+    const none = rows.length > 0 && found === 0;
+    setText(byId("not-found"), none ? noneText(wanted, states) : "");
+  }
+
+  /** @param {Row[]} rows */
+  _showChips(rows) {
+    const { states } = this.choice;
+    const counts = countsOf(rows, states);
+    for (const [group, chip] of this._chips) {
+      if (counts.some((each) => each.group === group)) continue;
+      chip.remove();
+      this._chips.delete(group);
+    }
+    const place = byId("robot-chips");
+    counts.forEach(({ group, count }, index) => {
+      const chip = this._chips.get(group) ?? this._chip(group);
+      this._chips.set(group, chip);
+      const row = rows.find((each) => each.group === group)?.row;
+      const shape = row?.querySelector(".shape.now use")?.getAttribute("href");
+      if (shape) chip.querySelector("use")?.setAttribute("href", shape);
+      if (row) chip.dataset.tone = row.dataset.tone ?? "";
+      setText(/** @type {Element} */ (chip.lastElementChild), `${count} ${group}`);
+      chip.setAttribute("aria-pressed", `${states.includes(group)}`);
+      // A chip that is moved loses the focus.
+      if (place.children[index] !== chip) place.insertBefore(chip, place.children[index] ?? null);
+    });
+  }
+
+  /** @param {string} group */
+  _chip(group) {
+    const shape = svg("svg", { class: "shape", "aria-hidden": "true" }, svg("use", {}));
+    const chip = html("button", "chip", { type: "button" }, shape, html("span", ""));
+    chip.addEventListener("click", () => {
+      const { states } = this.choice;
+      const others = states.filter((each) => each !== group);
+      this.choose({ states: others.length < states.length ? others : [...states, group] });
+    });
+    return chip;
+  }
+
+  /** Put the rows in order, below the names of their groups. */
+  _arrange() {
+    const rows = this._rows();
+    const long = !byId("robot-tools").hidden;
+    const groups = arranged(rows, long ? this.choice : AT_FIRST);
+    const old = [...this._list.querySelectorAll(":scope > .group-name")];
+    const wanted = groups.flatMap(({ name, robots }) => {
+      const text = `${name} (${robots.length})`;
+      const known = old.find((each) => each.textContent === text);
+      const title = known ?? html("li", "group-name", { dir: "auto", title: name }, text);
+      return [...(name ? [title] : []), ...robots.map(({ row }) => row)];
+    });
+    const shown = [...this._list.children];
+    if (wanted.length === shown.length && wanted.every((each, i) => each === shown[i])) return;
+    for (const title of old) if (!wanted.includes(title)) title.remove();
+    wanted.forEach((each, index) => {
+      const there = this._list.children[index];
+      if (there !== each) this._list.insertBefore(each, there ?? null);
+    });
+  }
+
+  /** @returns {HTMLElement[]} The buttons that select the listed robots. */
+  _buttons() {
+    const path = ":scope > .row:not(.filtered) [aria-pressed]";
+    return /** @type {HTMLElement[]} */ ([...this._list.querySelectorAll(path)]);
+  }
+
+  /**
+   * Enter selects the robot if the search leaves only one.
+   *
+   * @param {AbortSignal} signal
+   */
+  _listenToSearch(signal) {
+    const input = this._search;
+    input.addEventListener("input", () => this._update(), { signal });
+    const choose = (/** @type {KeyboardEvent} */ event) => {
+      const [first, ...more] = this._buttons();
+      if (event.key === "Enter" && more.length === 0) first?.click();
+      if (event.key !== "ArrowDown" || !first) return;
+      event.preventDefault();
+      first.focus();
+    };
+    input.addEventListener("keydown", choose, { signal });
+    const key = (/** @type {KeyboardEvent} */ event) => {
+      if (event.key !== "/" || event.ctrlKey || event.metaKey || typing(event)) return;
+      event.preventDefault();
+      input.focus();
+    };
+    document.addEventListener("keydown", key, { signal });
+  }
+
+  /**
+   * The arrow keys move in the list while the keyboard has brought the focus there.
+   * After a click on a robot they drive it, as everywhere else.
+   *
+   * @param {AbortSignal} signal
+   */
+  _listenToKeys(signal) {
+    let clicked = false;
+    const press = () => {
+      clicked = true;
+    };
+    this._list.addEventListener("pointerdown", press, { signal });
+    const leave = (/** @type {FocusEvent} */ { relatedTarget }) => {
+      if (!(relatedTarget instanceof Node && this._list.contains(relatedTarget))) clicked = false;
+    };
+    this._list.addEventListener("focusout", leave, { signal });
+    const key = (/** @type {KeyboardEvent} */ event) => {
+      if (event.key === "Tab") clicked = false;
+      const buttons = this._buttons();
+      const at = buttons.findIndex((each) => each === document.activeElement);
+      const to = { ArrowUp: at - 1, ArrowDown: at + 1, Home: 0, End: buttons.length - 1 }[event.key];
+      if (to === undefined || at < 0 || clicked) return;
+      event.preventDefault();
+      event.stopPropagation();
+      buttons[to]?.focus();
+    };
+    this._list.addEventListener("keydown", key, { signal });
+  }
+}
+
+/**
+ * @param {string} wanted
+ * @param {string[]} states
+ */
+function noneText(wanted, states) {
+  const filter = states.length > 0 ? ` among those that are ${states.join(" or ")}` : "";
+  if (wanted === "") return `No robot${filter}.`;
+  return `No robot has “${wanted}” in its name${filter}.`;
+}
+
+/** @returns {Choice} */
+function kept() {
+  try {
+    return checkedList(JSON.parse(localStorage.getItem(KEPT) ?? "null"), KEPT);
+  } catch {
+    return AT_FIRST;
+  }
+}
+
+/** @param {Choice} choice */
+function keep(choice) {
+  try {
+    localStorage.setItem(KEPT, JSON.stringify(choice));
+  } catch {
+    // A browser without storage opens the page with the usual list.
+  }
+}

@@ -1,0 +1,161 @@
+"""The fleet at a glance: the list and the map with many robots in many states."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from console_ready import wait_until_ready
+from playwright.sync_api import Browser, Page, expect
+
+from real_browser import watched_tab
+from webmap_process import page_of
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+SITE = Path(__file__).with_name("crowd_site.py")
+
+ROWS = "#robots > .row:not(.filtered) .name"
+
+
+@pytest.fixture(scope="module")
+def site() -> Iterator[str]:
+    """Run the console with 30 robots; give its address."""
+    with page_of(SITE) as url:
+        yield url
+
+
+@pytest.fixture
+def page(site: str, chromium: Browser) -> Iterator[Page]:
+    with watched_tab(chromium, 1280, 800) as page:
+        page.goto(site)
+        wait_until_ready(page)
+        expect(page.locator(".robot:not(.unplaced)")).to_have_count(30)
+        expect(page.locator("#robot-tools")).to_be_visible()
+        yield page
+
+
+def names(page: Page) -> list[str]:
+    return page.locator(ROWS).all_text_contents()
+
+
+def choose(page: Page, id: str, value: str) -> None:
+    if page.locator(".arrange:not([open])").count():
+        page.locator(".arrange > summary").click()
+    page.locator(id).select_option(value)
+
+
+def test_a_long_list_has_the_worst_robots_first(page):
+    expect(page.locator(ROWS).first).to_have_text("Robot 3")  # lost
+    assert names(page)[:6] == [f"Robot {n}" for n in (3, 1, 2, 4, 5, 6)]
+
+
+def test_the_counts_by_state_filter_the_list(page):
+    chips = page.locator(".chip")
+    expect(chips).to_have_text(
+        ["1 lost", "2 stopped", "1 battery low", "1 driven", "1 navigating", "24 free"]
+    )
+    chips.nth(1).click()
+    expect(chips.nth(1)).to_have_attribute("aria-pressed", "true")
+    assert names(page) == ["Robot 1", "Robot 2"]
+    chips.nth(0).click()
+    assert names(page) == ["Robot 3", "Robot 1", "Robot 2"]
+    page.locator("#search").fill("robot 2")
+    assert names(page) == ["Robot 2"]
+    page.locator("#search").fill("nobody")
+    expect(page.locator("#not-found")).to_contain_text(
+        "No robot has “nobody” in its name among those that are stopped or lost."
+    )
+
+
+def test_robots_are_ordered_by_name_in_natural_order(page):
+    choose(page, "#robot-order", "name")
+    found = [name for name in names(page) if name.startswith("Robot")]
+    assert found == [f"Robot {number}" for number in range(1, 25)]
+
+
+def test_robots_are_grouped_by_their_first_tag(page):
+    choose(page, "#robot-group", "tag")
+    titles = page.locator("#robots > .group-name")
+    expect(titles).to_have_text(["bay 0 (8)", "bay 1 (8)", "bay 2 (8)", "No tag (6)"])
+    page.locator(".chip", has_text="driven").click()  # Robot 5
+    expect(titles.and_(page.locator(":visible"))).to_have_text(["bay 1 (8)"])
+
+
+def test_order_groups_and_filter_are_remembered_in_the_browser(page):
+    choose(page, "#robot-order", "name")
+    choose(page, "#robot-group", "tag")
+    page.locator(".chip", has_text="stopped").click()
+    page.reload()
+    wait_until_ready(page)
+    expect(page.locator(ROWS)).to_have_text(["Robot 1", "Robot 2"])
+    expect(page.locator("#robot-order")).to_have_value("name")
+    expect(page.locator("#robot-group")).to_have_value("tag")
+
+
+def test_the_arrow_keys_move_in_the_list_and_enter_selects(page):
+    page.locator("#search").focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowDown")
+    expect(page.locator("#robots .row > button:focus .name")).to_have_text("Robot 1")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("Enter")
+    expect(page.locator("#card h2")).to_have_text("Robot 3")
+
+
+def test_the_order_is_kept_while_the_pointer_is_over_the_list(page):
+    expect(page.locator(ROWS).first).to_have_text("Robot 3")
+    # As if the state of the robot became the worst one.
+    change = """() => {
+      const row = [...document.querySelectorAll("#robots > .row")][9];
+      row.dataset.rank = "-1";
+      return row.querySelector(".name").textContent;
+    }"""
+    page.locator("#robots").hover()
+    name = page.evaluate(change)
+    page.wait_for_timeout(2500)
+    assert names(page)[0] == "Robot 3"
+    page.mouse.move(800, 400)
+    expect(page.locator(ROWS).first).to_have_text(name)
+
+
+def test_each_robot_on_the_map_has_the_shape_of_its_state_in_the_list(page):
+    shape = """() => Object.fromEntries([...document.querySelectorAll(".robot")].map(
+      (robot) => [robot.dataset.robot,
+        robot.querySelector(".state-mark > use").getAttribute("href")]))"""
+    listed = """() => Object.fromEntries([...document.querySelectorAll(".row")].map(
+      (row) => [row.dataset.robot,
+        row.querySelector(".shape.now use").getAttribute("href")]))"""
+    assert page.evaluate(shape) == page.evaluate(listed)
+    words = page.locator(".robot .words").all_text_contents()
+    assert sorted(filter(None, words)) == [
+        "Battery low",
+        "Lost: no new pose",
+        "STOP active",
+        "STOP active",
+    ]
+    robot = page.locator(".robot[data-name='Robot 5']")
+    expect(robot.locator("> title")).to_have_text("Robot 5: Ann is driving")
+
+
+def test_robots_that_overlap_are_one_mark_that_zooms_in(page):
+    mark = page.locator(".cluster")
+    expect(mark).to_have_count(1)
+    expect(mark.locator(".count")).to_have_text("10")
+    expect(mark).to_have_attribute(
+        "aria-label", "10 robots, the worst: free. Press to zoom in"
+    )
+    expect(page.locator(".robot.clustered .model:visible")).to_have_count(0)
+    mark.click()
+    expect(mark).to_have_count(0)
+    expect(page.locator("#card")).to_be_hidden()
+
+
+def test_long_names_do_not_widen_the_list_and_have_a_title(page):
+    name = page.locator(".row .name", has_text="xxxx")
+    expect(name).to_have_attribute("title", "x" * 200)
+    inside = "(e) => e.scrollWidth <= e.clientWidth"
+    assert page.locator("#robots").evaluate(inside)
+    label = page.locator(f".robot[data-name='{'x' * 200}'] .label")
+    expect(label).to_have_text("x" * 23 + "…")
+    arabic = page.locator(".row .name", has_text="عربة")
+    assert arabic.evaluate("(e) => getComputedStyle(e).direction") == "rtl"
