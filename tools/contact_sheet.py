@@ -8,13 +8,14 @@ of ``SIZES``; without any, the sheets of all sizes are made.
 """
 
 import io
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from PIL import Image, ImageDraw
 from playwright.sync_api import Browser, Page, sync_playwright
-from screenshots import ARGS, running, which
+from screenshots import ARGS, running
 
 FOLDER = Path(__file__).parents[1] / "test-results" / "screenshots"
 
@@ -169,7 +170,7 @@ def main(arguments: list[str]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with sync_playwright() as playwright, running("demo", "--no-browser") as url:
         browser = playwright.chromium.launch(
-            executable_path=which("chromium"), args=ARGS
+            executable_path=shutil.which("chromium"), args=ARGS
         )
         for size in sizes:
             for scheme in ("light", "dark"):
