@@ -11,6 +11,7 @@ import click
 from webmap.base.child_process import child_process
 from webmap.base.children import GRACE
 from webmap.base.errors import ConfigError
+from webmap.cli.bad_link import bad_link, bad_link_options
 from webmap.cli.demo_robots import FREE, demo_robot
 from webmap.cli.options import PORT, simulator_options, web_options
 
@@ -32,6 +33,7 @@ ROBOTS = 5
     is_flag=True,
     help="Show robots that all wait, without scan assist, a costmap or a low battery.",
 )
+@bad_link_options
 @click.option(
     "--bridge-port",
     type=PORT,
@@ -43,6 +45,9 @@ ROBOTS = 5
 def demo(
     robots: int | None,
     quiet: bool,
+    delay: float,
+    jitter: float,
+    stall: float,
     bridge_port: int,
     seed: int,
     dialect: str,
@@ -57,7 +62,8 @@ def demo(
     to place on their own, and wait after a command until 60 s pass without one.
 
     The simulator is a separate process behind a rosbridge, so the demo uses the same
-    code as real robots.
+    code as real robots. With --delay, --jitter and --stall the link to it is bad, to
+    train on such a link.
     """
     import webmap
     from webmap import console
@@ -67,7 +73,8 @@ def demo(
     if not quiet and number > FREE:
         options += ["--errands", number - FREE, "--low-battery"]
     with (
-        simulator(*options, "--dialect", dialect) as url,
+        simulator(*options, "--dialect", dialect) as direct,
+        bad_link(direct, delay, jitter, stall) as url,
         as_file(files("webmap.sim") / "data") as data,
     ):
         bridge = webmap.Bridge(url, name="simulator")
