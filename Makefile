@@ -31,7 +31,7 @@ ARGS ?=
 help:
 	@sed -n 's/^## /  make /p' Makefile
 
-## demo: install WebMap here and show two simulated robots (ARGS="--robots 5")
+## demo: install WebMap here and show simulated robots (ARGS="--robots 2 --quiet")
 .PHONY: demo
 demo: $(INSTALLED)
 	@exec $(BIN)/webmap demo $(ARGS)

@@ -89,9 +89,9 @@ def running(*arguments: str) -> Iterator[str]:
 
 
 @contextmanager
-def demo(robots: int = 6) -> Iterator[str]:
+def demo(*options: str) -> Iterator[str]:
     """Run the demo and yield its page's address."""
-    with running("demo", "--no-browser", "--robots", str(robots)) as url:
+    with running("demo", "--no-browser", *options) as url:
         yield url
 
 
@@ -259,7 +259,7 @@ PICTURES += [Picture("manual", step=step, phone=step == "phone") for step in STE
 
 def take_manual(browser: Browser, picture: Picture, url: str) -> None:
     """Take one picture of the manual, with 256 colours so that its file is small."""
-    with demo(robots=3) as own:
+    with demo("--robots", "3", "--quiet") as own:
         page = open_page(browser, picture, own)
         select(page, ROBOT)
         STEPS[picture.step](page, browser, picture, own)

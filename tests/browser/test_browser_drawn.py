@@ -32,7 +32,8 @@ SCAN = ".laserscan > .dot[d]"
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_the_demo_matches_the_recorded_drawing(chromium, dialect):
-    command = ("demo", "--port", "0", "--no-browser", "--dialect", dialect)
+    quiet = ("demo", "--robots", "2", "--quiet", "--port", "0", "--no-browser")
+    command = (*quiet, "--dialect", dialect)
     shown = (robots(2), SCAN, ".diagnostics", "#robots .charge", *CONSOLE)
     with webmap(*command) as url, opened(chromium, url, *shown) as page:
         unstable = [DRAINING]

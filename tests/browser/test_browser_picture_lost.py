@@ -27,7 +27,7 @@ def test_the_page_releases_its_inputs_when_the_scene_connection_is_lost(tab):
 
     tab.route_web_socket("**/scene*", through)
     tab.on("websocket", listen)
-    demo = ("demo", "--robots", 1, "--port", 0, "--no-browser")
+    demo = ("demo", "--robots", 1, "--quiet", "--port", 0, "--no-browser")
     with running(*demo, pattern=WEB) as process:
         tab.goto(process.url)
         tab.locator("#robots .row button").first.click()

@@ -1,16 +1,22 @@
 """``webmap demo``: its robots are those that the simulator plays."""
 
 import asyncio
+from types import SimpleNamespace
 
 import pytest
 
 from webmap import Bridge
-from webmap.cli.demo import demo_robot, simulator
+from webmap.base.errors import BridgeClosed
+from webmap.cli import demo_robots
+from webmap.cli.demo import simulator
+from webmap.cli.demo_robots import FREE, PauseErrands, demo_robot
 from webmap.discovery import discover
 from webmap.ros.asking import ask_topics
 
+DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 
-@pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+
+@DIALECTS
 def test_a_demo_robot_uses_the_topics_of_the_simulator(dialect):
     with simulator("--port", 0, "--robots", 1, "--dialect", dialect) as url:
         topics = asyncio.run(ask_topics(url, wait=10.0, waiting=print))
@@ -24,3 +30,93 @@ def test_a_demo_robot_uses_the_topics_of_the_simulator(dialect):
         assert (spec.cancel_topic or "") == found.topic("cancel")
     finally:
         robot.destroy()
+
+
+def on_maps(robot):
+    """The name and the topic of each module that a robot adds to its maps."""
+    modules = [m for m in robot.to_dict()["modules"] if m["name"] == "OnMaps"]
+    return [(module["args"][0], module["args"][2]) for module in modules]
+
+
+@DIALECTS
+def test_the_topics_that_only_the_lively_demo_has_exist(dialect):
+    count = FREE + 1
+    options = ("--robots", count, "--errands", 1, "--dialect", dialect)
+    with simulator("--port", 0, *options) as url:
+        topics = asyncio.run(ask_topics(url, wait=10.0, waiting=print))
+        robot = demo_robot(Bridge(url), FREE, dialect)
+    try:
+        shown = dict(on_maps(robot))
+        assert set(shown) == {"OccupancyGrid", "Markers"}
+        assert set(shown.values()) <= set(topics)
+        assert robot.motion.spec().assist.topic in topics
+        (pause,) = [each for each in robot.modules if isinstance(each, PauseErrands)]
+        assert pause.topic in topics
+    finally:
+        robot.destroy()
+
+
+@pytest.mark.parametrize(("index", "quiet"), [(0, True), (FREE, True), (0, False)])
+def test_a_quiet_robot_and_a_free_one_show_no_costmap_and_have_no_errands(index, quiet):
+    robot = demo_robot(Bridge("ws://127.0.0.1:1"), index, quiet=quiet)
+    try:
+        assert not on_maps(robot)
+        assert not [each for each in robot.modules if isinstance(each, PauseErrands)]
+        assert (robot.motion.spec().assist is None) == quiet
+    finally:
+        robot.destroy()
+
+
+class Robot:
+    report = SimpleNamespace(latched=False, changing=False, holder=None)
+
+
+class FakeBridge:
+    """Counts the messages that pause errands; the first finds a closed connection."""
+
+    def __init__(self):
+        self.sent = 0
+
+    def publish(self, topic, message, type):
+        assert (topic, message, type) == ("/pause", {}, "std_msgs/Empty")
+        self.sent += 1
+        if self.sent == 1:
+            raise BridgeClosed("it is closed")
+
+
+@pytest.mark.parametrize(
+    "change", [{"latched": True}, {"changing": True}, {"holder": "Ann"}]
+)
+def test_errands_are_paused_again_and_again_while_webmap_has_the_robot(
+    change, monkeypatch
+):
+    monkeypatch.setattr(demo_robots, "REPEAT", 0.01)
+
+    async def scenario():
+        robot, bridge = Robot(), FakeBridge()
+        pause = PauseErrands(robot, bridge, "/pause")
+
+        def report(**change):
+            facts = {"latched": False, "changing": False, "holder": None, **change}
+            robot.report = SimpleNamespace(**facts)
+            pause.on_report(robot.report)
+
+        report()
+        await asyncio.sleep(0)
+        assert bridge.sent == 0
+        report(**change)
+        report(**change)  # a second report begins no second repetition
+        async with asyncio.timeout(10):
+            while bridge.sent < 4:
+                await asyncio.sleep(0.01)
+        report()
+        async with asyncio.timeout(10):
+            while not pause.is_idle:
+                await asyncio.sleep(0.01)
+        count = bridge.sent
+        report(**change)
+        await asyncio.sleep(0)
+        assert bridge.sent == count + 1
+        report()
+
+    asyncio.run(scenario())

@@ -34,14 +34,14 @@ class Demo:
 
 @pytest.fixture(scope="module")
 def demo(request: pytest.FixtureRequest) -> Iterator[Demo]:
-    """Run ``webmap demo`` with the number of robots in the module's ``ROBOTS``, or 3.
+    """Run ``webmap demo --quiet`` with as many robots as the module's ``ROBOTS``, or 3.
 
     Each robot costs the simulator, the display and the browser time.
     """
     robots = getattr(request.module, "ROBOTS", 3)
     command = [sys.executable, "-m", "webmap", "demo", "--robots", str(robots)]
     with subprocess.Popen(
-        [*command, "--port", "0", "--no-browser"],
+        [*command, "--quiet", "--port", "0", "--no-browser"],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,

@@ -77,6 +77,7 @@ class Bench:
         drift=0.0,
         robot_timeout=0.25,
         tilted=False,
+        errands=0,
     ):
         behaviour = parse_quirks(quirks, dialect)
         self.world = World(
@@ -85,6 +86,7 @@ class Bench:
                 robots=robots,
                 base=BaseOptions(timeout=robot_timeout, drift=drift),
                 scanner=ScannerOptions(nan=nan),
+                errands=errands,
             ),
         )
         schema = Schema(Dialect(dialect))

@@ -99,6 +99,9 @@ def test_a_port_in_use_is_an_error():
         {"quirks": "odd"},
         {"quirks": "real,nonsense"},
         {"map": "/no/such/map.yaml"},
+        {"robots": 2, "errands": 3},
+        {"errands": -1},
+        {"errands": 1, "wander": True},
     ],
 )
 def test_invalid_simulator_options_are_refused(options):

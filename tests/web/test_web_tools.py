@@ -14,6 +14,7 @@ LAY = """async () => {
     tool.className = "webmap-panel tool";
     const [summary, much] = ["summary", "p"].map((tag) => document.createElement(tag));
     summary.textContent = name;
+    much.className = "webmap-tool-body";
     much.style.height = "2000px";
     tool.append(summary, much);
     lay(bench.maps[0], tool, "top-left");

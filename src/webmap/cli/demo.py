@@ -4,28 +4,36 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.resources import as_file, files
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
 import click
 
 from webmap.base.child_process import child_process
 from webmap.base.children import GRACE
 from webmap.base.errors import ConfigError
+from webmap.cli.bad_link import bad_link, bad_link_options
+from webmap.cli.demo_robots import FREE, demo_robot
 from webmap.cli.options import PORT, simulator_options, web_options
-
-if TYPE_CHECKING:
-    from webmap import Bridge, Robot
 
 READY = "rosbridge is ready at "
 USAGE = 2
 """Exit status of a command that has reported an error in one sentence."""
 
+ROBOTS = 5
+"""Number of robots, if it is not given."""
+
 
 @click.command()
 @simulator_options(
-    robots="Number of robots; 2 by default.",
+    robots=f"Number of robots; {ROBOTS} by default.",
     dialect="ROS version: ros1 has the actions of move_base, ros2 those of Nav2.",
 )
+@click.option(
+    "--quiet",
+    is_flag=True,
+    help="Show robots that all wait, without scan assist, a costmap or a low battery.",
+)
+@bad_link_options
 @click.option(
     "--bridge-port",
     type=PORT,
@@ -36,6 +44,10 @@ USAGE = 2
 @web_options
 def demo(
     robots: int | None,
+    quiet: bool,
+    delay: float,
+    jitter: float,
+    stall: float,
     bridge_port: int,
     seed: int,
     dialect: str,
@@ -46,81 +58,42 @@ def demo(
 ) -> None:
     """Show simulated robots, to try everything without a robot.
 
+    The first two robots wait for you. The others have errands: they drive from place
+    to place on their own, and wait after a command until 60 s pass without one.
+
     The simulator is a separate process behind a rosbridge, so the demo uses the same
-    code as real robots.
+    code as real robots. With --delay, --jitter and --stall the link to it is bad, to
+    train on such a link.
     """
     import webmap
     from webmap import console
 
-    number = robots or 2
-    options = ("--robots", number, "--port", bridge_port, "--seed", seed)
+    number = robots or ROBOTS
+    options = ["--robots", number, "--port", bridge_port, "--seed", seed]
+    if not quiet and number > FREE:
+        options += ["--errands", number - FREE, "--low-battery"]
     with (
-        simulator(*options, "--dialect", dialect) as url,
+        simulator(*options, "--dialect", dialect) as direct,
+        bad_link(direct, delay, jitter, stall) as url,
         as_file(files("webmap.sim") / "data") as data,
     ):
         bridge = webmap.Bridge(url, name="simulator")
-        floor = data / "floor.yaml"
         opened = console.open_console(
-            [bridge], [], floor=floor, title="WebMap demo", place="demo"
+            [bridge],
+            [],
+            floor=data / "floor.yaml",
+            title="WebMap demo",
+            place="demo",
+            layers_off=["Costmaps"] if quiet else [],
         )
         for index in range(number):
-            opened.add(demo_robot(bridge, index, dialect))
+            opened.add(demo_robot(bridge, index, dialect, quiet=quiet))
         webmap.run(
             host=host,
             port=port,
             open_browser=not no_browser,
             insecure_lan=insecure_lan,
         )
-
-
-def demo_robot(bridge: "Bridge", index: int, dialect: str = "ros1") -> "Robot":
-    """Return one of the simulator's robots, with modules that show its behavior.
-
-    Drawing all its topics would hide the map; ``webmap view`` draws all of them.
-
-    Args:
-        bridge: The simulator's bridge.
-        index: Number of the robot, from 0.
-        dialect: The ROS that the simulator imitates, ``"ros1"`` or ``"ros2"``.
-
-    """
-    import webmap
-    from webmap.console import make_robot
-
-    topics = f"/robot_{index}"
-    move = {
-        "topic": f"{topics}/goal_pose",
-        "action": f"{topics}/navigate_to_pose",
-        "action_type": "nav2_msgs/action/NavigateToPose",
-    }
-    if dialect != "ros2":
-        move = {
-            "topic": f"{topics}/move_base_simple/goal",
-            "cancel_topic": f"{topics}/move_base/cancel",
-            "action": f"{topics}/move_base",
-            "action_type": "move_base_msgs/MoveBaseAction",
-        }
-    link = {"bridge": bridge.url}
-    lookahead = {"name": "lookahead", "frame": "robot", "age_limit": 2.0}
-    point = f"{topics}/lookahead_point"
-    config = {
-        "name": f"Robot {index}",
-        "bridge": bridge.url,
-        "odometry": f"{topics}/odom",
-        "twist": {"topic": f"{topics}/cmd_vel", "stops_within": 0.25},
-        "scan": f"{topics}/base_scan",
-        "battery": f"{topics}/battery_state",
-        "cameras": f"{topics}/camera/image_raw/compressed",
-        "move": move,
-        "initial_pose": f"{topics}/initialpose",
-        "modules": [
-            {"name": "Path", "args": [link, f"{topics}/plan"]},
-            {"name": "Trail", "options": {"length": 10.0}},
-            {"name": "PointStamped", "args": [link, point], "options": lookahead},
-            {"name": "Diagnostics", "args": [link], "options": {"namespace": topics}},
-        ],
-    }
-    return make_robot(webmap.RobotConfig.from_dict(config), [bridge])
 
 
 def _give_up(status: int) -> NoReturn:

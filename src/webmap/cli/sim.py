@@ -61,6 +61,17 @@ from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
 @click.option("--nan", is_flag=True, help="Set some rays of each scan to NaN.")
 @click.option("--wander", is_flag=True, help="Let robots without commands drive about.")
 @click.option(
+    "--errands",
+    type=click.IntRange(0, 500),
+    default=0,
+    show_default=True,
+    help="Number of robots that go from place to place on their own, the last ones. A "
+    "robot that gets a command pauses until 60 s pass without one.",
+)
+@click.option(
+    "--low-battery", is_flag=True, help="Start the last robot with a low battery."
+)
+@click.option(
     "--flat",
     is_flag=True,
     help="One robot, with topics without a prefix: /odom, /cmd_vel, /base_scan.",
@@ -113,6 +124,8 @@ def sim(
     drift: float,
     nan: bool,
     wander: bool,
+    errands: int,
+    low_battery: bool,
     flat: bool,
     extras: bool,
     tilted: bool,
@@ -149,6 +162,8 @@ def sim(
             drift=drift,
             nan=nan,
             wander=wander,
+            errands=errands,
+            low_battery=low_battery,
             flat=flat,
             extras=extras,
             tilted=tilted,

@@ -23,11 +23,18 @@ class Console:
 
     Args:
         given: The robots that the console was opened with.
+        layers_off: The layers that are off until the user switches them on.
     """
 
-    def __init__(self, given: "Sequence[Robot]" = ()) -> None:
+    def __init__(
+        self,
+        given: "Sequence[Robot]" = (),
+        layers_off: Sequence[str] = ("Costmaps",),
+    ) -> None:
         self.given = tuple(given)
         """The robots that the console was opened with, in that order."""
+        self.layers_off = tuple(layers_off)
+        """The layers that are off until the user switches them on."""
         self.robots: list[Robot] = []
         """The robots that were added, in that order."""
         self.grids: dict[tuple[Bridge, str], dict[str, Any]] = {}

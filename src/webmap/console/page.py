@@ -46,6 +46,7 @@ def open_console(
     floor: Path | None = None,
     title: str = PRODUCT,
     place: str | None = None,
+    layers_off: Sequence[str] = ("Costmaps",),
 ) -> Console:
     """Make the console the page at ``/``.
 
@@ -57,6 +58,7 @@ def open_console(
         title: The name of this installation.
         place: The name under which labels and views are stored; by default the URLs of
             the bridges. Use it for bridges whose port changes at each start.
+        layers_off: The layers that are off until the user switches them on.
 
     Returns:
         The console, to add robots later.
@@ -66,7 +68,7 @@ def open_console(
     """
     plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(config, bridges) for config in robots]
-    opened = Console(fleet)
+    opened = Console(fleet, layers_off)
     opened.alert_watch.begin()
     if place is None:
         place = "\n".join(sorted(bridge.url for bridge in bridges))
@@ -100,7 +102,7 @@ def build(
     map.add_module("Teleop", SPEED, ROTATION_SPEED, holonomic=None, stop_place=stops)
     goals = map.add_module("GoalTool")
     poses = map.add_module("InitialPoseTool")
-    map.add_module("LayerSwitches", off=["Costmaps"])
+    map.add_module("LayerSwitches", off=opened.layers_off)
     map.add_module("MeasureTool")
     map.add_module("AlignTool")
     map.add_module("RouteTool", title)

@@ -104,6 +104,7 @@ class ActionlibServer:
         return {"stamp": stamp, "id": f"{self.topic}-{self._made}-{now:.3f}"}
 
     def _on_cancel(self, publication: Publication) -> None:
+        self.node.world.pause_errands(self.index)
         goal_id, stamp = publication.message["id"], publication.message["stamp"]
         before = _seconds(stamp)
         for tracked in self._goals:
@@ -207,6 +208,7 @@ class NavigateToPose:
         self._running.pop(handle.uuid, None)
 
     def _on_cancel(self, request: dict[str, Any], respond: Respond) -> None:
+        self.node.world.pause_errands(self.index)
         info = request["goal_info"]
         goal_id = info["goal_id"]["uuid"]
         chosen = [h for h in self._running.values() if goal_id in (_ALL_GOALS, h.uuid)]

@@ -101,6 +101,12 @@ class RobotsNode(Node):
                 "geometry_msgs/PoseStamped",
                 partial(self._on_simple_goal, index),
             )
+        if self.world.errands.has(index):
+            self.subscribe(
+                f"{prefix}/errands/pause",
+                "std_msgs/Empty",
+                lambda _: self.world.pause_errands(index),
+            )
         self.graph.serve(
             self,
             f"{prefix}/stop",

@@ -34,6 +34,8 @@ async def run_simulator(
     nan: bool = False,
     quirks: str = "real",
     wander: bool = False,
+    errands: int = 0,
+    low_battery: bool = False,
     flat: bool = False,
     extras: bool = True,
     tilted: bool = False,
@@ -60,6 +62,9 @@ async def run_simulator(
         quirks: ``real``, ``polite``, or one of them with changes; see
             :func:`webmap.ros.rosbridge.server.quirks.parse_quirks`.
         wander: Whether robots without commands drive to random places.
+        errands: Number of robots that go from station to station on their own, the
+            last ones; see :mod:`webmap.sim.errands`.
+        low_battery: Whether the last robot starts with a low battery.
         flat: Whether the only robot has its topics without a prefix: ``/odom``.
         extras: Whether robots have costmaps, clouds, footprints, particles, sonars,
             fixes, markers, diagnostics and logs too. They cost nothing without
@@ -98,6 +103,12 @@ async def run_simulator(
     _check(robots, dialect, twist, robot_timeout)
     if flat and robots != 1:
         raise ConfigError(f"without prefixes there can be one robot only, not {robots}")
+    if not 0 <= errands <= robots:
+        raise ConfigError(
+            f"errands must be from 0 to the number of robots, {robots}, got {errands}"
+        )
+    if errands and wander:
+        raise ConfigError("robots either wander or have errands: give only one of them")
     behaviour = parse_quirks(quirks, dialect)
     options = WorldOptions(
         robots=robots,
@@ -105,6 +116,8 @@ async def run_simulator(
         base=BaseOptions(timeout=robot_timeout, drift=drift, refuse_nan=refuse_nan),
         scanner=ScannerOptions(nan=nan),
         wander=wander,
+        errands=errands,
+        low_battery=low_battery,
         flat=flat,
     )
     world = World(load_map(map or FLOOR), options)

@@ -12,6 +12,7 @@ from PIL import Image
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose, Twist
+from webmap.sim.errands import Errands
 from webmap.sim.maps import FloorPlan
 from webmap.sim.navigator import Goal, Navigator
 from webmap.sim.obstacles import Obstacles
@@ -114,6 +115,12 @@ _APART = 3.0
 _ROOM = 0.6
 _REST = 2.0
 
+LOW_CHARGE = 0.17
+"""Charge at the start of a robot with a low battery."""
+
+_STATIONS = 2
+"""Stations for each robot with errands, besides the start poses."""
+
 
 @dataclass(frozen=True, slots=True)
 class WorldOptions:
@@ -125,6 +132,10 @@ class WorldOptions:
     scanner: ScannerOptions = field(default_factory=ScannerOptions)
     wander: bool = False
     """Whether robots without a goal or a command choose goals themselves."""
+    errands: int = 0
+    """Number of robots with errands, which are the last ones."""
+    low_battery: bool = False
+    """Whether the last robot starts with a low battery."""
     flat: bool = False
     """Whether the only robot's topics and frames have no prefix."""
 
@@ -147,7 +158,7 @@ class World:
         self.camera = Camera(self.obstacles)
         self.scanner = Scanner(self.obstacles, options.scanner, options.seed)
         self._random = Random(options.seed)  # noqa: S311 - reproducible by design
-        poses = self._spawn(options.robots)
+        places = self._spawn(options.robots + _STATIONS * options.errands)
         self.robots = [
             Robot(
                 "" if options.flat else f"robot_{i}",
@@ -155,9 +166,13 @@ class World:
                 options.base,
                 options.seed + i,
             )
-            for i, pose in enumerate(poses)
+            for i, pose in enumerate(places[: options.robots])
         ]
+        if options.low_battery:
+            self.robots[-1].charge = LOW_CHARGE
         self.navigators = [Navigator(robot, self.planner) for robot in self.robots]
+        busy = range(options.robots - options.errands, options.robots)
+        self.errands = Errands(self.navigators, busy, places, options.seed)
         self._planning = 0
         self._idle_since = [0.0 for _ in self.robots]
 
@@ -170,12 +185,15 @@ class World:
             robot.step(dt, self.now, self._blocked_for(i))
         if self.options.wander:
             self._wander()
+        self.errands.step(self.now)
 
     def command(self, index: int, twist: Twist) -> bool:
         """Send a client's velocity command to a robot; return False if it was refused.
 
         A nonzero command ends the robot's goal; a zero command only stops the robot.
+        Any command pauses the robot's errands.
         """
+        self.pause_errands(index)
         robot = self.robots[index]
         accepted = robot.command(twist, self.now)
         if accepted and not twist.is_zero:
@@ -185,14 +203,20 @@ class World:
         return accepted
 
     def send_goal(self, index: int, goal: Goal) -> None:
-        """Send a robot to a goal."""
+        """Send a robot to a goal of a client."""
+        self.pause_errands(index)
         self.navigators[index].send(goal)
 
     def stop(self, index: int) -> None:
         """Stop a robot and end its goal."""
+        self.pause_errands(index)
         self.navigators[index].cancel("stopped")
         self.robots[index].stop()
         self._idle_since[index] = self.now
+
+    def pause_errands(self, index: int) -> None:
+        """Pause the errands of a robot: a client sent the robot a command."""
+        self.errands.pause(index, self.now)
 
     def others(self, index: int) -> list[tuple[float, float, float]]:
         """Return the other robots as x, y and radius, in metres."""
@@ -245,6 +269,7 @@ class World:
         return is_blocked
 
     def _spawn(self, count: int) -> list[Pose]:
+        """Return places apart from each other: one for each robot, then stations."""
         roomy = ~self.obstacles.near(_ROOM) & self.obstacles.free
         rows, columns = np.nonzero(roomy)
         if not len(rows):
@@ -270,8 +295,10 @@ class World:
                     reachable = seen
                 poses.append(Pose(x, y, self._open_heading(x, y)))
             apart *= 0.7
-        if len(poses) < count:
-            raise ConfigError(f"the map has room for {len(poses)} robots, not {count}")
+        if len(poses) < self.options.robots:
+            raise ConfigError(
+                f"the map has room for {len(poses)} robots, not {self.options.robots}"
+            )
         return poses
 
     def _open_heading(self, x: float, y: float) -> float:

@@ -5,9 +5,9 @@ network faults, :func:`check_invariants` reports violations in sentences, and a
 :class:`Sentinel` measures how late the machine itself was in the same seconds.
 """
 
+from webmap.sim.proxy import FaultProxy, Shape
 from webmap.testing.invariants import Bounds, Quiet, check_invariants
 from webmap.testing.log import ClientMessage, Moved, ReceivedTwist, WitnessLog
-from webmap.testing.proxy import FaultProxy, Shape
 from webmap.testing.sentinel import Sentinel
 from webmap.testing.witness import WitnessRobot
 

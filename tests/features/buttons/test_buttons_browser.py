@@ -82,6 +82,7 @@ def tab(chromium: Browser, bench: Bench) -> Iterator[Page]:
     with watched_tab(chromium, 1280, 800) as page:
         page.goto(bench.url)
         page.locator("#robots .row").click()
+        page.locator("#card .more > summary").click()
         expect(page.locator(".robot-button")).to_have_count(3)
         expect(page.locator("#link")).to_have_attribute("data-link", "open")
         yield page

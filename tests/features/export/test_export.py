@@ -238,7 +238,7 @@ def test_the_export_button_of_the_console_saves_its_map(
         tab.locator("#robots .row").first.click()
         expect(tab.locator(".robot.selected")).to_have_count(1)
         tab.locator("#show-all").click()
-        expect(tab.locator(".map-tools .webmap-export-go")).to_have_count(1)
+        expect(tab.locator(".tools .webmap-export-go")).to_have_count(1)
         file = saved(tab, "svg", tmp_path)
         tab.evaluate(HIDE % ".map-tools, .card, .webmap-frame")
         box = tab.locator("svg.webmap").bounding_box()

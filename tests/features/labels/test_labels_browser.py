@@ -201,7 +201,7 @@ def test_an_added_label_is_on_other_pages_and_persists_after_a_restart(
 
 
 def test_labels_added_in_the_demo_persist_after_a_restart(chromium, tmp_path):
-    demo = ("demo", "--robots", "1", "--port", "0", "--no-browser")
+    demo = ("demo", "--robots", "1", "--quiet", "--port", "0", "--no-browser")
     for restarted in (False, True):
         with (
             webmap(*demo, WEBMAP_STATE_DIR=str(tmp_path)) as url,

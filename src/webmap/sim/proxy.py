@@ -8,8 +8,9 @@ import struct
 from collections import deque
 from dataclasses import dataclass
 from typing import Literal
+from weakref import WeakSet
 
-from webmap.testing.loop_thread import LoopThread
+from webmap.base.loop_thread import LoopThread
 
 Way = Literal["up", "down", "both"]
 """``up``: from the client to the server behind the proxy; ``down``: the opposite."""
@@ -110,7 +111,8 @@ class FaultProxy:
         self._thread = LoopThread("fault-proxy")
         self._links: set[_Link] = set()
         self._tasks: set[asyncio.Task[None]] = set()
-        self._writers: list[asyncio.StreamWriter] = []
+        # Weak, because a client that reconnects for days leaves thousands behind.
+        self._writers: WeakSet[asyncio.StreamWriter] = WeakSet()
         self._refusing = False
         self._directions, self._server, self.port = self._thread.call(self._listen())
 
@@ -128,7 +130,7 @@ class FaultProxy:
             await asyncio.sleep(0.01)  # for connections that were accepted just now
             for link in list(self._links):
                 link.reset()
-            for writer in self._writers:
+            for writer in list(self._writers):
                 writer.transport.abort()
             await asyncio.sleep(0.01)
 
@@ -208,7 +210,7 @@ class FaultProxy:
     def _accept(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
-        self._writers.append(writer)
+        self._writers.add(writer)
         task = asyncio.get_running_loop().create_task(self._serve(reader, writer))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -223,7 +225,7 @@ class FaultProxy:
         except (OSError, asyncio.CancelledError):
             _reset(writer)
             return
-        self._writers.append(far[1])
+        self._writers.add(far[1])
         link = _Link((reader, writer), far, self._directions)
         self._links.add(link)
         try:

@@ -1,4 +1,4 @@
-"""An event loop in a thread, for tests that block."""
+"""An event loop in a thread, for code that blocks."""
 
 import asyncio
 import gc
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 class LoopThread:
-    """Runs an event loop in a separate thread of a test.
+    """Runs an event loop in a separate thread.
 
     Args:
         name: Name of the thread.

@@ -1,0 +1,52 @@
+"""The robots of the lively demo that drive on their own, under an operator."""
+
+import pytest
+from console_ready import same_word, select, wait_until_ready
+from playwright.sync_api import expect
+
+from real_browser import watched_tab
+from webmap_process import webmap
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+PLACE = """() => {
+  const { e, f } = document.querySelector(".robot.selected").getScreenCTM();
+  return [Math.round(e), Math.round(f)];
+}"""
+PAUSE = 8000
+"""Milliseconds in which a robot begins its next errand, unless its errands pause."""
+
+
+@pytest.fixture
+def tab(chromium, tmp_path):
+    demo = ("demo", "--robots", "3", "--port", "0", "--no-browser")
+    with (
+        watched_tab(chromium, 1280, 800) as page,
+        webmap(*demo, WEBMAP_STATE_DIR=str(tmp_path)) as url,
+    ):
+        page.allowed = ["WebSocket", "ERR_CONNECTION"]  # when all of it ends
+        page.goto(url)
+        expect(page.locator(".robot:not(.unplaced)")).to_have_count(3)
+        wait_until_ready(page)
+        select(page, "Robot 2")
+        same_word(page, "Moving, not by WebMap", 30)
+        yield page
+
+
+def expect_standing(page):
+    """Expect that the selected robot does not move for longer than it rests."""
+    before = page.evaluate(PLACE)
+    page.wait_for_timeout(PAUSE)
+    assert page.evaluate(PLACE) == before
+
+
+def test_taking_control_of_a_robot_with_errands_stops_it_until_the_release(tab):
+    tab.locator(".webmap-teleop-lease").click()
+    same_word(tab, "You have control")
+    expect_standing(tab)
+
+
+def test_a_stop_of_a_robot_with_errands_holds(tab):
+    tab.keyboard.press("Space")
+    expect(tab.locator('.webmap-stop-verdict[data-state="confirmed"]')).to_be_visible()
+    expect_standing(tab)
