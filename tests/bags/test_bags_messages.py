@@ -9,7 +9,8 @@ import pytest
 from rosbags.typesys import get_types_from_msg
 
 from bag_making import BEGIN, Made, types_of
-from webmap.bags.recording import Messages, Recording
+from webmap.bags.messages import Messages
+from webmap.bags.recording import Recording
 from webmap.bags.times import Stamps
 from webmap.bags.types import texts_of
 from webmap.ros.conforming import Misfit

@@ -55,10 +55,10 @@ def test_a_message_is_decoded_as_the_rosbridge_server_publishes_messages(made, b
     recording.close()
 
 
-def test_latched_messages_before_a_start_time_are_kept(bag):
+def test_the_state_at_a_time_is_the_newest_message_of_each_topic(bag):
     recording = Recording([bag])
-    kept = list(recording.kept_until(BEGIN + 2 * 10**9))
-    assert [one.topic for one in kept] == ["/map"]
+    state = recording.state_at(BEGIN + 15 * 10**8)
+    assert [one.topic for one in state] == ["/map", "/odom"]
     recording.close()
 
 

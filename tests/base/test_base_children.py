@@ -185,10 +185,11 @@ def test_the_children_of_a_killed_parent_end(parent, bag):
     assert all(map(gone, children))
 
 
-def test_a_child_is_notified_of_input_before_its_parent_ends() -> None:
+def test_a_child_receives_input_before_its_parent_ends() -> None:
     program = (
         "from webmap.base.children import end_with_parent; import time\n"
-        "end_with_parent(lambda: None, lambda: print('data', flush=True), 0.0)\n"
+        "print_it = lambda data: print(data.decode(), flush=True)\n"
+        "end_with_parent(lambda: None, print_it, 0.0)\n"
         "time.sleep(60)"
     )
     child = subprocess.Popen(
@@ -198,7 +199,7 @@ def test_a_child_is_notified_of_input_before_its_parent_ends() -> None:
     assert child.stdout
     child.stdin.write(b"x")
     child.stdin.flush()
-    assert child.stdout.readline() == b"data\n"
+    assert child.stdout.readline() == b"x\n"
     child.stdin.close()
     assert child.wait(30) == 1
     child.stdout.close()

@@ -11,6 +11,7 @@ from cli_inside import run_inside
 
 from bag_making import ODOMETRY, TWIST, Made
 from webmap.bags import need_rosbags
+from webmap.bags.playback import Command
 from webmap.base.errors import ConfigError
 from webmap.cli.play import replay
 
@@ -74,15 +75,15 @@ def test_an_invalid_start_or_rate_exits_with_code_2(bag, options, words):
     assert_refused(run_inside("play", bag, *options), words)
 
 
-def test_restarting_an_ended_replay_prints_a_notice_and_raises_no_error(bag, capfd):
-    with replay("--loop", "--", bag) as (url, begin_anew):
+def test_a_command_to_an_ended_replay_prints_a_notice_and_raises_no_error(bag, capfd):
+    with replay("--loop", "--", bag) as (url, give):
         assert url.startswith("ws://")
         (child,) = [
             p for p in psutil.Process().children() if "webmap.bags" in p.cmdline()
         ]
         child.kill()
         psutil.wait_procs([child], timeout=10)
-        begin_anew()
+        give(Command("again"))
     assert "The replay has ended" in capfd.readouterr().err
 
 

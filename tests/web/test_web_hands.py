@@ -234,6 +234,26 @@ def test_space_and_escape_stop_all_robots_without_a_selection(
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
 
 
+def test_a_button_keeps_the_space_key_unless_this_page_drives(bench: Bench) -> None:
+    bench.page.evaluate(
+        """() => {
+            const button = document.createElement('button');
+            button.dataset.webmapKeepsSpace = '';
+            button.addEventListener('click', () => { button.textContent += 'x'; });
+            document.body.append(button);
+        }"""
+    )
+    button = bench.page.locator("[data-webmap-keeps-space]")
+    button.press("Space")
+    bench.until(lambda: button.inner_text() == "x")
+    assert bench.gate.of("stop") == []
+    bench.drive()
+    button.press("Space")
+    bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "r1"}])
+    bench.still(tolerance=0.05)
+    assert button.inner_text() == "x"
+
+
 def test_escape_in_a_non_modal_dialog_sends_stop(bench: Bench) -> None:
     bench.drive()
     bench.page.evaluate(

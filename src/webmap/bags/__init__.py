@@ -2,7 +2,7 @@
 
 A recording that is played replaces a rosbridge and its robots, as the simulator does.
 This is the only folder that uses rosbags, which ``webmap[bags]`` installs. It knows
-nothing of the display. Open ``player`` first, then ``recorder``.
+nothing of the display. Open ``player`` first, then ``playback`` and ``recorder``.
 """
 
 from importlib.util import find_spec

@@ -28,6 +28,9 @@ READY = "rosbridge is ready at "
 WRONG = "error: "
 """The beginning of the only line on standard output if there is nothing to play."""
 
+LONGEST = 100
+"""Bytes of a command, which is a line on standard input."""
+
 
 def main() -> int:
     """Play a recording until SIGINT or SIGTERM and return the exit status."""
@@ -53,15 +56,20 @@ async def _run(
     running = asyncio.get_running_loop()
     stop = asyncio.Event()
     player: Player | None = None
+    rest = b""
 
-    def begin_anew() -> None:
-        if player is not None:
-            player.begin_anew()
+    def hear(data: bytes) -> None:
+        nonlocal rest
+        *lines, rest = (rest + data).split(b"\n")
+        rest = rest[:LONGEST]
+        for line in lines:
+            if player is not None:
+                player.obey(line[:LONGEST].decode(errors="replace"))
 
     if with_parent:  # before the files are opened, which may take long
         end_with_parent(
             lambda: running.call_soon_threadsafe(stop.set),
-            lambda: running.call_soon_threadsafe(begin_anew),
+            lambda data: running.call_soon_threadsafe(hear, data),
         )
     recording = Recording(paths, warn=log.warning)
     try:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from webmap.bags.recorder import Incoming, Recorder
-from webmap.bags.replay import STATUS
+from webmap.bags.status import MARKS, STATUS
 from webmap.base.errors import BridgeError, ConfigError
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import is_type, normalise_topic
@@ -124,7 +124,8 @@ class Listening:
         """Subscribe to new topics to record, and report those left out."""
         unknown = []
         for topic, type_name in sorted(topics.items()):
-            chosen = topic in self._only if self._only else topic != STATUS
+            about_replay = topic in (STATUS, MARKS)
+            chosen = topic in self._only if self._only else not about_replay
             if not chosen or topic in self._seen or not type_name:
                 continue
             self._seen.add(topic)

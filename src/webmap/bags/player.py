@@ -1,14 +1,19 @@
-"""Playing of a recording at a given rate, from its beginning or any other time."""
+"""Playing of a recording: at a rate, from any position, until paused."""
 
 import asyncio
 import contextlib
+import itertools
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from typing import TypeVar
 
+from webmap.bags.marks import find_marks
+from webmap.bags.playback import FASTEST, SLOWEST, Playback, read_command
 from webmap.bags.recording import Recorded, Recording
 from webmap.bags.replay import Replay
-from webmap.bags.times import SECOND, Pace
+from webmap.bags.status import Marks, Status
+from webmap.bags.times import SECOND
 from webmap.base.errors import ConfigError
 
 log = logging.getLogger("webmap.bags")
@@ -16,14 +21,17 @@ log = logging.getLogger("webmap.bags")
 STATUS_PERIOD = 0.5
 """Seconds between two status messages with the position in the recording."""
 
-SLOWEST, FASTEST = 0.001, 1000.0
-"""The least and the greatest rate."""
+HOLD = 0.5
+"""Seconds between two publications of the state at a position that does not move, so
+that the page does not show it as stale."""
 
 ROUND = 1.0
 """Least seconds from one round to the next; a recording may be one message."""
 
 SOON = 1_000_000
 """Nanoseconds that are too short to wait for."""
+
+T = TypeVar("T")
 
 
 def steady_clock() -> Callable[[], int]:
@@ -39,7 +47,7 @@ class Player:
         recording: The recording.
         rate: Seconds of the recording that are played per second, from 0.001 to 1000.
         start: The position where the playing begins, in seconds.
-        loop: Whether to play again from the beginning after the end.
+        loop: Whether to play again from there after the end.
         now: Returns the time in nanoseconds since 1970.
 
     Raises:
@@ -68,32 +76,45 @@ class Player:
         self._now = now or steady_clock()
         self.replay = Replay(recording, clock=lambda: self._now() / SECOND)
         self._recording = recording
-        self._rate = rate
         self._loop = loop
-        self._first = recording.begin + round(start * SECOND)
-        self._pace = Pace(self._first, self._now(), rate)
-        self._kept: list[Recorded] | None = None
+        self._playback = Playback(
+            recording.begin,
+            recording.end,
+            start=start,
+            rate=rate,
+            loop=loop,
+            now=self._now(),
+        )
+        self._last = recording.begin  # the time of the newest message
+        self._marks = Marks([], read=0.0)
+        self._problem = ""
         self._over = False
-        self._ended = False
         self._late = False
-        self._again = False
         self._woken = asyncio.Event()
+        self._shown = asyncio.Event()
 
     @property
-    def status(self) -> str:
-        """The name, position and rate of the recording, for people."""
-        recording = self._recording
-        at = (self._pace.at(self._now()) - recording.begin) / SECOND
-        at = min(max(at, 0.0), recording.seconds)
-        speed = "" if self._rate == 1 else f", {self._rate:g} times as fast"
-        if self._ended:
-            return f"Recording {recording.name}: ended after {recording.seconds:.1f} s"
-        length = f"{recording.seconds:.1f} s"
-        return f"Recording {recording.name}: {at:.1f} of {length}{speed}"
+    def status(self) -> Status:
+        """The position in the recording, and how it is played."""
+        playback = self._playback
+        return Status(
+            name=self._recording.name,
+            at=round(playback.seconds_at(self._now()), 3),
+            seconds=round(self._recording.seconds, 3),
+            rate=playback.rate,
+            playing=playback.playing,
+            ended=playback.ended,
+            jumps=playback.jumps,
+            problem=self._problem,
+        )
 
-    def begin_anew(self) -> None:
-        """Go back to where the playing began."""
-        self._again = True
+    def obey(self, line: str) -> None:
+        """Carry out a command; one that is not valid is logged and changes nothing."""
+        try:
+            self._playback.obey(read_command(line), self._now())
+        except ConfigError as error:
+            log.warning("%s", error)
+            return
         self._woken.set()
 
     async def run(self) -> None:
@@ -101,75 +122,137 @@ class Player:
         await self.replay.graph.subscribed.wait()
         async with asyncio.TaskGroup() as group:
             group.create_task(self._publish_status())
-            group.create_task(self._play_rounds())
+            group.create_task(self._find_marks())
+            group.create_task(self._take_turns())
 
-    async def _play_rounds(self) -> None:
+    async def _take_turns(self) -> None:
+        jumps = self._playback.jumps
         while True:
-            self._again, self._ended = False, False
-            self._woken.clear()
-            self._pace = Pace(self._first, self._now(), self._rate)
-            self.replay.publish_status(
-                self.status
-            )  # first, as poses jump in a new round
-            soonest = self._now() + round(ROUND * SECOND)
-            try:
-                await self._once()
-            except ConfigError as error:
-                log.error("%s; the rest of the recording is not played", error)
-            if self._again:
-                continue
-            if self._loop:
-                end = self._pace.due(self._recording.end)
-                if await self._until(max(end, soonest)):
-                    continue
-            if not self._again:
-                self._ended = True
-                await self._woken.wait()
+            if self._playback.jumps != jumps:
+                jumps = self._playback.jumps
+                self._problem = ""
+                self.replay.forget()
+            self.replay.publish_status(self.status)  # first, as poses jump
+            await self._take_turn(self._playback.turn)
 
-    async def _once(self) -> None:
-        if self._kept is None:
-            self._kept = await self._read_kept()
-            self._pace = Pace(self._first, self._now(), self._rate)
-        for recorded in self._kept:
-            self.replay.publish(recorded, self._pace)
-        for recorded in self._recording.messages(self._first):
-            if not await self._until(self._pace.due(recorded.time)):
-                return
-            self.replay.publish(recorded, self._pace)
-
-    async def _read_kept(self) -> list[Recorded]:
-        """Read the earlier messages to keep, in a thread, since it may take long."""
-        reading = asyncio.create_task(asyncio.to_thread(self._kept_of_before))
+    async def _take_turn(self, turn: int) -> None:
+        """Play, or hold the position, until the next turn."""
+        playback = self._playback
+        start = self._last = playback.at(self._now())
+        state, messages = await self._in_thread(lambda: self._read(start, turn))
+        if playback.turn != turn:
+            return
+        playback.begin(self._now())
+        soonest = self._now() + round(ROUND * SECOND)
+        self.replay.publish_state(state, playback.pace(self._now()))
+        self._shown.set()
+        if not playback.playing:
+            await self._hold(turn, state)
+            return
         try:
-            return await asyncio.shield(reading)
+            await self._play(turn, messages)
+        except ConfigError as error:
+            log.error("%s; the rest of the recording is not played", error)
+            self._problem = str(error)
+        await self._finish(turn, soonest)
+
+    def _read(self, start: int, turn: int) -> tuple[list[Recorded], Iterator[Recorded]]:
+        """Read the state at a position, and the first message, which may take long."""
+        state: list[Recorded] = []
+        messages = self._recording.messages(start + 1)
+        first: list[Recorded] = []
+        try:
+            state = self._recording.state_at(
+                start, lambda: not self._over and self._playback.turn == turn
+            )
+            first = list(itertools.islice(messages, 1))
+        except ConfigError as error:
+            log.error("%s; a part of the recording is not played", error)
+            self._problem = str(error)
+        return state, itertools.chain(first, messages)
+
+    async def _play(self, turn: int, messages: Iterator[Recorded]) -> None:
+        for recorded in messages:
+            if not await self._until(turn, recorded.time):
+                return
+            self.replay.publish(recorded, self._playback.pace(self._now()))
+            self._last = recorded.time
+
+    async def _finish(self, turn: int, soonest: int) -> None:
+        """End the recording, or wait for its end and begin the next round."""
+        if self._loop and self._playback.turn == turn:
+            await self._until(turn, self._recording.end)
+            while self._playback.turn == turn and self._now() < soonest:
+                if not await self._wait((soonest - self._now()) / SECOND):
+                    break
+        if self._playback.turn == turn:
+            self._playback.finish(self._last)
+
+    async def _hold(self, turn: int, state: list[Recorded]) -> None:
+        """Publish the state again and again, as it ages while the position does not."""
+        topics = self._recording.topics
+        state = [one for one in state if not topics[one.topic].latched]
+        while self._playback.turn == turn:
+            await self._wait(HOLD)
+            if self._playback.turn == turn:
+                pace = self._playback.pace(self._now())
+                self.replay.publish_state(state, pace)
+
+    async def _until(self, turn: int, recorded: int) -> bool:
+        """Wait until a time of the recording; return whether the turn continues."""
+        while self._playback.turn == turn:
+            pace = self._playback.pace(self._now())
+            wait = pace.due(recorded) - self._now()
+            if wait < -SECOND:
+                pace.put_off(-wait)
+                if not self._late:
+                    self._late = True
+                    log.warning(
+                        "this computer is too slow for this rate: messages are played "
+                        "late"
+                    )
+            if wait < SOON:
+                await asyncio.sleep(0)  # let the subscribers run
+                break
+            if not await self._wait(wait / SECOND):
+                break
+        return self._playback.turn == turn
+
+    async def _wait(self, seconds: float) -> bool:
+        """Wait for a time; return whether a command came meanwhile."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await self._woken.wait()
+        if not self._woken.is_set():
+            return False
+        self._woken.clear()
+        self.replay.publish_status(self.status)
+        return True
+
+    async def _find_marks(self) -> None:
+        """Find the marks, in a thread, after the first picture."""
+
+        def found(marks: Marks) -> None:
+            self._marks = marks
+
+        await self._shown.wait()
+        paths = self._recording.paths
+        await self._in_thread(lambda: find_marks(paths, found, lambda: not self._over))
+
+    async def _in_thread(self, call: Callable[[], T]) -> T:
+        running = asyncio.create_task(asyncio.to_thread(call))
+        try:
+            return await asyncio.shield(running)
         except asyncio.CancelledError:
             self._over = True
-            await asyncio.wait([reading])  # the file is closed afterwards
+            await asyncio.wait([running])  # the file is closed afterwards
             raise
 
-    def _kept_of_before(self) -> list[Recorded]:
-        kept = self._recording.kept_until(self._first, lambda: not self._over)
-        return list(kept)
-
-    async def _until(self, due: int) -> bool:
-        """Wait until a message is due; return whether it is still to be played."""
-        wait = due - self._now()
-        if wait < -SECOND:
-            self._pace.put_off(-wait)
-            if not self._late:
-                self._late = True
-                log.warning(
-                    "this computer is too slow for this rate: messages are played late"
-                )
-        if wait < SOON:
-            await asyncio.sleep(0)  # let the subscribers run
-            return not self._again
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(wait / SECOND):
-                await self._woken.wait()
-        return not self._again
-
     async def _publish_status(self) -> None:
+        published: Marks | None = None
         while True:
             self.replay.publish_status(self.status)
+            if self._marks is not published:
+                published = self._marks
+                self.replay.publish_marks(published)
             await asyncio.sleep(STATUS_PERIOD)

@@ -1,17 +1,18 @@
 """A recording on disk: its topics, and its messages in order."""
 
-import keyword
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from webmap.bags.messages import Messages
+from webmap.bags.times import SECOND
 from webmap.bags.types import texts_of
 from webmap.base.errors import ConfigError
 from webmap.base.plain_files import refuse_special, resolved
-from webmap.ros.definitions import OCTETS, TIMES, Definitions, Field, UnknownType
+from webmap.ros.definitions import Definitions, UnknownType
 from webmap.ros.rosbridge.server.dialect import Dialect, DialectName, canonical, resolve
-from webmap.ros.rosbridge.server.schema import DTYPES, Schema
+from webmap.ros.rosbridge.server.schema import Schema
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
@@ -42,11 +43,11 @@ def is_static(topic: str) -> bool:
     return topic.rpartition("/")[2] == STATIC
 
 
-class StaticFrames:
-    """All static transforms so far, as one message.
+class AllFrames:
+    """The newest transform of each frame so far, as one message.
 
-    Each node publishes its own static transforms, and a bag does not record the node of
-    a message. So the newest message alone would lack the transforms of other nodes.
+    Each node publishes its own transforms, and a bag does not record the node of a
+    message. So the newest message alone would lack the transforms of other nodes.
     """
 
     def __init__(self) -> None:
@@ -59,88 +60,16 @@ class StaticFrames:
         return {"transforms": list(self._frames.values())}
 
 
-Make = Callable[[Any], Any]
+RECENT = 2 * SECOND
+"""How far the state at a time looks back at first, in nanoseconds."""
 
+LONGEST_LOOK = 60 * SECOND
+"""How far it looks back for a topic that does not latch, in nanoseconds."""
 
-class Messages:
-    """Converts rosbags' objects to messages of the rosbridge server.
+LOGS = ("rosgraph_msgs/Log", "rcl_interfaces/Log")
+"""Types of log lines, which are events and no state."""
 
-    Arrays stay arrays, and bytes become bytes; times have the field names of the
-    schema's dialect.
-
-    Args:
-        schema: The types with their fields.
-
-    """
-
-    def __init__(self, schema: Schema) -> None:
-        self._schema = schema
-        self._known: dict[str, Make] = {}
-
-    def message(self, type_name: str, value: object) -> dict[str, Any]:
-        """Return the message of an object.
-
-        Args:
-            type_name: The type of the message, by its name in the schema.
-            value: The object that rosbags decoded.
-
-        Raises:
-            UnknownType: If the type is not in the schema.
-
-        """
-        make = self._known.get(type_name)
-        if make is None:
-            # Built once for each type, since messages come many times a second.
-            fields = self._schema.fields(type_name)
-            make = self._known[type_name] = self._record(fields)
-        made: dict[str, Any] = make(value)
-        return made
-
-    def _record(self, fields: Sequence[Field]) -> Make:
-        parts = [
-            (field.name, _attribute(field.name), self._field(field)) for field in fields
-        ]
-        return lambda value: {
-            name: make(getattr(value, inner)) for name, inner, make in parts
-        }
-
-    def _field(self, field: Field) -> Make:
-        if not field.is_array:
-            return self._single(field)
-        if field.type in OCTETS:
-            return bytes
-        numbers = field.type in DTYPES
-        if field.type == "bool" or (numbers and field.size is not None):
-            return _listed
-        if numbers:
-            return _same
-        single = self._single(field)
-        return lambda values: [single(value) for value in values]
-
-    def _single(self, field: Field) -> Make:
-        if field.fields is not None:
-            return self._record(field.fields)
-        if field.type in TIMES:
-            whole, rest = self._schema.dialect.time(0)
-            return lambda time: {whole: int(time.sec), rest: int(time.nanosec)}
-        return _same
-
-
-def _attribute(field: str) -> str:
-    """Return rosbags' name of a field: a keyword of Python gets an underscore."""
-    return f"{field}_" if keyword.iskeyword(field) else field
-
-
-def _same(value: Any) -> Any:
-    return value
-
-
-def _listed(values: Any) -> list[Any]:
-    listed: list[Any] = values.tolist()
-    return listed
-
-
-SECOND = 1_000_000_000
+FRAMES = "tf2_msgs/TFMessage"
 
 ROS1, ROS2 = ".bag", (".mcap", ".db3")
 
@@ -191,6 +120,8 @@ class Recording:
     def __init__(
         self, paths: Sequence[Path], *, warn: Callable[[str], object] = lambda _: None
     ) -> None:
+        self.paths = tuple(paths)
+        """Its files or its folder."""
         self.name = recording_name(paths)
         """The name, as shown to people."""
         self.dialect: DialectName = _dialect(paths)
@@ -238,35 +169,76 @@ class Recording:
         """
         return self._read(self._connections, start, None)
 
-    def kept_until(
-        self, start: int, go_on: Callable[[], bool] = lambda: True
-    ) -> Iterator[Recorded]:
-        """Yield the earlier messages that are still valid at a time.
+    def messages_of(self, wants: Callable[[str, str], bool]) -> Iterator[Recorded]:
+        """Yield all messages of some topics, in order.
 
         Args:
-            start: The time, in nanoseconds since 1970.
-            go_on: Called repeatedly; returns whether to continue.
+            wants: Called with the name and the type of a topic.
+
+        Raises:
+            ConfigError: If the file is damaged.
+
+        """
+        wanted = [
+            connection
+            for connection in self._connections
+            if wants(name := self._names[connection.topic], self.topics[name].type)
+        ]
+        yield from self._read(wanted, None, None) if wanted else ()
+
+    def state_at(
+        self, time: int, go_on: Callable[[], bool] = lambda: True
+    ) -> list[Recorded]:
+        """Return the messages up to a time that show the state then, in order.
+
+        They are all static frames, the frames of the last two seconds, and the newest
+        message of every other topic, also of latched topics from long before. Log lines
+        are no state.
+
+        Args:
+            time: The time, in nanoseconds since 1970; its own messages are included.
+            go_on: Called repeatedly; returns whether to continue. If not, the result is
+                not complete.
 
         Raises:
             ConfigError: If the file is damaged before that time.
 
         """
-        latched = [
+        static = [c for c in self._connections if is_static(self._names[c.topic])]
+        found: list[Recorded] = []
+        for recorded in self._read(static, None, time + 1) if static else ():
+            if not go_on():
+                return found
+            found.append(recorded)
+        rest = [
             connection
             for connection in self._connections
-            if self.topics[self._names[connection.topic]].latched
+            if connection not in static
+            and self.topics[self._names[connection.topic]].type not in LOGS
         ]
-        if not latched:
-            return
-        newest: dict[str, Recorded] = {}
-        for recorded in self._read(latched, None, start):
-            if not go_on():
-                return
-            if is_static(recorded.topic):
-                yield recorded
-            else:
-                newest[recorded.topic] = recorded
-        yield from newest.values()
+        end, span, newest = time + 1, RECENT, dict[str, Recorded]()
+        # Each further look back is longer, and only for topics without a message yet.
+        while rest and end > self.begin and go_on():
+            begin = max(end - span, self.begin)
+            latest: dict[str, Recorded] = {}
+            for recorded in self._read(rest, begin, end):
+                if not go_on():
+                    return found
+                latest[recorded.topic] = recorded
+                if self.topics[recorded.topic].type == FRAMES:
+                    found.append(recorded)
+            newest |= latest
+            end, span = begin, span * 4
+            rest = [
+                connection
+                for connection in rest
+                if (name := self._names[connection.topic]) not in newest
+                and (self.topics[name].latched or time - end < LONGEST_LOOK)
+            ]
+        found += [
+            one for one in newest.values() if self.topics[one.topic].type != FRAMES
+        ]
+        return sorted(found, key=lambda one: one.time)
 
     def message(self, recorded: Recorded) -> dict[str, Any] | None:
         """Return a message for the rosbridge server to publish.

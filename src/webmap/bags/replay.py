@@ -1,10 +1,12 @@
 """A recording as a ROS system that can only be read."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
-from webmap.bags.recording import Recorded, Recording, StaticFrames, is_static
+from webmap.bags.recording import FRAMES, AllFrames, Recorded, Recording, is_static
+from webmap.bags.status import MARKS, STATUS, TYPE, Marks, Status, text_of
 from webmap.bags.times import Pace, Stamps
 from webmap.ros.rosbridge.server.graph import (
     BRIDGE_NODE,
@@ -19,12 +21,6 @@ from webmap.ros.rosbridge.server.schema import Schema
 
 NODE = "/recording"
 """The node that publishes the recorded messages."""
-
-STATUS = "/webmap/recording"
-"""Topic with the name and position of the recording; a ``std_msgs/String``.
-
-Only the replay publishes it: it is neither recorded nor played from a recording.
-"""
 
 REFUSED = "this is a recording: it accepts no messages, services or actions"
 
@@ -117,36 +113,70 @@ class Replay:
         self.recording = recording
         self.graph = ReplayGraph(recording.schema, clock=clock)
         self._stamps = Stamps(recording.schema)
-        self._static: dict[str, StaticFrames] = {}
+        self._static: dict[str, AllFrames] = {}
 
     def start(self) -> None:
         """Advertise all topics of the recording, and seal the graph."""
         for topic in self.recording.topics.values():
-            if topic.name == STATUS:
+            if topic.name in (STATUS, MARKS):
                 continue
             self.graph.advertise(
                 self, topic.name, topic.type, node=NODE, latch=topic.latched
             )
-            if is_static(topic.name) and topic.type == "tf2_msgs/TFMessage":
-                self._static[topic.name] = StaticFrames()
-        self.graph.advertise(self, STATUS, "std_msgs/String", node=NODE, latch=True)
+        for name in (STATUS, MARKS):
+            self.graph.advertise(self, name, TYPE, node=NODE, latch=True)
+        self.forget()
         Rosapi(self.graph, POLITE).start()
         self.graph.seal()
 
+    def forget(self) -> None:
+        """Forget all latched messages: they may be from after the next position."""
+        for topic in self.recording.topics.values():
+            if topic.name not in (STATUS, MARKS):
+                self.graph.forget_latched(self, topic.name)
+            if is_static(topic.name) and topic.type == FRAMES:
+                self._static[topic.name] = AllFrames()
+
     def publish(self, recorded: Recorded, pace: Pace) -> None:
         """Publish a message with shifted stamps, if there is a subscriber."""
-        name = recorded.topic
-        if name == STATUS or not self.graph.is_wanted(name):
-            return
-        message: dict[str, Any] | None = self.recording.message(recorded)
+        message = self._message(recorded, pace)
         if message is None:
             return
-        type_name = self.recording.topics[name].type
-        self._stamps.move(type_name, message, pace.moved)
-        if name in self._static:
-            message = self._static[name].with_all(message)
-        self.graph.publish(self, name, message)
+        if recorded.topic in self._static:
+            message = self._static[recorded.topic].with_all(message)
+        self.graph.publish(self, recorded.topic, message)
 
-    def publish_status(self, text: str) -> None:
-        """Publish the status of the replay, for people."""
-        self.graph.publish(self, STATUS, {"data": text})
+    def publish_state(self, state: Sequence[Recorded], pace: Pace) -> None:
+        """Publish the state at a position, the frames of each topic as one message."""
+        frames: dict[str, AllFrames] = {}
+        whole: dict[str, dict[str, Any]] = {}
+        for recorded in state:
+            name = recorded.topic
+            if self.recording.topics[name].type != FRAMES:
+                self.publish(recorded, pace)
+            elif (message := self._message(recorded, pace)) is not None:
+                known = self._static.get(name) or frames.setdefault(name, AllFrames())
+                whole[name] = known.with_all(message)
+        for name, message in whole.items():
+            self.graph.publish(self, name, message)
+
+    def publish_status(self, status: Status) -> None:
+        """Publish the position."""
+        self.graph.publish(self, STATUS, {"data": text_of(status)})
+
+    def publish_marks(self, marks: Marks) -> None:
+        """Publish the marks on the time line."""
+        self.graph.publish(self, MARKS, {"data": text_of(marks)})
+
+    def _message(self, recorded: Recorded, pace: Pace) -> dict[str, Any] | None:
+        name = recorded.topic
+        if name in (STATUS, MARKS) or not self.graph.is_wanted(name):
+            return None
+        message: dict[str, Any] | None = self.recording.message(recorded)
+        if message is None:
+            return None
+        topic = self.recording.topics[name]
+        if topic.latched:  # said once: its age is right, however old it is
+            pace = replace(pace, earliest=0)
+        self._stamps.move(topic.type, message, pace.moved)
+        return message

@@ -34,12 +34,15 @@ class Pace:
         begin: The time in the recording that is played first.
         now: When it is played.
         rate: Seconds of the recording that are played per second; above 0.
+        earliest: The least value of a played stamp. After a jump to another position it
+            is the time of the jump, so that stamps never go back.
 
     """
 
     begin: int
     now: int
     rate: float = 1.0
+    earliest: int = 0
 
     def due(self, recorded: int) -> int:
         """Return when a time of the recording is played."""
@@ -56,7 +59,9 @@ class Pace:
         stays, too, since it came from a clock that was set to another time.
         """
         moved = self.due(stamp)
-        return moved if stamp != 0 and 0 < moved < LAST else stamp
+        if stamp == 0 or not 0 < moved < LAST:
+            return stamp
+        return max(moved, self.earliest)
 
     def put_off(self, by: int) -> None:
         """Delay everything by so many nanoseconds."""

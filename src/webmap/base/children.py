@@ -28,7 +28,7 @@ def python_command(module: str, *arguments: object) -> list[str]:
 
 def end_with_parent(
     end: Callable[[], object],
-    on_data: Callable[[], object] = lambda: None,
+    on_data: Callable[[bytes], object] = lambda _: None,
     grace: float = GRACE,
 ) -> None:
     """End this process when its standard input ends.
@@ -39,7 +39,7 @@ def end_with_parent(
 
     Args:
         end: Called once when the input ends, in a thread of its own.
-        on_data: Called each time that data arrives, in the same thread.
+        on_data: Called with all data that arrives, in the same thread.
         grace: Seconds between ``end`` and the exit.
 
     """
@@ -47,8 +47,8 @@ def end_with_parent(
     def watch() -> None:
         # Do not use sys.stdin: its lock would be held while the interpreter ends.
         with contextlib.suppress(OSError, RuntimeError):
-            while os.read(0, 4096):
-                on_data()
+            while data := os.read(0, 4096):
+                on_data(data)
         with contextlib.suppress(RuntimeError):  # the event loop is already closed
             end()
         time.sleep(grace)

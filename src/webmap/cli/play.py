@@ -1,26 +1,17 @@
 """``webmap play FILE``: plays a recording on the map."""
 
 import contextlib
-import math
 import os
-import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
-import msgspec
 
+from webmap.bags.playback import Command
 from webmap.base.child_process import child_process
 from webmap.base.echo import echo
 from webmap.base.errors import ConfigError
 from webmap.cli.options import PORT, Finite, web_options
-
-if TYPE_CHECKING:
-    from webmap import Bridge, Map
-
-POSITION = re.compile(r".*: (\d+\.\d) of ")
-"""Matches the position in the recording, in seconds, in the replay's status."""
 
 
 @click.command(short_help="Play a recording on the map: a bag of ROS 1 or ROS 2.")
@@ -73,7 +64,7 @@ def play(
     from webmap import console
     from webmap.bags import need_rosbags
     from webmap.bags.recording import recording_name
-    from webmap.bags.replay import STATUS
+    from webmap.features.player.recording_player import RecordingPlayer, expect_jumps
     from webmap.fleet.found import find_fleet
     from webmap.fleet.overrides import Watched
 
@@ -81,7 +72,7 @@ def play(
     name = recording_name(files)
     options = ["--rate", rate, "--start", start, "--port", bridge_port]
     options += ["--loop"] if loop else []
-    with replay(*options, "--", *files) as (url, begin_anew):
+    with replay(*options, "--", *files) as (url, command):
         bridge = webmap.Bridge(url, name=f"recording {name}")
         bridge.replays = True
         watched = Watched(Path(name).stem)
@@ -89,7 +80,8 @@ def play(
         title = f"Recording {name}"
         opened = console.open_console([bridge], [], title=title, place=title)
         fleet.show(opened)
-        opened.add_module(RecordingLine, bridge, STATUS, once(begin_anew))
+        expect_jumps(bridge, lambda: opened.robots)
+        opened.add_module(RecordingPlayer, bridge, command)
         webmap.run(
             host=host,
             port=port,
@@ -99,8 +91,10 @@ def play(
 
 
 @contextlib.contextmanager
-def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
-    """Run a replay as a child process; yield its rosbridge's URL and a restart call.
+def replay(*arguments: object) -> Iterator[tuple[str, Callable[[Command], None]]]:
+    """Run a replay as a child process.
+
+    Yields the URL of its rosbridge, and a function that gives it a command.
 
     It ends with this process, however that ends, because its standard input closes.
 
@@ -117,51 +111,10 @@ def replay(*arguments: object) -> Iterator[tuple[str, Callable[[], None]]]:
         if not line.startswith(READY):
             raise ConfigError("the replay did not start; its error message is above")
 
-        def begin_anew() -> None:
+        def give(command: Command) -> None:
             try:  # unbuffered: a buffer would keep the line and fail again at exit
-                os.write(started.stdin.fileno(), b"again\n")
+                os.write(started.stdin.fileno(), f"{command.line}\n".encode())
             except (OSError, ValueError):
                 echo("The replay has ended: nothing is played", err=True)
 
-        yield line.removeprefix(READY).strip(), begin_anew
-
-
-def once(call: Callable[[], None]) -> Callable[[], None]:
-    """Return a function that calls another one on its first call only."""
-    left = [call]
-    return lambda: left.pop()() if left else None
-
-
-class _String(msgspec.Struct):
-    data: str
-
-
-class RecordingLine:
-    """Shows the file and the position of a replay next to the title; a map module.
-
-    Args:
-        map: The map.
-        bridge: The bridge to the replay.
-        topic: Topic on which the replay publishes its position as text.
-        opened: Called when a page is open.
-
-    """
-
-    def __init__(
-        self, map: "Map", bridge: "Bridge", topic: str, opened: Callable[[], object]
-    ) -> None:
-        self._map = map
-        self._at = math.inf  # the replay restarts when the first page opens
-        self._title = map.page.element("title")
-        bridge.subscribe(topic, self._show, "std_msgs/String", decode=_String)
-        opened()
-
-    def _show(self, message: _String) -> None:
-        self._title.text = message.data
-        found = POSITION.match(message.data)
-        if found is None:
-            return
-        before, self._at = self._at, float(found[1])
-        if self._at < before:  # a new round: the robots are back at their start
-            for robot in self._map.robots:
-                robot.expect_jump()
+        yield line.removeprefix(READY).strip(), give

@@ -69,6 +69,10 @@ class Trail:
         self._pieces.clear()
         self._last = None
 
+    def on_seek(self) -> None:
+        """Begin anew: a recording is played from another position."""
+        self.clear()
+
     def on_odometry_update(self) -> None:
         """Extend the trail to the robot's position."""
         at = (self.robot.position.x, self.robot.position.y)

@@ -213,7 +213,8 @@ function leaves(leave) {
 /**
  * @param {KeyboardEvent} event
  * @returns {boolean} Whether the focused element uses the key itself, and no other input (Enter,
- *     a click) does the same.
+ *     a click) does the same; or a button that everybody presses with Space, of a recording,
+ *     in which no robot can be driven (`data-webmap-keeps-space`).
  */
 function keepsKey(event) {
   const target = event.target;
@@ -223,5 +224,7 @@ function keepsKey(event) {
     const closes = "dialog:modal, [popover]:not([popover=manual]), textarea, select";
     return target.closest(closes) !== null || target.matches(TYPED);
   }
-  return target.matches("input[type=checkbox], input[type=radio], select, summary");
+  return target.matches(
+    "input[type=checkbox], input[type=radio], select, summary, [data-webmap-keeps-space]",
+  );
 }

@@ -147,6 +147,12 @@ class Graph:
             if publication:
                 deliver(publication)
 
+    def forget_latched(self, owner: object, name: str) -> None:
+        """Forget the newest message of a publisher that latches."""
+        topic = self.topics.get(name)
+        if topic and owner in topic.latched:
+            topic.latched[owner] = None
+
     def unsubscribe(self, owner: object, name: str) -> None:
         """Remove the subscriber."""
         topic = self.topics.get(resolve(name))

@@ -1,0 +1,108 @@
+"""The player bar of a recording, and the commands of a page to the replay."""
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import msgspec
+
+from webmap.bags.playback import Command, command_of
+from webmap.bags.status import MARKS, STATUS, TYPE, Marks, Status, Text
+from webmap.base.errors import ConfigError
+
+if TYPE_CHECKING:
+    from webmap.core.map import Map
+    from webmap.core.robot import Robot
+    from webmap.ros.bridge import Bridge
+
+T = TypeVar("T")
+
+
+class RecordingPlayer:
+    """Shows the position of a replay, and passes a page's commands to it.
+
+    All pages show one playback. A page with this module has a coloured frame.
+
+    Args:
+        map: The map.
+        bridge: The bridge to the replay.
+        give: Gives the replay a command.
+    """
+
+    def __init__(
+        self, map: "Map", bridge: "Bridge", give: Callable[[Command], object]
+    ) -> None:
+        self.map = map
+        self._give = give
+        self._status: Status | None = None
+        self._marks: Marks | None = None
+        self.browser_part = map.add_browser_part(
+            self,
+            "features/player/player_bar.js",
+            style="features/player/player_bar.css",
+        )
+        bridge.subscribe(STATUS, self._on_status, TYPE, decode=Text)
+        bridge.subscribe(MARKS, self._on_marks, TYPE, decode=Text)
+
+    def on_ready(self) -> None:
+        """Send the newest status to a page that was loaded."""
+        if self._status is not None:
+            self._send("status", self._status)
+        if self._marks is not None:
+            self._send("marks", self._marks)
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Pass a command to the replay, or report that it is not valid."""
+        try:
+            command = command_of(message.get("command"), message.get("value"))
+        except ConfigError as error:
+            self.map.report_error(str(error))
+            return
+        self._give(command)
+
+    def _on_status(self, text: Text) -> None:
+        status = _read(text, Status)
+        if status is None:
+            return
+        before, self._status = self._status, status
+        self._send("status", status)
+        if before is None and status.jumps == 0:
+            self._give(Command("again"))  # the first page sees it from its beginning
+
+    def _on_marks(self, text: Text) -> None:
+        marks = _read(text, Marks)
+        if marks is not None:
+            self._marks = marks
+            self._send("marks", marks)
+
+    def _send(self, kind: str, value: Status | Marks) -> None:
+        self.browser_part.send({kind: msgspec.to_builtins(value)})
+
+
+def expect_jumps(bridge: "Bridge", robots: Callable[[], Iterable["Robot"]]) -> None:
+    """Fire ``on_seek()`` on each robot whenever the position of a replay jumps.
+
+    Args:
+        bridge: The bridge to the replay.
+        robots: Returns the robots of the recording.
+    """
+    known: int | None = None
+
+    def on_status(text: Text) -> None:
+        nonlocal known
+        status = _read(text, Status)
+        if status is None or status.jumps == known:
+            return
+        known = status.jumps
+        for robot in robots():
+            robot.expect_jump()
+            robot.notify_modules("on_seek")
+
+    bridge.subscribe(STATUS, on_status, TYPE, decode=Text)
+
+
+def _read(text: Text, type_: type[T]) -> T | None:
+    """Return the content of a message; None if another program has sent it."""
+    try:
+        return msgspec.json.decode(text.data, type=type_)
+    except msgspec.MsgspecError:
+        return None
