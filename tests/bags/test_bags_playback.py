@@ -92,7 +92,7 @@ def test_at_first_the_age_of_a_message_from_before_the_recording_is_kept():
 
 def test_after_the_end_play_begins_where_the_playing_began():
     made = playback(start=10.0)
-    made.finish(after(50))
+    made.finish(BEGIN + 60 * SECOND)
     assert (made.ended, made.playing) == (True, False)
     assert made.seconds_at(after(99)) == 60.0
     obey(made, "play", 99)
@@ -102,7 +102,7 @@ def test_after_the_end_play_begins_where_the_playing_began():
 
 def test_with_loop_the_end_is_the_begin_of_the_next_round():
     made = playback(loop=True)
-    made.finish(after(60))
+    made.finish(BEGIN + 60 * SECOND)
     assert (made.ended, made.playing, made.jumps) == (False, True, 1)
     assert made.seconds_at(after(60)) == 0.0
 

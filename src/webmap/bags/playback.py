@@ -126,14 +126,19 @@ class Playback:
         if self.playing:
             self._held = None
 
-    def finish(self, now: int) -> None:
-        """End the recording, or begin the next round: all messages were played."""
+    def finish(self, at: int) -> None:
+        """End the recording, or begin the next round: all messages were played.
+
+        Args:
+            at: The position of the last message, as a time of the recording.
+
+        """
         self.playing = self._loop
         self.ended = not self._loop
         if self._loop:
             self._jump(self._first)
         else:
-            self._hold(now)
+            self._hold(at)
 
     def obey(self, command: Command, now: int) -> None:
         """Carry out a command."""
@@ -146,13 +151,13 @@ class Playback:
             self._jump(self._begin + round(value * SECOND))
         elif name == "pause" and self.playing:
             self.playing = False
-            self._hold(now)
+            self._hold(self.at(now))
         elif name == "again" or (name == "play" and self.ended):
             self.playing = True
             self._jump(self._first)
         elif name == "play" and not self.playing:
             self.playing = True
-            self._hold(now)
+            self._hold(self.at(now))
 
     def _jump(self, to: int) -> None:
         self.ended = False
@@ -160,6 +165,6 @@ class Playback:
         self.turn += 1
         self._held = min(max(to, self._begin), self._end)
 
-    def _hold(self, now: int) -> None:
+    def _hold(self, at: int) -> None:
         self.turn += 1
-        self._held = self.at(now)
+        self._held = at

@@ -85,6 +85,7 @@ class Player:
             loop=loop,
             now=self._now(),
         )
+        self._last = recording.begin  # the time of the newest message
         self._marks = Marks([], read=0.0)
         self._problem = ""
         self._over = False
@@ -137,7 +138,7 @@ class Player:
     async def _take_turn(self, turn: int) -> None:
         """Play, or hold the position, until the next turn."""
         playback = self._playback
-        start = playback.at(self._now())
+        start = self._last = playback.at(self._now())
         state, messages = await self._in_thread(lambda: self._read(start, turn))
         if playback.turn != turn:
             return
@@ -175,6 +176,7 @@ class Player:
             if not await self._until(turn, recorded.time):
                 return
             self.replay.publish(recorded, self._playback.pace(self._now()))
+            self._last = recorded.time
 
     async def _finish(self, turn: int, soonest: int) -> None:
         """End the recording, or wait for its end and begin the next round."""
@@ -184,7 +186,7 @@ class Player:
                 if not await self._wait((soonest - self._now()) / SECOND):
                     break
         if self._playback.turn == turn:
-            self._playback.finish(self._now())
+            self._playback.finish(self._last)
 
     async def _hold(self, turn: int, state: list[Recorded]) -> None:
         """Publish the state again and again, as it ages while the position does not."""
