@@ -47,7 +47,9 @@ export function listenToPanel(map, signal) {
   };
   edge.setAttribute("aria-valuemin", `${NARROWEST}`);
   edge.setAttribute("aria-valuemax", `${WIDEST}`);
-  show(shown);
+  // The card may have been unfolded before this module was loaded, and may come later.
+  show({ ...shown, more: shown.more || moreOfCard()?.open === true });
+  const off = map.onSelect(() => show(shown));
   const folded = (/** @type {Event} */ { target }) => {
     if (target === moreOfCard()) change({ more: moreOfCard()?.open });
   };
@@ -64,11 +66,15 @@ export function listenToPanel(map, signal) {
   edge.addEventListener("keydown", key, { signal });
   listenToEdge(edge, (x) => change({ width: x }), signal);
   edge.addEventListener("dblclick", () => change({ width: USUAL }), { signal });
-  return map.layout.add("panel", {
+  const leave = map.layout.add("panel", {
     read: () => shown,
     write: change,
     reset: () => change(AT_FIRST),
   });
+  return () => {
+    off();
+    leave();
+  };
 }
 
 /**

@@ -83,6 +83,7 @@ def tab(chromium: Browser, bench: Bench) -> Iterator[Page]:
         page.goto(bench.url)
         page.locator("#robots .row").click()
         page.locator("#card .more > summary").click()
+        expect(page.locator("#card .more[open]")).to_be_visible()
         expect(page.locator(".robot-button")).to_have_count(3)
         expect(page.locator("#link")).to_have_attribute("data-link", "open")
         yield page

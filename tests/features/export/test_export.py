@@ -240,7 +240,7 @@ def test_the_export_button_of_the_console_saves_its_map(
         tab.locator("#show-all").click()
         expect(tab.locator(".tools .webmap-export-go")).to_have_count(1)
         file = saved(tab, "svg", tmp_path)
-        tab.evaluate(HIDE % ".map-tools, .card, .webmap-frame")
+        tab.evaluate(HIDE % ".map-tools, .stop-place, .webmap-frame")
         box = tab.locator("svg.webmap").bounding_box()
         page = pixels(tab.screenshot(clip=box))
         alone = drawn_alone(chromium, file, int(box["width"]), int(box["height"]))
