@@ -49,13 +49,16 @@ CLOSED = ("svg.sprite", "#help")
 
 CONSOLE = (
     "svg.webmap-view-control",
-    *(f".webmap-{name}" for name in ("align", "export", "goal", "labels", "layers")),
+    *(
+        f".webmap-{name}"
+        for name in ("alerts", "align", "export", "goal", "labels", "layers")
+    ),
     *(f".webmap-{name}" for name in ("measure", "rosout", "route", "scale-bar")),
     *(f".webmap-{name}" for name in ("stop", "teleop", "teleop-stop")),
 )
 """What the modules of the browser put on the console; hands come when all are there."""
 
-UNORDERED = (".webmap-overlay", ".webmap-corner", "#stop-place", ".map-tools")
+UNORDERED = (".webmap-overlay", ".webmap-corner", "#stop-place", ".drive-bar")
 """Here modules of the browser lie in the order in which they happened to be loaded."""
 
 _READER = (HERE / "drawn_reader.js").read_text().strip().removesuffix(";")

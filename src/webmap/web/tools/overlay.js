@@ -25,6 +25,8 @@ export function lay(map, panel, corner, place = "") {
   const own = ownPlace(place) ?? (corner ? ownCorner(corner) : null);
   if (own) {
     own.append(panel);
+    const next = [...own.children].find((other) => placeOf(other) > placeOf(panel));
+    if (next) own.insertBefore(panel, next);
     return () => panel.remove();
   }
   const overlay = overlays.get(map) ?? new Overlay(map);
@@ -36,6 +38,15 @@ export function lay(map, panel, corner, place = "") {
     overlay.destroy();
     overlays.delete(map);
   };
+}
+
+/**
+ * @param {Element} panel
+ * @returns {number} Its place among others in the page's own element, which the page
+ *     sets in CSS with `--place`; the Tab key goes in this order.
+ */
+function placeOf(panel) {
+  return Number(getComputedStyle(panel).getPropertyValue("--place")) || 0;
 }
 
 /**
