@@ -38,6 +38,7 @@ def test_a_recording_shows_the_robot_at_its_pose_and_allows_no_driving(
         )
         expect(page.get_by_label("Speed")).to_have_value("2")
         expect(page.locator("#bridges")).to_contain_text("Bridge open")
+        card.locator(".more > summary").click()
         for name in ("Send goal…", "Cancel goal", "Set pose"):
             button = card.get_by_role("button", name=name)
             expect(button).to_be_disabled()

@@ -265,7 +265,7 @@ def test_only_buttons_with_during_stop_work_while_stop_is_active(sim, robot):
         async with linked(sim["ros1"], services={"/dock": trigger()}) as (bridge, node):
             light = {**DOCK, "label": "Light", "during_stop": True}
             module = robot.add_module("Buttons", bridge, [DOCK, light])
-            said = {"doing": "stopped", "holder": None, "goal": None}
+            said = {"doing": "stopped", "holder": None, "goal": None, "alarm": None}
             report = SimpleNamespace(latched=True, other_writer=None, **said)
             robot.on_gate_report(report)
             assert await module["Dock"].press() is False

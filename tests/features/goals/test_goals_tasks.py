@@ -223,7 +223,8 @@ class TestCard:
             "3.2 m to go, about 12 s left, 5 s elapsed, 2 recoveries",
         ]
 
-    def test_a_robot_without_a_goal_has_no_goal_line(self, robot):
+    def test_the_goal_line_of_a_robot_without_a_goal_keeps_its_place(self, robot):
         line = GoalLine()
         line.show(robot)
-        assert line.element.get("hidden") is not None
+        assert line.element.get("hidden") is None
+        assert line.element.get("data-tone") == "none"
