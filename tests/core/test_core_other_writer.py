@@ -9,7 +9,14 @@ from webmap import Bridge, Robot
 from webmap.core import motion
 from webmap.core.motion import RobotMotion
 
-REST = {"doing": "other", "holder": None, "goal": None, "measured": None, "alarm": None}
+REST = {
+    "doing": "other",
+    "holder": None,
+    "goal": None,
+    "measured": None,
+    "alarm": None,
+    "link": "up",
+}
 SAID = SimpleNamespace(other_writer="another program publishes to /cmd_vel", **REST)
 NOTHING = SimpleNamespace(other_writer=None, **REST)
 NODES = ["/rosbridge_websocket", "/teleop", "/webmap_sim", "/joy"]

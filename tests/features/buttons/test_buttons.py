@@ -266,6 +266,7 @@ def test_only_buttons_with_during_stop_work_while_stop_is_active(sim, robot):
             light = {**DOCK, "label": "Light", "during_stop": True}
             module = robot.add_module("Buttons", bridge, [DOCK, light])
             said = {"doing": "stopped", "holder": None, "goal": None, "alarm": None}
+            said |= {"link": "up", "measured": None}
             report = SimpleNamespace(latched=True, other_writer=None, **said)
             robot.on_gate_report(report)
             assert await module["Dock"].press() is False
