@@ -19,14 +19,14 @@ PAUSE = 8000
 
 @pytest.fixture
 def tab(chromium, tmp_path):
-    demo = ("demo", "--robots", "3", "--port", "0", "--no-browser")
+    demo = ("demo", "--robots", "4", "--port", "0", "--no-browser")
     with (
         watched_tab(chromium, 1280, 800) as page,
         webmap(*demo, WEBMAP_STATE_DIR=str(tmp_path)) as url,
     ):
         page.allowed = ["WebSocket", "ERR_CONNECTION"]  # when all of it ends
         page.goto(url)
-        expect(page.locator(".robot:not(.unplaced)")).to_have_count(3)
+        expect(page.locator(".robot:not(.unplaced)")).to_have_count(4)
         wait_until_ready(page)
         select(page, "Robot 2")
         same_word(page, "Moving, not by WebMap", 30)

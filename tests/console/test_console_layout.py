@@ -93,7 +93,8 @@ def test_a_layout_is_saved_reset_and_loaded_and_the_last_view_is_restored(
     assert download.value.suggested_filename == FILE
     download.value.save_as(tmp_path / FILE)
     saved = json.loads((tmp_path / FILE).read_text())
-    assert set(saved) == {"version", "view", "panel", "layers", "log", "camera"}
+    parts = {"version", "view", "panel", "list", "layers", "log", "camera"}
+    assert set(saved) == parts
     assert saved["layers"]["shown"]["Scans"] is False
 
     # What follows is the layout's doing alone.
