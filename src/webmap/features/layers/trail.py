@@ -85,15 +85,15 @@ class Trail:
             if len(self._pieces[-1].points) > PIECE:
                 self._begin(self._last)
             self._pieces[-1].go(at, far)
+            if self._pieces[-1].line.parent is None:
+                self.svg.append(self._pieces[-1].line)
             self._forget_old()
         self._last = at
 
     def _begin(self, at: tuple[float, float]) -> None:
         if self._pieces and len(self._pieces[-1].points) < 2:
-            self._pieces.pop().line.remove()
-        piece = _Piece(at)
-        self._pieces.append(piece)
-        self.svg.append(piece.line)
+            self._pieces.pop()
+        self._pieces.append(_Piece(at))
 
     def _forget_old(self) -> None:
         """Keep the pieces within the length, and shorten the oldest."""
@@ -107,7 +107,7 @@ class Trail:
 
 
 class _Piece:
-    """A part of the trail that is one line."""
+    """A part of the trail that is one line, drawn from the second point on."""
 
     def __init__(self, start: tuple[float, float]) -> None:
         self.points: deque[tuple[float, float]] = deque([start])
