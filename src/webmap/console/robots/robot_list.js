@@ -22,15 +22,23 @@ const ORDER_EVERY = 2000;
 /**
  * @param {MapCanvas} map
  * @param {AbortSignal} signal
- * @returns {() => void} Leaves the layout.
+ * @returns {() => void} Leaves the map and its layout.
  */
 export function listenToRobots(map, signal) {
   const list = new RobotList(signal);
-  return map.layout.add("list", {
-    read: () => list.choice,
-    write: (choice) => list.choose(choice),
-    reset: () => list.choose(AT_FIRST),
-  });
+  const choosing = () => byId("robots").classList.toggle("choosing", map.selected !== null);
+  const offs = [
+    map.onSelect(choosing),
+    map.layout.add("list", {
+      read: () => list.choice,
+      write: (choice) => list.choose(choice),
+      reset: () => list.choose(AT_FIRST),
+    }),
+  ];
+  choosing();
+  return () => {
+    for (const off of offs) off();
+  };
 }
 
 class RobotList {
