@@ -55,6 +55,9 @@ SAME = (
 )
 """The attributes that an event of the scene shares with a page's message."""
 
+DONE = ("click", "change")
+"""The events whose answer the operator waits for: the page gets a frame at once."""
+
 PageKey = tuple[str, str, str]
 """The path of a page, the page's own identifier, and its viewer's."""
 
@@ -182,6 +185,8 @@ class PageHost:
             **{name: getattr(report, name) for name in SAME},
         )
         page.dispatch(report.mount, element, event)
+        if report.event in DONE:
+            self.tick(time.monotonic())
 
     def close(self) -> None:
         """Close the page permanently."""
