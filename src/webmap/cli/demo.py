@@ -82,7 +82,7 @@ def demo(
             [bridge],
             [],
             floor=data / "floor.yaml",
-            title="WebMap demo",
+            title="Demo",
             place="demo",
             layers_off=["Costmaps"] if quiet else [],
         )

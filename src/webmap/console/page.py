@@ -202,8 +202,9 @@ class Frame:
         self._looks = 0
         self._placed = False
         self._dot_size = 0.0
+        tab = PRODUCT if title == PRODUCT else f"{title} - {PRODUCT}"
         self.browser_part = map.add_browser_part(
-            self, "console/console.js", {"title": title, "bounds": self._bounds}
+            self, "console/console.js", {"title": tab, "bounds": self._bounds}
         )
 
     def place(self) -> None:
