@@ -131,3 +131,79 @@ def test_the_view_the_layers_and_the_help_need_no_mouse(open_console):
     expect(page.locator("#panel")).to_be_hidden()
     find(page, "list of robots")
     expect(page.locator("#panel")).to_be_visible()
+
+
+def test_a_pose_is_set_with_arrow_keys(open_console):
+    page = open_console()
+    find(page, "robot 1")
+    for _ in range(5):  # a page that is too busy sends nothing
+        page.keyboard.press("i")
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("Shift+ArrowLeft")
+        page.keyboard.press("Enter")
+        try:
+            expect(page.locator(".webmap-locate-word")).to_have_text("Pose sent.")
+        except AssertionError:
+            continue
+        return
+    raise AssertionError(page.locator(".webmap-locate-word").inner_text())
+
+
+def tab_to(page: Page, name: str) -> None:
+    """Move the focus to the button whose name begins so with the Tab key."""
+    focused = "() => document.activeElement?.innerText ?? ''"
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        if page.evaluate(focused).startswith(name):
+            return
+    raise AssertionError(f"the Tab key does not reach {name}")
+
+
+def test_a_route_is_made_with_arrow_keys_and_started_and_ended(open_console):
+    page = open_console()
+    find(page, "robot 1")
+    find(page, "tool route")
+    tab_to(page, "Add points")
+    page.keyboard.press("Enter")
+    points = page.locator(".webmap-route-list > li")
+    for count in (1, 2):
+        for _ in range(4):
+            page.keyboard.press("ArrowDown")
+        page.keyboard.press("Enter")
+        expect(points).to_have_count(count)
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("button", name="Add points")).to_be_visible()
+    tab_to(page, "Start route")
+    page.keyboard.press("Enter")
+    word = page.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
+    expect(word).to_contain_text("Robot 1")
+    tab_to(page, "End route")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name="End route")).to_be_hidden()
+
+
+def test_a_camera_is_shown_large_and_small(open_console):
+    page = open_console()
+    find(page, "robot 1")
+    expect(page.locator("#card [data-camera-id]").first).to_be_visible()
+    find(page, "camera")
+    expect(page.locator(".camera-panel")).to_be_visible()
+    find(page, "camera")
+    expect(page.locator(".camera-panel")).to_be_hidden()
+
+
+def test_control_is_requested_and_handed_over(open_console):
+    mine, theirs = open_console(), open_console()
+    for page in (mine, theirs):
+        find(page, "robot 2")
+    mine.bring_to_front()
+    find(mine, "take control")
+    same_word(mine, "You have control")
+    theirs.bring_to_front()
+    find(theirs, "request control")
+    mine.bring_to_front()
+    expect(mine.get_by_role("button", name="Hand over")).to_be_visible()
+    tab_to(mine, "Hand over")
+    mine.keyboard.press("Enter")
+    theirs.bring_to_front()
+    same_word(theirs, "You have control")

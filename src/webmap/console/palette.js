@@ -17,6 +17,7 @@ const MOST = 12;
 const BUTTONS = /** @type {const} */ ([
   ["Robot", "#robots > .row > button", ".name"],
   ["Selected robot", "#card :is(.actions, .card-buttons) button", ""],
+  ["Camera", "#card [data-camera-id]", ".camera-title"],
   ["Control", ".webmap-teleop-acts button", ""],
   ["Tool", ".tools .webmap-tool-go", ".webmap-tool-name"],
   ["Layer", ".webmap-layers-row", "span"],

@@ -119,7 +119,7 @@ class InitialPoseTool {
   _explain() {
     if (!this._aim.active) return;
     const sure = this._uncertainty.text;
-    const text = "Press where the robot is and drag for the heading";
+    const text = "Press where the robot is and drag for the heading, or use the arrow keys and Enter";
     setText(this._message, sure === "" ? `${text}.` : `${text} (${sure}).`);
   }
 

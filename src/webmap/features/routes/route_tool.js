@@ -257,7 +257,9 @@ class RouteTool {
 
   /** @param {import('./route_run.js').RouteRun | undefined} run @param {string} name */
   _text(run, name) {
-    if (this._aim.active) return "Press on the map for each point and drag for the heading.";
+    if (this._aim.active) {
+      return "Press on the map for each point and drag for the heading. Or use the keys: arrows move, Shift turns, Enter adds.";
+    }
     if (this._aim.waits) return "Waiting: finish the other tool, then add more points.";
     if (this._area.active) return this._area.text;
     const how = this._running(run, name);

@@ -1,0 +1,74 @@
+"""How many presses each frequent task takes."""
+
+import re
+
+import pytest
+from console_ready import PLACES, same_word, title
+from playwright.sync_api import Page, expect
+
+from real_browser import hold
+
+# A page or a robot that waits for a processor stops.
+pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
+
+ROBOTS = 3
+
+COUNT = """() => {
+  window.presses = 0;
+  addEventListener("pointerdown", () => { window.presses += 1; }, true);
+}"""
+
+
+def presses(page: Page) -> int:
+    """Return the number of presses since the last call."""
+    return page.evaluate("() => { const n = presses; window.presses = 0; return n; }")
+
+
+def test_driving_stopping_and_resetting_take_one_one_and_two_presses(open_console):
+    page = open_console()
+    page.evaluate(COUNT)
+    page.locator("#robots .row", has_text="Robot 1").locator("button").first.click()
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
+    assert presses(page) == 1
+    page.locator(".webmap-teleop-stop").first.click()
+    page.keyboard.up("a")
+    same_word(page, "STOP active")
+    assert presses(page) == 1
+    reset = page.locator(".drive-bar .webmap-reset")
+    reset.click()
+    page.wait_for_timeout(450)
+    reset.click()
+    same_word(page, "Free")
+    assert presses(page) == 2
+
+
+def test_a_goal_takes_three_presses(open_console):
+    page = open_console()
+    page.evaluate(COUNT)
+    for _ in range(5):  # a page that is too busy sends nothing
+        page.locator("#robots .row", has_text="Robot 1").locator("button").first.click()
+        page.get_by_role("button", name="Send goal…").click()
+        expect(page.locator(".webmap-goal-word")).to_contain_text("Press on the map")
+        page.mouse.click(*page.evaluate(PLACES)[0])
+        assert presses(page) == 3
+        try:
+            text = re.compile("Goal sent|Goal accepted|Navigating|Goal reached")
+            expect(page.locator("#card .goal")).to_contain_text(text, timeout=5000)
+        except AssertionError:
+            continue
+        return
+    raise AssertionError(page.locator("#card .goal").inner_text())
+
+
+def test_control_of_a_robot_of_another_operator_takes_one_press(open_console):
+    mine, theirs = open_console(), open_console()
+    for page in (mine, theirs):
+        page.locator("#robots .row", has_text="Robot 2").locator("button").first.click()
+    mine.bring_to_front()
+    mine.get_by_role("button", name="Take control of Robot 2").click()
+    same_word(mine, "You have control")
+    theirs.bring_to_front()
+    theirs.evaluate(COUNT)
+    theirs.get_by_role("button", name="Request control").click()
+    same_word(theirs, "You have control", 30)  # after 10 s without an answer
+    assert presses(theirs) == 1
