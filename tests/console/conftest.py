@@ -9,6 +9,7 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import psutil
 import pytest
 from console_ready import wait_until_ready
 from playwright.sync_api import Browser, Page, expect
@@ -61,6 +62,15 @@ def demo(request: pytest.FixtureRequest) -> Iterator[Demo]:
                 process.wait(60)  # the machine may be busy
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+@pytest.fixture
+def halt(demo: Demo) -> Iterator[psutil.Process]:
+    """Halt the simulator's process while the test needs it."""
+    children = psutil.Process(demo.process.pid).children(recursive=True)
+    (simulator,) = [each for each in children if "sim" in each.cmdline()]
+    yield simulator
+    simulator.send_signal(signal.SIGCONT)
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 import re
 import signal
 
-import psutil
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -11,15 +10,6 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 LOST = re.compile("No pose received|No connection to the bridge")
 SOON = 15_000
-
-
-@pytest.fixture
-def halt(demo):
-    """Halt the simulator's process while the test needs it."""
-    children = psutil.Process(demo.process.pid).children(recursive=True)
-    (simulator,) = [each for each in children if "sim" in each.cmdline()]
-    yield simulator
-    simulator.send_signal(signal.SIGCONT)
 
 
 def opened(page: Page) -> Page:

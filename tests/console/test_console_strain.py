@@ -1,0 +1,166 @@
+"""The console when there is far too much, or nothing, or no storage."""
+
+import signal
+from pathlib import Path
+
+import pytest
+from console_ready import assert_free, select, title, wait_until_ready
+from playwright.sync_api import Page, expect
+
+from real_browser import end_stops, hold, watched_tab
+from webmap_process import page_of, simulator
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+SITE = Path(__file__).with_name("strained_site.py")
+
+ROBOTS = 10
+
+STOP_ALL = ".webmap-stop-all"
+
+NO_STORAGE = """() => {
+  const refuse = () => { throw new DOMException("Denied.", "SecurityError"); };
+  for (const name of ["localStorage", "sessionStorage"]) {
+    Object.defineProperty(window, name, { get: refuse });
+  }
+}"""
+"""Storage as in a page that may store nothing."""
+
+FULL_STORAGE = """() => {
+  Storage.prototype.setItem = () => {
+    throw new DOMException("Full.", "QuotaExceededError");
+  };
+}"""
+"""Storage that has no space left."""
+
+CORNER = """(e) => {
+  const { right, top } = e.getBoundingClientRect();
+  return [innerWidth - right, top];
+}"""
+"""Pixels from an element to the right and the top edge of the window."""
+
+
+COUNT_REMOVED = """() => {
+  window.removed = 0;
+  new MutationObserver((records) => {
+    const nodes = records.flatMap(({ removedNodes }) => [...removedNodes]);
+    window.removed += nodes.filter((node) => !node.isConnected).length;
+  }).observe(document.querySelector("#robots"), { childList: true });
+}"""
+"""Counts the lines that are removed from the list."""
+
+
+def rows(page: Page):
+    return page.locator("#robots > .row:not(.filtered)")
+
+
+def test_five_hundred_robots_are_listed_found_and_counted(chromium):
+    with page_of(SITE, ROBOTS="500") as url, watched_tab(chromium, 1280, 800) as page:
+        page.goto(url)
+        wait_until_ready(page)
+        expect(rows(page)).to_have_count(500, timeout=60_000)
+        expect(page.locator(".chip")).to_have_text(["500 view only"], timeout=60_000)
+        assert_free(page.locator(STOP_ALL))
+        page.keyboard.press("Control+k")
+        page.keyboard.type("robot 499")
+        page.keyboard.press("Enter")
+        expect(page.locator("#card h2")).to_have_text("Robot 499")
+        page.locator("#search").fill("robot 49")
+        expect(rows(page)).to_have_count(11)
+        assert_free(page.locator(STOP_ALL))
+
+
+def test_a_page_without_robots_shows_the_next_step_and_stays_as_large(chromium):
+    with page_of(SITE, ROBOTS="0") as url, watched_tab(chromium, 1280, 800) as page:
+        page.goto(url)
+        wait_until_ready(page)
+        expect(page.locator(".no-robots")).to_be_visible()
+        assert_free(page.locator(STOP_ALL))
+        page.wait_for_timeout(2000)
+        nodes = "() => document.querySelectorAll('*').length"
+        before = page.evaluate(nodes)
+        page.wait_for_timeout(4000)
+        assert page.evaluate(nodes) == before
+
+
+def test_a_robot_that_vanishes_again_and_again_changes_no_other_robot(chromium):
+    with (
+        simulator("--robots", "3") as bridge,
+        page_of(SITE, ROBOTS="3", BRIDGE=bridge) as url,
+        watched_tab(chromium, 1280, 800) as page,
+    ):
+        page.goto(url)
+        wait_until_ready(page)
+        select(page, "Robot 1")
+        corner = page.locator(STOP_ALL).evaluate(CORNER)
+        page.evaluate(COUNT_REMOVED)
+        page.wait_for_function("() => window.removed >= 3", timeout=30_000)
+        assert page.locator(STOP_ALL).evaluate(CORNER) == corner
+        expect(page.locator("#card h2")).to_have_text("Robot 1")
+        expect(page.locator(".robot.selected")).to_have_count(1)
+        page.locator("#robots .row", has_text="Robot 2").locator("button").first.click()
+        expect(page.locator("#card h2")).not_to_have_text("Robot 1")
+        page.wait_for_function("() => document.querySelector('#card').hidden")
+        expect(page.locator("#robots .row")).to_have_count(3)
+
+
+def test_all_robots_in_trouble_leave_the_map_and_the_stop_buttons_free(
+    open_console, halt
+):
+    page = open_console()
+    corner = page.locator(STOP_ALL).evaluate(CORNER)
+    halt.send_signal(signal.SIGSTOP)
+    expect(page.locator(".chip").first).to_have_text(f"{ROBOTS} lost", timeout=30_000)
+    expect(page.locator(".webmap-alert-badge")).to_have_text(str(ROBOTS))
+    page.locator(STOP_ALL).click()
+    page.locator(".webmap-alerts > summary").click()
+    alerts = page.locator("[aria-label='New alerts'] > li")
+    expect(alerts.nth(ROBOTS - 1)).to_be_attached()
+    select(page, "Robot 7")
+    for stop in (STOP_ALL, ".webmap-teleop-stop"):
+        assert_free(page.locator(stop).first)
+    assert page.locator(STOP_ALL).evaluate(CORNER) == corner
+    assert page.evaluate("() => document.documentElement.scrollWidth <= innerWidth")
+    halt.send_signal(signal.SIGCONT)
+    expect(page.locator(".chip").first).to_have_text(f"{ROBOTS} stopped")
+    end_stops(page.locator(".webmap-stop-list .webmap-reset"))
+
+
+@pytest.mark.parametrize("storage", [NO_STORAGE, FULL_STORAGE], ids=["none", "full"])
+def test_a_browser_that_stores_nothing_shows_and_changes_everything(
+    demo, chromium, storage
+):
+    with watched_tab(chromium, 1280, 800) as page:
+        page.add_init_script(f"({storage})()")
+        page.goto(demo.url)
+        wait_until_ready(page)
+        select(page, "Robot 1")
+        page.locator(".webmap-layers > summary").click()
+        page.get_by_label("Scans", exact=True).uncheck()
+        expect(page.locator(".laserscan").first).to_be_hidden()
+        page.get_by_role("button", name="List of robots").click()
+        expect(page.locator("#panel")).to_be_hidden()
+        page.get_by_role("button", name="List of robots").click()
+        edge = page.get_by_role("separator", name="Width of the list")
+        edge.focus()
+        page.keyboard.press("ArrowRight")
+        page.get_by_role("button", name="Take control of Robot 1").click()
+        expect(page.locator("#card .state .you")).to_have_text("You have control")
+
+
+@pytest.mark.serial  # a late command stops the robot
+def test_the_stop_button_keeps_its_corner_while_the_window_of_a_driver_changes(
+    open_console,
+):
+    page = open_console()
+    select(page, "Robot 1")
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
+    corner = page.locator(STOP_ALL).evaluate(CORNER)
+    for width, height in ((1440, 900), (1024, 600), (1280, 800)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_timeout(400)
+        assert page.locator(STOP_ALL).evaluate(CORNER) == corner
+        assert_free(page.locator(STOP_ALL))
+        expect(page.locator("#card h2")).to_have_text("Robot 1")
+    page.keyboard.up("a")
+    expect(title(page)).to_have_text("You have control")
