@@ -45,6 +45,12 @@ def test_a_long_frame_is_cut_and_the_next_frame_starts_a_new_piece():
     assert pieces[-3:] == [frame(0)] * 3
 
 
+def test_the_head_of_a_frame_may_come_byte_by_byte():
+    long = frame(1000)
+    *heads, body = (long[:1], long[1:2], long[2:3], long[3:4], long[4:])
+    assert b"".join(cut([*heads, body])) == long
+
+
 @given(st.lists(st.sampled_from([0, 1, 125, 126, 127, 70_000]), max_size=5), st.data())
 def test_no_piece_contains_the_ends_of_two_frames_for_any_chunk_sizes(lengths, data):
     stream = b"".join(map(frame, lengths))
