@@ -50,6 +50,19 @@ def test_a_reloaded_page_receives_the_newest_status_again(player, link):
     assert player.sent == [{"status": status()}] * 2
 
 
+def test_a_later_page_receives_marks_that_were_found_in_several_parts(
+    player, map, link, monkeypatch
+):
+    marks = {"marks": [], "left_out": 0, "read": 0.5}
+    say(link, MARKS, marks)
+    say(link, MARKS, marks | {"read": 1.0})
+    later = map.add_module(RecordingPlayer, link, print)
+    sent = []
+    monkeypatch.setattr(later.browser_part, "send", sent.append)
+    later.on_ready()
+    assert sent == [{"marks": marks | {"read": 1.0}}]
+
+
 @pytest.mark.parametrize(
     "text", ["", "Recording office: 1.0 of 4.0 s", "[]", '{"at": "x"}', "null", "{"]
 )

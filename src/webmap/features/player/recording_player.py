@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, TypeVar
+from weakref import WeakKeyDictionary
 
 import msgspec
 
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
     from webmap.ros.bridge import Bridge
 
 T = TypeVar("T")
+
+_found: "WeakKeyDictionary[Bridge, Marks]" = WeakKeyDictionary()
+"""The newest marks of each recording, for pages that are opened later: the bridge sends
+marks that were found in several parts to its first listener only."""
 
 
 class RecordingPlayer:
@@ -34,7 +39,7 @@ class RecordingPlayer:
         self.map = map
         self._give = give
         self._status: Status | None = None
-        self._marks: Marks | None = None
+        self._bridge = bridge
         self.browser_part = map.add_browser_part(
             self,
             "features/player/player_bar.js",
@@ -47,8 +52,9 @@ class RecordingPlayer:
         """Send the newest status to a page that was loaded."""
         if self._status is not None:
             self._send("status", self._status)
-        if self._marks is not None:
-            self._send("marks", self._marks)
+        marks = _found.get(self._bridge)
+        if marks is not None:
+            self._send("marks", marks)
 
     def on_message(self, message: dict[str, Any]) -> None:
         """Pass a command to the replay, or report that it is not valid."""
@@ -71,7 +77,7 @@ class RecordingPlayer:
     def _on_marks(self, text: Text) -> None:
         marks = _read(text, Marks)
         if marks is not None:
-            self._marks = marks
+            _found[self._bridge] = marks
             self._send("marks", marks)
 
     def _send(self, kind: str, value: Status | Marks) -> None:
