@@ -205,7 +205,7 @@ def show_stop(page: Page, browser: Browser, picture: Picture, url: str) -> None:
 def show_goal(page: Page, browser: Browser, picture: Picture, url: str) -> None:
     """Send a robot to a pose."""
     page.locator("[data-act=send]").click()
-    x, y = picture.size[0] * 0.62, picture.size[1] * 0.553
+    x, y = picture.size[0] * 0.58, picture.size[1] * 0.495
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 50, y, steps=5)
