@@ -84,6 +84,24 @@ def test_a_goal_is_placed_with_arrow_keys_turned_sent_and_cancelled(open_console
     expect(goal).to_contain_text(re.compile("cancelled|reached"))
 
 
+def test_arrow_keys_move_the_mark_of_a_goal_and_not_the_robot_in_control(open_console):
+    page = open_console()
+    find(page, "robot 1")
+    find(page, "take control")
+    same_word(page, "You have control")
+    expect(page.locator(".webmap-teleop-detail")).not_to_contain_text("Preparing")
+    page.keyboard.press("g")
+    expect(page.locator(".webmap-goal-word")).to_contain_text("arrows move")
+    place = "() => document.querySelector('.robot.selected').getCTM().f"
+    before = page.evaluate(place)
+    page.keyboard.down("ArrowDown")
+    page.wait_for_timeout(1500)
+    page.keyboard.up("ArrowDown")
+    assert page.evaluate(place) == pytest.approx(before, abs=0.01)
+    expect(page.locator(f"{GOAL_MARK}:visible")).to_have_count(1)
+    page.keyboard.press("Escape")
+
+
 def test_a_place_is_found_by_name_and_a_robot_is_sent_there(open_console):
     page = open_console()
     find(page, "robot 2")

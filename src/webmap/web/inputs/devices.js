@@ -149,8 +149,8 @@ export class Devices {
   }
 
   /**
-   * Let a tool use keys that would drive a robot, unless a robot is driven. A STOP key
-   * is never used.
+   * Let a tool use keys that would drive a robot, unless an input is held: a robot that
+   * is driven goes on. A STOP key is never used.
    *
    * @param {(event: KeyboardEvent) => boolean} use Returns whether it used the key.
    * @returns {() => void} Removes this use of keys.
@@ -167,8 +167,7 @@ export class Devices {
    * @returns {boolean} Whether a tool used the key, which then drives no robot.
    */
   _used(event) {
-    const { driven, taking } = this._drive.status;
-    if (driven !== null || taking) return false;
+    if (this._drive.status.pressed) return false;
     return [...this._keyUsers].some((use) => uses(() => use(event)));
   }
 
