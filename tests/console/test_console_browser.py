@@ -371,7 +371,7 @@ def test_route_points_can_be_added_by_touch_after_set_pose_in_between(
     ).to_have_text("Waiting: finish the other tool, then add more points.")
     tap_floor(2)
     expect(page.locator(".webmap-locate-word")).to_contain_text(
-        re.compile("^Pose sent|^Not sent")
+        re.compile("^Pose sent|^Pose not sent")
     )
     expect(edit).to_have_text("Done")
     for count in (2, 3):

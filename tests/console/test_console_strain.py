@@ -64,7 +64,7 @@ def test_five_hundred_robots_are_listed_found_and_counted(chromium):
         page.keyboard.press("Control+k")
         page.keyboard.type("robot 499")
         page.keyboard.press("Enter")
-        expect(page.locator("#card h2")).to_have_text("Robot 499")
+        expect(page.locator("#card h2")).to_have_text("Robot 499", timeout=60_000)
         page.locator("#search").fill("robot 49")
         expect(rows(page)).to_have_count(11)
         assert_free(page.locator(STOP_ALL))
