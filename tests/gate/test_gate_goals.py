@@ -454,6 +454,13 @@ class TestProgress:
         bench.say("b", op="cancel", robot="r1")
         assert self.end(bench, "reached").state == "reached"
 
+    def test_a_goal_that_fails_because_of_its_cancel_is_reported_as_cancelled(
+        self, bench
+    ):
+        bench.say("b", op="cancel", robot="r1")
+        goal = self.end(bench, "failed", "superseded")
+        assert (goal.state, goal.why) == ("cancelled", "by B")
+
     def test_a_goal_cancelled_by_another_program_reports_the_cause(self, bench):
         goal = self.end(bench, "cancelled", "")
         assert goal.why == "by the robot, or by another program"

@@ -180,12 +180,13 @@ class Goals:
         report = self._report_on(end.id)
         if report is not None and report.state not in OVER:
             self._cancelled_at = float("-inf")  # a cancel is answered by this
-            why = end.why
+            outcome, why = end.outcome, end.why
             if end.no_actions and self.spec.goal_topic is not None:
                 why = f"{why}; the next goal goes to {self.spec.goal_topic}"
-            if end.outcome == "cancelled":
-                why = report.why if report.state == "cancelling" else why
-            self._show(end.outcome, why or _DEFAULT_REASONS[end.outcome], now)
+            # Some robots answer a cancel by giving up the goal as failed.
+            if report.state == "cancelling" and outcome != "reached":
+                outcome, why = "cancelled", report.why
+            self._show(outcome, why or _DEFAULT_REASONS[outcome], now)
 
     def on_progress_lost(self, lost: GoalLost, now: float) -> None:
         """Note that no progress of a goal is received any more."""
