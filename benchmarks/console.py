@@ -19,9 +19,15 @@ FEW = 2
 BEAMS = 360
 TIMES = 20
 
+# The end of the first frame that begins with the effect on the page.
 DRAWN = """
-const drawn = () => new Promise((done) =>
-  requestAnimationFrame(() => setTimeout(() => done(performance.now()))));
+const drawn = (shown = () => true) => new Promise((done) => {
+  const begin = () => {
+    const there = shown();
+    setTimeout(() => there ? done(performance.now()) : requestAnimationFrame(begin));
+  };
+  requestAnimationFrame(begin);
+});
 """
 
 SELECT = """async (index) => {
@@ -30,8 +36,7 @@ SELECT = """async (index) => {
   const card = document.querySelector("#card");
   const from = performance.now();
   row.querySelector("button").click();
-  while (card.dataset.robot !== row.dataset.robot) await drawn();
-  return (await drawn()) - from;
+  return (await drawn(() => card.dataset.robot === row.dataset.robot)) - from;
 }""".replace("DRAWN", DRAWN)
 
 FILTER = """async (text) => {
