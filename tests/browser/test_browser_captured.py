@@ -79,7 +79,7 @@ def dots_in_world(tab, selector: str) -> list[list[float]]:
         """dot => {
             const world = dot.closest(".world");
             const tf = world.getCTM().inverse().multiply(dot.getCTM());
-            const square = /M(-?\\d+) (-?\\d+)h(\\d+)v(\\d+)h-\\d+z/y;
+            const square = /M(-?\\d+) (-?\\d+)h(\\d+)v(\\d+)h-\\d+/y;
             const d = dot.getAttribute("d"), places = [];
             while (square.lastIndex < d.length) {
                 const [, x, y, w, h] = square.exec(d).map(Number);

