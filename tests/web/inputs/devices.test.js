@@ -99,11 +99,18 @@ test("a key that a tool uses drives no robot", () => {
   assert.equal(keyAt({}, () => false)?.x, 1);
 });
 
-test("no tool uses a key while a robot is driven or taken", () => {
+test("no tool uses a key while another input is held", () => {
   const never = () => assert.fail("the tool was asked");
-  assert.equal(keyAt({ driven: "r1" }, never)?.x, 1);
-  assert.equal(keyAt({ taking: true }, never)?.x, 1);
+  assert.equal(keyAt({ driven: "r1", pressed: true }, never)?.x, 1);
+  assert.equal(keyAt({ taking: true, pressed: true }, never)?.x, 1);
   assert.deepEqual(reported, []);
+});
+
+test("a tool uses a key under control of a robot while no input is held", () => {
+  assert.equal(
+    keyAt({ driven: "r1", pressed: false }, () => true),
+    null,
+  );
 });
 
 test("a key drives although a tool fails", () => {
