@@ -56,6 +56,8 @@ def rows(page: Page):
 
 def test_five_hundred_robots_are_listed_found_and_counted(chromium):
     with page_of(SITE, ROBOTS="500") as url, watched_tab(chromium, 1280, 800) as page:
+        # A busy machine may not open the socket within the page's patience of 5 s.
+        page.allowed = ["closed before the connection is established"]
         page.goto(url)
         wait_until_ready(page)
         expect(rows(page)).to_have_count(500, timeout=60_000)

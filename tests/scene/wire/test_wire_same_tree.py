@@ -55,7 +55,7 @@ async (frames) => {
       classes: classes.split(" ").filter((name) => name && name !== "stale").sort(),
       size: node.style.getPropertyValue("--dot-size"),
       matrix: [m.a, m.b, m.c, m.d, m.e, m.f],
-      dots: (d ?? "").split("z").length - 1,
+      dots: (d ?? "").split("M").length - 1,
       children: Array.from(node.childNodes, plain),
     };
   };
