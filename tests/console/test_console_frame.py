@@ -157,3 +157,24 @@ def test_the_needle_shows_the_rotation_and_turns_north_up(open_console):
     expect(north).not_to_have_attribute("title", re.compile(r"turned by 0°"))
     north.click()
     expect(north).to_have_attribute("title", re.compile(r"turned by 0°"))
+
+
+SIZES_ON_A_WALL = """() => {
+  const names = [".row .name", "#card h2", ".robot .label", ".webmap-teleop-state"];
+  return names.map((name) => {
+    const element = document.querySelector(name);
+    const drawn = element instanceof SVGElement && element.getScreenCTM();
+    const size = Number.parseFloat(getComputedStyle(element).fontSize);
+    return drawn ? size * Math.hypot(drawn.a, drawn.b) : size;
+  });
+}"""
+"""The sizes of texts on the screen, in pixels."""
+
+
+def test_a_wall_has_text_that_is_read_from_some_metres(open_console):
+    page = open_console()
+    page.set_viewport_size({"width": 3840, "height": 2160})
+    select(page, "Robot 1")
+    sizes = page.evaluate(SIZES_ON_A_WALL)
+    assert min(sizes) >= 21, sizes
+    assert page.evaluate(ROBOT) == "free"

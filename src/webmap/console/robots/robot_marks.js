@@ -169,12 +169,13 @@ const STATES = Object.keys(WORDS);
 export function markRobots(map) {
   const marks = new ClusterMarks(map);
   const update = () => {
+    marks.wall = wallOf();
     const elements = [...map.world.querySelectorAll(".robot:not(.unplaced)")];
     const robots = elements.map(drawn);
-    const places = robots.map(({ id, x, y }) => ({
-      ...map.toScreen(x, y),
-      alone: id === map.selected,
-    }));
+    const places = robots.map(({ id, x, y }) => {
+      const place = map.toScreen(x, y);
+      return { x: place.x / marks.wall, y: place.y / marks.wall, alone: id === map.selected };
+    });
     const far = scaleOf(map.view) < TRUE_SIZE;
     const clusters = far ? clustersOf(places) : [];
     const joined = new Set(clusters.flat());
@@ -190,6 +191,11 @@ export function markRobots(map) {
     for (const off of offs) off();
     marks.remove();
   };
+}
+
+/** @returns {number} How much larger than on a desk the marks are: the CSS has `--wall`. */
+function wallOf() {
+  return Number(getComputedStyle(document.documentElement).getPropertyValue("--wall")) || 1;
 }
 
 /**
@@ -256,6 +262,8 @@ class ClusterMarks {
   /** @param {MapCanvas} map */
   constructor(map) {
     this._map = map;
+    /** How much larger than on a desk they are. */
+    this.wall = 1;
     this._group = svg("g", { class: "clusters" });
     /** @type {Map<string, {element: SVGGElement, robots: Drawn[]}>} By the first robot. */
     this._marks = new Map();
@@ -285,7 +293,8 @@ class ClusterMarks {
     for (const { element, robots } of this._marks.values()) {
       const [x, y] = middle(robots);
       const place = this._map.toScreen(x, y);
-      element.setAttribute("transform", `translate(${place.x} ${place.y})`);
+      const size = this.wall === 1 ? "" : ` scale(${this.wall})`;
+      element.setAttribute("transform", `translate(${place.x} ${place.y})${size}`);
     }
   }
 
