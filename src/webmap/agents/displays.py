@@ -1,0 +1,200 @@
+"""The displays of an agent: which of their messages reach the gate, and when they end.
+
+No I/O: the agent passes samples and times in, and sends what is returned. The agent
+trusts no display. A display may connect pages and pass on their commands, and nothing
+else: it declares no robot, and the gate decides about every command as always.
+
+A display is alive while it answers what the agent sends. An answer names the newest
+sample that has arrived, so its age is known by the agent's clock alone: an answer to an
+old sample, which the network delivers late, is no sign of life.
+"""
+
+import logging
+from collections import deque
+from collections.abc import Mapping
+
+import msgspec
+
+from webmap.agents.samples import Numbering, Order
+from webmap.base.errors import WireError
+from webmap.gate.commands import Stop, begins_like_stop, robot_in
+from webmap.gate.protocol import (
+    Connect,
+    Disconnect,
+    FromGate,
+    FromPage,
+    FromProgram,
+    Role,
+    Speeds,
+    ToGate,
+)
+
+log = logging.getLogger("webmap.agent")
+
+FRESH = 0.3
+"""Seconds after which an answer to a sample is no sign of life any more."""
+
+SILENT = 0.25
+"""Seconds without a sign of life after which the pages of a display count as lost."""
+
+MOST_PAGES = 200
+"""The greatest number of pages of one display."""
+
+
+class Answer(msgspec.Struct, frozen=True, tag="answer"):
+    """A display has received this sample of the agent; sent every 50 ms."""
+
+    session: int
+    number: int
+
+
+FromDisplay = Connect | Disconnect | FromPage | Speeds | Answer
+"""What a display may send. Everything else is refused whole."""
+
+_decode = msgspec.msgpack.Decoder(FromDisplay).decode
+_encode = msgspec.msgpack.Encoder().encode
+
+
+class Display:
+    """What the agent knows of one display."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.order = Order()
+        self.alive_at = float("-inf")
+        """When it was alive for certain."""
+        self.pages: dict[str, list[Connect | Speeds]] = {}
+        """The messages that make each of its pages known to a gate, by connection."""
+
+    def owns(self, connection: str) -> bool:
+        """Return whether a connection has the form that this display may use."""
+        return connection.startswith(f"{self.name}/")
+
+
+class Displays:
+    """All displays of one agent.
+
+    Args:
+        roles: What the users of each display may do at most, by the display's name;
+            "" is for the others. Without it, all of them may be operators.
+
+    """
+
+    def __init__(self, roles: Mapping[str, Role] | None = None) -> None:
+        self._roles = dict(roles or {"": "operator"})
+        self._displays: dict[str, Display] = {}
+        self._numbering = Numbering()
+        self._sent: deque[tuple[int, float]] = deque()
+
+    @property
+    def names(self) -> list[str]:
+        """The displays that have pages now."""
+        return [name for name, display in self._displays.items() if display.pages]
+
+    def introduction(self) -> list[ToGate]:
+        """Return the messages that make all pages known to a new gate."""
+        return [
+            message
+            for display in self._displays.values()
+            for messages in display.pages.values()
+            for message in messages
+        ]
+
+    def send(self, message: FromGate, now: float) -> bytes:
+        """Return the sample that carries a message of the gate to all displays."""
+        sample = self._numbering.next(_encode(message))
+        self._sent.append((self._numbering.sent, now))
+        while now - self._sent[0][1] > FRESH:
+            self._sent.popleft()
+        return sample
+
+    def receive(self, name: str, sample: bytes, now: float) -> list[ToGate]:
+        """Return what the gate gets from a sample of a display.
+
+        Args:
+            name: The display, by the key on which the router accepted the sample.
+            sample: The sample.
+            now: Seconds, monotonic.
+
+        Raises:
+            WireError: If the sample is not one that a display may send.
+
+        """
+        display = self._displays.setdefault(name, Display(name))
+        body, restarted = display.order.take(sample)
+        lost: list[ToGate] = self._end(display) if restarted else []
+        if body is None:
+            return lost
+        try:
+            message = _decode(body)
+        except (msgspec.DecodeError, RecursionError) as error:
+            raise WireError(f"display {name}: got no message: {error}") from error
+        if isinstance(message, Answer):
+            self._answered(display, message)
+            return lost
+        if not display.owns(message.connection):
+            raise WireError(
+                f"display {name}: got the connection {message.connection!r}, "
+                f"expected one that begins with {name}/"
+            )
+        return lost + self._pass_on(display, message, now)
+
+    def look(self, now: float) -> list[ToGate]:
+        """Return what ends the pages of displays that give no sign of life."""
+        ended: list[ToGate] = []
+        for display in self._displays.values():
+            if display.pages and now - display.alive_at > SILENT:
+                log.warning("display %s gives no sign of life", display.name)
+                ended += self._end(display)
+        return ended
+
+    def _answered(self, display: Display, answer: Answer) -> None:
+        if answer.session != self._numbering.session:
+            return
+        for number, at in self._sent:
+            if number == answer.number:
+                display.alive_at = max(display.alive_at, at)
+
+    def _pass_on(
+        self,
+        display: Display,
+        message: Connect | Disconnect | FromPage | Speeds,
+        now: float,
+    ) -> list[ToGate]:
+        match message:
+            case Connect():
+                if not display.pages:  # it answers as soon as it gets hello
+                    display.alive_at = max(display.alive_at, now)
+                if len(display.pages) >= MOST_PAGES:
+                    raise WireError(
+                        f"display {display.name}: got more than {MOST_PAGES} pages"
+                    )
+                allowed = self._allowed(display, message)
+                display.pages[message.connection] = [allowed]
+                return [allowed]
+            case Disconnect():
+                known = display.pages.pop(message.connection, None)
+                return [] if known is None else [message]
+            case Speeds():
+                known = display.pages.get(message.connection)
+                if known is not None:
+                    known[1:] = [message]
+            case _:
+                known = display.pages.get(message.connection)
+                if known is None and begins_like_stop(message.text):
+                    # A STOP of a page that counts as lost is obeyed all the same.
+                    robot = robot_in(message.text)
+                    return [FromProgram(Stop(None if robot == "*" else robot))]
+        return [] if known is None else [message]
+
+    def _allowed(self, display: Display, connect: Connect) -> Connect:
+        """Return a page's introduction with at most the role of its display."""
+        order = ("viewer", "operator", "admin")
+        most = self._roles.get(display.name, self._roles.get("", "viewer"))
+        role = min(connect.role, most, key=order.index)
+        return msgspec.structs.replace(connect, role=role)
+
+    def _end(self, display: Display) -> list[ToGate]:
+        ended: list[ToGate] = [Disconnect(connection) for connection in display.pages]
+        display.pages.clear()
+        return ended

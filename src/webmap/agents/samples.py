@@ -1,0 +1,69 @@
+"""Numbered samples: what is lost, doubled or out of order is noticed.
+
+A sample carries one message of the gate. It begins with the random number of its sender's
+session and with its own number, which grows by one.
+"""
+
+import secrets
+import struct
+
+from webmap.base.errors import WireError
+
+_head = struct.Struct("<QQ")
+
+MAX_BYTES = 1 << 20
+"""The longest sample, in bytes."""
+
+
+class Numbering:
+    """Numbers the samples of one sender."""
+
+    def __init__(self, session: int | None = None) -> None:
+        self.session = secrets.randbits(64) if session is None else session
+        """The identity of the sender until it restarts."""
+        self.sent = 0
+        """The number of the newest sample; 0 before the first."""
+
+    def next(self, body: bytes) -> bytes:
+        """Return the next sample, with this body."""
+        self.sent += 1
+        return _head.pack(self.session, self.sent) + body
+
+
+class Order:
+    """Accepts the samples of one sender, each once and in their order."""
+
+    def __init__(self) -> None:
+        self.session: int | None = None
+        """The session of the sender; None before the first sample."""
+        self.newest = 0
+        """The number of the newest accepted sample."""
+        self.lost = 0
+        """How many samples never came."""
+        self.refused = 0
+        """How many samples came twice or too late."""
+
+    def take(self, sample: bytes) -> tuple[bytes | None, bool]:
+        """Return the body of a sample, and whether its sender has restarted.
+
+        The body is None if the sample came twice or after a newer one.
+
+        Raises:
+            WireError: If the bytes are no sample.
+
+        """
+        if not _head.size <= len(sample) <= MAX_BYTES:
+            raise WireError(
+                f"got a sample of {len(sample)} bytes, "
+                f"expected {_head.size} to {MAX_BYTES}"
+            )
+        session, number = _head.unpack_from(sample)
+        restarted = session != self.session
+        if restarted:
+            self.session, self.newest = session, number - 1
+        if number <= self.newest:
+            self.refused += 1
+            return None, False
+        self.lost += number - self.newest - 1
+        self.newest = number
+        return sample[_head.size :], restarted

@@ -1,0 +1,128 @@
+"""What an agent accepts from displays, and when the pages of a display end."""
+
+import msgspec
+import pytest
+
+from webmap.agents.displays import Answer, Displays
+from webmap.agents.samples import Numbering, Order
+from webmap.base.errors import WireError
+from webmap.gate.commands import Stop
+from webmap.gate.protocol import (
+    Connect,
+    Disconnect,
+    Forget,
+    FromPage,
+    FromProgram,
+    Heartbeat,
+    RobotSpec,
+    Speeds,
+    Tick,
+    WriterNodes,
+)
+
+PAGE = Connect("west/c1", "Ann", "operator")
+STOP = b'{"op":"stop","robot":"*"}'
+
+
+class West:
+    """A display, and the agent that it reaches."""
+
+    def __init__(self, **roles):
+        self.displays = Displays({"": "operator"} | roles)
+        self.numbering = Numbering()
+        self.order = Order()
+
+    def says(self, message, now=0.0):
+        sample = self.numbering.next(msgspec.msgpack.encode(message))
+        return self.displays.receive("west", sample, now)
+
+    def hears(self, tick, now):
+        self.order.take(self.displays.send(Tick(tick, {}), now))
+
+    def answers(self, now):
+        return self.says(Answer(self.order.session, self.order.newest), now)
+
+
+@pytest.fixture
+def west():
+    return West()
+
+
+def test_a_page_and_its_commands_reach_the_gate(west):
+    speeds = Speeds("west/c1", 1.0, 2.0)
+    command = FromPage("west/c1", b'{"op":"take","robot":"r1"}')
+    assert [west.says(each) for each in (PAGE, speeds, command)] == [
+        [PAGE],
+        [speeds],
+        [command],
+    ]
+    assert west.displays.introduction() == [PAGE, speeds]
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        RobotSpec(id="r1", name="Bob", bridge_url="ws://evil", v_max=100.0),
+        Forget("r1"),
+        WriterNodes("r1", ("/a",)),
+        Heartbeat(),
+        FromProgram(Stop("r1")),
+    ],
+)
+def test_a_display_can_declare_no_robot_and_send_nothing_else(west, message):
+    with pytest.raises(WireError, match="display west: got no message"):
+        west.says(message)
+
+
+def test_a_display_uses_only_connections_of_its_own(west):
+    with pytest.raises(WireError, match="expected one that begins with west/"):
+        west.says(Connect("east/c1", "Ann", "operator"))
+
+
+def test_a_display_gives_its_pages_at_most_its_own_role():
+    west = West(west="viewer")
+    assert west.says(PAGE) == [Connect("west/c1", "Ann", "viewer")]
+
+
+def test_a_message_of_an_unknown_page_is_dropped_but_stop_is_obeyed(west):
+    assert west.says(FromPage("west/c7", b'{"op":"take","robot":"r1"}')) == []
+    assert west.says(FromPage("west/c7", STOP)) == [FromProgram(Stop(None))]
+
+
+def test_a_sample_that_comes_twice_or_late_is_dropped(west):
+    first = west.numbering.next(msgspec.msgpack.encode(PAGE))
+    second = west.numbering.next(msgspec.msgpack.encode(Disconnect("west/c1")))
+    assert west.displays.receive("west", second, 0.0) == []
+    assert west.displays.receive("west", first, 0.0) == []
+    assert west.displays.receive("west", second, 0.0) == []
+
+
+def test_the_pages_of_a_silent_display_end_after_250_ms(west):
+    west.says(PAGE, 0.0)
+    west.hears(1, 0.05)
+    west.answers(0.1)
+    assert west.displays.look(0.3) == []
+    assert west.displays.look(0.31) == [Disconnect("west/c1")]
+    assert west.displays.look(0.4) == []
+
+
+def test_an_answer_to_an_old_sample_is_no_sign_of_life(west):
+    west.says(PAGE, 0.0)
+    for tick in range(20):
+        west.hears(tick, 0.05 * tick)
+    late = Answer(west.order.session, 2)  # sent at 0.05 s
+    west.says(late, 1.0)
+    assert west.displays.look(1.0) == [Disconnect("west/c1")]
+
+
+def test_a_display_that_restarts_loses_its_pages(west):
+    west.says(PAGE)
+    west.numbering = Numbering()
+    again = Connect("west/c2", "Ann", "operator")
+    assert west.says(again) == [Disconnect("west/c1"), again]
+
+
+@pytest.mark.parametrize("sample", [b"", b"x" * 15, b"x" * 40, b"x" * 2_000_000])
+def test_bytes_that_are_no_sample_are_refused(west, sample):
+    with pytest.raises(WireError):
+        west.displays.receive("west", sample, 0.0)
