@@ -39,12 +39,12 @@ export class Drive {
     this._listeners = new Listeners();
     this._poseCommands = new PoseCommands(
       this._pilot,
-      this._session.loop,
+      this._session.loops,
       (commands) => this._send(commands),
       () => performance.now(),
     );
     this._link = new GateLink(socketUrl(baseUrl, options.id), {
-      open: () => this._session.loop.open(performance.now()),
+      open: () => this._session.loops.open(performance.now()),
       receive: (message) => this._receive(message),
       lost: () => this._emitAll(this._session.lost(performance.now())),
     });

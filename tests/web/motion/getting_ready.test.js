@@ -66,7 +66,7 @@ function pressAt(at) {
   for (let now = 0; now < END; now += 10) {
     if (BUSY.some(([from, to]) => now >= from && now < to)) continue;
     if (now === CONNECTED) {
-      session.loop.open(now);
+      session.loops.open(now);
       session.receive({ op: "hello", connection: "c1" }, now);
       session.receive(REPORT, now);
       pilot.choose("r1", now);

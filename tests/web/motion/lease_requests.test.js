@@ -3,7 +3,7 @@ import { beforeEach, describe, test } from "node:test";
 
 import { Inputs } from "../../../src/webmap/web/motion/inputs.js";
 import { Leases } from "../../../src/webmap/web/motion/leases.js";
-import { Loop } from "../../../src/webmap/web/motion/loop.js";
+import { Loops } from "../../../src/webmap/web/motion/loops.js";
 import { LeaseRequests, TAKE_PATIENCE } from "../../../src/webmap/web/motion/lease_requests.js";
 import { Stream } from "../../../src/webmap/web/motion/stream.js";
 
@@ -17,7 +17,7 @@ let it;
 beforeEach(() => {
   const inputs = new Inputs(-1000);
   const leases = new Leases();
-  const stream = new Stream(inputs, new Loop(), 0);
+  const stream = new Stream(inputs, new Loops(), 0);
   it = { inputs, leases, stream, reach: new LeaseRequests(inputs, leases, stream) };
   say("r1", {}, 0);
   it.reach.choose("r1");

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 
 import { Inputs } from "../../../src/webmap/web/motion/inputs.js";
-import { Loop } from "../../../src/webmap/web/motion/loop.js";
+import { Loops } from "../../../src/webmap/web/motion/loops.js";
 import { Pilot } from "../../../src/webmap/web/motion/pilot.js";
 
 export const FORWARD = { x: 1, y: 0, turn: 0 };
@@ -19,11 +19,11 @@ export class Bench {
     this.epoch = 7;
     /** @type {any[]} */
     this.sent = [];
-    this.loop = new Loop();
+    this.loops = new Loops();
     this.inputs = new Inputs(-1000);
-    this.pilot = new Pilot(this.inputs, this.loop, 0, options);
-    this.loop.open(0);
-    this.loop.receive(this.tick, -1, 0);
+    this.pilot = new Pilot(this.inputs, this.loops, 0, options);
+    this.loops.open(0);
+    this.loops.own.receive(this.tick, -1, 0);
     this.say("r1");
     this.say("r2");
     this.pilot.choose("r1", 0);
@@ -79,7 +79,7 @@ export class Bench {
 
   step(dt = 50) {
     this.now += dt;
-    if (this.ticking && dt > 0) this.loop.receive(++this.tick, this.ack, this.now);
+    if (this.ticking && dt > 0) this.loops.own.receive(++this.tick, this.ack, this.now);
     return this.keep(this.pilot.step(this.now, this.attentive));
   }
 

@@ -12,7 +12,7 @@ let it;
 beforeEach(() => {
   const session = new Session(0, {});
   const send = (/** @type {any[]} */ commands) => it.sent.push(...commands);
-  const poseCommands = new PoseCommands(session.pilot, session.loop, send, () => it.now);
+  const poseCommands = new PoseCommands(session.pilot, session.loops, send, () => it.now);
   it = { now: 0, sent: [], session, poseCommands };
   session.receive({ op: "hello", connection: "c1" }, 0);
   say(false);

@@ -22,7 +22,7 @@ const REPORT = {
 let session;
 beforeEach(() => {
   session = new Session(0, {});
-  session.loop.open(0);
+  session.loops.open(0);
 });
 
 /**
@@ -71,7 +71,7 @@ describe("a connection", () => {
     assert.deepEqual([also, report.robot, report.mine], ["robot", "r1", false]);
     assert.equal(session.connection, null);
     assert.equal(session.pilot.driven, null);
-    assert.equal(session.loop.tick, null);
+    assert.equal(session.loops.own.tick, null);
     assert.equal(session.inputs.blocked, true);
   });
 

@@ -2,19 +2,19 @@ import assert from "node:assert/strict";
 import { beforeEach, describe, test } from "node:test";
 
 import { Inputs } from "../../../src/webmap/web/motion/inputs.js";
-import { Loop } from "../../../src/webmap/web/motion/loop.js";
+import { Loops } from "../../../src/webmap/web/motion/loops.js";
 import { ASLEEP, SETTLE, Stream } from "../../../src/webmap/web/motion/stream.js";
 
 const FORWARD = { x: 1, y: 0, turn: 0 };
 
-/** @type {{inputs: Inputs, loop: Loop, stream: Stream, now: number}} */
+/** @type {{inputs: Inputs, loops: Loops, stream: Stream, now: number}} */
 let it;
 beforeEach(() => {
   const inputs = new Inputs(-1000);
-  const loop = new Loop();
-  it = { inputs, loop, stream: new Stream(inputs, loop, 0), now: 0 };
-  loop.open(0);
-  loop.receive(100, -1, 0);
+  const loops = new Loops();
+  it = { inputs, loops, stream: new Stream(inputs, loops, 0), now: 0 };
+  loops.open(0);
+  loops.own.receive(100, -1, 0);
   it.stream.open("r1", 7, 0);
   inputs.set("keys", FORWARD, 0);
 });
@@ -30,10 +30,10 @@ function run(ms, { armed = true, attentive = true, acking = true } = {}) {
   const said = [];
   for (const end = it.now + ms; it.now < end; ) {
     it.now += 50;
-    it.stream.look(it.now, attentive);
+    it.stream.look(it.now, attentive, "r1");
     said.push(...it.stream.step(armed, it.now));
     const ack = acking ? Number(said.at(-1)?.seq ?? -1) : -1;
-    it.loop.receive(100 + it.now / 50, ack, it.now);
+    it.loops.own.receive(100 + it.now / 50, ack, it.now);
   }
   return said;
 }
@@ -80,7 +80,7 @@ describe("a stream", () => {
     run(200);
     it.stream.restart();
     assert.equal(it.stream.lease, null);
-    assert.equal(it.stream.stamp().seq, 0);
+    assert.equal(it.stream.stamp("r1").seq, 0);
   });
 
   test("counts as used while inputs ask for motion", () => {
@@ -107,16 +107,16 @@ describe("a stream that moves a robot", () => {
 
   const doubts = {
     "the page is not attended to": () => run(50, { attentive: false }),
-    "the page slept": () => it.stream.look((it.now += ASLEEP + 1), true),
-    "the clock was set back": () => it.stream.look((it.now -= 1), true),
+    "the page slept": () => it.stream.look((it.now += ASLEEP + 1), true, "r1"),
+    "the clock was set back": () => it.stream.look((it.now -= 1), true, "r1"),
     "the picture is old": () => {
       it.stream.pictures.goBy("r1", () => 1001);
       run(50);
     },
-    "the loop is late": () => it.stream.look((it.now += 301), true),
+    "the loop is late": () => it.stream.look((it.now += 301), true, "r1"),
     "there is no tick": () => {
-      it.loop.open(it.now);
-      it.stream.look(it.now, true);
+      it.loops.open(it.now);
+      it.stream.look(it.now, true, "r1");
     },
     "somebody says so": () => it.stream.goNeutral(it.now),
   };

@@ -3,7 +3,7 @@ import { LeaseRequests } from "./lease_requests.js";
 import { Stream } from "./stream.js";
 
 /** @typedef {import('./inputs.js').Inputs} Inputs */
-/** @typedef {import('./loop.js').Loop} Loop */
+/** @typedef {import('./loops.js').Loops} Loops */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
 /** @typedef {import('./stream.js').Command} Command */
 
@@ -15,22 +15,22 @@ const RENEW = 10_000;
  * the axes to send with it.
  *
  * It is called at 20 Hz and after every change, and returns the messages to send. A robot
- * moves only with: an attentive page, inputs that are not blocked, an open loop, a lease
- * on the chosen robot, and neutral commands that the gate has received for a while since
- * {@link Pilot#goNeutral}. Times are in milliseconds of one clock.
+ * moves only with: an attentive page, inputs that are not blocked, an open loop to its
+ * gate, a lease on the chosen robot, and neutral commands that the gate has received for a
+ * while since {@link Pilot#goNeutral}. Times are in milliseconds of one clock.
  */
 export class Pilot {
   /**
    * @param {Inputs} inputs
-   * @param {Loop} loop
+   * @param {Loops} loops
    * @param {number} now
    * @param {{releaseAfter?: number}} [options] `releaseAfter`: the lease is
    *     released after this time without motion, in ms.
    */
-  constructor(inputs, loop, now, { releaseAfter = 30_000 } = {}) {
+  constructor(inputs, loops, now, { releaseAfter = 30_000 } = {}) {
     this.inputs = inputs;
     this.releaseAfter = releaseAfter;
-    this._stream = new Stream(inputs, loop, now);
+    this._stream = new Stream(inputs, loops, now);
     this._leases = new Leases();
     /**
      * When each lease was last renewed.
@@ -75,7 +75,7 @@ export class Pilot {
       driven: this.driven,
       taking: robot !== null,
       settled: this.settled,
-      early: this._stream.early,
+      early: this._stream.early(choice),
       pressed: this.inputs.pressed,
       blocked: this.inputs.blocked,
       axes: this.inputs.axes,
@@ -187,7 +187,7 @@ export class Pilot {
    */
   place(op, robot, pose, now) {
     if (robot !== this.driven) this._leases.park(robot, now);
-    const { seq, tick } = this._stream.stamp();
+    const { seq, tick } = this._stream.stamp(robot);
     return { op, robot, epoch: this.epoch(robot), seq, tick, ...pose };
   }
 
@@ -305,7 +305,7 @@ export class Pilot {
    * @returns {Command[]}
    */
   step(now, attentive) {
-    this._stream.look(now, attentive);
+    this._stream.look(now, attentive, this._requests.choice);
     const reached = this._requests.step(now);
     return [...reached, ...this._stream.step(this._armed, now), ...this._tidy(now)];
   }

@@ -1,6 +1,6 @@
 import { TAKE_PATIENCE } from "./lease_requests.js";
 
-/** @typedef {import('./loop.js').Loop} Loop */
+/** @typedef {import('./loops.js').Loops} Loops */
 /** @typedef {import('./pilot.js').Pilot} Pilot */
 /** @typedef {import('./stream.js').Command} Command */
 
@@ -24,13 +24,13 @@ import { TAKE_PATIENCE } from "./lease_requests.js";
 export class PoseCommands {
   /**
    * @param {Pilot} pilot
-   * @param {Loop} loop
+   * @param {Loops} loops
    * @param {(commands: Command[]) => void} send
    * @param {() => number} clock
    */
-  constructor(pilot, loop, send, clock) {
+  constructor(pilot, loops, send, clock) {
     this._pilot = pilot;
-    this._loop = loop;
+    this._loops = loops;
     this._send = send;
     this._clock = clock;
     /** @type {Set<PendingOperation>} */
@@ -54,9 +54,10 @@ export class PoseCommands {
       await this._until(robot, "take", () => this._pilot.epoch(robot) !== null);
     }
     const command = this._pilot.place(op, robot, { x, y, yaw }, this._clock());
+    const loop = this._loops.of(robot);
     this._send([command]);
     try {
-      await this._until(robot, op, () => this._loop.acknowledged(command.seq));
+      await this._until(robot, op, () => loop.acknowledged(command.seq));
     } catch (error) {
       if (taken) this._send(this._pilot.release(robot, this._clock()));
       throw error;

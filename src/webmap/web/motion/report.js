@@ -5,6 +5,7 @@ import { SEEN } from "./state_words.js";
  *
  * @typedef {object} RobotReport
  * @property {string} robot
+ * @property {string} [gate] The agent whose gate has it; none for the display's own gate.
  * @property {string} name
  * @property {'free' | 'held' | 'driving' | 'stopping' | 'stopped'} state
  * @property {string} doing The state as the page shows it: a name of `WORDS`.

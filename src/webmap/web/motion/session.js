@@ -8,7 +8,7 @@
 
 import { Requests } from "./requests.js";
 import { Inputs } from "./inputs.js";
-import { Loop } from "./loop.js";
+import { Loops } from "./loops.js";
 import { Onset } from "./onset.js";
 import { Pilot } from "./pilot.js";
 import { Stopping } from "./stopping.js";
@@ -19,11 +19,11 @@ import { Unanswered } from "./unanswered.js";
 /** @typedef {import('./stream.js').Command} Command */
 
 /**
- * The state that this page shares with the gate, across all its connections.
+ * The state that this page shares with the gates, across all its connections.
  *
- * Leases, numbers and ticks belong to one connection to one gate. The inputs, and a STOP
- * that was not sent, do not. A session processes the gate's messages and returns what to
- * send and which events to emit. Times are in milliseconds of one clock.
+ * Leases, numbers and ticks belong to one connection. The inputs, and a STOP that was not
+ * sent, do not. A session processes the gates' messages and returns what to send and which
+ * events to emit. Times are in milliseconds of one clock.
  */
 export class Session {
   /**
@@ -32,8 +32,8 @@ export class Session {
    */
   constructor(now, options) {
     this.inputs = new Inputs(now);
-    this.loop = new Loop();
-    this.pilot = new Pilot(this.inputs, this.loop, now, options);
+    this.loops = new Loops();
+    this.pilot = new Pilot(this.inputs, this.loops, now, options);
     this.stopping = new Stopping();
     this.requests = new Requests();
     this.onset = new Onset();
@@ -103,14 +103,14 @@ export class Session {
   }
 
   /**
-   * Update the state of the link from the state of the loop.
+   * Update the state of the link from the loop to the display's own gate.
    *
    * @param {number} now
    * @returns {DriveEvent[] | null} The events to emit; null if the connection must be
    *     closed.
    */
   judge(now) {
-    const state = this.loop.state(now);
+    const state = this.loops.own.state(now);
     if (state === "lost") return null;
     // Before its first message the other side may not be a gate.
     return this.connection === null ? [] : this._change(state);
@@ -153,7 +153,7 @@ export class Session {
   _received(message, now) {
     switch (message.op) {
       case "tick":
-        this.loop.receive(message.tick, message.ack, now);
+        this.loops.receive(message, now);
         return [];
       case "robot":
         for (const one of this._watching) one.report(message, now);
@@ -169,14 +169,15 @@ export class Session {
     }
   }
 
-  /** The objects that process each report of the gate. */
+  /** The objects that process each report of a gate. The pilot needs the loops first. */
   get _watching() {
-    return [this.pilot, this.stopping, this.requests, this.onset, this._unanswered];
+    const { loops, pilot, stopping, requests, onset } = this;
+    return [loops, pilot, stopping, requests, onset, this._unanswered];
   }
 
   /**
-   * Forget leases, numbers and ticks: they belong to one connection to one gate. A STOP
-   * without an answer does not, and is kept.
+   * Forget leases, numbers and ticks: they belong to one connection. A STOP without an
+   * answer does not, and is kept.
    *
    * @param {number} now
    */
@@ -185,7 +186,7 @@ export class Session {
     this.pilot.goNeutral(now);
     this.pilot.disconnect();
     this.requests.forget();
-    this.loop.open(now);
+    this.loops.open(now);
   }
 
   /**

@@ -4,6 +4,7 @@ import { Pictures } from "./pictures.js";
 /** @typedef {import('./axes.js').Axes} Axes */
 /** @typedef {import('./inputs.js').Inputs} Inputs */
 /** @typedef {import('./loop.js').Loop} Loop */
+/** @typedef {import('./loops.js').Loops} Loops */
 
 /** @typedef {{op: string, robot: string, [field: string]: unknown}} Command */
 
@@ -13,6 +14,7 @@ import { Pictures } from "./pictures.js";
  * @typedef {object} Lease
  * @property {string} robot
  * @property {number} epoch
+ * @property {Loop} loop The loop to the gate of the robot.
  * @property {number | null} firstNeutral The first command since `goNeutral`.
  * @property {number | null} seenSince Since when the gate acknowledges neutral commands.
  * @property {number} usedAt When it was last used, for motion or otherwise.
@@ -35,18 +37,18 @@ export const CALM = 500;
  * The stream of commands under one lease: the state of the inputs, or neutral.
  *
  * It is neutral until the gate has received neutral for {@link SETTLE} ms. It becomes
- * neutral again when the page is not attentive, the loop is not open, or the camera
- * picture is too old. Times are in milliseconds of one clock.
+ * neutral again when the page is not attentive, the loop to the robot's gate is not open,
+ * or the camera picture is too old. Times are in milliseconds of one clock.
  */
 export class Stream {
   /**
    * @param {Inputs} inputs
-   * @param {Loop} loop
+   * @param {Loops} loops
    * @param {number} now
    */
-  constructor(inputs, loop, now) {
+  constructor(inputs, loops, now) {
     this.inputs = inputs;
-    this.loop = loop;
+    this.loops = loops;
     this.pictures = new Pictures();
     /** @type {Lease | null} */
     this.lease = null;
@@ -56,12 +58,16 @@ export class Stream {
     this._attentive = true;
   }
 
-  /** Whether a press would be too early. The page becomes ready without any input. */
-  get early() {
+  /**
+   * @param {string | null} robot The robot that a press drives.
+   * @returns {boolean} Whether a press would be too early. The page becomes ready without
+   *     any input.
+   */
+  early(robot) {
     if (!this._attentive || this.inputs.pressed) return false;
     const now = this._lookedAt;
     const calm = now - this._sleptAt >= CALM;
-    return this.loop.tick === null || !calm || !this.inputs.ready(now);
+    return this._loop(robot).tick === null || !calm || !this.inputs.ready(now);
   }
 
   /** Whether the gate has received enough neutral, by its acknowledgements. */
@@ -72,8 +78,9 @@ export class Stream {
 
   /** How long an acknowledgement takes, in ms; null before the first. */
   get delay() {
-    const { delay } = this.loop;
-    return delay === null ? null : Math.max(delay, this.loop.age(this._lookedAt));
+    const loop = this.lease?.loop;
+    if (!loop || loop.delay === null) return null;
+    return Math.max(loop.delay, loop.age(this._lookedAt));
   }
 
   /**
@@ -84,14 +91,15 @@ export class Stream {
    * @param {number} now
    */
   open(robot, epoch, now) {
-    this.loop.rest();
-    this.lease = { robot, epoch, firstNeutral: null, seenSince: null, usedAt: now };
+    this.close();
+    const loop = this.loops.of(robot);
+    this.lease = { robot, epoch, loop, firstNeutral: null, seenSince: null, usedAt: now };
   }
 
   /** Stop sending: there is no lease. */
   close() {
+    this.lease?.loop.rest();
     this.lease = null;
-    this.loop.rest();
   }
 
   /** Start the numbers again, for another connection. */
@@ -121,15 +129,17 @@ export class Stream {
    * @param {number} now
    * @param {boolean} attentive Whether the page is visible, has the focus, and no
    *     text field has it.
+   * @param {string | null} robot The robot that a press drives.
    */
-  look(now, attentive) {
+  look(now, attentive, robot) {
     const gap = now - this._lookedAt;
     this._lookedAt = now;
     this._attentive = attentive;
     const slept = gap < 0 || gap > ASLEEP;
     if (slept) this._sleptAt = now;
     if (!attentive || slept) this.goNeutral(now, { drop: true });
-    if (this.loop.tick === null || this.loop.state(now) !== "open") this.goNeutral(now);
+    const loop = this._loop(robot);
+    if (loop.tick === null || loop.state(now) !== "open") this.goNeutral(now);
     if (this.lease && this.pictures.blind(this.lease.robot)) this.goNeutral(now);
   }
 
@@ -141,7 +151,7 @@ export class Stream {
   step(armed, now) {
     const { lease } = this;
     if (!lease) return [];
-    if (lease.firstNeutral !== null && this.loop.acknowledged(lease.firstNeutral)) {
+    if (lease.firstNeutral !== null && lease.loop.acknowledged(lease.firstNeutral)) {
       lease.seenSince ??= now;
     }
     const { axes } = this.inputs;
@@ -157,9 +167,22 @@ export class Stream {
     return this.lease ? [this._command(this.lease, NEUTRAL, now)] : [];
   }
 
-  /** Number a message, so that the gate knows the newest. */
-  stamp() {
-    return { seq: this._seq++, tick: this.loop.tick ?? 0 };
+  /**
+   * Number a message, so that the robot's gate knows the newest.
+   *
+   * @param {string} robot
+   */
+  stamp(robot) {
+    return { seq: this._seq++, tick: this.loops.of(robot).tick ?? 0 };
+  }
+
+  /**
+   * @param {string | null} robot
+   * @returns {Loop} The loop to the gate of the driven robot; without a lease, to that of
+   *     this robot.
+   */
+  _loop(robot) {
+    return this.lease?.loop ?? this.loops.of(robot);
   }
 
   /**
@@ -170,8 +193,8 @@ export class Stream {
    */
   _command(lease, { x, y, turn }, now) {
     const { robot, epoch } = lease;
-    const stamp = this.stamp();
-    this.loop.sent(stamp.seq, now);
+    const stamp = this.stamp(robot);
+    lease.loop.sent(stamp.seq, now);
     lease.firstNeutral ??= stamp.seq;
     const video = this.pictures.age(robot);
     const picture = video === undefined ? {} : { video };
