@@ -76,7 +76,9 @@ export class Drive {
 
   /** The state of the chosen robot and of the inputs, for the operator. */
   get status() {
-    return { link: this.state, connection: this.connection, ...this._pilot.status };
+    const { status } = this._pilot;
+    const link = this._session.linkTo(status.choice, performance.now());
+    return { link, connection: this.connection, ...status };
   }
 
   /** The requests for control. */

@@ -117,6 +117,17 @@ export class Session {
   }
 
   /**
+   * @param {string | null} robot The robot that the operator has chosen.
+   * @param {number} now
+   * @returns {LinkState} The state of the link to that robot's gate: late also while that
+   *     gate does not answer.
+   */
+  linkTo(robot, now) {
+    const late = this.state === "open" && this.loops.of(robot).state(now) !== "open";
+    return late ? "late" : this.state;
+  }
+
+  /**
    * Note that the connection is lost.
    *
    * @param {number} now
