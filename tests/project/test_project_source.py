@@ -73,6 +73,7 @@ ROSBRIDGE_WORDS = re.compile(
 PROTOCOL_ROOMS = (
     "ros/rosbridge/",
     "gate/",  # it has sockets of its own
+    "agents/",  # an agent passes on what displays ask of its rosbridge
     "testing/",  # its peers are rosbridges
 )
 # People have to read of rosapi, since they have to start it; a replay starts it, too.

@@ -5,6 +5,7 @@ gate may publish. The wire protocol is in ``rosbridge``.
 """
 
 import asyncio
+import importlib
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
@@ -32,8 +33,18 @@ from webmap.ros.topic_faults import TopicFaults
 
 log = logging.getLogger("webmap.ros")
 
-LINKS = {"ws": RosbridgeLink, "wss": RosbridgeLink}
+LINKS: dict[str, type[RosbridgeLink]] = {"ws": RosbridgeLink, "wss": RosbridgeLink}
 """The kind of link by the scheme of the URL: *A new kind of link* in the design."""
+
+_HOMES = {"zenoh": "webmap.agents.link", "zenohs": "webmap.agents.link"}
+"""Modules that add a kind of link when they are imported."""
+
+
+def _link_type(url: str) -> type[RosbridgeLink]:
+    scheme = url.partition(":")[0]
+    if scheme not in LINKS:
+        importlib.import_module(_HOMES[scheme])
+    return LINKS[scheme]
 
 
 class Bridge:
@@ -69,7 +80,7 @@ class Bridge:
         self._on_error = Callbacks(f"{self.name}: on_error", lambda _error: None)
         self._on_open = Callbacks(f"{self.name}: on_open", self._report)
         self._on_close = Callbacks(f"{self.name}: on_close", self._report)
-        self._link = LINKS[self.url.partition(":")[0]](
+        self._link = _link_type(self.url)(
             self.url,
             self.name,
             opened=self._opened,

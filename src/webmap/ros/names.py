@@ -13,7 +13,7 @@ _TYPE = re.compile(
     r"/(?P<name>[A-Za-z][A-Za-z0-9_]*)\Z"
 )
 _HOST = re.compile(r"(?:[A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(?::\d{1,5})?(?:/[^\s]*)?")
-_DEFAULT_PORT = {"ws": 80, "wss": 443}
+_DEFAULT_PORT = {"ws": 80, "wss": 443, "zenoh": 7447, "zenohs": 7447}
 _MAX_NAME = 255
 _THIS_COMPUTER = ("localhost", "127.0.0.1", "[::1]")
 

@@ -21,8 +21,9 @@ from webmap.ros.rosbridge.protocol import Protocol
 class Calls:
     """The calls to one bridge; the first call opens the socket."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, lane_type: type[Lane] = Lane) -> None:
         self.url = url
+        self._lane_type = lane_type
         self._lane: _CallsLane | None = None
         self._retired: set[_CallsLane] = set()
 
@@ -46,7 +47,7 @@ class Calls:
         id = generate_id()
         frame = ops.call_service(service, args, id=id, type=type)
         if self._lane is None or self._lane.is_over:
-            self._lane = _CallsLane(self.url)
+            self._lane = _CallsLane(self.url, self._lane_type)
         lane = self._lane
         try:
             async with asyncio.timeout(patience):
@@ -74,7 +75,7 @@ class Calls:
 
 
 class _CallsLane:
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, lane_type: type[Lane]) -> None:
         self._protocol = Protocol()
         self._waiting: dict[str, asyncio.Future[ServiceResponse]] = {}
         self._ready: asyncio.Future[None] = asyncio.Future()
@@ -82,7 +83,7 @@ class _CallsLane:
         self._ending: asyncio.Task[None] | None = None
         self._unreadable: str | None = None
         """The error of the newest frame that could not be read."""
-        self._lane = Lane(
+        self._lane = lane_type(
             url,
             opened=self._opened,
             received=self._received,

@@ -54,6 +54,9 @@ class RosbridgeLink:
 
     """
 
+    lane_type: type[Lane] = Lane
+    """The kind of its connections."""
+
     def __init__(
         self,
         url: str,
@@ -79,11 +82,11 @@ class RosbridgeLink:
         self._complained = False
         """Whether the failure of the connection has been logged."""
         self._protocol = Protocol()
-        self._calls = Calls(url)
+        self._calls = Calls(url, self.lane_type)
         self._subscriptions: dict[str, WireSubscription] = {}
         self._advertised: dict[str, _Advertised] = {}
         self._renewals = Renewals(self.graph.published, self._subscriptions.values)
-        self.lane = Lane(  # the socket for everything but calls
+        self.lane = self.lane_type(  # the socket for everything but calls
             url,
             opened=self._opened,
             received=self._received,
