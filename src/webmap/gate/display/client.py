@@ -23,7 +23,7 @@ from webmap.gate import commands, pipe, protocol
 from webmap.gate.commands import Refusal, begins_like_stop, robot_in
 from webmap.gate.display.pages import DriveConnection, Pages
 from webmap.gate.display.program import ProgramCommands
-from webmap.gate.display.supervisor import Supervisor
+from webmap.gate.display.supervisor import GateLink, GateListener, Supervisor
 from webmap.gate.protocol import FromGate, FromProgram, Report, RobotSpec, Role
 from webmap.gate.specs import checked
 
@@ -74,12 +74,26 @@ class GateClient:
 
     Every new gate receives the declared robots and the connections, but no leases: they
     ended with the old gate.
+
+    Args:
+        link: Makes the way to the gate, for its owner and with the lock to hold; a
+            process of this computer by default.
+        agent: The agent whose gate it is; "" for the display's own.
+        prefix: What the ids of the pages begin with.
+
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        link: "Callable[[GateListener, threading.RLock], GateLink]" = Supervisor,
+        agent: str = "",
+        prefix: str = "",
+    ) -> None:
         self._lock = threading.RLock()
-        self._supervisor = Supervisor(self, self._lock)
-        self._pages = Pages(self.send, self._lock, self._keep_stop_of_page)
+        self._supervisor = link(self, self._lock)
+        self._pages = Pages(
+            self.send, self._lock, self._keep_stop_of_page, agent, prefix
+        )
         self._program = ProgramCommands(self.send, self._lock)
         self._pending_stops = PendingStops()
         self._numbers = itertools.count(1)
@@ -136,6 +150,7 @@ class GateClient:
         role: Role,
         send: Callable[[str], None],
         close: Callable[[str], None],
+        id: str = "",
     ) -> DriveConnection:
         """Register a page's socket with the gate.
 
@@ -144,12 +159,17 @@ class GateClient:
             role: What the user may do.
             send: Called with each text for the page, in the client's thread.
             close: Called with the reason to close the socket, in the same thread.
+            id: Its id at another gate, which the page knows.
 
         Raises:
             ConfigError: If there is no such role.
 
         """
-        return self._pages.connect(name, role, send, close)
+        return self._pages.connect(name, role, send, close, id)
+
+    def show_again(self, connection: DriveConnection) -> None:
+        """Send a page the newest report of every robot."""
+        self._pages.show_again(connection)
 
     def on_report(self, fn: Callable[[Report], None]) -> Removal:
         """Call ``fn`` with every report, in the client's thread."""

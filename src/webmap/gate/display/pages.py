@@ -78,6 +78,9 @@ fields:
 command (``robot`` is then null), or ``"lease"`` when a lease has ended. The same
 refusal is sent once a second at most.
 
+A tick and a report of a robot whose gate is that of an agent have one more field,
+``gate``, with the name of the agent: a command has a tick of the gate of its robot.
+
 :mod:`webmap.gate.commands` has the commands of a page.
 """
 
@@ -101,22 +104,33 @@ def hello_text(hello: Hello) -> str:
     return _text("hello", connection=hello.connection)
 
 
-def tick_text(tick: int, ack: int) -> str:
+def tick_text(tick: int, ack: int, agent: str = "") -> str:
     """Return a tick, with the newest accepted ``seq`` of the connection."""
-    return f'{{"op":"tick","tick":{tick},"ack":{ack}}}'
+    gate = f',"gate":"{agent}"' if agent else ""
+    return f'{{"op":"tick","tick":{tick},"ack":{ack}{gate}}}'
 
 
-def robot_text(report: RobotReport, *, mine: bool, page: Cap) -> str:
+def robot_text(
+    report: RobotReport, *, mine: bool, page: Cap, agent: str = "", prefix: str = ""
+) -> str:
     """Return a robot's report for one page.
 
     Args:
         report: The report.
         mine: Whether the page has the lease.
         page: The page's own limit, which comes into force when it takes a free robot.
+        agent: The agent whose gate it is; "" for the display's own.
+        prefix: What the ids of this display's connections begin with at that gate.
 
     """
     fields = msgspec.to_builtins(report)
     del fields["type"]
+    if agent:
+        fields["gate"] = agent
+        for who in (fields["holder"], fields["asker"]):
+            if who is not None and who["connection"].startswith(prefix):
+                own = who["connection"].removeprefix(prefix)
+                who["connection"] = own.partition(".")[0]
     if report.holder is None:
         speed = offered(Speed(report.v, report.w, report.why), page)
         fields |= {"v": speed.v, "w": speed.w, "why": speed.why}
@@ -206,6 +220,8 @@ class Pages:
         send: Sends a message to the gate, if it runs.
         lock: Held while the state changes.
         heed: Called with each message of a page before the gate receives it.
+        agent: The agent whose gate it is; "" for the display's own.
+        prefix: What the id of each connection begins with.
 
     """
 
@@ -214,7 +230,11 @@ class Pages:
         send: Callable[[protocol.ToGate], None],
         lock: "threading.RLock",
         heed: Callable[[protocol.FromPage], None],
+        agent: str = "",
+        prefix: str = "",
     ) -> None:
+        self._agent = agent
+        self._prefix = prefix
         self.send = send
         self._lock = lock
         self._keep_stop_of_page = heed
@@ -237,15 +257,21 @@ class Pages:
         role: Role,
         send: Callable[[str], None],
         close: Callable[[str], None],
+        id: str = "",
     ) -> DriveConnection:
         """Register a page's socket; see ``GateClient.connect``."""
         if role not in get_args(Role):
             raise ConfigError(f"role {role!r} is none of {', '.join(get_args(Role))}")
         with self._lock:
-            hello = protocol.Connect(f"c{next(self._numbers)}", name, role)
+            number = next(self._numbers)
+            own = f"{id}.{number}" if id else f"c{number}"
+            hello = protocol.Connect(f"{self._prefix}{own}", name, role)
             connection = DriveConnection(self, hello, send, close)
             self._connections[connection.id] = connection
             self.send(hello)
+            if self._agent:  # the page is greeted by the display's own gate
+                connection.greeted = True
+                self.show_again(connection)
         return connection
 
     def knows(self, id: str) -> bool:
@@ -280,7 +306,7 @@ class Pages:
         for connection in self._all():
             ack = tick.acks.get(connection.id)
             if ack is not None:
-                connection.send_text(tick_text(tick.tick, ack))
+                connection.send_text(tick_text(tick.tick, ack, self._agent))
 
     def on_report(self, report: protocol.RobotReport) -> None:
         """Send a robot's report to all pages."""
@@ -291,7 +317,13 @@ class Pages:
             for connection in self._all():
                 mine, page = connection.id == holder, connection.cap
                 if (mine, page) not in texts:  # most pages receive the same text
-                    text = robot_text(report, mine=mine, page=page)
+                    text = robot_text(
+                        report,
+                        mine=mine,
+                        page=page,
+                        agent=self._agent,
+                        prefix=self._prefix,
+                    )
                     texts[mine, page] = text
                 connection.send_text(texts[mine, page])
 
@@ -321,12 +353,18 @@ class Pages:
             if connection is None:
                 return
             connection.greeted = True
-            connection.send_text(hello_text(hello))
+            if not self._agent:  # a page is greeted by the display's own gate alone
+                connection.send_text(hello_text(hello))
             for report in list(self._latest.values()):
                 self._show(connection, report)
 
     def gone(self) -> None:
-        """Discard the reports of a gate that has ended; the next one sends hello."""
+        """Discard the reports of a gate that has ended; the next one sends hello.
+
+        Robots of an agent stay, and are reported as unreachable.
+        """
+        if self._agent:
+            return
         with self._lock:
             self._latest.clear()
             for connection in self._connections.values():
@@ -334,8 +372,26 @@ class Pages:
 
     def _show(self, connection: DriveConnection, report: protocol.RobotReport) -> None:
         holder = None if report.holder is None else report.holder.connection
-        mine = holder == connection.id
-        connection.send_text(robot_text(report, mine=mine, page=connection.cap))
+        text = robot_text(
+            report,
+            mine=holder == connection.id,
+            page=connection.cap,
+            agent=self._agent,
+            prefix=self._prefix,
+        )
+        connection.send_text(text)
+
+    def show_again(self, connection: DriveConnection) -> None:
+        """Send a page the newest report of every robot."""
+        with self._lock:
+            for report in list(self._latest.values()):
+                self._show(connection, report)
+
+    @property
+    def latest(self) -> list[protocol.RobotReport]:
+        """The newest report of every robot."""
+        with self._lock:
+            return list(self._latest.values())
 
     def _all(self) -> list[DriveConnection]:
         with self._lock:

@@ -248,6 +248,31 @@ class GateListener(Protocol):
         """Note that the gate has ended, in any thread."""
 
 
+class GateLink(Protocol):
+    """The way of messages to a gate."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether a gate receives messages."""
+
+    @property
+    def trouble(self) -> str | None:
+        """Why there is no gate, if that is known."""
+
+    @property
+    def pid(self) -> int | None:
+        """The process id of the gate, if it runs on this computer."""
+
+    def start(self) -> None:
+        """Begin; a second call does nothing."""
+
+    def stop(self) -> None:
+        """Stop every driven robot, and end."""
+
+    def send(self, message: protocol.ToGate) -> None:
+        """Send a message to the gate, if there is one."""
+
+
 class Supervisor:
     """Keeps one gate running.
 

@@ -1,0 +1,164 @@
+"""A page at the gate of an agent: what the page gets, and its id there."""
+
+import json
+import threading
+
+import msgspec
+import pytest
+
+from webmap.gate.display.client import GateClient
+from webmap.gate.protocol import (
+    AskerReport,
+    Connect,
+    Disconnect,
+    FromPage,
+    GateDown,
+    Hello,
+    Holder,
+    Ready,
+    RobotGone,
+    RobotReport,
+    Speeds,
+    Tick,
+)
+
+PREFIX = "ann.4f/"
+
+REPORT = RobotReport(
+    robot="r1",
+    name="Bob",
+    state="held",
+    doing="held",
+    latched=False,
+    stop=None,
+    holder=None,
+    epoch=None,
+    asker=None,
+    changing=False,
+    armed=False,
+    v=1.0,
+    w=1.0,
+    why=(),
+    link="up",
+    sent=(0.0,) * 6,
+    echoed=None,
+    measured=None,
+    alarm=None,
+    age=None,
+    reaction=0.3,
+    brake=0.5,
+    stop_time=None,
+    stop_source=None,
+    stop_date=None,
+    test=None,
+    armable=True,
+    reason=None,
+)
+
+
+class Link:
+    """A way to a gate that keeps what is sent."""
+
+    ready, trouble, pid = True, None, None
+
+    def __init__(self, owner, lock):
+        self.sent = []
+
+    def start(self):
+        pass
+
+    def stop(self):
+        pass
+
+    def send(self, message):
+        self.sent.append(message)
+
+
+class Bench:
+    def __init__(self):
+        self.client = GateClient(self.make, "bay3", PREFIX)
+        self.told = []
+        self.page = self.connect()
+        self.id = f"{PREFIX}c7.1"
+
+    def make(self, owner, lock):
+        assert isinstance(lock, type(threading.RLock()))
+        self.link = Link(owner, lock)
+        return self.link
+
+    def connect(self):
+        def tell(text):
+            self.told.append(json.loads(text))
+
+        return self.client.connect("Ann", "operator", tell, print, "c7")
+
+    def hear(self, message):
+        self.told.clear()
+        self.client.hear(message)
+        return list(self.told)
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+def test_the_page_has_its_own_id_behind_the_name_of_the_display(bench):
+    assert bench.page.id == bench.id
+    assert bench.link.sent == [Connect(bench.id, "Ann", "operator")]
+    bench.page.receive('{"op":"x"}')
+    bench.page.set_speeds(1.0, 2.0)
+    bench.page.close()
+    assert bench.link.sent[1:] == [
+        FromPage(bench.id, b'{"op":"x"}'),
+        Speeds(bench.id, 1.0, 2.0),
+        Disconnect(bench.id),
+    ]
+
+
+def test_a_page_that_connects_again_has_another_id(bench):
+    assert bench.connect().id == f"{PREFIX}c7.2"
+
+
+def test_a_tick_names_the_agent(bench):
+    (tick,) = bench.hear(Tick(5, {bench.id: 3}))
+    assert tick == {"op": "tick", "tick": 5, "ack": 3, "gate": "bay3"}
+
+
+def test_a_report_names_the_agent_and_this_page_by_its_own_id(bench):
+    held = msgspec.structs.replace(
+        REPORT,
+        holder=Holder(bench.id, "Ann"),
+        asker=AskerReport("ben.5e/c1.1", "Ben", 5.0),
+    )
+    (told,) = bench.hear(held)
+    assert (told["gate"], told["mine"]) == ("bay3", True)
+    assert told["holder"]["connection"] == "c7"
+    assert told["asker"]["connection"] == "ben.5e/c1.1"
+
+
+def test_the_hello_of_an_agent_is_not_for_the_page_but_its_robots_are(bench):
+    bench.hear(REPORT)
+    (told,) = bench.hear(Hello(bench.id))
+    assert (told["op"], told["robot"]) == ("robot", "r1")
+    bench.told.clear()
+    bench.client.show_again(bench.page)
+    assert [told["op"] for told in bench.told] == ["robot"]
+
+
+def test_a_page_that_connects_later_is_told_of_the_robots_at_once(bench):
+    bench.hear(REPORT)
+    bench.told.clear()
+    bench.connect()
+    assert [told["op"] for told in bench.told] == ["robot"]
+
+
+def test_the_robots_of_a_lost_agent_stay_on_the_page(bench):
+    bench.hear(REPORT)
+    bench.client.gone(GateDown("no connection"))
+    bench.told.clear()
+    bench.client.show_again(bench.page)
+    assert [told["op"] for told in bench.told] == ["robot"]
+    assert bench.hear(RobotGone("r1")) == [{"op": "gone", "robot": "r1"}]
+    assert bench.hear(Ready(0)) == []
+    assert bench.client._pages.latest == []
