@@ -3,7 +3,7 @@
 import msgspec
 import pytest
 
-from webmap.agents.displays import Answer, Displays
+from webmap.agents.displays import AllPages, Answer, Displays, ReportAll, Unknown
 from webmap.agents.samples import Numbering, Order
 from webmap.base.errors import WireError
 from webmap.gate.commands import Stop
@@ -89,6 +89,58 @@ def test_a_message_of_an_unknown_page_is_dropped_but_stop_is_obeyed(west):
     assert west.says(FromPage("west/c7", STOP)) == [FromProgram(Stop(None))]
 
 
+def test_the_role_is_that_of_the_user_and_counts_for_each_of_its_displays():
+    displays = Displays({"": "viewer", "ann": "operator"})
+    for user, role in (("ann", "operator"), ("bob", "viewer")):
+        name = f"{user}.4f"
+        hello = Connect(f"{name}/c1", "A page", "operator")
+        sample = Numbering().next(msgspec.msgpack.encode(hello))
+        (got,) = displays.receive(name, sample, 0.0)
+        assert got.role == role
+
+
+def test_a_page_that_the_display_no_longer_lists_ends(west):
+    other = Connect("west/c2", "Ben", "operator")
+    west.says(PAGE)
+    west.says(other)
+    assert west.says(AllPages(("west/c2",))) == [Disconnect("west/c1")]
+    assert west.displays.introduction() == [other]
+
+
+def test_pages_that_ended_while_the_display_was_slow_are_asked_for(west):
+    west.says(PAGE, 0.0)
+    west.displays.look(1.1)
+    west.says(AllPages(("west/c1", "west/program")), 1.1)
+    unknown = west.displays.unknown("west")
+    assert unknown == Unknown("west", ("west/c1", "west/program"))
+    assert west.displays.unknown("west") is None
+
+
+def test_a_display_that_lost_a_sample_gets_all_reports_once(west):
+    assert not west.displays.wants_reports()
+    assert west.says(ReportAll()) == []
+    assert west.displays.wants_reports()
+    assert not west.displays.wants_reports()
+
+
+def test_an_agent_remembers_a_bounded_number_of_displays(monkeypatch):
+    monkeypatch.setattr("webmap.agents.displays.MOST_DISPLAYS", 2)
+    displays = Displays()
+
+    def connect(name):
+        hello = Connect(f"{name}/c1", "Ann", "operator")
+        return displays.receive(
+            name, Numbering().next(msgspec.msgpack.encode(hello)), 0.0
+        )
+
+    connect("a")
+    connect("b")
+    with pytest.raises(WireError, match="more than 2 displays"):
+        connect("c")
+    displays.look(1.1)
+    assert connect("c")
+
+
 def test_a_sample_that_comes_twice_or_late_is_dropped(west):
     first = west.numbering.next(msgspec.msgpack.encode(PAGE))
     second = west.numbering.next(msgspec.msgpack.encode(Disconnect("west/c1")))
@@ -97,22 +149,22 @@ def test_a_sample_that_comes_twice_or_late_is_dropped(west):
     assert west.displays.receive("west", second, 0.0) == []
 
 
-def test_the_pages_of_a_silent_display_end_after_250_ms(west):
+def test_the_pages_of_a_silent_display_end_after_1_s(west):
     west.says(PAGE, 0.0)
     west.hears(1, 0.05)
     west.answers(0.1)
-    assert west.displays.look(0.3) == []
-    assert west.displays.look(0.31) == [Disconnect("west/c1")]
-    assert west.displays.look(0.4) == []
+    assert west.displays.look(1.05) == []
+    assert west.displays.look(1.06) == [Disconnect("west/c1")]
+    assert west.displays.look(1.2) == []
 
 
 def test_an_answer_to_an_old_sample_is_no_sign_of_life(west):
     west.says(PAGE, 0.0)
-    for tick in range(20):
+    for tick in range(30):
         west.hears(tick, 0.05 * tick)
     late = Answer(west.order.session, 2)  # sent at 0.05 s
-    west.says(late, 1.0)
-    assert west.displays.look(1.0) == [Disconnect("west/c1")]
+    west.says(late, 1.5)
+    assert west.displays.look(1.5) == [Disconnect("west/c1")]
 
 
 def test_a_display_that_restarts_loses_its_pages(west):

@@ -34,11 +34,18 @@ log = logging.getLogger("webmap.agent")
 FRESH = 0.3
 """Seconds after which an answer to a sample is no sign of life any more."""
 
-SILENT = 0.25
-"""Seconds without a sign of life after which the pages of a display count as lost."""
+SILENT = 1.0
+"""Seconds without a sign of life after which the pages of a display count as lost.
+
+The gate itself stops a robot 200 ms after the last command; this ends control.
+"""
 
 MOST_PAGES = 200
 """The greatest number of pages of one display."""
+
+
+MOST_DISPLAYS = 100
+"""The greatest number of displays that an agent remembers."""
 
 
 class Answer(msgspec.Struct, frozen=True, tag="answer"):
@@ -48,7 +55,38 @@ class Answer(msgspec.Struct, frozen=True, tag="answer"):
     number: int
 
 
-FromDisplay = Connect | Disconnect | FromPage | Speeds | Answer
+class AllPages(msgspec.Struct, frozen=True, tag="pages"):
+    """All pages that a display has now; sent twice a second.
+
+    A lost message about a page that has closed is made good by this.
+    """
+
+    connections: tuple[str, ...]
+
+
+class ReportAll(msgspec.Struct, frozen=True, tag="report-all"):
+    """A display has lost a sample of the agent, and needs all reports again."""
+
+
+class Took(msgspec.Struct, frozen=True, tag="took"):
+    """The agent has received this STOP of a display."""
+
+    display: str
+    session: int
+    number: int
+
+
+class Unknown(msgspec.Struct, frozen=True, tag="unknown"):
+    """The agent does not know these pages of a display, or no longer."""
+
+    display: str
+    connections: tuple[str, ...]
+
+
+ToDisplays = FromGate | Took | Unknown
+"""What an agent sends to all displays."""
+
+FromDisplay = Connect | Disconnect | FromPage | Speeds | Answer | AllPages | ReportAll
 """What a display may send. Everything else is refused whole."""
 
 _decode = msgspec.msgpack.Decoder(FromDisplay).decode
@@ -61,6 +99,10 @@ class Display:
     def __init__(self, name: str) -> None:
         self.name = name
         self.order = Order()
+        self.wants_reports = False
+        """Whether it needs all reports again."""
+        self.unknown: tuple[str, ...] = ()
+        """Its pages that are not known here."""
         self.alive_at = float("-inf")
         """When it was alive for certain."""
         self.pages: dict[str, list[Connect | Speeds]] = {}
@@ -75,8 +117,8 @@ class Displays:
     """All displays of one agent.
 
     Args:
-        roles: What the users of each display may do at most, by the display's name;
-            "" is for the others. Without it, all of them may be operators.
+        roles: What the pages of each user of the router may do at most; "" is for the
+            others. Without it, all of them may be operators.
 
     """
 
@@ -100,7 +142,20 @@ class Displays:
             for message in messages
         ]
 
-    def send(self, message: FromGate, now: float) -> bytes:
+    def wants_reports(self) -> bool:
+        """Return whether a display needs all reports again; then no longer."""
+        wanting = [each for each in self._displays.values() if each.wants_reports]
+        for each in wanting:
+            each.wants_reports = False
+        return bool(wanting)
+
+    def unknown(self, name: str) -> Unknown | None:
+        """Return the pages that a display must introduce again, if there are any."""
+        display = self._displays[name]
+        connections, display.unknown = display.unknown, ()
+        return Unknown(name, connections) if connections else None
+
+    def send(self, message: ToDisplays, now: float) -> bytes:
         """Return the sample that carries a message of the gate to all displays."""
         sample = self._numbering.next(_encode(message))
         self._sent.append((self._numbering.sent, now))
@@ -120,7 +175,10 @@ class Displays:
             WireError: If the sample is not one that a display may send.
 
         """
-        display = self._displays.setdefault(name, Display(name))
+        display = self._displays.get(name)
+        if display is None:
+            self._make_room()
+            display = self._displays[name] = Display(name)
         body, restarted = display.order.take(sample)
         lost: list[ToGate] = self._end(display) if restarted else []
         if body is None:
@@ -129,9 +187,16 @@ class Displays:
             message = _decode(body)
         except (msgspec.DecodeError, RecursionError) as error:
             raise WireError(f"display {name}: got no message: {error}") from error
-        if isinstance(message, Answer):
-            self._answered(display, message)
-            return lost
+        match message:
+            case Answer():
+                self._answered(display, message)
+                return lost
+            case AllPages():
+                return lost + self._end_others(display, message)
+            case ReportAll():
+                display.wants_reports = True
+                return lost
+        assert not isinstance(message, Answer | AllPages | ReportAll)
         if not display.owns(message.connection):
             raise WireError(
                 f"display {name}: got the connection {message.connection!r}, "
@@ -147,6 +212,15 @@ class Displays:
                 log.warning("display %s gives no sign of life", display.name)
                 ended += self._end(display)
         return ended
+
+    def _make_room(self) -> None:
+        """Forget the oldest display without pages if there are too many."""
+        if len(self._displays) < MOST_DISPLAYS:
+            return
+        empty = [name for name, each in self._displays.items() if not each.pages]
+        if not empty:
+            raise WireError(f"got more than {MOST_DISPLAYS} displays")
+        del self._displays[empty[0]]
 
     def _answered(self, display: Display, answer: Answer) -> None:
         if answer.session != self._numbering.session:
@@ -185,12 +259,29 @@ class Displays:
                     # A STOP of a page that counts as lost is obeyed all the same.
                     robot = robot_in(message.text)
                     return [FromProgram(Stop(None if robot == "*" else robot))]
+                if known is None:  # it counts as lost: the display slept
+                    display.unknown = (message.connection,)
         return [] if known is None else [message]
+
+    def newest(self, name: str) -> tuple[int, int]:
+        """Return session and number of the newest sample of a display."""
+        order = self._displays[name].order
+        return order.session or 0, order.newest
+
+    def _end_others(self, display: Display, there: AllPages) -> list[ToGate]:
+        gone = [each for each in display.pages if each not in there.connections]
+        display.unknown = tuple(
+            each for each in there.connections if each not in display.pages
+        )
+        for connection in gone:
+            del display.pages[connection]
+        return [Disconnect(connection) for connection in gone]
 
     def _allowed(self, display: Display, connect: Connect) -> Connect:
         """Return a page's introduction with at most the role of its display."""
         order = ("viewer", "operator", "admin")
-        most = self._roles.get(display.name, self._roles.get("", "viewer"))
+        user = display.name.partition(".")[0]
+        most = self._roles.get(user, self._roles.get("", "viewer"))
         role = min(connect.role, most, key=order.index)
         return msgspec.structs.replace(connect, role=role)
 

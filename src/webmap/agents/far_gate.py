@@ -1,24 +1,45 @@
 """The display's side of a gate that runs beside a robot.
 
 It exchanges the same messages as with a gate of its own, as numbered samples. It takes
-samples and times and returns samples; ``zenoh_link.py`` carries them.
+samples and times and returns samples; ``peer.py`` carries them.
 """
 
+import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import msgspec
 
-from webmap.agents.displays import Answer
+from webmap.agents.displays import (
+    AllPages,
+    Answer,
+    FromDisplay,
+    ReportAll,
+    ToDisplays,
+    Took,
+    Unknown,
+)
 from webmap.agents.samples import Numbering, Order
-from webmap.gate import protocol
+from webmap.base.errors import WireError
+from webmap.gate import commands, protocol
+from webmap.gate.commands import begins_like_stop
 from webmap.gate.display.supervisor import GateListener
-from webmap.gate.protocol import FromGate
+from webmap.gate.protocol import RobotReport
 
 LOST = 0.5
 """Seconds without a sample after which the agent counts as lost."""
 
-_decode = msgspec.msgpack.Decoder(FromGate).decode
+AGAIN = 0.1
+"""Seconds until a STOP that the agent has not acknowledged is sent again."""
+
+ALL_PAGES = 0.5
+"""Seconds between two lists of all pages."""
+
+ASLEEP = "the agent heard nothing of this page for a moment: try again"
+
+NO_PROGRAM = "a program drives only robots of its own gate, not those of an agent"
+
+_decode = msgspec.msgpack.Decoder(ToDisplays).decode
 _encode = msgspec.msgpack.Encoder().encode
 
 
@@ -27,6 +48,7 @@ class FarGate:
 
     Args:
         agent: The name of the agent.
+        display: The name of this display.
         owner: Receives the gate's messages.
         lock: Held while the state changes.
         publish: Sends a sample to the agent, without waiting.
@@ -39,11 +61,13 @@ class FarGate:
     def __init__(
         self,
         agent: str,
+        display: str,
         owner: GateListener,
         lock: "threading.RLock",
         publish: Callable[[bytes], None],
     ) -> None:
         self.agent = agent
+        self.display = display
         self.ready = False
         """Whether messages of the gate arrive."""
         self.trouble: str | None = f"waiting for the agent {agent}"
@@ -54,10 +78,50 @@ class FarGate:
         self._order = Order()
         self._numbering = Numbering()
         self._heard_at = float("-inf")
+        self._pages: dict[str, protocol.Connect] = {}
+        self._greeted: set[str] = set()
+        self._reported = False
+        """Whether a robot was reported since the agent was found."""
+        self._stops: dict[int, tuple[float, protocol.FromPage]] = {}
+        """The STOPs without an acknowledgement, by number, each with its time."""
+        self._latest: dict[str, RobotReport] = {}
+        self._listed_at = float("-inf")
+
+    def start(self) -> None:
+        """Do nothing: the gate runs already, or its agent is away."""
+
+    def stop(self) -> None:
+        """Disconnect all pages, whose robots stop."""
+        with self._lock:
+            if self.ready:
+                self._put(AllPages(()))
+
+    @property
+    def connection(self) -> str:
+        """The connection of the programs of this display."""
+        return f"{self.display}/program"
 
     def send(self, message: protocol.ToGate) -> None:
-        """Send a message to the gate, if it can be reached."""
+        """Send a message to the gate, if it can be reached and takes it from displays.
+
+        The agent itself declares the robots.
+        """
         with self._lock:
+            match message:
+                case protocol.Connect():
+                    self._pages[message.connection] = message
+                case protocol.Disconnect():
+                    self._pages.pop(message.connection, None)
+                    self._greeted.discard(message.connection)
+                case protocol.FromProgram():
+                    program = self._of_program(message)
+                    if program is None:
+                        return
+                    message = program
+                case protocol.FromPage() | protocol.Speeds():
+                    pass
+                case _:
+                    return
             if self.ready:
                 self._put(message)
 
@@ -69,32 +133,146 @@ class FarGate:
 
         """
         with self._lock:
+            lost = self._order.lost
             body, restarted = self._order.take(sample)
             if body is None:
                 return
-            message = _decode(body)
+            try:
+                message = _decode(body)
+            except (msgspec.DecodeError, RecursionError) as error:
+                raise WireError(
+                    f"agent {self.agent}: got no message: {error}"
+                ) from error
             self._heard_at = now
-            if restarted and self.ready:
-                self._lose(f"the agent {self.agent} has restarted")
+            if self.ready and (restarted or isinstance(message, protocol.Ready)):
+                self._lose(f"the gate of the agent {self.agent} has restarted")
             if not self.ready:
-                self.ready, self.trouble = True, None
-                for each in self._owner.introduction():
-                    self._put(each)
-                self._owner.hear(protocol.Ready(0))
-            if not isinstance(message, protocol.Ready):
-                self._owner.hear(message)
+                self._begin(now)
+            elif self._order.lost != lost:
+                self._put(ReportAll())
+            self._hear(message)
 
     def beat(self, now: float) -> None:
         """Answer the newest sample, and note when the agent is silent; at 20 Hz."""
         with self._lock:
             if self.ready and now - self._heard_at > LOST:
-                self._lose(f"no message from the agent {self.agent}")
-            if self._order.session is not None:
-                self._put(Answer(self._order.session, self._order.newest))
+                self._lose(f"no connection to the agent {self.agent}")
+            if self._order.session is None:
+                return
+            self._put(Answer(self._order.session, self._order.newest))
+            if not self.ready:
+                return
+            for number, (at, stop) in list(self._stops.items()):
+                if now - at >= AGAIN:
+                    del self._stops[number]
+                    self._put(stop, now)
+            if now - self._listed_at >= ALL_PAGES:
+                self._listed_at = now
+                missing = [id for id in self._pages if id not in self._greeted]
+                if missing:  # a message was lost
+                    self._introduce(missing)
+                if not self._reported:
+                    self._put(ReportAll())
+                self._put(AllPages((self.connection, *self._pages)))
 
-    def _put(self, message: protocol.ToGate | Answer) -> None:
-        self._publish(self._numbering.next(_encode(message)))
+    def _begin(self, now: float) -> None:
+        self.ready, self.trouble, self._listed_at = True, None, now
+        self._greeted.clear()
+        self._reported = False
+        self._put(self._program)
+        for each in self._owner.introduction():
+            self.send(each)
+        self._put(ReportAll())
+        self._owner.hear(protocol.Ready(0))
+
+    def _hear(self, message: ToDisplays) -> None:
+        match message:
+            case protocol.Ready():
+                return
+            case Took():
+                if (message.display, message.session) == (
+                    self.display,
+                    self._numbering.session,
+                ):
+                    self._stops.pop(message.number, None)
+                return
+            case Unknown():
+                if message.display == self.display:
+                    self._introduce(message.connections)
+                return
+            case protocol.Hello():
+                if message.connection not in self._pages:
+                    return
+                self._greeted.add(message.connection)
+            case protocol.RobotReport():
+                self._latest[message.robot] = message
+                self._reported = True
+            case protocol.RobotGone():
+                self._latest.pop(message.robot, None)
+        self._owner.hear(message)
+
+    @property
+    def _program(self) -> protocol.Connect:
+        return protocol.Connect(self.connection, self.display, "operator")
+
+    def _introduce(self, connections: Collection[str]) -> None:
+        """Introduce pages again that the agent has ended, as this display was slow."""
+        for each in (self._program, *self._owner.introduction()):
+            if (
+                isinstance(each, protocol.Connect | protocol.Speeds)
+                and each.connection in connections
+            ):
+                self._put(each)
+        for connection in connections:
+            self._owner.hear(protocol.Refused(connection, None, "drive", ASLEEP))
+
+    def _put(self, message: FromDisplay, now: float | None = None) -> None:
+        sample = self._numbering.next(_encode(message))
+        if isinstance(message, protocol.FromPage) and begins_like_stop(message.text):
+            at = self._heard_at if now is None else now
+            self._stops[self._numbering.sent] = (at, message)
+        self._publish(sample)
+
+    def _of_program(self, message: protocol.FromProgram) -> protocol.FromPage | None:
+        """Return the command of a program in the form of a page's, if there is one."""
+        match message.command:
+            case commands.Stop(robot):
+                fields = {"op": "stop", "robot": robot or "*"}
+            case commands.Reset(robot, stop):
+                fields = {"op": "reset", "robot": robot, "stop": stop}
+            case commands.Cancel(robot):
+                fields = {"op": "cancel", "robot": robot}
+            case commands.Take(robot):
+                reply = protocol.TakeReply(message.request, robot, None, NO_PROGRAM)
+                self._owner.hear(reply)
+                return None
+            case _:
+                return None
+        return protocol.FromPage(self.connection, json.dumps(fields).encode())
 
     def _lose(self, why: str) -> None:
         self.ready, self.trouble = False, why
+        for report in list(self._latest.values()):
+            self._owner.hear(unreachable(report, why))
         self._owner.gone(protocol.GateDown(why))
+
+
+def unreachable(report: RobotReport, why: str) -> RobotReport:
+    """Return the report of a robot whose agent cannot be reached.
+
+    What the robot does is unknown; a STOP that was active stays so.
+    """
+    return msgspec.structs.replace(
+        report,
+        doing="down",
+        holder=None,
+        epoch=None,
+        asker=None,
+        changing=False,
+        armed=False,
+        armable=False,
+        link="down",
+        echoed=None,
+        measured=None,
+        reason=why,
+    )

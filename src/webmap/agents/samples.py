@@ -1,7 +1,7 @@
 """Numbered samples: what is lost, doubled or out of order is noticed.
 
-A sample carries one message of the gate. It begins with the random number of its sender's
-session and with its own number, which grows by one.
+A sample carries one message of the gate. It begins with the random number of its
+sender's session and with its own number, which grows by one.
 """
 
 import secrets

@@ -15,6 +15,7 @@ from webmap.base.outside_text import one_line
 
 LOGGERS = (
     "webmap",
+    "webmap.agent",
     "webmap.alignment",
     "webmap.bags",
     "webmap.buttons",

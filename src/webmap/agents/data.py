@@ -1,0 +1,129 @@
+"""The data between an agent and a display: what a piece of it is. No I/O.
+
+A piece begins with one byte: what follows is a frame of rosbridge, the same compressed,
+or a note of the connection itself, as JSON.
+"""
+
+import zlib
+from typing import Literal
+
+import msgspec
+
+from webmap.base.errors import WireError
+
+NOTE, FRAME, PACKED = b"\0", b"\1", b"\2"
+
+WORTH_PACKING = 256
+"""Bytes of a frame from which it is compressed, if that makes it shorter."""
+
+MOST = 64 << 20
+"""Bytes of the largest frame."""
+
+
+DICTIONARY = (
+    b'"covariance": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "twist": {"twist": {"linear": '
+    b'{"x": 0.0, "y": 0.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}, '
+    b'"transforms": [{"header": {"seq": 0, "stamp": {"secs": 1, "nsecs": 0, "sec": 1, '
+    b'"nanosec": 0}, "frame_id": "map"}, "child_frame_id": "base_link", "transform": '
+    b'{"translation": {"x": 0.0, "y": 0.0, "z": 0.0}, "rotation": {"x": 0.0, "y": 0.0, '
+    b'"z": 0.0, "w": 1.0}}}, {"op": "publish", "topic": "/odom", "msg": {"header": '
+    b'{"seq": 1, "stamp": {"sec": 1, "nanosec": 1}, "frame_id": "odom"}, '
+    b'"child_frame_id": "base_footprint", "pose": {"pose": {"position": {"x": 1.0, '
+    b'"y": 1.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}, '
+)
+"""What small frames have in common: with it, they need a quarter less."""
+
+
+class Ping(msgspec.Struct, frozen=True, tag="ping"):
+    """A display asks whether the agent and its rosbridge are there."""
+
+    number: int
+
+
+class Pong(msgspec.Struct, frozen=True, tag="pong"):
+    """The answer to a :class:`Ping`; it comes after all data sent before it."""
+
+    number: int
+    session: str
+    """The identity of the agent's connection to its rosbridge; "" without one."""
+    trouble: str = ""
+    """Why there is no connection to the rosbridge."""
+
+
+class Bye(msgspec.Struct, frozen=True, tag="bye"):
+    """A display ends a connection."""
+
+
+Note = Ping | Pong | Bye
+
+_note = msgspec.json.Decoder(Note).decode
+
+
+def pack_note(note: Note) -> bytes:
+    """Return the piece with a note."""
+    return NOTE + msgspec.json.encode(note)
+
+
+def pack_frame(frame: bytes | bytearray) -> bytes:
+    """Return the piece with a frame, compressed if that makes it shorter."""
+    if len(frame) >= WORTH_PACKING:
+        packing = zlib.compressobj(1, zdict=DICTIONARY)
+        packed = packing.compress(frame) + packing.flush()
+        if len(packed) < 0.9 * len(frame):
+            return PACKED + packed
+    return FRAME + bytes(frame)
+
+
+def unpack(piece: bytes) -> Note | bytes:
+    """Return the note or the frame in a piece.
+
+    Raises:
+        WireError: If the bytes are neither.
+
+    """
+    kind, body = piece[:1], piece[1:]
+    try:
+        if kind == FRAME:
+            return body
+        if kind == PACKED:
+            unpacking = zlib.decompressobj(zdict=DICTIONARY)
+            frame = unpacking.decompress(body, MOST)
+            if not unpacking.eof:
+                raise WireError(f"got a frame of more than {MOST} bytes")
+            return frame
+        if kind == NOTE:
+            note: Note = _note(body)
+            return note
+    except (zlib.error, msgspec.DecodeError) as error:
+        raise WireError(f"got data that cannot be read: {error}") from error
+    raise WireError(f"got data of the kind {kind!r}, expected one of 3")
+
+
+class SubscribeOp(msgspec.Struct, omit_defaults=True):
+    """What an operation of a display says about a topic or a service."""
+
+    op: str = ""
+    topic: str = ""
+    id: str | None = None
+    type: str | None = None
+    throttle_rate: int = 0
+    queue_length: int = 1
+    compression: Literal["none", "png", "cbor", "cbor-raw"] | None = None
+    service: str = ""
+    args: msgspec.Raw = msgspec.Raw(b"{}")
+
+
+_op = msgspec.json.Decoder(SubscribeOp).decode
+
+
+def read_op(frame: bytes) -> SubscribeOp:
+    """Return an operation of a display.
+
+    Raises:
+        WireError: If it is not one of rosbridge.
+
+    """
+    try:
+        return _op(frame)
+    except msgspec.DecodeError as error:
+        raise WireError(f"got an operation that cannot be read: {error}") from error

@@ -1,0 +1,249 @@
+"""The display's connection to the rosbridge of an agent, over a Zenoh router."""
+
+import asyncio
+import logging
+import secrets
+import time
+from collections.abc import Callable
+
+from webmap.agents import address, data
+from webmap.agents.peer import Peer, peer_of
+from webmap.base.errors import BridgeClosed, WireError
+from webmap.ros.bridge import LINKS
+from webmap.ros.received import LinkState
+from webmap.ros.rosbridge.connection import CLOSED_HERE, Lane, Liveness
+from webmap.ros.rosbridge.link import RosbridgeLink
+
+log = logging.getLogger("webmap.agent")
+
+LOOK = 0.25
+"""Seconds between two looks at the connection."""
+
+PATIENCE = 5.0
+"""Seconds for the first answer of an agent, after which the attempt has failed."""
+
+
+class AgentLane(Lane):
+    """A connection to the rosbridge of an agent, with the methods of ``Lane``.
+
+    Args:
+        url: The address of the agent, ``zenoh://host:7447/name``.
+        opened: Called when the connection is open.
+        received: Called with each frame.
+        closed: Called with the reason when an open connection has ended.
+        failed: Called with the error when the connection could not be opened.
+        again: Whether to reopen it whenever it ends or fails.
+        busy: Returns whether the rosbridge may be busy with a large message.
+
+    """
+
+    def __init__(
+        self,
+        url: str,
+        *,
+        opened: Callable[[], None],
+        received: Callable[[bytes | bytearray], None],
+        closed: Callable[[str], None],
+        failed: Callable[[BridgeClosed], None],
+        again: bool = True,
+        busy: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self.url = url
+        self.state: LinkState = "new"
+        self.last_heard: float | None = None
+        """When the last data came, on the monotonic clock."""
+        self._agent = address.agent_in(url)
+        self._opened = opened
+        self._received = received
+        self._closed = closed
+        self._failed = failed
+        self._again = again
+        self._busy = busy
+        self._id = secrets.token_hex(4)
+        self._peer: Peer | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._liveness: Liveness | None = None
+        self._pings = 0
+        self._session = ""
+        self._trouble = ""
+        self._listening: int | None = None
+        self._topics: dict[str, int] = {}
+
+    @property
+    def lag(self) -> float:
+        """Approximate delay of the data that now comes, from pings, in seconds."""
+        if self._liveness is None:
+            return 0.0
+        return self._liveness.lag(time.monotonic())
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begin to connect; a second call while it runs has no effect."""
+        if self._task is None and self.state in ("new", "closed"):
+            self.state = "connecting"
+            self._loop = loop
+            self._task = loop.create_task(self._run())
+
+    async def stop(self) -> None:
+        """Close the connection and do not reopen it."""
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()
+            await asyncio.wait([task])
+        self.state = "closed"
+
+    def send(self, frame: bytes) -> None:
+        """Send an operation, now.
+
+        Raises:
+            BridgeClosed: If the connection is not open.
+
+        """
+        if self.state != "open":
+            raise BridgeClosed(
+                f"the connection to {self.url} is not open ({self.state})"
+            )
+        op = data.read_op(frame)
+        if op.op == "subscribe":
+            self._listen(op.topic)
+        elif op.op == "unsubscribe":
+            self._unlisten(op.topic)
+        self._put(data.pack_frame(frame))
+
+    async def _run(self) -> None:
+        reason = CLOSED_HERE
+        try:
+            if self._agent is None:
+                self._failed(_not_reached(self.url, "the address names no agent"))
+                return
+            self._peer = peer = peer_of(self.url)
+            user = peer.user
+            self._key_in = address.data_in(
+                self._agent, user.name, user.instance, self._id
+            )
+            out = address.data_out(self._agent, user.name, user.instance, self._id)
+            self._listening = peer.listen(out, self._arrived)
+            while True:
+                self.state = "connecting"
+                if await self._reached():
+                    reason = await self._keep_open()
+                    self._end(reason)
+                if not self._again:
+                    break
+                await asyncio.sleep(LOOK)
+        except asyncio.CancelledError:
+            if self.state == "open":
+                self._end(CLOSED_HERE)
+            raise
+        finally:
+            if self._peer is not None:
+                self._put(data.pack_note(data.Bye()))
+                if self._listening is not None:
+                    self._peer.unlisten(self._listening)
+            self.state = "closed"
+            self._task = None
+
+    async def _reached(self) -> bool:
+        """Ask the agent until it answers; return whether its rosbridge is there."""
+        assert self._peer is not None
+        self._session, self._trouble = "", ""
+        self._liveness = Liveness(time.monotonic())
+        deadline = time.monotonic() + PATIENCE
+        while not self._session:
+            if time.monotonic() > deadline or self._trouble:
+                why = (
+                    self._peer.trouble
+                    or self._trouble
+                    or f"no answer from the agent {self._agent}"
+                )
+                self._failed(_not_reached(self.url, why))
+                return False
+            self._ask()
+            await asyncio.sleep(LOOK)
+        return True
+
+    async def _keep_open(self) -> str:
+        """Keep the connection until it ends; return the reason."""
+        session = self._session
+        self.state, self.last_heard = "open", time.monotonic()
+        self._liveness = liveness = Liveness(time.monotonic())
+        self._opened()
+        heard = self.last_heard
+        while not liveness.is_dead(time.monotonic(), heard, busy=self._busy()):
+            if self._session != session:
+                return self._trouble or "the agent has connected again"
+            if self._peer is not None and self._peer.trouble is not None:
+                return self._peer.trouble  # what was sent meanwhile is lost
+            if liveness.is_ping_due(time.monotonic()):
+                liveness.pinged(time.monotonic())
+                self._ask()
+            await asyncio.sleep(LOOK)
+            heard = self.last_heard
+        return f"no answer to a ping for {Liveness.LIMIT:g} s"
+
+    def _end(self, reason: str) -> None:
+        for topic in list(self._topics):
+            self._unlisten(topic)
+        self._liveness = None
+        self.state = "connecting" if self._again else "closed"
+        self._closed(reason)
+
+    def _ask(self) -> None:
+        self._pings += 1
+        self._put(data.pack_note(data.Ping(self._pings)))
+
+    def _put(self, piece: bytes) -> None:
+        assert self._peer is not None
+        self._peer.put_data(self._key_in, piece, all=True)
+
+    def _listen(self, topic: str) -> None:
+        if topic not in self._topics and self._peer is not None:
+            assert self._agent is not None
+            key = address.topic_key(self._agent, topic)
+            self._topics[topic] = self._peer.listen(key, self._arrived)
+
+    def _unlisten(self, topic: str) -> None:
+        number = self._topics.pop(topic, None)
+        if number is not None and self._peer is not None:
+            self._peer.unlisten(number)
+
+    def _arrived(self, _key: str, piece: bytes) -> None:
+        """Pass data to the model's thread; called in a thread of Zenoh."""
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._take, piece)
+
+    def _take(self, piece: bytes) -> None:
+        try:
+            received = data.unpack(piece)
+        except WireError as error:
+            log.warning("%s: %s", self.url, error)
+            return
+        self.last_heard = time.monotonic()
+        if isinstance(received, bytes):
+            if self.state == "open":
+                self._deliver(received)
+        elif isinstance(received, data.Pong):
+            self._session, self._trouble = received.session, received.trouble
+            if self._liveness is not None and received.number == self._pings:
+                self._liveness.ponged(self.last_heard)
+
+    def _deliver(self, frame: bytes | bytearray) -> None:
+        try:
+            self._received(frame)
+        except Exception:
+            log.exception("%s: a frame of %d bytes was lost", self.url, len(frame))
+
+
+def _not_reached(url: str, why: str) -> BridgeClosed:
+    closed = BridgeClosed(f"cannot reach the agent at {url}: {why}")
+    closed.why = why
+    return closed
+
+
+class AgentLink(RosbridgeLink):
+    """Topics and services of a robot's rosbridge, through its agent."""
+
+    lane_type = AgentLane
+
+
+for scheme in address.SCHEMES:
+    LINKS[scheme] = AgentLink

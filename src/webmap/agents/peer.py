@@ -1,0 +1,367 @@
+"""The sessions of this process with one Zenoh router.
+
+Commands and ticks have a session of their own: on one session with data they waited
+for seconds over a narrow link, whatever their priority. Both are clients of the router,
+find nobody by themselves and listen on nothing.
+"""
+
+import atexit
+import json
+import logging
+import os
+import secrets
+import threading
+from collections import OrderedDict, deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Self
+
+from webmap.agents.address import ANYONE, checked_name, locator
+from webmap.agents.reach import why_not_reached
+from webmap.base.errors import ConfigError
+from webmap.base.outside_text import one_line
+
+if TYPE_CHECKING:
+    import zenoh
+
+log = logging.getLogger("webmap.agent")
+
+Handler = Callable[[str, bytes], None]
+"""Called with the key and the bytes of a message, in a thread of Zenoh."""
+
+RETRY = 0.2
+"""Seconds between two attempts to reach the router."""
+
+EXPLAIN = 25
+"""Failed attempts between two looks for the reason."""
+
+LOOK = 0.25
+"""Seconds between two looks whether the router is connected."""
+
+SMALL = 4096
+"""Bytes up to which several messages of a topic may wait; of larger ones the newest."""
+
+MOST_WAITING = 10
+"""Messages of a topic that wait at most."""
+
+ASK_PATIENCE = 5.0
+"""Seconds for an answer of another peer."""
+
+
+class User:
+    """Who this process is for the router.
+
+    Args:
+        name: The name of the user; "" without users.
+        password: The password.
+        ca: The file with the certificate of the authority that signed the router's, if
+            the system does not know it.
+
+    """
+
+    def __init__(self, name: str = "", password: str = "", ca: str = "") -> None:
+        self.name = checked_name(name, "user of the router") if name else ANYONE
+        self.instance = secrets.token_hex(4)
+        self.password = password
+        self.ca = ca
+
+    @classmethod
+    def from_environment(cls) -> Self:
+        """Return the user of the variables ``WEBMAP_ROUTER_...``."""
+        names = ("USER", "PASSWORD", "CA")
+        return cls(*(os.environ.get(f"WEBMAP_ROUTER_{name}", "") for name in names))
+
+
+def zenoh_config(**settings: Any) -> "zenoh.Config":
+    """Return a configuration that finds nobody by itself and shares no memory.
+
+    Raises:
+        ConfigError: If Zenoh is not installed.
+
+    """
+    try:
+        import zenoh
+    except ImportError:
+        raise ConfigError(
+            "agents need Zenoh, which is not installed: pip install 'webmap[fleet]'"
+        ) from None
+    closed = {
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+    }
+    return zenoh.Config.from_json5(json.dumps({**closed, **settings}))
+
+
+class Peer:
+    """The sessions with one router; opened again by themselves after each loss.
+
+    Args:
+        router: The router's address.
+        user: Who this process is.
+
+    Raises:
+        ConfigError: If the address is none, or Zenoh is not installed.
+
+    """
+
+    def __init__(self, router: str, user: User | None = None) -> None:
+        self.locator = locator(router)
+        self.user = user or User.from_environment()
+        self.trouble: str | None = f"waiting for the router at {self.locator}"
+        """Why the router is not connected; None if it is."""
+        self._config = self._client_config()
+        zenoh_config()  # to fail here, not in a thread
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
+        self._gate: zenoh.Session | None = None
+        self._data: zenoh.Session | None = None
+        self._handlers: dict[int, tuple[str, Handler, bool]] = {}
+        self._answers: dict[str, Callable[[], bytes]] = {}
+        self._declared: dict[int, Any] = {}
+        self._number = 0
+        self._waiting: OrderedDict[str, deque[bytes]] = OrderedDict()
+        self._wake = threading.Condition()
+        self._threads: list[threading.Thread] = []
+
+    @property
+    def connected(self) -> bool:
+        """Whether the router is connected."""
+        return self.trouble is None
+
+    def start(self) -> None:
+        """Connect, and keep connected; a second call does nothing."""
+        if self._threads:
+            return
+        for fn, name in ((self._keep, "router"), (self._send_waiting, "data")):
+            thread = threading.Thread(target=fn, name=f"webmap-{name}", daemon=True)
+            self._threads.append(thread)
+            thread.start()
+
+    def close(self) -> None:
+        """Close the sessions; a process that does not close them hangs at its end."""
+        self._ended.set()
+        with self._wake:
+            self._wake.notify_all()
+        for thread in self._threads:
+            thread.join(5.0)
+        for session in (self._gate, self._data):
+            if session is not None:
+                session.close()  # type: ignore[no-untyped-call]
+        self._gate = self._data = None
+
+    def listen(self, key: str, fn: Handler, *, gate: bool = False) -> int:
+        """Call ``fn`` with each message under a key; return a number to end it."""
+        with self._lock:
+            self._number += 1
+            number = self._number
+            self._handlers[number] = (key, fn, gate)
+            self._declare(number)
+        return number
+
+    def unlisten(self, number: int) -> None:
+        """End :meth:`listen`."""
+        with self._lock:
+            self._handlers.pop(number, None)
+            declared = self._declared.pop(number, None)
+        if declared is not None:
+            declared.undeclare()
+
+    def answer(self, key: str, fn: Callable[[], bytes]) -> None:
+        """Answer every question for a key with the result of ``fn``."""
+        with self._lock:
+            self._answers[key] = fn
+            if self._data is not None:
+                self._declare_answer(key)
+
+    def ask(self, key: str) -> bytes | None:
+        """Return the answer of another peer; None if there is none. Waits for it."""
+        session = self._data
+        if session is None:
+            return None
+        for reply in session.get(key, timeout=ASK_PATIENCE):
+            if reply.ok is not None:
+                return reply.ok.payload.to_bytes()
+        return None
+
+    def put_gate(self, key: str, data: bytes) -> None:
+        """Send a sample of the gate now, or not at all."""
+        import zenoh
+
+        session = self._gate
+        if session is not None:
+            session.put(
+                key,
+                data,
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.REAL_TIME,
+                express=True,
+            )
+
+    def put_data(self, key: str, data: bytes, *, all: bool = False) -> None:
+        """Send data as soon as the link accepts it.
+
+        Args:
+            key: The key.
+            data: The data.
+            all: Whether every message counts. Otherwise the oldest that wait under the
+                key are left out.
+
+        """
+        if not self.connected:
+            return
+        with self._wake:
+            waiting = self._waiting.get(key)
+            if waiting is None:
+                waiting = self._waiting[key] = deque()
+            if not all:
+                most = MOST_WAITING if len(data) <= SMALL else 1
+                while len(waiting) >= most:
+                    waiting.popleft()
+            waiting.append(data)
+            self._wake.notify()
+
+    def _send_waiting(self) -> None:
+        import zenoh
+
+        while not self._ended.is_set():
+            with self._wake:
+                while not self._waiting and not self._ended.is_set():
+                    self._wake.wait()
+                if self._ended.is_set():
+                    return
+                key, waiting = self._waiting.popitem(last=False)
+                data = waiting.popleft()
+                if waiting:
+                    self._waiting[key] = waiting
+            session = self._data
+            if session is None or not self.connected:
+                continue
+            try:
+                session.put(
+                    key,
+                    data,
+                    congestion_control=zenoh.CongestionControl.BLOCK,
+                    priority=zenoh.Priority.DATA,
+                    express=True,
+                )
+            except zenoh.ZError as error:
+                log.warning("%s: data was not sent: %s", self.locator, error)
+
+    def _client_config(self) -> dict[str, Any]:
+        endpoint = self.locator
+        settings: dict[str, Any] = {
+            "mode": "client",
+            "connect": {
+                "endpoints": [endpoint],
+                "timeout_ms": 0,
+                "exit_on_failure": True,
+                "retry": {
+                    "period_init_ms": 50,
+                    "period_max_ms": 200,
+                    "period_increase_factor": 2,
+                },
+            },
+        }
+        link: dict[str, Any] = {"tx": {"queue": {"size": {"data": 1, "real_time": 1}}}}
+        if endpoint.startswith("tls/") and self.user.ca:
+            link["tls"] = {"root_ca_certificate": self.user.ca}
+        settings["transport"] = {"link": link, "shared_memory": {"enabled": False}}
+        if self.user.password:
+            settings["transport"]["auth"] = {
+                "usrpwd": {"user": self.user.name, "password": self.user.password}
+            }
+        return settings
+
+    def _keep(self) -> None:
+        """Open the sessions, then note whether the router is connected."""
+        import zenoh
+
+        failures = 0
+        while not self._ended.is_set():
+            try:
+                self._gate = self._gate or zenoh.open(zenoh_config(**self._config))
+                self._data = self._data or zenoh.open(zenoh_config(**self._config))
+                break
+            except zenoh.ZError:
+                if failures % EXPLAIN == 0:
+                    self._explain()
+                failures += 1
+                self._ended.wait(RETRY)
+        self._look()  # before messages arrive, which are answered
+        with self._lock:
+            for number in self._handlers:
+                self._declare(number)
+            for key in self._answers:
+                self._declare_answer(key)
+        while not self._ended.wait(LOOK):
+            self._look()
+
+    def _look(self) -> None:
+        """Note whether the router is connected."""
+        there = all(
+            session is not None and session.info.routers_zid()
+            for session in (self._gate, self._data)
+        )
+        if there and not self.connected:
+            self.trouble = None
+            log.info("the router at %s is connected", self.locator)
+        elif not there and self.connected:
+            self.trouble = f"no connection to the router at {self.locator}"
+            log.warning("%s", self.trouble)
+
+    def _explain(self) -> None:
+        """Note why the router cannot be reached, and log it when it changes."""
+        user = "" if self.user.name == ANYONE else self.user.name
+        why = why_not_reached(self.locator, user, self.user.ca)
+        trouble = f"cannot reach the router at {self.locator}: {one_line(why)}"
+        if trouble != self.trouble:
+            log.warning("%s", trouble)
+        self.trouble = trouble
+
+    def _declare(self, number: int) -> None:
+        key, fn, gate = self._handlers[number]
+        session = self._gate if gate else self._data
+        if session is None or number in self._declared:
+            return
+
+        def call(sample: "zenoh.Sample") -> None:
+            try:
+                fn(str(sample.key_expr), sample.payload.to_bytes())
+            except Exception:
+                log.exception("%s: a message was lost", key)
+
+        self._declared[number] = session.declare_subscriber(key, call)
+
+    def _declare_answer(self, key: str) -> None:
+        def call(query: "zenoh.Query") -> None:
+            with query:
+                try:
+                    query.reply(key, self._answers[key]())
+                except Exception:
+                    log.exception("%s: a question was not answered", key)
+
+        assert self._data is not None
+        self._data.declare_queryable(key, call)
+
+
+_peers: dict[str, Peer] = {}
+_peers_lock = threading.Lock()
+
+
+def peer_of(router: str) -> Peer:
+    """Return the peer of this process for a router; it is started."""
+    with _peers_lock:
+        place = locator(router)
+        peer = _peers.get(place)
+        if peer is None:
+            if not _peers:
+                atexit.register(close_peers)
+            peer = _peers[place] = Peer(router)
+            peer.start()
+        return peer
+
+
+def close_peers() -> None:
+    """Close the peers of this process."""
+    with _peers_lock:
+        for peer in _peers.values():
+            peer.close()
+        _peers.clear()

@@ -1,0 +1,60 @@
+"""Why a router cannot be reached, in words: Zenoh reports only that it cannot."""
+
+import socket
+import ssl
+
+PATIENCE = 2.0
+"""Seconds for an answer."""
+
+
+def why_not_reached(locator: str, user: str, ca: str) -> str:
+    """Return why a connection to a router fails. Waits for the network.
+
+    Args:
+        locator: The router's locator.
+        user: The name of the user; "" without one.
+        ca: The file with the certificate of the router's authority; "" for those that
+            the system knows.
+
+    """
+    transport, _, place = locator.partition("/")
+    host, _, port = place.rpartition(":")
+    host = host.strip("[]")
+    try:
+        link = socket.create_connection((host, int(port)), PATIENCE)
+    except socket.gaierror as error:
+        return f"the host's name is not known ({error.strerror})"
+    except ConnectionRefusedError:
+        return "the connection was refused, nothing listens there"
+    except TimeoutError:
+        return f"no answer within {PATIENCE:g} s"
+    except OSError as error:
+        return str(error)
+    with link:
+        if transport == "tls":
+            why = _why_no_tls(link, host, ca)
+            if why:
+                return why
+    if user:
+        return (
+            f"it does not let the user {user} in: the name or the password is wrong, "
+            "or it is not a Zenoh router"
+        )
+    return (
+        "it lets nobody in without a user: set WEBMAP_ROUTER_USER and "
+        "WEBMAP_ROUTER_PASSWORD, or it is not a Zenoh router"
+    )
+
+
+def _why_no_tls(link: socket.socket, host: str, ca: str) -> str:
+    try:
+        context = ssl.create_default_context(cafile=ca or None)
+    except OSError as error:
+        return f"the file of WEBMAP_ROUTER_CA cannot be used: {error}"
+    try:
+        context.wrap_socket(link, server_hostname=host).close()
+    except ssl.SSLCertVerificationError as error:
+        return f"its certificate is not valid: {error.verify_message}"
+    except OSError as error:
+        return f"it does not speak TLS: {error}"
+    return ""

@@ -1,0 +1,220 @@
+"""Zenoh's router in this process: its configuration, from a file of users.
+
+A router without users serves this computer alone. With users it is closed: an agent may
+send as itself only, and a display may reach only the agents that its user may drive.
+"""
+
+import os
+import socket
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from webmap.agents.address import checked_name, locator
+from webmap.base.errors import ConfigError
+
+LOOPBACK = ("127.0.0.1", "[::1]", "localhost")
+
+
+class UserEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """A user in the file of users."""
+
+    password: str
+    agent: str = ""
+    """The agent that this user is; "" for a display."""
+    drives: list[str] = []
+    """The agents that displays of this user reach; ``*`` for all."""
+
+
+class Users(msgspec.Struct, forbid_unknown_fields=True):
+    """The file of users: a table ``[users.NAME]`` for each."""
+
+    users: dict[str, UserEntry]
+
+
+def read_users(file: Path) -> dict[str, UserEntry]:
+    """Return the users of a file.
+
+    Raises:
+        ConfigError: If the file has a mistake.
+        OSError: If it cannot be read.
+
+    """
+    try:
+        users = msgspec.toml.decode(file.read_bytes(), type=Users).users
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{file}: {error}") from None
+    for name, user in users.items():
+        checked_name(name, "user")
+        for agent in (user.agent, *user.drives):
+            if agent not in ("", "*"):
+                checked_name(agent)
+        if not user.password or ":" in name or "\n" in user.password:
+            raise ConfigError(f"{file}: the user {name} has no password of one line")
+        if bool(user.agent) == bool(user.drives):
+            raise ConfigError(
+                f'{file}: the user {name} needs either "agent", the agent that it is, '
+                'or "drives", the agents that it reaches'
+            )
+    return users
+
+
+def is_loopback_locator(place: str) -> bool:
+    """Return whether only this computer reaches a locator."""
+    host = place.partition("/")[2].rpartition(":")[0]
+    return host in LOOPBACK
+
+
+def free_port(place: str) -> str:
+    """Return a locator with a free port in place of port 0."""
+    transport, _, rest = place.partition("/")
+    host, _, port = rest.rpartition(":")
+    if port != "0":
+        return place
+    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
+    with socket.socket(family) as probe:
+        probe.bind((host.strip("[]"), 0))
+        return f"{transport}/{host}:{probe.getsockname()[1]}"
+
+
+def router_settings(
+    listen: str,
+    users: Mapping[str, UserEntry] | None,
+    *,
+    certificate: str = "",
+    key: str = "",
+    insecure_lan: bool = False,
+) -> dict[str, Any]:
+    """Return the configuration of a router.
+
+    Args:
+        listen: The locator to listen on.
+        users: The users; None lets everybody in.
+        certificate: The file with the certificate of the router, for TLS.
+        key: The file with its private key.
+        insecure_lan: Whether other computers may connect without TLS or users.
+
+    Raises:
+        ConfigError: If other computers could connect without TLS or users, or the
+            files for TLS are missing.
+
+    """
+    place = free_port(locator(listen))
+    tls = place.startswith("tls/")
+    if tls and not (certificate and key):
+        raise ConfigError(f"{place}: TLS needs --certificate and --key")
+    if not is_loopback_locator(place) and not (tls and users) and not insecure_lan:
+        raise ConfigError(
+            f"{place} can be reached from other computers: use tls/ and --users, or "
+            "--insecure-lan if you trust this network"
+        )
+    transport: dict[str, Any] = {"shared_memory": {"enabled": False}}
+    if tls:
+        transport["link"] = {
+            "tls": {"listen_certificate": certificate, "listen_private_key": key}
+        }
+    settings: dict[str, Any] = {
+        "mode": "router",
+        "listen": {"endpoints": [place]},
+        "transport": transport,
+    }
+    if users is not None:
+        transport["auth"] = {"usrpwd": {"dictionary_file": _dictionary(users)}}
+        settings["access_control"] = access_rules(users)
+    return settings
+
+
+def _dictionary(users: Mapping[str, UserEntry]) -> str:
+    """Write the passwords for Zenoh into a file that only this user reads."""
+    number, name = tempfile.mkstemp(prefix="webmap-router-")
+    with os.fdopen(number, "w") as file:
+        for user, entry in users.items():
+            file.write(f"{user}:{entry.password}\n")
+    return name
+
+
+def access_rules(users: Mapping[str, UserEntry]) -> dict[str, Any]:
+    """Return the access rules of a router for its users."""
+    rules: list[dict[str, Any]] = []
+    policies: list[dict[str, Any]] = []
+    for user, entry in users.items():
+        sends, gets = _keys_of_agent(entry.agent), _keys_for_agent(entry.agent)
+        asks: list[str] = []
+        answers = [f"webmap/{entry.agent}/about"]
+        if not entry.agent:
+            agents = ["*"] if "*" in entry.drives else entry.drives
+            sends = [key for each in agents for key in _keys_of_display(each, user)]
+            gets = [key for each in agents for key in _keys_for_display(each, user)]
+            asks, answers = [f"webmap/{each}/about" for each in agents], []
+        found = [
+            _rule(f"{user}-sends", ["put"], ["ingress"], sends),
+            _rule(f"{user}-gets", ["put"], ["egress"], gets),
+            _rule(f"{user}-subscribes", ["declare_subscriber"], ["ingress"], gets),
+            _rule(f"{user}-told", ["declare_subscriber"], ["egress"], sends),
+        ]
+        if asks:
+            found.append(_rule(f"{user}-asks", ["query"], ["ingress"], asks))
+            found.append(_rule(f"{user}-answered", ["reply"], ["egress"], asks))
+            found.append(
+                _rule(f"{user}-finds", ["declare_queryable"], ["egress"], asks)
+            )
+        if answers:
+            found.append(
+                _rule(f"{user}-offers", ["declare_queryable"], ["ingress"], answers)
+            )
+            found.append(_rule(f"{user}-asked", ["query"], ["egress"], answers))
+            found.append(_rule(f"{user}-replies", ["reply"], ["ingress"], answers))
+        rules += found
+        policies.append({"rules": [rule["id"] for rule in found], "subjects": [user]})
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": [{"id": user, "usernames": [user]} for user in users],
+        "policies": policies,
+    }
+
+
+def _rule(
+    id: str, messages: list[str], flows: list[str], keys: list[str]
+) -> dict[str, Any]:
+    return {
+        "id": id,
+        "messages": messages,
+        "flows": flows,
+        "permission": "allow",
+        "key_exprs": keys,
+    }
+
+
+def _keys_of_agent(agent: str) -> list[str]:
+    root = f"webmap/{agent}"
+    return [
+        f"{root}/here",
+        f"{root}/gate/out",
+        f"{root}/data/out/**",
+        f"{root}/topics/**",
+    ]
+
+
+def _keys_for_agent(agent: str) -> list[str]:
+    root = f"webmap/{agent}"
+    return [f"{root}/here", f"{root}/gate/in/**", f"{root}/data/in/**"]
+
+
+def _keys_of_display(agent: str, user: str) -> list[str]:
+    root = f"webmap/{agent}"
+    return [f"{root}/gate/in/{user}/*", f"{root}/data/in/{user}/*/*"]
+
+
+def _keys_for_display(agent: str, user: str) -> list[str]:
+    root = f"webmap/{agent}"
+    return [
+        f"{root}/here",
+        f"{root}/gate/out",
+        f"{root}/data/out/{user}/*/*",
+        f"{root}/topics/**",
+    ]

@@ -1,0 +1,261 @@
+"""The display's side of the gate of an agent, without a network."""
+
+import json
+import threading
+
+import msgspec
+import pytest
+
+from webmap.agents.displays import Displays, Took, Unknown
+from webmap.agents.far_gate import FarGate
+from webmap.base.errors import WireError
+from webmap.gate import commands
+from webmap.gate.protocol import (
+    Connect,
+    Forget,
+    FromPage,
+    FromProgram,
+    GateDown,
+    Hello,
+    Ready,
+    RobotReport,
+    RobotSpec,
+    TakeReply,
+    Tick,
+)
+
+NAME = "ann.4f"
+PAGE = Connect(f"{NAME}/c1", "Ann", "operator")
+PROGRAM = Connect(f"{NAME}/program", NAME, "operator")
+STOP = FromPage(f"{NAME}/c1", b'{"op":"stop","robot":"r1"}')
+
+
+class Owner:
+    def __init__(self):
+        self.heard = []
+
+    def introduction(self):
+        return [RobotSpec(id="r1", name="Bob", bridge_url="zenoh://h/bay3"), PAGE]
+
+    def hear(self, message):
+        self.heard.append(message)
+
+    def gone(self, down):
+        self.heard.append(down)
+
+    def of(self, kind):
+        return [message for message in self.heard if isinstance(message, kind)]
+
+
+class Bench:
+    """A display and its agent; samples arrive when the test delivers them."""
+
+    def __init__(self):
+        self.owner = Owner()
+        self.sent = []
+        self.displays = Displays()
+        self.far = FarGate(
+            "bay3", NAME, self.owner, threading.RLock(), self.sent.append
+        )
+
+    def hears(self, message, now=0.0):
+        self.far.take(self.displays.send(message, now), now)
+
+    def arrive(self, now=0.0):
+        samples, self.sent[:] = list(self.sent), []
+        return [
+            message
+            for sample in samples
+            for message in self.displays.receive(NAME, sample, now)
+        ]
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+@pytest.fixture
+def connected(bench):
+    bench.hears(Tick(1, {}))
+    assert bench.arrive() == [PROGRAM, PAGE]
+    bench.hears(Hello(PAGE.connection))
+    return bench
+
+
+REPORT = msgspec.convert(
+    {
+        "type": "robot",
+        "robot": "r1",
+        "name": "Bob",
+        "state": "driving",
+        "doing": "driven",
+        "latched": False,
+        "stop": None,
+        "holder": {"connection": f"{NAME}/c1", "name": "Ann"},
+        "epoch": 3,
+        "asker": None,
+        "changing": False,
+        "armed": True,
+        "v": 1.0,
+        "w": 1.5,
+        "why": [],
+        "link": "up",
+        "sent": [0.0] * 6,
+        "echoed": None,
+        "measured": None,
+        "alarm": None,
+        "age": None,
+        "reaction": 0.3,
+        "brake": 0.5,
+        "stop_time": None,
+        "stop_source": None,
+        "stop_date": None,
+        "test": None,
+        "armable": True,
+        "reason": None,
+    },
+    RobotReport,
+)
+
+
+def test_the_first_sample_introduces_the_pages_and_no_robot(bench):
+    assert not bench.far.ready
+    assert bench.far.trouble == "waiting for the agent bay3"
+    bench.hears(Tick(1, {}))
+    assert bench.far.ready
+    assert bench.far.trouble is None
+    assert bench.arrive() == [PROGRAM, PAGE]
+    assert bench.owner.heard == [Ready(0), Tick(1, {})]
+
+
+def test_declarations_stay_here(connected):
+    connected.far.send(RobotSpec(id="r1", name="Bob", bridge_url="ws://evil"))
+    connected.far.send(Forget("r1"))
+    assert connected.arrive() == []
+
+
+def test_nothing_is_sent_before_the_agent_is_heard(bench):
+    bench.far.send(FromPage(PAGE.connection, b'{"op":"take","robot":"r1"}'))
+    assert bench.sent == []
+
+
+def test_a_stop_is_sent_again_until_the_agent_has_it(connected):
+    connected.far.send(STOP)
+    connected.sent.clear()  # lost
+    for now in (0.05, 0.1):
+        connected.far.beat(now)
+    assert connected.arrive(0.1) == [STOP]
+    session, number = connected.displays.newest(NAME)
+    took = Took(NAME, session, number - 1)
+    connected.hears(took, 0.12)  # of another sample
+    connected.far.beat(0.25)
+    assert STOP in connected.arrive(0.25)
+    taken = [n for n in connected.far._stops]
+    for number in taken:
+        connected.hears(Took(NAME, session, number), 0.3)
+    connected.far.beat(0.45)
+    assert STOP not in connected.arrive(0.45)
+
+
+def test_the_acknowledgement_of_another_display_ends_nothing(connected):
+    connected.far.send(STOP)
+    connected.arrive()
+    session, number = connected.displays.newest(NAME)
+    connected.hears(Took("ben.5e", session, number), 0.05)
+    connected.far.beat(0.15)
+    assert connected.arrive(0.15) == [STOP]
+
+
+def test_a_silent_agent_is_lost_and_its_robots_are_reported_as_unreachable(connected):
+    connected.hears(REPORT, 0.1)
+    connected.far.beat(0.59)
+    assert connected.owner.of(GateDown) == []
+    connected.far.beat(0.61)
+    (down,) = connected.owner.of(GateDown)
+    assert down.why == "no connection to the agent bay3"
+    last = connected.owner.of(RobotReport)[-1]
+    assert (last.link, last.holder, last.epoch, last.armable) == (
+        "down",
+        None,
+        None,
+        False,
+    )
+    assert last.reason == down.why
+    connected.far.send(STOP)
+    assert connected.arrive(0.7) == []
+
+
+def test_an_agent_that_returns_gets_the_pages_and_a_kept_stop_again(connected):
+    connected.far.send(STOP)
+    connected.sent.clear()
+    connected.far.beat(0.6)
+    connected.sent.clear()
+    connected.hears(Tick(9, {}), 5.0)
+    connected.far.beat(5.05)
+    assert connected.arrive(5.05) == [PROGRAM, PAGE, STOP]
+
+
+@pytest.mark.parametrize("how", ["agent", "gate"])
+def test_a_restart_ends_all_leases(connected, how):
+    connected.hears(REPORT, 0.1)
+    if how == "agent":
+        connected.displays = Displays()
+        connected.hears(Tick(1, {}), 0.2)
+    else:
+        connected.hears(Ready(7), 0.2)
+    (down,) = connected.owner.of(GateDown)
+    assert down.why == "the gate of the agent bay3 has restarted"
+    assert PAGE in connected.arrive(0.2)
+
+
+def test_lost_samples_make_the_display_ask_for_all_reports(connected):
+    connected.arrive()
+    assert connected.displays.wants_reports(), "at the beginning"
+    connected.displays.send(Tick(2, {}), 0.1)  # lost
+    connected.hears(Tick(3, {}), 0.15)
+    connected.arrive()
+    assert connected.displays.wants_reports()
+
+
+def test_a_page_without_an_answer_is_introduced_again(bench):
+    bench.hears(Tick(1, {}))
+    bench.sent.clear()  # all lost
+    bench.hears(Tick(2, {}), 0.4)
+    bench.far.beat(0.5)
+    assert PAGE in bench.arrive(0.5)
+
+
+def test_a_page_that_the_agent_has_ended_is_introduced_again(connected):
+    connected.hears(Unknown(NAME, (PAGE.connection, PROGRAM.connection)), 0.1)
+    assert connected.arrive(0.1) == [PROGRAM, PAGE]
+    connected.hears(Unknown("ben.5e", (PAGE.connection,)), 0.2)
+    assert connected.arrive(0.2) == []
+
+
+def test_samples_that_are_none_are_refused(connected):
+    with pytest.raises(WireError):
+        connected.far.take(b"x" * 40, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        (commands.Stop(None), {"op": "stop", "robot": "*"}),
+        (commands.Reset("r1", "5f"), {"op": "reset", "robot": "r1", "stop": "5f"}),
+        (commands.Cancel("r1"), {"op": "cancel", "robot": "r1"}),
+    ],
+)
+def test_a_program_stops_resets_and_cancels_at_an_agent(connected, command, text):
+    connected.far.send(FromProgram(command))
+    (got,) = connected.arrive()
+    assert got.connection == PROGRAM.connection
+    assert json.loads(got.text) == text
+
+
+def test_a_program_takes_no_robot_of_an_agent(connected):
+    connected.far.send(FromProgram(commands.Take("r1"), 4))
+    assert connected.arrive() == []
+    (reply,) = connected.owner.of(TakeReply)
+    assert (reply.request, reply.epoch) == (4, None)
+    assert "an agent" in reply.why

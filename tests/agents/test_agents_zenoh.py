@@ -1,0 +1,207 @@
+"""Peers and a real router: users, rules, TLS, and what is lost with a connection."""
+
+import time
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from webmap.agents import address
+from webmap.agents.peer import Peer, User, zenoh_config
+from webmap.agents.router import free_port, read_users, router_settings
+
+zenoh = pytest.importorskip("zenoh")
+
+TLS = Path(__file__).with_name("tls")
+
+USERS = """
+[users.bay3]
+password = "one"
+agent = "bay3"
+
+[users.bay4]
+password = "four"
+agent = "bay4"
+
+[users.west]
+password = "two"
+drives = ["bay3"]
+"""
+
+
+@contextmanager
+def router(listen="tcp/127.0.0.1:0", users=None, **options):
+    """Run a router in this process; yield its locator."""
+    settings = router_settings(listen, users, **options)
+    session = zenoh.open(zenoh_config(**settings))
+    try:
+        yield settings["listen"]["endpoints"][0]
+    finally:
+        session.close()
+
+
+@contextmanager
+def peers(place, *users):
+    """Connect one peer for each user."""
+    with ExitStack() as closing:
+        made = [Peer(place, user) for user in users]
+        for peer in made:
+            closing.callback(peer.close)
+            peer.start()
+        wait_for(lambda: all(peer.connected for peer in made))
+        yield made
+
+
+def wait_for(check, within=10.0):
+    deadline = time.monotonic() + within
+    while not check():
+        assert time.monotonic() < deadline, "it did not happen"
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def users(tmp_path):
+    file = tmp_path / "users.toml"
+    file.write_text(USERS)
+    return read_users(file)
+
+
+def test_messages_arrive_with_their_keys_and_questions_are_answered():
+    got = []
+    with router() as place, peers(place, User(), User()) as (one, other):
+        other.listen("webmap/*/here", lambda key, data: got.append((key, data)))
+        other.listen("webmap/a/gate/out", lambda _, data: got.append(data), gate=True)
+        one.answer("webmap/a/about", lambda: b"robots")
+        wait_for(lambda: other.ask("webmap/a/about") == b"robots")
+        one.put_data("webmap/a/here", b"x")
+        one.put_gate("webmap/a/gate/out", b"tick")
+        wait_for(lambda: len(got) == 2)
+    assert sorted(map(str, got)) == sorted(map(str, [("webmap/a/here", b"x"), b"tick"]))
+
+
+def test_an_ended_listener_gets_nothing():
+    got = []
+    with router() as place, peers(place, User(), User()) as (one, other):
+        number = other.listen("k", lambda key, data: got.append(data))
+        other.listen("k", lambda key, data: got.append(b"second " + data))
+        wait_for(lambda: (one.put_data("k", b"1"), time.sleep(0.05), got)[2])
+        other.unlisten(number)
+        got.clear()
+        one.put_data("k", b"2")
+        wait_for(lambda: got)
+        time.sleep(0.1)
+    assert got == [b"second 2"]
+
+
+def test_a_peer_without_a_router_says_so_and_connects_when_there_is_one():
+    place = free_port("tcp/127.0.0.1:0")
+    peer = Peer(place, User())
+    try:
+        peer.start()
+        wait_for(lambda: "cannot reach the router" in (peer.trouble or ""))
+        assert peer.ask("k") is None
+        peer.put_data("k", b"lost")
+        peer.put_gate("k", b"lost")
+        with router(place):
+            wait_for(lambda: peer.connected)
+        wait_for(lambda: peer.trouble == f"no connection to the router at {place}")
+        with router(place):
+            wait_for(lambda: peer.connected)
+    finally:
+        peer.close()
+
+
+def test_a_user_with_a_wrong_password_is_not_let_in(users):
+    with router(users=users) as place:
+        peer = Peer(place, User("west", "wrong"))
+        try:
+            peer.start()
+            wait_for(lambda: "does not let the user west in" in (peer.trouble or ""))
+            time.sleep(0.5)
+            assert not peer.connected
+        finally:
+            peer.close()
+
+
+def test_a_display_reaches_the_agents_that_its_user_may_drive(users):
+    got = []
+    west, bay3, bay4 = User("west", "two"), User("bay3", "one"), User("bay4", "four")
+    with (
+        router(users=users) as place,
+        peers(place, west, bay3, bay4) as (display, one, other),
+    ):
+        for peer, agent in ((one, "bay3"), (other, "bay4")):
+            key = address.gate_in(agent, "*", "*")
+            peer.listen(
+                key,
+                lambda key, data, agent=agent: got.append((agent, data)),
+                gate=True,
+            )
+            peer.answer(address.about(agent), agent.encode)
+        wait_for(lambda: display.ask(address.about("bay3")) == b"bay3")
+        assert display.ask(address.about("bay4")) is None
+        mine = address.gate_in("bay3", "west", west.instance)
+        wait_for(lambda: (display.put_gate(mine, b"mine"), time.sleep(0.05), got)[2])
+        for key in (
+            address.gate_in("bay4", "west", west.instance),
+            address.gate_in("bay3", "east", west.instance),
+            address.gate_in("bay3", "bay3", "x"),
+        ):
+            display.put_gate(key, b"not mine")
+        time.sleep(0.5)
+    assert {each for each in got} == {("bay3", b"mine")}
+
+
+def test_a_display_and_another_agent_cannot_speak_for_an_agent(users):
+    got = []
+    west, bay3, bay4 = User("west", "two"), User("bay3", "one"), User("bay4", "four")
+    with (
+        router(users=users) as place,
+        peers(place, User("west", "two"), west, bay3, bay4) as (
+            listener,
+            display,
+            one,
+            other,
+        ),
+    ):
+        listener.listen(
+            address.gate_out("bay3"), lambda _, data: got.append(data), gate=True
+        )
+        key = address.gate_out("bay3")
+        wait_for(lambda: (one.put_gate(key, b"tick"), time.sleep(0.05), got)[2])
+        other.put_gate(key, b"false")
+        display.put_gate(key, b"false")
+        time.sleep(0.5)
+    assert set(got) == {b"tick"}
+
+
+def test_peers_reach_a_router_over_tls():
+    with (
+        router(
+            "tls/127.0.0.1:0",
+            certificate=str(TLS / "router.pem"),
+            key=str(TLS / "router.key"),
+        ) as place,
+        peers(place, User(ca=str(TLS / "ca.pem"))) as (peer,),
+    ):
+        assert peer.connected
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("expired", "certificate has expired"), ("router", "local issuer certificate")],
+)
+def test_a_router_with_a_wrong_certificate_is_refused(name, words):
+    with router(
+        "tls/127.0.0.1:0",
+        certificate=str(TLS / f"{name}.pem"),
+        key=str(TLS / f"{name}.key"),
+    ) as place:
+        peer = Peer(place, User(ca=str(TLS / "ca.pem") if name == "expired" else ""))
+        try:
+            peer.start()
+            wait_for(lambda: "its certificate is not valid" in (peer.trouble or ""))
+            assert words in peer.trouble
+            assert not peer.connected
+        finally:
+            peer.close()
