@@ -37,7 +37,7 @@ class Gate:
 def gate(monkeypatch):
     """A gate in place of the process, which hears of nobody else's robots."""
     gate = Gate()
-    monkeypatch.setattr("webmap.gate.display.client.GateClient", lambda: gate)
+    monkeypatch.setattr(runtime_module, "_all_gates", lambda: gate)
     monkeypatch.setattr(runtime_module, "lifecycle", Lifecycle())
     monkeypatch.setattr(runtime_module, "robot_motions", set())
     return gate

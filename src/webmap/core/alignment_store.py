@@ -57,7 +57,7 @@ class AlignmentStore:
     def restore(self, robot: "Robot") -> None:
         """Apply the saved alignments of a robot and of its bridge."""
         bridge = robot.pose_source.bridge
-        if bridge is None:
+        if bridge is None or robot.motion.is_far:  # then its agent aligns it
             return
         self.restore_bridge(bridge)
         own = robot.pose_source.own_alignment

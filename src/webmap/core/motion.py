@@ -7,10 +7,12 @@ import zlib
 from collections import Counter
 from collections.abc import Mapping
 from concurrent.futures import Future
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
 
+from webmap.agents.address import is_agent_url
 from webmap.base.errors import MotionError
 from webmap.base.geometry import Pose, Twist
 from webmap.base.lifecycle import lifecycle
@@ -35,6 +37,7 @@ from webmap.ros.moving import STOP
 from webmap.ros.names import is_type
 
 if TYPE_CHECKING:
+    from webmap.agents.gates import Gates
     from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap.robot")
@@ -65,12 +68,21 @@ Links: TypeAlias = dict[str, Bridge | None]
 _used: Counter[str] = Counter()
 
 
+given_id: ContextVar[str | None] = ContextVar("given_id", default=None)
+"""The identifier of the robot that is made, if its agent has given it one."""
+
+
 def _id_of(name: str) -> str:
     """Return the identifier of a robot for pages and gate.
 
     It is the same after a restart, in whatever order robots are created: a page may
     still have to send a STOP that it could not deliver before.
     """
+    given = given_id.get()
+    if given is not None:
+        return given
+    if RobotMotion.agent:
+        name = f"{RobotMotion.agent}/{name}"
     id = f"r{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
     _used[id] += 1
     return id if _used[id] == 1 else f"{id}-{_used[id]}"
@@ -83,8 +95,11 @@ class RobotMotion:
     gate decides.
     """
 
-    gate: "GateClient | None" = None
-    """The gate of this process, once it is started."""
+    agent: str = ""
+    """The agent that this process is; "" for a display."""
+
+    gate: "Gates | GateClient | None" = None
+    """The gates of this process, once they are started."""
 
     def __init__(self, name: str, complain: Any) -> None:
         self.id = _id_of(name)
@@ -100,6 +115,12 @@ class RobotMotion:
         self._type_query: TypeQuery | None = None
         self._ask_writers_at = 0.0
         robot_motions.add(self)
+
+    @property
+    def is_far(self) -> bool:
+        """Whether the gate of an agent moves the robot, not that of this process."""
+        links = (self._bridges.get(key) for key in WRITING)
+        return any(link is not None and is_agent_url(link.url) for link in links)
 
     @property
     def axes(self) -> Axes:
@@ -341,7 +362,7 @@ class RobotMotion:
         if others is not None and self.gate is not None and self.config.twist is twist:
             self.gate.name_writers(self.id, tuple(others))
 
-    def _gate(self) -> "GateClient":
+    def _gate(self) -> "Gates | GateClient":
         if self.gate is None or not lifecycle.running:
             raise MotionError(
                 f"robot {self._name!r} cannot be moved before webmap.start()"

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Protocol
 
+from webmap.agents.peer import close_peers
 from webmap.base.geometry import Quaternion, Twist
 from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import Removal
@@ -31,6 +32,7 @@ from webmap.gate.protocol import (
 )
 
 if TYPE_CHECKING:
+    from webmap.agents.gates import Gates
     from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap")
@@ -60,7 +62,9 @@ class Runtime:
     """The model's thread, its tick, and the gate."""
 
     def __init__(self) -> None:
-        self.gate: GateClient | None = None
+        self.gate: Gates | GateClient | None = None
+        self.make_gate: Callable[[], Gates | GateClient] = _all_gates
+        """Makes the gate's client at each start."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._thread: threading.Thread | None = None
         self._watchers: dict[int, Watcher] = {}
@@ -132,6 +136,11 @@ class Runtime:
 
         return Removal(undo)
 
+    def notice(self, text: str) -> None:
+        """Show a sentence on every open page; called in the model's thread."""
+        for watcher in list(self._watchers.values()):
+            watcher.notice(text)
+
     def _run(self, ready: threading.Event, failure: list[BaseException]) -> None:
         try:
             with asyncio.Runner(loop_factory=_new_loop) as runner:
@@ -144,10 +153,8 @@ class Runtime:
             ready.set()
 
     async def _run_model(self, ready: threading.Event) -> None:
-        from webmap.gate.display.client import GateClient
-
         loop = self._loop = asyncio.get_running_loop()
-        gate = self.gate = GateClient()
+        gate = self.gate = self.make_gate()
 
         def pass_on(report: Report) -> None:
             loop.call_soon_threadsafe(self._on_report, report)
@@ -170,6 +177,7 @@ class Runtime:
             await asyncio.to_thread(gate.stop)
             self.gate = None
             await lifecycle.end()
+            await asyncio.to_thread(close_peers)
 
     async def _tick_on(self) -> None:
         loop = asyncio.get_running_loop()
@@ -192,10 +200,10 @@ class Runtime:
             return
         if isinstance(report, GateDown):
             for each in list(robots.values()):
-                each.on_gate_down()
+                if not each.motion.is_far:
+                    each.on_gate_down()
             if report.failing:
-                for watcher in list(self._watchers.values()):
-                    watcher.notice(report.why)
+                self.notice(report.why)
             return
         name = getattr(report, "robot", None)
         robot = None if name is None else robots.get(name)
@@ -232,6 +240,12 @@ def goal_message(sent: SentGoal) -> dict[str, Any]:
         "position": {"x": sent.x, "y": sent.y, "z": 0.0},
         "orientation": {"x": q.x, "y": q.y, "z": q.z, "w": q.w},
     }
+
+
+def _all_gates() -> "Gates":
+    from webmap.agents.gates import Gates
+
+    return Gates()
 
 
 def _new_loop() -> asyncio.AbstractEventLoop:

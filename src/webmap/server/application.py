@@ -10,10 +10,10 @@ from webmap.core.page import site
 from webmap.core.runtime import runtime
 
 if TYPE_CHECKING:
-    from webmap.gate.display.client import DriveConnection
     from webmap.gate.protocol import Role
     from webmap.server.access import Authenticate
     from webmap.server.app import WebApp
+    from webmap.server.open_pages import GateConnection
 
 log = logging.getLogger("webmap")
 
@@ -191,7 +191,7 @@ def _connect_to_gate(
     role: "Role",
     send: Callable[[str], None],
     close: Callable[[str], None],
-) -> "DriveConnection":
+) -> "GateConnection":
     if runtime.gate is None:
         raise WebMapError("WebMap has not been started: call webmap.start()")
     return runtime.gate.connect(name, role, send, close)

@@ -12,9 +12,8 @@ from starlette.websockets import WebSocket
 
 from webmap.core.page import Viewer
 from webmap.gate.commands import begins_like_stop
-from webmap.gate.display.client import DriveConnection
 from webmap.gate.protocol import Role
-from webmap.server.open_pages import OpenPages
+from webmap.server.open_pages import GateConnection, OpenPages
 from webmap.server.outbox import BatchedCallsByLoop, DriveQueue
 from webmap.server.page_socket import (
     BROKEN_RULE,
@@ -29,7 +28,7 @@ from webmap.server.page_socket import (
 from webmap.server.security import VIEWER
 
 ConnectToGate = Callable[
-    [str, Role, Callable[[str], None], Callable[[str], None]], DriveConnection
+    [str, Role, Callable[[str], None], Callable[[str], None]], GateConnection
 ]
 """Opens a connection to the gate for a viewer's name and role. The two callbacks send
 to the page and close its socket; they may be called from any thread."""
@@ -112,7 +111,7 @@ class DriveSockets:
             connection.close()
             self._pages.drive_closed(page_id, viewer, connection)
 
-    def _connect(self, page_socket: PageSocket, viewer: Viewer) -> DriveConnection:
+    def _connect(self, page_socket: PageSocket, viewer: Viewer) -> GateConnection:
         def close(reason: str) -> None:
             page_socket.end(BROKEN_RULE, reason)
 

@@ -10,7 +10,7 @@ import logging
 import time
 from collections.abc import Awaitable, Mapping
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Protocol
 
 from webmap.base.errors import WireError
 from webmap.base.geometry import Affine
@@ -21,7 +21,6 @@ from webmap.core.pictures import Publisher
 from webmap.core.refused import refusals
 from webmap.core.runtime import Runtime
 from webmap.core.view import Rect
-from webmap.gate.display.client import DriveConnection
 from webmap.scene.element import Event
 from webmap.scene.wire.messages import (
     ElementEvent,
@@ -65,6 +64,19 @@ KEPT_FOR = 30.0
 """Seconds for which a page is kept for its viewer after its socket was lost."""
 
 
+class GateConnection(Protocol):
+    """One page's socket at the gates."""
+
+    def receive(self, text: str | bytes) -> None:
+        """Pass a frame of the page to the gate, valid or not."""
+
+    def set_speeds(self, v: float, w: float) -> None:
+        """Set the page's own speed limits, in m/s and rad/s."""
+
+    def close(self) -> None:
+        """Remove the page, which has closed; the robots that it drove stop."""
+
+
 class PageHost:
     """One page of one viewer, kept when its socket is lost or the page is reloaded."""
 
@@ -86,7 +98,7 @@ class PageHost:
         self._giving_up: asyncio.TimerHandle | None = None
         self.lost_at: float | None = None
         """When its socket was lost, on the monotonic clock; None while it has one."""
-        self.drive: DriveConnection | None = None
+        self.drive: GateConnection | None = None
 
     def __repr__(self) -> str:
         return f"<page {self._entry.path} of {self.viewer.name}>"
@@ -306,7 +318,7 @@ class OpenPages:
         self.publisher = publisher
         self._max_pages = max_pages
         self._hosts: dict[PageKey, PageHost] = {}
-        self._drives: dict[tuple[str, str], DriveConnection] = {}
+        self._drives: dict[tuple[str, str], GateConnection] = {}
 
     # From the web thread.
 
@@ -317,13 +329,13 @@ class OpenPages:
         return SceneHandle(self, (entry_path, page_id, viewer.id), viewer, socket)
 
     def drive_opened(
-        self, page_id: str, viewer: Viewer, connection: DriveConnection
+        self, page_id: str, viewer: Viewer, connection: GateConnection
     ) -> None:
         """Set the connection by which a page drives, to set its speeds."""
         self.runtime.call(self._drive_opened, (page_id, viewer.id), connection)
 
     def drive_closed(
-        self, page_id: str, viewer: Viewer, connection: DriveConnection
+        self, page_id: str, viewer: Viewer, connection: GateConnection
     ) -> None:
         """Remove a connection that has ended, unless another has replaced it."""
         if self.runtime.running:
@@ -365,17 +377,17 @@ class OpenPages:
         for host in tuple(self._hosts.values()):
             host.close()
 
-    def _drive_opened(self, key: tuple[str, str], connection: DriveConnection) -> None:
+    def _drive_opened(self, key: tuple[str, str], connection: GateConnection) -> None:
         self._drives[key] = connection
         self._set_drive(key, connection)
 
-    def _drive_closed(self, key: tuple[str, str], connection: DriveConnection) -> None:
+    def _drive_closed(self, key: tuple[str, str], connection: GateConnection) -> None:
         if self._drives.get(key) is connection:
             del self._drives[key]
             self._set_drive(key, None)
 
     def _set_drive(
-        self, key: tuple[str, str], connection: DriveConnection | None
+        self, key: tuple[str, str], connection: GateConnection | None
     ) -> None:
         for host_key, host in self._hosts.items():
             if host_key[1:] == key:

@@ -129,6 +129,11 @@ class AlignTool:
             return "Select a robot first."
         if robot.pose_source.bridge is None:
             return f"Cannot align {robot.name}: its pose is unknown."
+        if robot.motion.is_far:
+            return (
+                f"The agent of {robot.name} aligns it: set the alignment in the fleet "
+                "file of the agent."
+            )
         concerned = self._together(robot) if whole else [robot]
         for each in concerned:
             if each.report is not None and each.report.state in MOVING:

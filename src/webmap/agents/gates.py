@@ -1,0 +1,297 @@
+"""All gates that a display reaches: its own, and those of agents.
+
+Each robot belongs to one gate. A page is connected to all of them over one socket.
+"""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+
+from webmap.agents import address
+from webmap.agents.address import is_agent_url
+from webmap.agents.far_gate import FarGate
+from webmap.agents.peer import Peer, peer_of
+from webmap.base.geometry import Twist
+from webmap.base.scope import Removal
+from webmap.gate import protocol
+from webmap.gate.commands import begins_like_stop, robot_in
+from webmap.gate.display.client import DriveConnection, GateClient
+from webmap.gate.protocol import Report, RobotSpec, Role
+
+log = logging.getLogger("webmap.agent")
+
+BEAT = 0.05
+"""Seconds between two signs of life for the agents."""
+
+
+class PageConnection:
+    """One page's socket at all gates."""
+
+    def __init__(
+        self,
+        gates: "Gates",
+        name: str,
+        role: Role,
+        send: Callable[[str], None],
+        close: Callable[[str], None],
+    ) -> None:
+        self._gates = gates
+        self._name = name
+        self._role: Role = role
+        self._send = send
+        self._close = close
+        self._speeds: tuple[float, float] | None = None
+        self._far: dict[str, DriveConnection] = {}
+        self._greeted = False
+        self._own = gates.own.connect(name, role, self._from_own, close)
+
+    def receive(self, text: str | bytes) -> None:
+        """Pass a frame of the page to the gate of its robot, a STOP for all to all."""
+        data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
+        client = self._gates.client_of(robot_in(data))
+        if client is None and begins_like_stop(data):
+            for far in list(self._far.values()):
+                far.receive(text)
+        for url, far in list(self._far.items()):
+            if self._gates.far.get(url) is client:
+                far.receive(text)
+                return
+        self._own.receive(text)
+
+    def set_speeds(self, v: float, w: float) -> None:
+        """Set the page's own speed limits, in m/s and rad/s."""
+        self._speeds = (v, w)
+        for connection in (self._own, *self._far.values()):
+            connection.set_speeds(v, w)
+
+    def close(self) -> None:
+        """Remove the page, which has closed; the robots that it drove stop."""
+        self._gates.drop(self)
+        for connection in (self._own, *self._far.values()):
+            connection.close()
+
+    def join(self, url: str, client: GateClient) -> None:
+        """Connect the page to one more gate."""
+        connection = client.connect(
+            self._name, self._role, self._from_far, self._close, self._own.id
+        )
+        self._far[url] = connection
+        if self._speeds is not None:
+            connection.set_speeds(*self._speeds)
+
+    def _from_own(self, text: str) -> None:
+        self._send(text)
+        if not text.startswith('{"op":"hello"'):
+            return
+        # The page has forgotten all robots and leases, and numbers its commands anew.
+        again, self._greeted = self._greeted, True
+        for url, connection in list(self._far.items()):
+            client = self._gates.far[url]
+            if again:
+                connection.close()
+                self.join(url, client)
+            else:
+                client.show_again(connection)
+
+    def _from_far(self, text: str) -> None:
+        if self._own.greeted:  # its first message is that of the display's own gate
+            self._send(text)
+
+
+class Gates:
+    """The gates of one display, with the methods of one :class:`GateClient`."""
+
+    def __init__(self) -> None:
+        self.own = GateClient()
+        """The gate of this computer."""
+        self.far: dict[str, GateClient] = {}
+        """The gates of agents, by the address of the agent."""
+        self._links: dict[str, FarGate] = {}
+        self._homes: dict[str, GateClient] = {}
+        self._pages: list[PageConnection] = []
+        self._listeners: list[Callable[[Report], None]] = []
+        self._lock = threading.RLock()
+        self._ended = threading.Event()
+        self._heart: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Start the gate of this computer; a second call does nothing."""
+        self.own.start()
+
+    def stop(self) -> None:
+        """Stop every driven robot and end the gate of this computer."""
+        self._ended.set()
+        if self._heart is not None:
+            self._heart.join()
+        for client in self.far.values():
+            client.stop()
+        self.own.stop()
+
+    @property
+    def pid(self) -> int | None:
+        """The process id of the gate of this computer, if it runs."""
+        return self.own.pid
+
+    @property
+    def ready(self) -> bool:
+        """Whether the gate of this computer runs and receives messages."""
+        return self.own.ready
+
+    def client_of(self, robot: str | None) -> GateClient | None:
+        """Return the client of the gate of a robot; None if no gate has the robot."""
+        return None if robot is None else self._homes.get(robot)
+
+    def connect(
+        self,
+        name: str,
+        role: Role,
+        send: Callable[[str], None],
+        close: Callable[[str], None],
+    ) -> PageConnection:
+        """Register a page's socket; see :meth:`GateClient.connect`."""
+        page = PageConnection(self, name, role, send, close)
+        with self._lock:
+            self._pages.append(page)
+            for url, client in self.far.items():
+                page.join(url, client)
+        return page
+
+    def drop(self, page: PageConnection) -> None:
+        """Forget a page; a second call does nothing."""
+        with self._lock:
+            if page in self._pages:
+                self._pages.remove(page)
+
+    def on_report(self, fn: Callable[[Report], None]) -> Removal:
+        """Call ``fn`` with every report, in a thread of a client."""
+        with self._lock:
+            self._listeners.append(fn)
+        return self.own.on_report(fn)
+
+    # Robots.
+
+    def declare(self, spec: RobotSpec) -> None:
+        """Declare a robot to its gate; see :meth:`GateClient.declare`.
+
+        An agent declares its robots itself: here its gate only learns their names.
+        """
+        client = self._client(spec.bridge_url)
+        with self._lock:
+            before = self._homes.get(spec.id)
+            self._homes[spec.id] = client
+        if before is not None and before is not client:
+            before.forget(spec.id)
+        client.declare(spec)
+
+    def forget(self, robot_id: str) -> None:
+        """Remove a robot; it is stopped if it is driven by this display."""
+        with self._lock:
+            client = self._homes.pop(robot_id, None)
+        if client is not None:
+            client.forget(robot_id)
+
+    def take(self, robot_id: str) -> "Future[int]":
+        """Take the lease of a robot for this program; see :meth:`GateClient.take`."""
+        return self._home(robot_id).take(robot_id)
+
+    def release(self, robot_id: str) -> None:
+        """Release the program's lease; the robot is stopped if it is driven."""
+        self._home(robot_id).release(robot_id)
+
+    def twist(self, robot_id: str, twist: Twist) -> None:
+        """Send one velocity; see :meth:`GateClient.twist`."""
+        self._home(robot_id).twist(robot_id, twist)
+
+    def move(self, robot_id: str, x: float, y: float, yaw: float) -> None:
+        """Send a goal; see :meth:`GateClient.move`."""
+        self._home(robot_id).move(robot_id, x, y, yaw)
+
+    def locate(self, robot_id: str, x: float, y: float, yaw: float) -> None:
+        """State where a robot is; see :meth:`GateClient.locate`."""
+        self._home(robot_id).locate(robot_id, x, y, yaw)
+
+    def cancel(self, robot_id: str) -> None:
+        """Cancel the robot's goals; needs no lease."""
+        self._home(robot_id).cancel(robot_id)
+
+    def stop_robot(self, robot_id: str | None) -> None:
+        """Send STOP to a robot or, with ``None``, to all robots of all gates."""
+        client = self.client_of(robot_id)
+        clients = [client] if client is not None else [self.own, *self.far.values()]
+        for each in clients:
+            each.stop_robot(robot_id)
+
+    def reset(self, robot_id: str, stop: str) -> None:
+        """End the STOP with this identity; see :meth:`GateClient.reset`."""
+        self._home(robot_id).reset(robot_id, stop)
+
+    def name_writers(self, robot_id: str, nodes: tuple[str, ...]) -> None:
+        """Name the other nodes that publish a robot's velocity."""
+        self._home(robot_id).name_writers(robot_id, nodes)
+
+    # Agents.
+
+    def _home(self, robot_id: str) -> GateClient:
+        return self._homes.get(robot_id, self.own)
+
+    def _client(self, url: str) -> GateClient:
+        if not is_agent_url(url):
+            return self.own
+        with self._lock:
+            if url not in self.far:
+                self._add(url)
+            return self.far[url]
+
+    def _add(self, url: str) -> None:
+        agent, peer = address.agent_in(url) or "", peer_of(url)
+        user = peer.user
+        display = address.Sender(user.name, user.instance).display
+        key = address.gate_in(agent, user.name, user.instance)
+        links: list[FarGate] = []
+
+        def link(owner: object, lock: "threading.RLock") -> FarGate:
+            assert isinstance(owner, GateClient)
+            links.append(
+                FarGate(
+                    agent, display, owner, lock, lambda data: peer.put_gate(key, data)
+                )
+            )
+            return links[0]
+
+        client = GateClient(link, agent, f"{display}/")
+        client.on_report(self._pass_on)
+        self.far[url], self._links[url] = client, links[0]
+        self._listen(peer, agent, links[0])
+        for page in self._pages:
+            page.join(url, client)
+        if self._heart is None:
+            self._heart = threading.Thread(
+                target=self._beat, name="webmap-agents-heartbeat", daemon=True
+            )
+            self._heart.start()
+
+    def _listen(self, peer: Peer, agent: str, link: FarGate) -> None:
+        def take(_key: str, sample: bytes) -> None:
+            link.take(sample, time.monotonic())
+
+        peer.listen(address.gate_out(agent), take, gate=True)
+
+    def _pass_on(self, report: Report) -> None:
+        # The loss of one agent says nothing about the robots of the others: their
+        # reports say it.
+        if not isinstance(report, protocol.GateUp | protocol.GateDown):
+            for fn in list(self._listeners):
+                try:
+                    fn(report)
+                except Exception:
+                    log.exception("a listener to an agent's gate failed")
+
+    def _beat(self) -> None:
+        while not self._ended.wait(BEAT):
+            for link in list(self._links.values()):
+                try:
+                    link.beat(time.monotonic())
+                except Exception:
+                    log.exception("the agent %s got no sign of life", link.agent)
