@@ -184,7 +184,7 @@ def report_for(viewer, bridge):
     map = map_of(viewer)
     with map.page.scope.active():
         element = map.page.element("bridges")
-        map.add_module(DoctorReports, element, [bridge])
+        map.add_module(DoctorReports, element).add(bridge)
     (report,) = element.children
     return map, report
 

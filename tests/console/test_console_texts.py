@@ -98,7 +98,7 @@ def test_an_unknown_charge_is_not_shown():
         (["connecting"], "Connecting to the bridge"),
         (["open", "open"], "2 bridges open"),
         (["open", "lost"], "1 of 2 bridges open"),
-        ([], "0 bridges open"),
+        ([], "No bridge yet"),
     ],
 )
 def test_the_states_of_the_bridges_are_summarized(links, text):

@@ -111,7 +111,7 @@ def test_only_given_draws_no_layers_besides_the_given_topics(
     def looking(bridge, shown, *, given, **options):
         asked.extend(each.robot.name for each in given)
 
-    def open_console(bridges, given, floor):
+    def open_console(bridges, given, **options):
         return Console([make_robot(config, bridges) for config in given])
 
     monkeypatch.setattr(webmap.console, "open_console", open_console)

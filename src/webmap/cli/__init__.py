@@ -15,12 +15,14 @@ from webmap.base.echo import echo
 from webmap.base.errors import ConfigError, WebMapError
 
 COMMANDS = {
+    "agent": "webmap.cli.agent:agent",
     "check": "webmap.cli.check:check",
     "demo": "webmap.cli.demo:demo",
     "discover": "webmap.cli.discover:discover",
     "doctor": "webmap.cli.doctor:doctor",
     "play": "webmap.cli.play:play",
     "record": "webmap.cli.record:record",
+    "router": "webmap.cli.router:router",
     "run": "webmap.cli.run:run",
     "sim": "webmap.cli.sim:sim",
     "view": "webmap.cli.view:view",
@@ -61,8 +63,8 @@ def cli() -> None:
     Start with webmap demo, which needs no robot. For a robot with a rosbridge, use
     webmap view ws://robot:9090.
 
-    The commands demo, view, play, run and sim print one line when they are ready, log
-    to standard error, and end on Ctrl+C.
+    The commands demo, view, play, run, sim, agent and router print one line when they
+    are ready, log to standard error, and end on Ctrl+C.
     """
 
 

@@ -1,23 +1,14 @@
 """``webmap demo``: runs the simulator and the console for its robots."""
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.resources import as_file, files
-from typing import NoReturn
 
 import click
 
-from webmap.base.child_process import child_process
-from webmap.base.children import GRACE
-from webmap.base.errors import ConfigError
 from webmap.cli.bad_link import bad_link, bad_link_options
+from webmap.cli.demo_agents import demo_of_agents
 from webmap.cli.demo_robots import FREE, demo_robot
+from webmap.cli.demo_simulator import simulator
 from webmap.cli.options import PORT, simulator_options, web_options
-
-READY = "rosbridge is ready at "
-USAGE = 2
-"""Exit status of a command that has reported an error in one sentence."""
 
 ROBOTS = 5
 """Number of robots, if it is not given."""
@@ -33,6 +24,12 @@ ROBOTS = 5
     is_flag=True,
     help="Show robots that all wait, without scan assist, a costmap or a low battery.",
 )
+@click.option(
+    "--agents",
+    type=click.IntRange(1, 9),
+    help="Show that many agents, each beside a robot with a simulator of its own, and "
+    "a second display; they meet at a router.",
+)
 @bad_link_options
 @click.option(
     "--bridge-port",
@@ -45,6 +42,7 @@ ROBOTS = 5
 def demo(
     robots: int | None,
     quiet: bool,
+    agents: int | None,
     delay: float,
     jitter: float,
     stall: float,
@@ -68,6 +66,20 @@ def demo(
     import webmap
     from webmap import console
 
+    def serve() -> None:
+        webmap.run(
+            host=host,
+            port=port,
+            open_browser=not no_browser,
+            insecure_lan=insecure_lan,
+        )
+
+    if agents is not None:
+        if bridge_port or robots:
+            raise click.UsageError("--agents has one robot for each agent")
+        with demo_of_agents(agents, dialect, seed):
+            serve()
+        return
     number = robots or ROBOTS
     options = ["--robots", number, "--port", bridge_port, "--seed", seed]
     if not quiet and number > FREE:
@@ -88,32 +100,4 @@ def demo(
         )
         for index in range(number):
             opened.add(demo_robot(bridge, index, dialect, quiet=quiet))
-        webmap.run(
-            host=host,
-            port=port,
-            open_browser=not no_browser,
-            insecure_lan=insecure_lan,
-        )
-
-
-def _give_up(status: int) -> NoReturn:
-    """End the command, with an error if the simulator has reported none."""
-    if status == USAGE:
-        sys.exit(USAGE)
-    raise ConfigError(f"the simulator ended with status {status} before it was ready")
-
-
-@contextmanager
-def simulator(*arguments: object) -> Iterator[str]:
-    """Run ``webmap sim`` as a child process and yield the URL of its rosbridge.
-
-    It ends with this process, however that ends, because its standard input closes.
-
-    Raises:
-        ConfigError: If it does not start.
-
-    """
-    with child_process("webmap", "sim", "--with-parent", *arguments) as started:
-        if not started.line.startswith(READY):
-            _give_up(started.process.wait(GRACE))
-        yield started.line.removeprefix(READY).strip()
+        serve()

@@ -85,9 +85,11 @@ def view(
 ) -> None:
     """See and drive the robots behind one rosbridge or several.
 
-    URL is the address of a rosbridge: ws://robot:9090. The robots behind it are found
-    by their topics, also those that appear later; --show lists the topics in use.
-    Correct a wrong guess with --set, or list a robot's topics with --robot.
+    URL is the address of a rosbridge: ws://robot:9090, or of a router with agents:
+    zenoh://host:7447, or of one of them: zenoh://host:7447/bay3. The robots behind a
+    rosbridge are found by their topics, also those that appear later; --show lists the
+    topics in use. Correct a wrong guess with --set, or list a robot's topics with
+    --robot.
 
     \b
     webmap view ws://robot:9090
@@ -98,13 +100,16 @@ def view(
 
     import webmap
     from webmap import console
+    from webmap.agents.address import is_agent_url
     from webmap.fleet.found import FoundFleet, find_fleet, given_fleet
     from webmap.fleet.given import given_robots
+    from webmap.fleet.of_agents import find_agents
     from webmap.fleet.overrides import Overrides, parse_setting
 
     one_bridge(url, topics)
     overrides = Overrides([parse_setting(text) for text in settings], stops_within)
-    bridges = [webmap.Bridge(text) for text in url]
+    bridges = [webmap.Bridge(text) for text in url if not is_agent_url(text)]
+    agents = find_agents([text for text in url if is_agent_url(text)])
     given = given_robots(robots, bridges)
     plan = Path(floor) if floor else None
     if discover or topics is not None or not given:
@@ -126,7 +131,13 @@ def view(
         echo(fleet.table(grid=plan is None, only_given=only_given), lines=True)
         return
     configs = [overrides.config(bridge.url, robot) for bridge, robot in fleet.given]
-    opened = console.open_console(bridges, configs, floor=plan)
+    for each in agents:
+        each.join(bridges)
+    opened = console.open_console(
+        bridges, configs, floor=plan, place="\n".join(sorted(url)) if agents else None
+    )
+    for each in agents:
+        each.show_on(opened)
     fleet.show(opened, grid=plan is None, only_given=only_given, topics=topics)
     webmap.run(
         host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan

@@ -1,6 +1,6 @@
 """Lists that unfold from the page's bar: bridges and refused messages."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from webmap import html, refusals
@@ -24,44 +24,48 @@ class BridgeList:
 
     Args:
         element: The page's element to fill.
-        bridges: The bridges.
-        buttons: The buttons of each bridge.
+        bridges: The bridges; more may be added to the list later.
+        button_of: Returns the button of a bridge.
     """
 
     def __init__(
         self,
         element: "Element",
         bridges: Sequence["Bridge"],
-        buttons: Sequence["Element"],
+        button_of: Callable[["Bridge"], "Element"],
     ) -> None:
-        self._bridges = list(bridges)
+        self._bridges = bridges
+        self._button_of = button_of
         self._text = html.span()
         self._summary = html.summary(
             html.span(class_="dot").set("aria-hidden", "true"),
             self._text,
             icon("icon-chevron"),
         )
-        self._words = [html.span(class_="word") for _ in self._bridges]
-        self._lines = [
-            html.li(
-                html.span(class_="dot").set("aria-hidden", "true"),
-                html.span(text=bridge.name or bridge.url, class_="url"),
-                word,
-                button,
-            ).set("title", bridge.url)
-            for bridge, word, button in zip(
-                self._bridges, self._words, buttons, strict=True
-            )
-        ]
+        self._words: list[Element] = []
+        self._lines: list[Element] = []
+        self._list = html.ul(class_="bridge-list")
         element.append(
-            html.details(
-                self._summary, html.ul(*self._lines, class_="bridge-list")
-            ).set("data-webmap-menu", "")
+            html.details(self._summary, self._list).set("data-webmap-menu", "")
         )
         self.poll()
 
+    def _add(self, bridge: "Bridge") -> None:
+        word = html.span(class_="word")
+        line = html.li(
+            html.span(class_="dot").set("aria-hidden", "true"),
+            html.span(text=bridge.name or bridge.url, class_="url"),
+            word,
+            self._button_of(bridge),
+        ).set("title", bridge.url)
+        self._words.append(word)
+        self._lines.append(line)
+        self._list.append(line)
+
     def poll(self) -> None:
         """Update the list."""
+        for bridge in self._bridges[len(self._lines) :]:
+            self._add(bridge)
         states = [describe_link(bridge) for bridge in self._bridges]
         for line, word, (link, text) in zip(
             self._lines, self._words, states, strict=True
@@ -89,6 +93,8 @@ def describe_link(bridge: "Bridge") -> tuple[str, str]:
 def summary(links: Sequence[str]) -> str:
     """Return a short text for the states of all bridges."""
     total, open_ = len(links), sum(link in ("open", "late") for link in links)
+    if total == 0:
+        return "No bridge yet"
     late = links.count("late")
     if total == 1:
         return {

@@ -68,6 +68,14 @@ class Console:
             for map in page.maps:
                 map.remove_robot(robot)
 
+    def forget(self, robot: "Robot") -> None:
+        """Remove a robot for good."""
+        self.robots = [other for other in self.robots if other is not robot]
+        self._removed.pop(robot, None)
+        for page in list(self._pages):
+            for map in page.maps:
+                map.remove_robot(robot)
+
     def bring_back(self) -> None:
         """Show removed robots again from which a pose has arrived since the removal."""
         now = time.monotonic()

@@ -51,7 +51,7 @@ def open_console(
     """Make the console the page at ``/``.
 
     Args:
-        bridges: The bridges whose state is shown.
+        bridges: The bridges whose state is shown; more may be added to the list later.
         robots: The robots on the map and in the list, in that order. Their bridges are
             named by address.
         floor: The YAML file of a floor plan, in the format of map_server.
@@ -136,8 +136,8 @@ def build(
     costmaps = map.add_module(CostmapNames)
     health = map.add_module(RobotHealth, card.notes)
     map.add_module(RobotButtons, card.more)
-    doctor = map.add_module(DoctorReports, page.element("bridges"), bridges)
-    links = BridgeList(page.element("bridges"), bridges, doctor.buttons)
+    doctor = map.add_module(DoctorReports, page.element("bridges"))
+    links = BridgeList(page.element("bridges"), bridges, doctor.add)
     refused = RefusedList(page.element("refused"), page.viewer.role)
     polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
     polls += [opened.bring_back, links.poll, refused.poll, doctor.poll, costmaps.poll]

@@ -1,7 +1,7 @@
 """The robots behind bridges, found or given with ``--robot``, for the console."""
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -9,6 +9,7 @@ from webmap.base.echo import echo
 from webmap.base.errors import BridgeClosed
 from webmap.base.outside_text import escaped
 from webmap.config.checks import same_name
+from webmap.config.robot import RobotConfig
 from webmap.discovery import FoundRobot
 from webmap.discovery.naming import free_name
 from webmap.discovery.rules import VELOCITY
@@ -89,11 +90,7 @@ class FoundFleet:
 
         """
         shown = ShownRobots(console, self.overrides, given=self.given, grid=grid)
-        for robot in self.robots:
-            shown.add(robot)
-        for bridge, one in self.behind.items():
-            robots = one.findings.robots
-            _services.append(LookingForRobots(bridge, robots, shown.came))
+        self._add_all(shown)
         config = self.overrides.config
         given = [
             ShownRobot(bridge, found, made, config(bridge.url, found))
@@ -104,6 +101,33 @@ class FoundFleet:
         for bridge in bridges:
             looking = LookingForLayers(bridge, shown, given=given, topics=topics)
             _services.append(looking)
+
+    def hold(
+        self,
+        console: "Console",
+        made_of: Callable[[RobotConfig], RobotConfig],
+    ) -> ShownRobots:
+        """Hold the robots found now and later, without a page.
+
+        Args:
+            console: Takes the maps under the robots.
+            made_of: Returns the part of a configuration that a robot is made of here.
+
+        """
+        shown = ShownRobots(console, self.overrides, made_of=made_of)
+        for robot in self.given:
+            shown.add(robot)
+        self._add_all(shown)
+        for bridge in self.behind:
+            _services.append(LookingForLayers(bridge, shown))
+        return shown
+
+    def _add_all(self, shown: ShownRobots) -> None:
+        for robot in self.robots:
+            shown.add(robot)
+        for bridge, one in self.behind.items():
+            robots = one.findings.robots
+            _services.append(LookingForRobots(bridge, robots, shown.came))
 
 
 _services: list[object] = []

@@ -1,7 +1,7 @@
 """The robots that ``webmap view`` shows, and how findings change them."""
 
 import logging
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -46,6 +46,11 @@ PARTS: Mapping[Role, str] = {
 """Roles that a shown robot can gain later, and their part of the configuration."""
 
 
+def whole(config: RobotConfig) -> RobotConfig:
+    """Return a configuration as it is."""
+    return config
+
+
 @dataclass(slots=True, eq=False)
 class ShownRobot:
     """A robot that is shown, found or given with ``--robot``."""
@@ -59,11 +64,15 @@ class ShownRobot:
     topics: set[str] = field(default_factory=set)
     """Topics that are drawn, or that were reported as not drawn."""
 
+    made_of: Callable[[RobotConfig], RobotConfig] = whole
+    """Returns the part of a configuration that the robot is made of here."""
+
     def change(self, config: RobotConfig) -> Mistakes:
         """Configure the parts of the robot that differ; return the mistakes."""
-        old, self.config = self.config, config
+        old, self.config = self.made_of(self.config), config
         with no_scope():
-            return apply(self.robot, old, config, {self.bridge.url: self.bridge})
+            new = self.made_of(config)
+            return apply(self.robot, old, new, {self.bridge.url: self.bridge})
 
     def use(self, config: RobotConfig) -> set[Any]:
         """Change the robot, and log and return the keys that cannot be used."""
@@ -115,6 +124,7 @@ class ShownRobots:
         overrides: Settings that replace guesses.
         given: Robots given with ``--robot``; each replaces the found robot.
         grid: Whether the robots' own maps are shown under them.
+        made_of: Returns the part of a configuration that a robot is made of here.
 
     """
 
@@ -125,7 +135,9 @@ class ShownRobots:
         *,
         given: Sequence[Candidate] = (),
         grid: bool = True,
+        made_of: Callable[[RobotConfig], RobotConfig] = whole,
     ) -> None:
+        self._made_of = made_of
         self.overrides = overrides or Overrides()
         self.grid = grid
         self._console = console
@@ -138,6 +150,11 @@ class ShownRobots:
         """The robots that were made."""
         return [shown.robot for shown in self._places.values()]
 
+    @property
+    def shown(self) -> list[ShownRobot]:
+        """The robots that were made, with their configurations."""
+        return list(self._places.values())
+
     def get(self, bridge: "Bridge", namespace: str) -> ShownRobot | None:
         """Return the robot that was found in a namespace behind a bridge."""
         return self._places.get((bridge, namespace))
@@ -149,9 +166,9 @@ class ShownRobots:
         self._names.add(same_name(found.name))
         config = self.overrides.config(bridge.url, found)
         with no_scope():
-            made = make_robot(config, [bridge])
+            made = make_robot(self._made_of(config), [bridge])
             store.restore(made)
-        shown = ShownRobot(bridge, found, made, config)
+        shown = ShownRobot(bridge, found, made, config, made_of=self._made_of)
         self._places[bridge, found.namespace] = shown
         self._console.add(made)
 

@@ -40,23 +40,25 @@ class DoctorReports:
     Args:
         map: The map.
         element: The page's element for the reports; each is a popover of it.
-        bridges: The bridges.
     """
 
-    def __init__(
-        self, map: "Map", element: "Element", bridges: Sequence["Bridge"]
-    ) -> None:
+    def __init__(self, map: "Map", element: "Element") -> None:
         self.map = map
+        self._element = element
         map.add_browser_part(
             self,
             "features/doctor/doctor_panel.js",
             {},
             "features/doctor/doctor_panel.css",
         )
-        self._reports = [Report(bridge, map) for bridge in bridges]
-        self.buttons = [report.opener for report in self._reports]
-        """For each bridge the button that opens its report and makes the first."""
-        element.append(*(report.element for report in self._reports))
+        self._reports: list[Report] = []
+
+    def add(self, bridge: "Bridge") -> "Element":
+        """Add a bridge; return the button that opens its report and makes the first."""
+        report = Report(bridge, self.map)
+        self._reports.append(report)
+        self._element.append(report.element)
+        return report.opener
 
     def poll(self) -> None:
         """Update the reports that have changed."""

@@ -1,0 +1,138 @@
+"""``webmap agent URL``: the gate beside the robot, which connects to a router."""
+
+import sys
+
+import click
+
+from webmap.base.echo import echo
+from webmap.cli.options import Finite, verbose_option
+
+
+@click.command()
+@click.argument("robot", metavar="URL|FILE")
+@click.option(
+    "--router",
+    required=True,
+    metavar="ADDRESS",
+    help="The Zenoh router to connect to: zenoh://HOST:7447, or with TLS "
+    "zenohs://HOST:7447.",
+)
+@click.option(
+    "--name", required=True, help="The name of this agent; letters, digits, - and _."
+)
+@click.option(
+    "--robot",
+    "robots",
+    multiple=True,
+    metavar="NAME:ODOM:CMD_VEL:SCAN",
+    help="A robot and its topics, as in webmap view. May be repeated.",
+)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="ROBOT.ROLE=TOPIC",
+    help="Replace a guessed topic, as in webmap view. May be repeated.",
+)
+@click.option(
+    "--stops-within",
+    type=Finite(0.0, min_open=True),
+    help="Command timeout: seconds after which every base stops by itself when "
+    "commands end. Without it, the limits are 0.3 m/s and 0.6 rad/s.",
+)
+@click.option(
+    "--operators",
+    metavar="USER,USER",
+    help="Users of the router whose pages may drive; pages of all others may only look "
+    "and press STOP. Without it, everybody whom the router lets in may drive.",
+)
+@click.option(
+    "--rate",
+    "rates",
+    multiple=True,
+    metavar="TOPIC=HZ",
+    help="At most so many messages of a topic per second, for a slow link. May be "
+    "repeated.",
+)
+@click.option(
+    "--wait",
+    type=Finite(0.0),
+    default=10.0,
+    show_default=True,
+    help="Seconds to wait for a rosbridge that cannot be reached.",
+)
+@click.option(
+    "--systemd",
+    is_flag=True,
+    help="Print a systemd unit that runs this command, and end.",
+)
+@click.option("--with-parent", is_flag=True, hidden=True)
+@verbose_option
+def agent(
+    robot: str,
+    router: str,
+    name: str,
+    robots: tuple[str, ...],
+    settings: tuple[str, ...],
+    stops_within: float | None,
+    operators: str | None,
+    rates: tuple[str, ...],
+    wait: float,
+    systemd: bool,
+    with_parent: bool,
+) -> None:
+    """Hold the gate of a robot, on the robot's computer or beside it.
+
+    URL is the address of the robot's rosbridge; FILE is a fleet file with one bridge,
+    for limits, buttons and an alignment. The agent connects to a router and listens on
+    nothing. Displays reach its robots with webmap view zenoh://HOST:7447. If the
+    network or the display fails, the agent stops the robot.
+
+    \b
+    webmap agent ws://localhost:9090 --router zenohs://fleet.example:7447 --name bay3
+    """
+    import threading
+    from pathlib import Path
+
+    from webmap.agents.address import checked_name
+    from webmap.core.motion import RobotMotion
+    from webmap.fleet.agent import (
+        Agent,
+        held_behind,
+        held_in_file,
+        parse_operators,
+        parse_rates,
+        run_agent,
+        systemd_unit,
+        warn_of_open_bridge,
+    )
+    from webmap.fleet.overrides import Overrides, parse_setting
+
+    if systemd:
+        echo(systemd_unit(name, sys.argv[1:]), lines=True)
+        return
+    RobotMotion.agent = checked_name(name)
+    overrides = Overrides([parse_setting(text) for text in settings], stops_within)
+    throttles = parse_rates(rates)
+    roles = None if operators is None else parse_operators(operators)
+    if "://" in robot:
+        held = held_behind(robot, robots, overrides, wait)
+    elif robots or settings or stops_within is not None:
+        raise click.UsageError("the fleet file has all settings of its robots")
+    else:
+        held = held_in_file(Path(robot))
+    warn_of_open_bridge(held.bridge.url)
+    made = Agent(name, router, held, roles=roles, throttles=throttles)
+    ended = threading.Event()
+
+    def ready() -> None:
+        echo(f"The agent {name} is ready at {made.address}")
+        sys.stdout.flush()
+        if with_parent:
+            threading.Thread(target=wait_for_parent, daemon=True).start()
+
+    def wait_for_parent() -> None:
+        sys.stdin.read()
+        ended.set()
+
+    run_agent(made, ready, ended)

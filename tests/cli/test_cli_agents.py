@@ -1,0 +1,166 @@
+"""``webmap agent`` and ``webmap router``: options, and what can be wrong with them."""
+
+import asyncio
+import os
+import subprocess
+import sys
+import time
+
+import msgspec
+import pytest
+from cli_inside import run_inside
+
+from webmap.agents import address
+from webmap.agents.peer import Peer, User
+from webmap.fleet.agent import About, Beacon, parse_operators, parse_rates
+from webmap.ros.asking import ask_topics
+from webmap_process import simulator, webmap
+
+pytest.importorskip("zenoh")
+
+ROUTER = ("--router", "zenoh://127.0.0.1:1")
+NAME = ("--name", "bay3")
+
+FLEET = """
+[bridges]
+forklift = {{ url = "{url}", alignment = [3.0, 4.0, 90.0] }}
+
+[[robots]]
+name = "Forklift"
+odometry = "/robot_0/odom"
+tags = "yard"
+scan = "/robot_0/base_scan"
+
+[robots.twist]
+topic = "/robot_0/cmd_vel"
+v_max = 0.7
+stops_within = 0.3
+
+[[robots.buttons]]
+label = "Dock"
+service = "/dock"
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("agent", "ws://h", *NAME), "Missing option '--router'"),
+        (("agent", "ws://h", *ROUTER), "Missing option '--name'"),
+        (("agent", "ws://h", *ROUTER, "--name", "a/b"), "got the agent 'a/b'"),
+        (("agent", "http://h", *ROUTER, *NAME), "is not the address of a rosbridge"),
+        (("agent", "ws://h", "--router", "ws://h", *NAME), "got the router 'ws://h'"),
+        (("agent", "ws://h", *ROUTER, *NAME, "--rate", "/scan"), "/scan=5"),
+        (("agent", "ws://h", *ROUTER, *NAME, "--rate", "/scan=0"), "/scan=5"),
+        (("agent", "ws://h", *ROUTER, *NAME, "--operators", "a b"), "got the user"),
+        (("agent", "none.toml", *ROUTER, *NAME), "none.toml"),
+        (
+            ("agent", "a.toml", *ROUTER, *NAME, "--stops-within", "1"),
+            "the fleet file has all settings",
+        ),
+        (("router", "--listen", "tcp/0.0.0.0:0"), "reached from other computers"),
+        (("router", "--listen", "nonsense"), "got the router 'nonsense'"),
+        (("demo", "--agents", "2", "--robots", "3"), "one robot for each agent"),
+    ],
+)
+def test_a_wrong_argument_ends_the_command_with_one_sentence(arguments, words):
+    said = run_inside(*arguments, *(("--wait", "0") if arguments[0] == "agent" else ()))
+    assert said.returncode == 2
+    assert words in said.stderr.splitlines()[-1]
+
+
+def test_the_unit_for_systemd_runs_the_same_command():
+    said = run_inside("agent", "ws://localhost:9090", *ROUTER, *NAME, "--systemd")
+    assert said.returncode == 0
+    (command,) = [
+        line for line in said.stdout.splitlines() if line.startswith("ExecStart=")
+    ]
+    assert command.endswith(
+        "-m webmap agent ws://localhost:9090 --router zenoh://127.0.0.1:1 --name bay3"
+    )
+    assert "EnvironmentFile=-/etc/webmap/bay3.env" in said.stdout
+
+
+def test_rates_and_operators_are_read():
+    assert parse_rates(["scan=5", "/map=0.1"]) == {"/scan": 200, "/map": 10_000}
+    assert parse_operators("ann, ben") == {
+        "": "viewer",
+        "ann": "operator",
+        "ben": "operator",
+    }
+
+
+def wait_for(check, within=20.0):
+    deadline = time.monotonic() + within
+    while True:
+        found = check()
+        if found:
+            return found
+        assert time.monotonic() < deadline, "it did not happen"
+        time.sleep(0.05)
+
+
+def test_an_agent_describes_the_robots_of_its_fleet_file(tmp_path):
+    file = tmp_path / "bay3.toml"
+    with (
+        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
+        simulator("--robots", "1") as url,
+    ):
+        file.write_text(FLEET.format(url=url))
+        peer = Peer(router, User())
+        beacons = []
+        peer.listen(address.here("*"), lambda key, data: beacons.append((key, data)))
+        peer.start()
+        try:
+            with webmap(
+                "agent", file, "--router", router, *NAME, WEBMAP_STATE_DIR=str(tmp_path)
+            ) as own:
+                assert own == f"{router}/bay3"
+                key, piece = wait_for(lambda: beacons and beacons[-1])
+                assert key == "webmap/bay3/here"
+                assert msgspec.json.decode(piece, type=Beacon).protocol == 1
+                answer = peer.ask(address.about("bay3"))
+                about = msgspec.json.decode(answer, type=About)
+                topics = asyncio.run(ask_topics(own, wait=10.0))
+        finally:
+            peer.close()
+    (robot,) = about.robots
+    assert robot.config["name"] == "Forklift"
+    assert robot.config["twist"]["v_max"] == 0.7
+    assert robot.config["tags"] == ["yard"]
+    assert about.alignment == pytest.approx((3.0, 4.0, 90.0))
+    assert topics["/robot_0/odom"] == "nav_msgs/Odometry"
+
+
+def test_a_second_agent_of_the_same_name_waits_and_says_why(tmp_path):
+    with (
+        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
+        simulator("--robots", "1") as url,
+        webmap("agent", url, "--router", router, *NAME, WEBMAP_STATE_DIR=str(tmp_path)),
+    ):
+        wait_for_beacon(router)
+        second = subprocess.Popen(
+            [sys.executable, "-m", "webmap", "agent", url, "--router", router, *NAME],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=os.environ | {"WEBMAP_STATE_DIR": str(tmp_path / "second")},
+        )
+        try:
+            lines = iter(second.stderr.readline, "")
+            assert any("another agent is called bay3" in line for line in lines)
+        finally:
+            second.terminate()
+            second.wait(20)
+            second.stderr.close()
+
+
+def wait_for_beacon(router):
+    beacons = []
+    peer = Peer(router, User())
+    peer.listen(address.here("bay3"), lambda key, data: beacons.append(data))
+    peer.start()
+    try:
+        wait_for(lambda: beacons)
+    finally:
+        peer.close()

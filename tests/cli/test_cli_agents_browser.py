@@ -1,0 +1,137 @@
+"""A router, agents and displays, each a process of its own, seen in a real browser."""
+
+from contextlib import ExitStack, contextmanager
+
+import pytest
+from playwright.sync_api import expect
+
+from real_browser import end_stops, hold, watched_tab
+from webmap_process import simulator, webmap
+
+pytest.importorskip("zenoh")
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+SOON = 20_000
+
+
+@contextmanager
+def fleet(tmp_path, number=1):
+    """Run a router and agents with a simulated robot each; yield the router's URL."""
+    with ExitStack() as running:
+        router = running.enter_context(webmap("router", "--listen", "tcp/127.0.0.1:0"))
+        for index in range(number):
+            options = ("--robots", "1", "--seed", str(index + 1))
+            url = running.enter_context(simulator(*options))
+            running.enter_context(agent(tmp_path, url, router, f"bay{index + 1}"))
+        yield router
+
+
+def agent(tmp_path, url, router, name):
+    return webmap(
+        "agent",
+        url,
+        "--router",
+        router,
+        "--name",
+        name,
+        "--stops-within",
+        "0.5",
+        WEBMAP_STATE_DIR=str(tmp_path / name),
+    )
+
+
+@contextmanager
+def display(chromium, router, *more):
+    """Open the page of a display of its own."""
+    options = ("--port", "0", "--no-browser")
+    with (
+        webmap("view", router, *more, *options) as url,
+        watched_tab(chromium, 1280, 800) as page,
+    ):
+        page.goto(url)
+        yield page
+
+
+def placed(page):
+    return page.locator(".robot:not(.unplaced)")
+
+
+def test_the_robots_of_all_agents_are_drawn_with_map_and_scan(chromium, tmp_path):
+    with fleet(tmp_path, 2) as router, display(chromium, router) as page:
+        expect(placed(page)).to_have_count(2, timeout=SOON)
+        expect(page.locator("#robots .row .name")).to_have_text(
+            ["robot_0", "robot_0 (bay2)"], timeout=SOON
+        )
+        expect(page.locator(".occupancy-grid.map image").first).to_be_attached(
+            timeout=SOON
+        )
+        expect(page.locator(".laserscan > .dot[d]")).to_have_count(2, timeout=SOON)
+
+
+def test_two_displays_drive_one_robot_in_turn_and_either_stops_it(chromium, tmp_path):
+    with (
+        fleet(tmp_path) as router,
+        display(chromium, router) as ann,
+        display(chromium, router) as ben,
+    ):
+        for page in (ann, ben):
+            expect(placed(page)).to_have_count(1, timeout=SOON)
+            page.locator("#robots .row button").first.click()
+        start = placed(ann).get_attribute("transform")
+        hold(
+            ann.keyboard,
+            "w",
+            lambda: placed(ann).get_attribute("transform") != start,
+        )
+        state = ben.locator("#card")
+        expect(state).to_contain_text("has control", timeout=SOON)
+        ben.keyboard.press(" ")
+        stopped = "#robots .row[data-group=stopped]"
+        for page in (ann, ben):
+            expect(page.locator(stopped)).to_have_count(1, timeout=SOON)
+        end_stops(ben.locator(".webmap-teleop .webmap-reset"))
+        expect(ben.locator(stopped)).to_have_count(0, timeout=SOON)
+        expect(ann.locator(stopped)).to_have_count(0, timeout=SOON)
+
+
+def test_an_agent_that_ends_is_shown_and_one_that_comes_later_appears(
+    chromium, tmp_path
+):
+    with (
+        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
+        simulator("--robots", "1") as url,
+        display(chromium, router) as page,
+    ):
+        expect(page.locator("#bridges summary")).to_have_text("No bridge yet")
+        with agent(tmp_path, url, router, "bay1"):
+            expect(placed(page)).to_have_count(1, timeout=SOON)
+            expect(page.locator("#bridges summary")).to_have_text(
+                "Bridge open", timeout=SOON
+            )
+        expect(page.locator("#robots .row")).to_contain_text("Lost", timeout=SOON)
+        expect(page.locator("#bridges summary")).to_have_text(
+            "No connection to the bridge", timeout=SOON
+        )
+        with agent(tmp_path, url, router, "bay1"):
+            expect(page.locator("#robots .row")).not_to_contain_text(
+                "Lost", timeout=SOON
+            )
+
+
+def test_robots_of_an_agent_and_of_a_rosbridge_share_one_map(chromium, tmp_path):
+    with (
+        fleet(tmp_path) as router,
+        simulator("--robots", "2") as url,
+        display(chromium, router, url) as page,
+    ):
+        expect(placed(page)).to_have_count(3, timeout=SOON)
+
+
+def test_the_demo_of_agents_shows_a_robot_of_each(chromium, tmp_path):
+    options = ("--agents", "2", "--port", "0", "--no-browser")
+    with (
+        webmap("demo", *options, WEBMAP_STATE_DIR=str(tmp_path)) as url,
+        watched_tab(chromium, 1280, 800) as page,
+    ):
+        page.goto(url)
+        expect(placed(page)).to_have_count(2, timeout=SOON)
