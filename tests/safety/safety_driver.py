@@ -1,5 +1,7 @@
 """A display without pages: a gate, one robot, and an operator that follows orders.
 
+Its arguments are the address of the robot's bridge or agent, and the robot's id.
+
 A process of its own, so that it can be killed. It reads orders, one a line (``take``,
 ``x 1.0``, ``stop``), and writes a line of JSON for each new report of the
 robot from the gate.
@@ -9,17 +11,22 @@ import json
 import sys
 import threading
 
-from webmap.gate.display.client import GateClient
+from webmap.agents.gates import Gates
+from webmap.agents.peer import close_peers
 from webmap.gate.protocol import RobotSpec
+
+ROBOT = sys.argv[2] if len(sys.argv) > 2 else "r1"
 
 
 class Operator:
     """Sends the messages of a page on ``/drive``, at 20 Hz."""
 
-    def __init__(self, client: GateClient) -> None:
+    def __init__(self, client: Gates) -> None:
         self.x: float | None = None
-        self._tick: int | None = None
+        self._ticks: dict[str, int] = {}
+        self._gate = ""
         self._epoch = 0
+        self._stop = ""
         self._seq = 0
         self._connection = client.connect("Ann", "operator", self._on_message, print)
 
@@ -27,17 +34,22 @@ class Operator:
         """Send a text as it is."""
         self._connection.receive(text)
 
+    def reset(self) -> None:
+        """End the STOP that the gate reported last."""
+        command = {"op": "reset", "robot": ROBOT, "stop": self._stop}
+        self.send(json.dumps(command))
+
     def step(self) -> None:
         """Send the command, if there is one."""
-        if self.x is None or self._tick is None:
+        if self.x is None or self._gate not in self._ticks:
             return
         self._seq += 1
         command = {
             "op": "drive",
-            "robot": "r1",
+            "robot": ROBOT,
             "epoch": self._epoch,
             "seq": self._seq,
-            "tick": self._tick,
+            "tick": self._ticks[self._gate],
             "x": self.x,
             "y": 0.0,
             "turn": 0.0,
@@ -48,9 +60,11 @@ class Operator:
         message = json.loads(text)
         match message["op"]:
             case "tick":
-                self._tick = message["tick"]
+                self._ticks[message.get("gate", "")] = message["tick"]
             case "robot":
                 self._epoch = message["epoch"] or 0
+                self._gate = message.get("gate", "")
+                self._stop = (message["stop"] or {}).get("id", "")
                 print(text, flush=True)
             case "refused":
                 print(text, flush=True)
@@ -58,10 +72,10 @@ class Operator:
 
 def main() -> None:
     """Follow the orders on standard input, until it ends."""
-    client = GateClient()
+    client = Gates()
     client.start()
     spec = RobotSpec(
-        id="r1",
+        id=ROBOT,
         name="Bob",
         bridge_url=sys.argv[1],
         twist_topic="/cmd_vel",
@@ -83,14 +97,19 @@ def main() -> None:
     for line in sys.stdin:
         match line.split(maxsplit=1):
             case ["take"]:
-                operator.send('{"op":"take","robot":"r1"}')
+                operator.send(json.dumps({"op": "take", "robot": ROBOT}))
             case ["x", value]:
                 operator.x = float(value)
             case ["stop"]:
-                operator.send('{"op":"stop","robot":"r1"}')
+                operator.send(
+                    json.dumps({"op": "stop", "robot": ROBOT}, separators=(",", ":"))
+                )
+            case ["reset"]:
+                operator.reset()
     ended.set()
     thread.join()
     client.stop()
+    close_peers()
 
 
 if __name__ == "__main__":

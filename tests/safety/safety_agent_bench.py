@@ -1,0 +1,155 @@
+"""A robot with an agent, and an operator at a display on another computer.
+
+::
+
+    operator ─ display ── proxy ── router ── proxy ── agent ─ gate ── witness robot
+                         "display"          "agent"
+
+The robot never stops by itself: only the agent can stop it.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import zlib
+from contextlib import ExitStack
+from pathlib import Path
+
+from processes import Process
+from safety_bench import pass_time, wait_for
+
+from webmap.testing import FaultProxy, WitnessRobot
+
+DRIVER = Path(__file__).with_name("safety_driver.py")
+
+ROBOT = f"r{zlib.crc32(b'bay3/Bob'):08x}"
+"""The identifier of the robot that the agent gives."""
+
+READY = r"is ready at zenoh://127\.0\.0\.1:(\d+)"
+
+
+class FarDriver:
+    """A display with an operator; see ``safety_driver.py``."""
+
+    def __init__(self, port, state):
+        self.reports, self.refused = [], []
+        self.popen = subprocess.Popen(
+            [sys.executable, DRIVER, f"zenoh://127.0.0.1:{port}/bay3", ROBOT],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "WEBMAP_STATE_DIR": str(state)},
+            text=True,
+        )
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    @property
+    def now(self):
+        """What the gate said last of the robot."""
+        return self.reports[-1] if self.reports else {}
+
+    def order(self, line):
+        self.popen.stdin.write(f"{line}\n")
+        self.popen.stdin.flush()
+
+    def end(self):
+        if self.popen.poll() is None:
+            self.popen.send_signal(signal.SIGCONT)
+            self.popen.stdin.close()
+            try:
+                self.popen.wait(15)
+            except subprocess.TimeoutExpired:
+                self.popen.kill()
+                self.popen.wait()
+        self._thread.join(10)
+        self.popen.stdout.close()
+        if not self.popen.stdin.closed:
+            self.popen.stdin.close()
+
+    def _read(self):
+        for line in self.popen.stdout:
+            message = json.loads(line)
+            if message.get("robot") in (ROBOT, None):
+                (self.reports if message["op"] == "robot" else self.refused).append(
+                    message
+                )
+
+
+class AgentBench:
+    """All processes between the operator's hand and the robot."""
+
+    def __init__(self, folder):
+        self._folder = folder
+        self._open = ExitStack()
+        self.router = self.agent = None
+
+    def __enter__(self):
+        enter = self._open.enter_context
+        os.environ["WEBMAP_STATE_DIR"] = str(self._folder / "agent")
+        self.robot = enter(WitnessRobot(timeout=None))
+        self._open.callback(self.end_router)
+        self.start_router()
+        self.display_hop = enter(FaultProxy(self.port))
+        self.agent_hop = enter(FaultProxy(self.port))
+        self._open.callback(self.end_agent)
+        self.start_agent()
+        self.driver = self.new_driver("west")
+        return self
+
+    def __exit__(self, *exception):
+        self._open.close()
+
+    def start_router(self):
+        port = self.port if self.router else 0
+        self.router = Process("router", "--listen", f"tcp/127.0.0.1:{port}")
+        self.port = int(self.router.ready(READY))
+
+    def end_router(self):
+        if not self.router.popen.stdout.closed:
+            self.router.popen.send_signal(signal.SIGCONT)
+            self.router.end()
+
+    def start_agent(self):
+        self.agent = Process(
+            "agent",
+            self.robot.url,
+            "--router",
+            f"zenoh://127.0.0.1:{self.agent_hop.port}",
+            "--name",
+            "bay3",
+            "--robot",
+            "Bob:/odom:/cmd_vel:",
+            "--stops-within",
+            "0.5",
+        )
+        self.agent.ready("The agent (bay3) is ready")
+
+    def end_agent(self):
+        if not self.agent.popen.stdout.closed:
+            self.agent.popen.send_signal(signal.SIGCONT)
+            self.agent.end(signal.SIGTERM)
+
+    def new_driver(self, name):
+        driver = FarDriver(self.display_hop.port, self._folder / name)
+        self._open.callback(driver.end)
+        wait_for(lambda: driver.now.get("link") == "up", "a report of the agent", 30)
+        return driver
+
+    def drive_off(self, within=20.0):
+        """Take the robot and drive, until it moves steadily."""
+        driver = self.driver
+        driver.order("x 0")
+        wait_for(
+            lambda: driver.now.get("armable"), "a robot that can be driven", within
+        )
+        driver.order("take")
+        wait_for(lambda: driver.now.get("mine"), "control of the robot", within)
+        pass_time(0.5)
+        driver.order("x 1")
+        wait_for(lambda: self.robot.velocity.vx > 0.1, "motion", within)
+        pass_time(0.5)
+        assert self.robot.velocity.vx > 0.1, "the robot does not go on"

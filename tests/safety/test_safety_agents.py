@@ -1,0 +1,155 @@
+"""Everything that can fail between an operator and a robot that has an agent."""
+
+import json
+import signal
+import time
+
+import pytest
+from safety_agent_bench import ROBOT, AgentBench
+from safety_bench import pass_time, wait_for
+
+pytest.importorskip("zenoh")
+pytestmark = [pytest.mark.safety, pytest.mark.serial]
+
+PROMISED = 0.3
+"""Seconds from the fault to the first zero at the robot (S1, S14)."""
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    with AgentBench(tmp_path_factory.mktemp("agents")) as bench:
+        yield bench
+
+
+def prove(bench, what, fail, within=PROMISED):
+    """Drive, let something fail, and measure the time to the first zero."""
+    bench.drive_off()
+    at = time.monotonic()
+    fail()
+    wait_for(
+        lambda: bench.robot.log.first_zero(at) is not None, "a zero at the robot", 10
+    )
+    took = bench.robot.log.first_zero(at) - at
+    pass_time(0.5)
+    moved = [t.at for t in bench.robot.log.twists if t.at > at + took and not t.is_zero]
+    assert not moved, "the robot moved again"
+    print(f"{what}: the first zero came after {took * 1000:.0f} ms")
+    assert took <= within, f"{what}: the first zero came after {took * 1000:.0f} ms"
+
+
+def back(bench):
+    """Wait until the robot can be driven again; nothing moves by itself."""
+    since = time.monotonic()
+    wait_for(lambda: bench.driver.now.get("link") == "up", "the agent", 30)
+    pass_time(1.0)
+    assert not [t for t in bench.robot.log.twists if t.at > since and not t.is_zero]
+
+
+def renew_driver(bench):
+    bench.driver.end()
+    bench.driver = bench.new_driver("west")
+
+
+def test_letting_go_stops_the_robot_through_the_router(bench):
+    prove(bench, "letting go", lambda: bench.driver.order("x 0"), 0.15)
+
+
+def test_stop_reaches_the_agent_and_stays(bench):
+    prove(bench, "STOP", lambda: bench.driver.order("stop"), 0.15)
+    wait_for(lambda: bench.driver.now.get("latched"), "a latched STOP")
+    bench.driver.order("reset")
+    wait_for(lambda: not bench.driver.now.get("latched"), "the reset")
+
+
+def test_a_killed_display_stops_the_robot(bench):
+    prove(bench, "the display is killed", bench.driver.popen.kill)
+    renew_driver(bench)
+
+
+def test_a_suspended_display_stops_the_robot_and_its_old_commands_move_nothing(bench):
+    driver = bench.driver.popen
+    prove(bench, "the display is stopped", lambda: driver.send_signal(signal.SIGSTOP))
+    pass_time(1.0)
+    driver.send_signal(signal.SIGCONT)
+    back(bench)
+
+
+@pytest.mark.parametrize("hop", ["display_hop", "agent_hop"])
+def test_a_link_that_carries_nothing_stops_the_robot(bench, hop):
+    proxy = getattr(bench, hop)
+    prove(bench, f"the {hop} carries nothing", proxy.hold)
+    pass_time(1.0)
+    proxy.release()
+    back(bench)
+
+
+@pytest.mark.parametrize("hop", ["display_hop", "agent_hop"])
+def test_a_link_that_is_reset_stops_the_robot(bench, hop):
+    proxy = getattr(bench, hop)
+
+    def fail():
+        proxy.refuse()
+        proxy.reset()
+
+    prove(bench, f"the {hop} is reset", fail)
+    proxy.refuse(False)
+    back(bench)
+
+
+def test_a_suspended_router_stops_the_robot(bench):
+    router = bench.router.popen
+    prove(bench, "the router is stopped", lambda: router.send_signal(signal.SIGSTOP))
+    pass_time(1.0)
+    router.send_signal(signal.SIGCONT)
+    back(bench)
+
+
+def test_a_killed_router_stops_the_robot_and_the_next_one_is_found(bench):
+    prove(bench, "the router is killed", bench.router.popen.kill)
+    bench.router.end()
+    bench.start_router()
+    back(bench)
+
+
+def test_a_suspended_agent_stops_the_robot_by_its_gate(bench):
+    agent = bench.agent.popen
+    prove(bench, "the agent is stopped", lambda: agent.send_signal(signal.SIGSTOP))
+    pass_time(0.5)
+    agent.send_signal(signal.SIGCONT)
+    back(bench)
+
+
+def test_a_killed_agent_stops_the_robot_by_its_gate(bench):
+    prove(bench, "the agent is killed", bench.agent.popen.kill)
+    bench.agent.end()
+    bench.start_agent()
+    back(bench)
+
+
+def test_a_stop_for_an_agent_that_is_away_is_the_first_it_gets_on_return(bench):
+    bench.agent_hop.refuse()
+    bench.agent_hop.reset()
+    wait_for(lambda: bench.driver.now.get("link") == "down", "a lost agent")
+    bench.driver.order("stop")
+    pass_time(1.0)
+    assert not bench.driver.now.get("latched"), "not confirmed while it is away"
+    bench.agent_hop.refuse(False)
+    wait_for(lambda: bench.driver.now.get("latched"), "the STOP", 20)
+    bench.driver.order("reset")
+    wait_for(lambda: not bench.driver.now.get("latched"), "the reset")
+
+
+def test_two_displays_cannot_both_drive_and_the_loss_of_one_ends_only_its_own(bench):
+    other = bench.new_driver("east")
+    bench.drive_off()
+    other.order("take")
+    wait_for(lambda: other.refused, "a refusal")
+    assert "has control" in json.dumps(other.refused[-1])
+    assert other.now["holder"]["name"] == "Ann"
+    assert not other.now["mine"]
+    other.popen.kill()
+    pass_time(1.0)
+    assert bench.robot.velocity.vx > 0.1, "the other display's loss stopped the robot"
+    assert bench.driver.now["mine"]
+    bench.driver.order("x 0")
+    assert bench.driver.now["robot"] == ROBOT
