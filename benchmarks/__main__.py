@@ -6,7 +6,7 @@ import click
 
 from benchmarks.harness import report
 
-BENCHES = ["bridge", "viewers", "drawing", "console"]
+BENCHES = ["bridge", "viewers", "drawing", "console", "agents"]
 
 
 @click.command()

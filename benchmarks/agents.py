@@ -1,0 +1,167 @@
+"""The way of a velocity through an agent and a router, compared with the direct way.
+
+The operator, the display, the router, the agent and the robot are on one computer, so
+the figures have the cost of the processes and none of a network.
+"""
+
+import json
+import statistics
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+
+from benchmarks.harness import Comparison, Contender, Figures, compare
+from webmap.agents.gates import Gates
+from webmap.agents.peer import close_peers
+from webmap.gate.protocol import RobotSpec
+from webmap.testing import WitnessRobot
+
+VELOCITIES = 300
+PERIOD = 0.05
+FULL = 1.0
+"""The robot's highest speed, in m/s."""
+
+
+@contextmanager
+def started(*command: str) -> Iterator[str]:
+    """Run a command of WebMap; yield the address in its first line."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "webmap", *command], stdout=subprocess.PIPE, text=True
+    ) as running:
+        try:
+            assert running.stdout is not None
+            line = running.stdout.readline()
+            if " at " not in line:
+                raise RuntimeError(f"expected an address, got {line!r}")
+            yield line.rpartition(" at ")[2].strip()
+        finally:
+            running.terminate()
+
+
+class Hand:
+    """An operator that holds a slowly changing speed, and notes when it was sent."""
+
+    def __init__(self, gates: Gates, robot: str) -> None:
+        self._robot = robot
+        self._ticks: dict[str, int] = {}
+        self._gate = ""
+        self._epoch: int | None = None
+        self._seq = 0
+        self.armable = threading.Event()
+        self.armed = threading.Event()
+        self._connection = gates.connect("Ann", "operator", self._hear, print)
+        self._connection.set_speeds(FULL, FULL)
+
+    def take(self) -> None:
+        """Take the robot."""
+        self._send(op="take")
+
+    def drive(self, x: float) -> None:
+        """Send one command; ``x`` is a part of the full speed."""
+        if self._epoch is None or self._gate not in self._ticks:
+            return
+        self._seq += 1
+        stamp = {"seq": self._seq, "tick": self._ticks[self._gate]}
+        self._send(op="drive", epoch=self._epoch, x=x, y=0.0, turn=0.0, **stamp)
+
+    def _send(self, **fields: object) -> None:
+        self._connection.receive(json.dumps({**fields, "robot": self._robot}))
+
+    def _hear(self, text: str) -> None:
+        message = json.loads(text)
+        if message["op"] == "tick":
+            self._ticks[message.get("gate", "")] = message["tick"]
+        elif message["op"] == "robot":
+            self._gate, self._epoch = message.get("gate", ""), message["epoch"]
+            if message["armable"]:
+                self.armable.set()
+            if message["armed"]:
+                self.armed.set()
+
+
+def delays(url: str, id: str, robot: WitnessRobot) -> list[float]:
+    """Return the times of velocities from the operator to the robot, in ms."""
+    gates = Gates()
+    gates.start()
+    try:
+        gates.declare(
+            RobotSpec(
+                id=id,
+                name="Bob",
+                bridge_url=url,
+                twist_topic="/cmd_vel",
+                stops_within=0.5,
+                odometry_topic="/odom",
+                odometry_type="nav_msgs/Odometry",
+            )
+        )
+        hand = Hand(gates, id)
+        if not hand.armable.wait(20):
+            raise RuntimeError("the robot cannot be driven")
+        hand.take()
+        deadline = time.monotonic() + 20
+        while not hand.armed.is_set() and time.monotonic() < deadline:
+            hand.drive(0.0)
+            time.sleep(PERIOD)
+        sent: dict[int, float] = {}
+        for number in range(VELOCITIES):
+            part = 0.2 + 0.001 * number
+            sent[number] = time.monotonic()
+            hand.drive(part)
+            time.sleep(PERIOD)
+        hand.drive(0.0)
+    finally:
+        gates.stop()
+        close_peers()
+    arrived: dict[int, float] = {}
+    for twist in robot.log.twists:
+        number = round((twist.twist.vx / FULL - 0.2) / 0.001)
+        arrived.setdefault(number, twist.at)
+    found = [
+        1000 * (arrived[number] - at)
+        for number, at in sent.items()
+        if number in arrived
+    ]
+    if len(found) < VELOCITIES / 2:
+        raise RuntimeError(f"only {len(found)} of {VELOCITIES} velocities arrived")
+    return found
+
+
+def way(*, agent: bool) -> Callable[[], Figures]:
+    """Return a run over the direct way, or through an agent and a router."""
+
+    def run() -> Figures:
+        with ExitStack() as running, tempfile.TemporaryDirectory() as _state:
+            robot = running.enter_context(WitnessRobot(timeout=0.5))
+            url, id = robot.url, "r1"
+            if agent:
+                router = running.enter_context(
+                    started("router", "--listen", "tcp/127.0.0.1:0")
+                )
+                topics = "Bob:/odom:/cmd_vel:"
+                options = ("--name", "bay3", "--robot", topics, "--stops-within", "0.5")
+                url = running.enter_context(
+                    started("agent", robot.url, "--router", router, *options)
+                )
+                id = f"r{zlib.crc32(b'bay3/Bob'):08x}"
+            found = delays(url, id, robot)
+        return {
+            "velocity to the robot, median (ms)": statistics.median(found),
+            "velocity to the robot, 99 % (ms)": statistics.quantiles(found, n=100)[-1],
+        }
+
+    return run
+
+
+def bench(rounds: int, quick: bool = False) -> list[Comparison]:
+    """Compare the way through an agent with the direct one."""
+    contenders = [
+        Contender("direct", way(agent=False)),
+        Contender("agent and router", way(agent=True)),
+    ]
+    return [compare("the way of a velocity", contenders, 1 if quick else rounds)]
