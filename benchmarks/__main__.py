@@ -6,7 +6,7 @@ import click
 
 from benchmarks.harness import report
 
-BENCHES = ["bridge", "viewers", "drawing", "console", "agents"]
+BENCHES = ["bridge", "viewers", "drawing", "console", "agents", "uplink"]
 
 
 @click.command()
