@@ -56,8 +56,8 @@ class DoctorReports:
     def add(self, bridge: "Bridge") -> "Element":
         """Add a bridge; return the button that opens its report and makes the first."""
         report = Report(bridge, self.map)
+        self._element.insert(len(self._reports), report.element)
         self._reports.append(report)
-        self._element.append(report.element)
         return report.opener
 
     def poll(self) -> None:
