@@ -7,7 +7,7 @@ import pytest
 from webmap.agents import address
 from webmap.agents.router import access_rules, read_users, router_settings
 from webmap.base.errors import ConfigError
-from webmap.ros.names import normalise_url
+from webmap.ros.names import is_agent_url, normalise_url
 
 USERS = """
 [users.bay3]
@@ -49,8 +49,8 @@ def test_what_is_no_address_of_a_router_is_refused(text):
 
 
 def test_the_address_of_an_agent():
-    assert address.is_agent_url("ZENOH://hall")
-    assert not address.is_agent_url("ws://hall")
+    assert is_agent_url("ZENOH://hall")
+    assert not is_agent_url("ws://hall")
     assert address.agent_in("zenoh://hall:7447/bay3") == "bay3"
     assert address.agent_in("zenoh://hall:7447") is None
     assert normalise_url("zenoh://Hall:7447/bay3/") == "zenoh://hall/bay3"

@@ -135,3 +135,16 @@ def test_the_demo_of_agents_shows_a_robot_of_each(chromium, tmp_path):
     ):
         page.goto(url)
         expect(placed(page)).to_have_count(2, timeout=SOON)
+
+
+def test_a_fleet_file_shows_the_robots_of_agents(chromium, tmp_path):
+    with fleet(tmp_path) as router:
+        file = tmp_path / "fleet.toml"
+        file.write_text(f'[bridges]\nyard = "{router}"\n')
+        options = ("--port", "0", "--no-browser")
+        with (
+            webmap("run", file, *options) as url,
+            watched_tab(chromium, 1280, 800) as page,
+        ):
+            page.goto(url)
+            expect(placed(page)).to_have_count(1, timeout=SOON)

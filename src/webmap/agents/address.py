@@ -68,11 +68,6 @@ def url(locator: str) -> str:
     return f"{scheme}://{place}"
 
 
-def is_agent_url(url: str) -> bool:
-    """Return whether an address is one of agents."""
-    return url.partition("://")[0].lower() in SCHEMES
-
-
 def agent_in(url: str) -> str | None:
     """Return the agent that an address names; None if it is for all of a router.
 

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from concurrent.futures import Future
 
 from webmap.agents import address
-from webmap.agents.address import is_agent_url
 from webmap.agents.far_gate import FarGate
 from webmap.agents.peer import Peer, peer_of
 from webmap.base.geometry import Twist
@@ -19,6 +18,7 @@ from webmap.gate import protocol
 from webmap.gate.commands import begins_like_stop, robot_in
 from webmap.gate.display.client import DriveConnection, GateClient
 from webmap.gate.protocol import Report, RobotSpec, Role
+from webmap.ros.names import is_agent_url
 
 log = logging.getLogger("webmap.agent")
 

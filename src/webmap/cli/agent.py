@@ -98,14 +98,12 @@ def agent(
     from webmap.core.motion import RobotMotion
     from webmap.fleet.agent import (
         Agent,
-        held_behind,
-        held_in_file,
         parse_operators,
         parse_rates,
         run_agent,
         systemd_unit,
-        warn_of_open_bridge,
     )
+    from webmap.fleet.held import held_behind, held_in_file, warn_of_open_bridge
     from webmap.fleet.overrides import Overrides, parse_setting
 
     if systemd:

@@ -37,9 +37,7 @@ def demo_of_agents(number: int, dialect: str, seed: int) -> Iterator[None]:
         line = running.enter_context(child("is ready at", *other))
         echo(f"A second display: {line}", err=True)
         bridges: list[webmap.Bridge] = []
-        agents = find_agents([router])
-        for each in agents:
-            each.join(bridges)
+        agents = find_agents([router], bridges)
         opened = console.open_console(
             bridges, [], floor=floor, title="Demo", place="demo of agents"
         )

@@ -100,16 +100,15 @@ def view(
 
     import webmap
     from webmap import console
-    from webmap.agents.address import is_agent_url
     from webmap.fleet.found import FoundFleet, find_fleet, given_fleet
     from webmap.fleet.given import given_robots
     from webmap.fleet.of_agents import find_agents
     from webmap.fleet.overrides import Overrides, parse_setting
+    from webmap.ros.names import is_agent_url
 
     one_bridge(url, topics)
     overrides = Overrides([parse_setting(text) for text in settings], stops_within)
     bridges = [webmap.Bridge(text) for text in url if not is_agent_url(text)]
-    agents = find_agents([text for text in url if is_agent_url(text)])
     given = given_robots(robots, bridges)
     plan = Path(floor) if floor else None
     if discover or topics is not None or not given:
@@ -131,10 +130,10 @@ def view(
         echo(fleet.table(grid=plan is None, only_given=only_given), lines=True)
         return
     configs = [overrides.config(bridge.url, robot) for bridge, robot in fleet.given]
-    for each in agents:
-        each.join(bridges)
+    shown = [*bridges]
+    agents = find_agents([text for text in url if is_agent_url(text)], shown)
     opened = console.open_console(
-        bridges, configs, floor=plan, place="\n".join(sorted(url)) if agents else None
+        shown, configs, floor=plan, place="\n".join(sorted(url)) if agents else None
     )
     for each in agents:
         each.show_on(opened)

@@ -21,7 +21,7 @@ from webmap.config.robot import (
     bridges_of,
     read_robot,
 )
-from webmap.ros.names import normalise_url
+from webmap.ros.names import is_agent_url, normalise_url
 
 
 def _address(value: Any) -> str:
@@ -154,6 +154,8 @@ def read_fleet(data: Mapping[str, Any], mistakes: Mistakes) -> FleetConfig:
 
     """
     whole = {"bridges": None, "robots": None, **data}
+    if whole["robots"] is None and _has_agents(whole["bridges"]):
+        del whole["robots"]  # the agents have their own
     fleet = read(FleetConfig, whole, (), mistakes)
     assert fleet is not None, "a file is a table"
     if fleet.bridges:
@@ -163,9 +165,22 @@ def read_fleet(data: Mapping[str, Any], mistakes: Mistakes) -> FleetConfig:
     return fleet
 
 
+def _has_agents(bridges: Any) -> bool:
+    values = bridges.values() if isinstance(bridges, Mapping) else ()
+    urls = [each.get("url") if isinstance(each, Mapping) else each for each in values]
+    return any(isinstance(url, str) and is_agent_url(url) for url in urls)
+
+
 def _linked(fleet: FleetConfig, mistakes: Mistakes) -> FleetConfig:
     """Return a fleet whose robots and maps all name their bridge."""
-    only = next(iter(fleet.bridges)) if len(fleet.bridges) == 1 else ""
+    # A bridge with a mistake has no address.
+    urls = {name: str(each.url) for name, each in fleet.bridges.items()}
+    own = [name for name, url in urls.items() if not is_agent_url(url)]
+    only = own[0] if len(own) == 1 else ""
+    for name, bridge in fleet.bridges.items():
+        if name not in own and bridge.alignment is not None:
+            message = "the fleet file of each agent has the alignment of its robots"
+            mistakes.add(("bridges", name, "alignment"), message)
     replace = msgspec.structs.replace
     maps = [replace(each, bridge=each.bridge or only) for each in fleet.map]
     robots = [replace(each, bridge=each.bridge or only) for each in fleet.robots]
@@ -194,6 +209,9 @@ def _linked(fleet: FleetConfig, mistakes: Mistakes) -> FleetConfig:
     for path, name in named:
         if not name:
             mistakes.add(path, 'the key "bridge" is missing')
+        elif name in fleet.bridges and name not in own:
+            message = f"{name} is for agents, whose own fleet files have their robots"
+            mistakes.add(path, message)
         elif name not in fleet.bridges:
             listed = f"the name of a bridge ({', '.join(fleet.bridges)})"
             hint = checks.did_you_mean(name, fleet.bridges)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
 
-from webmap.agents.address import is_agent_url
 from webmap.base.errors import MotionError
 from webmap.base.geometry import Pose, Twist
 from webmap.base.lifecycle import lifecycle
@@ -34,7 +33,7 @@ from webmap.gate.specs import checked, checked_assist
 from webmap.poses.type_query import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.moving import STOP
-from webmap.ros.names import is_type
+from webmap.ros.names import is_agent_url, is_type
 
 if TYPE_CHECKING:
     from webmap.agents.gates import Gates

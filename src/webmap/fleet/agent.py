@@ -10,32 +10,28 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
-from urllib.parse import urlsplit
+from typing import Any
 
 import msgspec
 
-import webmap
 from webmap.agents import address, clients, data
 from webmap.agents.address import Sender, sender_of
 from webmap.agents.agent_gate import AgentGate
 from webmap.agents.clients import Call, Clients
+from webmap.agents.description import (
+    PROTOCOL,
+    About,
+    AgentRobot,
+    Beacon,
+    read_beacon,
+)
 from webmap.agents.peer import Peer, peer_of
 from webmap.base.children import python_command
 from webmap.base.errors import BridgeError, ConfigError, WireError
 from webmap.base.lifecycle import lifecycle
 from webmap.base.tasks import spawn
-from webmap.config.checks import Mistakes
-from webmap.config.fleet import read_fleet
-from webmap.config.robot import RobotConfig
-from webmap.config.toml_text import read_text
-from webmap.console import Console, make_robot
 from webmap.core.runtime import runtime
-from webmap.fleet.found import find_fleet
-from webmap.fleet.given import given_robots
-from webmap.fleet.made import make_bridges
-from webmap.fleet.overrides import Overrides
+from webmap.fleet.held import Held
 from webmap.gate.protocol import Role
 from webmap.poses.alignment import alignments
 from webmap.ros.names import normalise_topic
@@ -44,153 +40,13 @@ from webmap.ros.rosbridge.connection import Lane
 from webmap.ros.rosbridge.events import Publish
 from webmap.ros.rosbridge.protocol import Protocol
 
-if TYPE_CHECKING:
-    from webmap import Bridge
-
 log = logging.getLogger("webmap.agent")
-
-PROTOCOL = 1
-"""The version of what agents and displays exchange."""
 
 BEACON = 0.5
 """Seconds between two signs that the agent is there."""
 
 LISTEN = 2.0
 """Seconds for which an agent listens for another one of its name before it begins."""
-
-LOOPBACK = ("localhost", "127.0.0.1", "::1")
-
-
-class Beacon(msgspec.Struct, frozen=True):
-    """The sign that an agent is there."""
-
-    protocol: int
-    session: str
-    about: str
-    """Changes whenever the description of the robots changes."""
-
-
-class AgentRobot(msgspec.Struct, frozen=True):
-    """A robot of an agent."""
-
-    id: str
-    config: dict[str, Any]
-
-
-class About(msgspec.Struct, frozen=True):
-    """The description of the robots of an agent."""
-
-    bridges: list[str]
-    """The names of the agent's bridge in the configurations."""
-    robots: list[AgentRobot]
-    grids: list[tuple[str, dict[str, Any]]]
-    """The topics of maps under the robots, with their options."""
-    alignment: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """The pose of the maps of all robots on the common one: metres and degrees."""
-
-
-class HeldRobot(NamedTuple):
-    """A robot that the agent holds."""
-
-    id: str
-    config: RobotConfig
-
-
-class Held(NamedTuple):
-    """The robots of an agent and the maps under them, behind one rosbridge."""
-
-    bridge: "Bridge"
-    robots: Callable[[], list[HeldRobot]]
-    """Returns the robots that the agent holds now."""
-    grids: Callable[[], Mapping[str, dict[str, Any]]]
-    """Returns the options of the maps under the robots, by topic."""
-
-
-def held_behind(
-    url: str, robots: Sequence[str], overrides: Overrides, wait: float
-) -> Held:
-    """Return the robots behind a rosbridge, found by their topics or given.
-
-    Args:
-        url: The address of the rosbridge.
-        robots: The values of ``--robot``.
-        overrides: Settings that replace guesses.
-        wait: How long to wait for an unreachable rosbridge, in seconds.
-
-    Raises:
-        ConfigError: If an argument is invalid.
-
-    """
-    bridge, console = webmap.Bridge(url), Console()
-    given = given_robots(robots, [bridge])
-    fleet = find_fleet([bridge], given, wait=wait, overrides=overrides)
-    shown = fleet.hold(console, moving_parts)
-    return Held(
-        bridge,
-        lambda: [HeldRobot(each.robot.motion.id, each.config) for each in shown.shown],
-        lambda: {topic: options for (_, topic), options in console.grids.items()},
-    )
-
-
-def held_in_file(file: Path) -> Held:
-    """Return the robots of a fleet file with one bridge.
-
-    Raises:
-        ConfigError: If the file has mistakes, or several bridges.
-        OSError: If it cannot be read.
-
-    """
-    text, mistakes = read_text(file), Mistakes()
-    fleet = read_fleet(text.data, mistakes)
-    if not mistakes.found and len(fleet.bridges) != 1:
-        mistakes.add(("bridges",), "an agent is beside the robots of one bridge")
-    for index, each in enumerate(fleet.robots):
-        if each.picture is not None:
-            message = "an agent has no pictures; give the robot a model instead"
-            mistakes.add(("robots", index, "picture"), message)
-    text.refuse(mistakes)
-    bridges = make_bridges(fleet)
-    (bridge,) = bridges.values()
-    made = [make_robot(moving_parts(config), bridges) for config in fleet.robots]
-    _kept.extend(made)
-    robots = [
-        HeldRobot(robot.motion.id, config)
-        for robot, config in zip(made, fleet.robots, strict=True)
-    ]
-    grids: dict[str, dict[str, Any]] = {}
-    for grid in fleet.map:
-        options = {"palette": grid.palette, "order": grid.order}
-        grids[grid.topic] = {
-            key: value for key, value in options.items() if value is not None
-        }
-    return Held(bridge, lambda: robots, lambda: grids)
-
-
-_kept: list[object] = []
-"""Robots that live as long as the process."""
-
-
-def moving_parts(config: RobotConfig) -> RobotConfig:
-    """Return what an agent itself needs of a robot: that which moves it."""
-    return RobotConfig(
-        name=config.name,
-        bridge=config.bridge,
-        base_link=config.base_link,
-        odometry=config.odometry,
-        alignment=config.alignment,
-        motion=config.motion,
-    )
-
-
-def warn_of_open_bridge(url: str) -> None:
-    """Log a warning if other computers may reach the rosbridge too."""
-    if (urlsplit(url).hostname or "") not in LOOPBACK:
-        log.warning(
-            "%s is not an address of this computer: whoever reaches that rosbridge can "
-            "drive the robot without the agent; let rosbridge listen on 127.0.0.1 and "
-            "run the agent beside it",
-            url,
-        )
 
 
 class Agent:
@@ -391,14 +247,6 @@ class Agent:
         except (BridgeError, WireError, ValueError, TypeError) as error:
             frame = clients.answered(call, str(error), well=False)
         self._reply(call.client, frame)
-
-
-def read_beacon(piece: bytes) -> Beacon | None:
-    """Return the beacon in a message; None if it is none."""
-    try:
-        return msgspec.json.decode(piece, type=Beacon)
-    except msgspec.DecodeError:
-        return None
 
 
 def parse_operators(text: str) -> dict[str, Role]:

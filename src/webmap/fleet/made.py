@@ -26,7 +26,9 @@ from webmap.fleet.files import (
     publish_picture,
     tile_options,
 )
+from webmap.fleet.of_agents import find_agents
 from webmap.poses.alignment import align_bridge
+from webmap.ros.names import is_agent_url
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
@@ -57,6 +59,8 @@ class ReadyFleet:
     """Pictures as ``Map.add_image`` takes them."""
     others: list[MapModule]
     """Further modules of the map that the file lists."""
+    agents: list[str]
+    """The addresses of routers with agents."""
 
 
 def prepare(file: Path) -> ReadyFleet:
@@ -97,13 +101,16 @@ def prepare(file: Path) -> ReadyFleet:
         for robot in robots:
             robot.destroy()
         raise
-    return ReadyFleet(fleet, bridges, robots, floor, modules, images, others)
+    agents = [each.url for each in fleet.bridges.values() if is_agent_url(each.url)]
+    return ReadyFleet(fleet, bridges, robots, floor, modules, images, others, agents)
 
 
 def make_bridges(fleet: FleetConfig) -> dict[str, "Bridge"]:
-    """Return the bridges of a file, by name."""
+    """Return the bridges of a file, by name, without those for agents."""
     bridges = {}
     for name, config in fleet.bridges.items():
+        if is_agent_url(config.url):
+            continue
         bridges[name] = webmap.Bridge(config.url, name=name)
         if config.alignment is not None:
             align_bridge(bridges[name], *config.alignment)
@@ -211,6 +218,10 @@ def open_fleet(ready: ReadyFleet) -> None:
     """Serve the console with these robots at ``/``."""
     options = {"title": ready.fleet.title} if ready.fleet.title else {}
     bridges = list(ready.bridges.values())
+    if ready.agents:
+        urls = sorted(each.url for each in ready.fleet.bridges.values())
+        options["place"] = "\n".join(urls)
+    agents = find_agents(ready.agents, bridges)
     shown = console.open_console(bridges, [], floor=ready.floor, **options)
     for name, arguments in ready.modules.items():
         shown.set_module(name, **arguments)
@@ -218,6 +229,8 @@ def open_fleet(ready: ReadyFleet) -> None:
     restore(ready.robots)
     for robot in ready.robots:
         shown.add(robot)
+    for each in agents:
+        each.show_on(shown)
 
 
 def show_scenery(shown: console.Console, ready: ReadyFleet) -> None:

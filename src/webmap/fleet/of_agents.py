@@ -11,6 +11,13 @@ import msgspec
 
 import webmap
 from webmap.agents import address
+from webmap.agents.description import (
+    PROTOCOL,
+    About,
+    AgentRobot,
+    Beacon,
+    read_beacon,
+)
 from webmap.agents.peer import peer_of
 from webmap.base.echo import echo, notify
 from webmap.base.errors import WebMapError
@@ -22,7 +29,6 @@ from webmap.console import Console, make_robot
 from webmap.core.configure import apply
 from webmap.core.motion import given_id
 from webmap.core.runtime import runtime
-from webmap.fleet.agent import PROTOCOL, About, AgentRobot, Beacon, read_beacon
 from webmap.poses.alignment import align_bridge
 
 if TYPE_CHECKING:
@@ -221,13 +227,20 @@ def _all(console: Console) -> "list[Robot]":
     return [*console.given, *console.robots]
 
 
-def find_agents(routers: Sequence[str]) -> list[Agents]:
-    """Return the agents of routers, after a moment in which those there are heard."""
+def find_agents(routers: Sequence[str], bridges: "list[Bridge]") -> list[Agents]:
+    """Return the agents of routers, after a moment in which those there are heard.
+
+    Args:
+        routers: The addresses of the routers.
+        bridges: Gets the bridges of the agents, also of those that come later.
+
+    """
     found = [Agents(router) for router in routers]
     until = time.monotonic() + FIRST
     while found and time.monotonic() < until:
         time.sleep(0.05)
     for each in found:
+        each.join(bridges)
         if each.trouble is not None:
             echo(f"{each.trouble}. Its robots appear when it is there.", err=True)
         elif not each.heard:

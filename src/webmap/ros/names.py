@@ -14,6 +14,7 @@ _TYPE = re.compile(
 )
 _HOST = re.compile(r"(?:[A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(?::\d{1,5})?(?:/[^\s]*)?")
 _DEFAULT_PORT = {"ws": 80, "wss": 443, "zenoh": 7447, "zenohs": 7447}
+_AGENTS = ("zenoh", "zenohs")
 _MAX_NAME = 255
 _THIS_COMPUTER = ("localhost", "127.0.0.1", "[::1]")
 
@@ -103,6 +104,11 @@ def ros2_type(type: str) -> str:
     """
     package, name = split_type(type)
     return f"{package}/msg/{name}"
+
+
+def is_agent_url(url: str) -> bool:
+    """Return whether an address is one of a router with agents, or of an agent."""
+    return url.partition("://")[0].strip().lower() in _AGENTS
 
 
 def normalise_url(url: str) -> str:

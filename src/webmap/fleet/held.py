@@ -1,0 +1,129 @@
+"""The robots that an agent holds: found behind a rosbridge, or of a fleet file."""
+
+import logging
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+from urllib.parse import urlsplit
+
+import webmap
+from webmap.config.checks import Mistakes
+from webmap.config.fleet import read_fleet
+from webmap.config.robot import RobotConfig
+from webmap.config.toml_text import read_text
+from webmap.console import Console, make_robot
+from webmap.fleet.found import find_fleet
+from webmap.fleet.given import given_robots
+from webmap.fleet.made import make_bridges
+from webmap.fleet.overrides import Overrides
+
+if TYPE_CHECKING:
+    from webmap import Bridge
+
+log = logging.getLogger("webmap.agent")
+
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+
+
+class HeldRobot(NamedTuple):
+    """A robot that the agent holds."""
+
+    id: str
+    config: RobotConfig
+
+
+class Held(NamedTuple):
+    """The robots of an agent and the maps under them, behind one rosbridge."""
+
+    bridge: "Bridge"
+    robots: Callable[[], list[HeldRobot]]
+    """Returns the robots that the agent holds now."""
+    grids: Callable[[], Mapping[str, dict[str, Any]]]
+    """Returns the options of the maps under the robots, by topic."""
+
+
+def held_behind(
+    url: str, robots: Sequence[str], overrides: Overrides, wait: float
+) -> Held:
+    """Return the robots behind a rosbridge, found by their topics or given.
+
+    Args:
+        url: The address of the rosbridge.
+        robots: The values of ``--robot``.
+        overrides: Settings that replace guesses.
+        wait: How long to wait for an unreachable rosbridge, in seconds.
+
+    Raises:
+        ConfigError: If an argument is invalid.
+
+    """
+    bridge, console = webmap.Bridge(url), Console()
+    given = given_robots(robots, [bridge])
+    fleet = find_fleet([bridge], given, wait=wait, overrides=overrides)
+    shown = fleet.hold(console, moving_parts)
+    return Held(
+        bridge,
+        lambda: [HeldRobot(each.robot.motion.id, each.config) for each in shown.shown],
+        lambda: {topic: options for (_, topic), options in console.grids.items()},
+    )
+
+
+def held_in_file(file: Path) -> Held:
+    """Return the robots of a fleet file with one bridge.
+
+    Raises:
+        ConfigError: If the file has mistakes, or several bridges.
+        OSError: If it cannot be read.
+
+    """
+    text, mistakes = read_text(file), Mistakes()
+    fleet = read_fleet(text.data, mistakes)
+    if not mistakes.found and len(fleet.bridges) != 1:
+        mistakes.add(("bridges",), "an agent is beside the robots of one bridge")
+    for index, each in enumerate(fleet.robots):
+        if each.picture is not None:
+            message = "an agent has no pictures; give the robot a model instead"
+            mistakes.add(("robots", index, "picture"), message)
+    text.refuse(mistakes)
+    bridges = make_bridges(fleet)
+    (bridge,) = bridges.values()
+    made = [make_robot(moving_parts(config), bridges) for config in fleet.robots]
+    _kept.extend(made)
+    robots = [
+        HeldRobot(robot.motion.id, config)
+        for robot, config in zip(made, fleet.robots, strict=True)
+    ]
+    grids: dict[str, dict[str, Any]] = {}
+    for grid in fleet.map:
+        options = {"palette": grid.palette, "order": grid.order}
+        grids[grid.topic] = {
+            key: value for key, value in options.items() if value is not None
+        }
+    return Held(bridge, lambda: robots, lambda: grids)
+
+
+_kept: list[object] = []
+"""Robots that live as long as the process."""
+
+
+def moving_parts(config: RobotConfig) -> RobotConfig:
+    """Return what an agent itself needs of a robot: that which moves it."""
+    return RobotConfig(
+        name=config.name,
+        bridge=config.bridge,
+        base_link=config.base_link,
+        odometry=config.odometry,
+        alignment=config.alignment,
+        motion=config.motion,
+    )
+
+
+def warn_of_open_bridge(url: str) -> None:
+    """Log a warning if other computers may reach the rosbridge too."""
+    if (urlsplit(url).hostname or "") not in LOOPBACK:
+        log.warning(
+            "%s is not an address of this computer: whoever reaches that rosbridge can "
+            "drive the robot without the agent; let rosbridge listen on 127.0.0.1 and "
+            "run the agent beside it",
+            url,
+        )
