@@ -205,3 +205,16 @@ def test_a_router_with_a_wrong_certificate_is_refused(name, words):
             assert not peer.connected
         finally:
             peer.close()
+
+
+def test_of_messages_that_wait_for_a_slow_link_the_newest_are_kept():
+    peer = Peer("tcp/127.0.0.1:1", User())  # it is not started
+    peer.trouble = None
+    for number in range(2000):
+        peer.put_data("small", b"%d" % number)
+        peer.put_data("large", bytes(5000) + b"%d" % number)
+        peer.put_data("answers", b"%d" % number, all=True)
+    waiting = peer._waiting
+    assert list(waiting["small"]) == [b"%d" % n for n in range(1990, 2000)]
+    assert [each[5000:] for each in waiting["large"]] == [b"1999"]
+    assert len(waiting["answers"]) == 1000

@@ -7,6 +7,7 @@ import sys
 import time
 
 import msgspec
+import psutil
 import pytest
 from cli_inside import run_inside
 
@@ -100,7 +101,26 @@ def wait_for(check, within=20.0):
         time.sleep(0.05)
 
 
-def test_an_agent_describes_the_robots_of_its_fleet_file(tmp_path):
+def listening(command):
+    """Return the sockets on which a command that runs now listens, and its gate."""
+    started = [
+        process
+        for process in psutil.Process().children()
+        if command in process.cmdline()
+    ]
+    assert started
+    every = [*started, *started[0].children(recursive=True)]
+    return [
+        place
+        for process in every
+        for place in process.net_connections()
+        if place.status == psutil.CONN_LISTEN
+    ]
+
+
+def test_an_agent_describes_the_robots_of_its_fleet_file_and_listens_on_nothing(
+    tmp_path,
+):
     file = tmp_path / "bay3.toml"
     with (
         webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
@@ -122,6 +142,7 @@ def test_an_agent_describes_the_robots_of_its_fleet_file(tmp_path):
                 answer = peer.ask(address.about("bay3"))
                 about = msgspec.json.decode(answer, type=About)
                 topics = asyncio.run(ask_topics(own, wait=10.0))
+                assert listening("agent") == []
         finally:
             peer.close()
     (robot,) = about.robots

@@ -120,3 +120,8 @@ def test_every_address_of_this_computer_gives_the_same_three_spellings(host, res
 )
 def test_the_address_of_another_computer_has_one_spelling(url):
     assert names.spellings_of(url) == [url]
+
+
+def test_the_address_of_a_router_with_agents_is_recognised_by_its_scheme():
+    assert names.is_agent_url("ZENOHS://hall/bay3")
+    assert not names.is_agent_url("wss://hall/zenoh")

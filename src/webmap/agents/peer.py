@@ -43,6 +43,9 @@ SMALL = 4096
 MOST_WAITING = 10
 """Messages of a topic that wait at most."""
 
+MOST_OF_ALL = 1000
+"""Messages under a key that wait at most where every one counts."""
+
 ASK_PATIENCE = 5.0
 """Seconds for an answer of another peer."""
 
@@ -211,10 +214,9 @@ class Peer:
             waiting = self._waiting.get(key)
             if waiting is None:
                 waiting = self._waiting[key] = deque()
-            if not all:
-                most = MOST_WAITING if len(data) <= SMALL else 1
-                while len(waiting) >= most:
-                    waiting.popleft()
+            most = MOST_WAITING if len(data) <= SMALL else 1
+            while len(waiting) >= (MOST_OF_ALL if all else most):
+                waiting.popleft()
             waiting.append(data)
             self._wake.notify()
 
@@ -304,6 +306,8 @@ class Peer:
             self.trouble = None
             log.info("the router at %s is connected", self.locator)
         elif not there and self.connected:
+            with self._wake:
+                self._waiting.clear()  # it would arrive late, as if it were new
             self.trouble = f"no connection to the router at {self.locator}"
             log.warning("%s", self.trouble)
 

@@ -16,6 +16,9 @@ import msgspec
 from webmap.agents.address import checked_name, locator
 from webmap.base.errors import ConfigError
 
+MOST_SESSIONS = 10_000
+"""Sessions of a router; each agent and each display has two."""
+
 LOOPBACK = ("127.0.0.1", "[::1]", "localhost")
 
 
@@ -111,7 +114,10 @@ def router_settings(
             f"{place} can be reached from other computers: use tls/ and --users, or "
             "--insecure-lan if you trust this network"
         )
-    transport: dict[str, Any] = {"shared_memory": {"enabled": False}}
+    transport: dict[str, Any] = {
+        "shared_memory": {"enabled": False},
+        "unicast": {"max_sessions": MOST_SESSIONS},
+    }
     if tls:
         transport["link"] = {
             "tls": {"listen_certificate": certificate, "listen_private_key": key}
