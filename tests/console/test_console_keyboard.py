@@ -32,9 +32,19 @@ def reset(page: Page) -> None:
     page.keyboard.press("Enter")
 
 
+def select(page: Page, robot: str) -> None:
+    """Select a robot, and free it from what an earlier test left: a page, a STOP."""
+    find(page, robot)
+    expect(page.locator("#card h2")).to_have_text(robot.capitalize())
+    expect(shown_state(page)).to_have_text(re.compile("Free|STOP active"))
+    if shown_state(page).text_content() == "STOP active":
+        reset(page)
+        same_word(page, "Free")
+
+
 def test_a_robot_is_selected_driven_stopped_and_released(open_console):
     page = open_console()
-    find(page, "robot 1")
+    select(page, "robot 1")
     expect(page.locator("#card h2")).to_have_text("Robot 1")
     find(page, "take control")
     same_word(page, "You have control")
@@ -62,7 +72,7 @@ def test_a_robot_is_selected_driven_stopped_and_released(open_console):
 
 def test_a_goal_is_placed_with_arrow_keys_turned_sent_and_cancelled(open_console):
     page = open_console()
-    find(page, "robot 1")
+    select(page, "robot 1")
     before = page.locator(".robot.selected").get_attribute("transform")
     for _ in range(5):  # a page that is too busy sends nothing
         page.keyboard.press("g")
@@ -86,7 +96,7 @@ def test_a_goal_is_placed_with_arrow_keys_turned_sent_and_cancelled(open_console
 
 def test_arrow_keys_move_the_mark_of_a_goal_and_not_the_robot_in_control(open_console):
     page = open_console()
-    find(page, "robot 1")
+    select(page, "robot 1")
     find(page, "take control")
     same_word(page, "You have control")
     expect(page.locator(".webmap-teleop-detail")).not_to_contain_text("Preparing")
@@ -104,7 +114,7 @@ def test_arrow_keys_move_the_mark_of_a_goal_and_not_the_robot_in_control(open_co
 
 def test_a_place_is_found_by_name_and_a_robot_is_sent_there(open_console):
     page = open_console()
-    find(page, "robot 2")
+    select(page, "robot 2")
     page.keyboard.press("l")
     where = page.locator("svg.webmap").bounding_box()
     # The position of a new label needs the pointer once; the task is to send there.
@@ -153,7 +163,7 @@ def test_the_view_the_layers_and_the_help_need_no_mouse(open_console):
 
 def test_a_pose_is_set_with_arrow_keys(open_console):
     page = open_console()
-    find(page, "robot 1")
+    select(page, "robot 1")
     for _ in range(5):  # a page that is too busy sends nothing
         page.keyboard.press("i")
         page.keyboard.press("ArrowDown")
@@ -179,7 +189,7 @@ def tab_to(page: Page, name: str) -> None:
 
 def test_a_route_is_made_with_arrow_keys_and_started_and_ended(open_console):
     page = open_console()
-    find(page, "robot 1")
+    select(page, "robot 1")
     find(page, "tool route")
     tab_to(page, "Add points")
     page.keyboard.press("Enter")
@@ -202,7 +212,7 @@ def test_a_route_is_made_with_arrow_keys_and_started_and_ended(open_console):
 
 def test_a_camera_is_shown_large_and_small(open_console):
     page = open_console()
-    find(page, "robot 1")
+    select(page, "robot 1")
     expect(page.locator("#card [data-camera-id]").first).to_be_visible()
     find(page, "camera")
     expect(page.locator(".camera-panel")).to_be_visible()
@@ -213,7 +223,7 @@ def test_a_camera_is_shown_large_and_small(open_console):
 def test_control_is_requested_and_handed_over(open_console):
     mine, theirs = open_console(), open_console()
     for page in (mine, theirs):
-        find(page, "robot 2")
+        select(page, "robot 2")
     mine.bring_to_front()
     find(mine, "take control")
     same_word(mine, "You have control")

@@ -45,19 +45,25 @@ def test_driving_stopping_and_resetting_take_one_one_and_two_presses(open_consol
 def test_a_goal_takes_three_presses(open_console):
     page = open_console()
     page.evaluate(COUNT)
-    for _ in range(5):  # a page that is too busy sends nothing
+    goal = page.locator("#card .goal")
+    without_path: set[tuple[float, ...]] = set()
+    for _ in range(12):  # a page that is too busy sends nothing
         page.locator("#robots .row", has_text="Robot 1").locator("button").first.click()
         page.get_by_role("button", name="Send goal…").click()
         expect(page.locator(".webmap-goal-word")).to_contain_text("Press on the map")
-        page.mouse.click(*page.evaluate(PLACES)[0])
+        places = map(tuple, page.evaluate(PLACES))
+        x, y = next(place for place in places if place not in without_path)
+        page.mouse.click(x, y)
         assert presses(page) == 3
+        text = re.compile("Goal sent|Goal accepted|Navigating|Goal reached")
         try:
-            text = re.compile("Goal sent|Goal accepted|Navigating|Goal reached")
-            expect(page.locator("#card .goal")).to_contain_text(text, timeout=5000)
+            expect(goal).to_contain_text(text, timeout=5000)
         except AssertionError:
-            continue
-        return
-    raise AssertionError(page.locator("#card .goal").inner_text())
+            if "Goal failed" in goal.inner_text():
+                without_path.add((x, y))
+        else:
+            return
+    raise AssertionError(goal.inner_text())
 
 
 def test_control_of_a_robot_of_another_operator_takes_one_press(open_console):
