@@ -6,7 +6,7 @@ import pytest
 from gate_harness import Bench, spec
 
 from webmap.gate import protocol
-from webmap.gate.commands import begins_like_stop, robot_in
+from webmap.gate.commands import Stop, begins_like_stop, robot_in, stop_in
 
 START = b'{"op":"stop"'
 
@@ -76,6 +76,30 @@ def test_a_message_that_does_not_begin_like_a_stop_is_not_recognized(frame):
 )
 def test_the_robot_of_a_malformed_stop_is_read_only_if_it_is_unambiguous(rest, robot):
     assert robot_in(START + rest) == robot
+
+
+@pytest.mark.parametrize(
+    "frame", [b"5", b"null", b"true", b'"robot"', b"[5]", b"[[1, 2, 3]]", b"{}", b""]
+)
+def test_a_frame_that_is_no_object_names_no_robot(frame):
+    assert robot_in(frame) is None
+
+
+@pytest.mark.parametrize(
+    ("frame", "stop"),
+    [
+        (b'{"op":"stop","robot":"r1"}', Stop("r1")),
+        (b'{"robot":"r1","op":"stop"}', Stop("r1")),
+        (b'{"robot":"*","op":"stop"}', Stop(None)),
+        (b'{"op":"stop","robot":"r1","why":1}', Stop("r1")),
+        (b'{"op":"stop"', Stop(None)),
+        (b'{"op":"take","robot":"r1"}', None),
+        (b'{"robot":"r1","op":"stop","why":1}', None),
+        (b"5", None),
+    ],
+)
+def test_the_stop_in_a_frame(frame, stop):
+    assert stop_in(frame) == stop
 
 
 @pytest.fixture

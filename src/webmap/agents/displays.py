@@ -17,7 +17,7 @@ import msgspec
 
 from webmap.agents.samples import Numbering, Order
 from webmap.base.errors import WireError
-from webmap.gate.commands import Stop, begins_like_stop, robot_in
+from webmap.gate.commands import stop_in
 from webmap.gate.protocol import (
     Connect,
     Disconnect,
@@ -255,11 +255,10 @@ class Displays:
                     known[1:] = [message]
             case _:
                 known = display.pages.get(message.connection)
-                if known is None and begins_like_stop(message.text):
-                    # A STOP of a page that counts as lost is obeyed all the same.
-                    robot = robot_in(message.text)
-                    return [FromProgram(Stop(None if robot == "*" else robot))]
                 if known is None:  # it counts as lost: the display slept
+                    stop = stop_in(message.text)
+                    if stop is not None:  # it is obeyed all the same
+                        return [FromProgram(stop)]
                     display.unknown = (message.connection,)
         return [] if known is None else [message]
 

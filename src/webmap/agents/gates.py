@@ -15,7 +15,7 @@ from webmap.agents.peer import Peer, peer_of
 from webmap.base.geometry import Twist
 from webmap.base.scope import Removal
 from webmap.gate import protocol
-from webmap.gate.commands import begins_like_stop, robot_in
+from webmap.gate.commands import robot_in, stop_in
 from webmap.gate.display.client import DriveConnection, GateClient
 from webmap.gate.protocol import Report, RobotSpec, Role
 from webmap.ros.names import is_agent_url
@@ -51,7 +51,7 @@ class PageConnection:
         """Pass a frame of the page to the gate of its robot, a STOP for all to all."""
         data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
         client = self._gates.client_of(robot_in(data))
-        if client is None and begins_like_stop(data):
+        if client is None and stop_in(data) is not None:
             for far in list(self._far.values()):
                 far.receive(text)
         for url, far in list(self._far.items()):

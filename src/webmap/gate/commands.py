@@ -411,11 +411,20 @@ def begins_like_stop(data: bytes) -> bool:
     return _BEGINS.match(data) is not None
 
 
+def stop_in(data: bytes) -> Stop | None:
+    """Return the STOP that a frame is, valid or not; ``None`` if it is none."""
+    try:
+        command = parse(data)
+    except Refusal:
+        return Stop(robot_in(data)) if begins_like_stop(data) else None
+    return command if isinstance(command, Stop) else None
+
+
 def robot_in(data: bytes) -> str | None:
     """Return the one robot that a frame names, if that can be read for certain.
 
     Args:
-        data: A frame that begins like a STOP.
+        data: A frame: a command, or one that begins like a STOP.
 
     Returns:
         The name, which may be unknown; ``None`` if the frame names no robot or several,
@@ -425,7 +434,7 @@ def robot_in(data: bytes) -> str | None:
     try:
         fields = json.loads(data.decode(), object_pairs_hook=list)
         names = [value for name, value in fields if name == "robot"]
-    except (ValueError, RecursionError):
+    except (ValueError, TypeError, RecursionError):  # not JSON, or not an object
         names = _named_next(data)
     name = names[0] if len(names) == 1 else None
     return name if isinstance(name, str) else None

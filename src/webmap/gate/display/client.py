@@ -20,7 +20,7 @@ from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.base.scope import Removal
 from webmap.gate import commands, pipe, protocol
-from webmap.gate.commands import Refusal, begins_like_stop, robot_in
+from webmap.gate.commands import stop_in
 from webmap.gate.display.pages import DriveConnection, Pages
 from webmap.gate.display.program import ProgramCommands
 from webmap.gate.display.supervisor import GateLink, GateListener, Supervisor
@@ -265,19 +265,12 @@ class GateClient:
         """Keep a page's STOP, in case no gate receives it."""
         if b"stop" not in message.text:
             return
-        try:
-            command = commands.parse(message.text)
-        except Refusal:
-            if not begins_like_stop(message.text):
-                return
-            robot = robot_in(message.text)
-        else:
-            if not isinstance(command, commands.Stop):
-                return
-            robot = command.robot
+        stop = stop_in(message.text)
+        if stop is None:
+            return
         # As in the gate: a STOP that names no known robot is for all.
-        known = robot in self._specs
-        self._keep_stop(message.connection, robot if known else None)
+        known = stop.robot in self._specs
+        self._keep_stop(message.connection, stop.robot if known else None)
 
     def _keep_stop(self, by: str | None, robot: str | None) -> None:
         if not self.ready:

@@ -1,0 +1,107 @@
+"""A page's socket at the gates of agents, and at that of its own computer."""
+
+import json
+
+import pytest
+
+from webmap.agents.gates import Gates
+from webmap.gate.display.client import GateClient
+from webmap.gate.protocol import FromPage, RobotSpec
+
+AGENT = "zenoh://127.0.0.1:7447/bay3"
+
+
+class Link:
+    """A way to a gate that keeps what is sent."""
+
+    ready, trouble, pid = True, None, None
+
+    def __init__(self, owner, lock):
+        self.texts = []
+
+    def send(self, message):
+        if isinstance(message, FromPage):
+            self.texts.append(message.text)
+
+
+class Page:
+    """A page of a display with a robot of its own and one of an agent."""
+
+    def __init__(self):
+        self.links = []
+        gates = Gates()
+        gates.own = GateClient(self._link)
+        gates.far[AGENT] = GateClient(self._link, "bay3", "ann.4f/")
+        self.own, self.far = self.links
+        for robot, url in (("here", "ws://127.0.0.1:9090"), ("there", AGENT)):
+            gates.declare(
+                RobotSpec(
+                    id=robot,
+                    name=robot,
+                    bridge_url=url,
+                    twist_topic="/cmd_vel",
+                    stops_within=0.0,
+                    v_max=1.0,
+                    w_max=1.5,
+                )
+            )
+        self._socket = gates.connect("Ann", "operator", print, print)
+
+    def _link(self, owner, lock):
+        self.links.append(Link(owner, lock))
+        return self.links[-1]
+
+    def send(self, text):
+        """Send a frame; return whether the own gate and the agent's got it."""
+        for link in self.links:
+            link.texts.clear()
+        self._socket.receive(text)
+        data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
+        for link in self.links:
+            assert all(
+                data.startswith(text) for text in link.texts
+            )  # long ones are cut
+        return tuple(bool(link.texts) for link in self.links)
+
+
+@pytest.fixture
+def page():
+    return Page()
+
+
+def test_a_command_reaches_the_gate_of_its_robot_alone(page):
+    for op in ("take", "stop", "cancel"):
+        for robot, expected in (("here", (True, False)), ("there", (False, True))):
+            assert page.send(json.dumps({"op": op, "robot": robot})) == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"op":"stop","robot":"*"}',
+        '{"robot":"*","op":"stop"}',
+        '{"op":"stop","robot":"unknown"}',
+        '{"op":"stop"',
+    ],
+)
+def test_a_stop_for_no_known_robot_reaches_every_gate(page, text):
+    assert page.send(text) == (True, True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "5",
+        "null",
+        '"robot"',
+        "[5]",
+        "[[1,2,3]]",
+        "[" * 5000,
+        "\ud800",
+        b"\xff",
+        "{",
+    ],
+)
+def test_a_frame_that_is_no_command_is_refused_by_the_own_gate(page, text):
+    assert page.send(text) == (True, False)
