@@ -1,5 +1,6 @@
 """A router, agents and displays, each a process of its own, seen in a real browser."""
 
+import os
 from contextlib import ExitStack, contextmanager
 
 import pytest
@@ -26,7 +27,7 @@ def fleet(tmp_path, number=1):
         yield router
 
 
-def agent(tmp_path, url, router, name):
+def agent(tmp_path, url, router, name, **environment):
     return webmap(
         "agent",
         url,
@@ -37,6 +38,7 @@ def agent(tmp_path, url, router, name):
         "--stops-within",
         "0.5",
         WEBMAP_STATE_DIR=str(tmp_path / name),
+        **environment,
     )
 
 
@@ -116,6 +118,46 @@ def test_an_agent_that_ends_is_shown_and_one_that_comes_later_appears(
             expect(page.locator("#robots .row")).not_to_contain_text(
                 "Lost", timeout=SOON
             )
+
+
+def test_an_agent_that_restarts_with_other_robots_shows_these(chromium, tmp_path):
+    with (
+        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
+        simulator("--robots", "1") as one,
+        simulator("--robots", "3") as three,
+        display(chromium, router) as page,
+    ):
+        names = page.locator("#robots .row .name")
+        for url, number in ((one, 1), (three, 3), (one, 1)):
+            with agent(tmp_path, url, router, "bay1"):
+                expected = [f"robot_{index}" for index in range(number)]
+                expect(names).to_have_text(expected, timeout=2 * SOON)
+                expect(placed(page)).to_have_count(number, timeout=SOON)
+
+
+TOMORROW = """
+import time
+
+now = time.time
+time.time = lambda: now() + 86_400.0
+"""
+
+
+def test_a_robot_is_driven_whose_agent_has_a_clock_one_day_ahead(chromium, tmp_path):
+    (tmp_path / "sitecustomize.py").write_text(TOMORROW)
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.getenv("PYTHONPATH")])])
+    with (
+        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
+        simulator("--robots", "1") as url,
+        agent(tmp_path, url, router, "bay1", PYTHONPATH=path),
+        display(chromium, router) as page,
+    ):
+        expect(placed(page)).to_have_count(1, timeout=SOON)
+        page.locator("#robots .row button").first.click()
+        title = page.locator(".webmap-teleop-title")
+        hold(page.keyboard, "w", lambda: title.text_content() == "You are driving")
+        page.keyboard.up("w")
+        expect(title).to_have_text("You have control", timeout=SOON)
 
 
 def test_robots_of_an_agent_and_of_a_rosbridge_share_one_map(chromium, tmp_path):
