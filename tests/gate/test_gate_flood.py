@@ -212,6 +212,24 @@ async def test_messages_sent_before_the_end_of_the_link_are_received():
 
 
 @in_loop
+async def test_a_link_over_its_budget_is_read_later():
+    seen, waits_left = Received(), [0.01, 0.01]
+
+    class Spent(Budget):
+        def wait(self, now):
+            return waits_left.pop() if waits_left else 0.0
+
+    async def talk(link):
+        await link.accept(frame(TEXT, b"{}"))
+        await link.reader.read()
+
+    async with raw_bridge(talk) as url:
+        await open_socket(url, seen.ears, Spent())
+        await until(lambda: seen.texts, "the message")
+    assert waits_left == []
+
+
+@in_loop
 async def test_an_exception_in_a_handler_drops_the_link_with_a_reason():
     seen = Received()
 
