@@ -13,7 +13,13 @@ from cli_inside import run_inside
 
 from webmap.agents import address
 from webmap.agents.peer import Peer, User
-from webmap.fleet.agent import About, Beacon, parse_operators, parse_rates
+from webmap.fleet.agent import (
+    About,
+    Beacon,
+    parse_beams,
+    parse_operators,
+    parse_rates,
+)
 from webmap.ros.asking import ask_topics
 from webmap_process import simulator, webmap
 
@@ -53,6 +59,8 @@ service = "/dock"
         (("agent", "ws://h", "--router", "ws://h", *NAME), "got the router 'ws://h'"),
         (("agent", "ws://h", *ROUTER, *NAME, "--rate", "/scan"), "/scan=5"),
         (("agent", "ws://h", *ROUTER, *NAME, "--rate", "/scan=0"), "/scan=5"),
+        (("agent", "ws://h", *ROUTER, *NAME, "--beams", "/scan=0"), "/scan=180"),
+        (("agent", "ws://h", *ROUTER, *NAME, "--beams", "/scan"), "/scan=180"),
         (("agent", "ws://h", *ROUTER, *NAME, "--operators", "a b"), "got the user"),
         (("agent", "none.toml", *ROUTER, *NAME), "none.toml"),
         (
@@ -83,6 +91,7 @@ def test_the_unit_for_systemd_runs_the_same_command():
 
 
 def test_rates_and_operators_are_read():
+    assert parse_beams(["scan=180"]) == {"/scan": 180}
     assert parse_rates(["scan=5", "/map=0.1"]) == {"/scan": 200, "/map": 10_000}
     assert parse_operators("ann, ben") == {
         "": "viewer",

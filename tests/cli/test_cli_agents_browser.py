@@ -16,18 +16,20 @@ SOON = 20_000
 
 
 @contextmanager
-def fleet(tmp_path, number=1):
+def fleet(tmp_path, number=1, *more):
     """Run a router and agents with a simulated robot each; yield the router's URL."""
     with ExitStack() as running:
         router = running.enter_context(webmap("router", "--listen", "tcp/127.0.0.1:0"))
         for index in range(number):
             options = ("--robots", "1", "--seed", str(index + 1))
             url = running.enter_context(simulator(*options))
-            running.enter_context(agent(tmp_path, url, router, f"bay{index + 1}"))
+            running.enter_context(
+                agent(tmp_path, url, router, f"bay{index + 1}", *more)
+            )
         yield router
 
 
-def agent(tmp_path, url, router, name, **environment):
+def agent(tmp_path, url, router, name, *more, **environment):
     return webmap(
         "agent",
         url,
@@ -37,6 +39,7 @@ def agent(tmp_path, url, router, name, **environment):
         name,
         "--stops-within",
         "0.5",
+        *more,
         WEBMAP_STATE_DIR=str(tmp_path / name),
         **environment,
     )
@@ -68,6 +71,16 @@ def test_the_robots_of_all_agents_are_drawn_with_map_and_scan(chromium, tmp_path
             timeout=SOON
         )
         expect(page.locator(".laserscan > .dot[d]")).to_have_count(2, timeout=SOON)
+
+
+def test_a_scan_crosses_the_uplink_with_the_beams_that_the_agent_allows(
+    chromium, tmp_path
+):
+    beams = ("--beams", "/robot_0/base_scan=30")
+    with fleet(tmp_path, 1, *beams) as router, display(chromium, router) as page:
+        dots = page.locator(".laserscan > .dot[d]")
+        expect(dots).to_have_count(1, timeout=SOON)
+        assert 5 < dots.get_attribute("d").upper().count("M") <= 30
 
 
 def test_two_displays_drive_one_robot_in_turn_and_either_stops_it(chromium, tmp_path):

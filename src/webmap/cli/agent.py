@@ -55,6 +55,14 @@ from webmap.cli.options import Finite, verbose_option
     "repeated.",
 )
 @click.option(
+    "--beams",
+    "beams",
+    multiple=True,
+    metavar="TOPIC=NUMBER",
+    help="At most so many beams of a scan, for a slow link; of neighbouring beams the "
+    "shortest counts. May be repeated.",
+)
+@click.option(
     "--wait",
     type=Finite(0.0),
     default=10.0,
@@ -77,6 +85,7 @@ def agent(
     stops_within: float | None,
     operators: str | None,
     rates: tuple[str, ...],
+    beams: tuple[str, ...],
     wait: float,
     systemd: bool,
     with_parent: bool,
@@ -98,6 +107,7 @@ def agent(
     from webmap.core.motion import RobotMotion
     from webmap.fleet.agent import (
         Agent,
+        parse_beams,
         parse_operators,
         parse_rates,
         run_agent,
@@ -111,7 +121,7 @@ def agent(
         return
     RobotMotion.agent = checked_name(name)
     overrides = Overrides([parse_setting(text) for text in settings], stops_within)
-    throttles = parse_rates(rates)
+    throttles, most = parse_rates(rates), parse_beams(beams)
     roles = None if operators is None else parse_operators(operators)
     if "://" in robot:
         held = held_behind(robot, robots, overrides, wait)
@@ -120,7 +130,7 @@ def agent(
     else:
         held = held_in_file(Path(robot))
     warn_of_open_bridge(held.bridge.url)
-    made = Agent(name, router, held, roles=roles, throttles=throttles)
+    made = Agent(name, router, held, roles=roles, throttles=throttles, beams=most)
     ended = threading.Event()
 
     def ready() -> None:

@@ -26,6 +26,7 @@ from webmap.agents.description import (
     read_beacon,
 )
 from webmap.agents.peer import Peer, peer_of
+from webmap.agents.thinning import thinned
 from webmap.base.children import python_command
 from webmap.base.errors import BridgeError, ConfigError, WireError
 from webmap.base.lifecycle import lifecycle
@@ -58,6 +59,7 @@ class Agent:
         held: Its robots.
         roles: What the pages of each user may do at most.
         throttles: The least milliseconds between two messages, by topic.
+        beams: The greatest number of beams of a scan, by topic.
 
     """
 
@@ -69,6 +71,7 @@ class Agent:
         *,
         roles: Mapping[str, Role] | None = None,
         throttles: Mapping[str, int] | None = None,
+        beams: Mapping[str, int] | None = None,
     ) -> None:
         self.name = address.checked_name(name)
         self.url = url = held.bridge.url
@@ -96,6 +99,7 @@ class Agent:
             calls=lambda: self._allowed[1],
             throttles=throttles,
         )
+        self._beams = dict(beams or {})
         self._lane = Lane(
             url,
             opened=self._bridge_opened,
@@ -224,7 +228,19 @@ class Agent:
             event.topic, event.frame, now
         ):
             key = address.topic_key(self.name, event.topic)
-            self._peer.put_data(key, data.pack_frame(event.frame))
+            frame = self._thinned(event.topic, event.frame)
+            self._peer.put_data(key, data.pack_frame(frame))
+
+    def _thinned(self, topic: str, frame: bytes | bytearray) -> bytes | bytearray:
+        beams = self._beams.get(topic)
+        if beams is None:
+            return frame
+        try:
+            return thinned(frame, beams)
+        except WireError as error:
+            del self._beams[topic]
+            log.warning("%s is sent with all of its data: %s", topic, error)
+            return frame
 
     def _reply(self, client: Sender, frame: bytes) -> None:
         self._put(client, data.pack_frame(frame))
@@ -263,6 +279,27 @@ def parse_operators(text: str) -> dict[str, Role]:
     for user in text.split(","):
         roles[address.checked_name(user.strip(), "user")] = "operator"
     return roles
+
+
+def parse_beams(texts: Sequence[str]) -> dict[str, int]:
+    """Return the greatest number of beams of a scan, by topic.
+
+    Args:
+        texts: The values of ``--beams``: ``/scan=180``.
+
+    Raises:
+        ConfigError: If one has another form.
+
+    """
+    beams = {}
+    for text in texts:
+        topic, _, number = text.partition("=")
+        if not number.isdecimal() or int(number) < 1:
+            raise ConfigError(
+                f"beams {text!r}: expected a topic and a number, as in /scan=180"
+            )
+        beams[normalise_topic(topic)] = int(number)
+    return beams
 
 
 def parse_rates(texts: Sequence[str]) -> dict[str, int]:

@@ -1,0 +1,97 @@
+"""Scans with fewer beams: what remains of the distances, and at which angles."""
+
+import json
+import math
+from pathlib import Path
+
+import cbor2
+import pytest
+
+from webmap.agents.thinning import thinned
+from webmap.base.errors import WireError
+from webmap.ros.rosbridge.cbor import decode
+
+CAPTURED = Path(__file__).parents[1] / "captured"
+
+
+def scan_of(frame):
+    text = frame if isinstance(frame, str) else frame.decode()
+    return json.loads(text)["msg"]
+
+
+def frame(distances, **changes):
+    scan = {
+        "angle_min": -1.0,
+        "angle_max": -1.0 + 0.5 * (len(distances) - 1),
+        "angle_increment": 0.5,
+        "time_increment": 0.001,
+        "range_min": 0.1,
+        "range_max": 10.0,
+        "ranges": distances,
+        "intensities": [1.0] * len(distances),
+    }
+    return json.dumps(
+        {"op": "publish", "topic": "/scan", "msg": scan | changes}
+    ).encode()
+
+
+def test_the_shortest_distance_of_neighbouring_beams_remains():
+    scan = scan_of(thinned(frame([5.0, 4.0, 3.0, 6.0, 7.0, 2.0]), 3))
+    assert scan["ranges"] == [4.0, 3.0, 2.0]
+    assert scan["intensities"] == []
+
+
+def test_a_beam_is_in_the_middle_of_those_that_it_replaces():
+    scan = scan_of(thinned(frame([1.0] * 6), 3))
+    assert scan["angle_min"] == pytest.approx(-0.75)
+    assert scan["angle_increment"] == pytest.approx(1.0)
+    assert scan["angle_max"] == pytest.approx(1.25)
+    assert scan["time_increment"] == pytest.approx(0.002)
+
+
+def test_a_distance_that_is_none_hides_no_other():
+    got = thinned(frame([None, 3.0, 0.0, 4.0, None, None]), 3)
+    assert scan_of(got)["ranges"] == [3.0, 4.0, None]
+
+
+def test_a_number_of_beams_that_does_not_divide_the_scan():
+    scan = scan_of(thinned(frame([5.0, 4.0, 3.0, 2.0, 1.0, 6.0, 7.0]), 3))
+    assert scan["ranges"] == [3.0, 1.0, 7.0]
+
+
+def test_a_scan_with_few_beams_is_not_changed():
+    given = frame([1.0, 2.0])
+    assert thinned(given, 2) is given
+
+
+@pytest.mark.parametrize("kind", ["ros1", "ros2"])
+def test_the_scan_of_a_rosbridge_keeps_its_form(kind):
+    given = (CAPTURED / kind / "cbor_scan_inf_nan.bin").read_bytes()
+    before, after = decode(given), decode(thinned(given, 20))
+    assert {**before, "msg": None} == {**after, "msg": None}
+    assert before["msg"].keys() == after["msg"].keys()
+    assert before["msg"]["header"] == after["msg"]["header"]
+    assert len(after["msg"]["ranges"]) <= 20
+    least = before["msg"]["range_min"]
+    nearest = min(each for each in before["msg"]["ranges"] if each >= least)
+    assert min(after["msg"]["ranges"]) == pytest.approx(nearest)
+    assert not any(math.isnan(each) for each in after["msg"]["ranges"])
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        b"{",
+        b"[]",
+        b'{"op":"publish","topic":"/scan"}',
+        b'{"op":"publish","topic":"/scan","msg":{"data":[1,2]}}',
+        frame([1.0] * 3, ranges=["far", "near", "far"]),
+        frame([1.0] * 3, angle_increment=None),
+        frame([1.0] * 3, ranges=[[1.0], [2.0, 3.0], []]),
+        b"\xa1",
+        cbor2.dumps({"op": "publish", "msg": 5}),
+    ],
+)
+def test_a_message_that_is_no_scan_is_refused(given):
+    with pytest.raises(WireError, match="no scan"):
+        thinned(given, 2)
