@@ -129,6 +129,28 @@ def test_the_first_sample_introduces_the_pages_and_no_robot(bench):
     assert bench.owner.heard == [Ready(0), Tick(1, {})]
 
 
+def test_a_tick_is_as_long_with_many_pages_that_only_look_and_reaches_each(connected):
+    acks = {PAGE.connection: -1, "program": -1}
+    few = connected.displays.send(Tick(2, acks), 0.0)
+    many = {f"east.{number}/c1": -1 for number in range(100)}
+    assert len(connected.displays.send(Tick(3, acks | many), 0.0)) == len(few)
+    connected.hears(Tick(4, acks))
+    connected.hears(Tick(5, {**acks, PAGE.connection: 7}))
+    assert connected.owner.heard[-2:] == [
+        Tick(4, {PAGE.connection: -1}),
+        Tick(5, {PAGE.connection: 7}),
+    ]
+
+
+def test_a_page_that_the_agent_does_not_know_gets_no_tick(connected):
+    connected.hears(Unknown(NAME, (PAGE.connection,)))
+    connected.hears(Tick(2, {}))
+    assert connected.owner.heard[-1] == Tick(2, {})
+    connected.hears(Hello(PAGE.connection))
+    connected.hears(Tick(3, {}))
+    assert connected.owner.heard[-1] == Tick(3, {PAGE.connection: -1})
+
+
 def test_declarations_stay_here(connected):
     connected.far.send(RobotSpec(id="r1", name="Bob", bridge_url="ws://evil"))
     connected.far.send(Forget("r1"))

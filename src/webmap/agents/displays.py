@@ -26,6 +26,7 @@ from webmap.gate.protocol import (
     FromProgram,
     Role,
     Speeds,
+    Tick,
     ToGate,
 )
 
@@ -156,7 +157,14 @@ class Displays:
         return Unknown(name, connections) if connections else None
 
     def send(self, message: ToDisplays, now: float) -> bytes:
-        """Return the sample that carries a message of the gate to all displays."""
+        """Return the sample that carries a message of the gate to all displays.
+
+        A tick names only the pages that have sent a command: it would grow with every
+        page that looks. :class:`FarGate` adds the others.
+        """
+        if isinstance(message, Tick):
+            acks = {id: ack for id, ack in message.acks.items() if ack >= 0}
+            message = Tick(message.tick, acks)
         sample = self._numbering.next(_encode(message))
         self._sent.append((self._numbering.sent, now))
         while now - self._sent[0][1] > FRESH:

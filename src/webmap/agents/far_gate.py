@@ -198,8 +198,12 @@ class FarGate:
                 return
             case Unknown():
                 if message.display == self.display:
+                    self._greeted.difference_update(message.connections)
                     self._introduce(message.connections)
                 return
+            case protocol.Tick():
+                quiet = dict.fromkeys(self._greeted, -1)
+                message = protocol.Tick(message.tick, quiet | message.acks)
             case protocol.Hello():
                 if message.connection not in self._pages:
                     return
