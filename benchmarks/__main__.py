@@ -6,7 +6,15 @@ import click
 
 from benchmarks.harness import report
 
-BENCHES = ["bridge", "viewers", "drawing", "console", "agents", "uplink"]
+BENCHES = [
+    "bridge",
+    "viewers",
+    "drawing",
+    "console",
+    "agents",
+    "uplink",
+    "transports",
+]
 
 
 @click.command()
