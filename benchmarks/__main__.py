@@ -14,6 +14,7 @@ BENCHES = [
     "agents",
     "uplink",
     "transports",
+    "router",
 ]
 
 
