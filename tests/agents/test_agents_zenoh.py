@@ -175,6 +175,25 @@ def test_a_display_and_another_agent_cannot_speak_for_an_agent(users):
     assert set(got) == {b"tick"}
 
 
+def test_a_display_finds_the_agents_that_it_reaches_without_their_names(users):
+    found = []
+    west, bay3, bay4 = User("west", "two"), User("bay3", "one"), User("bay4", "four")
+    with (
+        router(users=users) as place,
+        peers(place, west, bay3, bay4) as (display, one, other),
+    ):
+        display.listen(address.here(address.EVERY), lambda key, _: found.append(key))
+        wait_for(
+            lambda: (
+                other.put_data(address.here("bay4"), b"here"),
+                one.put_data(address.here("bay3"), b"here"),
+                time.sleep(0.05),
+                len(found) > 5,
+            )[3]
+        )
+    assert set(found) == {"webmap/bay3/here"}
+
+
 def test_peers_reach_a_router_over_tls():
     with (
         router(

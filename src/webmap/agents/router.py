@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from webmap.agents.address import checked_name, locator
+from webmap.agents.address import EVERY, checked_name, here, locator
 from webmap.base.errors import ConfigError
 
 MOST_SESSIONS = 10_000
@@ -148,17 +148,18 @@ def access_rules(users: Mapping[str, UserEntry]) -> dict[str, Any]:
     policies: list[dict[str, Any]] = []
     for user, entry in users.items():
         sends, gets = _keys_of_agent(entry.agent), _keys_for_agent(entry.agent)
-        asks: list[str] = []
+        names, asks = gets, list[str]()
         answers = [f"webmap/{entry.agent}/about"]
         if not entry.agent:
             agents = ["*"] if "*" in entry.drives else entry.drives
             sends = [key for each in agents for key in _keys_of_display(each, user)]
             gets = [key for each in agents for key in _keys_for_display(each, user)]
             asks, answers = [f"webmap/{each}/about" for each in agents], []
+            names = [*gets, here(EVERY)]  # it finds only those that it reaches
         found = [
             _rule(f"{user}-sends", ["put"], ["ingress"], sends),
             _rule(f"{user}-gets", ["put"], ["egress"], gets),
-            _rule(f"{user}-subscribes", ["declare_subscriber"], ["ingress"], gets),
+            _rule(f"{user}-subscribes", ["declare_subscriber"], ["ingress"], names),
             _rule(f"{user}-told", ["declare_subscriber"], ["egress"], sends),
         ]
         if asks:
