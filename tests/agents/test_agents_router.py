@@ -61,8 +61,9 @@ def test_the_address_of_an_agent():
 def test_the_sender_is_named_by_the_key():
     key = address.data_in("bay3", "west", "4f", "1")
     assert address.sender_of(key) == ("west", "4f", "1")
-    key = address.gate_in("bay3", "west", "4f")
-    assert address.sender_of(key).display == "west.4f"
+    for key_of in (address.gate_in, address.looks_in):
+        key = key_of("bay3", "west", "4f")
+        assert address.sender_of(key).display == "west.4f"
 
 
 def test_an_agent_sends_as_itself_and_a_display_as_its_user(users):
@@ -72,10 +73,13 @@ def test_an_agent_sends_as_itself_and_a_display_as_its_user(users):
         "webmap/bay3/gate/out",
         "webmap/bay3/data/out/**",
         "webmap/bay3/topics/**",
+        "webmap/bay3/pictures/out/**",
+        "webmap/bay3/pictures/of/*",
     ]
     assert rules["west-sends"]["key_exprs"] == [
         "webmap/bay3/gate/in/west/*",
         "webmap/bay3/data/in/west/*/*",
+        "webmap/bay3/pictures/in/west/*",
     ]
     assert access_rules(read_users(users))["default_permission"] == "deny"
 

@@ -1,5 +1,6 @@
 """Addresses of agents and routers, and the keys under which both exchange messages."""
 
+import hashlib
 import re
 from typing import NamedTuple
 from urllib.parse import urlsplit
@@ -139,3 +140,24 @@ def data_out(agent: str, user: str, instance: str, lane: str) -> str:
 def topic_key(agent: str, topic: str) -> str:
     """Return the key of the messages of a topic, for all displays."""
     return f"webmap/{agent}/topics{topic}"
+
+
+def looks_in(agent: str, user: str, instance: str) -> str:
+    """Return the key of what a display says about cameras."""
+    return f"webmap/{agent}/pictures/in/{user}/{instance}"
+
+
+def looks_out(agent: str, user: str, instance: str) -> str:
+    """Return the key of what an agent answers a display about cameras."""
+    return f"webmap/{agent}/pictures/out/{user}/{instance}"
+
+
+def camera_key(agent: str, robot: str, camera: str) -> str:
+    """Return the key of the pictures of a camera, for all displays."""
+    name = f"{robot}/{camera}".encode("utf-8", "surrogatepass")
+    return f"webmap/{agent}/pictures/of/{hashlib.sha256(name).hexdigest()[:32]}"
+
+
+def about_picture(agent: str, name: str) -> str:
+    """Return the key under which an agent gives the picture of a robot."""
+    return f"webmap/{agent}/about/{name}"

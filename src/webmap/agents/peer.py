@@ -174,12 +174,12 @@ class Peer:
             if self._data is not None:
                 self._declare_answer(key)
 
-    def ask(self, key: str) -> bytes | None:
+    def ask(self, key: str, patience: float = ASK_PATIENCE) -> bytes | None:
         """Return the answer of another peer; None if there is none. Waits for it."""
         session = self._data
         if session is None:
             return None
-        for reply in session.get(key, timeout=ASK_PATIENCE):
+        for reply in session.get(key, timeout=patience):
             if reply.ok is not None:
                 return reply.ok.payload.to_bytes()
         return None

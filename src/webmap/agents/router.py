@@ -149,12 +149,12 @@ def access_rules(users: Mapping[str, UserEntry]) -> dict[str, Any]:
     for user, entry in users.items():
         sends, gets = _keys_of_agent(entry.agent), _keys_for_agent(entry.agent)
         names, asks = gets, list[str]()
-        answers = [f"webmap/{entry.agent}/about"]
+        answers = [f"webmap/{entry.agent}/about/**"]
         if not entry.agent:
             agents = ["*"] if "*" in entry.drives else entry.drives
             sends = [key for each in agents for key in _keys_of_display(each, user)]
             gets = [key for each in agents for key in _keys_for_display(each, user)]
-            asks, answers = [f"webmap/{each}/about" for each in agents], []
+            asks, answers = [f"webmap/{each}/about/**" for each in agents], []
             names = [*gets, here(EVERY)]  # it finds only those that it reaches
         found = [
             _rule(f"{user}-sends", ["put"], ["ingress"], sends),
@@ -204,17 +204,24 @@ def _keys_of_agent(agent: str) -> list[str]:
         f"{root}/gate/out",
         f"{root}/data/out/**",
         f"{root}/topics/**",
+        f"{root}/pictures/out/**",
+        f"{root}/pictures/of/*",
     ]
 
 
 def _keys_for_agent(agent: str) -> list[str]:
     root = f"webmap/{agent}"
-    return [f"{root}/here", f"{root}/gate/in/**", f"{root}/data/in/**"]
+    ins = [f"{root}/{kind}/in/**" for kind in ("gate", "data", "pictures")]
+    return [f"{root}/here", *ins]
 
 
 def _keys_of_display(agent: str, user: str) -> list[str]:
     root = f"webmap/{agent}"
-    return [f"{root}/gate/in/{user}/*", f"{root}/data/in/{user}/*/*"]
+    return [
+        f"{root}/gate/in/{user}/*",
+        f"{root}/data/in/{user}/*/*",
+        f"{root}/pictures/in/{user}/*",
+    ]
 
 
 def _keys_for_display(agent: str, user: str) -> list[str]:
@@ -224,4 +231,6 @@ def _keys_for_display(agent: str, user: str) -> list[str]:
         f"{root}/gate/out",
         f"{root}/data/out/{user}/*/*",
         f"{root}/topics/**",
+        f"{root}/pictures/out/{user}/*",
+        f"{root}/pictures/of/*",
     ]

@@ -46,6 +46,23 @@ def make_robot(
     return robot
 
 
+def draw_picture(robot: "Robot", picture: "PictureConfig | None", href: str) -> None:
+    """Draw a robot that the console has made as another picture, or as its usual body.
+
+    Args:
+        robot: The robot.
+        picture: The position of the picture on the robot; None for the usual body.
+        href: The URL from which pages load the picture.
+    """
+    drawn = robot_model() if picture is None else picture_model(picture, href)
+    parts = drawn.children
+    drawn.clear()
+    robot.model.clear()
+    robot.model.append(*parts)
+    reach = None if picture is None else picture_reach(picture)
+    robot.svg.set_style("--reach", reach)
+
+
 BODY = (
     "M0.08 -0.19H-0.14A0.08 0.08 0 0 0 -0.22 -0.11V0.11A0.08 0.08 0 0 0 -0.14 0.19"
     "H0.08C0.18 0.19 0.25 0.08 0.25 0C0.25 -0.08 0.18 -0.19 0.08 -0.19Z"

@@ -10,6 +10,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import msgspec
@@ -17,6 +18,7 @@ import msgspec
 from webmap.agents import address, clients, data
 from webmap.agents.address import Sender, sender_of
 from webmap.agents.agent_gate import AgentGate
+from webmap.agents.cameras import AgentCameras
 from webmap.agents.clients import Call, Clients
 from webmap.agents.description import (
     PROTOCOL,
@@ -33,6 +35,7 @@ from webmap.base.lifecycle import lifecycle
 from webmap.base.tasks import spawn
 from webmap.core.runtime import runtime
 from webmap.fleet.held import Held
+from webmap.fleet.passed_on import passed_on
 from webmap.gate.protocol import Role
 from webmap.poses.alignment import alignments
 from webmap.ros.names import normalise_topic
@@ -81,6 +84,7 @@ class Agent:
         self._peer: Peer = peer_of(router)
         self.address = f"{address.url(self._peer.locator)}/{self.name}"
         """The address of the agent for displays."""
+        self._cameras = AgentCameras(self.name, self._peer)
         self._serving = False
         self._rival: str | None = None
         self._out = address.gate_out(self.name)
@@ -133,6 +137,7 @@ class Agent:
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait([self._task])
+        await self._cameras.stop()
         await self._lane.stop()
         await self._calls.stop()
 
@@ -144,10 +149,15 @@ class Agent:
         await self._wait_for_own_name()
         everybody = address.EVERY
         peer.answer(address.about(name), lambda: self._about)
+        pictures = self._held.pictures
+        for picture in pictures:
+            key = address.about_picture(name, picture)
+            peer.answer(key, partial(pictures.__getitem__, picture))
         peer.listen(
             address.gate_in(name, everybody, everybody), self._sample, gate=True
         )
         peer.listen(address.data_in(name, everybody, everybody, everybody), self._piece)
+        self._cameras.start(asyncio.get_running_loop())
         self._serving = True
         while True:
             self._describe()
@@ -156,6 +166,7 @@ class Agent:
             )
             peer.put_data(address.here(name), msgspec.json.encode(beacon))
             self._clients.look(time.monotonic())
+            self._cameras.look(time.monotonic())
             await asyncio.sleep(BEACON)
 
     async def _wait_for_own_name(self) -> None:
@@ -183,7 +194,8 @@ class Agent:
 
     def _describe(self) -> None:
         held = self._held.robots()
-        robots = [AgentRobot(each.id, each.config.to_dict()) for each in held]
+        robots = [AgentRobot(id, passed_on(config).to_dict()) for id, config in held]
+        self._cameras.hold(held)
         names = sorted({self.url, self._held.bridge.name})
         grids = list(self._held.grids().items())
         pose = alignments.of(self._held.bridge)

@@ -23,6 +23,9 @@ MOST_PIXELS = 1 << 26
 PICTURES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".svg", ".tif", ".tiff")
 """Suffixes of pictures; such a file in place of a YAML file is a common mistake."""
 
+FORMATS = ("BMP", "GIF", "ICO", "JPEG", "PNG", "WEBP")
+"""Formats of pictures that browsers show, by the names of Pillow."""
+
 NEEDED = ("name", "x", "y")
 """The required keys of a label."""
 
@@ -154,11 +157,29 @@ def picture_file(file: Path) -> tuple[bytes, str]:
         )
     published = Published()  # raises errors of the file itself
     found = published.image(published.publish_image(file).removeprefix(IMAGES))
-    if found.media_type.startswith("image/svg"):
-        _check_svg(file, found.data)
-    else:
-        _check_pixels(file, found.data)
+    check_picture(file, found.data, found.media_type)
     return found.data, found.media_type
+
+
+def check_picture(
+    file: Path, data: bytes, media_type: str, most_pixels: int = MOST_PIXELS
+) -> None:
+    """Check that browsers can show a picture.
+
+    Args:
+        file: Its name, for the error.
+        data: Its content.
+        media_type: Its type, by its suffix.
+        most_pixels: The most pixels that it may have.
+
+    Raises:
+        ConfigError: If they cannot.
+
+    """
+    if media_type.startswith("image/svg"):
+        _check_svg(file, data)
+    else:
+        _check_pixels(file, data, most_pixels)
 
 
 def _check_svg(file: Path, data: bytes) -> None:
@@ -166,11 +187,11 @@ def _check_svg(file: Path, data: bytes) -> None:
         raise ConfigError(f"{str(file)!r} is not an SVG: it has no element <svg>")
 
 
-def _check_pixels(file: Path, data: bytes) -> None:
+def _check_pixels(file: Path, data: bytes, most_pixels: int) -> None:
     from PIL import Image
 
     try:
-        with Image.open(io.BytesIO(data)) as image:
+        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
             width, height = image.size
             image.verify()
     except Exception as error:  # each picture format has its own errors
@@ -178,9 +199,9 @@ def _check_pixels(file: Path, data: bytes) -> None:
             f"{str(file)!r} cannot be read: expected a complete picture in the format "
             f"of its suffix {file.suffix}, got {_reason(error)}"
         ) from None
-    if width * height > MOST_PIXELS:
+    if width * height > most_pixels:
         raise ConfigError(
-            f"{str(file)!r} has {width} x {height} pixels; expected {MOST_PIXELS} at "
+            f"{str(file)!r} has {width} x {height} pixels; expected {most_pixels} at "
             f"the most"
         )
 

@@ -10,12 +10,14 @@ import webmap
 from webmap.config.checks import Mistakes
 from webmap.config.fleet import read_fleet
 from webmap.config.robot import RobotConfig
+from webmap.config.secrets import readable_secret
 from webmap.config.toml_text import read_text
 from webmap.console import Console, make_robot
 from webmap.fleet.found import find_fleet
 from webmap.fleet.given import given_robots
 from webmap.fleet.made import make_bridges
 from webmap.fleet.overrides import Overrides
+from webmap.fleet.passed_on import check_passed_on, load_pictures
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -40,6 +42,8 @@ class Held(NamedTuple):
     """Returns the robots that the agent holds now."""
     grids: Callable[[], Mapping[str, dict[str, Any]]]
     """Returns the options of the maps under the robots, by topic."""
+    pictures: Mapping[str, bytes] = {}
+    """The pictures of the robots, by the names in their configurations."""
 
 
 def held_behind(
@@ -80,18 +84,19 @@ def held_in_file(file: Path) -> Held:
     fleet = read_fleet(text.data, mistakes)
     if not mistakes.found and len(fleet.bridges) != 1:
         mistakes.add(("bridges",), "an agent is beside the robots of one bridge")
-    for index, each in enumerate(fleet.robots):
-        if each.picture is not None:
-            message = "an agent has no pictures; give the robot a model instead"
-            mistakes.add(("robots", index, "picture"), message)
+    check_passed_on(fleet, mistakes)
+    configs, pictures = load_pictures(fleet.robots, file.parent, mistakes)
     text.refuse(mistakes)
+    warning = readable_secret(file, text.data)
+    if warning is not None:
+        log.warning("%s", warning)
     bridges = make_bridges(fleet)
     (bridge,) = bridges.values()
-    made = [make_robot(moving_parts(config), bridges) for config in fleet.robots]
+    made = [make_robot(moving_parts(config), bridges) for config in configs]
     _kept.extend(made)
     robots = [
         HeldRobot(robot.motion.id, config)
-        for robot, config in zip(made, fleet.robots, strict=True)
+        for robot, config in zip(made, configs, strict=True)
     ]
     grids: dict[str, dict[str, Any]] = {}
     for grid in fleet.map:
@@ -99,7 +104,7 @@ def held_in_file(file: Path) -> Held:
         grids[grid.topic] = {
             key: value for key, value in options.items() if value is not None
         }
-    return Held(bridge, lambda: robots, lambda: grids)
+    return Held(bridge, lambda: robots, lambda: grids, pictures)
 
 
 _kept: list[object] = []

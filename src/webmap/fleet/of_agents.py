@@ -23,12 +23,16 @@ from webmap.base.echo import echo, notify
 from webmap.base.errors import WebMapError
 from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import no_scope
+from webmap.base.tasks import spawn
 from webmap.config.checks import same_name
-from webmap.config.robot import RobotConfig
+from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.console import Console, make_robot
+from webmap.console.fleet import draw_picture
 from webmap.core.configure import apply
 from webmap.core.motion import given_id
+from webmap.core.pictures import pictures
 from webmap.core.runtime import runtime
+from webmap.fleet.passed_on import accepted, received_picture
 from webmap.poses.alignment import align_bridge
 
 if TYPE_CHECKING:
@@ -42,11 +46,21 @@ FIRST = 1.5
 LOOK = 0.5
 """Seconds between two looks at what the agents say."""
 
+PICTURE_PATIENCE = 15.0
+"""Seconds for the picture of a robot, which a slow link carries late."""
+
+PICTURE_AGAIN = 5.0
+"""Seconds after which a picture that did not come is asked for again."""
+
 
 @dataclass(eq=False)
 class _Shown:
     robot: "Robot"
     config: RobotConfig
+    picture: PictureConfig | None = None
+    """The picture that its agent has."""
+    drawn: PictureConfig | None = None
+    """The picture that is drawn."""
 
 
 @dataclass(eq=False)
@@ -62,6 +76,9 @@ class KnownAgent:
     """The robots on the console, by their ids."""
     alignment: tuple[float, float, float] = (0.0, 0.0, 0.0)
     complained: str = ""
+    pictures: dict[str, str] = field(default_factory=dict)
+    """The URLs of the pictures of its robots, by name; "" for what is no picture."""
+    drawing: "asyncio.Task[None] | None" = None
 
 
 class Agents:
@@ -114,9 +131,12 @@ class Agents:
 
     async def stop(self) -> None:
         """Stop to show changes."""
-        if self._task is not None:
-            self._task.cancel()
-            await asyncio.wait([self._task])
+        tasks = [self._task, *(agent.drawing for agent in self._known.values())]
+        running = [task for task in tasks if task is not None]
+        for task in running:
+            task.cancel()
+        if running:
+            await asyncio.wait(running)
 
     def _heard(self, key: str, piece: bytes) -> None:
         beacon = read_beacon(piece)
@@ -142,6 +162,8 @@ class Agents:
                         await self._describe(agent, self._console)
                     except Exception:
                         log.exception("the robots of the agent %s are not shown", name)
+                if agent.drawing is None and _undrawn(agent):
+                    agent.drawing = spawn(self._draw(agent))
             await asyncio.sleep(LOOK)
 
     async def _describe(self, agent: KnownAgent, console: Console) -> None:
@@ -187,7 +209,13 @@ class Agents:
             notify(f"{shown.robot.name} is no longer a robot of the agent {agent.name}")
         bridges = dict.fromkeys([*about.bridges, agent.bridge.url], agent.bridge)
         for each in there.values():
-            self._show(agent, each, bridges, console)
+            try:
+                self._show(agent, each, bridges, console)
+            except WebMapError as error:
+                name = each.config.get("name", each.id)
+                self._complain(
+                    agent, f"{name} of the agent {agent.name} is not shown: {error}"
+                )
 
     def _show(
         self,
@@ -196,9 +224,11 @@ class Agents:
         bridges: "dict[str, Bridge]",
         console: Console,
     ) -> None:
-        config = RobotConfig.from_dict(each.config)
+        given = RobotConfig.from_dict(each.config)
+        config, picture = accepted(given, agent.bridge.url, each.id, bridges)
         shown = agent.robots.get(each.id)
         if shown is not None:
+            shown.picture = picture
             config = msgspec.structs.replace(config, name=shown.config.name)
             if shown.config != config:
                 old, shown.config = shown.config, config
@@ -218,9 +248,55 @@ class Agents:
                 robot = make_robot(config, bridges)
         finally:
             given_id.reset(token)
-        agent.robots[each.id] = _Shown(robot, config)
+        agent.robots[each.id] = _Shown(robot, config, picture)
         console.add(robot)
         notify(f"{robot.name} is a robot of the agent {agent.name}")
+
+    async def _draw(self, agent: KnownAgent) -> None:
+        """Draw the robots of an agent as their pictures, which the agent has."""
+        try:
+            for shown in _undrawn(agent):
+                picture = shown.picture
+                if picture is None:
+                    draw_picture(shown.robot, None, "")
+                elif not await self._get_picture(agent, picture.file):
+                    continue
+                elif shown.picture == picture and shown in agent.robots.values():
+                    draw_picture(shown.robot, picture, agent.pictures[picture.file])
+                shown.drawn = picture
+            used = {each.picture.file for each in agent.robots.values() if each.picture}
+            for name in agent.pictures.keys() - used:
+                pictures.retire(agent.pictures.pop(name))
+        finally:
+            agent.drawing = None
+
+    async def _get_picture(self, agent: KnownAgent, name: str) -> bool:
+        """Publish a picture of an agent; return whether it is one."""
+        if name not in agent.pictures:
+            key = address.about_picture(agent.name, name)
+            answer = await asyncio.to_thread(self._peer.ask, key, PICTURE_PATIENCE)
+            if answer is None:
+                await asyncio.sleep(PICTURE_AGAIN)
+                return False
+            try:
+                found = await asyncio.to_thread(received_picture, name, answer)
+                agent.pictures[name] = pictures.publish(*found)
+            except WebMapError as error:
+                agent.pictures[name] = ""
+                self._complain(
+                    agent, f"a picture of the agent {agent.name} is not shown: {error}"
+                )
+        return agent.pictures[name] != ""
+
+
+def _undrawn(agent: KnownAgent) -> list[_Shown]:
+    """Return the robots that are drawn otherwise than their agent has them."""
+    return [
+        each
+        for each in agent.robots.values()
+        if each.drawn != each.picture
+        and (each.picture is None or agent.pictures.get(each.picture.file) != "")
+    ]
 
 
 def _all(console: Console) -> "list[Robot]":

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from webmap.agents.far_camera import FarCamera, FarPull
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.lifecycle import lifecycle
 from webmap.core.registry import robot_modules
@@ -9,6 +10,7 @@ from webmap.features.cameras.camera_feed import CameraFeed
 from webmap.ros.image_address import parse_address
 from webmap.ros.image_pull import Pull
 from webmap.ros.messages_image import CompressedImageMsg
+from webmap.ros.names import is_agent_url
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -25,7 +27,8 @@ class HttpCamera(CameraFeed):
         robot: The robot that carries the camera.
         address: ``http://`` or ``https://``: a ``multipart/x-mixed-replace`` stream,
             such as ``/stream`` of ``web_video_server``, or a single picture that is
-            requested repeatedly, such as ``/snapshot``.
+            requested repeatedly, such as ``/snapshot``. For a robot of an agent, the
+            camera as the agent names it: the agent loads its pictures.
         name: The camera's name, for people.
         throttle: The least time between two pictures, in milliseconds.
 
@@ -46,9 +49,10 @@ class HttpCamera(CameraFeed):
                 f"the throttle of a camera is in milliseconds, 0 or more, got "
                 f"{throttle!r}"
             )
-        self._address = parse_address(address)
+        far = isinstance(address, str) and is_agent_url(address)
+        self._address = FarCamera.parse(address) if far else parse_address(address)
         self._throttle = throttle
-        self._pull: Pull | None = None
+        self._pull: Pull | FarPull | None = None
 
     @property
     def address(self) -> str:
@@ -57,8 +61,11 @@ class HttpCamera(CameraFeed):
 
     def begin(self) -> None:
         """Connect to the camera as soon as the process runs."""
-        seconds = self._throttle / 1000
-        self._pull = Pull(self._address, seconds, self._show, self._complain)
+        address, seconds = self._address, self._throttle / 1000
+        if isinstance(address, FarCamera):
+            self._pull = FarPull(address, self._show, self._complain)
+        else:
+            self._pull = Pull(address, seconds, self._show, self._complain)
         lifecycle.add(self._pull)
 
     def end(self) -> None:
@@ -68,14 +75,14 @@ class HttpCamera(CameraFeed):
             self._pull.hang_up()
             self._pull = None
 
-    def _show(self, data: bytes) -> None:
+    def _show(self, data: bytes, age: float = 0.0) -> None:
         try:
             media_type = CompressedImageMsg(data).media_type
         except ProtocolError as error:
             self._complain(f"it sends {error}")
             return
         self.robot.clear_problem(self)
-        self.show(data, media_type)
+        self.show(data, media_type, age)
 
     def _complain(self, text: str) -> None:
         self.robot.set_problem(self, f"{self.name} at {self.address}: {text}")

@@ -1,0 +1,154 @@
+"""What displays and agents exchange about cameras. No I/O.
+
+A display looks at a camera again and again, and each look names the newest picture that
+it got. The agent answers each look to its sender, and sends a picture once to all.
+"""
+
+import struct
+from collections import deque
+from typing import NamedTuple
+
+import msgspec
+
+from webmap.base.errors import WireError
+
+MOST_BYTES = 4096
+"""The longest message of a display about a camera, in bytes."""
+
+_head = struct.Struct("<Qd")
+
+
+class Look(msgspec.Struct, frozen=True, tag="look"):
+    """A display shows a camera and wants its pictures for the next seconds."""
+
+    number: int
+    """Grows with each look of a display."""
+    robot: str
+    """The id of the robot."""
+    camera: str
+    """The name of the camera."""
+    newest: int = 0
+    """The number of the newest picture that came; 0 before the first."""
+
+
+class LookAway(msgspec.Struct, frozen=True, tag="away"):
+    """A display does not show a camera any more."""
+
+    robot: str
+    camera: str
+
+
+class Looked(msgspec.Struct, frozen=True):
+    """The answer to a look."""
+
+    number: int
+    """The number of the look."""
+    clock: float
+    """The agent's clock when the look came, in seconds."""
+    trouble: str = ""
+    """Why no pictures come from the camera."""
+
+
+class CameraPicture(NamedTuple):
+    """A picture of a camera."""
+
+    number: int
+    clock: float
+    """The agent's clock when the picture came from the camera, in seconds."""
+    data: bytes
+
+
+_look = msgspec.json.Decoder(Look | LookAway).decode
+_looked = msgspec.json.Decoder(Looked).decode
+
+
+def read_look(piece: bytes) -> Look | LookAway:
+    """Return what a display says about a camera.
+
+    Raises:
+        WireError: If the bytes are nothing of the kind.
+
+    """
+    if len(piece) > MOST_BYTES:
+        raise WireError(f"got a look of {len(piece)} bytes, {MOST_BYTES} at most")
+    try:
+        look: Look | LookAway = _look(piece)
+    except msgspec.DecodeError as error:
+        raise WireError(f"got a look that cannot be read: {error}") from error
+    return look
+
+
+def read_looked(piece: bytes) -> Looked:
+    """Return the answer to a look.
+
+    Raises:
+        WireError: If the bytes are none.
+
+    """
+    try:
+        looked: Looked = _looked(piece)
+    except msgspec.DecodeError as error:
+        raise WireError(f"got an answer that cannot be read: {error}") from error
+    return looked
+
+
+def pack_picture(picture: CameraPicture) -> bytes:
+    """Return the message with a picture."""
+    return _head.pack(picture.number, picture.clock) + picture.data
+
+
+def read_picture(piece: bytes) -> CameraPicture:
+    """Return the picture in a message.
+
+    Raises:
+        WireError: If the message is too short for one.
+
+    """
+    if len(piece) <= _head.size:
+        raise WireError(f"got a picture of {len(piece)} bytes")
+    number, clock = _head.unpack_from(piece)
+    return CameraPicture(number, clock, piece[_head.size :])
+
+
+class AgentClock:
+    """Tells how old at most a picture is, without a common clock.
+
+    The agent's clock was read between a look and its answer. So the oldest that a
+    picture can be follows from the latest look that could have found that clock.
+    """
+
+    KEPT = 30
+    """Answers from which the age follows; the two clocks drift apart over longer."""
+
+    def __init__(self) -> None:
+        self._asked: dict[int, float] = {}
+        self._ahead: deque[float] = deque(maxlen=self.KEPT)
+        """How much the display's clock is ahead of the agent's at least, in seconds."""
+
+    def asked(self, number: int, now: float) -> None:
+        """Note the time of a look."""
+        self._asked[number] = now
+        if len(self._asked) > self.KEPT:
+            del self._asked[next(iter(self._asked))]
+
+    def answered(self, number: int, clock: float, now: float) -> bool:
+        """Note the agent's clock in the answer to a look; return whether it was asked.
+
+        Answers of the same agent about other cameras come too.
+        """
+        asked = self._asked.pop(number, None)
+        if asked is None:
+            return False
+        if self._ahead and max(self._ahead) > now - clock:
+            self._ahead.clear()  # one of the computers slept, or the agent is a new one
+        self._ahead.append(asked - clock)
+        return True
+
+    def age(self, clock: float, now: float) -> float | None:
+        """Return the greatest possible age of what had this time on the agent's clock.
+
+        None before the first answer.
+        """
+        if not self._ahead:
+            return None
+        return max(0.0, now - clock - max(self._ahead))

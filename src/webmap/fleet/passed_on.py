@@ -1,0 +1,193 @@
+"""What an agent passes on of the files and addresses of its robots, and what not.
+
+Files and addresses of an agent are on its computer and in its network. The agent loads
+pictures there and passes them on; a display opens no file and no address that an agent
+names.
+"""
+
+import hashlib
+import re
+from collections.abc import Container, Mapping
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from webmap.agents.far_camera import FarCamera
+from webmap.base.errors import ConfigError
+from webmap.config.checks import KeyPath, Mistakes
+from webmap.config.fleet import FleetConfig
+from webmap.config.robot import (
+    ModuleConfig,
+    PictureConfig,
+    RobotConfig,
+    named_cameras,
+)
+from webmap.fleet.files import check_picture, picture_file
+from webmap.ros.image_address import parse_address
+from webmap.ros.messages_image import MAX_PIXELS
+from webmap.server.files import MEDIA_TYPES
+
+LARGEST = 1 << 20
+"""Most bytes of the picture of a robot that an agent passes on."""
+
+OPENING = ("HttpCamera", "Labels", "MapFile", "TileLayer")
+"""Modules that open the file or the address among their arguments."""
+
+OF_DISPLAYS = ("floor", "image", "modules", "tiles", "labels")
+"""Keys of a fleet file for what is under the robots and on the page."""
+
+_SERVED = re.compile(r"[0-9a-f]{32}(\.[a-z]{3,4})")
+
+
+def check_passed_on(fleet: FleetConfig, mistakes: Mistakes) -> None:
+    """Note what is in an agent's fleet file and would not reach a display."""
+    for key in OF_DISPLAYS:
+        if getattr(fleet, key):
+            message = "an agent does not pass it on: a display's own fleet file has it"
+            mistakes.add((key,), message)
+    for index, config in enumerate(fleet.robots):
+        path: KeyPath = ("robots", index)
+        for number, module in enumerate(config.modules):
+            if opens(module):
+                message = (
+                    "displays open no file and no address of an agent"
+                    if module.name != "HttpCamera"
+                    else 'an agent passes on the cameras of "cameras"'
+                )
+                mistakes.add((*path, "modules", number), message)
+        if config.model is not None and _has_image(config.model):
+            message = 'an agent passes on no images of a model; use "picture"'
+            mistakes.add((*path, "model"), message)
+
+
+def opens(module: ModuleConfig) -> bool:
+    """Return whether a module opens a file or an address that it is given."""
+    name: Any = module.name
+    if name == "OnMaps":
+        name = module.options.get("module", next(iter(module.args), None))
+    return name in OPENING
+
+
+def _has_image(element: Any) -> bool:
+    if not isinstance(element, Mapping):
+        return False
+    children = element.get("children", ())
+    inside = isinstance(children, list | tuple) and any(map(_has_image, children))
+    return element.get("tag") == "image" or inside
+
+
+def load_pictures(
+    robots: list[RobotConfig], folder: Path, mistakes: Mistakes
+) -> tuple[list[RobotConfig], dict[str, bytes]]:
+    """Return robots whose pictures have the names under which an agent has them.
+
+    Args:
+        robots: The robots of a fleet file.
+        folder: The file's folder.
+        mistakes: Receives the mistakes.
+
+    Returns:
+        The robots, and the pictures by name.
+
+    """
+    loaded, pictures = [], {}
+    for index, config in enumerate(robots):
+        picture = config.picture
+        if picture is not None:
+            file = folder / picture.file
+            try:
+                data, media_type = picture_file(file)
+                check_far(file, data, media_type)
+            except (ConfigError, OSError) as error:
+                mistakes.add(("robots", index, "picture", "file"), str(error))
+            else:
+                name = hashlib.sha256(data).hexdigest()[:32] + file.suffix.lower()
+                pictures[name] = data
+                picture = msgspec.structs.replace(picture, file=name)
+                config = msgspec.structs.replace(config, picture=picture)
+        loaded.append(config)
+    return loaded, pictures
+
+
+def check_far(file: Path, data: bytes, media_type: str) -> None:
+    """Check the picture of a robot that comes from an agent.
+
+    Raises:
+        ConfigError: If it is not a picture, or too large.
+
+    """
+    if len(data) > LARGEST:
+        raise ConfigError(
+            f"{str(file)!r} has {len(data)} bytes; an agent passes on pictures of "
+            f"{LARGEST} at the most"
+        )
+    check_picture(file, data, media_type, MAX_PIXELS)
+    if media_type.startswith("image/svg") and b"<!ENTITY" in data:
+        # Entities of entities fill the memory of a browser.
+        raise ConfigError(f"{str(file)!r} has entities; save it without them")
+
+
+def received_picture(name: str, data: bytes) -> tuple[bytes, str]:
+    """Return a picture that an agent gave under a name, and its media type.
+
+    Raises:
+        ConfigError: If it is not a picture, or too large.
+
+    """
+    media_type = MEDIA_TYPES[Path(name).suffix]
+    check_far(Path(name), data, media_type)
+    return data, media_type
+
+
+def is_served(name: str) -> bool:
+    """Return whether an agent may have a picture under this name."""
+    found = _SERVED.fullmatch(name)
+    return found is not None and MEDIA_TYPES.get(found[1], "").startswith("image/")
+
+
+def passed_on(config: RobotConfig) -> RobotConfig:
+    """Return what displays get of a robot: addresses of cameras without secrets."""
+    cameras = [
+        msgspec.structs.replace(each, url=parse_address(each.url).shown)
+        if each.url
+        else each
+        for each in named_cameras(config.cameras)
+    ]
+    return msgspec.structs.replace(config, cameras=cameras)
+
+
+def accepted(
+    config: RobotConfig, agent: str, id: str, bridges: Container[str]
+) -> tuple[RobotConfig, PictureConfig | None]:
+    """Return what a display shows of a robot of an agent, and its picture.
+
+    Args:
+        config: The configuration that the agent gave.
+        agent: The address of the agent.
+        id: The id of the robot.
+        bridges: The names of the agent's own bridge.
+
+    Raises:
+        ConfigError: If it has a file or an address that the display would open.
+
+    """
+    for _, bridge in config.bridges():
+        if bridge not in bridges:
+            raise ConfigError(f"{bridge!r} is not the rosbridge of the agent")
+    for module in config.modules:
+        if opens(module):
+            raise ConfigError(
+                f"a display does not open what an agent names: the module {module.name}"
+            )
+    picture = config.picture
+    if picture is not None and not is_served(picture.file):
+        raise ConfigError(f"{picture.file!r} is not a picture of the agent")
+    cameras = [
+        msgspec.structs.replace(each, url=FarCamera(agent, id, each.name, each.url).url)
+        if each.url
+        else each
+        for each in named_cameras(config.cameras)
+    ]
+    shown = msgspec.structs.replace(config, cameras=cameras, picture=None)
+    return shown, picture
