@@ -1,12 +1,15 @@
 """A router, agents and displays, each a process of its own, seen in a real browser."""
 
 import os
+import re
 from contextlib import ExitStack, contextmanager
 
 import pytest
 from playwright.sync_api import expect
 
+from camera_server import CameraServer
 from real_browser import end_stops, hold, watched_tab
+from webmap.base.loop_thread import LoopThread
 from webmap_process import simulator, webmap
 
 pytest.importorskip("zenoh")
@@ -203,3 +206,68 @@ def test_a_fleet_file_shows_the_robots_of_agents(chromium, tmp_path):
         ):
             page.goto(url)
             expect(placed(page)).to_have_count(1, timeout=SOON)
+
+
+PICTURED = """
+[bridges]
+forklift = "{bridge}"
+
+[[robots]]
+name = "Forklift"
+odometry = "/robot_0/odom"
+cameras = {{ url = "{front}", name = "Front" }}
+picture = {{ file = "forklift.svg", width = 1.2, height = 0.8 }}
+"""
+
+SVG = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 3 2" width="3" height="2">
+<path d="M0 0H3V2H0Z" fill="#c33"/></svg>"""
+
+
+@pytest.fixture
+def camera():
+    """A camera on the web, in a thread of its own."""
+    thread = LoopThread("camera")
+    server = CameraServer()
+    thread.call(server.__aenter__())
+    yield server
+    thread.call(server.__aexit__())
+    thread.end()
+
+
+def test_the_page_shows_the_camera_and_the_picture_of_an_agents_robot(
+    chromium, tmp_path, camera
+):
+    (tmp_path / "forklift.svg").write_text(SVG)
+    file = tmp_path / "bay1.toml"
+    with (
+        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
+        simulator("--robots", "1") as url,
+    ):
+        file.write_text(PICTURED.format(bridge=url, front=camera.at("/stream")))
+        with (
+            webmap(
+                "agent",
+                file,
+                "--router",
+                router,
+                "--name",
+                "bay1",
+                WEBMAP_STATE_DIR=str(tmp_path / "bay1"),
+            ),
+            display(chromium, router) as page,
+        ):
+            expect(placed(page)).to_have_count(1, timeout=SOON)
+            picture = page.locator(".robot .pictured image.picture")
+            expect(picture).to_have_attribute("href", re.compile("."), timeout=SOON)
+            loaded = picture.evaluate(
+                "async (image) => { const loaded = new Image(); "
+                "loaded.src = image.href.baseVal; await loaded.decode(); "
+                "return [loaded.naturalWidth, loaded.naturalHeight]; }"
+            )
+            assert loaded == [3, 2]
+            page.locator("#robots .row button").first.click()
+            front = page.locator("#card .cameras img")
+            expect(front).to_have_js_property("naturalWidth", 16, timeout=SOON)
+            first = front.get_attribute("src")
+            expect(front).not_to_have_attribute("src", first, timeout=SOON)
+            assert camera.open == 1

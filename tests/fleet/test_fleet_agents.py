@@ -1,8 +1,15 @@
 """Fleet files with robots of agents, which the agents describe themselves."""
 
+import asyncio
+
 import pytest
 
+from webmap.agents.description import About, AgentRobot
 from webmap.base.errors import ConfigError
+from webmap.base.lifecycle import Lifecycle
+from webmap.console import Console
+from webmap.core.pictures import pictures
+from webmap.fleet import of_agents
 from webmap.fleet.made import prepare
 
 AGENTS = '[bridges]\nyard = "zenoh://hall:7447"\n'
@@ -44,3 +51,93 @@ def test_robots_without_a_bridge_are_behind_the_only_rosbridge(tmp_path):
 def test_what_an_agent_describes_itself_is_refused(tmp_path, text, words):
     with pytest.raises(ConfigError, match=words):
         prepare(written(tmp_path, text))
+
+
+class FakePeer:
+    """The sessions with a router whose agents give these answers."""
+
+    trouble = None
+
+    def __init__(self):
+        self.answers = {}
+
+    def listen(self, key, fn, *, gate=False):
+        return 0
+
+    def ask(self, key, patience=0.0):
+        return self.answers.get(key)
+
+
+@pytest.fixture
+def shown(monkeypatch):
+    """A display that has heard of the agent bay3, and what it tells people."""
+    peer, notices = FakePeer(), []
+    monkeypatch.setattr(of_agents, "peer_of", lambda router: peer)
+    monkeypatch.setattr(of_agents, "lifecycle", Lifecycle())
+    monkeypatch.setattr(of_agents, "PICTURE_AGAIN", 0.0)
+    monkeypatch.setattr(of_agents.runtime, "notice", notices.append)
+    agents, console = of_agents.Agents("zenoh://hall/bay3"), Console()
+
+    def show(*robots):
+        agent = agents._known["bay3"]
+        configs = [
+            AgentRobot(f"r{index}", {"bridge": "b", "odometry": "/odom", **each})
+            for index, each in enumerate(robots)
+        ]
+        agents._apply(agent, About(["b"], configs, []), console)
+        if of_agents._undrawn(agent):
+            asyncio.run(agents._draw(agent))
+        return {robot.name: robot for robot in console.robots}
+
+    yield show, peer, notices
+    for robot in list(console.robots):
+        robot.destroy()
+
+
+def pictured(name):
+    return {"picture": {"file": name, "width": 1.0, "height": 0.5}}
+
+
+def hrefs(robot):
+    images = [each for each in robot.svg.walk() if getattr(each, "tag", "") == "image"]
+    return [each.get("href") for each in images]
+
+
+def test_a_robot_gets_its_picture_when_it_comes_and_its_usual_body_without(shown):
+    show, peer, notices = shown
+    one, other = "1" * 32 + ".svg", "2" * 32 + ".svg"
+    bob = show({"name": "Bob", **pictured(one)})["Bob"]
+    assert hrefs(bob) == []
+    for name in (one, other):
+        peer.answers[f"webmap/bay3/about/{name}"] = b"<svg>%s</svg>" % name.encode()
+        assert show({"name": "Bob", **pictured(name)}) == {"Bob": bob}
+        (url,) = hrefs(bob)
+        image = pictures.get(url.rpartition("/")[2])
+        assert (image.data, image.media_type) == (
+            peer.answers[f"webmap/bay3/about/{name}"],
+            "image/svg+xml; charset=utf-8",
+        )
+    show({"name": "Bob"})
+    assert (hrefs(bob), notices) == ([], [])
+
+
+def test_what_is_no_picture_is_reported_and_asked_for_once(shown):
+    show, peer, notices = shown
+    name = "1" * 32 + ".png"
+    peer.answers[f"webmap/bay3/about/{name}"] = b"<script>"
+    for _ in range(2):
+        assert hrefs(show({"name": "Bob", **pictured(name)})["Bob"]) == []
+    (notice,) = notices
+    assert notice.startswith("A picture of the agent bay3 is not shown: ")
+    assert "expected a complete picture in the format of its suffix .png" in notice
+
+
+def test_a_robot_that_cannot_be_shown_leaves_the_others(shown):
+    show, _, notices = shown
+    elsewhere = {"odometry": {"topic": "/odom", "bridge": "ws://elsewhere"}}
+    robots = show({"name": "Ann", **elsewhere}, {"name": "Bob"})
+    assert list(robots) == ["Bob"]
+    assert notices == [
+        "Ann of the agent bay3 is not shown: 'ws://elsewhere' is not the rosbridge of "
+        "the agent."
+    ]
