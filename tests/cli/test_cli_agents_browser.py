@@ -176,6 +176,22 @@ def test_a_robot_is_driven_whose_agent_has_a_clock_one_day_ahead(chromium, tmp_p
         expect(title).to_have_text("You have control", timeout=SOON)
 
 
+def test_the_log_shows_the_lines_of_an_agent_that_comes_while_it_is_open(
+    chromium, tmp_path
+):
+    with (
+        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
+        simulator("--robots", "1") as url,
+        display(chromium, router) as page,
+    ):
+        log = page.locator(".webmap-rosout")
+        log.locator("summary").click()
+        expect(log.locator(".webmap-rosout-count")).to_have_text("No log lines yet.")
+        with agent(tmp_path, url, router, "bay1"):
+            lines = log.get_by_role("list", name="Log of bay1")
+            expect(lines).to_contain_text("the battery is at", timeout=SOON)
+
+
 def test_robots_of_an_agent_and_of_a_rosbridge_share_one_map(chromium, tmp_path):
     with (
         fleet(tmp_path) as router,

@@ -222,3 +222,23 @@ def test_a_gone_robot_can_be_removed_until_its_poses_return(
             each.close()
 
     asyncio.run(run())
+
+
+def test_maps_are_named_by_their_bridge_too_once_there_are_several_bridges(
+    bridge, robots
+):
+    hall, opened = Bridge("ws://hall:9090", name="hall"), Console(robots)
+
+    def names(page):
+        (map,) = page.maps
+        grids = [getattr(each, "layer", None) for each in map.modules]
+        return [grid.svg.get("data-layer") for grid in grids if grid is not None]
+
+    def scenario(page):
+        opened.opened(page)
+        opened.add_grid(bridge, "/map")
+        assert names(page) == ["/map"]
+        opened.add_grid(hall, "/map")
+        assert names(page) == ["/map (ws://localhost:9090)", "/map (hall)"]
+
+    on_a_page(scenario, bridge, robots)

@@ -39,6 +39,10 @@ class Console:
         """The robots that were added, in that order."""
         self.grids: dict[tuple[Bridge, str], dict[str, Any]] = {}
         """The options of ``OccupancyGrid`` by bridge and topic, the first map first."""
+        self._layers: weakref.WeakValueDictionary[tuple[Bridge, str], Any] = (
+            weakref.WeakValueDictionary()
+        )
+        """The layers that draw the maps; all pages share them."""
         self.images: list[tuple[str, float, float, float, float]] = []
         """Pictures below everything else, as arguments of ``Map.add_image``."""
         self._modules: dict[str, dict[str, Any]] = {}
@@ -176,15 +180,16 @@ class Console:
     def _show_grids(
         self, page: "Page", *, only: "tuple[Bridge, str] | None" = None
     ) -> None:
-        bridges = {bridge for bridge, _ in self.grids}
         for (bridge, topic), options in self.grids.items():
             if only not in (None, (bridge, topic)):
                 continue
             for map in page.maps:
                 grid = map.add_module("OccupancyGrid", bridge, topic, **options)
-                if len(bridges) > 1:  # else the topic identifies the map
-                    name = f"{topic} ({bridge.name})"
-                    grid.layer.svg.set("data-layer", name)
+                self._layers[bridge, topic] = grid.layer
+        if len({bridge for bridge, _ in self.grids}) > 1:
+            # The topic alone does not identify a map any more.
+            for (bridge, topic), layer in self._layers.items():
+                layer.svg.set("data-layer", f"{topic} ({bridge.name})")
 
 
 def _show(robot: "Robot", page: "Page") -> None:

@@ -83,6 +83,30 @@ def test_the_log_panel_receives_ros_1_and_ros_2_lines_only_while_open(map, page,
     asyncio.run(scenario())
 
 
+def test_a_bridge_that_comes_while_the_log_panel_is_open_is_followed(map, page, said):
+    old, new = LogLink("old"), LogLink("new")
+    bridges = [old]
+
+    async def scenario():
+        panel = map.add_module("RosoutPanel", bridges)
+        panel.on_message({"open": True})
+        panel.send_new_lines()
+        assert [(each["bridge"], each["name"]) for each in said] == [(0, "old")]
+        said.clear()
+        bridges.append(new)
+        while not new.listeners:
+            await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        new.say("error", "stuck")
+        panel.send_new_lines()
+        assert {(each["bridge"], each["name"]) for each in said} == {(1, "new")}
+        assert said[-1]["lines"][0][1:5] == ["error", "/planner", "stuck", 1]
+        page.close()
+        assert old.listeners == new.listeners == []
+
+    asyncio.run(scenario())
+
+
 def test_pages_share_one_log_subscription_that_keeps_the_newest_lines():
     link = LogLink("shared")
     log = log_of(link)

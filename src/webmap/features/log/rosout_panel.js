@@ -8,7 +8,6 @@ import { foldedTool } from "../../web/tools/tool.js";
 
 /**
  * @typedef {object} Options
- * @property {string[]} [bridges] Names of the bridges.
  * @property {string[]} [levels] In ascending order.
  * @property {string} [level] The least level that is shown at first.
  * @property {number} [lines] Number of lines of each bridge.
@@ -37,7 +36,8 @@ const LOOKS = /** @type {Record<string, [string, string, string]>} */ ({
 /**
  * The newest log lines of nodes, in a panel that unfolds. The display subscribes only
  * while the panel is unfolded: sends `{open: true}` and `{open: false}`; receives
- * `{bridge, lines, total, state}` with the lines that are new or repeated.
+ * `{bridge, name, lines, total, state}` with the bridge's number and name, and the lines
+ * that are new or repeated.
  *
  * @param {MapCanvas} map
  * @param {Options} options
@@ -68,13 +68,14 @@ class RosoutPanel {
    * @param {Options} options
    * @param {Send} send
    */
-  constructor(map, { bridges = [], levels = [], level = "info", lines = 100 }, send) {
+  constructor(map, { levels = [], level = "info", lines = 100 }, send) {
     this._map = map;
     this._send = send;
     this._levels = levels;
     this._most = lines;
     const { open, least } = kept();
-    this._books = bridges.map((name) => new Book(name, bridges.length > 1));
+    /** @type {Book[]} By the bridge's number. */
+    this._books = [];
     this._choice = html("select", "");
     for (const each of levels) {
       const words = `${LOOKS[each]?.[0] ?? each}${each === levels.at(-1) ? "" : " and worse"}`;
@@ -99,7 +100,6 @@ class RosoutPanel {
       { "data-webmap-menu": "" },
       html("label", "webmap-rosout-level", {}, "Show", this._choice),
       this._count,
-      ...this._books.map(({ element }) => element),
     );
     this._details.querySelector("summary")?.append(this._badge);
     this._details.open = open;
@@ -117,12 +117,21 @@ class RosoutPanel {
   }
 
   /** @param {any} message */
-  receive({ bridge, lines, total, state }) {
-    const book = this._books[bridge];
-    if (!book) return;
-    book.add(lines, total, state, this._most);
+  receive({ bridge, name, lines, total, state }) {
+    this._books[bridge] ??= this._begin(name);
+    this._books[bridge].add(lines, total, state, this._most);
     this._filter();
     this._age();
+  }
+
+  /**
+   * @param {string} name Of a bridge.
+   * @returns {Book}
+   */
+  _begin(name) {
+    const book = new Book(name);
+    this._count.parentElement?.append(book.element);
+    return book;
   }
 
   /**
@@ -150,7 +159,7 @@ class RosoutPanel {
         if (!row.hidden) shown += 1;
         if (level === "error" || level === "fatal") bad += 1;
       }
-      book.showState();
+      book.showState(this._books.length > 1);
     }
     setText(this._badge, bad > 0 ? `${bad}` : "");
     this._badge.title = bad > 0 ? `${bad} error${bad === 1 ? "" : "s"} in the newest lines` : "";
@@ -183,11 +192,8 @@ class RosoutPanel {
 
 /** The lines of one bridge, the newest on top. */
 class Book {
-  /**
-   * @param {string} name
-   * @param {boolean} named Whether there are other bridges.
-   */
-  constructor(name, named) {
+  /** @param {string} name */
+  constructor(name) {
     this.total = 0;
     this._state = "";
     /**
@@ -197,9 +203,8 @@ class Book {
     this.rows = new Map();
     this._list = html("ol", "webmap-rosout-lines", { "aria-label": `Log of ${name}` });
     this._note = html("p", "webmap-rosout-note");
-    const head = html("h3", "", {}, name);
-    head.hidden = !named;
-    this.element = html("section", "webmap-rosout-book", {}, head, this._note, this._list);
+    this._head = html("h3", "", {}, name);
+    this.element = html("section", "webmap-rosout-book", {}, this._head, this._note, this._list);
   }
 
   /**
@@ -223,7 +228,9 @@ class Book {
     }
   }
 
-  showState() {
+  /** @param {boolean} named Whether there are other bridges. */
+  showState(named) {
+    this._head.hidden = !named;
     const away = this._state !== "" && this._state !== "open";
     setText(this._note, away ? "No connection to this bridge: no new log lines." : "");
   }

@@ -5,7 +5,7 @@ import itertools
 import time
 import weakref
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -133,7 +133,7 @@ class RosoutPanel:
 
     Args:
         map: The map.
-        bridges: The bridges of the ROS systems.
+        bridges: The bridges of the ROS systems; more may be added to the list later.
         level: The least level that is shown until the page chooses another:
             ``"debug"``, ``"info"``, ``"warn"``, ``"error"`` or ``"fatal"``.
         lines: The number of lines of each bridge that are shown.
@@ -145,7 +145,7 @@ class RosoutPanel:
     def __init__(
         self,
         map: "Map",
-        bridges: Iterable["Bridge"],
+        bridges: Sequence["Bridge"],
         *,
         level: str = "info",
         lines: int = 100,
@@ -155,21 +155,15 @@ class RosoutPanel:
         if not 1 <= lines <= 200:
             raise ConfigError(f"lines must be 1 to 200, got {lines}")
         self.map = map
-        self._bridges = list(bridges)
+        self._bridges = bridges
         self._lines = lines
-        self._logs: list[BridgeLog] = [log_of(bridge) for bridge in self._bridges]
-        self._sent: list[tuple[int, str]] = []
-        self._watching: list[Removal] = []
+        self._sent: dict[Bridge, tuple[int, str]] = {}
+        self._watching: dict[Bridge, Removal] = {}
         self._task: asyncio.Task[None] | None = None
         self.browser_part = map.add_browser_part(
             self,
             "features/log/rosout_panel.js",
-            {
-                "bridges": [bridge.name or bridge.url for bridge in self._bridges],
-                "level": level,
-                "levels": list(LEVELS),
-                "lines": lines,
-            },
+            {"level": level, "levels": list(LEVELS), "lines": lines},
             "features/log/rosout_panel.css",
         )
         keep(Removal(self._close))
@@ -182,13 +176,13 @@ class RosoutPanel:
             self._close()
 
     def send_new_lines(self) -> None:
-        """Send the page the new lines."""
-        for number, log in enumerate(self._logs):
-            state = self._bridges[number].state
-            version, sent_state = self._sent[number]
+        """Send the page the new lines, also of bridges that are new."""
+        for number, bridge in enumerate(self._bridges):
+            log, state = log_of(bridge), bridge.state
+            version, sent_state = self._sent.get(bridge, (0, ""))
             if (log.version, state) == (version, sent_state):
                 continue
-            self._sent[number] = (log.version, state)
+            self._sent[bridge] = (log.version, state)
             lines = [
                 [
                     line.number,
@@ -201,26 +195,37 @@ class RosoutPanel:
                 for line in log.since(version)[-self._lines :]
             ]
             self.browser_part.send(
-                {"bridge": number, "lines": lines, "total": log.total, "state": state}
+                {
+                    "bridge": number,
+                    "name": bridge.name or bridge.url,
+                    "lines": lines,
+                    "total": log.total,
+                    "state": state,
+                }
             )
 
     def _open(self) -> None:
         # A page that was loaded again knows none of the earlier lines.
-        self._sent = [(0, "") for _ in self._logs]
-        if not self._watching:
-            self._watching = [log.watch() for log in self._logs]
+        self._sent = {}
+        self._watch()
         if self._task is None:
             self._task = asyncio.get_running_loop().create_task(self._send_regularly())
+
+    def _watch(self) -> None:
+        for bridge in self._bridges:
+            if bridge not in self._watching:
+                self._watching[bridge] = log_of(bridge).watch()
 
     def _close(self) -> None:
         if self._task is not None:
             self._task.cancel()
             self._task = None
-        for watching in self._watching:
+        for watching in self._watching.values():
             watching.remove()
-        self._watching = []
+        self._watching = {}
 
     async def _send_regularly(self) -> None:
         while True:
+            self._watch()
             self.send_new_lines()
             await asyncio.sleep(PERIOD)
