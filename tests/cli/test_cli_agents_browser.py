@@ -120,12 +120,17 @@ def test_an_agent_that_ends_is_shown_and_one_that_comes_later_appears(
         simulator("--robots", "1") as url,
         display(chromium, router) as page,
     ):
-        expect(page.locator("#bridges summary")).to_have_text("No bridge yet")
+        expect(page.locator("#bridges summary")).to_have_text("No agent yet")
+        expect(page.locator("#routers")).to_have_text(f"No agent is at {router} yet.")
         with agent(tmp_path, url, router, "bay1"):
             expect(placed(page)).to_have_count(1, timeout=SOON)
             expect(page.locator("#bridges summary")).to_have_text(
                 "Bridge open", timeout=SOON
             )
+            expect(page.locator("#routers")).to_have_text("")
+        page.locator("#bridges summary").click()
+        line = page.locator(f"#bridges li[title='{router}']")
+        expect(line).to_contain_text("0 agents connected; away: bay1", timeout=SOON)
         expect(page.locator("#robots .row")).to_contain_text("Lost", timeout=SOON)
         expect(page.locator("#bridges summary")).to_have_text(
             "No connection to the bridge", timeout=SOON
@@ -174,6 +179,19 @@ def test_a_robot_is_driven_whose_agent_has_a_clock_one_day_ahead(chromium, tmp_p
         hold(page.keyboard, "w", lambda: title.text_content() == "You are driving")
         page.keyboard.up("w")
         expect(title).to_have_text("You have control", timeout=SOON)
+
+
+def test_the_page_of_a_display_shows_why_its_router_is_not_there(chromium, tmp_path):
+    with (
+        simulator("--robots", "1") as url,
+        display(chromium, "zenoh://127.0.0.1:1", url) as page,
+    ):
+        expect(page.locator("#bridges summary")).to_have_text(
+            "Bridge open, no connection to a router", timeout=SOON
+        )
+        page.locator("#bridges summary").click()
+        line = page.locator("#bridges li[title='zenoh://127.0.0.1:1']")
+        expect(line).to_contain_text("nothing listens there; reconnecting")
 
 
 def test_the_log_shows_the_lines_of_an_agent_that_comes_while_it_is_open(

@@ -242,3 +242,36 @@ def test_maps_are_named_by_their_bridge_too_once_there_are_several_bridges(
         assert names(page) == ["/map (ws://localhost:9090)", "/map (hall)"]
 
     on_a_page(scenario, bridge, robots)
+
+
+def test_a_page_shows_routers_and_why_no_robot_of_their_agents_is_there(bridge):
+    state = ["lost", "cannot reach the router: nothing listens there; reconnecting"]
+
+    async def scenario():
+        page = open_page()
+        with page.scope.active():
+            opened = Console()
+            opened.routers["zenoh://hall:7447"] = lambda: tuple(state)
+            build(page, [bridge], opened, None, "test", "test")
+        (details,) = [e for e in page.element("bridges").children if e.tag == "details"]
+        listed = details.children[1]
+        try:
+            yard, own = listed.children
+            assert (yard.get("data-link"), yard.get("title")) == (
+                "lost",
+                "zenoh://hall:7447",
+            )
+            assert own.get("data-link") == "connecting"
+            assert details.children[0].get("data-link") == "lost"
+            assert page.element("routers").text == (
+                "Cannot reach the router: nothing listens there; reconnecting."
+            )
+            state[:] = "open", "1 agent connected"
+            while page.element("routers").text:
+                await asyncio.sleep(0.01)
+            assert "1 agent connected" in yard.text
+            assert details.children[0].get("data-link") == "connecting"
+        finally:
+            page.close()
+
+    asyncio.run(scenario())

@@ -103,3 +103,21 @@ def test_an_unknown_charge_is_not_shown():
 )
 def test_the_states_of_the_bridges_are_summarized(links, text):
     assert summary(links) == text
+
+
+@pytest.mark.parametrize(
+    ("links", "routers", "text"),
+    [
+        ([], ["lost"], "No connection to the router"),
+        ([], ["connecting"], "No agent yet"),
+        (["lost", "lost"], ["lost"], "No connection to the router"),
+        (["lost"], ["open"], "No connection to the bridge"),
+        (["open", "open"], ["open", "connecting"], "2 bridges open"),
+        (["open"], ["lost"], "Bridge open, no connection to a router"),
+        (["open", "lost"], ["lost"], "1 of 2 bridges open, no connection to a router"),
+    ],
+)
+def test_a_router_that_is_lost_or_without_agents_is_in_the_summary(
+    links, routers, text
+):
+    assert summary(links, routers) == text

@@ -1,6 +1,6 @@
 """Lists that unfold from the page's bar: bridges and refused messages."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from webmap import html, refusals
@@ -20,12 +20,14 @@ LATE = 0.5
 
 
 class BridgeList:
-    """A summary of the bridges that unfolds into a list of them.
+    """A summary of the routers and bridges that unfolds into a list of them.
 
     Args:
         element: The page's element to fill.
         bridges: The bridges; more may be added to the list later.
         button_of: Returns the button of a bridge.
+        routers: The routers with agents, as in :attr:`Console.routers`.
+        waiting: The page's element for sentences about routers without agents.
     """
 
     def __init__(
@@ -33,49 +35,65 @@ class BridgeList:
         element: "Element",
         bridges: Sequence["Bridge"],
         button_of: Callable[["Bridge"], "Element"],
+        routers: Mapping[str, Callable[[], tuple[str, str]]],
+        waiting: "Element",
     ) -> None:
         self._bridges = bridges
         self._button_of = button_of
+        self._routers = routers
+        self._waiting = waiting
         self._text = html.span()
         self._summary = html.summary(
             html.span(class_="dot").set("aria-hidden", "true"),
             self._text,
             icon("icon-chevron"),
         )
-        self._words: list[Element] = []
-        self._lines: list[Element] = []
+        self._lines: dict[Bridge | str, tuple[Element, Element]] = {}
         self._list = html.ul(class_="bridge-list")
         element.append(
             html.details(self._summary, self._list).set("data-webmap-menu", "")
         )
         self.poll()
 
-    def _add(self, bridge: "Bridge") -> None:
+    def poll(self) -> None:
+        """Update the list."""
+        routers = {url: describe() for url, describe in self._routers.items()}
+        bridges = {bridge: describe_link(bridge) for bridge in self._bridges}
+        for url, state in routers.items():
+            self._show(url, state)
+        for bridge, state in bridges.items():
+            self._show(bridge, state)
+        of_routers = [link for link, _ in routers.values()]
+        of_bridges = [link for link, _ in bridges.values()]
+        links = {*of_routers, *of_bridges}
+        worst = next((name for name in WORST if name in links), "open")
+        self._summary.set("data-link", worst)
+        self._text.text = summary(of_bridges, of_routers)
+        self._waiting.text = " ".join(
+            f"{text[0].upper()}{text[1:]}."
+            for link, text in routers.values()
+            if link != "open"
+        )
+
+    def _show(self, key: "Bridge | str", state: tuple[str, str]) -> None:
+        line, word = self._lines.get(key) or self._add(key)
+        line.set("data-link", state[0])
+        word.text = state[1]
+
+    def _add(self, key: "Bridge | str") -> "tuple[Element, Element]":
+        """Add the line of a bridge, or of the router at an address."""
+        name, url = (key, key) if isinstance(key, str) else (key.name, key.url)
         word = html.span(class_="word")
         line = html.li(
             html.span(class_="dot").set("aria-hidden", "true"),
-            html.span(text=bridge.name or bridge.url, class_="url"),
+            html.span(text=name or url, class_="url"),
             word,
-            self._button_of(bridge),
-        ).set("title", bridge.url)
-        self._words.append(word)
-        self._lines.append(line)
+        ).set("title", url)
+        if not isinstance(key, str):
+            line.append(self._button_of(key))
+        self._lines[key] = line, word
         self._list.append(line)
-
-    def poll(self) -> None:
-        """Update the list."""
-        for bridge in self._bridges[len(self._lines) :]:
-            self._add(bridge)
-        states = [describe_link(bridge) for bridge in self._bridges]
-        for line, word, (link, text) in zip(
-            self._lines, self._words, states, strict=True
-        ):
-            line.set("data-link", link)
-            word.text = text
-        links = {link for link, _ in states}
-        worst = next((name for name in WORST if name in links), "open")
-        self._summary.set("data-link", worst)
-        self._text.text = summary([link for link, _ in states])
+        return line, word
 
 
 def describe_link(bridge: "Bridge") -> tuple[str, str]:
@@ -90,23 +108,25 @@ def describe_link(bridge: "Bridge") -> tuple[str, str]:
     return "connecting", "connecting"
 
 
-def summary(links: Sequence[str]) -> str:
-    """Return a short text for the states of all bridges."""
+def summary(links: Sequence[str], routers: Sequence[str] = ()) -> str:
+    """Return a short text for the states of all bridges and routers."""
     total, open_ = len(links), sum(link in ("open", "late") for link in links)
+    late, lost = links.count("late"), "lost" in routers
+    if lost and not open_:
+        return "No connection to the router"
     if total == 0:
-        return "No bridge yet"
-    late = links.count("late")
+        return "No agent yet" if routers else "No bridge yet"
     if total == 1:
-        return {
+        text = {
             "open": "Bridge open",
             "lost": "No connection to the bridge",
             "late": "Bridge slow",
         }.get(links[0], "Connecting to the bridge")
-    if late:
-        return f"{open_} of {total} bridges open, {late} slow"
-    if open_ == total:
-        return f"{total} bridges open"
-    return f"{open_} of {total} bridges open"
+    elif open_ == total and not late:
+        text = f"{total} bridges open"
+    else:
+        text = f"{open_} of {total} bridges open" + (f", {late} slow" if late else "")
+    return f"{text}, no connection to a router" if lost else text
 
 
 SHOWN = 12

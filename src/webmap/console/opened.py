@@ -37,6 +37,11 @@ class Console:
         """The layers that are off until the user switches them on."""
         self.robots: list[Robot] = []
         """The robots that were added, in that order."""
+        self.routers: dict[str, Callable[[], tuple[str, str]]] = {}
+        """What pages show of each router with agents, by its address.
+
+        Returns ``"open"``, ``"connecting"`` or ``"lost"``, and a sentence.
+        """
         self.grids: dict[tuple[Bridge, str], dict[str, Any]] = {}
         """The options of ``OccupancyGrid`` by bridge and topic, the first map first."""
         self._layers: weakref.WeakValueDictionary[tuple[Bridge, str], Any] = (

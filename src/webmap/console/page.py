@@ -137,7 +137,13 @@ def build(
     health = map.add_module(RobotHealth, card.notes)
     map.add_module(RobotButtons, card.more)
     doctor = map.add_module(DoctorReports, page.element("bridges"))
-    links = BridgeList(page.element("bridges"), bridges, doctor.add)
+    links = BridgeList(
+        page.element("bridges"),
+        bridges,
+        doctor.add,
+        opened.routers,
+        page.element("routers"),
+    )
     refused = RefusedList(page.element("refused"), page.viewer.role)
     polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
     polls += [opened.bring_back, links.poll, refused.poll, doctor.poll, costmaps.poll]

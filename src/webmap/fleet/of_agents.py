@@ -19,6 +19,7 @@ from webmap.agents.description import (
     read_beacon,
 )
 from webmap.agents.peer import peer_of
+from webmap.base.counted import counted
 from webmap.base.echo import echo, notify
 from webmap.base.errors import WebMapError
 from webmap.base.lifecycle import lifecycle
@@ -51,6 +52,9 @@ PICTURE_PATIENCE = 15.0
 
 PICTURE_AGAIN = 5.0
 """Seconds after which a picture that did not come is asked for again."""
+
+AWAY = 3.0
+"""Seconds without a sign of an agent after which it is shown as away."""
 
 
 @dataclass(eq=False)
@@ -97,6 +101,8 @@ class Agents:
         self._bridges: list[Bridge] = []
         self._known: dict[str, KnownAgent] = {}
         self._news: dict[str, Beacon] = {}
+        self._news_at: dict[str, float] = {}
+        """When each agent said last that it is there, on the monotonic clock."""
         self._task: asyncio.Task[None] | None = None
         self._peer = peer_of(router)
         self._peer.listen(address.here(self.only or address.EVERY), self._heard)
@@ -122,8 +128,22 @@ class Agents:
         self._bridges = bridges
 
     def show_on(self, console: Console) -> None:
-        """Show the robots on a console from now on."""
+        """Show the robots, and the state of the router, on a console from now on."""
         self._console = console
+        if self.only is None or self._place not in console.routers:
+            console.routers[self._place] = self.describe
+
+    def describe(self) -> tuple[str, str]:
+        """Return the state of the router, as for a bridge, and a sentence about it."""
+        if self.trouble is not None:
+            return "lost", f"{self.trouble}; reconnecting"
+        now = time.monotonic()
+        heard = {name: now - at < AWAY for name, at in list(self._news_at.items())}
+        if not heard:
+            return "connecting", f"no agent is at {self.url} yet"
+        away = sorted(name for name, is_there in heard.items() if not is_there)
+        text = f"{counted(len(heard) - len(away), 'agent')} connected"
+        return "open", f"{text}; away: {', '.join(away)}" if away else text
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Begin to show robots."""
@@ -141,7 +161,9 @@ class Agents:
     def _heard(self, key: str, piece: bytes) -> None:
         beacon = read_beacon(piece)
         if beacon is not None:
-            self._news[key.split("/")[1]] = beacon
+            name = key.split("/")[1]
+            self._news[name] = beacon
+            self._news_at[name] = time.monotonic()
 
     def _get(self, name: str, beacon: Beacon) -> KnownAgent:
         agent = self._known.get(name)

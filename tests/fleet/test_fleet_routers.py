@@ -1,0 +1,59 @@
+"""What a display shows of a router: why it is not there, and which agents are."""
+
+import msgspec
+
+from webmap.agents.description import PROTOCOL, Beacon
+from webmap.base.lifecycle import lifecycle
+from webmap.console import Console
+from webmap.fleet import of_agents
+from webmap.fleet.of_agents import AWAY, Agents
+
+
+class FakePeer:
+    """A router that may be there, and signs of agents."""
+
+    def __init__(self):
+        self.trouble = "cannot reach the router: nothing listens there"
+
+    def listen(self, key, fn):
+        self.key, self._fn = key, fn
+
+    def sign_of(self, name):
+        beacon = msgspec.json.encode(Beacon(PROTOCOL, "s", "a"))
+        self._fn(f"webmap/{name}/here", beacon)
+
+
+class Clock:
+    now = 100.0
+
+    def monotonic(self):
+        return self.now
+
+
+def test_a_display_says_what_is_wrong_with_a_router_and_which_agents_are_away(
+    monkeypatch,
+):
+    peer, clock = FakePeer(), Clock()
+    monkeypatch.setattr(of_agents, "peer_of", lambda _: peer)
+    monkeypatch.setattr(of_agents, "time", clock)
+    agents, console = Agents("zenoh://hall:7447"), Console()
+    try:
+        agents.show_on(console)
+        (describe,) = console.routers.values()
+        assert list(console.routers) == ["zenoh://hall:7447"]
+        assert describe() == (
+            "lost",
+            "cannot reach the router: nothing listens there; reconnecting",
+        )
+        peer.trouble = None
+        assert describe() == ("connecting", "no agent is at zenoh://hall:7447 yet")
+        peer.sign_of("bay2")
+        peer.sign_of("bay1")
+        assert describe() == ("open", "2 agents connected")
+        clock.now += AWAY
+        peer.sign_of("bay1")
+        assert describe() == ("open", "1 agent connected; away: bay2")
+        peer.sign_of("bay2")
+        assert describe() == ("open", "2 agents connected")
+    finally:
+        lifecycle.discard(agents)
