@@ -64,6 +64,57 @@ def test_a_good_robot_is_ready_and_the_unknown_command_timeout_is_a_note():
     assert said(GOOD, "stops by itself") == "note"
 
 
+AGENT = replace(GOOD, url="zenohs://fleet:7447/bay3", link=LinkFacts())
+
+
+@pytest.mark.parametrize(
+    ("open_at", "words", "level"),
+    [
+        ((), "listens on its own computer alone", "good"),
+        (None, "does not know whether other computers reach its rosbridge", "note"),
+        (("0.0.0.0",), "may reach the agent's rosbridge at 0.0.0.0", "warning"),
+    ],
+)
+def test_the_doctor_reports_who_reaches_the_rosbridge_of_an_agent(
+    open_at, words, level
+):
+    seen = replace(AGENT, open_at=open_at)
+    assert said(seen, words) == level
+    texts = " ".join(f"{each.text} {each.advice}" for each in judge(seen))
+    assert "compress" not in texts, "the display has no socket to that rosbridge"
+    assert "not encrypted" not in texts
+    assert "--stop-test" not in texts, "only the agent's gate moves the robot"
+    assert "button on its card" in texts
+
+
+def test_the_doctor_warns_of_a_router_without_tls_on_another_computer():
+    plain = replace(AGENT, url="zenoh://fleet:7447/bay3")
+    assert said(plain, "not encrypted") == "warning"
+    here = replace(AGENT, url="zenoh://127.0.0.1:7447/bay3")
+    assert not any("not encrypted" in each.text for each in judge(here))
+
+
+@pytest.mark.parametrize(
+    ("trouble", "advice"),
+    [
+        (
+            "cannot reach the router at tcp/h:7447: nothing listens there",
+            "the router's",
+        ),
+        (
+            "the agent bay3 does not reach its rosbridge: no answer",
+            "Start rosbridge on",
+        ),
+        ("no answer from the agent bay3", "with --name bay3"),
+    ],
+)
+def test_advice_for_an_agent_that_cannot_be_reached_fits_the_reason(trouble, advice):
+    (finding,) = judge(Observed("zenoh://h/bay3", trouble=trouble))
+    assert finding.level == "wrong"
+    assert trouble in finding.text
+    assert advice in finding.advice
+
+
 def test_an_unreachable_bridge_is_the_only_finding():
     findings = judge(Observed("ws://bob:9090", trouble="nothing listens there"))
     assert [each.level for each in findings] == ["wrong"]

@@ -1,6 +1,8 @@
 """Fleet files with robots of agents, which the agents describe themselves."""
 
 import asyncio
+import socket
+import sys
 
 import pytest
 
@@ -9,7 +11,8 @@ from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
 from webmap.console import Console
 from webmap.core.pictures import pictures
-from webmap.fleet import of_agents
+from webmap.fleet import held, of_agents
+from webmap.fleet.held import open_at
 from webmap.fleet.made import prepare
 
 AGENTS = '[bridges]\nyard = "zenoh://hall:7447"\n'
@@ -51,6 +54,23 @@ def test_robots_without_a_bridge_are_behind_the_only_rosbridge(tmp_path):
 def test_what_an_agent_describes_itself_is_refused(tmp_path, text, words):
     with pytest.raises(ConfigError, match=words):
         prepare(written(tmp_path, text))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc lists the sockets")
+def test_a_rosbridge_on_loopback_is_reached_by_this_computer_alone():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        assert open_at(f"ws://127.0.0.1:{port}") == []
+
+
+def test_an_agent_knows_where_other_computers_reach_its_rosbridge(monkeypatch):
+    places = ["127.0.0.1", "0.0.0.0", "192.0.2.7"]
+    monkeypatch.setattr(held, "listening_addresses", lambda _: places)
+    assert open_at("ws://127.0.0.1:9090") == ["0.0.0.0", "192.0.2.7"]
+
+
+def test_a_rosbridge_on_another_computer_is_reached_by_others():
+    assert open_at("ws://192.0.2.7:9090") == ["192.0.2.7"]
 
 
 class FakePeer:

@@ -8,5 +8,5 @@ Open ``gates`` first: all gates that a display reaches. ``samples`` numbers what
 sent, ``displays`` is the agent's side of the gate and ``far_gate`` the display's.
 ``clients`` is the agent's side of the data and ``link`` the display's. ``cameras`` and
 ``far_camera`` are the two sides of cameras over HTTP. ``peer`` has the sessions with
-the router.
+the router, ``present`` finds agents for commands that end.
 """

@@ -138,7 +138,8 @@ class Clients:
         self._numbers = 0
         self.session = ""
         """The identity of the connection to the rosbridge; "" without one."""
-        self.trouble = "the agent is not connected to its rosbridge yet"
+        self.trouble = "connecting"
+        """Why the rosbridge is not connected."""
 
     @property
     def topics(self) -> list[str]:

@@ -34,6 +34,8 @@ class About(msgspec.Struct, frozen=True):
     """The topics of maps under the robots, with their options."""
     alignment: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """The pose of the maps of all robots on the common one: metres and degrees."""
+    open_at: list[str] | None = None
+    """Where other computers may reach the agent's rosbridge; None if it is unknown."""
 
 
 def read_beacon(piece: bytes) -> Beacon | None:

@@ -19,8 +19,11 @@ log = logging.getLogger("webmap.agent")
 LOOK = 0.25
 """Seconds between two looks at the connection."""
 
-PATIENCE = 5.0
-"""Seconds for the first answer of an agent, after which the attempt has failed."""
+PATIENCE = 3.0
+"""Seconds for the first answer of an agent, after which the attempt has failed.
+
+Less than a service call waits, so that it fails with the reason of the attempt.
+"""
 
 
 class AgentLane(Lane):
@@ -152,7 +155,7 @@ class AgentLane(Lane):
             if time.monotonic() > deadline or self._trouble:
                 why = (
                     self._peer.trouble
-                    or self._trouble
+                    or self._why_no_bridge()
                     or f"no answer from the agent {self._agent}"
                 )
                 self._failed(_not_reached(self.url, why))
@@ -170,7 +173,7 @@ class AgentLane(Lane):
         heard = self.last_heard
         while not liveness.is_dead(time.monotonic(), heard, busy=self._busy()):
             if self._session != session:
-                return self._trouble or "the agent has connected again"
+                return self._why_no_bridge() or "the agent has connected again"
             if self._peer is not None and self._peer.trouble is not None:
                 return self._peer.trouble  # what was sent meanwhile is lost
             if liveness.is_ping_due(time.monotonic()):
@@ -179,6 +182,11 @@ class AgentLane(Lane):
             await asyncio.sleep(LOOK)
             heard = self.last_heard
         return f"no answer to a ping for {Liveness.LIMIT:g} s"
+
+    def _why_no_bridge(self) -> str:
+        if not self._trouble:
+            return ""
+        return f"the agent {self._agent} does not reach its rosbridge: {self._trouble}"
 
     def _end(self, reason: str) -> None:
         for topic in list(self._topics):

@@ -113,7 +113,7 @@ def agent(
         run_agent,
         systemd_unit,
     )
-    from webmap.fleet.held import held_behind, held_in_file, warn_of_open_bridge
+    from webmap.fleet.held import held_behind, held_in_file
     from webmap.fleet.overrides import Overrides, parse_setting
 
     if systemd:
@@ -129,7 +129,6 @@ def agent(
         raise click.UsageError("the fleet file has all settings of its robots")
     else:
         held = held_in_file(Path(robot))
-    warn_of_open_bridge(held.bridge.url)
     made = Agent(name, router, held, roles=roles, throttles=throttles, beams=most)
     ended = threading.Event()
 

@@ -6,7 +6,13 @@ import sys
 import click
 
 from webmap.base.echo import echo
-from webmap.cli.options import one_bridge, topics_option, verbose_option, wait_option
+from webmap.cli.options import (
+    one_bridge,
+    topics_option,
+    verbose_option,
+    wait_option,
+    waiting_for,
+)
 
 
 @click.command(
@@ -22,20 +28,34 @@ def discover(
 ) -> None:
     """List the robots behind rosbridges, their topics, and the rule for each topic.
 
-    Nothing is moved or changed. The exit code is 1 if no robot is found.
+    The address of a router is that of all its agents: zenoh://host:7447. Nothing is
+    moved or changed. The exit code is 1 if no robot is found.
 
     \b
     webmap discover ws://robot:9090
     webmap discover ws://robot:9090 --toml > fleet.toml
     ros2 topic list -t | webmap discover ws://robot:9090 --topics -
     """
+    from webmap.agents.present import agents_behind
+    from webmap.base.errors import BridgeClosed
     from webmap.discovery.fleet_toml import fleet_toml
     from webmap.discovery.tables import report
     from webmap.fleet.find import find
-    from webmap.ros.names import normalise_url
+    from webmap.ros.names import is_agent_url
 
     one_bridge(url, topics)
-    urls = [normalise_url(text) for text in url]
+    if toml and any(is_agent_url(text) for text in url):
+        raise click.UsageError(
+            "the fleet file of an agent has the address of its rosbridge: run webmap "
+            "discover --toml on the robot with that address, such as "
+            "ws://localhost:9090"
+        )
+    urls: list[str] = []
+    for text in url:
+        try:
+            urls += agents_behind(text, wait=wait, waiting=waiting_for(text))
+        except BridgeClosed as error:
+            echo(f"{error}.", err=True)
     found = asyncio.run(find(urls, wait=wait, topics=topics))
     if toml:
         text = fleet_toml([(one.label, one.url, one.findings) for one in found])

@@ -12,6 +12,7 @@ from webmap.cli.options import (
     topics_option,
     verbose_option,
     wait_option,
+    waiting_for,
 )
 
 
@@ -75,46 +76,68 @@ def doctor(
 ) -> None:
     """Diagnose a rosbridge and the robots behind it, and suggest what to do.
 
+    The address of an agent is that of its rosbridge: zenoh://host:7447/bay3; that of a
+    router is that of all its agents.
+
     The robots are found by their topics, unless --robot, --set or a fleet file in
     place of URL configures them.
 
     Nothing is moved, published or changed, unless --stop-test is given. The exit code
     is 1 if anything is wrong.
     """
+    from webmap.ros.names import is_agent_url
+
     if stop_test is not None and (robots or settings):
         raise click.UsageError(
             "--stop-test needs a robot's name from webmap discover; leave out --robot "
             "and --set"
         )
+    if stop_test is not None and any(is_agent_url(text) for text in url):
+        raise click.UsageError(
+            "the gate of an agent alone moves its robots: press Stop test on the "
+            "robot's card of webmap view"
+        )
     if stop_test is not None:
         from webmap.discovery.doctor.stop_test import find_out
 
         sys.exit(find_out(url, stop_test, wait=wait, yes=yes))
-    from webmap.discovery.doctor import is_ready, judge
+    from webmap.agents.present import agents_behind, one_agent
+    from webmap.base.errors import BridgeClosed
+    from webmap.discovery.doctor import Observed, is_ready, judge
     from webmap.discovery.doctor.measure import observe
     from webmap.discovery.doctor.verdict import report
-    from webmap.fleet.diagnose import bridges_of
+    from webmap.fleet.diagnose import Configured, bridges_of
 
-    bridges = bridges_of(url, robots, settings)
-    one_bridge([address for address, _ in bridges], topics)
+    if len(url) == 1 and (robots or settings) and is_agent_url(url[0]):
+        url = (one_agent(url[0], wait=wait, waiting=waiting_for(url[0])),)
+    bridges: list[tuple[str, Configured, str]] = []
+    for text, configured in bridges_of(url, robots, settings):
+        try:
+            found = agents_behind(text, wait=wait, waiting=waiting_for(text))
+            bridges += [(each, configured, "") for each in found]
+        except BridgeClosed as error:
+            bridges.append((text, configured, error.why or str(error)))
+    one_bridge([address for address, _, _ in bridges], topics)
     ready = True
-    for number, (address, configured) in enumerate(bridges):
+    for number, (address, configured, trouble) in enumerate(bridges):
 
         def waiting(why: str, address: str = address) -> None:
             echo(f"Waiting for the rosbridge at {address}: {why}", err=True)
 
-        seen = asyncio.run(
-            observe(
-                address,
-                wait=wait,
-                seconds=seconds,
-                ask_parameters=ask_parameters,
-                try_call=try_call,
-                topics=topics,
-                configured=configured,
-                waiting=waiting,
+        seen = Observed(address, trouble=trouble)
+        if not trouble:
+            seen = asyncio.run(
+                observe(
+                    address,
+                    wait=wait,
+                    seconds=seconds,
+                    ask_parameters=ask_parameters,
+                    try_call=try_call,
+                    topics=topics,
+                    configured=configured,
+                    waiting=waiting,
+                )
             )
-        )
         findings = judge(seen)
         ready &= is_ready(findings)
         echo("\n" * bool(number) + report(address, findings), lines=True)

@@ -8,6 +8,7 @@ from typing import IO, Any, TypeVar
 
 import click
 
+from webmap.base.echo import echo
 from webmap.base.errors import ConfigError
 from webmap.base.logs import set_up_logging
 from webmap.ros.names import is_topic, split_type
@@ -122,6 +123,16 @@ def simulator_options(*, robots: str, dialect: str) -> Callable[[F], F]:
 
 LARGEST = 4 << 20
 """Most characters of a list of topics; input from a pipe may never end."""
+
+
+def waiting_for(url: str) -> Callable[[str], None]:
+    """Return a function that prints why a command waits for an address."""
+
+    def waiting(why: str) -> None:
+        echo(f"Waiting for {url}: {why}", err=True)
+
+    return waiting
+
 
 _LINE = re.compile(
     r"(?:\*\s+)?(?P<topic>/\S*?):?\s+\[?(?P<type>[A-Za-z]\w*(?:/\w+){1,2})"

@@ -6,7 +6,13 @@ from pathlib import Path
 import click
 
 from webmap.base.errors import ConfigError
-from webmap.cli.options import Finite, topics_option, verbose_option, wait_option
+from webmap.cli.options import (
+    Finite,
+    topics_option,
+    verbose_option,
+    wait_option,
+    waiting_for,
+)
 
 
 @click.command(short_help="Record the topics of a bridge into a bag.")
@@ -51,6 +57,8 @@ def record(
 ) -> None:
     """Record the topics behind a rosbridge into a bag.
 
+    URL is the address of a rosbridge, or of an agent: zenoh://host:7447/bay3.
+
     The bag has the format of the robot's ROS: a .bag file, or a folder with an MCAP
     file. Topics that appear later are recorded too. Nothing is moved. This command
     needs rosbags: pip install "webmap[bags]".
@@ -61,9 +69,10 @@ def record(
     """
     import asyncio
 
+    from webmap.agents.present import one_agent
     from webmap.bags import need_rosbags
     from webmap.bags.record import record_to, stated_types
-    from webmap.ros.names import normalise_topic, normalise_url
+    from webmap.ros.names import normalise_topic
 
     need_rosbags()
     names = [normalise_topic(topic) for topic in only]
@@ -79,7 +88,7 @@ def record(
             )
     failed = asyncio.run(
         record_to(
-            normalise_url(url),
+            one_agent(url, wait=wait, waiting=waiting_for(url)),
             out,
             only=names,
             stated=stated,

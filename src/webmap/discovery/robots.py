@@ -12,7 +12,7 @@ from webmap.discovery.grouping import inside, nearest, robot_namespaces
 from webmap.discovery.layers import drawn_otherwise, find_layers
 from webmap.discovery.rules import INNER_VELOCITY, VELOCITY, Match, match
 from webmap.discovery.tf_robots import Base, Trees, owners
-from webmap.ros.names import is_topic, is_type
+from webmap.ros.names import agent_named, is_topic, is_type
 
 SHARED: tuple[Role, ...] = ("map", "tf")
 """Roles that a topic without a namespace fills for every robot."""
@@ -69,8 +69,11 @@ def discover(
 def host_name(url: str) -> str:
     """Return the name of a robot without a namespace behind a bridge.
 
-    It is the first part of the host's name, or "robot" if the host is an IP address.
+    It is the name of the agent, or the first part of the host's name, or "robot" if the
+    host is an IP address.
     """
+    if agent := agent_named(url):
+        return agent
     host = urlsplit(url).hostname or "robot"
     try:
         ipaddress.ip_address(host)

@@ -34,7 +34,7 @@ from webmap.base.errors import BridgeError, ConfigError, WireError
 from webmap.base.lifecycle import lifecycle
 from webmap.base.tasks import spawn
 from webmap.core.runtime import runtime
-from webmap.fleet.held import Held
+from webmap.fleet.held import Held, open_at, warn_of_open_bridge
 from webmap.fleet.passed_on import passed_on
 from webmap.gate.protocol import Role
 from webmap.poses.alignment import alignments
@@ -81,6 +81,7 @@ class Agent:
         self._held = held
         self._session = secrets.token_hex(8)
         self._about = b""
+        self._open_at: list[str] | None = None
         self._peer: Peer = peer_of(router)
         self.address = f"{address.url(self._peer.locator)}/{self.name}"
         """The address of the agent for displays."""
@@ -200,7 +201,7 @@ class Agent:
         grids = list(self._held.grids().items())
         pose = alignments.of(self._held.bridge)
         placed = (pose.x, pose.y, math.degrees(pose.yaw))
-        about = About(names, robots, grids, placed)
+        about = About(names, robots, grids, placed, self._open_at)
         self._about = msgspec.json.encode(about)
         buttons = [button for each in held for button in each.config.buttons]
         self._allowed = (
@@ -226,6 +227,9 @@ class Agent:
 
     def _bridge_opened(self) -> None:
         log.info("%s: the connection is open", self.url)
+        places, self._open_at = self._open_at, open_at(self.url)
+        if self._open_at and self._open_at != places:
+            warn_of_open_bridge(self.url, self._open_at)
         self._protocol = Protocol()
         self._clients.opened(secrets.token_hex(8))
 

@@ -20,6 +20,8 @@ def bridges_of(
 ) -> list[tuple[str, Configured]]:
     """Return each bridge to check, with the settings for the robots behind it.
 
+    The addresses of routers are returned as they are.
+
     Args:
         given: The addresses of bridges, or one fleet file.
         robots: The values of ``--robot``.
@@ -70,8 +72,11 @@ def _of_file(file: Path) -> list[tuple[str, Configured]]:
         where = (ready.bridges[grid.bridge], grid.topic)
         maps.append(("OccupancyGrid", where, {"palette": grid.palette}))
     return [
-        (bridge.url, _always(in_use(ready.robots, bridge, maps)))
-        for bridge in ready.bridges.values()
+        *(
+            (bridge.url, _always(in_use(ready.robots, bridge, maps)))
+            for bridge in ready.bridges.values()
+        ),
+        *((url, _always(())) for url in ready.agents),
     ]
 
 

@@ -12,6 +12,7 @@ from webmap.discovery.frame_listening import receive_frames
 from webmap.discovery.naming import free_name, unique_names
 from webmap.discovery.robots import host_name
 from webmap.ros.asking import ask_topics
+from webmap.ros.names import agent_named
 
 LIST_ROBOTS = (
     "List each robot with --robot NAME:ODOM:CMD_VEL:SCAN, "
@@ -77,9 +78,15 @@ async def find(
 
 
 def labels(urls: Sequence[str]) -> list[str]:
-    """Return a name for each bridge: its host, with the port if others have it too."""
+    """Return a name for each bridge: its agent, or its host.
+
+    The port is added if others have the same name.
+    """
     parts = [urlsplit(url) for url in urls]
-    hosts = [part.hostname or "robot" for part in parts]
+    hosts = [
+        agent_named(url) or part.hostname or "robot"
+        for url, part in zip(urls, parts, strict=True)
+    ]
     names = [
         host if hosts.count(host) == 1 or part.port is None else f"{host}:{part.port}"
         for host, part in zip(hosts, parts, strict=True)

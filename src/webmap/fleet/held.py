@@ -18,13 +18,12 @@ from webmap.fleet.given import given_robots
 from webmap.fleet.made import make_bridges
 from webmap.fleet.overrides import Overrides
 from webmap.fleet.passed_on import check_passed_on, load_pictures
+from webmap.ros.rosbridge.checks import is_loopback, listening_addresses
 
 if TYPE_CHECKING:
     from webmap import Bridge
 
 log = logging.getLogger("webmap.agent")
-
-LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
 class HeldRobot(NamedTuple):
@@ -123,12 +122,28 @@ def moving_parts(config: RobotConfig) -> RobotConfig:
     )
 
 
-def warn_of_open_bridge(url: str) -> None:
-    """Log a warning if other computers may reach the rosbridge too."""
-    if (urlsplit(url).hostname or "") not in LOOPBACK:
-        log.warning(
-            "%s is not an address of this computer: whoever reaches that rosbridge can "
-            "drive the robot without the agent; let rosbridge listen on 127.0.0.1 and "
-            "run the agent beside it",
-            url,
-        )
+def open_at(url: str) -> list[str] | None:
+    """Return where other computers may reach a rosbridge; None if it is unknown.
+
+    Args:
+        url: The address of the rosbridge, which runs.
+
+    """
+    parts = urlsplit(url)
+    if not is_loopback(parts.hostname or ""):
+        return [parts.hostname or ""]
+    listens = listening_addresses(parts.port or 80)
+    if not listens:
+        return None
+    return [each for each in listens if not is_loopback(each)]
+
+
+def warn_of_open_bridge(url: str, places: Sequence[str]) -> None:
+    """Log a warning that other computers may reach the rosbridge at these places."""
+    log.warning(
+        "other computers may reach the rosbridge %s at %s, and drive the robot without "
+        "the agent: let rosbridge listen on 127.0.0.1 and run the agent beside it, or "
+        "close its port in the firewall",
+        url,
+        ", ".join(places),
+    )

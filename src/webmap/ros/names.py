@@ -111,6 +111,11 @@ def is_agent_url(url: str) -> bool:
     return url.partition("://")[0].strip().lower() in _AGENTS
 
 
+def agent_named(url: str) -> str:
+    """Return the agent in an address; empty if it is no address of an agent."""
+    return urlsplit(url).path.strip("/") if is_agent_url(url) else ""
+
+
 def normalise_url(url: str) -> str:
     """Return the normalised address of a bridge.
 

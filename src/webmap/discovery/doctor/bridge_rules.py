@@ -2,8 +2,10 @@
 
 from collections.abc import Iterator
 
+from webmap.discovery.doctor import agent_rules
 from webmap.discovery.doctor.observed import MOST_ROBOTS, Clock, Observed
 from webmap.ros.finding import BRIDGE, Finding
+from webmap.ros.names import is_agent_url
 from webmap.ros.rosbridge import advice
 
 SLOW_LOOP = 0.15
@@ -27,11 +29,19 @@ GIVE_TOPICS = (
 
 def bridge_findings(seen: Observed) -> Iterator[Finding]:
     """Yield the findings about the connection and everything behind it."""
+    by_agent = is_agent_url(seen.url)
     if seen.trouble:
-        yield advice.unreachable(seen.trouble)
+        yield (
+            agent_rules.unreachable(seen)
+            if by_agent
+            else advice.unreachable(seen.trouble)
+        )
         return
     dialect = seen.findings.dialect
-    yield advice.openness(seen.link, seen.url, seen.shown, dialect)
+    if by_agent:
+        yield from agent_rules.agent_findings(seen)
+    else:
+        yield advice.openness(seen.link, seen.url, seen.shown, dialect)
     if seen.unlisted:
         yield advice.topics_not_listed(
             seen.unlisted, "" if seen.topics_given else GIVE_TOPICS
@@ -43,8 +53,9 @@ def bridge_findings(seen: Observed) -> Iterator[Finding]:
     elif not seen.unlisted:
         text = "The bridge does not report its time, so clocks are not compared."
         yield Finding("note", BRIDGE, text)
-    yield advice.blocking(seen.link, seen.url, dialect)
-    yield advice.compression(seen.link, _packed_scans(seen))
+    if not by_agent:
+        yield advice.blocking(seen.link, seen.url, dialect)
+        yield advice.compression(seen.link, _packed_scans(seen))
 
 
 def _packed_scans(seen: Observed) -> list[str]:

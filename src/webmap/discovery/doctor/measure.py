@@ -9,8 +9,9 @@ import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
+from webmap.agents.present import about_agent
 from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.discovery.doctor.configured import ConfiguredRobot, merge_configured
 from webmap.discovery.doctor.frames import FrameListening
@@ -28,7 +29,7 @@ from webmap.discovery.frame_listening import LateFrames, frame_topics
 from webmap.discovery.robots import discover, host_name
 from webmap.ros.asking import ask_topics
 from webmap.ros.bridge import Bridge, TemporaryBridge
-from webmap.ros.names import is_type
+from webmap.ros.names import is_agent_url, is_type
 from webmap.ros.received import ReceivedMessage
 from webmap.ros.rosbridge import checks
 from webmap.ros.subscriptions import Encoding
@@ -115,7 +116,7 @@ async def observe(
                 ),
                 types=asked,
                 findings=discover(asked, host_name(url), trees),
-                link=await checks.look(url),
+                **await _look(url),
             )
             seen = _with_configured(seen, configured(seen.findings))
             if not unlisted:
@@ -138,8 +139,21 @@ async def observe(
             return Observed(url, trouble=str(error) or type(error).__name__)
 
 
+async def _look(url: str) -> dict[str, Any]:
+    """Return what is seen of the rosbridge itself, or known by its agent."""
+    if not is_agent_url(url):
+        return {"link": await checks.look(url)}
+    about = await asyncio.to_thread(about_agent, url)
+    if about is None or about.open_at is None:
+        return {}
+    return {"open_at": tuple(about.open_at)}
+
+
 async def tried(seen: Observed) -> Observed:
     """Return the observations, with a test of what a slow service call delays."""
+    if is_agent_url(seen.url):
+        why = "an agent lets a display offer no service"
+        return replace(seen, link=checks.not_tried(seen.link, why))
     if seen.unlisted:
         return replace(seen, link=checks.not_tried(seen.link))
     return replace(seen, link=await checks.tried_a_call(seen.link, seen.url))

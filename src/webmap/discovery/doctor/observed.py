@@ -134,3 +134,6 @@ class Observed:
 
     link: LinkFacts = field(default_factory=LinkFacts)
     """Facts about the bridge itself."""
+
+    open_at: tuple[str, ...] | None = None
+    """Where other computers may reach the rosbridge of an agent, if the agent knows."""

@@ -8,7 +8,7 @@ from webmap.discovery.doctor.rate_rules import rare_finding, rate_finding
 from webmap.discovery.doctor.shown_rules import shown_findings
 from webmap.discovery.found import FoundRobot, Guess
 from webmap.ros.finding import Finding
-from webmap.ros.names import is_type, same_type
+from webmap.ros.names import is_agent_url, is_type, same_type
 from webmap.ros.rosbridge import advice
 from webmap.ros.rosbridge.graph import is_client_node
 
@@ -35,6 +35,8 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         # The stop test identifies robots by the names that discovery finds.
         name = one.found_as if robot.name in seen.configured else robot.name
         command = f"webmap doctor {seen.url} --stop-test {name}, or " if name else ""
+        if is_agent_url(seen.url):  # its gate alone moves its robots
+            command = ""
         yield Finding(
             "note",
             robot.name,

@@ -79,7 +79,7 @@ def openness(
             BRIDGE,
             f"The rosbridge is on this machine and listens at {', '.join(outward)}: it "
             f"has no sign-in, so everybody who reaches this machine can drive.",
-            _listen_advice(dialect, "this machine alone (address: 127.0.0.1)"),
+            listen_advice(dialect, "this machine alone (address: 127.0.0.1)"),
         )
     if here:
         return Finding(
@@ -98,13 +98,13 @@ def openness(
         BRIDGE,
         f"The rosbridge is open to the network ({facts.peer or parts.hostname}): it "
         f"has no sign-in, so everybody who reaches it can drive; {secret}.{hidden}",
-        f"{_listen_advice(dialect, 'the robot alone or on a VPN (address)')} Hide "
+        f"{listen_advice(dialect, 'the robot alone or on a VPN (address)')} Hide "
         "topics and services that no client needs (topics_glob, services_glob), and "
         "use wss with a certificate.",
     )
 
 
-def _listen_advice(dialect: str | None, where: str) -> str:
+def listen_advice(dialect: str | None, where: str) -> str:
     """Return advice on how to close the port to other machines."""
     if dialect == "ros1":
         return (
