@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 from webmap import Bridge, Robot
-from webmap.base.errors import BridgeClosed, ConfigError, MotionError, MotionRefused
+from webmap.base.errors import (
+    BridgeClosed,
+    ConfigError,
+    MotionError,
+    MotionRefused,
+    NoLease,
+)
 from webmap.base.lifecycle import lifecycle
 from webmap.core.motion import RobotMotion
 from webmap.gate import pipe
@@ -52,6 +58,9 @@ class Gate:
     def stop_robot(self, robot_id):
         self.asked.append(("stop", robot_id))
 
+    def cancel(self, robot_id):
+        self.asked.append(("cancel", robot_id))
+
     def reset(self, robot_id, stop):
         self.asked.append(("reset", robot_id, stop))
 
@@ -74,6 +83,37 @@ def gate(monkeypatch):
 def drivable(robot, **options):
     robot.set_twist_topic(Link(), "/cmd_vel", type="geometry_msgs/Twist", **options)
     return robot
+
+
+class AgentLink(Link):
+    url = "zenoh://hall:7447/bay3"
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        lambda robot: asyncio.run(robot.acquire_lease()),
+        lambda robot: robot.twist(0.5),
+        lambda robot: robot.twist(0.0),
+        lambda robot: robot.move(robot.position, robot.orientation),
+        lambda robot: robot.locate(robot.position, robot.orientation),
+    ],
+)
+def test_a_program_on_a_display_is_refused_the_control_of_an_agents_robot(
+    robot, gate, command
+):
+    gate.ready = False  # its agent is away: the reason is the same, and comes at once
+    robot.set_twist_topic(AgentLink(), "/cmd_vel", type="geometry_msgs/Twist")
+    robot.set_move_topic(AgentLink(), "/goal")
+    with pytest.raises(NoLease, match="'Bob' is an agent's: a program on a display"):
+        command(robot)
+    assert gate.asked == []
+    robot.stop()
+    robot.cancel()
+    assert gate.asked == [
+        ("stop", robot.motion.id),
+        ("cancel", robot.motion.id),
+    ]
 
 
 def test_stop_and_reset_stop_are_sent_to_the_gate(robot, gate):
