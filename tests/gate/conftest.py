@@ -7,6 +7,7 @@ from gate_robot import FakeRobot
 
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import RobotSpec
+from webmap.gate.rules.machines import Machines
 
 
 @pytest.fixture(autouse=True)
@@ -24,6 +25,25 @@ def decisions(request, monkeypatch):
     found.listen(monkeypatch)
     yield found
     found.end()
+
+
+@pytest.fixture(autouse=True)
+def awake(monkeypatch):
+    """Check after each event and step that exactly the active machines are awake.
+
+    Returns:
+        The method without this check.
+
+    """
+    report = Machines.report
+
+    def checked(machines, now):
+        report(machines, now)
+        active = {m for m in machines._by_key.values() if m.active}
+        assert machines._awake == active
+
+    monkeypatch.setattr(Machines, "report", checked)
+    return report
 
 
 @pytest.fixture(autouse=True)

@@ -17,8 +17,9 @@ import json
 import logging
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -56,9 +57,14 @@ def path_of(folder: Path, key: Key, kind: str) -> Path:
 
 def _paths_of(folder: Path, key: Key, kind: str) -> list[Path]:
     """Return the file, then its former paths, when each spelling had its own file."""
+    return [folder / f"{name}.{kind}" for name in _names_of(key)]
+
+
+@lru_cache(maxsize=1 << 14)
+def _names_of(key: Key) -> tuple[str, ...]:
+    """Return the names of a machine's files, without the kind, one per spelling."""
     keys = [key._replace(url=url) for url in spellings_of(key.url)]
-    names = [hashlib.sha256("\n".join(k).encode()).hexdigest()[:24] for k in keys]
-    return [folder / f"{name}.{kind}" for name in names]
+    return tuple(hashlib.sha256("\n".join(k).encode()).hexdigest()[:24] for k in keys)
 
 
 def _found(folder: Path, key: Key, kind: str) -> Path:
@@ -86,6 +92,18 @@ class Records:
     def latch_of(self, key: Key) -> Press | None:
         """Return the active STOP of a machine, if there is one."""
         return _press_in(_found(self._folder, key, "stop"))
+
+    def may_be_stopped(self, keys: Iterable[Key]) -> set[Key]:
+        """Return those of the machines that may have a STOP file, by one listing.
+
+        The folder of a thousand machines rarely has more than a few STOP files.
+        """
+        try:
+            files = os.listdir(self._folder)
+        except OSError:  # each file may be there nevertheless
+            return set(keys)
+        names = {name.partition(".")[0] for name in files if ".stop" in name}
+        return {key for key in keys if not names.isdisjoint(_names_of(key))}
 
     def stamp_of(self, key: Key) -> tuple[int, int] | None:
         """Return a value that changes with the STOP file; ``None`` without a file."""
@@ -255,7 +273,13 @@ class Disk:
 
     def _changed(self) -> list[StopFileChanged]:
         seen = []
-        for key, before in list(self._stamps.items()):
+        stamps = self._stamps.copy()
+        listed = self._records.may_be_stopped(stamps)
+        for key, before in stamps.items():
+            # A listing may miss a file that is being replaced, so one that was there
+            # before is looked at itself.
+            if before is None and key not in listed:
+                continue
             stamp = self._records.stamp_of(key)
             if stamp != before and key in self._stamps:
                 self._stamps[key] = stamp

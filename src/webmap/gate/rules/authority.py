@@ -224,6 +224,13 @@ class Authority:
         """Return whether this connection has the lease."""
         return self.lease is not None and self.lease.connection == connection
 
+    def involves(self, connection: str) -> bool:
+        """Return whether this connection has the lease, or waits for it."""
+        waiting = (self.handover.asker, self.handover.successor)
+        return self.is_held_by(connection) or any(
+            who is not None and who.id == connection for who in waiting
+        )
+
     def give(self, to: Connection, now: float) -> int:
         """Give the lease to a connection and return its epoch; nothing moves."""
         epoch = self._epochs.next()

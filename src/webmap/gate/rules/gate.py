@@ -122,7 +122,7 @@ class Gate:
             message.connection
         ):
             return
-        for machine in self._machines:
+        for machine in self._machines.which(lambda m: m.involves(message.connection)):
             machine.lost(message.connection, now)
 
     def _speeds(self, message: protocol.Speeds, now: float) -> None:
@@ -130,9 +130,9 @@ class Gate:
         if connection is None:
             return
         connection.set_speeds(message.v, message.w)
-        for machine in self._machines:
-            if machine.authority.is_held_by(connection.id):
-                machine.authority.set_cap(connection.cap)
+        holds = self._machines.which(lambda m: m.authority.is_held_by(connection.id))
+        for machine in holds:
+            machine.authority.set_cap(connection.cap)
 
     def _from_page(self, message: protocol.FromPage, now: float) -> None:
         connection = self._connections.find(message.connection)

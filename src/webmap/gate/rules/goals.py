@@ -255,6 +255,10 @@ class Goals:
         if self.can_cancel:
             self.cancel(now, "STOP")
 
+    def is_by(self, connection: str) -> bool:
+        """Return whether this connection sent the goal that may be running."""
+        return self._by == connection
+
     def lost(self, now: float, connection: str | None = None) -> None:
         """Apply ``on_operator_loss`` if the sender of the goal is lost.
 

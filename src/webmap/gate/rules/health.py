@@ -66,13 +66,14 @@ class LinkHealth:
         self.up = False
         self.trips = Ages()
         """The round trips of the pings, in seconds."""
+        self.answered_at = float("-inf")
+        """When the newest answer came, or the link was opened."""
         self._ping_at = float("-inf")
-        self._answered_at = float("-inf")
 
     def opened(self, now: float) -> None:
         """Note that the link is up; none of its pings is answered yet."""
         self.up = True
-        self._ping_at, self._answered_at = float("-inf"), now
+        self._ping_at, self.answered_at = float("-inf"), now
         self.trips.clear()
 
     def closed(self) -> None:
@@ -82,7 +83,7 @@ class LinkHealth:
     def answered(self, asked_at: float, now: float) -> None:
         """Note that the ping of ``asked_at`` was answered at ``now``."""
         self._ping_at = max(self._ping_at, asked_at)
-        self._answered_at = now
+        self.answered_at = now
         self.trips.add(now - asked_at, now)
 
     def answered_since(self, then: float) -> bool:
@@ -98,7 +99,7 @@ class LinkHealth:
 
     def stalled(self, now: float) -> bool:
         """Return whether the link is open but carries nothing."""
-        return self.up and now - self._answered_at > STALL_LIMIT
+        return self.up and now - self.answered_at > STALL_LIMIT
 
 
 class DisplayPulse:

@@ -136,6 +136,12 @@ class Machine:
             or self.other_writer.seen is not None
         )
 
+    def involves(self, connection: str) -> bool:
+        """Return whether a connection has or wants control, or sent a goal."""
+        return self.authority.involves(connection) or any(
+            goals.is_by(connection) for goals in self.robots.goals.values()
+        )
+
     # The robots of the machine.
 
     def declare(

@@ -20,7 +20,7 @@ from webmap.gate.protocol import (
 )
 from webmap.gate.rules.connections import Epochs
 from webmap.gate.rules.goals import Goals
-from webmap.gate.rules.health import DisplayPulse, LinkHealth
+from webmap.gate.rules.health import STALL_LIMIT, DisplayPulse, LinkHealth
 from webmap.gate.rules.machine import Machine
 from webmap.gate.rules.report import Reporter, report
 from webmap.gate.rules.stop import StopLatch
@@ -50,6 +50,8 @@ class Machines:
         self._emit = emit
         self._refuse = refuse
         self._by_key: dict[events.Key, Machine] = {}
+        self._by_url: dict[str, dict[Machine, None]] = {}
+        """The machines that use, or once used, a link to each bridge."""
         self._latches: dict[events.Key, StopLatch] = {}
         self._stopped_as: dict[events.Key, dict[events.Key, str]] = {}
         """For each machine with a STOP: the keys that it had before and under which the
@@ -58,6 +60,10 @@ class Machines:
         self._links: dict[tuple[str, events.Lane], LinkHealth] = {}
         self._reporters: dict[str, Reporter] = {}
         self._touched: set[events.Key] = set()
+        self._awake: set[Machine] = set()
+        """The active machines; only an event changes that, or their own step."""
+        self._oldest_answer = float("-inf")
+        """No control link that is up was answered before, see :meth:`step`."""
         self.handlers: dict[type, Callable[[Any, float], None]] = {
             RobotSpec: self._declare,
             Forget: self._forget,
@@ -87,6 +93,16 @@ class Machines:
             self._touched.add(machine.key)
             yield machine
 
+    def which(self, test: Callable[[Machine], bool]) -> list[Machine]:
+        """Return the machines that pass a test, and mark them as possibly changed.
+
+        A report takes much longer than a test: an event must not cause one for each of
+        a thousand machines that it does not concern.
+        """
+        found = [machine for machine in self._by_key.values() if test(machine)]
+        self._touched.update(machine.key for machine in found)
+        return found
+
     def touch_all(self) -> None:
         """Mark every machine as possibly changed, so that it is reported."""
         self._touched.update(self._by_key)
@@ -94,7 +110,7 @@ class Machines:
     @property
     def busy(self) -> bool:
         """Whether :meth:`step` has anything to do for any machine."""
-        return any(machine.active for machine in self._by_key.values())
+        return bool(self._awake)
 
     @property
     def silent(self) -> bool:
@@ -144,28 +160,52 @@ class Machines:
             same = latch.press is not None and latch.press.id in (earlier, stop)
             if left and same:
                 latch.reset()
+                if there is not None:
+                    self._sort(there)
 
     def step(self, now: float) -> None:
-        """Do what is due for each machine, and close stalled control links."""
-        for machine in list(self._by_key.values()):
-            if machine.active:
+        """Do what is due for each active machine, and close stalled control links."""
+        if self._awake:
+            for machine in [m for m in self._by_key.values() if m in self._awake]:
                 machine.step(now)
                 self._touched.add(machine.key)
                 self._drop_if_empty(machine)
+        if now - self._oldest_answer > STALL_LIMIT:
+            self._cut_stalled(now)
+
+    def _cut_stalled(self, now: float) -> None:
+        """Close stalled control links, and note the oldest answer of the others.
+
+        Answers only become newer, and a link that opens later counts as answered then.
+        So no link is stalled until that answer is too old.
+        """
+        self._oldest_answer = now
         for (url, lane), link in self._links.items():
             if lane == "control" and link.stalled(now):
                 self._emit(CutLink(url))
                 self._link_down(events.LinkDown(url, lane), now)
+            elif lane == "control" and link.up:
+                self._oldest_answer = min(self._oldest_answer, link.answered_at)
 
     def report(self, now: float) -> None:
         """Send a report on each robot whose machine may have changed."""
         touched, self._touched = self._touched, set()
         for key in touched:
             machine = self._by_key.get(key)
+            if machine is None:
+                continue
+            self._sort(machine)
             # Until the shell reports the lock, it is unknown whether STOP is active.
-            if machine is not None and machine.known:
+            if machine.known:
                 for spec in list(machine.robots.specs.values()):
                     self._report(machine, spec, now)
+
+    def _sort(self, machine: Machine) -> None:
+        """Note whether a machine is active now."""
+        if machine.active:
+            self._awake.add(machine)
+        else:
+            self._awake.discard(machine)
 
     def _report(self, machine: Machine, spec: RobotSpec, now: float) -> None:
         reporter = self._reporters.get(spec.id)
@@ -203,7 +243,10 @@ class Machines:
                 self._emit(Attach(key, spec))
                 return
         machine = self._by_key.get(key) or self._new_machine(key)
-        tasks = self._link(spec.goal_url or key.url, "tasks")
+        goal_url = spec.goal_url or key.url
+        for url in (key.url, goal_url, spec.bridge_url):
+            self._by_url.setdefault(url, {})[machine] = None
+        tasks = self._link(goal_url, "tasks")
         machine.declare(spec, tasks, self._link(spec.bridge_url, "tasks"), now)
         self._emit(Attach(key, spec))
         if not machine.known:
@@ -264,6 +307,9 @@ class Machines:
     def _drop_if_empty(self, machine: Machine) -> None:
         if not machine.robots.specs:
             del self._by_key[machine.key]
+            self._awake.discard(machine)
+            for machines in self._by_url.values():
+                machines.pop(machine, None)
             self._emit(Unlock(machine.key))
 
     # Events of the shell.
@@ -271,10 +317,16 @@ class Machines:
     def _link(self, url: str, lane: events.Lane) -> LinkHealth:
         return self._links.setdefault((url, lane), LinkHealth())
 
+    def _at(self, url: str) -> list[Machine]:
+        """Return the machines that may use a link to a bridge, marked as changed."""
+        machines = list(self._by_url.get(url, ()))
+        self._touched.update(machine.key for machine in machines)
+        return machines
+
     def _link_up(self, event: events.LinkUp, now: float) -> None:
         link = self._link(event.url, event.lane)
         link.opened(now)
-        for machine in self:
+        for machine in self._at(event.url):
             if machine.control is link:
                 machine.link_up(now)
             machine.active_stop.tasks_up(link, now)
@@ -282,7 +334,7 @@ class Machines:
     def _link_down(self, event: events.LinkDown, now: float) -> None:
         link = self._link(event.url, event.lane)
         link.closed()
-        for machine in self:
+        for machine in self._at(event.url):
             if machine.control is link:
                 machine.link_down(now)
             if not event.spent:
