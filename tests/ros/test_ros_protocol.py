@@ -57,6 +57,25 @@ def test_every_captured_message_decodes_and_its_head_names_the_topic(path):
     assert isinstance(event.decode(), dict)
 
 
+@given(
+    name=st.text(st.sampled_from('/\\"ab_é\n\x7f'), min_size=1, max_size=12)
+    | st.integers(590, 1210).map("/".ljust),
+    escaped=st.booleans(),
+    spaced=st.booleans(),
+)
+def test_a_head_names_the_topic_that_the_whole_frame_has_or_none(name, escaped, spaced):
+    operation = {"op": "publish", "topic": name, "msg": {}}
+    separators = None if spaced else (",", ":")
+    text = json.dumps(operation, separators=separators, ensure_ascii=escaped)
+    frame = (text.replace("/", "\\/") if escaped else text).encode()
+    assert topic_in_head(frame) in (name, None)
+    if name.isidentifier() and name.isascii():
+        assert topic_in_head(frame) == name
+    event = Protocol().receive(frame, 0.0)
+    assert isinstance(event, Publish)
+    assert (event.topic, event.decode()) == (name, {})
+
+
 @pytest.mark.parametrize("path", files("publish_odom_nan*", "cbor_odom_nan*"))
 def test_odometry_with_nan_in_its_covariance_decodes(path):
     odom = read(path).decode(messages.OdometryMsg)

@@ -7,8 +7,7 @@ removed when the scope closes, in reverse order, also when one removal raises.
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from contextvars import ContextVar
 from typing import Any, Protocol, TypeVar
 
@@ -78,14 +77,9 @@ class Scope:
         """Forget ``thing``, which was removed by other means."""
         self._things.pop(id(thing), None)
 
-    @contextmanager
-    def active(self) -> Iterator["Scope"]:
+    def active(self) -> "Within":
         """Make this the scope that new objects join, within a ``with`` block."""
-        token = _current.set(self)
-        try:
-            yield self
-        finally:
-            _current.reset(token)
+        return Within(self)
 
     def close(self) -> None:
         """Remove all objects, newest first, also when one removal raises."""
@@ -103,14 +97,30 @@ def current_scope() -> Scope | None:
     return _current.get()
 
 
-@contextmanager
-def no_scope() -> Iterator[None]:
+class Within:
+    """A ``with`` block in which new objects join a given scope; used once.
+
+    Args:
+        scope: The scope; ``None`` for no scope.
+
+    """
+
+    __slots__ = ("_scope", "_token")
+
+    def __init__(self, scope: Scope | None) -> None:
+        self._scope = scope
+
+    def __enter__(self) -> Scope | None:
+        self._token = _current.set(self._scope)
+        return self._scope
+
+    def __exit__(self, *error: object) -> None:
+        _current.reset(self._token)
+
+
+def no_scope() -> Within:
     """Let new objects join no scope, within a ``with`` block."""
-    token = _current.set(None)
-    try:
-        yield
-    finally:
-        _current.reset(token)
+    return Within(None)
 
 
 def keep(thing: T) -> T:

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from webmap.base.scope import Removal, break_off, current_scope, no_scope
+from webmap.base.scope import Removal, Within, break_off, current_scope
 
 log = logging.getLogger("webmap.ros")
 
@@ -40,9 +40,9 @@ class Callback:
         if self.removed:
             return
         try:
-            with self._scope.active() if self._scope is not None else no_scope():
+            with Within(self._scope):
                 result = self.fn(*args)
-                if inspect.isawaitable(result):
+                if result is not None and inspect.isawaitable(result):
                     task = asyncio.ensure_future(result)
                     self._tasks.add(task)
                     task.add_done_callback(self._finished)

@@ -4,6 +4,8 @@ import asyncio
 import time
 from collections.abc import Iterable
 
+import msgspec
+
 from webmap.ros.offload import Offload
 from webmap.ros.received import ReceivedMessage
 from webmap.ros.subscriptions import Subscription
@@ -61,23 +63,25 @@ class FanOut:
             self._hold(listener)
 
     def _give(self, message: ReceivedMessage, listeners: list[Subscription]) -> None:
-        _deliver(message, [each for each in listeners if each.undecoded])
-        listeners = [each for each in listeners if not each.undecoded]
-        if not listeners:
+        decoding = []
+        for listener in listeners:
+            if listener.undecoded:
+                listener.deliver(message)
+            else:
+                decoding.append(listener)
+        if decoding and self._offload.is_needed(message):
+            self._decode_elsewhere(message, decoding)
             return
-        if self._offload.is_needed(message):
-            types = frozenset(listener.decode for listener in listeners)
-            self._offload.decode(
-                message,
-                types,
-                lambda type: _deliver(
-                    message, [each for each in listeners if each.decode is type]
-                ),
-            )
-        else:
-            _deliver(message, listeners)
+        for listener in decoding:
+            listener.deliver(message)
 
+    def _decode_elsewhere(
+        self, message: ReceivedMessage, listeners: list[Subscription]
+    ) -> None:
+        def deliver(type: type[msgspec.Struct] | None) -> None:
+            for listener in listeners:
+                if listener.decode is type:
+                    listener.deliver(message)
 
-def _deliver(message: ReceivedMessage, listeners: list[Subscription]) -> None:
-    for listener in listeners:
-        listener.deliver(message)
+        types = frozenset(listener.decode for listener in listeners)
+        self._offload.decode(message, types, deliver)

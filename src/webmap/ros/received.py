@@ -36,14 +36,16 @@ class ReceivedMessage:
                 fields of ``type``.
 
         """
-        if type not in self._decoded:
-            try:
-                self._decoded[type] = self._decode(type)
-            except ProtocolError as error:
-                self._decoded[type] = error
-        value = self._decoded[type]
-        if isinstance(value, ProtocolError):
-            raise value
+        if type in self._decoded:
+            value = self._decoded[type]
+            if isinstance(value, ProtocolError):
+                raise value
+            return value
+        try:
+            value = self._decoded[type] = self._decode(type)
+        except ProtocolError as error:
+            self._decoded[type] = error
+            raise
         return value
 
     def is_decoded(self, type: type[msgspec.Struct] | None) -> bool:

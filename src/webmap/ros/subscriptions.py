@@ -78,6 +78,8 @@ class Throttle(Generic[T]):
 
     def offer(self, thing: T, now: float) -> T | None:
         """Return ``thing`` if it is due; else keep it in place of an older one."""
+        if not self.period:
+            return thing
         if now < self._due:
             self._held = thing
             return None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from webmap.base.errors import SceneError
-from webmap.base.scope import Removal, Scope, current_scope, keep, no_scope
+from webmap.base.scope import Removal, Scope, Within, current_scope, keep
 from webmap.scene.allowed import (
     attribute_name,
     check_event,
@@ -95,7 +95,7 @@ class Listener:
 
     def call(self, event: Event, report: Report, spawn: Spawn | None) -> None:
         """Call the handler in its scope; an exception is reported, not raised."""
-        with self.scope.active() if self.scope is not None else no_scope():
+        with Within(self.scope):
             try:
                 result = self.handler(event)
                 if spawn is not None and inspect.isawaitable(result):

@@ -3,6 +3,7 @@
 import sys
 from array import array
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NoReturn
 
 from webmap.base.errors import ProtocolError
@@ -17,7 +18,10 @@ _REFUSED_TOO = (258, 260, 261, 1004, 43000, 55799)
 _LITTLE = {64: "B", 68: "B", 69: "H", 70: "I", 71: "Q"}
 _LITTLE |= {72: "b", 77: "h", 78: "i", 79: "q", 85: "f", 86: "d"}
 _BIG = {65: "H", 66: "I", 67: "Q", 73: "h", 74: "i", 75: "q", 81: "f", 82: "d"}
-TYPED_ARRAY_TAGS = frozenset(_LITTLE) | frozenset(_BIG)
+_CODES = _LITTLE | _BIG
+TYPED_ARRAY_TAGS = frozenset(_CODES)
+_FOREIGN = frozenset(_LITTLE if sys.byteorder == "big" else _BIG)
+"""The tags of numbers in the other byte order than this machine's."""
 
 
 def looks_like_cbor(frame: bytes | bytearray) -> bool:
@@ -56,7 +60,7 @@ def decode(frame: bytes | bytearray) -> dict[str, Any]:
     return value
 
 
-def typed_array(tag: int, value: object) -> "array[Any]":
+def typed_array(tag: int, value: object, _immutable: bool = False) -> "array[Any]":
     """Return the numbers of a CBOR typed array.
 
     Raises:
@@ -65,15 +69,10 @@ def typed_array(tag: int, value: object) -> "array[Any]":
     """
     if not isinstance(value, bytes):
         raise ValueError(f"typed array {tag} holds {type(value).__name__}, not bytes")
-    numbers: array[Any] = array(_LITTLE.get(tag) or _BIG[tag])
-    numbers.frombytes(value)
-    if (sys.byteorder == "big") != (tag in _BIG):
+    numbers: array[Any] = array(_CODES[tag], value)
+    if tag in _FOREIGN:
         numbers.byteswap()
     return numbers
-
-
-def _numbers(tag: int) -> Callable[[Any, bool], Any]:
-    return lambda value, _immutable: typed_array(tag, value)
 
 
 def _refuse(tag: int) -> Callable[[Any, bool], NoReturn]:
@@ -89,5 +88,5 @@ def _unknown_tag(tag: Any, _immutable: bool) -> NoReturn:
 
 _DECODERS: dict[int, Callable[[Any, bool], Any]] = {
     **{tag: _refuse(tag) for tag in (*_REFUSED, *_REFUSED_TOO)},
-    **{tag: _numbers(tag) for tag in TYPED_ARRAY_TAGS},
+    **{tag: partial(typed_array, tag) for tag in TYPED_ARRAY_TAGS},
 }

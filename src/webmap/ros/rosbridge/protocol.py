@@ -206,7 +206,7 @@ class Fragments:
 
 # The beginning of a message on a topic from every bridge that was measured.
 _JSON_HEAD = re.compile(
-    rb'\s*\{\s*"op"\s*:\s*"publish"\s*,\s*"topic"\s*:\s*"((?:[^"\\]|\\/){1,600})"'
+    rb'\s*+\{\s*+"op"\s*+:\s*+"publish"\s*+,\s*+"topic"\s*+:\s*+"([^"]{1,1200}+)"'
 )
 _CBOR_HEAD = re.compile(
     rb"[\xa3-\xb7]\x62op\x67publish\x65topic(?:([\x61-\x77])|\x78(.))", re.DOTALL
@@ -340,7 +340,8 @@ def topic_in_head(frame: bytes | bytearray) -> str | None:
     """
     match = _JSON_HEAD.match(frame)
     if match is not None:
-        return _text(match[1].replace(rb"\/", b"/"))
+        name = match[1].replace(rb"\/", b"/")  # some bridges escape every slash
+        return None if b"\\" in name else _text(name)
     match = _CBOR_HEAD.match(frame)
     if match is None:
         return None
