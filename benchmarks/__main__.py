@@ -15,6 +15,7 @@ BENCHES = [
     "uplink",
     "transports",
     "router",
+    "idle",
 ]
 
 

@@ -3,7 +3,8 @@
 Each listens in its own process to the same player in another process. roslibpy returns
 dicts and lists; WebMap returns typed messages and numpy arrays, so it does more work.
 WebMap requests scans in CBOR, which roslibpy cannot read; the third contender is WebMap
-with a bridge that only has JSON.
+with a bridge that only has JSON. For odometry the reference is the floor: websockets
+and msgspec alone, which WebMap uses.
 """
 
 import json
@@ -48,7 +49,7 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare the clients on odometry and on scans."""
     comparisons = []
     for topic, title, clients in (
-        (ODOM, "Odometry of 1.9 kB", ["webmap", "roslibpy"]),
+        (ODOM, "Odometry of 1.9 kB", ["libraries", "webmap", "roslibpy"]),
         (SCAN, "LaserScan of 720 ranges", ["webmap", "roslibpy", "webmap-json"]),
     ):
         count = WARM + COUNTS[topic] // (10 if quick else 1)

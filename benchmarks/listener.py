@@ -107,11 +107,36 @@ async def _listen_with_webmap(
     await bridge.stop()
 
 
+def listen_with_libraries(port: int, topic: str, meter: Meter) -> None:
+    """Receive typed messages with websockets and msgspec alone, and nothing around."""
+    asyncio.run(_listen_with_libraries(port, topic, meter))
+
+
+async def _listen_with_libraries(port: int, topic: str, meter: Meter) -> None:
+    import msgspec
+    from websockets.asyncio.client import connect
+
+    from webmap.ros.arrays import dec_hook
+    from webmap.ros.messages import OdometryMsg
+    from webmap.ros.rosbridge import ops
+
+    fields = [("op", str), ("topic", str), ("msg", OdometryMsg)]
+    decode = msgspec.json.Decoder(msgspec.defstruct("Frame", fields), dec_hook=dec_hook)
+    async with connect(f"ws://127.0.0.1:{port}", compression=None) as link:
+        await link.send(ops.subscribe(topic, id="1", type=TYPES[topic]), text=True)
+        while not meter.done.is_set():
+            message: Any = decode.decode(await link.recv(decode=False))
+            _ = message.msg.pose.pose.position.x
+            meter.frame()
+
+
 def main(client: str, port: int, topic: str, count: int) -> None:
     """Listen with one client and print the figures."""
     meter = Meter(count)
     if client == "roslibpy":
         listen_with_roslibpy(port, topic, meter)
+    elif client == "libraries":
+        listen_with_libraries(port, topic, meter)
     else:
         encoding: Encoding | None = "text" if client == "webmap-json" else None
         listen_with_webmap(port, topic, meter, encoding)

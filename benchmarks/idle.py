@@ -1,0 +1,176 @@
+"""What robots that nobody drives cost the gate.
+
+First one rosbridge with many robots: the gate has three connections, whatever their
+number, so this shows the work for each robot. Then one rosbridge for each robot: the
+gate pings each connection, and bare connections of the ``websockets`` package that are
+pinged as often are the reference.
+"""
+
+import asyncio
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+
+import psutil
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.server import ServerConnection, serve
+
+from benchmarks.harness import Comparison, Contender, Figures, compare
+from webmap.gate.display.client import GateClient
+from webmap.gate.protocol import Report, RobotReport, RobotSpec
+
+MANY = 1000
+"""Robots of one rosbridge."""
+
+BRIDGES = 100
+"""Robots with a rosbridge each."""
+
+PINGS = (0.5, 1.0, 1.0)
+"""Seconds between pings on the gate's lanes: control, odometry and tasks."""
+
+PATIENCE = 60.0
+"""Seconds until all connections must be open."""
+
+
+async def _serve() -> None:
+    """Accept everything and send nothing; prints the port."""
+
+    async def handle(link: ServerConnection) -> None:
+        async for _ in link:
+            pass
+
+    keep = {"compression": None, "ping_interval": None}
+    async with serve(handle, "127.0.0.1", 0, **keep) as server:  # type: ignore[arg-type]
+        print(next(iter(server.sockets)).getsockname()[1], flush=True)
+        await server.serve_forever()
+
+
+async def _ping(link: ClientConnection, period: float) -> None:
+    while True:
+        await (await link.ping())
+        await asyncio.sleep(period)
+
+
+async def _connect(port: str, robots: int) -> None:
+    """Open three connections for each robot and ping them; prints a line when open."""
+    address = f"ws://127.0.0.1:{port}"
+    pinging = []
+    for _ in range(robots):
+        for period in PINGS:
+            link = await connect(address, compression=None, ping_interval=None)
+            pinging.append(asyncio.create_task(_ping(link, period)))
+    print("open", flush=True)
+    await asyncio.gather(*pinging)
+
+
+@contextmanager
+def _running(*arguments: object) -> Iterator[tuple[str, psutil.Process]]:
+    """Run a part of this module; yield its first line and its process."""
+    command = [sys.executable, "-m", "benchmarks.idle", *map(str, arguments)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            yield process.stdout.readline().strip(), psutil.Process(process.pid)
+        finally:
+            process.terminate()
+
+
+def _measured(process: psutil.Process, seconds: float) -> Figures:
+    before = sum(process.cpu_times()[:2])
+    time.sleep(seconds)
+    used = sum(process.cpu_times()[:2]) - before
+    return {"cpu (% of a core)": 100 * used / seconds}
+
+
+def _spec(number: int, url: str) -> RobotSpec:
+    return RobotSpec(
+        id=f"robot {number}",
+        name=f"robot {number}",
+        bridge_url=url,
+        twist_topic=f"/robot_{number}/cmd_vel",
+        odometry_topic=f"/robot_{number}/odom",
+        goal_topic=f"/robot_{number}/goal",
+        cancel_topic=f"/robot_{number}/cancel",
+    )
+
+
+def gate_with(robots: int, seconds: float, *, apart: bool) -> Callable[[], Figures]:
+    """Return a run of the gate with idle robots.
+
+    Args:
+        robots: How many.
+        seconds: The time that is measured.
+        apart: Whether each robot has its own rosbridge.
+
+    """
+
+    def run() -> Figures:
+        with ExitStack() as running:
+            folder = running.enter_context(tempfile.TemporaryDirectory())
+            os.environ["WEBMAP_STATE_DIR"] = folder
+            port, _ = running.enter_context(_running("serve"))
+            up: set[str] = set()
+            all_up = threading.Event()
+
+            def note(report: Report) -> None:
+                if isinstance(report, RobotReport) and report.link == "up":
+                    up.add(report.robot)
+                    if len(up) == robots:
+                        all_up.set()
+
+            client = GateClient()
+            client.on_report(note)
+            client.start()
+            running.callback(client.stop)
+            for number in range(robots):
+                path = f"/{number}" if apart else ""
+                client.declare(_spec(number, f"ws://127.0.0.1:{port}{path}"))
+            if not all_up.wait(PATIENCE):
+                raise RuntimeError(f"only {len(up)} of {robots} robots are connected")
+            time.sleep(2.0)
+            assert client.pid is not None
+            return _measured(psutil.Process(client.pid), seconds)
+
+    return run
+
+
+def bare(robots: int, seconds: float) -> Callable[[], Figures]:
+    """Return a run of as many connections as the gate has for these robots."""
+
+    def run() -> Figures:
+        with ExitStack() as running:
+            port, _ = running.enter_context(_running("serve"))
+            _, process = running.enter_context(_running("connect", port, robots))
+            time.sleep(2.0)
+            return _measured(process, seconds)
+
+    return run
+
+
+def bench(rounds: int, quick: bool = False) -> list[Comparison]:
+    """Compare many idle robots with one, and their connections with bare ones."""
+    seconds = 2.0 if quick else 10.0
+    many = [
+        Contender(f"{robots} robots", gate_with(robots, seconds, apart=False))
+        for robots in (1, MANY)
+    ]
+    apart = [
+        Contender("bare connections", bare(BRIDGES, seconds)),
+        Contender("the gate", gate_with(BRIDGES, seconds, apart=True)),
+    ]
+    return [
+        compare("Idle robots of one rosbridge", many, rounds),
+        compare(f"{BRIDGES} idle robots with a rosbridge each", apart, rounds),
+    ]
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "serve":
+        asyncio.run(_serve())
+    else:
+        asyncio.run(_connect(sys.argv[2], int(sys.argv[3])))
