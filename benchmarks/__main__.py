@@ -11,6 +11,7 @@ BENCHES = [
     "viewers",
     "drawing",
     "console",
+    "opening",
     "agents",
     "uplink",
     "transports",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from webmap.server.app import FOLDERS
+from webmap.server.own_files import FOLDERS
 
 ROOT = Path(__file__).parents[2]
 SOURCES = sorted((ROOT / "src").rglob("*.py"))

@@ -1,4 +1,7 @@
+import gzip
 import logging
+import re
+import zlib
 
 import pytest
 from server_fakes import TOKEN, FakePage, key_in
@@ -14,6 +17,7 @@ from webmap.server.auth import Token
 from webmap.server.security import CONTENT_SECURITY_POLICY
 
 ORIGIN = {"origin": "http://127.0.0.1:8000"}
+PAGE_JS = 'src="{}/_webmap/v-[0-9a-f]{{16}}/web/page.js"'
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -155,7 +159,7 @@ def test_a_made_page_is_served(client):
     answer = client.get("/lab/")
     assert answer.headers["content-type"] == "text/html; charset=utf-8"
     assert "<title>The &lt;lab&gt;</title>" in answer.text
-    assert 'src="/_webmap/web/page.js"' in answer.text
+    assert re.search(PAGE_JS.format(""), answer.text)
 
 
 def test_a_missing_or_additional_slash_redirects_to_the_page(client, with_page):
@@ -166,7 +170,7 @@ def test_a_missing_or_additional_slash_redirects_to_the_page(client, with_page):
 def test_an_html_page_of_the_user_is_served_with_the_files_of_its_folder(with_page):
     page = with_page.get("/own/page")
     assert "Grüße" in page.text
-    assert 'src="/_webmap/web/page.js"' in page.text
+    assert re.search(PAGE_JS.format(""), page.text)
     sheet = with_page.get("/own/style.css")
     assert (sheet.status_code, sheet.text) == (200, "a{}")
     assert sheet.headers["content-type"] == "text/css; charset=utf-8"
@@ -222,6 +226,88 @@ def test_a_file_in_the_cache_of_the_browser_is_not_sent_again(client):
     tag = client.get("/_webmap/icon.svg").headers["etag"]
     again = client.get("/_webmap/icon.svg", headers={"if-none-match": tag})
     assert (again.status_code, again.content) == (304, b"")
+
+
+def versioned(client, name):
+    """Return the URL of one of WebMap's own files in the page's HTML."""
+    page = client.get("/lab/").text
+    return re.search(rf'"(/_webmap/v-[0-9a-f]{{16}}/{re.escape(name)})"', page)[1]
+
+
+@pytest.mark.parametrize("name", ["web/page.js", "web/webmap.css", "icon.svg"])
+def test_a_browser_never_asks_again_for_a_file_of_this_version(client, name):
+    answer = client.get(versioned(client, name))
+    assert answer.status_code == 200
+    assert "immutable" in answer.headers["cache-control"]
+    assert client.get("/lab/").headers["cache-control"] == "no-cache"
+
+
+def test_a_page_that_was_opened_before_an_update_gets_the_present_files(client):
+    url = re.sub(r"v-\w+", f"v-{'0' * 16}", versioned(client, "web/page.js"))
+    answer = client.get(url)
+    assert answer.content == client.get(versioned(client, "web/page.js")).content
+    assert answer.headers["cache-control"] == "no-cache"
+
+
+def test_without_a_version_a_module_is_that_of_the_present_version(client):
+    version = versioned(client, "web/page.js").split("/")[2]
+    page = client.get("/_webmap/web/page.js")
+    assert page.text == f'export * from "../{version}/web/page.js";\n'
+    part = client.get("/_webmap/features/drive/teleop.js")
+    address = f"../../{version}/features/drive/teleop.js"
+    assert part.text == (
+        f'export * from "{address}";\nexport {{ default }} from "{address}";\n'
+    )
+
+
+def test_every_text_is_compressed_for_browsers_that_read_gzip(
+    client, with_page, folder
+):
+    (folder / "style.css").write_text("a{}" * 500)
+    (folder / "picture.png").write_bytes(PNG + bytes(1000))
+    for path, compressed in (
+        ("/lab/", True),
+        ("/own/page", True),
+        (versioned(client, "web/page.js"), True),
+        (versioned(client, "web/webmap.css"), True),
+        (versioned(client, "web/page.js") + ".map", True),
+        ("/own/style.css", True),
+        ("/own/picture.png", False),
+    ):
+        packed = client.get(path, headers={"accept-encoding": "br, gzip;q=0.5"})
+        assert packed.status_code == 200, path
+        found = packed.headers.get("content-encoding")
+        assert found == ("gzip" if compressed else None), path
+        if not compressed:
+            continue
+        assert packed.headers["vary"] == "accept-encoding"
+        for accepted in ("", "br", "gzip;q=0"):
+            plain = client.get(path, headers={"accept-encoding": accepted})
+            assert "content-encoding" not in plain.headers, path
+            assert plain.headers["vary"] == "accept-encoding"
+            assert plain.content == packed.content, path
+            assert plain.headers.get("etag") == packed.headers.get("etag"), path
+
+
+def test_a_file_is_compressed_once_and_again_only_when_it_changes(
+    client, with_page, folder, monkeypatch
+):
+    compressed = []
+
+    def compress(data, **options):
+        compressed.append(data)
+        return zlib.compress(data, wbits=31)
+
+    monkeypatch.setattr(gzip, "compress", compress)
+    (folder / "style.css").write_text("a{}" * 500)
+    page_js = versioned(client, "web/page.js")
+    for _ in range(3):
+        for path in ("/lab/", "/own/page", "/own/style.css", page_js):
+            assert client.get(path).headers["content-encoding"] == "gzip"
+    assert len(compressed) == len(set(compressed)) == 4
+    (folder / "style.css").write_text("b{}" * 600)
+    assert client.get("/own/style.css").text == "b{}" * 600
+    assert len(compressed) == 5
 
 
 def test_head_is_answered_like_get_without_the_body(client):
@@ -362,7 +448,7 @@ def test_the_application_works_under_a_prefix(app, rooms, make_client, with_page
     answer = client.get(location)
     assert "Path=/robots/;" in answer.headers["set-cookie"]
     key = key_in(answer.text)
-    assert 'src="/robots/_webmap/web/page.js"' in client.get("/robots/lab/").text
+    assert re.search(PAGE_JS.format("/robots"), client.get("/robots/lab/").text)
     assert client.get("/robots/lab").headers["location"] == "/robots/lab/"
     assert client.get("/robots/_webmap/icon.svg").status_code == 200
     assert client.get("/robots/own/style.css").text == "a{}"

@@ -1,8 +1,12 @@
 import pytest
 
 from webmap.server.html import base_of, make_page, prepare_page
+from webmap.server.modules import STARTS
 
-SHEET = '<link rel="stylesheet" href="/_webmap/web/webmap.css">'
+PRELOADS = "".join(
+    f'<link rel="modulepreload" href="/_webmap/{name}">' for name in STARTS
+)
+SHEET = '<link rel="stylesheet" href="/_webmap/web/webmap.css">' + PRELOADS
 SCRIPT = '<script type="module" src="/_webmap/web/page.js"></script>'
 ICON = '<link rel="icon" href="/_webmap/icon.svg" type="image/svg+xml">'
 
@@ -11,7 +15,7 @@ def test_a_made_page_has_one_container_and_an_escaped_title():
     text = make_page("A <b>", base_of(""))
     assert '<div id="webmap_container"></div>' in text
     assert "<title>A &lt;b&gt;</title>" in text
-    assert prepare_page(text, base_of("")).text == text
+    assert text.count(SCRIPT) == text.count(PRELOADS) == 1
     assert prepare_page(text, base_of("")).blocked == []
 
 
@@ -63,7 +67,23 @@ def test_files_that_the_html_already_loads_are_not_added_again():
         '<link rel="shortcut icon" href="me.png">'
         '<script type="module" src="_webmap/web/page.js"></script></head>'
     )
-    assert prepare_page(text, base_of("")).text == text
+    own = prepare_page(text, base_of("")).text
+    assert own == text.replace("<head>", f"<head>{PRELOADS}")
+
+
+def test_own_files_of_webmap_that_the_html_loads_get_the_address_of_their_version():
+    text = (
+        '<head><link rel="stylesheet" href="../_webmap/web/style/row.css">\n'
+        '<link rel="stylesheet" href="web/own.css"></head>'
+        '<body data-x="_webmap/web/"><img src="_webmap/files/x/y.png">'
+        '<script src="/_webmap/features/x.js"></script>'
+    )
+    own = prepare_page(text, base_of("/a") + "v-12/").text
+    assert 'href="../_webmap/v-12/web/style/row.css">\n' in own
+    assert '<link rel="stylesheet" href="web/own.css">' in own
+    assert '<body data-x="_webmap/web/">' in own
+    assert '<img src="_webmap/files/x/y.png">' in own
+    assert own.endswith('<script src="/_webmap/v-12/features/x.js"></script>')
 
 
 def test_content_blocked_by_the_policy_is_named_with_its_line():

@@ -6,6 +6,7 @@ in :mod:`webmap.core` and :mod:`webmap.scene.wire`; what moves a robot, in the g
 
 Begin with ``app``, which routes requests: ``security`` and ``access`` let them in,
 ``scene_socket`` and ``drive_socket`` serve a page's sockets, ``open_pages`` has the
-pages, and ``files`` and ``html`` are what browsers load. ``application`` has the public
-functions, and ``runner`` is the server that they run.
+pages, and ``html``, ``files`` and ``own_files`` are what browsers load, which
+``modules`` and ``packed`` make small. ``application`` has the public functions, and
+``runner`` is the server that they run.
 """

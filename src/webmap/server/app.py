@@ -1,6 +1,7 @@
 """The web application: routes of requests."""
 
 import asyncio
+import gzip
 import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -20,19 +21,14 @@ from webmap.server.files import FILES, IMAGES, File, NoSuchFile, Published, read
 from webmap.server.html import FOLDER, base_of, make_page, prepare_page
 from webmap.server.open_pages import OpenPages
 from webmap.server.outbox import BatchedCallsByLoop
+from webmap.server.own_files import own_files
+from webmap.server.packed import Packed, accepts_gzip, may_pack
 from webmap.server.scene_socket import SceneSockets, find_page
 from webmap.server.security import PAGE_KEY, SANDBOX, Security, plain
 
 log = logging.getLogger("webmap.server")
 
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
-
-PACKAGE = Path(__file__).parents[1]
-
-FOLDERS = ("console/", "features/", "web/")
-"""Folders of the package with files for the browser; their URLs are their paths."""
-
-ASSETS = Path(__file__).parent / "assets"
 
 
 class WebApp:
@@ -64,6 +60,7 @@ class WebApp:
     ) -> None:
         self.settings = settings = settings or Settings()
         self.published = published or Published()
+        self._packed = Packed()
         calls = BatchedCallsByLoop()
         scene = SceneSockets(site, pages, calls, settings.max_pages)
         drive = DriveSockets(pages, connect_to_gate, calls, settings.max_pages)
@@ -74,7 +71,7 @@ class WebApp:
             Route(FILES + "{name:path}", self._published_file),
             Route(IMAGES + "{tag}", self._published_image),
             Route("/_webmap/{name:path}", self._static),
-            Route("/{path:path}", PageAnswers(site)),
+            Route("/{path:path}", PageAnswers(site, self._packed)),
         ]
         self._security = Security(
             Starlette(
@@ -95,16 +92,18 @@ class WebApp:
 
     async def _static(self, request: Request) -> Response:
         name = request.path_params["name"]
-        return await answer_file(request, lambda: _read_static(name))
+        return await answer_file(request, self._packed, lambda: own_files.file(name))
 
     async def _published_file(self, request: Request) -> Response:
         name = request.path_params["name"]
-        return await answer_file(request, lambda: self.published.file(name))
+        return await answer_file(
+            request, self._packed, lambda: self.published.file(name)
+        )
 
     async def _published_image(self, request: Request) -> Response:
         tag = request.path_params["tag"]
         return await answer_file(
-            request, lambda: self.published.image(tag), unchanging=True
+            request, self._packed, lambda: self.published.image(tag)
         )
 
 
@@ -112,10 +111,6 @@ async def _key_fits(request: Request) -> Response:
     """Answer a page whose socket was refused: its key is valid."""
     del request
     return Response(status_code=204)
-
-
-def _read_static(name: str) -> File:
-    return read_below(PACKAGE if name.startswith(FOLDERS) else ASSETS, name)
 
 
 @asynccontextmanager
@@ -137,44 +132,55 @@ async def _answer_error(request: Request, error: Exception) -> Response:
 
 
 async def answer_file(
-    request: Request, read: Callable[[], File], *, unchanging: bool = False
+    request: Request, packed: Packed, read: Callable[[], File]
 ) -> Response:
     """Answer with a file, or with status 304 if the browser has it.
 
     Args:
         request: The request.
+        packed: The files that were compressed before.
         read: Called in another thread; may raise :class:`NoSuchFile`.
-        unchanging: Whether this URL always has the same content.
 
     Raises:
         HTTPException: With status 404, if there is no such file.
 
     """
+    return await asyncio.to_thread(_answer_file, request, packed, read)
+
+
+def _answer_file(
+    request: Request, packed: Packed, read: Callable[[], File]
+) -> Response:
     try:
-        file = await asyncio.to_thread(read)
+        file = read()
     except NoSuchFile:
         raise HTTPException(404) from None
-    tag = f'"{file.tag}"'
-    headers = {
-        "etag": tag,
-        "cache-control": "private, max-age=31536000, immutable"
-        if unchanging
-        else "no-cache",
-    }
+    # Weak: the compressed file has the same tag.
+    tag = f'W/"{file.tag}"'
+    headers = {"etag": tag, "cache-control": "no-cache"}
+    if file.unchanging:
+        headers["cache-control"] = "private, max-age=31536000, immutable"
     if file.fleeting:
         headers["cache-control"] = "no-store"
     if file.media_type.startswith("image/"):
         headers["content-security-policy"] = SANDBOX
     if tag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
-    return Response(file.data, media_type=file.media_type, headers=headers)
+    data = file.data
+    if not file.fleeting and may_pack(file.media_type, len(data)):
+        headers["vary"] = "accept-encoding"
+        if accepts_gzip(request.headers.get("accept-encoding", "")):
+            headers["content-encoding"] = "gzip"
+            data = packed.of(data)
+    return Response(data, media_type=file.media_type, headers=headers)
 
 
 class PageAnswers:
     """Serves all paths that are not WebMap's own: pages, and files in their folders."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: Site, packed: Packed) -> None:
         self._site = site
+        self._packed = packed
         self._warned: dict[Path, list[str]] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -193,22 +199,39 @@ class PageAnswers:
         if entry is not None:
             root = base_of(request.scope.get("root_path", "")).removesuffix(FOLDER)
             return RedirectResponse(root + entry.path, 308)
-        return await answer_file(request, lambda: self._folder_file("/" + path))
+        return await answer_file(
+            request, self._packed, lambda: self._folder_file("/" + path)
+        )
 
     async def _page(self, request: Request, entry: PageEntry) -> Response:
+        return await asyncio.to_thread(self._page_now, request, entry)
+
+    def _page_now(self, request: Request, entry: PageEntry) -> Response:
         base = base_of(request.scope.get("root_path", ""))
+        files = f"{base}v-{own_files.version()}/"
         key = request.scope.get(PAGE_KEY)
-        headers = {"cache-control": "no-store" if key else "no-cache"}
         if entry.html is None:
-            return HTMLResponse(make_page(entry.title, base, key), headers=headers)
+            return self._html(request, make_page(entry.title, files, key), key)
         try:
-            text = await asyncio.to_thread(entry.html.read_text, "utf-8-sig")
+            text = entry.html.read_text("utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             log.error("page %s: cannot read %s: %s", entry.path, entry.html, error)
             return plain(500, "The HTML file of this page cannot be read as UTF-8.")
-        page = prepare_page(text, base, key)
+        page = prepare_page(text, files, key)
         self._warn(entry.html, page.blocked)
-        return HTMLResponse(page.text, headers=headers)
+        return self._html(request, page.text, key)
+
+    def _html(self, request: Request, text: str, key: str | None) -> Response:
+        data = text.encode()
+        headers = {
+            "cache-control": "no-store" if key else "no-cache",
+            "vary": "accept-encoding",
+        }
+        if accepts_gzip(request.headers.get("accept-encoding", "")):
+            headers["content-encoding"] = "gzip"
+            # A page with a key is sent once, and the key is not stored.
+            data = gzip.compress(data) if key else self._packed.of(data)
+        return HTMLResponse(data, headers=headers)
 
     def _folder_file(self, path: str) -> File:
         # Longest first: the files of the nearest page come first.

@@ -59,6 +59,8 @@ class File:
     """Changes with the file; without quotes."""
     fleeting: bool = False
     """Whether browsers should not cache it."""
+    unchanging: bool = False
+    """Whether its URL always has the same content."""
 
 
 def media_type_of(path: Path) -> str | None:
@@ -212,7 +214,7 @@ class Published:
         image = self._images.get(tag) or drawn.pictures.get(tag)
         if image is None:
             raise NoSuchFile
-        return File(image.data, image.media_type, tag, image.fleeting)
+        return File(image.data, image.media_type, tag, image.fleeting, unchanging=True)
 
 
 def _checked_path(path: Path) -> Path:

@@ -1,15 +1,19 @@
 """The HTML of pages: the user's own with additions, or a generated page.
 
-The user's file is changed in two places only: the base style sheet is inserted first in
-the head, so that the user's own rules override it, and the script last.
+The user's file is changed in three ways only: the base style sheet is inserted first in
+the head, so that the user's own rules override it, and the script last; and WebMap's
+own files that the page loads by itself get the address of their version.
 """
 
+import re
 from dataclasses import dataclass, field
 from html import escape
 from html.parser import HTMLParser
 from urllib.parse import quote
 
 from webmap.server.access import KEY
+from webmap.server.modules import STARTS
+from webmap.server.own_files import FOLDERS
 
 FOLDER = "/_webmap/"
 """The path of WebMap's own files and sockets, under the application's root."""
@@ -24,6 +28,7 @@ _MADE = """<!doctype html>
 <link rel="icon" href="{base}icon.svg" type="image/svg+xml">
 <link rel="stylesheet" href="{base}web/webmap.css">
 <link rel="stylesheet" href="{base}made_page.css">
+{preloads}
 <script type="module" src="{base}web/page.js"></script>
 </head>
 <body>
@@ -35,6 +40,7 @@ _MADE = """<!doctype html>
 
 # Other types are data, which no policy blocks.
 _SCRIPTS = {"", "module", "importmap", "text/javascript", "application/javascript"}
+_OWN = re.compile(f"(_webmap/)(?={'|'.join(FOLDERS)})")
 _LOADS = {"script": "src", "img": "src", "link": "href", "iframe": "src"}
 
 
@@ -48,11 +54,23 @@ def make_page(title: str, base: str, key: str | None = None) -> str:
 
     Args:
         title: The page's title.
-        base: The URL of WebMap's own files, from :func:`base_of`.
+        base: The URL of WebMap's own files: that of :func:`base_of`, and a version.
         key: The page's key, if it has just signed in.
 
     """
-    return _MADE.format(title=escape(title), base=escape(base), key=_key_element(key))
+    return _MADE.format(
+        title=escape(title),
+        base=escape(base),
+        key=_key_element(key),
+        preloads=_preloads(base),
+    )
+
+
+def _preloads(base: str) -> str:
+    """Return the elements with which a browser loads all at once, not in turn."""
+    return "".join(
+        f'<link rel="modulepreload" href="{escape(base)}{name}">' for name in STARTS
+    )
 
 
 def _key_element(key: str | None) -> str:
@@ -73,20 +91,24 @@ def prepare_page(text: str, base: str, key: str | None = None) -> OwnPage:
 
     Args:
         text: The user's whole HTML.
-        base: The URL of WebMap's own files, from :func:`base_of`.
+        base: The URL of WebMap's own files: that of :func:`base_of`, and a version.
         key: The page's key, if it has just signed in.
 
     """
+    version = base.rpartition(FOLDER)[2]
     seen = _Reader(text)
     first, last = _key_element(key), ""
     if not seen.has("web/webmap.css"):
         first += f'<link rel="stylesheet" href="{escape(base)}web/webmap.css">'
+    first += _preloads(base)
     if not seen.has("web/page.js"):
         last = f'<script type="module" src="{escape(base)}web/page.js"></script>'
     if not seen.icon:
         last += f'<link rel="icon" href="{escape(base)}icon.svg" type="image/svg+xml">'
     start, end = seen.head()
-    text = text[:start] + first + text[start:end] + last + text[end:]
+    added = [(end, last), (start, first), *((at, version) for at in seen.own)]
+    for at, what in sorted(added, key=lambda one: one[0], reverse=True):
+        text = text[:at] + what + text[at:]
     return OwnPage(text, seen.blocked)
 
 
@@ -97,6 +119,8 @@ class _Reader(HTMLParser):
         super().__init__()
         self.blocked: list[str] = []
         self.icon = False
+        self.own: list[int] = []
+        """Where the addresses of WebMap's own files have their version."""
         self._loaded: list[str] = []
         self._head_start: int | None = None
         self._head_end: int | None = None
@@ -121,6 +145,9 @@ class _Reader(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self._look_at(tag, {name: value or "" for name, value in attrs})
+        own = _OWN.search(self.get_starttag_text() or "")
+        if tag in _LOADS and own:
+            self.own.append(self._here() + own.end())
         if tag == "head" and self._head_start is None:
             self._head_start = self._here() + len(self.get_starttag_text() or "")
         elif tag == "body" and self._head_start is not None and self._head_end is None:

@@ -1,5 +1,6 @@
 """The web server: uvicorn, configured for small messages."""
 
+import asyncio
 import logging
 import os
 import socket
@@ -14,6 +15,7 @@ from webmap.base.not_listening import why_not_listening
 from webmap.server.app import WebApp
 from webmap.server.connections import protocols
 from webmap.server.origins import WILDCARD, is_loopback
+from webmap.server.own_files import own_files
 
 log = logging.getLogger("webmap.server")
 
@@ -171,9 +173,12 @@ class Server(uvicorn.Server):
         super().__init__(config)
         self._on_ready = on_ready
         self.failure: Exception | None = None
+        self._reading: asyncio.Task[str] | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start to listen, then call the callback."""
+        # The first page does not wait for it.
+        self._reading = asyncio.create_task(asyncio.to_thread(own_files.version))
         await super().startup(sockets)
         for listener in sockets or ():
             listener.listen(_BACKLOG)

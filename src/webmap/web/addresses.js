@@ -1,12 +1,15 @@
 import { FOLDER } from "./constants.js";
 
-/** The URL below which WebMap serves its own files and sockets. */
-export const BASE = new URL("..", import.meta.url);
+/** The URL below which WebMap serves its own files of this version. */
+export const OWN_FILES = new URL("..", import.meta.url);
+
+/** The URL below which WebMap serves files and sockets; its own files, of any version. */
+export const BASE = new URL(/\/v-\w+\/$/.test(OWN_FILES.pathname) ? ".." : ".", OWN_FILES);
 
 /**
  * Resolve an address from the server to a file of the page.
  *
- * @param {string} address WebMap's own begin with "/_webmap/", under every prefix.
+ * @param {string} address Those that begin with "/_webmap/" are below every prefix.
  * @param {string | URL} base The base of other addresses.
  * @returns {string | null} null if it is on another origin.
  */

@@ -1,4 +1,4 @@
-import { BASE, resolve } from "./addresses.js";
+import { OWN_FILES, resolve } from "./addresses.js";
 
 /** @typedef {import('./map.js').MapCanvas} MapCanvas */
 
@@ -63,7 +63,7 @@ export class BrowserParts {
    * @param {unknown} options
    */
   async _load(attached, instance, module, options) {
-    const url = resolve(module, BASE);
+    const url = resolve(module, OWN_FILES);
     if (url === null) throw new Error("it is on another server");
     const [code] = await Promise.all([importOf(url), this._page.ready()]);
     // It may have been detached while it was loading.
@@ -112,7 +112,7 @@ export class BrowserParts {
 
   /** @param {string} css */
   _addStyle(css) {
-    const url = resolve(css, BASE);
+    const url = resolve(css, OWN_FILES);
     if (url === null || this._styles.has(url)) return;
     this._styles.add(url);
     const link = document.createElement("link");

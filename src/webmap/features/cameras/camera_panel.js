@@ -7,6 +7,7 @@ import {
   readKept,
   roomFor,
 } from "./camera_view.js";
+import { resolve } from "../../web/addresses.js";
 import { closeSheet } from "../../web/tools/dom.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -100,7 +101,8 @@ class CameraPanel {
     else if (message.camera === this._camera?.id) {
       const { clock } = this._map;
       const age = clock === null ? 0 : 1000 * (clock - message.stamp);
-      this._picture.offer(addressOf(message.url), age);
+      const url = resolve(message.url, document.baseURI);
+      if (url !== null) this._picture.offer(url, age);
     }
   }
 
@@ -244,14 +246,6 @@ class CameraPanel {
     style.left = `${left + this._kept.x * width}px`;
     style.top = `${top + this._kept.y * height}px`;
   }
-}
-
-/**
- * @param {string} url URLs of WebMap begin with "/_webmap/", under any path of the
- *     server.
- */
-function addressOf(url) {
-  return new URL(`../../${url.replace("/_webmap/", "")}`, import.meta.url).href;
 }
 
 /**

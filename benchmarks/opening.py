@@ -1,0 +1,171 @@
+"""How soon an opened page shows a robot: the console, compared with a bare page.
+
+The bare page is an HTML file with one module, which opens a socket and shows what comes
+on it: no page that gets its robots by a socket can be faster. Both are opened in a new
+browser, on this machine, and over a link with a round trip of 100 ms and 1.6 Mbit/s as
+Chromium imitates it.
+"""
+
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import uvicorn
+from playwright.sync_api import Page
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from benchmarks.display import display
+from benchmarks.drawing import browser_page
+from benchmarks.harness import Comparison, Contender, Figures, compare
+
+ROBOTS = 10
+BEAMS = 360
+
+ROUND_TRIP_MS = 100
+BYTES_A_SECOND = 200_000
+
+HTML = """<!doctype html><meta charset="utf-8"><title>Bare</title>
+<script type="module" src="bare.js"></script><body></body>"""
+
+MODULE = """
+const socket = new WebSocket(new URL("socket", location.href));
+socket.addEventListener("open", () => socket.send("hello"));
+socket.addEventListener("message", ({ data }) => {
+  const robot = document.createElement("p");
+  robot.className = "robot";
+  robot.textContent = data;
+  document.body.append(robot);
+});
+"""
+
+WATCH = """
+const look = () => {
+  if (document.querySelector(".robot:not(.unplaced)")) {
+    globalThis.firstRobot = performance.now();
+  } else requestAnimationFrame(look);
+};
+look();
+"""
+
+
+async def _page(request: Request) -> Response:
+    del request
+    return HTMLResponse(HTML)
+
+
+async def _module(request: Request) -> Response:
+    del request
+    return Response(MODULE, media_type="text/javascript")
+
+
+async def _socket(websocket: WebSocket) -> None:
+    await websocket.accept()
+    await websocket.receive_text()
+    await websocket.send_text("robot")
+    await websocket.receive()
+
+
+@contextmanager
+def bare_page() -> Iterator[str]:
+    """Serve the bare page on a free port; return its URL."""
+    app = Starlette(
+        routes=[
+            Route("/", _page),
+            Route("/bare.js", _module),
+            WebSocketRoute("/socket", _socket),
+        ]
+    )
+    listener = socket.socket()
+    listener.bind(("127.0.0.1", 0))
+    server = uvicorn.Server(
+        uvicorn.Config(app, log_level="warning", lifespan="off", ws="websockets-sansio")
+    )
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}/"
+    finally:
+        server.should_exit = server.force_exit = True
+        thread.join()
+        listener.close()
+
+
+def measure(page: Page, url: str, *, slow: bool) -> Figures:
+    """Open a page and return the time until its first robot, and what was loaded."""
+    session = page.context.new_cdp_session(page)
+    sizes: list[float] = []
+    session.on(
+        "Network.loadingFinished",
+        lambda event: sizes.append(event["encodedDataLength"]),
+    )
+    session.send("Network.enable")
+    if slow:
+        session.send(
+            "Network.emulateNetworkConditions",
+            {
+                "offline": False,
+                "latency": ROUND_TRIP_MS,
+                "downloadThroughput": BYTES_A_SECOND,
+                "uploadThroughput": BYTES_A_SECOND,
+            },
+        )
+    page.add_init_script(WATCH)
+    page.goto(url, wait_until="commit")
+    page.locator(".robot:not(.unplaced)").first.wait_for(state="attached")
+    # Polled from outside, because the page may not use eval.
+    while not page.evaluate("globalThis.firstRobot ?? 0"):
+        page.wait_for_timeout(10)
+    first: float = page.evaluate("firstRobot")
+    page.wait_for_timeout(3000)
+    return {
+        "first robot (ms)": first,
+        "requests in all": len(sizes),
+        "loaded in all (kB)": sum(sizes) / 1000,
+    }
+
+
+def bare(*, slow: bool) -> Callable[[], Figures]:
+    """Return a run of the bare page."""
+
+    def run() -> Figures:
+        with bare_page() as url, browser_page() as page:
+            return measure(page, url, slow=slow)
+
+    return run
+
+
+def console(robots: int, *, slow: bool) -> Callable[[], Figures]:
+    """Return a run of the console, whose robots were there before."""
+
+    def run() -> Figures:
+        with display(robots, BEAMS, console=True) as shown:
+            with browser_page() as page:  # the robots, and the files, are ready
+                measure(page, shown.url, slow=False)
+            with browser_page() as page:
+                return measure(page, shown.url, slow=slow)
+
+    return run
+
+
+def bench(rounds: int, quick: bool = False) -> list[Comparison]:
+    """Compare the console with the bare page, without and with a slow link."""
+    robots = 2 if quick else ROBOTS
+    return [
+        compare(
+            f"opening a page, {where}",
+            [
+                Contender("bare page", bare(slow=slow)),
+                Contender("console", console(robots, slow=slow)),
+            ],
+            rounds,
+        )
+        for where, slow in (
+            ("on this machine", False),
+            (f"{ROUND_TRIP_MS} ms and {BYTES_A_SECOND * 8 / 1e6} Mbit/s", True),
+        )
+    ]

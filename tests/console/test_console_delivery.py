@@ -1,0 +1,178 @@
+"""What a browser loads until the console shows a robot, and afterwards.
+
+Work is counted, not time: requests, bytes, and what a browser need not ask for again.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from urllib.parse import urlsplit
+
+import pytest
+from console_ready import wait_until_ready
+from playwright.sync_api import Browser, Page
+
+from webmap.server.modules import STARTS
+from webmap.server.own_files import own_files
+
+pytestmark = pytest.mark.browser
+
+ROBOTS = 1
+
+MOST_REQUESTS = 20
+MOST_BYTES = 90_000
+"""Before the first robot; the page needs about 10 requests and 70 kB."""
+
+MOST_REQUESTS_IN_ALL = 75
+
+WATCH = """
+const look = () => {
+  if (document.querySelector(".robot:not(.unplaced)")) {
+    globalThis.firstRobot = (performance.timeOrigin + performance.now()) / 1000;
+  } else requestAnimationFrame(look);
+};
+look();
+"""
+
+
+@dataclass
+class Answer:
+    """One request, and what came of it."""
+
+    url: str
+    begun: float
+    """When it was sent, as a Unix time in seconds; so are the other times."""
+    offset: float
+    """The difference between Unix time and the browser's own."""
+    ended: float = float("inf")
+    size: int = 0
+    status: int = 0
+    headers: dict[str, str] = field(default_factory=dict)
+    stored: bool = False
+    """Whether the browser had it already."""
+
+    @property
+    def path(self) -> str:
+        return urlsplit(self.url).path
+
+
+class Loading:
+    """Everything that a page loads by HTTP."""
+
+    def __init__(self, page: Page) -> None:
+        self.answers: dict[str, Answer] = {}
+        self.redirects = 0
+        session = self._session = page.context.new_cdp_session(page)
+        session.on("Network.requestWillBeSent", self._sent)
+        session.on("Network.requestServedFromCache", self._from_cache)
+        session.on("Network.responseReceived", self._answered)
+        session.on("Network.loadingFinished", self._finished)
+        session.send("Network.enable")
+
+    def end(self) -> None:
+        """Record nothing more."""
+        self._session.detach()
+
+    def until(self, moment: float) -> list[Answer]:
+        """Return what was loaded until a Unix time."""
+        return [one for one in self.answers.values() if one.ended <= moment]
+
+    def _sent(self, event: dict) -> None:
+        if not event["request"]["url"].startswith("http"):
+            return  # the page made it itself
+        self.redirects += "redirectResponse" in event
+        at = event["wallTime"]
+        answer = Answer(event["request"]["url"], at, at - event["timestamp"])
+        self.answers[event["requestId"]] = answer
+
+    def _from_cache(self, event: dict) -> None:
+        if event["requestId"] in self.answers:
+            self.answers[event["requestId"]].stored = True
+
+    def _answered(self, event: dict) -> None:
+        if event["requestId"] not in self.answers:
+            return
+        answer, response = self.answers[event["requestId"]], event["response"]
+        answer.status = response["status"]
+        answer.headers = {k.lower(): v for k, v in response["headers"].items()}
+        answer.stored |= response.get("fromDiskCache", False)
+
+    def _finished(self, event: dict) -> None:
+        if event["requestId"] not in self.answers:
+            return
+        answer = self.answers[event["requestId"]]
+        answer.size = event["encodedDataLength"]
+        answer.ended = event["timestamp"] + answer.offset
+
+
+@dataclass
+class Opened:
+    """A page of the console that was opened in a new browser, and loaded again."""
+
+    loading: Loading
+    first_robot: float
+    again: Loading
+
+
+@pytest.fixture(scope="module")
+def opened(chromium: Browser, demo) -> Iterator[Opened]:
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    page.add_init_script(WATCH)
+    loading = Loading(page)
+    page.goto(demo.url)
+    page.locator(".robot:not(.unplaced)").first.wait_for(state="attached")
+    wait_until_ready(page)
+    first_robot = page.evaluate("firstRobot")
+    loading.end()
+    again = Loading(page)
+    page.reload()
+    page.locator(".robot:not(.unplaced)").first.wait_for(state="attached")
+    wait_until_ready(page)
+    again.end()
+    yield Opened(loading, first_robot, again)
+    context.close()
+
+
+def test_the_first_robot_is_shown_after_few_requests_and_bytes(opened: Opened) -> None:
+    before = opened.loading.until(opened.first_robot)
+    requests = len(before) + opened.loading.redirects
+    assert requests <= MOST_REQUESTS, [one.url for one in before]
+    sizes = {one.path: one.size for one in before}
+    assert 0 < sum(sizes.values()) <= MOST_BYTES, sizes
+
+
+def test_stop_and_driving_do_not_wait_for_the_first_picture(opened: Opened) -> None:
+    begun = {
+        one.path
+        for one in opened.loading.answers.values()
+        if one.begun < opened.first_robot
+    }
+    files = f"/_webmap/v-{own_files.version()}/"
+    assert {files + name for name in STARTS} <= begun
+
+
+def test_the_whole_console_loads_each_file_once(opened: Opened) -> None:
+    answers = list(opened.loading.answers.values())
+    assert len(answers) <= MOST_REQUESTS_IN_ALL
+    loaded = [one.url for one in answers if not one.stored]
+    assert len(loaded) == len(set(loaded))
+
+
+def test_all_that_is_loaded_is_compressed_and_never_asked_for_again(
+    opened: Opened,
+) -> None:
+    document, *files = opened.loading.answers.values()
+    assert document.headers["content-encoding"] == "gzip"
+    assert document.headers["cache-control"] in ("no-store", "no-cache")
+    assert files
+    for one in files:
+        assert one.status == 200, one.url
+        assert "immutable" in one.headers["cache-control"], one.url
+        text = one.headers["content-type"].startswith(("text/", "image/svg"))
+        if text and one.headers.get("content-encoding") != "gzip":
+            assert int(one.headers["content-length"]) < 500, one.url
+
+
+def test_a_page_that_is_loaded_again_asks_for_its_html_only(opened: Opened) -> None:
+    asked = [one.path for one in opened.again.answers.values() if not one.stored]
+    assert asked == ["/"]

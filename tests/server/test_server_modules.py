@@ -1,0 +1,207 @@
+"""What browsers get of WebMap's own modules and style sheets."""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from webmap.server.modules import (
+    STARTS,
+    served_modules,
+    served_sheets,
+    without_comments,
+)
+from webmap.server.own_files import FOLDERS, PACKAGE
+
+HERE = Path(__file__).parent
+
+OBJECT = re.compile(r"\$\w+")
+"""The names of the objects with which modules refer to each other."""
+
+
+def own_files(suffix: str) -> dict[str, str]:
+    return {
+        path.relative_to(PACKAGE).as_posix(): path.read_text("utf-8")
+        for folder in FOLDERS
+        for path in (PACKAGE / folder).rglob(f"*{suffix}")
+    }
+
+
+@pytest.fixture(scope="module")
+def read():
+    """Let a parser of JavaScript read all modules, as written and as served."""
+    sources = own_files(".js")
+    served = served_modules(sources)
+    given = {
+        "pairs": {
+            name: [text, without_comments(text)] for name, text in sources.items()
+        },
+        "modules": {name: text for name, text in served.items() if name in sources},
+    }
+    written = {f"written {name}": text for name, text in sources.items()}
+    given["modules"] |= written
+    node = shutil.which("node")
+    assert node, "node is needed to test the browser's modules"
+    done = subprocess.run(
+        [node, HERE / "served_tokens.mjs"],
+        input=json.dumps(given),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout)
+
+
+def test_only_comments_are_left_out_and_lines_keep_their_numbers(read):
+    assert read["different"] == []
+    sources = own_files(".js").values()
+    left = sum(len(without_comments(text)) for text in sources)
+    assert left < 0.75 * sum(map(len, sources))
+
+
+def test_each_module_has_the_same_exports_as_its_source(read):
+    exported = read["exported"]
+    for name in own_files(".js"):
+        names = [one for one in exported[name] if not OBJECT.fullmatch(one)]
+        assert sorted(names) == sorted(exported[f"written {name}"]), name
+
+
+def test_each_module_of_webmap_is_served_once_and_a_page_starts_with_few():
+    sources = own_files(".js")
+    served = served_modules(sources)
+    texts = {name: text for name, text in served.items() if name in sources}
+    for name in sources:
+        made = "$" + re.sub(r"\W", "_", name.removesuffix(".js"))
+        where = [key for key, text in texts.items() if f"const {made} = (" in text]
+        assert len(where) == 1, name
+    loaded, todo = set(), list(STARTS)
+    while todo:
+        name = todo.pop()
+        loaded.add(name)
+        for address in re.findall(r'^import .* from "(.+)";$', texts[name], re.M):
+            needed = (PACKAGE / name).parent.joinpath(address).resolve()
+            todo.append(needed.relative_to(PACKAGE).as_posix())
+    assert loaded == set(STARTS)
+
+
+def test_a_source_map_has_the_source_of_each_line():
+    sources = own_files(".js")
+    served = served_modules(sources)
+    found = 0
+    for name, text in served.items():
+        if not name.endswith(".map"):
+            continue
+        lines = served[name.removesuffix(".map")].split("\n")
+        for section in json.loads(text)["sections"]:
+            (source,) = section["map"]["sourcesContent"]
+            (address,) = section["map"]["sources"]
+            origin = (PACKAGE / name).parent.joinpath(address).resolve()
+            assert sources[origin.relative_to(PACKAGE).as_posix()] == source
+            written, start = source.split("\n"), section["offset"]["line"]
+            assert len(section["map"]["mappings"].split(";")) == len(written)
+            for line, served_line in zip(written, lines[start:], strict=False):
+                changed = re.match(r"import |export |  \w+( as \w+)?,$|} from ", line)
+                assert served_line in ("", line) or changed, (origin, line)
+            found += 1
+    assert found == len(sources)
+
+
+FEW = {
+    "start.js": 'import { a, b as c } from "./both.js";\nexport const page = a + c;\n',
+    "both.js": "/** Two. */\nexport const a = 1;\nexport function b() {}\n",
+    "x/one.js": 'import { b } from "../both.js";\n'
+    'import { own } from "./own.js";\n'
+    'import { tool } from "../tool.js";\n'
+    "export default function attach() {}\n",
+    "x/own.js": 'import {\n  a,\n  b as c,\n} from "../both.js";\n'
+    "// Own.\nexport class own {}\n",
+    "x/two.js": 'import { tool } from "../tool.js";\nexport default class Two {}\n',
+    "tool.js": "export async function tool() {}\n",
+}
+
+
+def test_a_module_is_served_with_those_that_only_it_needs():
+    served = served_modules(FEW, ["start.js"])
+    assert served["x/one.js"] == (
+        'import { $both } from "../start.js";\n'
+        'import { $tool } from "../tool.js";\n'
+        "const $x_own = (() => {\n"
+        "const {\n  a,\n  b: c,\n} = $both;\n"
+        "\nclass own {}\n"
+        "\nreturn { own };\n})();\n"
+        "const $x_one = (() => {\n"
+        "const { b } = $both;\nconst { own } = $x_own;\nconst { tool } = $tool;\n"
+        "function attach() {}\n"
+        "\nreturn { default: attach };\n})();\n"
+        "export { $x_own, $x_one };\n"
+        "export default $x_one.default;\n"
+        "//# sourceMappingURL=one.js.map\n"
+    )
+
+
+def test_the_address_of_a_module_within_another_has_the_same_exports():
+    served = served_modules(FEW, ["start.js"])
+    assert served["both.js"] == (
+        'import { $both } from "./start.js";\nexport const { a, b } = $both;\n'
+    )
+    assert served["x/own.js"] == (
+        'import { $x_own } from "./one.js";\nexport const { own } = $x_own;\n'
+    )
+    assert set(served) - set(FEW) == {
+        "start.js.map", "x/one.js.map", "x/two.js.map", "tool.js.map",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        'import "./both.js";',
+        'import * as all from "./both.js";',
+        'import one from "./both.js";',
+        'import { a } from "https://example.com/x.js";',
+        'export * from "./both.js";',
+        "export let a = 1;",
+        "export { a };",
+        "export const { a } = {};",
+        "export default 1;",
+        'import { a } from "./gone.js";',
+        'import { own } from "./a.js";',
+    ],
+)
+def test_a_module_of_another_form_is_refused(line):
+    with pytest.raises(ValueError, match=r"a\.js (has an|imports)"):
+        served_modules({**FEW, "a.js": line + "\n"}, ["start.js"])
+
+
+def test_a_style_sheet_is_served_with_those_that_it_imports():
+    sheets = {
+        "base.css": "/* All. */\nb{}\n",
+        "x/a.css": '/* A. */\n@import url("../base.css");\n'
+        '@import url("own/c.css");\na{}\n',
+        "x/own/c.css": "c{}\n",
+        "x/d.css": '@import url("a.css");\n@import url("own/c.css");\nd{}\n',
+    }
+    served = served_sheets(sheets, shared="other.css")
+    assert served["x/d.css"].split() == ["b{}", "c{}", "a{}", "c{}", "d{}"]
+    del sheets["x/d.css"]
+    served = served_sheets(sheets, shared="base.css")
+    assert served["x/a.css"].split("\n") == [
+        '@import url("../base.css");', "c{}", "", "a{}", "",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "text",
+    ['b{}\n@import url("base.css");\n', '@import url("c.css") screen;\nb{}\n'],
+)
+def test_a_style_sheet_with_an_import_of_another_form_is_refused(text):
+    with pytest.raises(ValueError, match=r"a\.css"):
+        served_sheets({"a.css": text, "base.css": "", "c.css": ""}, shared="base.css")
+
+
+def test_the_style_sheets_of_webmap_import_one_at_most():
+    for text in served_sheets(own_files(".css")).values():
+        assert text.count("@import") <= 1
