@@ -116,7 +116,7 @@ def test_an_installed_wheel_serves_the_demo_page_and_all_its_files(
             assert line.startswith("WebMap is ready at http://")
             loaded = load(line.split()[-1])
             own = {"web/page.js", "icon.svg", "features/drive/teleop.js"}
-            assert loaded >= {"/", *(f"/_webmap/{name}" for name in own)}
+            assert "/" in loaded
             named = {re.sub("^/_webmap/v-[0-9a-f]{16}/", "", path) for path in loaded}
             assert named >= own
         finally:
