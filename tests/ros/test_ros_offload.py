@@ -1,7 +1,9 @@
 import asyncio
 import os
 import signal
+from array import array
 
+import cbor2
 import msgspec
 import pytest
 from fake_rosbridge import bridged, until
@@ -18,6 +20,13 @@ MAP = (CAPTURED / "ros2/publish_map.ros2.json").read_bytes()
 
 class Grid(msgspec.Struct):
     data: list[int]
+
+
+HEADER = {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "map"}
+ORIGIN = {
+    "position": {"x": 0.0, "y": 0.0, "z": 0.0},
+    "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+}
 
 
 def run(scenario):
@@ -200,3 +209,28 @@ def test_the_worker_answers_a_broken_frame_with_an_error():
         reply, parts = worker.answer(worker.Request(len(frame), "/a"), frame)
         assert reply.error
         assert not parts
+
+
+def test_large_arrays_of_an_answer_are_not_copied_and_small_ones_do_not_keep_it():
+    def answered(count: int):
+        info = {"resolution": 0.05, "width": count, "height": 1, "origin": ORIGIN}
+        grid = {
+            "header": HEADER,
+            "info": info,
+            "data": cbor2.CBORTag(72, b"\7" * count),
+        }
+        data = cbor2.dumps({"op": "publish", "topic": "/map", "msg": grid})
+        view = worker.view_name(OccupancyGridMsg)
+        request = worker.Request(len(data), "/map", worker.view_name(Publish), view)
+        answer, parts = worker.answer(request, data)
+        parts = [bytearray(part) for part in parts]
+        (message,) = offload.values(answer, parts, OccupancyGridMsg)
+        return message.data, parts
+
+    cells, parts = answered(2 << 20)
+    assert cells.values.obj is parts[0]
+    assert cells.array()[-1] == 7
+    assert not cells.array().flags.writeable, "other subscribers have it, too"
+    cells, _ = answered(1000)
+    assert isinstance(cells.values, array)
+    assert bytes(cells) == b"\7" * 1000

@@ -10,6 +10,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
+from webmap.base.loading import load_soon
 from webmap.core.problems import Owner, Refusing
 from webmap.core.registry import Namespace
 from webmap.modules.declaration import Declaration, FoundTopic, usual_options
@@ -239,6 +240,7 @@ class TopicLayer(LayerOptions):
     def _subscribe(self, owner: Owner) -> None:
         """Draw the messages of the topic; ``owner`` shows their errors."""
         self._refusing = Refusing(owner, self.topic)
+        load_soon("numpy")  # most layers need it for their first message
         type = self.type or self.declared.types[0]
         view = self.declared.view_of(type)
         take = self.take if view is not None else self._take_plain

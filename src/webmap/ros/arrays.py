@@ -50,11 +50,11 @@ class Numbers:
         if isinstance(value, array):
             same = value.typecode == cls.typecode
             return value if same else array(cls.typecode, value)
+        if isinstance(value, memoryview):
+            return cls._from_view(value)
         if isinstance(value, bytes):
             if len(value) > NOT_COPIED:
-                return cast(
-                    "array[Any]", memoryview(value).cast(cast(Any, cls.typecode))
-                )
+                return cls._from_view(memoryview(value).cast(cast(Any, cls.typecode)))
             numbers: array[Any] = array(cls.typecode)
             numbers.frombytes(value)
             return numbers
@@ -63,6 +63,13 @@ class Numbers:
         if not isinstance(value, list):
             raise TypeError("it is neither a list nor a typed array")
         return cls._from_list(value)
+
+    @classmethod
+    def _from_view(cls, value: memoryview) -> "array[Any]":
+        """Return numbers of the same width, without a copy if there are many."""
+        if value.format == cls.typecode and value.nbytes > NOT_COPIED:
+            return cast("array[Any]", value)
+        return array(cls.typecode, value)
 
     @classmethod
     def _from_list(cls, value: list[Any]) -> "array[Any]":

@@ -6,8 +6,8 @@ import logging
 import time
 from array import array
 from collections import deque
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import AsyncIterator, Callable, Iterator
+from typing import Any, NamedTuple, cast
 
 import msgspec
 
@@ -160,7 +160,9 @@ def values(answer: Answer, parts: list[bytearray], type: Any) -> Iterator[Any]:
             plain = msgspec.msgpack.decode(parts[0], ext_hook=_array)
             yield plain if type is None else convert(plain, type)
             return
-        message = msgspec.msgpack.decode(parts[0], type=type, dec_hook=dec_hook)
+        message = msgspec.msgpack.decode(
+            parts[0], type=type, dec_hook=dec_hook, ext_hook=_numbers
+        )
         if answer.field is not None:
             item: Any = item_type(message, answer.field)
             items = msgspec.msgpack.Decoder(list[item])
@@ -189,6 +191,10 @@ def _array(code: int, data: memoryview) -> "array[Any]":
     return numbers
 
 
+def _numbers(code: int, data: memoryview) -> memoryview:
+    return data.cast(cast(Any, chr(code)))
+
+
 _shared: _Worker | None = None
 
 
@@ -209,6 +215,17 @@ async def _release(user: object) -> None:
     if not worker.users:
         _shared = None
         await worker.stop()
+
+
+@contextlib.asynccontextmanager
+async def worker_kept() -> AsyncIterator[None]:
+    """Keep the worker process for several calls of :func:`aside`."""
+    user = object()
+    _acquire(user)
+    try:
+        yield
+    finally:
+        await _release(user)
 
 
 async def aside(

@@ -148,7 +148,9 @@ def item_type(message: Any, field: str) -> Any:
 
 def _enc_hook(value: Any) -> Any:
     if isinstance(value, Numbers):
-        return memoryview(value.values).cast("B")
+        # As an extension, which the display reads without a copy.
+        data = memoryview(value.values).cast("B")
+        return msgspec.msgpack.Ext(ord(value.typecode), data)
     if isinstance(value, array):
         return msgspec.msgpack.Ext(ord(value.typecode), value.tobytes())
     raise ProtocolError(f"a message cannot hold a {type(value).__name__}")

@@ -11,6 +11,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from webmap.base.errors import BridgeClosed
+from webmap.base.loading import load
 from webmap.ros.backoff import Backoff
 from webmap.ros.limits import LARGE, MAX_FRAME
 from webmap.ros.received import LinkState
@@ -248,6 +249,8 @@ class Lane:
 
 
 async def _connect(url: str) -> "ClientConnection":
+    await load("webmap.ros.rosbridge.paced")
+
     from websockets.asyncio.client import connect
 
     from webmap.ros.rosbridge.paced import PacedConnection
