@@ -126,6 +126,11 @@ def typed(tag: int, numbers: np.ndarray) -> cbor2.CBORTag:
     return cbor2.CBORTag(tag, numbers.tobytes())
 
 
+def images(layer) -> list:
+    """The ``<image>`` elements of a layer."""
+    return [each for each in layer.svg.children if each.tag == "image"]
+
+
 def image_of(element) -> Image.Image:
     """The picture that an ``<image>`` shows."""
     tag = element.get("href").rpartition("/")[2]

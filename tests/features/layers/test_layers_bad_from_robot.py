@@ -301,7 +301,7 @@ class Scene:
         return {
             "/odom": (at.x, at.y, robot.yaw),
             "/scan": look(by["LaserScanner"].dots),
-            "/map": look(self.grids[number].picture.element),
+            "/map": look(self.grids[number].svg),
             "/amcl_pose": by["PoseWithCovariance"].ellipse._transform,
             "/plan": by["Path"].points,
         }

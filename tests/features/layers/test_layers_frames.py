@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from module_fakes import dots, header, image_of, numbers, pose, to_root
+from module_fakes import dots, header, image_of, images, numbers, pose, to_root
 from test_layers_cloud import cloud
 from test_layers_grid import BLACK, CORNERS, grid
 from test_layers_poses import sonar
@@ -138,7 +138,7 @@ def test_a_costmap_in_the_odometry_frame_moves_with_that_frame(map, link, channe
     link.say("/local", local())
     (error,) = channel.errors
     assert "the pose of 'odom' on the map is unknown" in error
-    image = module.layer.picture.element
+    (image,) = images(module.layer)
     for at in [ODOM, (0.0, 0.0, -1.0)]:
         tell(link, transform("map", "odom", *at, secs=4 + int(at != ODOM)))
         there = Affine.translation(*at[:2]) @ Affine.rotation(at[2])
@@ -157,7 +157,7 @@ def test_a_costmap_is_placed_by_the_frames_of_its_namespace(map, link):
     )
     link.say("/r1/local", local())
     link.say("/r1/tf", {"transforms": [transform("map", "odom", *ODOM)]})
-    image = module.layer.picture.element
+    (image,) = images(module.layer)
     assert colour(image, *IN_ODOM.apply(2.5, 3.5)) == BLACK
     assert "/tf" not in link.listeners
 
@@ -165,5 +165,6 @@ def test_a_costmap_is_placed_by_the_frames_of_its_namespace(map, link):
 def test_a_grid_without_a_map_frame_ignores_frames(map, link):
     module = map.add_module("OccupancyGrid", link, "/local")
     link.say("/local", local())
-    assert colour(module.layer.picture.element, 2.5, 3.5) == BLACK
+    (image,) = images(module.layer)
+    assert colour(image, 2.5, 3.5) == BLACK
     assert set(link.listeners) == {"/local", "/local_updates"}

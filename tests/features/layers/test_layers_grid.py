@@ -2,17 +2,16 @@
 
 import asyncio
 import math
-import time
 
 import numpy as np
 import pytest
-from module_fakes import header, image_of, pixel, pose, typed
+from module_fakes import header, image_of, images, pixel, pose, typed
 
 from webmap import Map
 from webmap.base.geometry import Affine
 from webmap.core.layer import Layer
 from webmap.core.pictures import pictures
-from webmap.features.layers import occupancy_grid as room
+from webmap.features.layers import grid_tiles as room
 from webmap.server.files import Published
 
 WHITE, BLACK, CLEAR = (255, 255, 255, 255), (0, 0, 0, 255), (0, 0, 0, 0)
@@ -51,7 +50,10 @@ def update(x, y, cells) -> dict:
 
 
 def shown(module):
-    return module.layer.picture.element
+    """The only tile of a grid; None if there is none."""
+    found = images(module.layer)
+    assert len(found) <= 1
+    return found[0] if found else None
 
 
 @pytest.fixture
@@ -136,7 +138,7 @@ def test_an_update_changes_only_its_rectangle(link, module):
 
 def test_an_update_before_the_grid_changes_nothing(link, module, channel):
     link.say("/map_updates", update(0, 0, [[100]]))
-    assert shown(module).get("href") is None
+    assert shown(module) is None
     assert channel.errors == []
 
 
@@ -250,14 +252,20 @@ def test_a_large_grid_is_drawn_in_the_background_and_the_newest_is_shown(map, li
             message = grid(cells)
             message["data"] = typed(72, cells)
             link.say("/map", message, cbor=True)
-        assert shown(module).get("href") is None, "it is not drawn in the callback"
-        deadline = time.monotonic() + 20
-        while module.layer._drawing is not None:
-            assert time.monotonic() < deadline
-            await asyncio.sleep(0.005)
-        assert pixel(shown(module), 1, 1) == BLACK
+        assert images(module.layer) == [], "it is not drawn in the callback"
+        await drawn(module)
+        assert all(image_of(each).getcolors() for each in images(module.layer))
+        colours = {image_of(each).getcolors()[0][1] for each in images(module.layer)}
+        assert colours == {BLACK}
 
     asyncio.run(scenario())
+
+
+async def drawn(module) -> None:
+    """Wait until the tiles of a grid are drawn."""
+    async with asyncio.timeout(30):
+        while module.layer.tiles.is_drawing or module.layer._copying:
+            await asyncio.sleep(0.005)
 
 
 def test_a_grid_becomes_stale_only_with_an_age_limit(map, link):

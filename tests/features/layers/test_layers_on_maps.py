@@ -1,7 +1,7 @@
 """Map modules that a robot brings along."""
 
 import pytest
-from module_fakes import header, pose
+from module_fakes import header, images, pose
 
 from webmap import Map, Robot
 from webmap.base.errors import ConfigError, ModuleNotFound
@@ -50,7 +50,8 @@ def test_the_map_module_of_a_robot_draws_its_grid(map, robot, link, channel):
     info = {"map_load_time": header()["stamp"], "resolution": 1, "width": 1}
     info |= {"height": 1, "origin": pose(0, 0)}
     link.say("/c", {"header": header(), "info": info, "data": [100]})
-    assert grids(map)[0].layer.picture.element.get("href")
+    (image,) = images(grids(map)[0].layer)
+    assert image.get("href")
 
 
 def test_an_unknown_map_module_is_refused_with_its_name(robot):

@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from module_fakes import pixel
+from module_fakes import images, pixel
 
 from webmap import Bridge, Map
 from webmap.core.page import Page
@@ -27,11 +27,11 @@ def test_drawn_cells_match_the_floor_plan_of_the_simulator(
         module = map.add_module("OccupancyGrid", bridge, "/map")
         way = robot.add_module("Path", bridge, "/robot_0/plan")
         bridge.start(asyncio.get_running_loop())
-        image = module.layer.picture.element
+        layer = module.layer
         try:
-            await until(lambda: image.get("href"))
+            await until(lambda: images(layer) and not layer.tiles.is_drawing)
             assert module.layer.problems == {}
-            check(image)
+            check(layer)
             assert way.points == []
             assert robot.problems == {}
         finally:
@@ -82,15 +82,18 @@ def test_missing_frames_are_a_problem_some_time_after_the_link_opens(
     asyncio.run(scenario())
 
 
-def check(image) -> None:
-    """Compare 200 places of the picture with the floor plan of the simulator."""
+def check(layer) -> None:
+    """Compare 200 places of the map with the floor plan of the simulator."""
     plan = load_map(FLOOR)
     rows, columns = plan.occupancy.shape
     random = np.random.default_rng(3)
     seen = set()
     for row, column in random.integers((rows, columns), size=(200, 2)):
         value = int(plan.occupancy[row, column])
-        r, _, _, alpha = pixel(image, *plan.center(row, column))
+        at = plan.center(row, column)
+        tiles = [colour for each in images(layer) if (colour := pixel(each, *at))]
+        assert len(set(tiles)) == 1, "tiles overlap with the same cells"
+        r, _, _, alpha = tiles[0]
         drawn = -1 if alpha == 0 else round(100 * (255 - r) / 255)
         assert drawn == value, (row, column)
         seen.add(value)

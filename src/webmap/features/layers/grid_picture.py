@@ -2,7 +2,10 @@
 
 import io
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, TypeAlias
+
+import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine, Pose
@@ -39,31 +42,44 @@ def place_grid(origin: Pose, height: float) -> Affine:
     return placed @ Affine(1, 0, 0, -1, 0, height)
 
 
-async def draw_aside(cells: "NDArray[np.int8]", palette: str) -> bytes:
-    """Return a large grid as a PNG, drawn by the worker process.
+async def draw_aside(pieces: "Sequence[NDArray[np.int8]]", palette: str) -> list[bytes]:
+    """Return pieces of a large grid as PNGs, drawn by the worker process.
 
     Args:
-        cells: Array of shape (height, width), the lowest row first.
+        pieces: Arrays like that of :func:`grid_png`.
         palette: The name of one of :data:`PALETTES`.
 
     Raises:
         ProtocolError: If the worker fails.
     """
+    data = b"".join(piece.tobytes() for piece in pieces)
+    shapes = [piece.shape for piece in pieces]
+    drawn = await aside(pngs_of_bytes, data, shapes, palette)
+    return msgspec.msgpack.decode(drawn, type=list[bytes])
+
+
+def pngs_of_bytes(data: bytes, shapes: list[list[int]], palette: str) -> bytes:
+    """Return the PNGs of pieces of a grid as a list in MessagePack.
+
+    Args:
+        data: The rows of all pieces, one after the other.
+        shapes: Height and width of each piece, in cells.
+        palette: The name of one of :data:`PALETTES`.
+    """
     import numpy as np
 
-    data = np.ascontiguousarray(cells).data.cast("B")
-    return bytes(await aside(png_of_bytes, data, cells.shape[1], palette))
-
-
-def png_of_bytes(data: bytes, width: int, palette: str) -> bytes:
-    """Return a grid, given as the bytes of its rows, as a PNG like :func:`grid_png`."""
-    import numpy as np
-
-    return grid_png(np.frombuffer(data, np.int8).reshape(-1, width), palette)
+    cells, at, drawn = np.frombuffer(data, np.int8), 0, []
+    for height, width in shapes:
+        piece = cells[at : at + height * width].reshape(height, width)
+        drawn.append(grid_png(piece, palette))
+        at += height * width
+    return msgspec.msgpack.encode(drawn)
 
 
 def grid_png(cells: "NDArray[np.int8]", palette: str) -> bytes:
     """Return a grid as a PNG of one pixel per cell, its highest row at the top.
+
+    It is empty if no cell of the grid can be seen.
 
     Args:
         cells: Array of shape (height, width), the lowest row first.
@@ -74,8 +90,11 @@ def grid_png(cells: "NDArray[np.int8]", palette: str) -> bytes:
 
     height, width = cells.shape
     pixels = np.ascontiguousarray(cells[::-1]).view(np.uint8)
-    image = Image.frombytes("P", (width, height), pixels.tobytes())
     colours = PALETTES[palette]
+    seen = np.array([colour[3] > 0 for colour in colours])
+    if not seen[pixels].any():
+        return b""
+    image = Image.frombytes("P", (width, height), pixels.tobytes())
     image.putpalette([part for colour in colours for part in colour[:3]])
     out = io.BytesIO()
     alpha = bytes(colour[3] for colour in colours)

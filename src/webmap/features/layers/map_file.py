@@ -4,18 +4,13 @@ import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from webmap.base.errors import ConfigError, ProtocolError
+from webmap.base.errors import ConfigError
 from webmap.base.map_file import MapImage, read_map
 from webmap.base.tasks import spawn
 from webmap.core.layer import Layer
-from webmap.core.pictures import Picture
 from webmap.core.registry import map_modules
-from webmap.features.layers.grid_picture import (
-    Palette,
-    check_palette,
-    draw_aside,
-    place_grid,
-)
+from webmap.features.layers.grid_picture import Palette, check_palette
+from webmap.features.layers.grid_tiles import GridTiles
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -68,21 +63,23 @@ class FileLayer(Layer):
 
     def start(self) -> None:
         """Begin to read the file."""
-        self.picture = Picture()
-        self.svg.append(self.picture.element)
+        self.tiles = GridTiles(self.svg, self.palette, self._fail)
         spawn(self._read())
 
     async def _read(self) -> None:
         try:
             image = await asyncio.to_thread(read_map, self.file)
-            png = await draw_aside(image.cells, self.palette)
-        except (ConfigError, ProtocolError, MemoryError) as error:
-            self.set_problem(self, f"map {error}")
+        except (ConfigError, MemoryError) as error:
+            self._fail(str(error))
             return
         if self.scope.closed:
             return
         self.image = image
-        height, width = (cells * image.resolution for cells in image.cells.shape)
-        self.picture.show(
-            png, place_grid(image.origin, height), width, height, image.resolution
-        )
+        self.tiles.show(image.cells, image.resolution, image.origin)
+
+    def _fail(self, problem: str | None) -> None:
+        """Show why the map cannot be drawn, or that it can."""
+        if problem is None:
+            self.clear_problem(self)
+        else:
+            self.set_problem(self, f"map {problem}")

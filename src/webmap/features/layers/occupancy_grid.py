@@ -1,4 +1,4 @@
-"""Maps and costmaps, drawn as images."""
+"""Maps and costmaps, drawn as tiles."""
 
 import asyncio
 import math
@@ -7,15 +7,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST
 from webmap.base.tasks import spawn
-from webmap.core.pictures import Picture
 from webmap.core.problems import refusing
-from webmap.features.layers.grid_picture import (
-    Palette,
-    check_palette,
-    draw_aside,
-    grid_png,
-    place_grid,
-)
+from webmap.features.layers.grid_picture import Palette, check_palette
+from webmap.features.layers.grid_tiles import SMALL, GridTiles
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.modules.map_layer import MapLayer
 from webmap.ros.messages import (
@@ -32,9 +26,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Found: TypeAlias = tuple[MapMetaDataMsg, NDArray[np.int8]]
-
-SMALL = 1 << 18
-"""Cells up to which a grid is drawn at once; the worker process draws larger grids."""
 
 
 class OccupancyGridUpdateMsg(Stamped, frozen=True, kw_only=True):
@@ -102,11 +93,14 @@ class OccupancyGridUpdateMsg(Stamped, frozen=True, kw_only=True):
     rank=10,
 )
 class OccupancyGrid(MapLayer):
-    """A map or a costmap as an image, shared by all pages.
+    """A map or a costmap, shared by all pages.
 
     The topic has the type ``nav_msgs/OccupancyGrid``; the topic with ``_updates`` added
     has the type ``map_msgs/OccupancyGridUpdate``. Unknown cells are transparent. Cells
     must be -1 to 100; other values are refused, unless the palette is ``"raw"``.
+
+    A grid is drawn as tiles of 512 x 512 cells, each an image. A tile is drawn and sent
+    again only when its cells have changed.
 
     Style it by CSS: ``.occupancy-grid``, with the palette's name as a further class:
     ``.occupancy-grid.costmap { opacity: 0.4 }``.
@@ -143,7 +137,7 @@ class OccupancyGrid(MapLayer):
         return options
 
     def build(self) -> None:
-        """Make the image.
+        """Make the tiles.
 
         Raises:
             ConfigError: If there is no such palette.
@@ -154,18 +148,18 @@ class OccupancyGrid(MapLayer):
         """Size and position of the newest grid."""
         self.cells: NDArray[np.int8] | None = None
         """The newest cells, of shape (height, width), the lowest row first."""
-        self._drawing: asyncio.Task[None] | None = None
-        self._undrawn = False
+        self._updates: list[OccupancyGridUpdateMsg] = []
+        """Updates that wait until the cells are copied, the oldest first."""
+        self._copying: asyncio.Task[None] | None = None
         self.svg.classes.add(self.palette)
         # Each of several maps has its own switch.
         self.svg.set("data-layer", self.topic)
         if self.palette == "costmap":
             self.svg.set("data-layer", None).set(opacity=0.7)
-        self.picture = Picture()
-        self.svg.append(self.picture.element)
+        self.tiles = GridTiles(self.svg, self.palette, self._fail)
 
     def start(self) -> None:
-        """Make the image, and subscribe to the grid and to its updates."""
+        """Make the tiles, and subscribe to the grid and to its updates."""
         super().start()
         updates = self.topic.rstrip("/") + "_updates"
         # Every update counts, so none may be delayed or replaced by the next.
@@ -204,7 +198,8 @@ class OccupancyGrid(MapLayer):
     def draw(self, found: "Found", at: Transform) -> None:
         """Draw the grid."""
         self.info, self.cells = found
-        self._draw()
+        self._updates.clear()
+        self.tiles.show(self.cells, self.info.resolution, self.info.origin.planar)
 
     def on_update(self, update: OccupancyGridUpdateMsg) -> None:
         """Change a rectangle of the grid; does nothing without a grid.
@@ -223,45 +218,47 @@ class OccupancyGrid(MapLayer):
                 f"row {y} reaches out of a grid of {width} x {height}"
             )
         check_values(patch, self.palette)
+        self._updates.append(update)
+        if not self.cells.flags.writeable and self.cells.size > SMALL:
+            if self._copying is None:
+                self._copying = spawn(self._copy())
+            return
         if not self.cells.flags.writeable:
             self.cells = self.cells.copy()
-        self.cells[y : y + update.height, x : x + update.width] = patch
-        self._draw()
+        self._update()
+
+    async def _copy(self) -> None:
+        """Copy the cells of a large message, which others may use, for the updates.
+
+        The copy is made in a thread, since it takes several milliseconds.
+        """
+        try:
+            while self._updates and self.cells is not None and not self.scope.closed:
+                given = self.cells
+                copy = await asyncio.to_thread(given.copy)
+                if self.cells is given:  # no new grid came meanwhile
+                    self.cells = copy
+                    self._update()
+        finally:
+            self._copying = None
+
+    def _update(self) -> None:
+        """Change the cells by the updates that wait."""
+        assert self.cells is not None
+        for update in self._updates:
+            x, y, patch = update.x, update.y, update.cells
+            height, width = patch.shape
+            self.cells[y : y + height, x : x + width] = patch
+            self.tiles.change(self.cells, x, y, width, height)
+        self._updates.clear()
         self.be_new()
 
-    def _draw(self) -> None:
-        if self.cells is not None and self.cells.size <= SMALL:
-            self._show(grid_png(self.cells, self.palette), self.info)
-            return
-        self._undrawn = True
-        if self._drawing is None:
-            self._drawing = spawn(self._draw_on())
-
-    async def _draw_on(self) -> None:
-        """Draw the newest grid until the drawing is up to date."""
-        try:
-            while self._undrawn and self.cells is not None and not self.scope.closed:
-                self._undrawn = False
-                cells, info = self.cells, self.info
-                # An update during the drawing may be half drawn; it causes another
-                # drawing.
-                try:
-                    png = await draw_aside(cells, self.palette)
-                except ProtocolError as error:
-                    self.set_problem(self, f"{self.topic}: {error}")
-                    continue
-                self.clear_problem(self)
-                self._show(png, info)
-        finally:
-            self._drawing = None
-
-    def _show(self, png: bytes, info: MapMetaDataMsg | None) -> None:
-        if info is None or self.scope.closed:
-            return
-        size = (info.width * info.resolution, info.height * info.resolution)
-        self.picture.show(
-            png, place_grid(info.origin.planar, size[1]), *size, info.resolution
-        )
+    def _fail(self, problem: str | None) -> None:
+        """Show why tiles cannot be drawn, or that they can again."""
+        if problem is None:
+            self.clear_problem(self)
+        else:
+            self.set_problem(self, f"{self.topic}: {problem}")
 
 
 def check_values(cells: "NDArray[np.int8]", palette: str) -> None:
