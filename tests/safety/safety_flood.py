@@ -37,10 +37,8 @@ async def send_maps(stop: asyncio.Event) -> None:
     cells = np.zeros((SIDE, SIDE), np.int8)
     cells[::97], cells[:, ::113], cells[: SIDE // 8] = 100, 100, -1
     print(f"maps at {await server.start('127.0.0.1', 0)}", flush=True)
-    number = 0
     while not stop.is_set():
-        number += 1
-        cells[SIDE // 2, : number % SIDE] = 50
+        cells = np.roll(cells, 1, axis=0)  # every tile has to be drawn again
         now = time.time()
         message = messages.cells("/huge", now, "map", cells, 0.05, (0.0, 0.0))
         graph.publish(node, "/huge", message)

@@ -220,9 +220,12 @@ def test_a_smaller_grid_removes_tiles_and_their_pictures(link, module, count, pa
         say(link, SPECKLED)
         await drawn(grids)
         assert len(pictures) == before + 9
+        say(link, SPECKLED[:, :1000])
+        await drawn(grids)
+        assert len(images(grids.layer)) == 6
         say(link, SPECKLED[:600, :500])
         await drawn(grids)
-        assert len(images(grids.layer)) == 2
+        assert len(images(grids.layer)) == 1
         page.close()
         assert Layer._shared == {}
         assert len(pictures) == before
@@ -374,5 +377,24 @@ def test_the_drawing_ends_with_the_layer(link, module, page, monkeypatch):
         await drawn(grids)
         assert len(batches) == 1
         assert len(pictures) == before
+
+    asyncio.run(scenario())
+
+
+def test_a_grid_of_a_million_cells_is_one_tile_that_moves_with_the_grid(
+    link, module, count
+):
+    async def scenario():
+        grids = module()
+        cells = SPECKLED[:1000, :1048]
+        for at in ((0, 0), (3, -4, 0.5), (600 * CELL, 0)):
+            say(link, cells, *at)
+            await drawn(grids)
+            (only,) = images(grids.layer)
+            assert image_of(only).size == (1048, 1000)
+            visible = cells >= 0
+            at = (*at, 0)[:3]
+            picture = seen(grids.layer, cells.shape, at)
+            assert np.array_equal(picture[visible], expected(cells)[visible])
 
     asyncio.run(scenario())

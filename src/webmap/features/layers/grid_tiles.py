@@ -20,8 +20,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+ONE = 1 << 20
+"""Cells up to which a grid is one tile, as are most floors of buildings."""
+
 SIDE = 512
-"""The side of a tile, in cells."""
+"""The side of a tile of a larger grid, in cells."""
 
 OVERLAP = 8
 """Further cells of a tile at its right and at its top, which the next tile draws too.
@@ -131,6 +134,7 @@ class GridTiles:
         self._lattice: Lattice | None = None
         self._first = (0, 0)
         """The cell of the lattice at the grid's lower left corner."""
+        self._side = SIDE
         self._undrawn: dict[Place, None] = {}
         """The tiles to draw, the one that has waited longest first."""
         self._numbers = 0
@@ -179,10 +183,11 @@ class GridTiles:
         """Find the tiles of the grid, and remove those of earlier grids."""
         assert self._cells is not None
         height, width = self._cells.shape
-        first = None
-        # A grid of one tile moves with it: a costmap around a robot.
-        if self._lattice is not None and max(width, height) > SIDE:
-            first = self._lattice.cell_of(origin, resolution)
+        self._side, first = max(width, height), None
+        if width * height > ONE:
+            self._side = SIDE
+            if self._lattice is not None:
+                first = self._lattice.cell_of(origin, resolution)
         if first is None:
             self._lattice, first = Lattice(origin, resolution), (0, 0)
         self._first = first
@@ -195,9 +200,9 @@ class GridTiles:
 
     def _places(self, x: int, y: int, width: int, height: int) -> Iterator[Place]:
         """Return the tiles that have a cell of a rectangle of the grid."""
-        left, low = self._first[0] + x, self._first[1] + y
-        for row in range(low // SIDE, (low + height - 1) // SIDE + 1):
-            for column in range(left // SIDE, (left + width - 1) // SIDE + 1):
+        left, low, side = self._first[0] + x, self._first[1] + y, self._side
+        for row in range(low // side, (low + height - 1) // side + 1):
+            for column in range(left // side, (left + width - 1) // side + 1):
                 yield column, row
 
     def _mark(self, places: Iterator[Place]) -> None:
@@ -219,8 +224,8 @@ class GridTiles:
         assert self._lattice is not None
         height, width = self._cells.shape
         (column, row), (left, low) = place, self._first
-        x, end_x = _span(column, left, width)
-        y, end_y = _span(row, low, height)
+        x, end_x = _span(column, self._side, left, width)
+        y, end_y = _span(row, self._side, low, height)
         cells = self._cells[y:end_y, x:end_x].copy()
         tile = self.tiles[place]
         matrix = self._lattice.place(x + left, y + low, end_y - y)
@@ -298,13 +303,14 @@ class GridTiles:
         self._undrawn.clear()
 
 
-def _span(number: int, first: int, count: int) -> tuple[int, int]:
+def _span(number: int, side: int, first: int, count: int) -> tuple[int, int]:
     """Return the first cell of a tile in its grid, and the cell after its last.
 
     Args:
         number: The tile's column or row.
+        side: The side of a tile.
         first: The cell of the lattice at the grid's first cell.
         count: The number of cells of the grid.
     """
-    start = max(0, number * SIDE - first)
-    return start, min(count, (number + 1) * SIDE - first + OVERLAP)
+    start = max(0, number * side - first)
+    return start, min(count, (number + 1) * side - first + OVERLAP)

@@ -99,8 +99,8 @@ class OccupancyGrid(MapLayer):
     has the type ``map_msgs/OccupancyGridUpdate``. Unknown cells are transparent. Cells
     must be -1 to 100; other values are refused, unless the palette is ``"raw"``.
 
-    A grid is drawn as tiles of 512 x 512 cells, each an image. A tile is drawn and sent
-    again only when its cells have changed.
+    A grid of more than a million cells is drawn as tiles of 512 x 512 cells, each an
+    image. A tile is drawn and sent again only when its cells have changed.
 
     Style it by CSS: ``.occupancy-grid``, with the palette's name as a further class:
     ``.occupancy-grid.costmap { opacity: 0.4 }``.
