@@ -27,6 +27,7 @@ from webmap.ros.rosbridge.frame_limits import (
     MAX_OTHER,
     check_count,
 )
+from webmap.ros.rosbridge.pieces import SHORTENED
 from webmap.ros.rosbridge.protocol import Protocol
 
 MIB = 1 << 20
@@ -84,6 +85,53 @@ def test_a_too_large_message_is_reported_to_its_subscriber_and_logged_once(caplo
     asyncio.run(scenario())
     lines = [r for r in caplog.records if "got a message of" in r.getMessage()]
     assert len(lines) == 1
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_a_map_of_any_size_costs_neither_the_connection_nor_memory(binary, caplog):
+    """Such a map is latched: it would come again on each new connection."""
+    cells = b"0," * (40 * MIB)
+    text = b'{"op":"publish","topic":"/map","msg":{"data":[' + cells + b"0]}}"
+    if binary:
+        map = {"info": {}, "data": cbor2.CBORTag(72, cells)}
+        text = cbor2.dumps({"op": "publish", "topic": "/map", "msg": map})
+    large = text if binary else text.decode()
+    del text, cells
+
+    async def scenario():
+        got, said, maps = [], [], []
+        scope = Scope("page", lambda text, about: said.append(text), lambda _: None)
+        async with bridged() as (server, bridge):
+            with scope.active():
+                bridge.subscribe("/map", maps.append, "nav_msgs/OccupancyGrid")
+                bridge.subscribe("/odom", got.append, "nav_msgs/Odometry")
+            for number in range(2):
+                await server.send(large)
+                await server.send('{"op":"publish","topic":"/odom","msg":{"n":1}}')
+                await until(lambda number=number: len(got) > number)
+            await until(lambda: said)
+            assert said == [
+                "/map: got a message of 80.0 MiB; nav_msgs/OccupancyGrid may have "
+                "64 MiB: publish a coarser map, or a part of it"
+            ]
+            assert bridge.stats.links == 1
+            assert bridge.stats.bytes < 10_000
+            assert maps == []
+            scope.close()
+
+    asyncio.run(scenario())
+    assert caplog.text.count("got a message of") == 1
+
+
+def test_a_message_that_only_looks_shortened_is_refused():
+    for size in (0, 5, limits.MAX_FRAME):
+        frame = SHORTENED + size.to_bytes(8, "big") + publish('{"data":1}')
+        assert isinstance(Protocol().receive(frame, 0.0), Malformed)
+    size = limits.MAX_FRAME + 1
+    frame = SHORTENED + size.to_bytes(8, "big") + b'{"op":"call_service"'
+    event = Protocol().receive(frame, 0.0)
+    assert isinstance(event, Malformed)
+    assert event.reason == "a frame of 67108865 bytes, at most 67108864"
 
 
 def test_the_value_limit_counts_objects_and_lists_but_not_texts():

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.ros.limits import MAX_FRAME
-from webmap.ros.rosbridge.pieces import PIECE, Pieces
+from webmap.ros.rosbridge.pieces import KEPT, PIECE, SHORTENED, Pieces
 from webmap.ros.rosbridge.turns import turns
 
 
@@ -107,8 +107,34 @@ def test_a_long_frame_is_split_into_fragments_of_one_message(data):
     assert frames[-1] == (0x81, b"xxx")
 
 
-def test_the_head_of_a_too_long_or_masked_frame_is_passed_on_unchanged():
-    too_long = b"\x82\x7f" + (MAX_FRAME + 1).to_bytes(8, "big")
+@given(st.data())
+def test_only_the_beginning_of_a_frame_that_is_too_long_is_passed_on(data):
+    begins = bytes(range(250)) * 5
+    length = MAX_FRAME + data.draw(st.integers(1, 200_000))
+    head = b"\x82\x7f" + length.to_bytes(8, "big")
+    stream = frame(5) + head + begins
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
+    pieces, waiting, cutting = [], bytearray(), Pieces()
+
+    def give(chunk):
+        waiting.extend(chunk)
+        while piece := cutting.take(waiting, shaken=True):
+            pieces.append(piece)
+
+    for a, b in itertools.pairwise([0, *cuts, len(stream)]):
+        give(stream[a:b])
+    left, size = length - len(begins), data.draw(st.integers(1 << 20, 1 << 23))
+    for at in range(0, left, size):
+        assert len(waiting) == 0, "nothing of the rest is kept"
+        give(bytes(min(size, left - at)))
+    give(frame(7))
+    _, (first, short), after = frames_of(b"".join(pieces))
+    assert (first, after) == (0x82, (0x81, b"x" * 7))
+    assert short == SHORTENED + length.to_bytes(8, "big") + begins[:KEPT]
+
+
+def test_the_head_of_a_masked_frame_or_a_too_long_fragment_is_passed_on_unchanged():
+    too_long = b"\x02\x7f" + (MAX_FRAME + 1).to_bytes(8, "big")
     masked = b"\x82\xff" + (100_000).to_bytes(8, "big")
     for head in (too_long, masked):
         assert Pieces().take(bytearray(head + b"data"), shaken=True)[:10] == head

@@ -14,7 +14,7 @@ from webmap.ros.names import split_type
 MIB = 1 << 20
 
 MAX_FRAME = 64 * MIB
-"""Most bytes of a WebSocket message; a longer one ends the connection."""
+"""Most bytes of a WebSocket message; of a longer one only the topic is read."""
 
 LARGE = 256 << 10
 """Bytes above which the worker process decodes a frame."""

@@ -17,12 +17,14 @@ class ReceivedMessage:
     kind of link has a subclass that reads its bytes.
     """
 
-    __slots__ = ("_decoded", "frame", "topic")
+    __slots__ = ("_decoded", "frame", "size", "topic")
 
     def __init__(self, topic: str, frame: bytes | bytearray) -> None:
         self.topic = topic
         self.frame = frame
-        """The bytes as received."""
+        """The bytes as received; only the first ones of a message that is too long."""
+        self.size = len(frame)
+        """The number of bytes that were sent."""
         self._decoded: dict[Any, Any] = {}
 
     def decode(self, type: type[msgspec.Struct] | None = None) -> Any:

@@ -312,7 +312,7 @@ class Topic:
         A message that is too large is reported and not delivered.
         """
         self.count += 1
-        size = len(message.frame)
+        size = message.size
         if size > GENERAL.size:
             views = [listener.decode for listener in self.listeners]
             type = self.message_type

@@ -71,7 +71,7 @@ class Listening:
         self._newest[topic] = (message, wall)
         self._measured[topic] = Measurement(
             measured.count + 1,
-            bytes=measured.bytes + len(message.frame),
+            bytes=measured.bytes + message.size,
         )
 
     def end(self, now: float) -> dict[str, Measurement]:
@@ -148,7 +148,7 @@ class Sampling:
         if topic not in self._bytes or topic in self._left:
             return False
         self._listening.received(message, now, wall)
-        self._bytes[topic] += len(message.frame)
+        self._bytes[topic] += message.size
         self._came[topic].append(now)
         if len(self._came[topic]) < self._enough and self._bytes[topic] < MOST_BYTES:
             return False

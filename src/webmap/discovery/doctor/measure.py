@@ -268,7 +268,7 @@ async def _sample(
 
     def received(message: ReceivedMessage) -> None:
         if checks.came_in_parts(message) and is_type(topics[message.topic], *LATCHED):
-            too_large[message.topic] = len(message.frame)
+            too_large[message.topic] = message.size
 
     measured = await sample(bridge, topics, max(seconds, SLOW_TOPICS), received)
     silent = {

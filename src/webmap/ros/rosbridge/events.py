@@ -20,10 +20,13 @@ class Publish(ReceivedMessage):
 
     __slots__ = ("_map", "in_parts")
 
-    def __init__(self, topic: str, frame: bytes | bytearray) -> None:
+    def __init__(
+        self, topic: str, frame: bytes | bytearray, size: int | None = None
+    ) -> None:
         self.topic = topic
         self.frame = frame
         """The whole operation as received, JSON or CBOR."""
+        self.size = len(frame) if size is None else size
         self.in_parts = False
         """Whether the bridge sent it in fragments."""
         self._decoded = {}

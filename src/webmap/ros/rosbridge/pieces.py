@@ -2,6 +2,10 @@
 
 256 KiB, which asyncio reads at once, may be 128,000 frames. So the bytes are passed on
 frame by frame, and those of a long frame in parts.
+
+Of a frame that is longer than any message may be, only the beginning is passed on. A
+map that is too large would otherwise end the connection, and, since it is sent again on
+the next one, take the robot's odometry away for good.
 """
 
 from webmap.ros.limits import MAX_FRAME
@@ -11,6 +15,17 @@ PIECE = (1 << 16) - 1
 
 _TWO, _EIGHT = 126, 127
 """Length values that state how many further bytes hold the length."""
+
+SHORTENED = b"\0shortened\0"
+"""The start of a message that stands for a longer one: its length in 8 bytes and its
+first bytes follow. No message of rosbridge begins like this.
+"""
+
+KEPT = 1024
+"""Bytes of a message that is too long that are passed on; the topic is among them."""
+
+_WHOLE = (0x81, 0x82)
+"""The first byte of a frame that is a whole message, as text or binary."""
 
 _FIN = 0x80
 """The bit of a head's first byte that ends a message."""
@@ -31,6 +46,8 @@ class Pieces:
         self._long = False
         """Whether the current frame is passed on as several."""
         self._fin = self._opcode = 0
+        self._unwanted = 0
+        """Bytes to drop: the rest of a frame that is too long."""
 
     def next(self, waiting: bytearray, *, shaken: bool) -> int:
         """Return the length of the next piece; 0 if it is incomplete.
@@ -59,11 +76,34 @@ class Pieces:
             shaken: Whether the handshake has ended.
 
         """
+        if self._unwanted:
+            dropped = min(self._unwanted, len(waiting))
+            del waiting[:dropped]
+            self._unwanted -= dropped
         if shaken and self._rest == 0:
+            short = self._shorten(waiting)
+            if short is not None:
+                return short
             self._begin(waiting)
         if self._long:
             return self._fragment(waiting)
         return _cut(waiting, self.next(waiting, shaken=shaken))
+
+    def _shorten(self, waiting: bytearray) -> bytes | None:
+        """Return a short frame for one that is too long, empty if it is incomplete.
+
+        None for every other frame.
+        """
+        head, length = _head(waiting)
+        if length <= MAX_FRAME or waiting[0] not in _WHOLE or waiting[1] & _MASK:
+            return None
+        if len(waiting) < head + KEPT:
+            return b""
+        first = waiting[0]
+        del waiting[:head]
+        message = SHORTENED + length.to_bytes(8, "big") + _cut(waiting, KEPT)
+        self._unwanted = length - KEPT
+        return bytes([first, _TWO]) + len(message).to_bytes(2, "big") + message
 
     def _begin(self, waiting: bytearray) -> None:
         head, length = _head(waiting)

@@ -28,6 +28,7 @@ from webmap.ros.rosbridge.events import (
     Unknown,
 )
 from webmap.ros.rosbridge.frame_limits import MAX_NUMBERS, MAX_OTHER, check_count
+from webmap.ros.rosbridge.pieces import SHORTENED
 
 
 def decode_png(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:
@@ -273,8 +274,13 @@ class Protocol:
     def _read(
         self, frame: bytes | bytearray, now: float, *, nested: bool
     ) -> Event | None:
-        if len(frame) > MAX_FRAME:
-            raise ProtocolError(f"a frame of {len(frame)} bytes, at most {MAX_FRAME}")
+        size = len(frame)
+        if frame.startswith(SHORTENED):
+            size, frame = _whole_of(frame)
+            if (topic := topic_in_head(frame)) is not None:
+                return Publish(topic, frame, size)
+        if size > MAX_FRAME:
+            raise ProtocolError(f"a frame of {size} bytes, at most {MAX_FRAME}")
         topic = topic_in_head(frame)
         if topic is not None:
             return Publish(topic, frame)
@@ -314,6 +320,20 @@ class Protocol:
         ):
             raise ProtocolError("a PNG that holds another wrapping")
         return self._read(frame, now, nested=True)
+
+
+def _whole_of(frame: bytes | bytearray) -> tuple[int, bytes | bytearray]:
+    """Return the length of a message of which only the beginning came, and that.
+
+    Raises:
+        ProtocolError: If it is no such message.
+
+    """
+    start = len(SHORTENED) + 8
+    size = int.from_bytes(frame[len(SHORTENED) : start], "big")
+    if size <= MAX_FRAME:
+        raise ProtocolError("a frame that begins like a shortened one")
+    return size, frame[start:]
 
 
 def _check_other(frame: bytes | bytearray) -> None:
