@@ -9,6 +9,7 @@ from benchmarks.harness import report
 BENCHES = [
     "bridge",
     "viewers",
+    "wire",
     "grids",
     "drawing",
     "console",

@@ -65,7 +65,7 @@ class Comparison:
         if name == next(iter(self.runs)) or not ratios:
             return text
         middle, low, high = statistics.median(ratios), min(ratios), max(ratios)
-        return f"{text} ({middle:.2f} x, {low:.2f} to {high:.2f})"
+        return f"{text} ({_short(middle)} x, {_short(low)} to {_short(high)})"
 
     def as_dict(self) -> dict[str, object]:
         """Return all figures, with medians and ratios."""
@@ -76,6 +76,10 @@ class Comparison:
             "medians": {n: {f: self.median(n, f) for f in figures} for n in self.runs},
             "ratios": {n: {f: self.ratios(n, f) for f in figures} for n in self.runs},
         }
+
+
+def _short(ratio: float) -> str:
+    return f"{ratio:.2f}" if ratio >= 0.1 else f"{ratio:.1g}"
 
 
 def compare(title: str, contenders: Sequence[Contender], rounds: int) -> Comparison:

@@ -10,6 +10,20 @@ from webmap.scene.node import Parent
 
 isfinite = math.isfinite
 
+STILL, STILL_TURN = 1e-4, 1e-5
+"""Metres and radians by which a pose must change to be sent: a tenth of a millimetre,
+also of what is drawn ten metres from the origin of the element."""
+
+AGES_EVERY = 0.5
+"""Seconds between two frames for a page on which only ages change."""
+
+SOON = 0.85
+"""The part of its limit that an age may reach on a page while a newer one waits."""
+
+SAME = 0.001
+"""Seconds by which two times of measurement may differ and count as the same; pages
+get milliseconds."""
+
 
 class Dots(NamedTuple):
     """Points to draw as small squares."""
@@ -65,6 +79,9 @@ class Live(Parent):
     def set_pose(self, x: float, y: float, yaw: float) -> None:
         """Place the element in its parent; replaces the previous placement.
 
+        A pose that differs by less than anyone can see changes nothing, so that the
+        rounding errors of a robot that stands still are not sent.
+
         Args:
             x: Metres.
             y: Metres.
@@ -76,9 +93,13 @@ class Live(Parent):
         """
         if not isfinite(x + y + yaw):
             raise SceneError(f"a pose must be finite, got {x}, {y}, {yaw}")
-        pose = (x, y, yaw)
-        if pose != self._transform:
-            self._place(pose)
+        placed = self._transform
+        if not isinstance(placed, tuple) or (
+            abs(placed[0] - x) >= STILL
+            or abs(placed[1] - y) >= STILL
+            or abs(placed[2] - yaw) >= STILL_TURN
+        ):
+            self._place((x, y, yaw))
 
     def set_matrix(self, matrix: Affine) -> None:
         """Place the element in its parent by an affine map; replaces the previous one.
@@ -135,7 +156,9 @@ class Live(Parent):
 
         From then on every page counts the age by itself, shows it in ``data-age`` and
         gives the element the class ``stale`` beyond the limit, even when it cannot
-        reach this process.
+        reach this process. A page gets an age with the next change of the scene. If
+        nothing else changes, a newer age waits up to :data:`AGES_EVERY` seconds, unless
+        the page would show the data as stale meanwhile.
 
         Args:
             seconds_old: Seconds since the data was measured; infinity if there was none
@@ -154,7 +177,7 @@ class Live(Parent):
             raise SceneError(f"the limit of an age must be at least 0 s, got {limit}")
         old = self._age
         if old is None:
-            old = Age(0.0, 1.0, False)
+            old = Age(-math.inf, 1.0, False)
             self._touch("age-limit")
         if limit is None:
             limit = old.limit
@@ -162,5 +185,20 @@ class Live(Parent):
             age_text = old.shown
         if limit != old.limit or age_text != old.shown:
             self._touch("age-limit")
-        self._age = Age(time.monotonic() - seconds_old, limit, age_text)
-        self._touch("age")
+        now = time.monotonic()
+        measured = now - seconds_old
+        if measured == old.measured or abs(measured - old.measured) < SAME:
+            self._age = Age(old.measured, limit, age_text)
+            return
+        self._age = Age(measured, limit, age_text)
+        self._touch("age", waits=_may_wait(old.measured, measured, now, limit))
+
+
+def _may_wait(before: float, measured: float, now: float, limit: float) -> bool:
+    """Return whether pages that have the age ``before`` can get the newer one later.
+
+    Every page gets the ages at the next multiple of :data:`AGES_EVERY`. Data that is
+    older than before goes at once: a page must not show it as newer than it is.
+    """
+    then = (now // AGES_EVERY + 1) * AGES_EVERY
+    return before < measured and then - before <= SOON * limit

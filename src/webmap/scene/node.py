@@ -49,9 +49,9 @@ class Node:
     def _release(self) -> None:
         """Release references that would keep other objects alive."""
 
-    def _touch(self, slot: str) -> None:
+    def _touch(self, slot: str, *, waits: bool = False) -> None:
         if self.fragment is not None:
-            self.fragment.touch(self, slot)
+            self.fragment.touch(self, slot, waits=waits)
 
 
 class Text(Node):
@@ -228,6 +228,8 @@ class Fragment:
         self.id = next(_fragment_ids)
         self.root = root
         self.revision = 0
+        self.urgent = 0
+        """The revision of the newest change that pages get at once; newer ones wait."""
         self.memo: Any = None
         """A cache of the encoder; no part of the scene."""
         self._nodes: dict[int, Node] = {}
@@ -251,9 +253,19 @@ class Fragment:
 
     # Changes of nodes -----------------------------------------------------------
 
-    def touch(self, node: Node, slot: str) -> None:
-        """Record that a value of ``node`` changed."""
+    def touch(self, node: Node, slot: str, *, waits: bool = False) -> None:
+        """Record that a value of ``node`` changed.
+
+        Args:
+            node: A node of this fragment.
+            slot: The value.
+            waits: Whether pages get it with the next change that does not wait, or with
+                the next ages.
+
+        """
         self.revision = revision = self.revision + 1
+        if not waits:
+            self.urgent = revision
         node._slots[slot] = node._changed = revision
         touched = self._touched
         touched.pop(node.id, None)
@@ -261,13 +273,13 @@ class Fragment:
 
     def put_in(self, node: Node) -> None:
         """Record that ``node`` was added to the tree."""
-        self.revision += 1
+        self.revision = self.urgent = self.revision + 1
         self._added[node.id] = node
         self._adopt(node)
 
     def take_out(self, node: Node) -> None:
         """Record that ``node`` is removed from the tree."""
-        self.revision += 1
+        self.revision = self.urgent = self.revision + 1
         # A node that was never sent needs no removal.
         if node._attached <= self._sent:
             self._removed.append((self.revision, node.id))

@@ -11,6 +11,7 @@ import msgspec
 from webmap.base.errors import WireError
 from webmap.scene.allowed import check_event
 from webmap.scene.element import Element, split_classes
+from webmap.scene.live import AGES_EVERY
 from webmap.scene.node import Fragment
 from webmap.scene.wire.encode import encode_changes, string, varint
 from webmap.scene.wire.messages import (
@@ -51,6 +52,7 @@ class SceneSession:
         self._frame = 0
         self._seen = 0
         self._spoke = math.inf
+        self._aged = -math.inf  # the number of the last period whose ages were sent
         self._pending = PendingRecords()
 
     # Fragments ------------------------------------------------------------------
@@ -305,7 +307,9 @@ class SceneSession:
         """Return the next frame, or None if there is nothing to send, or not yet.
 
         A page gets the time at least every :data:`HEARTBEAT` seconds, so that it
-        detects when the display stops sending.
+        detects when the display stops sending. Ages that wait are sent with the first
+        frame after each multiple of :data:`webmap.scene.live.AGES_EVERY`, to every page
+        at the same time, so that they are encoded once.
 
         Args:
             now: Seconds of :func:`time.monotonic`.
@@ -313,7 +317,9 @@ class SceneSession:
         """
         if self._frame - self._seen >= self.WINDOW:
             return None
-        body = None if self._pending.send_all else self._changes()
+        period = now // AGES_EVERY
+        ages = period != self._aged
+        body = None if self._pending.send_all else self._changes(ages)
         if body == b"" and now - self._spoke < self.HEARTBEAT:
             return None
         if body is None:
@@ -321,16 +327,24 @@ class SceneSession:
         head = _HEADER(VERSION, RESET * self._pending.send_all, self._frame + 1, now)
         self._frame += 1
         self._spoke = now
+        if ages:
+            self._aged = period
         self._pending.sent()
         return head + body
 
-    def _changes(self) -> bytes | None:
-        """Return the changes since the last frame; None if they were discarded."""
+    def _changes(self, ages: bool) -> bytes | None:
+        """Return the changes since the last frame; None if they were discarded.
+
+        Args:
+            ages: Whether ages that wait are sent too.
+
+        """
         parts: list[bytes | bytearray] = [self._pending.gone]
         fragments = self._fragments
         for fragment, known in fragments.items():
             revision = fragment.revision
-            if known != revision and known is not None:
+            newest = revision if ages else fragment.urgent
+            if known is not None and known < newest:
                 changes = encode_changes(fragment, known)
                 if changes is None:
                     self._pending.send_all = True
