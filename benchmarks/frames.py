@@ -66,9 +66,12 @@ def scan(number: int, beams: int = 720) -> dict[str, Any]:
     }
 
 
-def json_frames(topic: str) -> list[str]:
+def json_frames(topic: str, beams: int = 720) -> list[str]:
     """Return publish frames as the bridge of ROS 1 writes them with ``ujson``."""
-    make = odometry if topic == ODOM else scan
+
+    def make(number: int) -> dict[str, Any]:
+        return odometry(number) if topic == ODOM else scan(number, beams)
+
     return [
         json.dumps(
             {"op": "publish", "topic": topic, "msg": make(number)},

@@ -4,17 +4,23 @@ The robots, their layers and the session of a page are real; only the clock is m
 that the figures are the same on each machine. The page acknowledges each frame.
 """
 
+import json
 import math
 import time
 from collections.abc import Callable
 from unittest.mock import patch
 
+import numpy as np
+
 import webmap
-from benchmarks.frames import ODOM, json_frames
+from benchmarks.frames import ODOM, SCAN, VARIANTS, json_frames
 from benchmarks.harness import Comparison, Contender, Figures, compare
 from benchmarks.watchers import HEAD
 from webmap.base.geometry import Quaternion, Vector3
 from webmap.poses.placing import PoseReading
+from webmap.ros.decoding import convert
+from webmap.ros.messages import LaserScanMsg
+from webmap.scene.node import Fragment
 from webmap.scene.wire.session import SceneSession
 
 ROBOTS = 20
@@ -25,22 +31,41 @@ TICKS = 20
 """Ticks of the display a second."""
 
 
+BEAMS = 360
+NOISE = 0.01
+"""Metres; the standard deviation of the distances of a usual scanner."""
+
+VIEW = {"op": "view", "b": 0, "c": 0, "e": 0, "f": 0, "width": 1200, "height": 900}
+
+
 class Site:
     """Robots whose data a viewer gets.
 
     Args:
         moves: Whether the robots drive along circles.
+        pixels: Pixels a metre of the viewer's map; 0 for robots without scans.
 
     """
 
-    def __init__(self, *, moves: bool) -> None:
+    def __init__(self, *, moves: bool, pixels: float = 0.0) -> None:
         self.now = 1000.0
         self._moves = moves
         self.robots = [webmap.Robot(f"robot {number}") for number in range(ROBOTS)]
         self.session = SceneSession()
+        world = webmap.svg.g()
+        root = webmap.svg.svg(world).set_map(world, 1200, 900)
+        mount = self.session.mount(Fragment(root), under=0)
         for robot in self.robots:
-            self.session.mount(robot.fragment, under=0)
+            self.session.mount(robot.fragment, under=world.id, within=mount)
+        if pixels:
+            bridge = webmap.Bridge("ws://127.0.0.1:1")
+            for robot in self.robots:
+                robot.add_module("LaserScanner", bridge, "/scan", max_dots=None)
+            at = {"map_element": root.id, "a": pixels, "d": -pixels}
+            view = {**VIEW, **at, "left": 0, "top": 0}
+            self.session.receive(json.dumps(view))
         self.frames = self.bytes = 0
+        self._chance = np.random.default_rng(1)
 
     def run(self, seconds: float) -> None:
         """Let time pass."""
@@ -57,6 +82,26 @@ class Site:
         turn = 0.7 * number + (0.5 * self.now if self._moves else 0.0)
         place = Vector3(4.0 * number + math.cos(turn), math.sin(turn), 0.0)
         robot.show_pose(PoseReading(place, Quaternion.from_yaw(turn)), self.now)
+        for scanner in robot.modules:
+            scanner.take(self._scan(turn))
+
+    def _scan(self, turn: float) -> LaserScanMsg:
+        """Return the scan of a room of 8 m by 6 m, with noise."""
+        bearings = (np.arange(BEAMS) + 0.5) * math.tau / BEAMS - math.pi
+        cos, sin = np.cos(bearings + turn), np.sin(bearings + turn)
+        along, across = np.where(cos > 0, 5.0, 3.0), np.where(sin > 0, 2.0, 4.0)
+        reach = np.minimum(along / abs(cos), across / abs(sin))
+        reach += self._chance.normal(0.0, NOISE, BEAMS)
+        ranges = np.round(reach, 3).astype(np.float32)
+        fields = {
+            "ranges": ranges.tolist(),
+            "angle_min": float(bearings[0]),
+            "angle_increment": math.tau / BEAMS,
+            "range_min": 0.1,
+            "range_max": 12.0,
+        }
+        message: LaserScanMsg = convert(fields, LaserScanMsg)
+        return message
 
     def _tick(self) -> None:
         frame = self.session.frame(self.now)
@@ -67,11 +112,11 @@ class Site:
             self.session.receive(f'{{"op":"seen","frame":{number}}}')
 
 
-def shown(seconds: float, *, moves: bool) -> Callable[[], Figures]:
-    """Return a run of the display."""
+def shown(seconds: float, *, moves: bool, pixels: float = 0.0) -> Callable[[], Figures]:
+    """Return a run of the display; see :class:`Site`."""
 
     def run() -> Figures:
-        site = Site(moves=moves)
+        site = Site(moves=moves, pixels=pixels)
         with patch.object(time, "monotonic", lambda: site.now):
             site.run(2.0)
             site.frames = site.bytes = 0
@@ -90,10 +135,8 @@ def rosbridge(*topics: str) -> Callable[[], Figures]:
     """Return what a rosbridge sends to one browser: every message, in JSON."""
 
     def run() -> Figures:
-        size = sum(
-            sum(map(len, frames)) / len(frames)
-            for frames in (json_frames(topic) for topic in topics)
-        )
+        frames = {ODOM: json_frames(ODOM), SCAN: json_frames(SCAN, BEAMS)}
+        size = sum(sum(map(len, frames[topic])) / VARIANTS for topic in topics)
         messages = ROBOTS * RATE
         return {
             "messages a second": messages * len(topics),
@@ -111,5 +154,18 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
         Contender("robots that move", shown(seconds, moves=True)),
         Contender("robots that stand still", shown(seconds, moves=False)),
     ]
-    title = f"poses of {ROBOTS} robots at {RATE} Hz, to one viewer"
-    return [compare(title, poses, 1)]
+    scans = [
+        Contender("rosbridge's JSON", rosbridge(ODOM, SCAN)),
+        *(
+            Contender(
+                f"{pixels} pixels a metre", shown(seconds, moves=True, pixels=pixels)
+            )
+            for pixels in (100, 50, 20)
+        ),
+        Contender("20, standing still", shown(seconds, moves=False, pixels=20)),
+    ]
+    to = f"of {ROBOTS} robots at {RATE} Hz, to one viewer"
+    return [
+        compare(f"poses {to}", poses, 1),
+        compare(f"poses and scans of {BEAMS} {to}", scans, 1),
+    ]

@@ -12,11 +12,13 @@ import cbor2
 import numpy as np
 from PIL import Image
 
+from ray_points import points_of
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Affine
 from webmap.base.scope import Removal, current_scope, keep, no_scope
 from webmap.core.pictures import pictures
 from webmap.ros.rosbridge.protocol import Protocol
+from webmap.scene.live import Rays
 
 
 class Link:
@@ -176,5 +178,7 @@ def numbers(text: str) -> list[float]:
 def dots(element) -> np.ndarray:
     """Where a path has its dots, of shape (N, 2), in metres of its parent."""
     shown = element._dots
+    if isinstance(shown, Rays):
+        return points_of(shown)
     points = np.frombuffer(shown.points, "<i2").reshape(-1, 2) * shown.unit
     return points

@@ -1,8 +1,8 @@
-"""Values that change many times a second: poses, dots and ages."""
+"""Values that change many times a second: poses, dots, rays and ages."""
 
 import math
 import time
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from webmap.base.errors import SceneError
 from webmap.base.geometry import Affine
@@ -35,6 +35,30 @@ class Dots(NamedTuple):
     """Metres in one unit of ``points``."""
 
 
+class Rays(NamedTuple):
+    """Where the rays of a scan hit, to draw a small square at each point."""
+
+    ranges: bytes
+    """Distances in metres, as 32-bit floats, little-endian; NaN where nothing was hit.
+    """
+
+    total: int
+    """Number of rays of the whole scan; those of ``ranges`` are evenly chosen."""
+
+    first: float
+    """Bearing of the first ray, in radians."""
+
+    turn: float
+    """Radians from each ray of the scan to the next one."""
+
+    place: Affine = Affine()
+    """The transform from the plane of the scan to the element, in metres."""
+
+    moved: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Pose of the sensor after the last ray, relative to that at the first one: x and y
+    in metres, yaw in radians."""
+
+
 class Age(NamedTuple):
     """When the data of an element was measured, by this process's clock."""
 
@@ -64,7 +88,7 @@ class MapPlace(NamedTuple):
 class Live(Parent):
     """A node whose pose, dots and age can be set cheaply at every tick."""
 
-    __slots__ = ("_age", "_dots", "_map", "_transform")
+    __slots__ = ("_age", "_coded", "_dots", "_map", "_transform")
 
     namespace = "svg"
 
@@ -72,7 +96,9 @@ class Live(Parent):
         super().__init__()
         # The newest of: an attribute's text, a pose (x, y, yaw), a matrix.
         self._transform: str | tuple[float, float, float] | Affine | None = None
-        self._dots: Dots | None = None
+        self._dots: Dots | Rays | None = None
+        self._coded: dict[float, Any] = {}
+        """The encoded dots by detail; a cache of the encoder."""
         self._age: Age | None = None
         self._map: MapPlace | None = None
 
@@ -140,7 +166,32 @@ class Live(Parent):
             raise SceneError(f"points are 4 bytes each, got {len(data)} bytes in all")
         if not (isfinite(unit) and unit > 0):
             raise SceneError(f"unit must be a number of metres above 0, got {unit}")
-        dots = Dots(data, unit)
+        self._set_dots(Dots(data, unit))
+
+    def set_rays(self, rays: Rays) -> None:
+        """Draw the element, a ``path``, as a small square where each ray hit.
+
+        A page gets the distances as exactly as it can show them. The squares are those
+        of :meth:`set_dots`.
+
+        Raises:
+            SceneError: If the element is no path, there is part of a distance, there
+                are more distances than rays, or another number is not finite.
+
+        """
+        if self.tag != "path":
+            raise SceneError(f"{self!r} is not a path, so it cannot be drawn as rays")
+        size = len(rays.ranges)
+        if size % 4 or size > 4 * rays.total:
+            raise SceneError(
+                f"distances are 4 bytes each, got {size} bytes for {rays.total} rays"
+            )
+        numbers = (rays.first, rays.turn, *rays.place.values, *rays.moved)
+        if not all(map(isfinite, numbers)):
+            raise SceneError(f"the numbers of rays must be finite, got {numbers}")
+        self._set_dots(rays)
+
+    def _set_dots(self, dots: Dots | Rays) -> None:
         if dots != self._dots:
             self._dots = dots
             self._touch("dots")

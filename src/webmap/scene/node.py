@@ -232,6 +232,8 @@ class Fragment:
         """The revision of the newest change that pages get at once; newer ones wait."""
         self.memo: Any = None
         """A cache of the encoder; no part of the scene."""
+        self.dotted: dict[int, Node] = {}
+        """The nodes that are drawn as dots, of which each page gets its own detail."""
         self._nodes: dict[int, Node] = {}
         self._touched: dict[int, Node] = {}
         self._added: dict[int, Node] = {}
@@ -267,6 +269,8 @@ class Fragment:
         if not waits:
             self.urgent = revision
         node._slots[slot] = node._changed = revision
+        if slot == "dots":
+            self.dotted[node.id] = node
         touched = self._touched
         touched.pop(node.id, None)
         touched[node.id] = node
@@ -289,6 +293,7 @@ class Fragment:
             gone.fragment = None
             gone._slots.clear()
             del self._nodes[gone.id]
+            self.dotted.pop(gone.id, None)
             self._touched.pop(gone.id, None)
             self._added.pop(gone.id, None)
 
@@ -297,6 +302,8 @@ class Fragment:
             new.fragment = self
             new._attached = self.revision
             self._nodes[new.id] = new
+            if getattr(new, "_dots", None) is not None:
+                self.dotted[new.id] = new
 
     # Requests of viewers --------------------------------------------------------
 

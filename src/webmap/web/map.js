@@ -372,6 +372,7 @@ export class MapCanvas {
       height: this.height,
       left: place?.e ?? 0,
       top: place?.f ?? 0,
+      dpr: devicePixelRatio,
       follow: this.following,
       applied: this._operations.applied,
     });

@@ -8,6 +8,7 @@ import {
   VERSION,
   VIEW_OPERATIONS,
 } from "./opcodes.js";
+import { rays } from "./rays.js";
 
 /**
  * Receives the records of a frame, one by one; see `webmap/scene/wire/opcodes.py`.
@@ -79,7 +80,7 @@ export class VersionError extends WireError {}
 const decoder = new TextDecoder();
 
 /** Reads one frame from its bytes. */
-class Reader {
+export class Reader {
   /** @param {ArrayBuffer} buffer */
   constructor(buffer) {
     this._view = new DataView(buffer);
@@ -160,6 +161,31 @@ class Reader {
   matrix() {
     const [a, b, c, d, e, f] = this.f64s(6);
     return { a, b, c, d, e, f };
+  }
+
+  /** @param {number} count */
+  f32s(count) {
+    this._need(4 * count);
+    return Array.from({ length: count }, () => this.f32());
+  }
+
+  /**
+   * @param {number} most
+   * @returns {number} A number that is not above `most`.
+   */
+  upTo(most) {
+    const number = this.varint();
+    if (number > most) throw new WireError(`expected at most ${most}, got ${number}`);
+    return number;
+  }
+
+  /**
+   * @param {number} count
+   * @returns {number} `count`, if that many bits are left.
+   */
+  bitsLeftFor(count) {
+    this._need(count / 8);
+    return count;
   }
 
   /** @param {number} count */
@@ -252,6 +278,7 @@ const RECORDS = {
   [OP.FAR_POSE]: (r, sink) => sink.pose(r.varint(), r.f64(), r.f64(), r.f32()),
   [OP.MATRIX]: (r, sink) => sink.matrix(r.varint(), r.matrix()),
   [OP.DOTS]: (r, sink) => sink.dots(r.varint(), r.f32(), r.i16s(2 * r.varint())),
+  [OP.RAYS]: (r, sink) => sink.dots(r.varint(), ...rays(r)),
   [OP.AGE]: (r, sink) => sink.age(r.varint(), r.varint() || null),
   [OP.AGE_LIMIT]: (r, sink) => sink.ageLimit(r.varint(), r.f32(), r.u8() > 0),
   [OP.DATA]: (r, sink) => sink.data(r.varint(), r.string()),

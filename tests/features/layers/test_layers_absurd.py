@@ -25,7 +25,8 @@ from test_layers_poses import ZEROS, covariance, doubtful, polygon, sonar
 from test_layers_robot import scan
 from test_layers_ways import path
 
-from webmap.features.layers.laser_scanner import scan_points
+from ray_points import points_of
+from webmap.features.layers.laser_scanner import scan_rays
 
 FAR = 1e300
 ENDLESS = {"stamp": {"secs": 10**400, "nsecs": 0}, "frame_id": "map"}
@@ -187,8 +188,8 @@ def test_a_grid_with_absurdly_large_values_is_refused(
 def test_range_limits_beyond_single_precision_are_applied_without_warnings(low):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        points, _ = scan_points(scan([1.0, 2.0, 1e30], low=low, high=1e39))
-        assert len(scan_points(scan([1.0], low=1e39, high=1e39))[0]) == 0
+        points = points_of(scan_rays(scan([1.0, 2.0, 1e30], low=low, high=1e39)))
+        assert len(points_of(scan_rays(scan([1.0], low=1e39, high=1e39)))) == 0
     assert np.allclose(points, [[1, 0], [0, 2]])
 
 

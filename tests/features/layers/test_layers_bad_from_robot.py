@@ -15,7 +15,7 @@ from contextlib import AsyncExitStack
 import cbor2
 import numpy as np
 import pytest
-from module_fakes import header, pose, typed
+from module_fakes import dots, header, pose, typed
 from websockets.asyncio.server import serve
 
 from webmap import Bridge, Robot
@@ -256,10 +256,9 @@ DOUBTED = {
 def look(element) -> tuple:
     """All of an element that people see, its age left out."""
     attributes = {k: v for k, v in element.attributes.items() if k != "data-age"}
-    dots = getattr(element, "_dots", None)
-    points = None if dots is None else (dots.points, dots.unit)
+    drawn = getattr(element, "_dots", None)
     parts = tuple(look(child) for child in element.children)
-    return (element.tag, sorted(attributes.items()), element._transform, points, parts)
+    return (element.tag, sorted(attributes.items()), element._transform, drawn, parts)
 
 
 class Scene:
@@ -449,7 +448,7 @@ def test_a_scan_without_any_range_is_drawn_without_dots_and_gives_one_notice(
 
 def dots_of(scene: Scene) -> np.ndarray:
     (scanner,) = (m for m in scene.robots[0].modules if hasattr(m, "max_dots"))
-    return np.frombuffer(scanner.dots._dots.points, "<i2").reshape(-1, 2)
+    return dots(scanner.dots)
 
 
 def test_frames_of_nested_braces_take_little_processor_time(map, channel):

@@ -2,24 +2,18 @@
 
 import math
 from dataclasses import KW_ONLY
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from webmap.base.errors import ProtocolError
-from webmap.base.geometry import FARTHEST
+from webmap.base.geometry import FARTHEST, Affine
 from webmap.config.robot import scan_name
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
-from webmap.modules.drawing import in_units, levelled
 from webmap.modules.layer_options import Limit
 from webmap.modules.robot_layer import RobotLayer
 from webmap.ros.messages import LaserScanMsg
 from webmap.ros.tf import Transform
 from webmap.scene import svg
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from webmap.base.geometry import Pose
+from webmap.scene.live import Rays
 
 MAX_RAYS = 1 << 18
 """Greatest number of rays of a scan."""
@@ -100,8 +94,8 @@ class LaserScanner(RobotLayer):
         """Make the path of all dots."""
         self.dots = self.add(svg.path(class_="dot"))
 
-    def read(self, message: LaserScanMsg) -> "NDArray[np.float64]":
-        """Return the points that the rays hit, relative to the sensor at the first ray.
+    def read(self, message: LaserScanMsg) -> Rays:
+        """Return the rays, relative to the sensor at the first one.
 
         Raises:
             ProtocolError: If the angles are not valid, or there are too many rays.
@@ -110,18 +104,17 @@ class LaserScanner(RobotLayer):
         fault = scan_fault(message)
         if fault is not None:
             self.complain(fault)
-        points, rays = scan_points(message, self.max_dots)
+        rays = scan_rays(message, self.max_dots)
         took = len(message.ranges) * getattr(message, "time_increment", 0.0)
-        if 0.0 < took <= LONGEST_SWEEP and len(points):
+        if 0.0 < took <= LONGEST_SWEEP:
             moved = self.placed.moved_within(message.frame_id, message.stamp, took)
-            points = straightened(points, rays / len(message.ranges), moved)
-        return points
+            rays = rays._replace(moved=(moved.x, moved.y, moved.yaw))
+        return rays
 
-    def draw(self, found: "NDArray[np.float64]", at: Transform) -> None:
+    def draw(self, found: Rays, at: Transform) -> None:
         """Draw the dots as seen from above."""
-        points, _ = levelled(found, at)
-        dots, unit = in_units(points)
-        self.dots.set_dots(dots.tobytes(), unit)
+        (a, c, _, e), (b, d, _, f), _ = at.rows
+        self.dots.set_rays(found._replace(place=Affine(a, b, c, d, e, f)))
 
 
 def scan_fault(scan: LaserScanMsg) -> str | None:
@@ -170,57 +163,27 @@ def check_rays(scan: LaserScanMsg) -> None:
         )
 
 
-def straightened(
-    points: "NDArray[np.float64]", shares: "NDArray[np.float64]", moved: "Pose"
-) -> "NDArray[np.float64]":
-    """Return points as the sensor would have seen them at the beginning of a sweep.
-
-    Args:
-        points: The points in the order of the rays, relative to the moving sensor, of
-            shape (N, 2), in metres.
-        shares: The time of each point, from 0 at the beginning to 1 at the end of the
-            sweep.
-        moved: The sensor's pose at the end, relative to its pose at the beginning.
-    """
-    import numpy as np
-
-    turn = shares * moved.yaw
-    cos, sin = np.cos(turn), np.sin(turn)
-    x, y = points[:, 0], points[:, 1]
-    return np.column_stack(
-        (cos * x - sin * y + shares * moved.x, sin * x + cos * y + shares * moved.y)
-    )
-
-
-def scan_points(
-    scan: LaserScanMsg, max_dots: int | None = None
-) -> "tuple[NDArray[np.float64], NDArray[np.int64]]":
-    """Return the points that the rays hit, in metres in the sensor's own frame.
+def scan_rays(scan: LaserScanMsg, max_dots: int | None = None) -> Rays:
+    """Return the rays of a scan, in the sensor's own frame.
 
     A ray counts if its range is within the sensor's limits. This leaves out the values
     of REP 117 for "too near", "nothing detected" and "bad reading".
 
     Args:
         scan: The scan, with finite angles.
-        max_dots: The greatest number of points, evenly spread over the rays, so that
-            every scan keeps the same bearings; None for all.
+        max_dots: The greatest number of rays, evenly chosen, so that every scan keeps
+            the same bearings; None for all.
 
-    Returns:
-        Points of shape (N, 2), in ray order, and the number of each point's ray.
     """
     import numpy as np
 
     ranges = scan.ranges
-    rays = np.arange(len(ranges))
-    if max_dots is not None and len(ranges) > max_dots:
-        rays = (np.arange(max_dots) * (len(ranges) / max_dots)).astype(int)
-        ranges = ranges[rays]
+    count = len(ranges)
+    if max_dots is not None and count > max_dots:
+        ranges = ranges[(np.arange(max_dots) * (count / max_dots)).astype(int)]
     low = scan.range_min if math.isfinite(scan.range_min) else 0.0
     high = min(scan.range_max, FARTHEST) if scan.range_max > 0 else FARTHEST
-    low = max(-FARTHEST, min(low, FARTHEST))  # ranges are of single precision
+    low = max(0.0, min(low, FARTHEST))  # ranges are of single precision
     hit = np.isfinite(ranges) & (ranges >= low) & (ranges <= high)
-    rays = rays[hit]
-    bearings = scan.angle_min + scan.angle_increment * rays
-    reach = ranges[hit].astype(np.float64)
-    points = np.column_stack((reach * np.cos(bearings), reach * np.sin(bearings)))
-    return points, rays
+    reach = np.where(hit, ranges, np.nan).astype("<f4").tobytes()
+    return Rays(reach, count, scan.angle_min, scan.angle_increment)

@@ -2,16 +2,26 @@
 
 import math
 import struct
-from collections.abc import Callable
-from functools import lru_cache
-from typing import cast
+from collections.abc import Callable, Iterable
+from typing import NamedTuple, cast
 
 from webmap.base.geometry import Affine
 from webmap.scene.allowed import ATTRIBUTES, EVENTS
 from webmap.scene.bound import BoundElement, Document
 from webmap.scene.element import Element
+from webmap.scene.live import Dots, Rays
 from webmap.scene.node import Added, Changed, Fragment, Node, Removed, Text
-from webmap.scene.wire.opcodes import AFTER, FIRST, LAST, PREVENT, STOP, TAGS, Op
+from webmap.scene.wire.opcodes import (
+    AFTER,
+    FIRST,
+    LAST,
+    PREVENT,
+    STOP,
+    TAGS,
+    Op,
+    string,
+    varint,
+)
 
 _TAG = {tag: index for index, tag in reversed(list(enumerate(TAGS)))}
 _HTML_TAG = {tag: index for index, tag in enumerate(TAGS)}
@@ -25,23 +35,6 @@ _MATRIX = struct.Struct("<6d").pack
 _FLOAT = struct.Struct("<f").pack
 _FAR = 4096.0
 """Metres beyond which the error of single precision exceeds half a millimetre."""
-
-
-@lru_cache(maxsize=1 << 12)  # for ids and lengths; ages never repeat
-def varint(number: int) -> bytes:
-    """Return ``number``, which is not negative, with seven bits in each byte."""
-    out = bytearray()
-    while number > 0x7F:
-        out.append(number & 0x7F | 0x80)
-        number >>= 7
-    out.append(number)
-    return bytes(out)
-
-
-def string(text: str) -> bytes:
-    """Return the length of ``text`` and its UTF-8; lone surrogates become ``?``."""
-    data = text.encode("utf-8", "replace")
-    return varint(len(data)) + data
 
 
 class _Memo:
@@ -70,8 +63,8 @@ def encode_changes(fragment: Fragment, since: int) -> bytes | None:
         since: The revision that the page has.
 
     Returns:
-        The section of the fragment, empty if nothing changed, or None if a snapshot is
-        needed.
+        The section of the fragment without its dots, empty if nothing else changed, or
+        None if a snapshot is needed.
 
     """
     memo = _memo(fragment)
@@ -83,7 +76,7 @@ def encode_changes(fragment: Fragment, since: int) -> bytes | None:
 
 
 def encode_snapshot(fragment: Fragment) -> bytes:
-    """Return the records that build the whole current fragment."""
+    """Return the records that build the whole current fragment without its dots."""
     memo = _memo(fragment)
     if memo.snapshot is None:
         fragment.mark_sent()
@@ -93,13 +86,74 @@ def encode_snapshot(fragment: Fragment) -> bytes:
     return memo.snapshot
 
 
+def encode_dots(fragment: Fragment, since: int | None, detail: float) -> bytes:
+    """Return the records of the dots that a page needs.
+
+    Args:
+        fragment: The fragment; the records before must be of the same fragment.
+        since: The revision that the page has; None if it has no dots at this detail.
+        detail: Metres that the page can distinguish.
+
+    """
+    if not fragment.dotted:
+        return b""
+    out = []
+    for node in cast("Iterable[Element]", fragment.dotted.values()):
+        changed = max(node._attached, node._slots.get("dots", 0))
+        if since is None or changed > since:
+            coded = _coded(node, detail)
+            if since is None or max(node._attached, coded.since) > since:
+                out.append(coded.data)
+    return b"".join(out)
+
+
+class _Coded(NamedTuple):
+    """The encoded dots of an element at one detail."""
+
+    dots: Dots | Rays
+    """What is encoded."""
+
+    since: int
+    """The revision since which the bytes are the same."""
+
+    data: bytes
+
+
+def _coded(element: Element, detail: float) -> _Coded:
+    dots = element._dots
+    assert dots is not None  # it is in a fragment's table of dots
+    known: _Coded | None = element._coded.get(detail)
+    if known is not None and known.dots is dots:
+        return known
+    out = bytearray()
+    if isinstance(dots, Rays):
+        from webmap.scene.wire.rays import encode_rays
+
+        _head(out, Op.RAYS, element)
+        out += encode_rays(dots, detail)
+    else:
+        _put_dots(out, element, dots)
+    data, since = bytes(out), element._slots.get("dots", 0)
+    if known is not None and known.data == data:
+        since = known.since
+    coded = element._coded[detail] = _Coded(dots, since, data)
+    return coded
+
+
+def delta(fragment: Fragment) -> bytes:
+    """Return the record before the changes of a fragment."""
+    return bytes((Op.DELTA, *varint(fragment.id)))
+
+
 def _encode_changes(fragment: Fragment, since: int) -> bytes | None:
     changes = fragment.changes_since(since)
     if not changes:
         return None if changes is None else b""
-    out = bytearray([Op.DELTA]) + varint(fragment.id)
+    out = bytearray()
     for change in changes:
         match change:
+            case Changed(_, "dots"):
+                continue
             case Changed(node, slot):
                 _put_slot(out, node, slot)
             case Removed(node_id):
@@ -108,7 +162,7 @@ def _encode_changes(fragment: Fragment, since: int) -> bytes | None:
             case Added(node, after):
                 parent = cast("Element", node.parent).id
                 _put_node(out, node, parent, after.id + AFTER if after else FIRST)
-    return bytes(out)
+    return delta(fragment) + bytes(out) if out else b""
 
 
 # Nodes --------------------------------------------------------------------------
@@ -147,8 +201,6 @@ def _slots_of(element: Element) -> list[str]:
         slots.append("class")
     if element._transform is not None:
         slots.append("transform")
-    if element._dots is not None:
-        slots.append("dots")
     if element._age is not None:
         slots += ("age-limit", "age")
     if element._listeners:
@@ -219,12 +271,10 @@ def _put_pose(out: bytearray, element: Element, x: float, y: float, yaw: float) 
         out += _FAR_POSE(x, y, yaw)
 
 
-def _put_dots(out: bytearray, element: Element) -> None:
-    if element._dots is not None:
-        points, unit = element._dots
-        _head(out, Op.DOTS, element)
-        out += _FLOAT(unit) + varint(len(points) // 4)
-        out += points
+def _put_dots(out: bytearray, element: Element, dots: Dots) -> None:
+    _head(out, Op.DOTS, element)
+    out += _FLOAT(dots.unit) + varint(len(dots.points) // 4)
+    out += dots.points
 
 
 def _put_age(out: bytearray, element: Element) -> None:
@@ -275,7 +325,6 @@ _SLOTS = cast(
     "dict[str, Callable[[bytearray, Node], None]]",
     {
         "transform": _put_transform,
-        "dots": _put_dots,
         "age": _put_age,
         "age-limit": _put_age_limit,
         "class": _put_classes,

@@ -97,6 +97,9 @@ class ViewReport(Message, frozen=True, tag="view"):
     top: float
     """Pixels from the top of the window."""
 
+    dpr: float = 1.0
+    """Pixels of the screen per pixel of the page."""
+
     follow: _Id = 0
     """The element that the view follows, or 0."""
 

@@ -13,6 +13,7 @@ that the page acknowledges, and the display's monotonic clock in seconds.
 
 import zlib
 from enum import IntEnum
+from functools import lru_cache
 
 from webmap.scene.allowed import (
     ATTRIBUTES,
@@ -80,6 +81,7 @@ class Op(IntEnum):
     EVENTS = 50  # v id, u8 count, count times (u8 event, u8 flags)
     EMPTY = 51  # v id: drop the page's own content of a bound element
     MAP = 52  # v id of svg, v id of world, f32 width, f32 height (0: its container's)
+    RAYS = 53  # v id, and the bytes of webmap.scene.wire.rays
 
 
 TABLES = {
@@ -97,3 +99,20 @@ TABLES = {
 
 VERSION = zlib.crc32(repr(TABLES).encode()) & 0xFFFF
 """The version of the tables; a page with another one detects the difference."""
+
+
+@lru_cache(maxsize=1 << 12)  # for ids and lengths; ages never repeat
+def varint(number: int) -> bytes:
+    """Return ``number``, which is not negative, with seven bits in each byte."""
+    out = bytearray()
+    while number > 0x7F:
+        out.append(number & 0x7F | 0x80)
+        number >>= 7
+    out.append(number)
+    return bytes(out)
+
+
+def string(text: str) -> bytes:
+    """Return the length of ``text`` and its UTF-8; lone surrogates become ``?``."""
+    data = text.encode("utf-8", "replace")
+    return varint(len(data)) + data

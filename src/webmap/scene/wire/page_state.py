@@ -8,11 +8,21 @@ from typing import ClassVar
 
 from webmap.scene.element import Element
 from webmap.scene.node import Fragment
-from webmap.scene.wire.encode import EVENT_NUMBER, encode_snapshot, string, varint
+from webmap.scene.wire.encode import EVENT_NUMBER, encode_snapshot
 from webmap.scene.wire.messages import ViewReport
-from webmap.scene.wire.opcodes import PREVENT, STOP, VIEW_OPERATIONS, Op
+from webmap.scene.wire.opcodes import PREVENT, STOP, VIEW_OPERATIONS, Op, string, varint
 
 _ORDER = struct.Struct("<d").pack
+
+
+FINEST = 0.001
+"""Metres to which the distances of scans are rounded at a close view."""
+
+COARSEST = 1.0
+"""Metres to which they are rounded at the most distant view."""
+
+PARTS = 8
+"""They are rounded to an eighth of a pixel, or finer."""
 
 
 class Mount:
@@ -132,9 +142,30 @@ class MapView:
             self._unreported.popleft()
 
     @property
+    def pixel(self) -> float:
+        """Metres across a pixel of the page's screen; 0 if it is not known."""
+        report = self.report
+        if report is None:
+            return 0.0
+        area = abs(report.a * report.d - report.b * report.c) * report.dpr**2
+        return 1 / math.sqrt(area) if area > 0.0 else 0.0
+
+    @property
     def unreported(self) -> bytes:
         """The records of the operations that no report contains yet."""
         return b"".join(record for _, record in self._unreported)
+
+
+def detail_for(views: Iterable[MapView]) -> float:
+    """Return the metres that a page can distinguish on some of its maps.
+
+    It is one of few steps, so that pages with similar views share what is encoded.
+    """
+    pixel = min((view.pixel for view in views), default=0.0)
+    if pixel <= FINEST * PARTS:
+        return FINEST
+    steps = math.floor(math.log2(pixel / PARTS / FINEST))
+    return min(COARSEST, FINEST * 2.0**steps)
 
 
 class PendingRecords:

@@ -13,7 +13,7 @@ from webmap.scene.allowed import check_event
 from webmap.scene.element import Element, split_classes
 from webmap.scene.live import AGES_EVERY
 from webmap.scene.node import Fragment
-from webmap.scene.wire.encode import encode_changes, string, varint
+from webmap.scene.wire.encode import delta, encode_changes, encode_dots
 from webmap.scene.wire.messages import (
     ElementEvent,
     ModuleMessage,
@@ -24,8 +24,15 @@ from webmap.scene.wire.messages import (
     ViewReport,
     read_message,
 )
-from webmap.scene.wire.opcodes import RESET, VERSION, Op
-from webmap.scene.wire.page_state import MapView, Mount, PendingRecords, flags
+from webmap.scene.wire.opcodes import RESET, VERSION, Op, string, varint
+from webmap.scene.wire.page_state import (
+    FINEST,
+    MapView,
+    Mount,
+    PendingRecords,
+    detail_for,
+    flags,
+)
 
 _HEADER = struct.Struct("<HBId").pack
 
@@ -53,6 +60,8 @@ class SceneSession:
         self._seen = 0
         self._spoke = math.inf
         self._aged = -math.inf  # the number of the last period whose ages were sent
+        self._detail = FINEST
+        self._finer = False  # whether the page needs all dots at a finer detail
         self._pending = PendingRecords()
 
     # Fragments ------------------------------------------------------------------
@@ -301,6 +310,8 @@ class SceneSession:
             self._map_view(map_element).take(report)
         except WireError:
             return False
+        before, self._detail = self._detail, detail_for(self._map_views.values())
+        self._finer = self._finer or self._detail < before
         return True
 
     def frame(self, now: float) -> bytes | None:
@@ -330,6 +341,7 @@ class SceneSession:
         if ages:
             self._aged = period
         self._pending.sent()
+        self._finer = False
         return head + body
 
     def _changes(self, ages: bool) -> bytes | None:
@@ -342,15 +354,17 @@ class SceneSession:
         parts: list[bytes | bytearray] = [self._pending.gone]
         fragments = self._fragments
         for fragment, known in fragments.items():
-            revision = fragment.revision
-            newest = revision if ages else fragment.urgent
-            if known is not None and known < newest:
-                changes = encode_changes(fragment, known)
-                if changes is None:
-                    self._pending.send_all = True
-                    return None
-                parts.append(changes)
-                fragments[fragment] = revision
+            newest = fragment.revision if ages else fragment.urgent
+            if known is None or not (known < newest or self._finer):
+                continue
+            changes = encode_changes(fragment, known)
+            if changes is None:
+                self._pending.send_all = True
+                return None
+            since = None if self._finer else known
+            dots = encode_dots(fragment, since, self._detail)
+            parts += (changes or (delta(fragment) if dots else b""), dots)
+            fragments[fragment] = fragment.revision
         parts += [self._place(self._mounts[number]) for number in self._pending.new]
         unsaid = self._pending
         parts += (unsaid.records, *unsaid.messages, *unsaid.problems.values())
@@ -358,7 +372,7 @@ class SceneSession:
 
     def _place(self, mount: Mount) -> bytes:
         self._fragments[mount.fragment] = mount.fragment.revision
-        return mount.record()
+        return mount.record() + encode_dots(mount.fragment, None, self._detail)
 
     def _everything(self) -> bytes:
         parts = [self._place(mount) for mount in self._mounts.values()]
