@@ -218,3 +218,27 @@ def test_a_pose_changes_only_by_what_can_be_seen(clock):
     assert abs(root._transform[0] - (1.0 + 99e-5)) < 1e-4
     root.set_pose(1.0 + 99e-5, 2.0, 0.5 + 2e-5)
     assert root._transform[2] == 0.5 + 2e-5
+
+
+def test_a_page_whose_answer_was_late_gets_each_age_at_once(clock):
+    """With the delay of the network, ages that wait would look stale."""
+    (fragment,) = robots(1)
+    page = Page(fragment)
+    answers, frames = [], []
+    for step in range(600):
+        clock.now = START + step * TICK
+        fragment.root.set_age(0.0)
+        while answers and answers[0][0] <= clock.now:
+            page.session.receive(answers.pop(0)[1])
+        frame = page.session.frame(clock.now)
+        if frame is not None:
+            number = HEADER.unpack_from(frame)[2]
+            delay = 0.4 if 10 <= step / 20 < 12 else 0.1
+            answers.append((clock.now + delay, f'{{"op":"seen","frame":{number}}}'))
+            frames.append(clock.now - START)
+    prompt = [at for at in frames if 2 <= at < 10]
+    late = [at for at in frames if 13 <= at < 20]
+    again = [at for at in frames if 23 <= at < 30]
+    assert len(prompt) == 2 * 8
+    assert len(late) > 15 * 7
+    assert len(again) == 2 * 7

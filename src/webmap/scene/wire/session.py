@@ -47,6 +47,11 @@ class SceneSession:
 
     WINDOW = 2
     HEARTBEAT = 1.0
+    LATE = 0.25
+    """Seconds after which an answer is late."""
+
+    LATE_FOR = 10.0
+    """Seconds for which a page whose answer was late gets each age at once."""
 
     def __init__(self) -> None:
         self._key = secrets.randbits(31)
@@ -59,6 +64,7 @@ class SceneSession:
         self._frame = 0
         self._seen = 0
         self._spoke = math.inf
+        self._late = -math.inf  # when an answer of the page was late
         self._aged = -math.inf  # the number of the last period whose ages were sent
         self._detail = FINEST
         self._finer = False  # whether the page needs all dots at a finer detail
@@ -320,16 +326,19 @@ class SceneSession:
         A page gets the time at least every :data:`HEARTBEAT` seconds, so that it
         detects when the display stops sending. Ages that wait are sent with the first
         frame after each multiple of :data:`webmap.scene.live.AGES_EVERY`, to every page
-        at the same time, so that they are encoded once.
+        at the same time, so that they are encoded once. A page whose answers are late
+        gets each age at once: together with the delay, fresh data would look stale.
 
         Args:
             now: Seconds of :func:`time.monotonic`.
 
         """
+        if self._seen < self._frame and now - self._spoke >= self.LATE:
+            self._late = now
         if self._frame - self._seen >= self.WINDOW:
             return None
         period = now // AGES_EVERY
-        ages = period != self._aged
+        ages = period != self._aged or now - self._late < self.LATE_FOR
         body = None if self._pending.send_all else self._changes(ages)
         if body == b"" and now - self._spoke < self.HEARTBEAT:
             return None
