@@ -35,7 +35,9 @@ BEAMS = 360
 NOISE = 0.01
 """Metres; the standard deviation of the distances of a usual scanner."""
 
-VIEW = {"op": "view", "b": 0, "c": 0, "e": 0, "f": 0, "width": 1200, "height": 900}
+VIEW = {"op": "view", "b": 0, "c": 0, "e": 0, "f": 500, "height": 1000}
+WIDE = 10_000
+"""Pixels of a map that shows all robots, which are in a row."""
 
 
 class Site:
@@ -44,10 +46,13 @@ class Site:
     Args:
         moves: Whether the robots drive along circles.
         pixels: Pixels a metre of the viewer's map; 0 for robots without scans.
+        width: The width of the map, in pixels.
 
     """
 
-    def __init__(self, *, moves: bool, pixels: float = 0.0) -> None:
+    def __init__(
+        self, *, moves: bool, pixels: float = 0.0, width: float = WIDE
+    ) -> None:
         self.now = 1000.0
         self._moves = moves
         self.robots = [webmap.Robot(f"robot {number}") for number in range(ROBOTS)]
@@ -62,7 +67,7 @@ class Site:
             for robot in self.robots:
                 robot.add_module("LaserScanner", bridge, "/scan", max_dots=None)
             at = {"map_element": root.id, "a": pixels, "d": -pixels}
-            view = {**VIEW, **at, "left": 0, "top": 0}
+            view = {**VIEW, **at, "width": width, "left": 0, "top": 0}
             self.session.receive(json.dumps(view))
         self.frames = self.bytes = 0
         self._chance = np.random.default_rng(1)
@@ -112,11 +117,13 @@ class Site:
             self.session.receive(f'{{"op":"seen","frame":{number}}}')
 
 
-def shown(seconds: float, *, moves: bool, pixels: float = 0.0) -> Callable[[], Figures]:
+def shown(
+    seconds: float, *, moves: bool, pixels: float = 0.0, width: float = WIDE
+) -> Callable[[], Figures]:
     """Return a run of the display; see :class:`Site`."""
 
     def run() -> Figures:
-        site = Site(moves=moves, pixels=pixels)
+        site = Site(moves=moves, pixels=pixels, width=width)
         with patch.object(time, "monotonic", lambda: site.now):
             site.run(2.0)
             site.frames = site.bytes = 0
@@ -163,6 +170,9 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
             for pixels in (100, 50, 20)
         ),
         Contender("20, standing still", shown(seconds, moves=False, pixels=20)),
+        Contender(
+            "50, map of 600 pixels", shown(seconds, moves=True, pixels=50, width=600)
+        ),
     ]
     to = f"of {ROBOTS} robots at {RATE} Hz, to one viewer"
     return [

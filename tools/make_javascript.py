@@ -15,7 +15,7 @@ from webmap.core.robot_state import SEEN, STATE_TEXTS
 from webmap.features.goals.goal_tool import SPACING
 from webmap.features.routes.route_tool import LONGEST_NAME, MOST_POINTS
 from webmap.ros.messages_log import LEVELS
-from webmap.scene.wire.messages import LONGEST_TEXTS, PAGE_ID
+from webmap.scene.wire.messages import LONGEST_TEXTS, MOST_UNSEEN, PAGE_ID
 from webmap.scene.wire.opcodes import TABLES, VERSION
 from webmap.server.access import CODE, KEY, PROTOCOL
 from webmap.server.html import FOLDER
@@ -60,6 +60,10 @@ def constants_js() -> str:
         "LONGEST_TEXTS": (
             LONGEST_TEXTS,
             "Characters that texts in messages to the server may have.",
+        ),
+        "MOST_UNSEEN": (
+            MOST_UNSEEN,
+            "Most elements that a page names because it does not show them.",
         ),
         "FOR_GOOD": (
             [BROKEN_RULE, REPLACED],

@@ -196,6 +196,33 @@ def test_dots_are_squares_of_the_size_in_the_style(host, tab):
     assert matrix(tab, ".dot") == pytest.approx([0.01, 0, 0, 0.01, 3, 4])
 
 
+def test_a_page_has_no_dots_of_a_layer_that_it_does_not_show(host, tab):
+    points = struct.pack("<4h", 1000, 2000, -1000, 0)
+
+    def build(shown):
+        _, world, mount = shown.add_map()
+        shown.robot, _ = shown.add_robot(world, mount)
+        shown.dots = svg.path(class_="dot")
+        shown.dots.set_dots(points, 0.001)
+        shown.robot.append(svg.g(shown.dots, class_="laserscan"))
+
+    host.build = build
+    tab.goto(host.url)
+    drawn = "document.querySelector('.dot').getAttribute('d')"
+    display = "document.querySelector('.laserscan').style.display"
+    wait(tab, f"({drawn} ?? '').length > 10")
+    for _ in range(2):
+        tab.evaluate(f"{display} = 'none'")
+        wait(tab, f"{drawn} === ''")
+        host.call(host.one.dots.set_dots, points + points, 0.001)
+        tab.wait_for_timeout(300)
+        assert tab.evaluate(drawn) == ""
+        tab.evaluate(f"{display} = ''")
+        wait(tab, f"{drawn}.split('M').length === 5")
+        host.call(host.one.dots.set_dots, points, 0.001)
+        wait(tab, f"{drawn}.split('M').length === 3")
+
+
 def test_the_page_increases_ages_without_new_data(host, tab):
     def build(shown):
         _, world, mount = shown.add_map()

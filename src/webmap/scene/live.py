@@ -88,7 +88,7 @@ class MapPlace(NamedTuple):
 class Live(Parent):
     """A node whose pose, dots and age can be set cheaply at every tick."""
 
-    __slots__ = ("_age", "_coded", "_dots", "_map", "_transform")
+    __slots__ = ("_age", "_coded", "_dots", "_map", "_reach", "_transform")
 
     namespace = "svg"
 
@@ -99,6 +99,8 @@ class Live(Parent):
         self._dots: Dots | Rays | None = None
         self._coded: dict[float, Any] = {}
         """The encoded dots by detail; a cache of the encoder."""
+        self._reach: tuple[Dots | Rays, float] | None = None
+        """Dots, and the distance within which they are; a cache of the encoder."""
         self._age: Age | None = None
         self._map: MapPlace | None = None
 

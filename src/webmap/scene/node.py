@@ -234,6 +234,8 @@ class Fragment:
         """A cache of the encoder; no part of the scene."""
         self.dotted: dict[int, Node] = {}
         """The nodes that are drawn as dots, of which each page gets its own detail."""
+        self.places: tuple[int, Any] | None = None
+        """Where the dots are at a revision; a cache of the encoder."""
         self._nodes: dict[int, Node] = {}
         self._touched: dict[int, Node] = {}
         self._added: dict[int, Node] = {}

@@ -23,6 +23,9 @@ export const LONGEST_TEXTS = Object.freeze({
   "trouble": 2000,
 });
 
+/** Most elements that a page names because it does not show them. */
+export const MOST_UNSEEN = 1000;
+
 /** Close codes after which the page does not connect again. */
 export const FOR_GOOD = Object.freeze([1008, 4001]);
 

@@ -313,6 +313,16 @@ export class Dots {
     this._undrawn.delete(item);
   }
 
+  /** @returns {number[]} The ids of elements that are shown at no place of the page. */
+  unseen() {
+    const [seen, unseen] = [new Set(), new Set()];
+    for (const { id, element } of this._all) {
+      // Chromium's checkVisibility() is wrong for SVG in a group that is not displayed.
+      (element.getClientRects().length > 0 ? seen : unseen).add(id);
+    }
+    return [...unseen].filter((id) => !seen.has(id)).sort((a, b) => a - b);
+  }
+
   /** Note that styles may give other sizes now. */
   restyle() {
     this._restyled = true;

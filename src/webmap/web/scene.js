@@ -1,5 +1,6 @@
 import { BASE } from "./addresses.js";
 import { Ages, DisplayClock } from "./ages.js";
+import { MOST_UNSEEN } from "./constants.js";
 import { Listeners } from "./events.js";
 import { BoundItem, Dots } from "./item.js";
 import { Maps } from "./maps.js";
@@ -14,6 +15,9 @@ import { readFrame } from "./wire.js";
 
 /** Most images that cannot be loaded and are reported. */
 const MOST_LOST = 20;
+
+/** Milliseconds between two looks for dots that are not shown. */
+const LOOK_PERIOD = 250;
 
 /**
  * The services that the scene needs from its page.
@@ -61,8 +65,19 @@ export class Scene {
     this._onGone = this._onGone.bind(this);
     /** @type {Set<string>} Paths of images that could not be loaded. */
     this._lost = new Set();
+    this._unseen = "";
+    setInterval(() => this._reportUnseen(), LOOK_PERIOD);
     // Such an error does not bubble, but it can be captured.
     document.addEventListener("error", ({ target }) => this._onLost(target), true);
+  }
+
+  /** Send which dots are not shown, such as those of a layer that is off. */
+  _reportUnseen() {
+    const elements = this._dots.unseen().slice(0, MOST_UNSEEN);
+    const unseen = elements.join();
+    if (unseen === this._unseen) return;
+    this._unseen = unseen;
+    this._page.send({ op: "unseen", elements });
   }
 
   /** @param {EventTarget | null} target An element that could not be loaded. */
@@ -100,6 +115,7 @@ export class Scene {
   _clear() {
     for (const mount of [...this._mounts.values()].reverse()) this.unmount(mount.id);
     this._targets = [];
+    this._unseen = "";
     this._clock.reset();
     this._page.recheckProblems();
   }

@@ -9,10 +9,10 @@ from webmap.scene import html, svg
 from webmap.scene.allowed import ATTRIBUTES
 from webmap.scene.bound import Document
 from webmap.scene.node import Fragment
+from webmap.scene.wire.dots import PageDots
 from webmap.scene.wire.encode import (
     _SLOTS,
     encode_changes,
-    encode_dots,
     encode_snapshot,
 )
 from webmap.scene.wire.opcodes import TAGS, Op, string, varint
@@ -72,7 +72,7 @@ def test_a_dot_needs_two_bytes_per_coordinate():
     path = svg.path()
     fragment = Fragment(path)
     path.set_dots(bytes(4 * 360), 0.001)
-    data = encode_dots(fragment, 0, 0.001)
+    data = PageDots({}, {}).records(fragment, 0)
     assert encode_changes(fragment, 0) == b""
     assert len(data) - 4 * 360 <= 1 + len(varint(path.id)) + 4 + 2
 

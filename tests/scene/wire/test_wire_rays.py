@@ -122,7 +122,7 @@ def test_dots_are_where_the_rays_hit(decoder, name):
 def test_the_page_reads_any_distances(decoder, reach, detail):
     scan = rays(reach)
     session, _, path, _ = shown()
-    session._detail = detail
+    session._dots._detail = detail
     path.set_rays(scan)
     found, expected = drawn(decoder, look(session)), points_of(scan)
     farthest = max([0.0, *np.nan_to_num(reach)])

@@ -54,7 +54,8 @@ class LayerSwitches:
 
     Only layers with present content are listed. A layer with different drawings, such
     as two scans or two maps, also has a switch for each of them. Each browser stores
-    its own choice; robots still send data of layers that are off.
+    its own choice. Robots still send data of layers that are off; WebMap sends no dots
+    of them to the page.
 
     Args:
         map: The map.

@@ -2,14 +2,13 @@
 
 import math
 import struct
-from collections.abc import Callable, Iterable
-from typing import NamedTuple, cast
+from collections.abc import Callable
+from typing import cast
 
 from webmap.base.geometry import Affine
 from webmap.scene.allowed import ATTRIBUTES, EVENTS
 from webmap.scene.bound import BoundElement, Document
 from webmap.scene.element import Element
-from webmap.scene.live import Dots, Rays
 from webmap.scene.node import Added, Changed, Fragment, Node, Removed, Text
 from webmap.scene.wire.opcodes import (
     AFTER,
@@ -84,60 +83,6 @@ def encode_snapshot(fragment: Fragment) -> bytes:
         _put_node(out, fragment.root, 0, LAST)
         memo.snapshot = bytes(out)
     return memo.snapshot
-
-
-def encode_dots(fragment: Fragment, since: int | None, detail: float) -> bytes:
-    """Return the records of the dots that a page needs.
-
-    Args:
-        fragment: The fragment; the records before must be of the same fragment.
-        since: The revision that the page has; None if it has no dots at this detail.
-        detail: Metres that the page can distinguish.
-
-    """
-    if not fragment.dotted:
-        return b""
-    out = []
-    for node in cast("Iterable[Element]", fragment.dotted.values()):
-        changed = max(node._attached, node._slots.get("dots", 0))
-        if since is None or changed > since:
-            coded = _coded(node, detail)
-            if since is None or max(node._attached, coded.since) > since:
-                out.append(coded.data)
-    return b"".join(out)
-
-
-class _Coded(NamedTuple):
-    """The encoded dots of an element at one detail."""
-
-    dots: Dots | Rays
-    """What is encoded."""
-
-    since: int
-    """The revision since which the bytes are the same."""
-
-    data: bytes
-
-
-def _coded(element: Element, detail: float) -> _Coded:
-    dots = element._dots
-    assert dots is not None  # it is in a fragment's table of dots
-    known: _Coded | None = element._coded.get(detail)
-    if known is not None and known.dots is dots:
-        return known
-    out = bytearray()
-    if isinstance(dots, Rays):
-        from webmap.scene.wire.rays import encode_rays
-
-        _head(out, Op.RAYS, element)
-        out += encode_rays(dots, detail)
-    else:
-        _put_dots(out, element, dots)
-    data, since = bytes(out), element._slots.get("dots", 0)
-    if known is not None and known.data == data:
-        since = known.since
-    coded = element._coded[detail] = _Coded(dots, since, data)
-    return coded
 
 
 def delta(fragment: Fragment) -> bytes:
@@ -269,12 +214,6 @@ def _put_pose(out: bytearray, element: Element, x: float, y: float, yaw: float) 
     else:
         _head(out, Op.FAR_POSE, element)
         out += _FAR_POSE(x, y, yaw)
-
-
-def _put_dots(out: bytearray, element: Element, dots: Dots) -> None:
-    _head(out, Op.DOTS, element)
-    out += _FLOAT(dots.unit) + varint(len(dots.points) // 4)
-    out += dots.points
 
 
 def _put_age(out: bytearray, element: Element) -> None:

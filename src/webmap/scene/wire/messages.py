@@ -16,6 +16,9 @@ LONGEST_TEXTS = {"name": 64, "value": 8192, "url": 2048, "trouble": 2000}
 """The greatest lengths of texts in these messages, in characters; the browser cuts
 longer ones."""
 
+MOST_UNSEEN = 1000
+"""The greatest number of elements that a page does not show and names."""
+
 PAGE_ID = "^[A-Za-z0-9_-]{8,64}$"
 """The pattern of the name that a page chooses for itself."""
 
@@ -132,6 +135,12 @@ class Seen(Message, frozen=True, tag="seen"):
     frame: _Id
 
 
+class Unseen(Message, frozen=True, tag="unseen"):
+    """The elements that are drawn as dots and not shown: their layers are off."""
+
+    elements: Annotated[list[_Id], Meta(max_length=MOST_UNSEEN)]
+
+
 class Resync(Message, frozen=True, tag="resync"):
     """The page could not read a frame and requests the whole state."""
 
@@ -139,12 +148,12 @@ class Resync(Message, frozen=True, tag="resync"):
 PageEvent = Hello | ElementEvent | ViewReport | ModuleReady | ModuleMessage | Trouble
 """Messages that concern more than the session itself."""
 
-_decoder: msgspec.json.Decoder[PageEvent | Seen | Resync] = msgspec.json.Decoder(
-    PageEvent | Seen | Resync
+_decoder: msgspec.json.Decoder[PageEvent | Seen | Unseen | Resync] = (
+    msgspec.json.Decoder(PageEvent | Seen | Unseen | Resync)
 )
 
 
-def read_message(text: str | bytes) -> PageEvent | Seen | Resync:
+def read_message(text: str | bytes) -> PageEvent | Seen | Unseen | Resync:
     """Return the decoded message of a page.
 
     Raises:

@@ -15,16 +15,6 @@ from webmap.scene.wire.opcodes import PREVENT, STOP, VIEW_OPERATIONS, Op, string
 _ORDER = struct.Struct("<d").pack
 
 
-FINEST = 0.001
-"""Metres to which the distances of scans are rounded at a close view."""
-
-COARSEST = 1.0
-"""Metres to which they are rounded at the most distant view."""
-
-PARTS = 8
-"""They are rounded to an eighth of a pixel, or finer."""
-
-
 class Mount:
     """A fragment at one place of one page."""
 
@@ -154,18 +144,6 @@ class MapView:
     def unreported(self) -> bytes:
         """The records of the operations that no report contains yet."""
         return b"".join(record for _, record in self._unreported)
-
-
-def detail_for(views: Iterable[MapView]) -> float:
-    """Return the metres that a page can distinguish on some of its maps.
-
-    It is one of few steps, so that pages with similar views share what is encoded.
-    """
-    pixel = min((view.pixel for view in views), default=0.0)
-    if pixel <= FINEST * PARTS:
-        return FINEST
-    steps = math.floor(math.log2(pixel / PARTS / FINEST))
-    return min(COARSEST, FINEST * 2.0**steps)
 
 
 class PendingRecords:

@@ -13,7 +13,8 @@ from webmap.scene.allowed import check_event
 from webmap.scene.element import Element, split_classes
 from webmap.scene.live import AGES_EVERY
 from webmap.scene.node import Fragment
-from webmap.scene.wire.encode import delta, encode_changes, encode_dots
+from webmap.scene.wire.dots import PageDots
+from webmap.scene.wire.encode import delta, encode_changes
 from webmap.scene.wire.messages import (
     ElementEvent,
     ModuleMessage,
@@ -21,16 +22,15 @@ from webmap.scene.wire.messages import (
     PageEvent,
     Resync,
     Seen,
+    Unseen,
     ViewReport,
     read_message,
 )
 from webmap.scene.wire.opcodes import RESET, VERSION, Op, string, varint
 from webmap.scene.wire.page_state import (
-    FINEST,
     MapView,
     Mount,
     PendingRecords,
-    detail_for,
     flags,
 )
 
@@ -57,6 +57,7 @@ class SceneSession:
         self._key = secrets.randbits(31)
         self._mounts: dict[int, Mount] = {}
         self._map_views: dict[int, MapView] = {}
+        self._dots = PageDots(self._mounts, self._map_views)
         self._attached: dict[int, tuple[int, bytes]] = {}
         # The revision of each fragment that the page has; None if none yet.
         self._fragments: dict[Fragment, int | None] = {}
@@ -66,8 +67,6 @@ class SceneSession:
         self._spoke = math.inf
         self._late = -math.inf  # when an answer of the page was late
         self._aged = -math.inf  # the number of the last period whose ages were sent
-        self._detail = FINEST
-        self._finer = False  # whether the page needs all dots at a finer detail
         self._pending = PendingRecords()
 
     # Fragments ------------------------------------------------------------------
@@ -104,6 +103,7 @@ class SceneSession:
         self._mounts[number] = Mount(number, fragment, within or 0, under, order)
         self._fragments.setdefault(fragment, None)
         self._pending.new.append(number)
+        self._dots.mounts_changed()
         return number
 
     def unmount(self, mount: int) -> None:
@@ -114,6 +114,7 @@ class SceneSession:
         gone = self._mounts.pop(mount, None)
         if gone is None:
             return
+        self._dots.mounts_changed()
         for inner in [n for n, m in self._mounts.items() if m.within == mount]:
             self.unmount(inner)
         for map_view in [c for c in self._map_views.values() if c.mount == mount]:
@@ -281,6 +282,7 @@ class SceneSession:
         """Send the whole state again, to a new socket or after a missed frame."""
         self._pending.send_all = True
         self._seen = self._frame
+        self._dots.restart()
 
     def receive(self, text: str | bytes) -> list[PageEvent]:
         """Process a message from the page.
@@ -299,6 +301,9 @@ class SceneSession:
                 if self._seen < frame <= self._frame:
                     self._seen = frame
                 return []
+            case Unseen(elements=elements):
+                self._dots.switch_off(elements)
+                return []
             case Resync():
                 self.restart()
                 return []
@@ -316,8 +321,7 @@ class SceneSession:
             self._map_view(map_element).take(report)
         except WireError:
             return False
-        before, self._detail = self._detail, detail_for(self._map_views.values())
-        self._finer = self._finer or self._detail < before
+        self._dots.view_changed()
         return True
 
     def frame(self, now: float) -> bytes | None:
@@ -350,7 +354,7 @@ class SceneSession:
         if ages:
             self._aged = period
         self._pending.sent()
-        self._finer = False
+        self._dots.sent()
         return head + body
 
     def _changes(self, ages: bool) -> bytes | None:
@@ -364,14 +368,14 @@ class SceneSession:
         fragments = self._fragments
         for fragment, known in fragments.items():
             newest = fragment.revision if ages else fragment.urgent
-            if known is None or not (known < newest or self._finer):
+            looks = self._dots.due and fragment.dotted
+            if known is None or not (known < newest or looks):
                 continue
             changes = encode_changes(fragment, known)
             if changes is None:
                 self._pending.send_all = True
                 return None
-            since = None if self._finer else known
-            dots = encode_dots(fragment, since, self._detail)
+            dots = self._dots.records(fragment, known)
             parts += (changes or (delta(fragment) if dots else b""), dots)
             fragments[fragment] = fragment.revision
         parts += [self._place(self._mounts[number]) for number in self._pending.new]
@@ -381,7 +385,7 @@ class SceneSession:
 
     def _place(self, mount: Mount) -> bytes:
         self._fragments[mount.fragment] = mount.fragment.revision
-        return mount.record() + encode_dots(mount.fragment, None, self._detail)
+        return mount.record() + self._dots.records(mount.fragment, None)
 
     def _everything(self) -> bytes:
         parts = [self._place(mount) for mount in self._mounts.values()]
