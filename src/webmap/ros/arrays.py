@@ -67,9 +67,13 @@ class Numbers:
     @classmethod
     def _from_view(cls, value: memoryview) -> "array[Any]":
         """Return numbers of the same width, without a copy if there are many."""
-        if value.format == cls.typecode and value.nbytes > NOT_COPIED:
+        if value.format != cls.typecode:
+            return array(cls.typecode, value)
+        if value.nbytes > NOT_COPIED:
             return cast("array[Any]", value)
-        return array(cls.typecode, value)
+        numbers: array[Any] = array(cls.typecode)
+        numbers.frombytes(value.cast("B"))  # much faster than number by number
+        return numbers
 
     @classmethod
     def _from_list(cls, value: list[Any]) -> "array[Any]":
