@@ -16,6 +16,7 @@ BENCHES = [
     "opening",
     "agents",
     "uplink",
+    "narrow",
     "transports",
     "router",
     "idle",

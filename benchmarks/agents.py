@@ -6,16 +6,15 @@ the figures have the cost of the processes and none of a network.
 
 import json
 import statistics
-import subprocess
-import sys
 import tempfile
 import threading
 import time
 import zlib
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 
 from benchmarks.harness import Comparison, Contender, Figures, compare
+from benchmarks.processes import started
 from webmap.agents.gates import Gates
 from webmap.agents.peer import close_peers
 from webmap.gate.protocol import RobotSpec
@@ -27,22 +26,6 @@ FULL = 1.0
 """The robot's highest speed, in m/s."""
 
 
-@contextmanager
-def started(*command: str) -> Iterator[str]:
-    """Run a command of WebMap; yield the address in its first line."""
-    with subprocess.Popen(
-        [sys.executable, "-m", "webmap", *command], stdout=subprocess.PIPE, text=True
-    ) as running:
-        try:
-            assert running.stdout is not None
-            line = running.stdout.readline()
-            if " at " not in line:
-                raise RuntimeError(f"expected an address, got {line!r}")
-            yield line.rpartition(" at ")[2].strip()
-        finally:
-            running.terminate()
-
-
 class Hand:
     """An operator that holds a slowly changing speed, and notes when it was sent."""
 
@@ -51,11 +34,21 @@ class Hand:
         self._ticks: dict[str, int] = {}
         self._gate = ""
         self._epoch: int | None = None
+        self._mine = False
         self._seq = 0
+        self._from = 0
+        self._waiting: dict[int, float] = {}
+        self.trips: list[float] = []
+        """Milliseconds from each command to the tick that acknowledged it."""
         self.armable = threading.Event()
         self.armed = threading.Event()
         self._connection = gates.connect("Ann", "operator", self._hear, print)
         self._connection.set_speeds(FULL, FULL)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the gate has said that it has the robot."""
+        return self._mine
 
     def take(self) -> None:
         """Take the robot."""
@@ -66,8 +59,25 @@ class Hand:
         if self._epoch is None or self._gate not in self._ticks:
             return
         self._seq += 1
+        self._waiting[self._seq] = time.monotonic()
         stamp = {"seq": self._seq, "tick": self._ticks[self._gate]}
         self._send(op="drive", epoch=self._epoch, x=x, y=0.0, turn=0.0, **stamp)
+
+    def forget(self) -> None:
+        """Count commands and their acknowledgements from now on."""
+        self._waiting.clear()
+        self.trips.clear()
+        self._from = self._seq
+
+    @property
+    def sent(self) -> int:
+        """How many commands were sent since :meth:`forget`."""
+        return self._seq - self._from
+
+    def _acknowledged(self, ack: int) -> None:
+        now = time.monotonic()
+        for seq in [seq for seq in self._waiting if seq <= ack]:
+            self.trips.append(1000 * (now - self._waiting.pop(seq)))
 
     def _send(self, **fields: object) -> None:
         self._connection.receive(json.dumps({**fields, "robot": self._robot}))
@@ -75,9 +85,13 @@ class Hand:
     def _hear(self, text: str) -> None:
         message = json.loads(text)
         if message["op"] == "tick":
-            self._ticks[message.get("gate", "")] = message["tick"]
+            gate = message.get("gate", "")
+            self._ticks[gate] = message["tick"]
+            if gate == self._gate:
+                self._acknowledged(message["ack"])
         elif message["op"] == "robot":
             self._gate, self._epoch = message.get("gate", ""), message["epoch"]
+            self._mine = self._epoch is not None
             if message["armable"]:
                 self.armable.set()
             if message["armed"]:
@@ -140,12 +154,12 @@ def way(*, agent: bool) -> Callable[[], Figures]:
             robot = running.enter_context(WitnessRobot(timeout=0.5))
             url, id = robot.url, "r1"
             if agent:
-                router = running.enter_context(
+                router, _ = running.enter_context(
                     started("router", "--listen", "tcp/127.0.0.1:0")
                 )
                 topics = "Bob:/odom:/cmd_vel:"
                 options = ("--name", "bay3", "--robot", topics, "--stops-within", "0.5")
-                url = running.enter_context(
+                url, _ = running.enter_context(
                     started("agent", robot.url, "--router", router, *options)
                 )
                 id = f"r{zlib.crc32(b'bay3/Bob'):08x}"
