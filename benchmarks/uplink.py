@@ -1,155 +1,239 @@
 """What displays and viewers cost an agent, and the bytes on its uplink.
 
-The agent of five simulated robots, with one display and with several, each a process
-with viewers that draw nothing. A relay between agent and router counts the bytes.
+The agent of simulated robots with scans, with one display and with several, each a
+process with viewers that draw nothing. A line between agent and router counts the
+bytes: of data, ticks and everything else. They are compared with those of rosbridge in
+JSON: a client that subscribes to the same topics, as often. Figures are for each
+message of a topic, because a busy machine makes fewer of them.
 """
 
+import asyncio
 import json
-import os
-import socket
 import subprocess
 import sys
 import tempfile
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
 
-import psutil
+from websockets.asyncio.client import connect
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
 
 from benchmarks.harness import Comparison, Contender, Figures, compare
+from benchmarks.line import Line
+from benchmarks.processes import started, used
+from webmap.agents.peer import Peer, User
+from webmap.base.loop_thread import LoopThread
 
-ROBOTS = 5
-SHAPES = ((1, 1), (4, 1), (1, 20))
+ROBOTS = 20
+SHAPES = ((1, 1), (1, 20), (4, 1), (4, 20))
 """Displays, and viewers of each."""
 
+SLOW = 2.0
+"""Scans a second of each robot where ``--rate`` thins them."""
 
-class CountingRelay:
-    """Passes connections on to a port, and counts the bytes that come from near."""
-
-    def __init__(self, port: int) -> None:
-        self.bytes = 0
-        self._target = port
-        self._server = socket.create_server(("127.0.0.1", 0))
-        self.port: int = self._server.getsockname()[1]
-        self._links: list[socket.socket] = []
-        threading.Thread(target=self._accept, daemon=True).start()
-
-    def close(self) -> None:
-        """End every connection."""
-        for link in (self._server, *self._links):
-            link.close()
-
-    def _accept(self) -> None:
-        while True:
-            try:
-                near, _ = self._server.accept()
-            except OSError:
-                return
-            far = socket.create_connection(("127.0.0.1", self._target))
-            for link in (near, far):
-                link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._links += [near, far]
-            for one, other, counts in ((near, far, True), (far, near, False)):
-                threading.Thread(
-                    target=self._pass_on, args=(one, other, counts), daemon=True
-                ).start()
-
-    def _pass_on(self, one: socket.socket, other: socket.socket, counts: bool) -> None:
-        try:
-            while data := one.recv(1 << 16):
-                self.bytes += len(data) if counts else 0
-                other.sendall(data)
-        except OSError:
-            pass
+MESSAGES = "messages of topics (a second)"
+BYTES = "bytes on the uplink (bytes a message)"
+CPU = "cpu of the agent (us a message)"
 
 
-@contextmanager
-def started(*command: object, state: str = "") -> Iterator[tuple[str, psutil.Process]]:
-    """Run a command of WebMap; yield the address in its first line, and its process."""
-    with subprocess.Popen(
-        [sys.executable, "-m", "webmap", *map(str, command)],
-        stdout=subprocess.PIPE,
-        text=True,
-        env=os.environ | ({"WEBMAP_STATE_DIR": state} if state else {}),
-    ) as running:
-        try:
-            assert running.stdout is not None
-            line = running.stdout.readline()
-            if " at " not in line:
-                raise RuntimeError(f"expected an address, got {line!r}")
-            yield line.rpartition(" at ")[2].strip(), psutil.Process(running.pid)
-        finally:
-            running.terminate()
+@dataclass
+class Scene:
+    """What an agent asked of its rosbridge to show its robots."""
+
+    subscriptions: list[dict[str, object]] = field(default_factory=list)
+
+    @property
+    def scans(self) -> list[str]:
+        """The topics of scans."""
+        types = ("sensor_msgs/LaserScan", "sensor_msgs/msg/LaserScan")
+        return [str(op["topic"]) for op in self.subscriptions if op["type"] in types]
+
+    def note(self, frame: str | bytes) -> None:
+        """Note an operation that a client sent."""
+        op = json.loads(frame)
+        if str(op.get("id", "")).startswith("agent-") and op["op"] == "subscribe":
+            kept = [each for each in self.subscriptions if each["topic"] != op["topic"]]
+            self.subscriptions = [*kept, op]
 
 
-def used(process: psutil.Process) -> float:
-    """Return the seconds of processor time of a process and its children."""
-    every = [process, *process.children(recursive=True)]
-    return sum(sum(each.cpu_times()[:2]) for each in every)
+def watched_scene() -> Scene:
+    """Return what an agent subscribes to for a display with a viewer."""
+    scene = Scene()
+    thread = LoopThread("listening")
+    with ExitStack() as running:
+        running.callback(thread.end)
+        url, _ = running.enter_context(started(*_simulator()))
+
+        async def pass_on(near: ServerConnection) -> None:
+            async with connect(url, compression=None, max_size=None) as far:
+
+                async def back() -> None:
+                    async for frame in far:
+                        await near.send(frame)
+
+                task = asyncio.create_task(back())
+                with suppress(ConnectionClosed):
+                    async for frame in near:
+                        scene.note(frame)
+                        await far.send(frame)
+                task.cancel()
+
+        async def listen() -> int:
+            server = await serve(pass_on, "127.0.0.1", 0, compression=None)
+            port: int = next(iter(server.sockets)).getsockname()[1]
+            return port
+
+        near = f"ws://127.0.0.1:{thread.call(listen())}"
+        router, _ = running.enter_context(started(*_router()))
+        _agent_and_displays(running, near, router, router, 1, 1, 5.0, [])
+        time.sleep(3.0)
+    if not scene.subscriptions:
+        raise RuntimeError("the agent subscribed to nothing")
+    return scene
 
 
-def watched_by(displays: int, viewers: int, seconds: float) -> Callable[[], Figures]:
-    """Return a run with a number of displays, and viewers of each."""
+def _simulator() -> tuple[object, ...]:
+    return ("sim", "--robots", ROBOTS, "--port", 0, "--no-extras")
+
+
+def _router() -> tuple[object, ...]:
+    return ("router", "--listen", "tcp/127.0.0.1:0")
+
+
+def _agent_and_displays(
+    running: ExitStack,
+    bridge: str,
+    uplink: str,
+    router: str,
+    displays: int,
+    viewers: int,
+    seconds: float,
+    options: list[object],
+) -> tuple[Callable[[], float], list["subprocess.Popen[str]"]]:
+    """Start an agent and its displays; return its processor time, and the viewers."""
+    folder = running.enter_context(tempfile.TemporaryDirectory())
+    named = ("--router", uplink, "--name", "bay3", *options)
+    _, agent = running.enter_context(
+        started("agent", bridge, *named, state=f"{folder}/agent")
+    )
+    watching = []
+    for number in range(displays):
+        view = ("view", router, "--port", 0, "--no-browser")
+        page, _ = running.enter_context(started(*view, state=f"{folder}/{number}"))
+        command = (sys.executable, "-m", "benchmarks.watchers", page)
+        watching.append(
+            running.enter_context(
+                subprocess.Popen(
+                    [*command, str(viewers), str(seconds)],
+                    stdout=subprocess.PIPE,
+                    text=True,
+                )
+            )
+        )
+        running.callback(watching[-1].terminate)
+    for each in watching:
+        assert each.stdout is not None
+        if each.stdout.readline().strip() != "ready":
+            raise RuntimeError("the viewers saw no frame")
+    return lambda: used(agent), watching
+
+
+def watched_by(
+    displays: int, viewers: int, seconds: float, options: Callable[[], list[object]]
+) -> Callable[[], Figures]:
+    """Return a run with displays, viewers of each, and options of the agent."""
 
     def run() -> Figures:
         with ExitStack() as running:
-            folder = running.enter_context(tempfile.TemporaryDirectory())
-            sim = ("sim", "--robots", ROBOTS, "--port", 0, "--no-extras")
-            url, _ = running.enter_context(started(*sim))
-            router, _ = running.enter_context(
-                started("router", "--listen", "tcp/127.0.0.1:0")
+            url, _ = running.enter_context(started(*_simulator()))
+            router, _ = running.enter_context(started(*_router()))
+            line = running.enter_context(Line(int(router.rpartition(":")[2])))
+            uplink = f"zenoh://127.0.0.1:{line.port}"
+            cpu, watching = _agent_and_displays(
+                running, url, uplink, router, displays, viewers, 600.0, options()
             )
-            relay = CountingRelay(int(router.rpartition(":")[2]))
-            running.callback(relay.close)
-            uplink = f"zenoh://127.0.0.1:{relay.port}"
-            options = ("--router", uplink, "--name", "bay3")
-            _, agent = running.enter_context(
-                started("agent", url, *options, state=f"{folder}/agent")
-            )
-            watching = []
-            for number in range(displays):
-                view = ("view", router, "--port", 0, "--no-browser")
-                page, _ = running.enter_context(
-                    started(*view, state=f"{folder}/{number}")
-                )
-                command = (sys.executable, "-m", "benchmarks.watchers", page)
-                watching.append(
-                    subprocess.Popen(
-                        [*command, str(viewers), str(seconds + 5.0)],
-                        stdout=subprocess.PIPE,
-                        text=True,
-                    )
-                )
-            for each in watching:
-                assert each.stdout is not None
-                if each.stdout.readline().strip() != "ready":
-                    raise RuntimeError("the viewers saw no frame")
-            time.sleep(2.0)
-            before, sent = used(agent), relay.bytes
+            counted = 0
+
+            def count(_key: str, _piece: bytes) -> None:
+                nonlocal counted
+                counted += 1
+
+            peer = Peer(router, User())
+            running.callback(peer.close)
+            peer.start()
+            peer.listen("webmap/bay3/topics/**", count)
+            time.sleep(3.0)
+            before, sent, already = cpu(), line.up.bytes, counted
+            begun = time.monotonic()
             time.sleep(seconds)
-            cpu, sent = used(agent) - before, relay.bytes - sent
-            for each in watching:
-                assert each.stdout is not None
-                json.loads(each.stdout.readline())
-                each.wait()
-                each.stdout.close()
+            took = time.monotonic() - begun
+            spent, sent = cpu() - before, line.up.bytes - sent
+            messages = counted - already
+            if any(each.poll() is not None for each in watching):
+                raise RuntimeError("viewers ended early")
         return {
-            "cpu of the agent (ms a second)": 1000 * cpu / seconds,
-            "bytes on the uplink (kB a second)": sent / seconds / 1000,
+            MESSAGES: messages / took,
+            BYTES: sent / messages,
+            CPU: 1e6 * spent / messages,
         }
 
     return run
 
 
+def in_json(scene: Callable[[], Scene], seconds: float) -> Callable[[], Figures]:
+    """Return a run of one client of the rosbridge, in JSON and without an agent."""
+
+    async def listen(url: str, subscriptions: list[dict[str, object]]) -> Figures:
+        async with connect(url, compression=None, max_size=None) as link:
+            for op in subscriptions:
+                await link.send(json.dumps({**op, "compression": "none"}))
+            received = count = 0
+            with suppress(TimeoutError):
+                async with asyncio.timeout(2.0):
+                    async for _ in link:
+                        pass
+            begun = time.monotonic()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(seconds):
+                    async for frame in link:
+                        received += len(frame)
+                        count += 1
+            took = time.monotonic() - begun
+        return {MESSAGES: count / took, BYTES: received / count}
+
+    def run() -> Figures:
+        with started(*_simulator()) as (url, _):
+            return asyncio.run(listen(url, scene().subscriptions))
+
+    return run
+
+
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
-    """Compare one display and viewer with several."""
+    """Compare one display and viewer with several, and with rosbridge in JSON."""
     seconds = 2.0 if quick else 10.0
-    contenders = [
+    scene = watched_scene()
+    thinned: list[object] = []
+    for topic in scene.scans:
+        thinned += ["--rate", f"{topic}={SLOW:g}"]
+    shapes = [
         Contender(
             f"{displays} displays, {viewers} viewers each",
-            watched_by(displays, viewers, seconds),
+            watched_by(displays, viewers, seconds, list),
         )
-        for displays, viewers in SHAPES
+        for displays, viewers in (SHAPES[:2] if quick else SHAPES)
     ]
-    return [compare(f"an agent with {ROBOTS} robots", contenders, rounds)]
+    ways = [
+        Contender("rosbridge, JSON", in_json(lambda: scene, seconds)),
+        Contender("agent", watched_by(1, 1, seconds, list)),
+        Contender(
+            f"agent, scans at {SLOW:g} Hz",
+            watched_by(1, 1, seconds, lambda: list(thinned)),
+        ),
+    ]
+    return [
+        compare(f"an agent with {ROBOTS} robots", shapes, rounds),
+        compare(f"the uplink of {ROBOTS} robots", ways, rounds),
+    ]

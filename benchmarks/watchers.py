@@ -1,5 +1,7 @@
 """Viewers that draw nothing: they receive and acknowledge frames, like a page.
 
+Each has a socket to the gates too, as a page has, and sends no command.
+
 Run as ``python -m benchmarks.watchers URL COUNT SECONDS``. Prints ``ready`` when all
 have received a frame, then JSON with the data received in the seconds after that.
 """
@@ -41,20 +43,35 @@ class Watcher:
                 self.first.set()
 
 
-async def open_link(url: str, name: str) -> ClientConnection:
-    """Open ``/scene`` like a separate browser, with a key for the token."""
+async def open_links(url: str, name: str) -> tuple[ClientConnection, ClientConnection]:
+    """Open both sockets like a separate browser, with a key for the token.
+
+    Returns:
+        The sockets of ``/scene`` and ``/drive``.
+
+    """
     async with httpx.AsyncClient(follow_redirects=True) as client:
         page = (await client.get(url)).raise_for_status().text
     key = re.search(r'name="webmap-key" content="([^"]+)"', page)
     assert key, "the sign-in page contains no key"
     place = urlsplit(url)
-    return await connect(
-        f"ws://{place.netloc}/_webmap/scene?page=/&id={name}",
-        origin=f"http://{place.netloc}",  # type: ignore[arg-type]  # a NewType of str
-        subprotocols=["webmap", key[1]],  # type: ignore[list-item]  # as above
-        compression=None,
-        max_size=None,
-    )
+    scene, drive = [
+        await connect(
+            f"ws://{place.netloc}/_webmap/{path}?page=/&id={name}",
+            origin=f"http://{place.netloc}",  # type: ignore[arg-type]  # a NewType
+            subprotocols=["webmap", key[1]],  # type: ignore[list-item]  # as above
+            compression=None,
+            max_size=None,
+        )
+        for path in ("scene", "drive")
+    ]
+    return scene, drive
+
+
+async def read(link: ClientConnection) -> None:
+    """Read what comes on a socket, and use nothing of it."""
+    async for _ in link:
+        pass
 
 
 async def main(url: str, count: int, seconds: float) -> None:
@@ -63,10 +80,12 @@ async def main(url: str, count: int, seconds: float) -> None:
     tasks = []
     for number in range(count):
         name = f"watcher{number:04d}"
-        watcher = Watcher(await open_link(url, name))
+        scene, drive = await open_links(url, name)
+        watcher = Watcher(scene)
+        tasks.append(asyncio.create_task(read(drive)))
         watchers.append(watcher)
         tasks.append(asyncio.create_task(watcher.watch(name)))
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(90):
         for watcher in watchers:
             await watcher.first.wait()
     await asyncio.sleep(1.0)
