@@ -125,3 +125,9 @@ def test_the_address_of_another_computer_has_one_spelling(url):
 def test_the_address_of_a_router_with_agents_is_recognised_by_its_scheme():
     assert names.is_agent_url("ZENOHS://hall/bay3")
     assert not names.is_agent_url("wss://hall/zenoh")
+
+
+def test_the_agent_in_an_address():
+    assert names.agent_named("zenoh://hall:7447/bay3") == "bay3"
+    assert names.agent_named("zenoh://hall:7447/") == ""
+    assert names.agent_named("ws://robot:9090/bay3") == ""

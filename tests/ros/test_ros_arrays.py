@@ -1,0 +1,30 @@
+"""Arrays of numbers from other processes, which come as views of memory."""
+
+from array import array
+
+import pytest
+
+from webmap.ros.arrays import NOT_COPIED, Floats, Int8s
+
+
+@pytest.mark.parametrize("count", [0, 3, NOT_COPIED])
+def test_a_view_of_the_same_width_has_the_same_numbers(count):
+    cells = Int8s.from_wire(memoryview(array("b", [5] * count)))
+    assert (len(cells), bytes(cells)) == (count, b"\5" * count)
+
+
+def test_many_numbers_are_not_copied():
+    memory = array("b", [5]) * (NOT_COPIED + 1)
+    cells = Int8s.from_wire(memoryview(memory))
+    memory[0] = 7
+    assert bytes(cells)[0] == 7
+
+
+def test_numbers_of_another_width_are_converted():
+    distances = Floats.from_wire(memoryview(array("d", [0.5, 2.0])))
+    assert distances == Floats(array("f", [0.5, 2.0]))
+
+
+def test_a_number_that_does_not_fit_is_an_error():
+    with pytest.raises(ValueError, match="expected an array of numbers"):
+        Int8s.from_wire(memoryview(array("h", [300])))
