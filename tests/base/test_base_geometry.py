@@ -96,7 +96,9 @@ def test_an_affine_map_and_its_inverse_undo_each_other(tf, x, y):
 @given(MAPS, MAPS, st.floats(-10, 10), st.floats(-10, 10))
 def test_a_product_of_affine_maps_applies_both_in_turn(first, second, x, y):
     together = (second @ first).apply(x, y)
-    assert together == pytest.approx(second.apply(*first.apply(x, y)), rel=1e-6)
+    assert together == pytest.approx(
+        second.apply(*first.apply(x, y)), rel=1e-6, abs=1e-6
+    )
 
 
 def test_a_singular_affine_map_has_no_inverse():

@@ -20,6 +20,12 @@ def test_many_numbers_are_not_copied():
     assert bytes(cells)[0] == 7
 
 
+def test_many_received_bytes_are_not_copied():
+    cells = Int8s.from_wire(b"\5" * (NOT_COPIED + 1))
+    assert isinstance(cells.values, memoryview)
+    assert (len(cells), cells.values[-1]) == (NOT_COPIED + 1, 5)
+
+
 def test_numbers_of_another_width_are_converted():
     distances = Floats.from_wire(memoryview(array("d", [0.5, 2.0])))
     assert distances == Floats(array("f", [0.5, 2.0]))

@@ -15,6 +15,7 @@ import msgspec
 from webmap.agents.address import Sender
 from webmap.agents.data import Bye, Ping, Pong, SubscribeOp, read_op, unpack
 from webmap.base.errors import WireError
+from webmap.ros.names import same_type
 from webmap.ros.rosbridge import ops
 
 log = logging.getLogger("webmap.agent")
@@ -192,6 +193,12 @@ class Clients:
         topic.newest = frame if topic.count == 1 else b""
         topic.at = now
         return True
+
+    def has_scans(self, name: str) -> bool:
+        """Return whether displays expect laser scans on a topic."""
+        topic = self._topics.get(name)
+        type = topic.sent.type if topic is not None and topic.sent is not None else None
+        return type is not None and same_type(type, "sensor_msgs/LaserScan")
 
     def _do(self, client: Sender, op: SubscribeOp, frame: bytes, now: float) -> None:
         match op.op:

@@ -28,10 +28,11 @@ from webmap.agents.description import (
     read_beacon,
 )
 from webmap.agents.peer import Peer, peer_of
-from webmap.agents.thinning import thinned
+from webmap.agents.scans import lean_scan
 from webmap.base.children import python_command
 from webmap.base.errors import BridgeError, ConfigError, WireError
 from webmap.base.lifecycle import lifecycle
+from webmap.base.loading import load_soon
 from webmap.base.tasks import spawn
 from webmap.core.runtime import runtime
 from webmap.fleet.held import Held, open_at, warn_of_open_bridge
@@ -105,6 +106,8 @@ class Agent:
             throttles=throttles,
         )
         self._beams = dict(beams or {})
+        self._whole: set[str] = set()
+        """The topics whose messages could not be read as scans."""
         self._lane = Lane(
             url,
             opened=self._bridge_opened,
@@ -146,6 +149,7 @@ class Agent:
 
     async def _run(self) -> None:
         peer, name = self._peer, self.name
+        load_soon("numpy")  # for scans
         peer.listen(address.here(name), self._heard_of)
         await self._wait_for_own_name()
         everybody = address.EVERY
@@ -244,17 +248,18 @@ class Agent:
             event.topic, event.frame, now
         ):
             key = address.topic_key(self.name, event.topic)
-            frame = self._thinned(event.topic, event.frame)
+            frame = self._lean(event.topic, event.frame)
             self._peer.put_data(key, data.pack_frame(frame))
 
-    def _thinned(self, topic: str, frame: bytes | bytearray) -> bytes | bytearray:
+    def _lean(self, topic: str, frame: bytes | bytearray) -> bytes | bytearray:
         beams = self._beams.get(topic)
-        if beams is None:
+        is_scan = beams is not None or self._clients.has_scans(topic)
+        if not is_scan or topic in self._whole:
             return frame
         try:
-            return thinned(frame, beams)
+            return lean_scan(frame, beams)
         except WireError as error:
-            del self._beams[topic]
+            self._whole.add(topic)
             log.warning("%s is sent with all of its data: %s", topic, error)
             return frame
 

@@ -1,4 +1,4 @@
-"""Scans with fewer beams: what remains of the distances, and at which angles."""
+"""Scans over an uplink: what remains of the distances, and at which angles."""
 
 import json
 import math
@@ -7,7 +7,8 @@ from pathlib import Path
 import cbor2
 import pytest
 
-from webmap.agents.thinning import thinned
+from webmap.agents.data import pack_frame
+from webmap.agents.scans import lean_scan
 from webmap.base.errors import WireError
 from webmap.ros.rosbridge.cbor import decode
 
@@ -36,13 +37,13 @@ def frame(distances, **changes):
 
 
 def test_the_shortest_distance_of_neighbouring_beams_remains():
-    scan = scan_of(thinned(frame([5.0, 4.0, 3.0, 6.0, 7.0, 2.0]), 3))
+    scan = scan_of(lean_scan(frame([5.0, 4.0, 3.0, 6.0, 7.0, 2.0]), 3))
     assert scan["ranges"] == [4.0, 3.0, 2.0]
     assert scan["intensities"] == []
 
 
 def test_a_beam_is_in_the_middle_of_those_that_it_replaces():
-    scan = scan_of(thinned(frame([1.0] * 6), 3))
+    scan = scan_of(lean_scan(frame([1.0] * 6), 3))
     assert scan["angle_min"] == pytest.approx(-0.75)
     assert scan["angle_increment"] == pytest.approx(1.0)
     assert scan["angle_max"] == pytest.approx(1.25)
@@ -50,32 +51,48 @@ def test_a_beam_is_in_the_middle_of_those_that_it_replaces():
 
 
 def test_a_distance_that_is_none_hides_no_other():
-    got = thinned(frame([None, 3.0, 0.0, 4.0, None, None]), 3)
+    got = lean_scan(frame([None, 3.0, 0.0, 4.0, None, None]), 3)
     assert scan_of(got)["ranges"] == [3.0, 4.0, None]
 
 
 def test_a_number_of_beams_that_does_not_divide_the_scan():
-    scan = scan_of(thinned(frame([5.0, 4.0, 3.0, 2.0, 1.0, 6.0, 7.0]), 3))
+    scan = scan_of(lean_scan(frame([5.0, 4.0, 3.0, 2.0, 1.0, 6.0, 7.0]), 3))
     assert scan["ranges"] == [3.0, 1.0, 7.0]
 
 
 def test_a_scan_with_few_beams_is_not_changed():
     given = frame([1.0, 2.0])
-    assert thinned(given, 2) is given
+    assert lean_scan(given, 2) is given
 
 
 @pytest.mark.parametrize("kind", ["ros1", "ros2"])
 def test_the_scan_of_a_rosbridge_keeps_its_form(kind):
     given = (CAPTURED / kind / "cbor_scan_inf_nan.bin").read_bytes()
-    before, after = decode(given), decode(thinned(given, 20))
+    before, after = decode(given), decode(lean_scan(given, 20))
     assert {**before, "msg": None} == {**after, "msg": None}
     assert before["msg"].keys() == after["msg"].keys()
     assert before["msg"]["header"] == after["msg"]["header"]
     assert len(after["msg"]["ranges"]) <= 20
     least = before["msg"]["range_min"]
     nearest = min(each for each in before["msg"]["ranges"] if each >= least)
-    assert min(after["msg"]["ranges"]) == pytest.approx(nearest)
+    assert min(after["msg"]["ranges"]) == pytest.approx(nearest, abs=0.5 / 1024)
     assert not any(math.isnan(each) for each in after["msg"]["ranges"])
+
+
+@pytest.mark.parametrize("kind", ["ros1", "ros2"])
+def test_the_distances_of_a_rosbridge_are_rounded_and_need_fewer_bytes(kind):
+    given = (CAPTURED / kind / "cbor_scan_inf_nan.bin").read_bytes()
+    got = lean_scan(given, None)
+    before, after = decode(given)["msg"], decode(got)["msg"]
+    for one, other in zip(before["ranges"], after["ranges"], strict=True):
+        assert other == pytest.approx(one, abs=0.5 / 1024, nan_ok=True)
+    assert {**before, "ranges": 0} == {**after, "ranges": 0}
+    assert len(pack_frame(got)) < 0.85 * len(pack_frame(given))
+
+
+def test_json_without_a_number_of_beams_is_not_changed():
+    given = frame([1.00001, 2.0])
+    assert lean_scan(given, None) is given
 
 
 @pytest.mark.parametrize(
@@ -94,4 +111,4 @@ def test_the_scan_of_a_rosbridge_keeps_its_form(kind):
 )
 def test_a_message_that_is_no_scan_is_refused(given):
     with pytest.raises(WireError, match="no scan"):
-        thinned(given, 2)
+        lean_scan(given, 2)
