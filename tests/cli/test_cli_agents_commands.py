@@ -3,11 +3,14 @@
 import re
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 
 import pytest
 from rosbags.highlevel import AnyReader
 
+from webmap.agents import address as keys
+from webmap.agents.peer import Peer, User
 from webmap_process import simulator
 from webmap_process import webmap as running
 
@@ -34,7 +37,23 @@ def agent(router, name, folder):
             WEBMAP_STATE_DIR=str(folder / name),
         ) as address,
     ):
+        wait_for_sign(router, name)
         yield address
+
+
+def wait_for_sign(router, name):
+    """Wait until an agent shows that it is there, once it knows that no other has its
+    name."""
+    signs, peer = [], Peer(router, User())
+    peer.listen(keys.here(name), lambda *sign: signs.append(sign))
+    peer.start()
+    try:
+        deadline = time.monotonic() + 30
+        while not signs:
+            assert time.monotonic() < deadline, "the agent gives no sign"
+            time.sleep(0.05)
+    finally:
+        peer.close()
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
-from module_fakes import header, image_of, pixel
+from module_fakes import header, image_of, images, pixel
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
@@ -129,11 +129,12 @@ def value_of(colour: tuple[int, int, int, int]) -> int:
 
 async def shown(module):
     deadline = time.monotonic() + 20
-    while module.layer.picture.element.get("href") is None:
+    while not images(module.layer):
         assert not module.layer.problems
         assert time.monotonic() < deadline
         await asyncio.sleep(0.002)
-    return module.layer.picture.element
+    (only,) = images(module.layer)
+    return only
 
 
 CORNER = Plan(((0, 255), (128, 255)), origin=(-3.0, 4.0, math.pi / 2), resolution=1.0)
@@ -180,7 +181,7 @@ def test_every_cell_of_a_map_file_is_placed_at_its_world_position(
         # The same map from a topic, whose first row is the lowest.
         topic = map.add_module("OccupancyGrid", link, "/map", palette="raw")
         link.say("/map", grid_message(plan, found))
-        other = topic.layer.picture.element
+        (other,) = images(topic.layer)
         for row in range(rows):
             for column in range(columns):
                 at = plan.place(row + up, column + across)

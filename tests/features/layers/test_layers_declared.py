@@ -207,7 +207,7 @@ PRIVATE = {
     "Markers": {"LayerFrames", "TransformError", "not_known", "Removal", "keep"},
     "OccupancyGrid": {"refusing", "spawn"},
     # What only these know.
-    "LaserScanner": {"scan_name"},
+    "LaserScanner": {"Rays", "scan_name"},
     "NavSatFix": {"LocalPlane"},
     "Polygon": {"check_items"},
 }
