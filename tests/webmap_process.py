@@ -8,10 +8,19 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
+HERE = str(Path(__file__).parent)
+
 
 @contextmanager
 def webmap(*arguments: str | Path, **environment: str) -> Iterator[str]:
-    """Run the command ``webmap``; yield the address that it prints when ready."""
+    """Run the command ``webmap``; yield the address that it prints when ready.
+
+    A ``PYTHONPATH`` is searched before the folder of the tests and the paths that this
+    process has.
+    """
+    if "PYTHONPATH" in environment:
+        paths = [environment["PYTHONPATH"], HERE, os.getenv("PYTHONPATH")]
+        environment["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
     with subprocess.Popen(
         [sys.executable, "-m", "webmap", *arguments],
         stdout=subprocess.PIPE,

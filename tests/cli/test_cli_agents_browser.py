@@ -1,6 +1,5 @@
 """A router, agents and displays, each a process of its own, seen in a real browser."""
 
-import os
 import re
 from contextlib import ExitStack, contextmanager
 
@@ -166,11 +165,10 @@ time.time = lambda: now() + 86_400.0
 
 def test_a_robot_is_driven_whose_agent_has_a_clock_one_day_ahead(chromium, tmp_path):
     (tmp_path / "sitecustomize.py").write_text(TOMORROW)
-    path = os.pathsep.join([str(tmp_path), *filter(None, [os.getenv("PYTHONPATH")])])
     with (
         webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
         simulator("--robots", "1") as url,
-        agent(tmp_path, url, router, "bay1", PYTHONPATH=path),
+        agent(tmp_path, url, router, "bay1", PYTHONPATH=str(tmp_path)),
         display(chromium, router) as page,
     ):
         expect(placed(page)).to_have_count(1, timeout=SOON)

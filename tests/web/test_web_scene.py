@@ -208,7 +208,7 @@ def test_a_page_has_no_dots_of_a_layer_that_it_does_not_show(host, tab):
 
     host.build = build
     tab.goto(host.url)
-    drawn = "document.querySelector('.dot').getAttribute('d')"
+    drawn = "document.querySelector('.dot')?.getAttribute('d')"
     display = "document.querySelector('.laserscan').style.display"
     wait(tab, f"({drawn} ?? '').length > 10")
     for _ in range(2):
