@@ -16,4 +16,4 @@ def open_page(page: webmap.Page) -> None:
     """Show the robot."""
     map = webmap.Map(page.element("webmap_container"))
     map.add_robot(robot)
-    map.scale(0.4)
+    map.scale(20.0)  # scans are as exact as the pixels
