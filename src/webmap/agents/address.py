@@ -108,7 +108,7 @@ ANYONE = "anyone"
 
 
 def here(agent: str) -> str:
-    """Return the key on which an agent says that it is there."""
+    """Return the key of the signs that an agent is there."""
     return f"webmap/{agent}/here"
 
 
@@ -143,7 +143,7 @@ def topic_key(agent: str, topic: str) -> str:
 
 
 def looks_in(agent: str, user: str, instance: str) -> str:
-    """Return the key of what a display says about cameras."""
+    """Return the key of the messages of a display about cameras."""
     return f"webmap/{agent}/pictures/in/{user}/{instance}"
 
 

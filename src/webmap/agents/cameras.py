@@ -115,7 +115,7 @@ class Cameras:
                 self._forget(name)
 
     def receive(self, client: Sender, look: Look | LookAway, now: float) -> None:
-        """Process what a display says about a camera.
+        """Process a message of a display about a camera.
 
         Raises:
             WireError: If too many displays look at the camera.

@@ -100,7 +100,7 @@ def unpack(piece: bytes) -> Note | bytes:
 
 
 class SubscribeOp(msgspec.Struct, omit_defaults=True):
-    """What an operation of a display says about a topic or a service."""
+    """An operation of a display on a topic or a service."""
 
     op: str = ""
     topic: str = ""

@@ -1,4 +1,4 @@
-"""What an agent says about itself and its robots."""
+"""The description of an agent and of its robots, which displays receive."""
 
 from typing import Any
 

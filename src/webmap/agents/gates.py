@@ -279,8 +279,8 @@ class Gates:
         peer.listen(address.gate_out(agent), take, gate=True)
 
     def _pass_on(self, report: Report) -> None:
-        # The loss of one agent says nothing about the robots of the others: their
-        # reports say it.
+        # The loss of one agent does not concern the robots of the others: their
+        # own reports have their states.
         if not isinstance(report, protocol.GateUp | protocol.GateDown):
             for fn in list(self._listeners):
                 try:

@@ -63,7 +63,7 @@ _looked = msgspec.json.Decoder(Looked).decode
 
 
 def read_look(piece: bytes) -> Look | LookAway:
-    """Return what a display says about a camera.
+    """Return the message of a display about a camera.
 
     Raises:
         WireError: If the bytes are nothing of the kind.
@@ -111,7 +111,7 @@ def read_picture(piece: bytes) -> CameraPicture:
 
 
 class AgentClock:
-    """Tells how old at most a picture is, without a common clock.
+    """Computes how old at most a picture is, without a common clock.
 
     The agent's clock was read between a look and its answer. So the oldest that a
     picture can be follows from the latest look that could have found that clock.

@@ -382,7 +382,7 @@ def systemd_unit(name: str, arguments: Sequence[str]) -> str:
 def run_agent(
     agent: Agent, ready: Callable[[], object], ended: threading.Event
 ) -> None:
-    """Run an agent until the process is told to end.
+    """Run an agent until the process is requested to end.
 
     Args:
         agent: The agent.

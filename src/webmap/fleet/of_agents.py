@@ -45,7 +45,7 @@ FIRST = 1.5
 """Seconds for which a display listens for agents before it opens its page."""
 
 LOOK = 0.5
-"""Seconds between two looks at what the agents say."""
+"""Seconds between two looks at the signs of the agents."""
 
 PICTURE_PATIENCE = 15.0
 """Seconds for the picture of a robot, which a slow link carries late."""
@@ -102,7 +102,7 @@ class Agents:
         self._known: dict[str, KnownAgent] = {}
         self._news: dict[str, Beacon] = {}
         self._news_at: dict[str, float] = {}
-        """When each agent said last that it is there, on the monotonic clock."""
+        """When the last sign of each agent came, on the monotonic clock."""
         self._task: asyncio.Task[None] | None = None
         self._peer = peer_of(router)
         self._peer.listen(address.here(self.only or address.EVERY), self._heard)
@@ -112,7 +112,7 @@ class Agents:
 
     @property
     def heard(self) -> bool:
-        """Whether an agent says that it is there."""
+        """Whether a sign of an agent came."""
         return bool(self._news)
 
     @property

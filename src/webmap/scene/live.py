@@ -108,7 +108,7 @@ class Live(Parent):
         """Place the element in its parent; replaces the previous placement.
 
         A pose that differs by less than anyone can see changes nothing, so that the
-        rounding errors of a robot that stands still are not sent.
+        rounding errors of a robot that does not move are not sent.
 
         Args:
             x: Metres.

@@ -17,7 +17,7 @@ _TWO, _EIGHT = 126, 127
 """Length values that state how many further bytes hold the length."""
 
 SHORTENED = b"\0shortened\0"
-"""The start of a message that stands for a longer one: its length in 8 bytes and its
+"""The start of a message that replaces a longer one: its length in 8 bytes and its
 first bytes follow. No message of rosbridge begins like this.
 """
 
