@@ -49,6 +49,18 @@ describe("the position", () => {
     assert.equal(position.at(900), 40.5);
   });
 
+  test("is the wanted one when the replay answers the key before", () => {
+    const position = new Position();
+    position.receive(status({ at: 30, playing: false }), 0);
+    position.want(31, 100);
+    position.want(32, 110);
+    position.receive(status({ at: 31, jumps: 1, playing: false }), 120);
+    assert.equal(position.at(120), 32);
+    position.receive(status({ at: 32, jumps: 2, playing: false }), 130);
+    position.receive(status({ at: 33, jumps: 3, playing: false }), 140);
+    assert.equal(position.at(140), 33, "another page may seek again");
+  });
+
   test("is the replay's again when a seek has no effect", () => {
     const position = new Position();
     position.receive(status({ playing: false }), 0);

@@ -25,6 +25,9 @@ const TEXTS = 5;
 /** Milliseconds without a status after which the replay is not connected. */
 const LOST = 3000;
 
+/** Seconds by which a position may differ from a wanted one and confirm it. */
+const NEAR = 0.1;
+
 /** Milliseconds for which a wanted position is shown while no status confirms it. */
 const WANTED = 2000;
 
@@ -58,8 +61,11 @@ export class Position {
     this.status = status;
     this._received = now;
     const wanted = this._wanted;
-    const near = wanted !== null && Math.abs(status.at - wanted.at) <= 1 + status.rate;
-    if (wanted !== null && near && status.jumps !== wanted.jumps) this._wanted = null;
+    if (wanted === null || status.jumps === wanted.jumps) return;
+    // Keys come faster than answers: the answer to the key before is 1 s away from this.
+    const played = status.playing ? (status.rate * (now - wanted.since)) / 1000 : 0;
+    const beyond = status.at - wanted.at;
+    if (beyond >= -NEAR && beyond <= played + NEAR) this._wanted = null;
   }
 
   /**
