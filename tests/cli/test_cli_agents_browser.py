@@ -1,7 +1,7 @@
 """A router, agents and displays, each a process of its own, seen in a real browser."""
 
 import re
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 
 import pytest
 from playwright.sync_api import expect
@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 from camera_server import CameraServer
 from real_browser import end_stops, hold, watched_tab
 from webmap.base.loop_thread import LoopThread
-from webmap_process import simulator, webmap
+from webmap_process import page_of, simulator, webmap
 
 pytest.importorskip("zenoh")
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -17,21 +17,15 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 SOON = 20_000
 
 
-@contextmanager
-def fleet(tmp_path, number=1, *more):
-    """Run a router and agents with a simulated robot each; yield the router's URL."""
-    with ExitStack() as running:
-        router = running.enter_context(webmap("router", "--listen", "tcp/127.0.0.1:0"))
-        for index in range(number):
-            options = ("--robots", "1", "--seed", str(index + 1))
-            url = running.enter_context(simulator(*options))
-            running.enter_context(
-                agent(tmp_path, url, router, f"bay{index + 1}", *more)
-            )
-        yield router
+TOMORROW = """
+import time
+
+now = time.time
+time.time = lambda: now() + 86_400.0
+"""
 
 
-def agent(tmp_path, url, router, name, *more, **environment):
+def agent(folder, url, router, name, *more, **environment):
     return webmap(
         "agent",
         url,
@@ -42,7 +36,7 @@ def agent(tmp_path, url, router, name, *more, **environment):
         "--stops-within",
         "0.5",
         *more,
-        WEBMAP_STATE_DIR=str(tmp_path / name),
+        WEBMAP_STATE_DIR=str(folder / name),
         **environment,
     )
 
@@ -59,47 +53,58 @@ def display(chromium, router, *more):
         yield page
 
 
+@pytest.fixture(scope="module")
+def yard(tmp_path_factory):
+    """The URL of a router with two agents of one robot each.
+
+    Bay 1 sends scans of 30 beams. The clock of bay 2 is one day ahead.
+    """
+    folder = tmp_path_factory.mktemp("yard")
+    (folder / "sitecustomize.py").write_text(TOMORROW)
+    beams = ("--beams", "/robot_0/base_scan=30")
+    with (
+        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
+        simulator("--robots", "1", "--seed", "1") as one,
+        simulator("--robots", "1", "--seed", "2") as two,
+        agent(folder, one, router, "bay1", *beams),
+        agent(folder, two, router, "bay2", PYTHONPATH=str(folder)),
+    ):
+        yield router
+
+
 def placed(page):
     return page.locator(".robot:not(.unplaced)")
 
 
-def test_the_robots_of_all_agents_are_drawn_with_map_and_scan(chromium, tmp_path):
-    with fleet(tmp_path, 2) as router, display(chromium, router) as page:
+def choose(page, name):
+    """Select a robot once it is placed."""
+    row = page.locator("#robots .row").filter(has_text=name)
+    expect(row).to_have_count(1, timeout=SOON)
+    expect(placed(page)).to_have_count(2, timeout=SOON)
+    row.get_by_role("button").first.click()
+
+
+def test_the_robots_of_all_agents_are_drawn_with_map_and_scan(chromium, yard):
+    with display(chromium, yard) as page:
         expect(placed(page)).to_have_count(2, timeout=SOON)
-        expect(page.locator("#robots .row .name")).to_have_text(
-            ["robot_0", "robot_0 (bay2)"], timeout=SOON
-        )
+        names = page.locator("#robots .row .name")
+        expect(names).to_have_text(["robot_0 (bay1)", "robot_0 (bay2)"], timeout=SOON)
         expect(page.locator(".occupancy-grid.map image").first).to_be_attached(
             timeout=SOON
         )
-        expect(page.locator(".laserscan > .dot[d]")).to_have_count(2, timeout=SOON)
-
-
-def test_a_scan_crosses_the_uplink_with_the_beams_that_the_agent_allows(
-    chromium, tmp_path
-):
-    beams = ("--beams", "/robot_0/base_scan=30")
-    with fleet(tmp_path, 1, *beams) as router, display(chromium, router) as page:
         dots = page.locator(".laserscan > .dot[d]")
-        expect(dots).to_have_count(1, timeout=SOON)
-        assert 5 < dots.get_attribute("d").upper().count("M") <= 30
+        expect(dots).to_have_count(2, timeout=SOON)
+        drawn = [dot.get_attribute("d").upper().count("M") for dot in dots.all()]
+        fewest, most = sorted(drawn)
+        assert 5 < fewest <= 30 < most, "one agent allows 30 beams"
 
 
-def test_two_displays_drive_one_robot_in_turn_and_either_stops_it(chromium, tmp_path):
-    with (
-        fleet(tmp_path) as router,
-        display(chromium, router) as ann,
-        display(chromium, router) as ben,
-    ):
+def test_two_displays_drive_one_robot_in_turn_and_either_stops_it(chromium, yard):
+    with display(chromium, yard) as ann, display(chromium, yard) as ben:
         for page in (ann, ben):
-            expect(placed(page)).to_have_count(1, timeout=SOON)
-            page.locator("#robots .row button").first.click()
-        start = placed(ann).get_attribute("transform")
-        hold(
-            ann.keyboard,
-            "w",
-            lambda: placed(ann).get_attribute("transform") != start,
-        )
+            choose(page, "bay1")
+        title = ann.locator(".webmap-teleop-title")
+        hold(ann.keyboard, "w", lambda: title.text_content() == "You are driving")
         state = ben.locator("#card")
         expect(state).to_contain_text("has control", timeout=SOON)
         ben.keyboard.press(" ")
@@ -111,72 +116,48 @@ def test_two_displays_drive_one_robot_in_turn_and_either_stops_it(chromium, tmp_
         expect(ann.locator(stopped)).to_have_count(0, timeout=SOON)
 
 
-def test_an_agent_that_ends_is_shown_and_one_that_comes_later_appears(
-    chromium, tmp_path
-):
-    with (
-        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
-        simulator("--robots", "1") as url,
-        display(chromium, router) as page,
-    ):
-        expect(page.locator("#bridges summary")).to_have_text("No agent yet")
-        expect(page.locator("#routers")).to_have_text(f"No agent is at {router} yet.")
-        with agent(tmp_path, url, router, "bay1"):
-            expect(placed(page)).to_have_count(1, timeout=SOON)
-            expect(page.locator("#bridges summary")).to_have_text(
-                "Bridge open", timeout=SOON
-            )
-            expect(page.locator("#routers")).to_have_text("")
-        page.locator("#bridges summary").click()
-        line = page.locator(f"#bridges li[title='{router}']")
-        expect(line).to_contain_text("0 agents connected; away: bay1", timeout=SOON)
-        expect(page.locator("#robots .row")).to_contain_text("Lost", timeout=SOON)
-        expect(page.locator("#bridges summary")).to_have_text(
-            "No connection to the bridge", timeout=SOON
-        )
-        with agent(tmp_path, url, router, "bay1"):
-            expect(page.locator("#robots .row")).not_to_contain_text(
-                "Lost", timeout=SOON
-            )
+def test_a_robot_is_driven_whose_agent_has_a_clock_one_day_ahead(chromium, yard):
+    with display(chromium, yard) as page:
+        choose(page, "bay2")
+        title = page.locator(".webmap-teleop-title")
+        hold(page.keyboard, "w", lambda: title.text_content() == "You are driving")
+        page.keyboard.up("w")
+        expect(title).to_have_text("You have control", timeout=SOON)
 
 
-def test_an_agent_that_restarts_with_other_robots_shows_these(chromium, tmp_path):
+def test_agents_that_come_and_end_while_a_page_is_open(chromium, tmp_path):
     with (
         webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
         simulator("--robots", "1") as one,
         simulator("--robots", "3") as three,
         display(chromium, router) as page,
     ):
+        bridges = page.locator("#bridges summary")
+        expect(bridges).to_have_text("No agent yet")
+        expect(page.locator("#routers")).to_have_text(f"No agent is at {router} yet.")
+        log = page.locator(".webmap-rosout")
+        log.locator("summary").click()
+        expect(log.locator(".webmap-rosout-count")).to_have_text("No log lines yet.")
+        with agent(tmp_path, one, router, "bay1"):
+            expect(placed(page)).to_have_count(1, timeout=SOON)
+            expect(bridges).to_have_text("Bridge open", timeout=SOON)
+            expect(page.locator("#routers")).to_have_text("")
+            lines = log.get_by_role("list", name="Log of bay1")
+            expect(lines).to_contain_text("the battery is at", timeout=SOON)
+        log.locator("summary").click()
+        bridges.click()
+        line = page.locator(f"#bridges li[title='{router}']")
+        expect(line).to_contain_text("0 agents connected; away: bay1", timeout=SOON)
+        expect(page.locator("#robots .row")).to_contain_text("Lost", timeout=SOON)
+        expect(bridges).to_have_text("No connection to the bridge", timeout=SOON)
         names = page.locator("#robots .row .name")
-        for url, number in ((one, 1), (three, 3), (one, 1)):
+        for url, number in ((three, 3), (one, 1)):  # it restarts with other robots
             with agent(tmp_path, url, router, "bay1"):
-                expected = [f"robot_{index}" for index in range(number)]
+                expected = [f"robot_{index} (bay1)" for index in range(number)]
                 expect(names).to_have_text(expected, timeout=2 * SOON)
                 expect(placed(page)).to_have_count(number, timeout=SOON)
-
-
-TOMORROW = """
-import time
-
-now = time.time
-time.time = lambda: now() + 86_400.0
-"""
-
-
-def test_a_robot_is_driven_whose_agent_has_a_clock_one_day_ahead(chromium, tmp_path):
-    (tmp_path / "sitecustomize.py").write_text(TOMORROW)
-    with (
-        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
-        simulator("--robots", "1") as url,
-        agent(tmp_path, url, router, "bay1", PYTHONPATH=str(tmp_path)),
-        display(chromium, router) as page,
-    ):
-        expect(placed(page)).to_have_count(1, timeout=SOON)
-        page.locator("#robots .row button").first.click()
-        title = page.locator(".webmap-teleop-title")
-        hold(page.keyboard, "w", lambda: title.text_content() == "You are driving")
-        page.keyboard.up("w")
-        expect(title).to_have_text("You have control", timeout=SOON)
+                lost = page.locator("#robots .row").filter(has_text="Lost")
+                expect(lost).to_have_count(0, timeout=SOON)
 
 
 def test_the_page_of_a_display_shows_why_its_router_is_not_there(chromium, tmp_path):
@@ -192,31 +173,6 @@ def test_the_page_of_a_display_shows_why_its_router_is_not_there(chromium, tmp_p
         expect(line).to_contain_text("nothing listens there; reconnecting")
 
 
-def test_the_log_shows_the_lines_of_an_agent_that_comes_while_it_is_open(
-    chromium, tmp_path
-):
-    with (
-        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
-        simulator("--robots", "1") as url,
-        display(chromium, router) as page,
-    ):
-        log = page.locator(".webmap-rosout")
-        log.locator("summary").click()
-        expect(log.locator(".webmap-rosout-count")).to_have_text("No log lines yet.")
-        with agent(tmp_path, url, router, "bay1"):
-            lines = log.get_by_role("list", name="Log of bay1")
-            expect(lines).to_contain_text("the battery is at", timeout=SOON)
-
-
-def test_robots_of_an_agent_and_of_a_rosbridge_share_one_map(chromium, tmp_path):
-    with (
-        fleet(tmp_path) as router,
-        simulator("--robots", "2") as url,
-        display(chromium, router, url) as page,
-    ):
-        expect(placed(page)).to_have_count(3, timeout=SOON)
-
-
 def test_the_demo_of_agents_shows_a_robot_of_each(chromium, tmp_path):
     options = ("--agents", "2", "--port", "0", "--no-browser")
     with (
@@ -227,17 +183,26 @@ def test_the_demo_of_agents_shows_a_robot_of_each(chromium, tmp_path):
         expect(placed(page)).to_have_count(2, timeout=SOON)
 
 
-def test_a_fleet_file_shows_the_robots_of_agents(chromium, tmp_path):
-    with fleet(tmp_path) as router:
-        file = tmp_path / "fleet.toml"
-        file.write_text(f'[bridges]\nyard = "{router}"\n')
-        options = ("--port", "0", "--no-browser")
-        with (
-            webmap("run", file, *options) as url,
-            watched_tab(chromium, 1280, 800) as page,
-        ):
+MIXED = """
+[bridges]
+yard = "{yard}"
+hall = "{hall}"
+
+[[robots]]
+name = "Cart"
+odometry = "/robot_0/odom"
+"""
+
+
+def test_a_fleet_file_shows_robots_of_agents_and_of_a_rosbridge(
+    chromium, tmp_path, yard
+):
+    file = tmp_path / "fleet.toml"
+    with simulator("--robots", "1") as hall:
+        file.write_text(MIXED.format(yard=yard, hall=hall))
+        with page_of(file) as url, watched_tab(chromium, 1280, 800) as page:
             page.goto(url)
-            expect(placed(page)).to_have_count(1, timeout=SOON)
+            expect(placed(page)).to_have_count(3, timeout=SOON)
 
 
 PICTURED = """

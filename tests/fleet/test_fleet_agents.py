@@ -126,11 +126,11 @@ def hrefs(robot):
 def test_a_robot_gets_its_picture_when_it_comes_and_its_usual_body_without(shown):
     show, peer, notices = shown
     one, other = "1" * 32 + ".svg", "2" * 32 + ".svg"
-    bob = show({"name": "Bob", **pictured(one)})["Bob"]
+    bob = show({"name": "Bob", **pictured(one)})["Bob (bay3)"]
     assert hrefs(bob) == []
     for name in (one, other):
         peer.answers[f"webmap/bay3/about/{name}"] = b"<svg>%s</svg>" % name.encode()
-        assert show({"name": "Bob", **pictured(name)}) == {"Bob": bob}
+        assert show({"name": "Bob", **pictured(name)}) == {"Bob (bay3)": bob}
         (url,) = hrefs(bob)
         image = pictures.get(url.rpartition("/")[2])
         assert (image.data, image.media_type) == (
@@ -146,7 +146,7 @@ def test_what_is_no_picture_is_reported_and_asked_for_once(shown):
     name = "1" * 32 + ".png"
     peer.answers[f"webmap/bay3/about/{name}"] = b"<script>"
     for _ in range(2):
-        assert hrefs(show({"name": "Bob", **pictured(name)})["Bob"]) == []
+        assert hrefs(show({"name": "Bob", **pictured(name)})["Bob (bay3)"]) == []
     (notice,) = notices
     assert notice.startswith("A picture of the agent bay3 is not shown: ")
     assert "expected a complete picture in the format of its suffix .png" in notice
@@ -156,8 +156,13 @@ def test_a_robot_that_cannot_be_shown_leaves_the_others(shown):
     show, _, notices = shown
     elsewhere = {"odometry": {"topic": "/odom", "bridge": "ws://elsewhere"}}
     robots = show({"name": "Ann", **elsewhere}, {"name": "Bob"})
-    assert list(robots) == ["Bob"]
+    assert list(robots) == ["Bob (bay3)"]
     assert notices == [
         "Ann of the agent bay3 is not shown: 'ws://elsewhere' is not the rosbridge of "
         "the agent."
     ]
+
+
+def test_every_display_has_the_same_name_for_a_robot(shown):
+    show, _, _ = shown
+    assert list(show({"name": "Bob"}, {"name": "Bay3"})) == ["Bob (bay3)", "Bay3"]

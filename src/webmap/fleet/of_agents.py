@@ -259,11 +259,8 @@ class Agents:
                 for path, message in mistakes.found:
                     log.error("%s: %s: %s", shown.robot.name, path[0], message)
             return
-        if any(
-            same_name(other.name) == same_name(config.name) for other in _all(console)
-        ):
-            name = f"{config.name} ({agent.name})"
-            config = msgspec.structs.replace(config, name=name)
+        name = shown_name(config.name, agent.name)
+        config = msgspec.structs.replace(config, name=name)
         token = given_id.set(each.id)
         try:
             with no_scope():
@@ -321,8 +318,13 @@ def _undrawn(agent: KnownAgent) -> list[_Shown]:
     ]
 
 
-def _all(console: Console) -> "list[Robot]":
-    return [*console.given, *console.robots]
+def shown_name(name: str, agent: str) -> str:
+    """Return the name of an agent's robot on every display.
+
+    It does not depend on which agents a display knows: operators of several displays
+    mean the same robot by the same name.
+    """
+    return name if same_name(name) == same_name(agent) else f"{name} ({agent})"
 
 
 def find_agents(routers: Sequence[str], bridges: "list[Bridge]") -> list[Agents]:
