@@ -8,6 +8,7 @@ determines the rank of the topic.
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 from webmap.base.errors import ConfigError
@@ -178,10 +179,10 @@ def match(topic: str, type: str) -> Match | None:
         plain = str(split_type(type))
     except ConfigError:
         return None
-    for place, (rule, pattern) in enumerate(_COMPILED):
+    for place, rule in enumerate(RULES):
         if plain not in rule.types or re.search(rule.unless, topic):
             continue
-        found = pattern.match(topic)
+        found = _pattern(rule.tail).match(topic)
         if found is not None:
             between = found["parts"].count("/")
             rank = (place, between, topic)
@@ -189,13 +190,8 @@ def match(topic: str, type: str) -> Match | None:
     return None
 
 
-# The shortest namespace matches, so that parts of a robot do not count as robots.
-_COMPILED = tuple(
-    (
-        rule,
-        re.compile(
-            rf"(?P<ns>(?:/[^/]+)*?)/(?P<parts>(?:(?:{PARTS})/)*)(?:{rule.tail})\Z"
-        ),
-    )
-    for rule in RULES
-)
+@cache
+def _pattern(tail: str) -> re.Pattern[str]:
+    """Return the pattern of topics, compiled at its first use: it takes long."""
+    # The shortest namespace matches, so that parts of a robot do not count as robots.
+    return re.compile(rf"(?P<ns>(?:/[^/]+)*?)/(?P<parts>(?:(?:{PARTS})/)*)(?:{tail})\Z")
