@@ -17,6 +17,13 @@ from webmap.poses import type_query
 from webmap.ros import messages
 
 
+class Listening(Removal):
+    """A subscription whose rate makes no difference."""
+
+    def set_unwatched(self, unwatched):
+        pass
+
+
 class Link:
     """A bridge that is open at once and says what it is told to say."""
 
@@ -40,7 +47,7 @@ class Link:
     def subscribe(self, topic, callback, type=None, *, throttle=0, decode=None, **kw):
         entry = (topic, callback, type, throttle, decode)
         self.subscribed.append(entry)
-        return Removal(lambda: self.subscribed.remove(entry))
+        return Listening(lambda: self.subscribed.remove(entry))
 
     def protect(self, topic, carries):
         self.protected[topic] = carries

@@ -21,6 +21,13 @@ from webmap.ros.rosbridge.protocol import Protocol
 from webmap.scene.live import Rays
 
 
+class Listening(Removal):
+    """A subscription whose rate makes no difference."""
+
+    def set_unwatched(self, unwatched):
+        pass
+
+
 class Link:
     """A bridge that decodes as a real one does."""
 
@@ -43,7 +50,7 @@ class Link:
             if not self.listeners[topic]:
                 del self.listeners[topic]
 
-        return keep(Removal(undo))
+        return keep(Listening(undo))
 
     def on_open(self, fn):
         """It is open already, and nobody waits for what comes soon."""

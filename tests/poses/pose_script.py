@@ -60,6 +60,13 @@ class Jumping(selectors.SelectSelector):
         return ready
 
 
+class Listening(Removal):
+    """A subscription whose rate makes no difference."""
+
+    def set_unwatched(self, unwatched: int) -> None:
+        pass
+
+
 class Link:
     """A bridge whose frames, state and lag a script gives."""
 
@@ -97,7 +104,7 @@ class Link:
     def subscribe(self, topic, callback, type=None, *, decode=None, **options):
         entry = (callback, decode, current_scope())
         self._subscriptions.setdefault(topic, []).append(entry)
-        return keep(Removal(lambda: self._subscriptions[topic].remove(entry)))
+        return keep(Listening(lambda: self._subscriptions[topic].remove(entry)))
 
     def publish(self, topic: str, message: dict) -> None:
         """Receive a message as a rosbridge writes it, if the link is open."""

@@ -53,6 +53,9 @@ class PoseSource:
         """When the newest pose arrived, in seconds of :func:`time.monotonic`."""
         self.expected_at: float | None = None
         """When the newest pose arrived from a source that also sends at rest."""
+        self.period = 0.0
+        """The least time to the next pose when that pose arrived, in seconds."""
+        self._is_needed = False
         self._robot = robot
         self._show_pose = show_pose
         self._silence = SilenceWatch(lambda: robot.name)
@@ -111,7 +114,7 @@ class PoseSource:
         placing = Placing(frames, map_frame, base_frame, quiet=quiet)
         self.pipeline.placing = placing
         self._robot.motion.base_frame = placing.base_frame
-        self._frames_removal = frames.join(self._on_frames)
+        self._frames_removal = frames.join(self._on_frames, self._needs_frames)
         self._restart()
 
     def unplace(self) -> None:
@@ -133,6 +136,30 @@ class PoseSource:
             "namespace": frames.namespace,
             "quiet": placing.quiet,
         }
+
+    def keep_on(self, needed: bool) -> None:
+        """Receive all poses also while nobody looks, or only some.
+
+        Args:
+            needed: Whether a program or a person needs all of them.
+
+        """
+        if needed != self._is_needed:
+            self._is_needed = needed
+            self._pace()
+
+    def _pace(self) -> None:
+        if self.feed is not None:
+            self.feed.keep_on(self._is_needed)
+        if self.frames is not None:
+            self.frames.looking_changed()
+
+    def _needs_frames(self) -> bool:
+        """Return whether frames are needed while nobody looks.
+
+        Without a topic with poses, only the frames show whether the robot is lost.
+        """
+        return self.feed is None or self._is_needed
 
     def end(self) -> None:
         """Stop receiving poses."""
@@ -194,8 +221,8 @@ class PoseSource:
             return
         self.received_at = now = time.monotonic()
         if feed.type == ODOMETRY:  # other poses may arrive only while the robot moves
-            self.expected_at = now
-            self._silence.record(now)
+            self.expected_at, self.period = now, feed.period
+            self._silence.record(now, self.period)
         self._show(self.pipeline.step(reading, self.frames, now), now - feed.bridge.lag)
 
     def _on_frames(self) -> None:
@@ -208,8 +235,8 @@ class PoseSource:
             # The pose may have waited for the next call of listeners.
             self.received_at = came = frames.received_at
             if step.pose.stamp:  # otherwise it is fixed to the map, and arrives once
-                self.expected_at = came
-                self._silence.record(now)
+                self.expected_at, self.period = came, 0.0
+                self._silence.record(now, 0.0)
             self._show(step, came - frames.bridge.lag)
         else:
             self._show_problems(step)
@@ -260,8 +287,9 @@ class PoseSource:
             bridge, topic = frames.bridge, f"{frames.namespace}/tf"
         self.pipeline.restart(period)
         self._change_problems({})
-        self._silence.restart(bridge, topic, period or 0.0)
+        self._silence.restart(bridge, topic)
         self.expected_at = None
+        self._pace()
         if bridge is not self.bridge:
             self._alignment_removal.remove()
             self.bridge = bridge

@@ -22,6 +22,7 @@ from webmap.core.registry import Namespace, robot_modules
 from webmap.core.robot_model import ModelImages, checked_model
 from webmap.core.robot_state import Facts, RobotState, since_when, state_of
 from webmap.gate.protocol import RobotReport
+from webmap.gate.rules.goals import OVER
 from webmap.poses.alignment import alignment
 from webmap.poses.odometry import OdometryFeed
 from webmap.poses.placing import PoseReading
@@ -117,7 +118,7 @@ class Robot(Listed):
             Facts(
                 self.report,
                 None if feed is None else feed.bridge,
-                0.0 if feed is None else feed.throttle / 1000,
+                self.pose_source.period,
                 self.silent_for,
                 self.pose_age,
                 self.motion.axes.seen(self.measured_twist),
@@ -417,6 +418,7 @@ class Robot(Listed):
             self._state_timer = loop.call_later(STATE_EVERY, self._watch_state)
 
     def _show_state(self) -> None:
+        self.pose_source.keep_on(self._needs_poses())
         state, shown = self.state, self._state_shown
         if state == shown:
             return
@@ -427,6 +429,23 @@ class Robot(Listed):
         since = since_when(self.silent_for) if state.name == "gone" else None
         self.svg.set("data-since", since)
         self.notify_modules("on_state", state)
+
+    def _needs_poses(self) -> bool:
+        """Return whether somebody needs all poses also while no page is open.
+
+        That is who has control of the robot, such as a program, and a module of the
+        user that gets each pose.
+        """
+        report = self.report
+        if report is not None:
+            goes = report.goal is not None and report.goal.state not in OVER
+            if goes or report.holder is not None:
+                return True
+        return any(
+            hasattr(module, "on_odometry_update")
+            and not type(module).__module__.startswith("webmap.")
+            for module in self.modules
+        )
 
     def show_pose(self, pose: PoseReading, stamp: float | None = None) -> None:
         """Draw the robot at a pose on the common map, and fire ``on_odometry_update``.

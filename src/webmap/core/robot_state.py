@@ -101,7 +101,7 @@ class Facts(NamedTuple):
     """The bridge of the topic with poses; None if there is no such topic."""
 
     period: float
-    """The least time between two poses of that topic, in seconds."""
+    """The least time between two poses when the newest one came, in seconds."""
 
     silent_for: float | None
     """Seconds since the newest pose from a source that also sends while the robot is at
@@ -229,6 +229,6 @@ def _is_quiet(facts: Facts) -> bool:
 def _moves(facts: Facts) -> bool:
     """Return whether fresh odometry shows a robot in motion."""
     age, twist = facts.pose_age, facts.twist
-    if age is None or age > FRESH or twist is None:
+    if age is None or age > max(FRESH, PERIODS * facts.period) or twist is None:
         return False
     return moves(twist, MOVES, TURNS)

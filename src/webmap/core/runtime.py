@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from webmap.agents.peer import close_peers
 from webmap.base.geometry import Quaternion, Twist
 from webmap.base.lifecycle import lifecycle
+from webmap.base.looking import looking
 from webmap.base.scope import Removal
 from webmap.base.tasks import spawn
 from webmap.core.motion import RobotMotion, robot_motions
@@ -68,6 +69,7 @@ class Runtime:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._thread: threading.Thread | None = None
         self._watchers: dict[int, Watcher] = {}
+        self._serves_pages = False
         self._on_stop: list[Callable[[], None]] = []
         self._has_watchers = asyncio.Event()
         self._ending = asyncio.Event()
@@ -120,6 +122,12 @@ class Runtime:
             raise RuntimeError("WebMap has not been started: call webmap.start()")
         loop.call_soon_threadsafe(fn, *args)
 
+    def serve_pages(self) -> None:
+        """Receive what is only shown less often while no page is open."""
+        self._serves_pages = True
+        if self._loop is not None:
+            self.call(looking.expect_pages, self._loop)
+
     def on_stop(self, fn: Callable[[], None]) -> None:
         """Call ``fn`` in the model's thread whenever the thread is about to end."""
         self._on_stop.append(fn)
@@ -128,8 +136,10 @@ class Runtime:
         """Tick ``watcher`` until the removal; called in the model's thread."""
         self._watchers[id(watcher)] = watcher
         self._has_watchers.set()
+        opened = looking.page_opened()
 
         def undo() -> None:
+            opened.remove()
             self._watchers.pop(id(watcher), None)
             if not self._watchers:
                 self._has_watchers.clear()
@@ -163,6 +173,8 @@ class Runtime:
         gate.start()
         try:
             lifecycle.begin(loop)
+            if self._serves_pages:
+                looking.expect_pages(loop)
             RobotMotion.gate = gate
             for motion in list(robot_motions):
                 motion.declare_or_complain()
@@ -173,6 +185,7 @@ class Runtime:
         finally:
             for fn in self._on_stop:
                 fn()
+            looking.end()
             RobotMotion.gate = None
             await asyncio.to_thread(gate.stop)
             self.gate = None

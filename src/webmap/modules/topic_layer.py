@@ -160,6 +160,11 @@ class TopicLayer(LayerOptions):
     queue_length: ClassVar[int] = 1
     """The number of messages that the bridge may queue."""
 
+    unwatched: ClassVar[int] = 0
+    """The same as ``throttle`` while no page is open, as in
+    :meth:`webmap.Bridge.subscribe`; 0 for a layer that does more than draw, or whose
+    messages add to a drawing."""
+
     bridge: Bridge
     topic: str
     svg: Element
@@ -252,6 +257,7 @@ class TopicLayer(LayerOptions):
             decode=view,
             encoding=self.encoding,
             queue_length=self.queue_length,
+            unwatched=self.unwatched,
         )
 
     def _take_plain(self, message: Mapping[str, Any]) -> None:

@@ -10,10 +10,12 @@ from functools import partial
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Quaternion, Vector3
+from webmap.base.looking import looking
 from webmap.base.scope import Removal, no_scope
 from webmap.poses.lasting import Lasting
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import TFMessage
+from webmap.ros.subscriptions import Subscription
 from webmap.ros.tf import Buffer, Transform, TransformError
 from webmap.ros.tf.buffer import LONGEST_NAME
 
@@ -26,8 +28,9 @@ QUEUE = 100
 """The bridge's queue length: many nodes share the topic, and each message counts."""
 
 GRACE = 3.0
-"""Seconds after the connection first opened in which no frame is reported missing:
-publishers are still being discovered, and static frames arrive late."""
+"""Seconds after the connection first opened, or frames are received again, in which no
+frame is reported missing: publishers are still being discovered, and static frames
+arrive late."""
 
 PERIOD = 0.05
 """The least time between two calls of the listeners in seconds: transforms that arrive
@@ -133,6 +136,7 @@ class Frames:
         self._pending_since: float | None = None
         self._notified_at = -math.inf
         self._listeners: dict[int, Callable[[], object]] = {}
+        self._needs: dict[int, Callable[[], bool]] = {}
         self._raised: set[tuple[int, type[Exception]]] = set()
         self._since = time.monotonic()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -140,37 +144,70 @@ class Frames:
         self._soon: asyncio.TimerHandle | None = None
         with no_scope():
             self._open_removal = bridge.on_open(self._opened)
-            self._subscriptions = [
-                bridge.subscribe(
-                    f"{namespace}/{topic}",
-                    partial(self._on_message, topic == "tf_static"),
-                    TYPE,
-                    decode=TFMessage,
-                    queue_length=QUEUE,
-                )
-                for topic in ("tf", "tf_static")
-            ]
+            self._moving: Subscription | None = self._subscribe("tf")
+            self._static = self._subscribe("tf_static")
+        looking.follow(self)
 
-    def join(self, listener: Callable[[], object]) -> Removal:
+    def _subscribe(self, topic: str) -> Subscription:
+        return self.bridge.subscribe(
+            f"{self.namespace}/{topic}",
+            partial(self._on_message, topic == "tf_static"),
+            TYPE,
+            decode=TFMessage,
+            queue_length=QUEUE,
+        )
+
+    def join(
+        self,
+        listener: Callable[[], object],
+        needs: Callable[[], bool] = lambda: False,
+    ) -> Removal:
         """Call ``listener`` when frames have moved, until the removal.
 
         The call is immediate, or :data:`PERIOD` after the last call.
+
+        Args:
+            listener: The function.
+            needs: Returns whether it needs the frames also while nobody looks; else it
+                is not called then.
+
         """
         key = id(listener)
-        self._listeners[key] = listener
+        self._listeners[key], self._needs[key] = listener, needs
+        self.looking_changed()
 
         def leave() -> None:
-            del self._listeners[key]
+            del self._listeners[key], self._needs[key]
             self._raised = {raised for raised in self._raised if raised[0] != key}
-            if not self._listeners:
+            if self._listeners:
+                self.looking_changed()
+            else:
                 self._end()
 
         return Removal(leave)
 
+    def looking_changed(self) -> None:
+        """Receive frames that move while somebody looks, or a listener needs them.
+
+        A throttle would lose messages of some of the nodes that share the topic.
+        """
+        needed = looking.somebody or any(needs() for needs in self._needs.values())
+        if needed and self._moving is None:
+            self._since = time.monotonic()
+            with no_scope():
+                self._moving = self._subscribe("tf")
+            self.wake(GRACE)
+        elif not needed and self._moving is not None:
+            self._moving.remove()
+            self._moving = None
+
     @property
     def complete_from(self) -> float:
-        """When absent frames start to count as missing, by the monotonic clock."""
-        return self._since + GRACE
+        """When absent frames start to count as missing, by the monotonic clock.
+
+        Never while they are not received.
+        """
+        return math.inf if self._moving is None else self._since + GRACE
 
     def wake(self, after: float) -> None:
         """Call all listeners once more, even if no transform arrives until then.
@@ -179,7 +216,7 @@ class Frames:
             after: Seconds from now; the earliest of several requests counts.
 
         """
-        if self._loop is None:
+        if self._loop is None or after == math.inf:
             return
         when = self._loop.time() + after
         if self._timer is not None:
@@ -233,8 +270,10 @@ class Frames:
     def _end(self) -> None:
         _shared_frames.pop((self.bridge, self.namespace), None)
         self._open_removal.remove()
-        for subscription in self._subscriptions:
-            subscription.remove()
+        looking.forget(self)
+        for subscription in (self._static, self._moving):
+            if subscription is not None:
+                subscription.remove()
         for timer in (self._timer, self._soon):
             if timer is not None:
                 timer.cancel()

@@ -10,12 +10,17 @@ from webmap.poses.placing import PoseReading
 from webmap.poses.type_query import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.decoding import convert
+from webmap.ros.subscriptions import Subscription, SubscriptionOptions
 from webmap.ros.views import (
     ODOMETRY_VIEWS,
     OdometryView,
     odometry_view,
     odometry_view_by_shape,
 )
+
+UNWATCHED = 2000
+"""Least milliseconds between two poses while nobody looks: the last pose stays known,
+and a robot whose poses end is noticed."""
 
 ODOMETRY = "nav_msgs/Odometry"
 """The pose type that also has a velocity."""
@@ -60,6 +65,7 @@ class OdometryFeed:
         self.topic = topic
         self.throttle = throttle
         self.type: str | None = None
+        self._unwatched = UNWATCHED
         self._listener = listener
         self._typed = typed
         self._on_complaint = complain
@@ -68,7 +74,7 @@ class OdometryFeed:
         self._scope = Scope(
             f"poses of {topic}", self._failed, lambda _: self._complain(None)
         )
-        self._subscription: Removable | None = None
+        self._subscription: Subscription | None = None
         self._type_query: Removable | None = None
         if type is None:
             self._type_query = TypeQuery(
@@ -76,6 +82,21 @@ class OdometryFeed:
             )
         else:
             self._subscribe(odometry_view(type))
+
+    @property
+    def period(self) -> float:
+        """The least time between two messages now, in seconds."""
+        asked = SubscriptionOptions(throttle=self.throttle, unwatched=self._unwatched)
+        return asked.least / 1000
+
+    def keep_on(self, needed: bool) -> None:
+        """Receive all poses, or only some while nobody looks."""
+        unwatched = 0 if needed else UNWATCHED
+        if unwatched == self._unwatched:
+            return
+        self._unwatched = unwatched
+        if self._subscription is not None:
+            self._subscription.set_unwatched(unwatched)
 
     def remove(self) -> None:
         """Unsubscribe; a second call does nothing."""
@@ -93,7 +114,10 @@ class OdometryFeed:
         if self._subscription is None:
             with self._scope.active():
                 self._subscription = self.bridge.subscribe(
-                    self.topic, self._on_first, throttle=self.throttle
+                    self.topic,
+                    self._on_first,
+                    throttle=self.throttle,
+                    unwatched=self._unwatched,
                 )
 
     def _on_type(self, type: str) -> None:
@@ -141,6 +165,7 @@ class OdometryFeed:
                 self.type,
                 throttle=self.throttle,
                 decode=view,
+                unwatched=self._unwatched,
             )
 
     def _on_message(self, message: OdometryView) -> None:

@@ -44,8 +44,15 @@ class Silence:
         """When the line is due if no pose arrives until then."""
         return max(self._counted_from + self.limit, self._logged_at + AGAIN)
 
-    def record(self, now: float) -> float | None:
-        """Record a pose; return the time without poses, if it was logged."""
+    def record(self, now: float, period: float = 0.0) -> float | None:
+        """Record a pose; return the time without poses, if it was logged.
+
+        Args:
+            now: The time.
+            period: The least time until the next pose.
+
+        """
+        self.limit = max(LIMIT, PERIODS * period)
         took = now - self._last_pose_at if self._is_logged else None
         self._last_pose_at = self._counted_from = now
         self._is_logged = False
@@ -92,13 +99,12 @@ class SilenceWatch:
         self._timer: asyncio.TimerHandle | None = None
         self._due_at = 0.0
 
-    def restart(self, bridge: Bridge | None, topic: str, period: float) -> None:
+    def restart(self, bridge: Bridge | None, topic: str) -> None:
         """Watch another source, from its first pose on.
 
         Args:
             bridge: The bridge of the poses; None if there is no source.
             topic: The topic.
-            period: The least time between two of its messages, in seconds.
 
         """
         if self._timer is not None:
@@ -106,16 +112,16 @@ class SilenceWatch:
         self._timer = self._links = None
         self._bridge, self._topic = bridge, topic
         self._silence.forget()
-        self._silence.limit = max(LIMIT, PERIODS * period)
 
-    def record(self, now: float) -> None:
+    def record(self, now: float, period: float) -> None:
         """Record a pose of a topic that also sends while the robot is at rest.
 
         Args:
             now: The time, in seconds of :func:`time.monotonic`.
+            period: The least time until the next pose, in seconds.
 
         """
-        took = self._silence.record(now)
+        took = self._silence.record(now, period)
         if took is not None:
             log.info("%s: poses again, after %.0f s", self._name(), took)
         try:

@@ -14,6 +14,7 @@ import msgspec
 
 from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.base.lifecycle import lifecycle
+from webmap.base.looking import looking
 from webmap.base.scope import Removal, keep, no_scope
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.definitions import Definitions
@@ -94,6 +95,7 @@ class Bridge:
 
     def _enlist(self) -> None:
         lifecycle.add(self)
+        looking.follow(self)
         keep(Removal(self._end))
 
     def __repr__(self) -> str:
@@ -167,6 +169,7 @@ class Bridge:
         decode: type[msgspec.Struct] | None = None,
         encoding: Encoding | None = None,
         queue_length: int = 1,
+        unwatched: int = 0,
     ) -> Subscription:
         """Subscribe to a topic, also to one that does not exist yet.
 
@@ -190,6 +193,9 @@ class Bridge:
                 markers) and text for all others.
             queue_length: Most messages that the bridge may queue; WebMap asks for at
                 least 1.
+            unwatched: The same as ``throttle``, if that is longer, while the process
+                serves pages and none was open for ten seconds. For data that is only
+                shown; it has no effect with a ``throttle`` of 0.
 
         Returns:
             The subscription. It ends with the current scope, or by its ``remove()``.
@@ -202,7 +208,7 @@ class Bridge:
         """
         self._link.refuse_if_over()
         name = normalise_topic(topic)
-        given = SubscriptionOptions(type, throttle, queue_length, encoding)
+        given = SubscriptionOptions(type, throttle, queue_length, encoding, unwatched)
         options = checked(given, callback, decode)
         if type is not None:
             split_type(type)
@@ -377,6 +383,11 @@ class Bridge:
 
         """
         return await self._graph.set_parameter(name, value, timeout)
+
+    def looking_changed(self) -> None:
+        """Subscribe to what is only shown as often as somebody looks."""
+        for topic in list(self._topics.values()):
+            topic.repace()
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Open the connection and keep it open; called when WebMap starts."""

@@ -8,6 +8,7 @@ from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 import msgspec
 
 from webmap.base.errors import BridgeError, ConfigError, ProtocolError
+from webmap.base.looking import looking
 from webmap.base.scope import Scope, current_scope
 from webmap.ros.callbacks import Callback
 from webmap.ros.limits import GENERAL, LARGE, TooLarge, check_size, limit_of
@@ -32,6 +33,15 @@ class SubscriptionOptions(NamedTuple):
 
     queue_length: int = 1
     encoding: Encoding | None = None
+    unwatched: int = 0
+    """The same as ``throttle`` while nobody looks, if that is longer."""
+
+    @property
+    def least(self) -> int:
+        """The least time between two messages now, in milliseconds."""
+        if looking.somebody or not self.throttle:
+            return self.throttle
+        return max(self.throttle, self.unwatched)
 
 
 def checked(
@@ -45,7 +55,7 @@ def checked(
     """
     if not callable(callback):
         raise ConfigError(f"a subscription needs a function, got {callback!r}")
-    for name in ("throttle", "queue_length"):
+    for name in ("throttle", "unwatched", "queue_length"):
         value = getattr(options, name)
         if not isinstance(value, int) or value < 0:
             raise ConfigError(f"{name} is a whole number from 0 up, got {value!r}")
@@ -97,6 +107,12 @@ class Throttle(Generic[T]):
             return None
         return self._release(held, now)
 
+    def change(self, period: float, now: float) -> None:
+        """Use another period; what waits for a longer one is due at once."""
+        if period < self.period:
+            self._due = min(self._due, now)
+        self.period = period
+
     def drop(self) -> None:
         """Forget the held message: its connection has ended."""
         self._held = None
@@ -133,10 +149,11 @@ class Subscription:
         self.removed = False
         self.undecoded = False
         """Whether the callback gets each message at once, without decoding."""
-        self.throttle: Throttle[ReceivedMessage] = Throttle(options.throttle / 1000)
+        self.throttle: Throttle[ReceivedMessage] = Throttle(options.least / 1000)
         self._of = topic
         self._callback = callback
         self._timer: TimerHandle | None = None
+        self._releasing: tuple[AbstractEventLoop, Callable[[], None]] | None = None
         self._reported = False
         self._scope: Scope | None = current_scope()
         if self._scope is not None:
@@ -153,6 +170,22 @@ class Subscription:
         if self._scope is not None:
             self._scope.discard(self)
         self._of.remove(self)
+
+    def set_unwatched(self, unwatched: int) -> None:
+        """Change how often messages come while nobody looks; see ``subscribe``."""
+        self.options = self.options._replace(unwatched=unwatched)
+        self._of.repace()
+
+    def repace(self) -> bool:
+        """Use the throttle of now; return whether it has changed."""
+        period = self.options.least / 1000
+        if period == self.throttle.period:
+            return False
+        self.throttle.change(period, time.monotonic())
+        if self._timer is not None and self._releasing is not None:
+            self.forget_timer()
+            self.hold(*self._releasing)
+        return True
 
     def deliver(self, message: ReceivedMessage) -> None:
         """Decode the message as the listener's type and call the callback."""
@@ -194,6 +227,7 @@ class Subscription:
         """Set a timer for the message that the throttle holds."""
         due = self.throttle.due
         if due is not None and self._timer is None:
+            self._releasing = (loop, release)
             self._timer = loop.call_later(max(0.0, due - time.monotonic()), release)
 
     def hush(self) -> None:
@@ -284,12 +318,17 @@ class Topic:
         self._latest = None
         self._emptied(self)
 
+    def repace(self) -> None:
+        """Subscribe to more or less if somebody looks now, or nobody any more."""
+        if any([listener.repace() for listener in self.listeners]):
+            self._changed(self)
+
     def options(self) -> SubscriptionOptions:
-        """Return options that serve every listener."""
+        """Return options that serve every listener now."""
         each = [listener.options for listener in self.listeners]
         return SubscriptionOptions(
             self.message_type,
-            min(options.throttle for options in each),
+            min(options.least for options in each),
             max(options.queue_length for options in each),
             next((options.encoding for options in each if options.encoding), None),
         )

@@ -171,6 +171,7 @@ def _make_app(settings: Any, *, with_lifespan: bool) -> "WebApp":
     published = Published()
     pages = OpenPages(runtime, site.pages, published, max_pages=settings.max_pages)
     runtime.on_stop(pages.close)
+    runtime.serve_pages()
     lifespan = _live if with_lifespan else None
     return WebApp(
         site, pages, _connect_to_gate, settings, published=published, lifespan=lifespan

@@ -31,8 +31,9 @@ def robot(*, link=None, told=None, silent=0.1, throttle=100, modules=()):
     return SimpleNamespace(
         id="r1",
         name="Bob",
-        pose_source=SimpleNamespace(bridge=bridge() if link is None else link),
-        feed=SimpleNamespace(throttle=throttle),
+        pose_source=SimpleNamespace(
+            bridge=bridge() if link is None else link, period=throttle / 1000
+        ),
         silent_for=silent,
         report=report() if told is None else told,
         modules=modules,

@@ -14,6 +14,13 @@ from webmap.poses.frames import frames_of
 from webmap_process import simulator
 
 
+class Listening(Removal):
+    """A subscription whose rate makes no difference."""
+
+    def set_unwatched(self, unwatched):
+        pass
+
+
 class Link:
     """A bridge that says what it is told to say."""
 
@@ -30,7 +37,7 @@ class Link:
     def subscribe(self, topic, callback, type=None, *, decode=None, **more):
         entry = (topic, callback, decode)
         self.subscribed.append(entry)
-        return Removal(lambda: self.subscribed.remove(entry))
+        return Listening(lambda: self.subscribed.remove(entry))
 
     def say(self, topic, message):
         received = [entry for entry in self.subscribed if entry[0] == topic]

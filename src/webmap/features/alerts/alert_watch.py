@@ -34,8 +34,7 @@ def conditions(robot: "Robot") -> dict[str, str]:
     if bridge is not None and bridge.lost:
         found["lost"] = "No connection to the bridge"
     elif bridge is None or bridge.state == "open":
-        period = 0.0 if robot.feed is None else robot.feed.throttle / 1000
-        silent = robot.silent_for
+        silent, period = robot.silent_for, robot.pose_source.period
         if silent is not None and silent > max(LOST, PERIODS * period):
             found["lost"] = "No pose received"
     charge = robot.charge

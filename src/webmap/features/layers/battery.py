@@ -4,6 +4,7 @@ import math
 import time
 from typing import TYPE_CHECKING
 
+from webmap.base.looking import RARELY
 from webmap.base.scope import Removal, keep
 from webmap.core.registry import robot_modules
 from webmap.ros.bridge import Bridge
@@ -50,6 +51,7 @@ class Battery:
             "sensor_msgs/BatteryState",
             throttle=throttle,
             decode=BatteryStateMsg,
+            unwatched=RARELY,
         )
 
     def on_message(self, message: BatteryStateMsg) -> None:

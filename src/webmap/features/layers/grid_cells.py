@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST
+from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import check_finite, in_space, thinned
 from webmap.modules.layer_options import Count, Frame
@@ -96,6 +97,8 @@ class GridCells(RobotLayer):
     Style it by CSS: ``.gridcells > .cells``, and one of several by its name:
     ``.gridcells.frontiers > .cells``.
     """
+
+    unwatched = RARELY
 
     frame: Frame = "map"
     """``"robot"`` for cells in the robot's own frame."""

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST, Affine
+from webmap.base.looking import RARELY
 from webmap.config.robot import scan_name
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.modules.layer_options import Limit
@@ -61,6 +62,8 @@ class LaserScanner(RobotLayer):
     name: ``.laserscan.rear > .dot``; their size is the custom property ``--dot-size``,
     in metres.
     """
+
+    unwatched = RARELY
 
     frame = "robot"
 

@@ -8,6 +8,7 @@ import msgspec
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
 from webmap.base.local_plane import LocalPlane
+from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.robot_layer import RobotLayer
 from webmap.ros.messages import Stamped
@@ -85,6 +86,8 @@ class NavSatFix(RobotLayer):
     Style it by CSS: ``.navsatfix > .cross``, ``.navsatfix > .covariance`` and
     ``.navsatfix.lost``.
     """
+
+    unwatched = RARELY
 
     topic: str = "/fix"
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST
+from webmap.base.looking import RARELY
 from webmap.base.tasks import spawn
 from webmap.core.problems import refusing
 from webmap.features.layers.grid_picture import Palette, check_palette
@@ -105,6 +106,8 @@ class OccupancyGrid(MapLayer):
     Style it by CSS: ``.occupancy-grid``, with the palette's name as a further class:
     ``.occupancy-grid.costmap { opacity: 0.4 }``.
     """
+
+    unwatched = RARELY
 
     topic: str = "/map"
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 from typing import Annotated
 
 from webmap.base.geometry import Vector3
+from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import check_finite, flat, in_space, rounded, thinned
 from webmap.modules.layer_options import Limit
@@ -47,6 +48,8 @@ class Path(RobotLayer):
     Style it by CSS: ``.path > polyline``, and one of several by its name: ``.path.local
     > polyline``.
     """
+
+    unwatched = RARELY
 
     topic: str = "/plan"
 

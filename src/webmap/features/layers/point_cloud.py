@@ -10,6 +10,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
+from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import in_units, levelled
 from webmap.modules.layer_options import Count, Frame, Limit
@@ -238,6 +239,8 @@ class PointCloud(RobotLayer):
     Style it by CSS: ``.pointcloud > .dot``, ``.pointcloud > .dot.band-7``; the dots'
     size is the custom property ``--dot-size``, in metres.
     """
+
+    unwatched = RARELY
 
     x: float = 0.0
     """Position of the sensor on the robot, in metres forward."""

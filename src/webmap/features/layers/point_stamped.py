@@ -4,6 +4,7 @@ import math
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST, Vector3
+from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import flat, rounded
 from webmap.modules.layer_options import Frame, Metres
@@ -46,6 +47,8 @@ class PointStamped(RobotLayer):
     Style it by CSS: ``.pointstamped > .point``, and one of several by its name:
     ``.pointstamped.lookahead > .point``.
     """
+
+    unwatched = RARELY
 
     frame: Frame = "map"
     """``"robot"`` for a point in the robot's own frame, as from Nav2's controllers."""

@@ -4,6 +4,7 @@ import msgspec
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Vector3
+from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import check_finite, flat, in_space, rounded
 from webmap.modules.layer_options import Frame, Seconds
@@ -64,6 +65,8 @@ class Polygon(RobotLayer):
     Style it by CSS: ``.polygon > polygon``, and one of several by its name:
     ``.polygon.footprint > polygon``.
     """
+
+    unwatched = RARELY
 
     name: str = "footprint"
 

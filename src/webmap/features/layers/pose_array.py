@@ -5,6 +5,7 @@ import math
 import msgspec
 
 from webmap.base.geometry import Pose
+from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import thinned
 from webmap.modules.layer_options import Count, Frame, Metres
@@ -65,6 +66,8 @@ class PoseArray(RobotLayer):
 
     Style them by CSS: ``.posearray > .arrow``.
     """
+
+    unwatched = RARELY
 
     in_plane = True
 

@@ -3,6 +3,7 @@
 import math
 
 from webmap.base.geometry import Pose
+from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.layer_options import Frame, Metres
 from webmap.modules.robot_layer import RobotLayer
@@ -40,6 +41,8 @@ class PoseStamped(RobotLayer):
     Style it by CSS: ``.posestamped > .arrow``, and one of several by its name:
     ``.posestamped.goal > .arrow``.
     """
+
+    unwatched = RARELY
 
     in_plane = True
 

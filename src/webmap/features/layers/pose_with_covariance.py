@@ -7,6 +7,7 @@ import msgspec
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST, Pose
+from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import sector
 from webmap.modules.layer_options import Limit
@@ -131,6 +132,8 @@ class PoseWithCovariance(RobotLayer):
 
     Style it by CSS: ``.covariance > .ellipse`` and ``.covariance > .heading``.
     """
+
+    unwatched = RARELY
 
     in_plane = True
 

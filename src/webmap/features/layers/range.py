@@ -5,6 +5,7 @@ from dataclasses import KW_ONLY
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST
+from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import cone, sector
 from webmap.modules.robot_layer import RobotLayer
@@ -53,6 +54,8 @@ class Range(RobotLayer):
 
     Style it by CSS: ``.range > .cone`` and ``.range > .cone.clear``.
     """
+
+    unwatched = RARELY
 
     encoding = "binary"  # JSON has no infinity, which is a reading
 

@@ -14,6 +14,10 @@ from webmap.scene.element import Element
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
+SPEED = 2.0
+"""Metres per second that a robot may drive between two poses that are requested rarely,
+as while nobody looks."""
+
 PIECE = 50
 """Points after which a piece of the trail is complete and never sent again."""
 
@@ -30,7 +34,8 @@ class Trail:
         robot: The robot; its odometry topic has its position.
         length: The length of the trail, in metres.
         step: The distance between two points, in metres.
-        jump: The distance in metres from which two poses are not connected by a line.
+        jump: The distance in metres from which two poses are not connected by a line;
+            more if poses are requested so rarely that a robot at 2 m/s drives further.
 
     Raises:
         ConfigError: If ``length``, ``step`` or ``jump`` is not a number above 0.
@@ -77,9 +82,10 @@ class Trail:
         """Extend the trail to the robot's position."""
         at = (self.robot.position.x, self.robot.position.y)
         far = math.inf if self._last is None else math.dist(self._last, at)
+        jump = max(self.jump, SPEED * self.robot.pose_source.period)
         if far < self.step:
             return
-        if far > self.jump or self._last is None:
+        if far > jump or self._last is None:
             self._begin(at)
         else:
             if len(self._pieces[-1].points) > PIECE:

@@ -1,0 +1,270 @@
+"""Poses while nobody looks: some are enough, and none is missed because of that."""
+
+import asyncio
+from types import SimpleNamespace
+
+import pytest
+from pose_script import ODOMETRY, odometry, play, transform, transforms
+
+from webmap import Bridge, Robot
+from webmap.base.looking import looking
+from webmap.features.alerts.alert_watch import conditions
+from webmap.poses.odometry import UNWATCHED
+
+
+@pytest.fixture(autouse=True)
+def somebody_looks():
+    yield
+    looking._set(True)
+
+
+@pytest.fixture
+def bridge():
+    return Bridge("ws://robot:9090")
+
+
+@pytest.fixture
+def robot(bridge):
+    robot = Robot("Bob")
+    robot.set_odometry_topic(bridge, "/odom", type=ODOMETRY)
+    yield robot
+    robot.destroy()
+
+
+def throttle(bridge):
+    return bridge._topics["/odom"].options().throttle
+
+
+def held(robot, **changes):
+    """Set the gate's report on a robot."""
+    robot.report = SimpleNamespace(**{"holder": None, "goal": None} | changes)
+    robot.pose_source.keep_on(robot._needs_poses())
+
+
+def test_few_poses_come_while_nobody_looks(bridge, robot):
+    looking._set(False)
+    assert throttle(bridge) == UNWATCHED
+    looking._set(True)
+    assert throttle(bridge) == 100
+
+
+def test_all_poses_come_while_a_program_has_control_or_sent_a_goal(bridge, robot):
+    looking._set(False)
+    held(robot, holder=SimpleNamespace(connection="p1", name="patrol"))
+    assert throttle(bridge) == 100
+    held(robot)
+    assert throttle(bridge) == UNWATCHED
+    held(robot, goal=SimpleNamespace(state="active"))
+    assert throttle(bridge) == 100
+    held(robot, goal=SimpleNamespace(state="reached"))
+    assert throttle(bridge) == UNWATCHED
+
+
+def test_all_poses_come_to_a_module_of_the_user_but_not_for_the_trail(bridge, robot):
+    class Odometer:
+        def __init__(self, robot):
+            pass
+
+        def on_odometry_update(self):
+            pass
+
+    robot.add_module("Trail")
+    looking._set(False)
+    held(robot)
+    assert throttle(bridge) == UNWATCHED
+    odometer = robot.add_module(Odometer)
+    held(robot)
+    assert throttle(bridge) == 100
+    robot.remove_module(odometer)
+    held(robot)
+    assert throttle(bridge) == UNWATCHED
+
+
+def test_a_topic_set_while_nobody_looks_begins_with_few_poses(bridge):
+    looking._set(False)
+    robot = Robot("Bob")
+    robot.set_odometry_topic(bridge, "/odom", type=ODOMETRY)
+    assert throttle(bridge) == UNWATCHED
+    robot.destroy()
+
+
+def test_moving_frames_are_received_while_somebody_looks(bridge, robot):
+    robot.set_tf(bridge)
+    looking._set(False)
+    assert set(bridge._topics) == {"/odom", "/tf_static"}
+    looking._set(True)
+    assert set(bridge._topics) == {"/odom", "/tf_static", "/tf"}
+
+
+def test_frames_that_alone_place_a_robot_show_that_it_is_lost(bridge, robot):
+    robot.set_tf(bridge)
+    looking._set(False)
+    robot.unsubscribe_odometry_topic()
+    assert "/tf" in bridge._topics
+    robot.set_odometry_topic(bridge, "/odom", type=ODOMETRY)
+    assert "/tf" not in bridge._topics
+    other = Robot("Eve")
+    other.set_tf(bridge, base_frame="eve")
+    assert "/tf" in bridge._topics
+    other.destroy()
+    assert "/tf" not in bridge._topics
+    held(robot, holder=SimpleNamespace(connection="p1", name="patrol"))
+    assert "/tf" in bridge._topics
+
+
+def test_frames_that_end_while_nobody_looks_begin_no_more(bridge, robot):
+    robot.set_tf(bridge)
+    looking._set(False)
+    robot.unset_tf()
+    looking._set(True)
+    assert set(bridge._topics) == {"/odom"}
+
+
+def names(lines):
+    return [line for line in lines if "no pose for" in line or "poses again" in line]
+
+
+def test_a_robot_with_few_poses_is_not_lost(monkeypatch):
+    async def script(stage):
+        robot = stage.robot
+        robot.remove_modules()
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        stage.publish("/odom", odometry(0.0, stamp=100.0))
+        looking._set(False)
+        await stage.wait(1.0)
+        for number in range(1, 4):
+            stage.publish("/odom", odometry(0.1 * number, stamp=100.0 + 2.9 * number))
+            await stage.wait(2.9)
+        await stage.wait(2.0)
+        looking._set(True)  # the bridge has sent nothing for 4.9 s
+        assert "lost" not in conditions(robot)
+        assert robot.state.name != "lost"
+        assert robot.pose_age == pytest.approx(4.9)  # and is shown so
+        stage.publish("/odom", odometry(0.5, stamp=113.6))
+        await stage.wait(2.9)
+        assert "lost" not in conditions(robot)
+        await stage.wait(0.2)
+        assert "lost" in conditions(robot)
+        assert robot.state.name == "lost"
+
+    assert len(names(play(script, monkeypatch))) == 1
+
+
+def test_a_robot_whose_poses_end_while_nobody_looks_is_lost_after_five_seconds(
+    monkeypatch,
+):
+    async def script(stage):
+        robot = stage.robot
+        robot.remove_modules()
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        looking._set(False)
+        stage.publish("/odom", odometry(0.0, stamp=100.0))
+        await stage.wait(4.9)
+        assert "lost" not in conditions(robot)
+        await stage.wait(0.2)
+        assert "lost" in conditions(robot)
+        looking._set(True)
+        assert "lost" in conditions(robot)
+
+    assert len(names(play(script, monkeypatch))) == 1
+
+
+def test_a_lost_robot_stays_lost_when_nobody_looks_any_more(monkeypatch):
+    async def script(stage):
+        robot = stage.robot
+        robot.remove_modules()
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        stage.publish("/odom", odometry(0.0, stamp=100.0))
+        await stage.wait(3.1)
+        assert "lost" in conditions(robot)
+        looking._set(False)
+        await stage.wait(1.0)
+        assert "lost" in conditions(robot)
+
+    play(script, monkeypatch)
+
+
+def test_a_moving_robot_with_few_poses_moves_between_them(monkeypatch):
+    async def script(stage):
+        robot = stage.robot
+        robot.remove_modules()
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        looking._set(False)
+        for number in range(3):
+            stage.publish("/odom", odometry(2.0 * number, stamp=100.0 + 2 * number))
+            await stage.wait(2.0)
+            assert robot.pose_source.period == 2.0
+
+    play(script, monkeypatch)
+
+
+def test_paused_frames_are_no_problem_and_missing_ones_are_when_somebody_looks(
+    monkeypatch,
+):
+    async def script(stage):
+        robot = stage.robot
+        robot.remove_modules()
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        robot.set_tf(stage.link)
+        for number in range(50):
+            stamp = 100.0 + number / 10
+            stage.publish("/tf", transforms(transform("map", "odom", 1.0, stamp=stamp)))
+            stage.publish("/odom", odometry(0.0, stamp=stamp))
+            await stage.wait(0.1)
+        looking._set(False)
+        for number in range(15):
+            stage.publish("/odom", odometry(0.0, stamp=105.0 + 2 * number))
+            await stage.wait(2.0)
+        assert robot.problems == {}
+        assert robot.position.x == 1.0  # by the last frames
+        looking._set(True)
+        for number in range(20):
+            stage.publish("/odom", odometry(0.0, stamp=135.0 + number / 10))
+            await stage.wait(0.1)
+        assert robot.problems == {}
+        for number in range(20, 40):
+            stage.publish("/odom", odometry(0.0, stamp=135.0 + number / 10))
+            await stage.wait(0.1)
+        assert "no new transform 'map' -> 'odom'" in robot.problems["tf"]
+
+    play(script, monkeypatch)
+
+
+def test_a_trail_stays_whole_while_nobody_looks(monkeypatch):
+    async def script(stage):
+        robot = stage.robot
+        robot.remove_modules()
+        trail = robot.add_module("Trail")
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        looking._set(False)
+        for number in range(5):
+            stage.publish("/odom", odometry(3.0 * number, stamp=100.0 + 2 * number))
+            await stage.wait(2.0)
+        assert len(trail.points) == 1
+        looking._set(True)
+        for number in range(2):
+            place = 12.0 + 1.5 * number
+            stage.publish("/odom", odometry(place, stamp=110.0 + number))
+            await stage.wait(1.0)
+        assert len(trail.points) == 2
+
+    play(script, monkeypatch)
+
+
+def test_few_poses_come_also_before_the_type_is_known():
+    async def scenario():
+        bridge = Bridge("ws://robot:9090")
+        robot = Robot("Bob")
+        robot.set_odometry_topic(bridge, "/odom")
+        looking._set(False)
+        robot.feed._listen_untyped()
+        assert throttle(bridge) == UNWATCHED
+        robot.destroy()
+
+    asyncio.run(scenario())
