@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 from webmap.agents import address, data
+from webmap.agents.heard import Heard
 from webmap.agents.peer import Peer, peer_of
 from webmap.base.errors import BridgeClosed, WireError
 from webmap.ros.bridge import LINKS
@@ -70,7 +71,7 @@ class AgentLane(Lane):
         self._session = ""
         self._trouble = ""
         self._listening: int | None = None
-        self._topics: dict[str, int] = {}
+        self._topics: dict[str, Heard] = {}
 
     @property
     def lag(self) -> float:
@@ -107,9 +108,11 @@ class AgentLane(Lane):
             )
         op = data.read_op(frame)
         if op.op == "subscribe":
-            self._listen(op.topic)
+            self._listen(op)
         elif op.op == "unsubscribe":
-            self._unlisten(op.topic)
+            heard = self._topics.get(op.topic)
+            if heard is not None and heard.unsubscribe(op.id):
+                self._unlisten(op.topic)
         self._put(data.pack_frame(frame))
 
     async def _run(self) -> None:
@@ -203,16 +206,26 @@ class AgentLane(Lane):
         assert self._peer is not None
         self._peer.put_data(self._key_in, piece, all=True)
 
-    def _listen(self, topic: str) -> None:
-        if topic not in self._topics and self._peer is not None:
+    def _listen(self, op: data.SubscribeOp) -> None:
+        if self._peer is None:
+            return
+        heard = self._topics.get(op.topic)
+        if heard is None:
             assert self._agent is not None
-            key = address.topic_key(self._agent, topic)
-            self._topics[topic] = self._peer.listen(key, self._arrived)
+            heard = self._topics[op.topic] = Heard(self._take, self._loop)
+            heard.subscribe(op.id, op.throttle_rate)
+            key = address.topic_key(self._agent, op.topic)
+            heard.number = self._peer.listen(key, heard.arrived)
+        else:
+            heard.subscribe(op.id, op.throttle_rate)
 
     def _unlisten(self, topic: str) -> None:
-        number = self._topics.pop(topic, None)
-        if number is not None and self._peer is not None:
-            self._peer.unlisten(number)
+        heard = self._topics.pop(topic, None)
+        if heard is None:
+            return
+        if heard.number is not None and self._peer is not None:
+            self._peer.unlisten(heard.number)
+        heard.forget()
 
     def _arrived(self, _key: str, piece: bytes) -> None:
         """Pass data to the model's thread; called in a thread of Zenoh."""
