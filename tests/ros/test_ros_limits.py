@@ -27,7 +27,7 @@ from webmap.ros.rosbridge.frame_limits import (
     MAX_OTHER,
     check_count,
 )
-from webmap.ros.rosbridge.pieces import SHORTENED
+from webmap.ros.rosbridge.incoming import SHORTENED
 from webmap.ros.rosbridge.protocol import Protocol
 
 MIB = 1 << 20

@@ -4,12 +4,12 @@ import asyncio
 import itertools
 import time
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.ros.limits import MAX_FRAME
-from webmap.ros.rosbridge.pieces import KEPT, PIECE, SHORTENED, Pieces
-from webmap.ros.rosbridge.turns import turns
+from webmap.ros.rosbridge.pieces import PIECE, Pieces
+from webmap.ros.rosbridge.turns import Turn, turns
 
 
 def frame(length):
@@ -67,79 +67,6 @@ def test_no_piece_contains_the_ends_of_two_frames_for_any_chunk_sizes(lengths, d
         at += len(piece)
 
 
-def frames_of(stream):
-    """Return the frames in a stream: first byte and payload."""
-    frames = []
-    while stream:
-        length, head = stream[1], 2
-        if length == 126:
-            length, head = int.from_bytes(stream[2:4], "big"), 4
-        elif length == 127:
-            length, head = int.from_bytes(stream[2:10], "big"), 10
-        frames.append((stream[0], stream[head : head + length]))
-        assert len(frames[-1][1]) == length
-        stream = stream[head + length :]
-    return frames
-
-
-def taken(chunks):
-    """Return the pieces that are taken of what comes in chunks."""
-    pieces, waiting, cutting = [], bytearray(), Pieces()
-    for chunk in chunks:
-        waiting += chunk
-        while piece := cutting.take(waiting, shaken=True):
-            pieces.append(piece)
-    assert not waiting
-    return pieces
-
-
-@given(st.data())
-def test_a_long_frame_is_split_into_fragments_of_one_message(data):
-    long = bytes(data.draw(st.integers(65_530, 200_000)))
-    stream = b"\x01\x01x" + b"\x80\x7f" + len(long).to_bytes(8, "big") + long + frame(3)
-    cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
-    pieces = taken(stream[a:b] for a, b in itertools.pairwise([0, *cuts, len(stream)]))
-    assert all(len(piece) <= PIECE + 4 for piece in pieces)
-    frames = frames_of(b"".join(pieces))
-    assert [first for first, _ in frames[:-2]] == [1] + [0] * (len(frames) - 3)
-    assert frames[-2][0] == 0x80  # the last fragment ends the message
-    assert b"".join(payload for _, payload in frames[1:-1]) == long
-    assert frames[-1] == (0x81, b"xxx")
-
-
-@given(st.data())
-def test_only_the_beginning_of_a_frame_that_is_too_long_is_passed_on(data):
-    begins = bytes(range(250)) * 5
-    length = MAX_FRAME + data.draw(st.integers(1, 200_000))
-    head = b"\x82\x7f" + length.to_bytes(8, "big")
-    stream = frame(5) + head + begins
-    cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=6)))
-    pieces, waiting, cutting = [], bytearray(), Pieces()
-
-    def give(chunk):
-        waiting.extend(chunk)
-        while piece := cutting.take(waiting, shaken=True):
-            pieces.append(piece)
-
-    for a, b in itertools.pairwise([0, *cuts, len(stream)]):
-        give(stream[a:b])
-    left, size = length - len(begins), data.draw(st.integers(1 << 20, 1 << 23))
-    for at in range(0, left, size):
-        assert len(waiting) == 0, "nothing of the rest is kept"
-        give(bytes(min(size, left - at)))
-    give(frame(7))
-    _, (first, short), after = frames_of(b"".join(pieces))
-    assert (first, after) == (0x82, (0x81, b"x" * 7))
-    assert short == SHORTENED + length.to_bytes(8, "big") + begins[:KEPT]
-
-
-def test_the_head_of_a_masked_frame_or_a_too_long_fragment_is_passed_on_unchanged():
-    too_long = b"\x02\x7f" + (MAX_FRAME + 1).to_bytes(8, "big")
-    masked = b"\x82\xff" + (100_000).to_bytes(8, "big")
-    for head in (too_long, masked):
-        assert Pieces().take(bytearray(head + b"data"), shaken=True)[:10] == head
-
-
 def test_during_the_handshake_each_line_is_a_piece():
     cutting = Pieces()
     assert cutting.next(bytearray(b"HTTP/1.1 101 OK\r\nX: y\r\n"), shaken=False) == 17
@@ -153,8 +80,8 @@ class Greedy:
     def __init__(self, noted, name, times):
         self.noted, self.name, self.times = noted, name, times
 
-    def take(self, until):
-        while time.thread_time() < until:
+    def take(self, turn):
+        while not turn.is_over:
             pass
         self.noted.append(self.name)
         self.times -= 1
@@ -179,12 +106,73 @@ def test_links_take_turns_and_the_event_loop_runs_between_them():
     assert max(steps) <= 5, "the loop goes on after a few turns"
 
 
+def test_a_turn_asks_for_processor_time_only_when_it_may_be_over(monkeypatch):
+    clock, used, asked = [100.0], [5.0], []
+
+    def thread_time():
+        asked.append(clock[0])
+        return used[0]
+
+    monkeypatch.setattr("webmap.ros.rosbridge.turns.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("webmap.ros.rosbridge.turns.time.thread_time", thread_time)
+    turn = Turn(5.0, 0.5)
+    clock[0] = 100.4
+    assert not turn.is_over
+    assert asked == []
+    clock[0], used[0] = 100.6, 5.25  # the thread did not run all the time
+    assert not turn.is_over
+    assert asked == [100.6]
+    clock[0] = 100.8
+    assert not turn.is_over
+    assert asked == [100.6]
+    clock[0], used[0] = 100.9, 5.5
+    assert turn.is_over
+
+
+@pytest.mark.parametrize("longest", [0.001, 0.5])
+def test_the_rest_after_a_step_is_as_long_as_the_step_but_at_most_the_longest(longest):
+    async def story():
+        ended, rested = [], []
+
+        class Long:
+            def take(self, turn):
+                if ended:
+                    rested.append(time.monotonic() - ended[0])
+                    return None
+                while time.thread_time() < begun + 0.05:
+                    pass
+                ended.append(time.monotonic())
+                return 0.0
+
+        turns().longest_rest = longest
+        begun = time.thread_time()
+        turns().ask(Long())
+        while not rested:
+            await asyncio.sleep(0.001)
+        return rested[0]
+
+    delays = []
+    loop_type = type(asyncio.new_event_loop())
+    call_later = loop_type.call_later
+
+    def noted(loop, delay, callback, *args, **options):
+        if getattr(callback, "__name__", "") == "_step":
+            delays.append(delay)
+        return call_later(loop, delay, callback, *args, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop_type, "call_later", noted)
+        asyncio.run(story())
+    (delay,) = delays
+    assert delay == longest if longest < 0.04 else 0.04 <= delay < longest
+
+
 def test_a_link_that_asks_for_a_delay_gets_its_next_turn_after_the_delay():
     async def story():
         noted, ended = [], asyncio.Event()
 
         class Waiting:
-            def take(self, until):
+            def take(self, turn):
                 noted.append(asyncio.get_running_loop().time())
                 if len(noted) == 2:
                     ended.set()

@@ -41,6 +41,9 @@ class AgentLane(Lane):
 
     """
 
+    last_heard: float | None = None
+    """When the last data came, on the monotonic clock."""
+
     def __init__(
         self,
         url: str,
@@ -54,8 +57,6 @@ class AgentLane(Lane):
     ) -> None:
         self.url = url
         self.state: LinkState = "new"
-        self.last_heard: float | None = None
-        """When the last data came, on the monotonic clock."""
         self._agent = address.agent_in(url)
         self._opened = opened
         self._received = received

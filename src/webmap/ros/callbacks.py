@@ -6,7 +6,13 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from webmap.base.scope import Removal, Within, break_off, current_scope
+from webmap.base.scope import (
+    Removal,
+    break_off,
+    current_scope,
+    enter_scope,
+    leave_scope,
+)
 
 log = logging.getLogger("webmap.ros")
 
@@ -40,12 +46,15 @@ class Callback:
         if self.removed:
             return
         try:
-            with Within(self._scope):
+            before = enter_scope(self._scope)
+            try:
                 result = self.fn(*args)
                 if result is not None and inspect.isawaitable(result):
                     task = asyncio.ensure_future(result)
                     self._tasks.add(task)
                     task.add_done_callback(self._finished)
+            finally:
+                leave_scope(before)
         except Exception as error:
             self._failed(error)
 

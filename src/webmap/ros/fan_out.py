@@ -34,13 +34,11 @@ class FanOut:
         self, message: ReceivedMessage, listeners: Iterable[Subscription]
     ) -> None:
         """Deliver a new message to the listeners whose throttle allows it."""
-        now = time.monotonic()
-        due = []
-        for listener in listeners:
-            if listener.throttle.offer(message, now) is not None:
-                due.append(listener)
-            else:
-                self._hold(listener)
+        due = [
+            listener
+            for listener in listeners
+            if not listener.throttle.period or self._is_due(listener, message)
+        ]
         if due:
             self._give(message, due)
 
@@ -48,6 +46,12 @@ class FanOut:
         """Deliver an earlier message to a new listener."""
         if self._loop is not None:
             self._loop.call_soon(self._give, message, [listener])
+
+    def _is_due(self, listener: Subscription, message: ReceivedMessage) -> bool:
+        if listener.throttle.offer(message, time.monotonic()) is not None:
+            return True
+        self._hold(listener)
+        return False
 
     def _hold(self, listener: Subscription) -> None:
         if self._loop is not None:
@@ -63,16 +67,12 @@ class FanOut:
             self._hold(listener)
 
     def _give(self, message: ReceivedMessage, listeners: list[Subscription]) -> None:
-        decoding = []
+        if self._offload.is_needed(message):
+            decoding = [each for each in listeners if not each.undecoded]
+            if decoding:
+                self._decode_elsewhere(message, decoding)
+            listeners = [each for each in listeners if each.undecoded]
         for listener in listeners:
-            if listener.undecoded:
-                listener.deliver(message)
-            else:
-                decoding.append(listener)
-        if decoding and self._offload.is_needed(message):
-            self._decode_elsewhere(message, decoding)
-            return
-        for listener in decoding:
             listener.deliver(message)
 
     def _decode_elsewhere(

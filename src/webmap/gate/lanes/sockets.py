@@ -30,7 +30,7 @@ from webmap.gate.clock import now
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.navigation import readable
 from webmap.ros.rosbridge.pieces import Pieces
-from webmap.ros.rosbridge.turns import turns
+from webmap.ros.rosbridge.turns import Turn, turns
 
 log = logging.getLogger("webmap.gate")
 
@@ -178,11 +178,11 @@ class Socket(asyncio.Protocol):
         self._choked = False
         self._turns.ask(self)
 
-    def take(self, until: float) -> float | None:
+    def take(self, turn: Turn) -> float | None:
         """Process waiting bytes, as far as the time and the link's budget allow.
 
         Args:
-            until: When to end, by :func:`time.thread_time`.
+            turn: The turn; no piece is begun when it is over.
 
         Returns:
             Seconds until the socket needs another turn; ``None`` if it will ask for
@@ -207,7 +207,7 @@ class Socket(asyncio.Protocol):
             except Exception as error:
                 self.drop(f"invalid data from the bridge: {error!r}")
             pieces, size = pieces + 1, size + length
-            if time.thread_time() >= until:
+            if turn.is_over:
                 break
         self._budget.spend(pieces, size, time.thread_time() - begun, at)
         self._budget.note(at, behind=length > 0)

@@ -13,33 +13,18 @@ from typing import TYPE_CHECKING
 from webmap.base.errors import BridgeClosed
 from webmap.base.loading import load
 from webmap.ros.backoff import Backoff
-from webmap.ros.limits import LARGE, MAX_FRAME
+from webmap.ros.limits import MAX_FRAME
 from webmap.ros.received import LinkState
 
 if TYPE_CHECKING:
-    from websockets.asyncio.client import ClientConnection
+    from webmap.ros.rosbridge.paced import PacedConnection
 
 log = logging.getLogger("webmap.ros")
 
 CONNECT_TIMEOUT = 5.0
 MAX_UNSENT = 4 << 20
 
-MAX_WAITING = 4
-"""Complete frames that may wait to be read; then reading from the socket stops."""
-
-RATE = 128 << 20
-"""Bytes per second of large frames read from a connection, on average."""
-
-TURN = 64
-"""Frames read from a connection before other tasks get their turn."""
-
 LOOK_PERIOD = 0.25
-
-MOST_FRAGMENTS = 4096
-"""Fragments of one message that end the connection; 64 MiB make 1025."""
-
-MESSAGE_TOO_BIG = 1009
-"""The close code for a message of too many fragments."""
 
 CLOSED_HERE = "WebMap closed the connection"
 
@@ -75,8 +60,9 @@ class Lane:
     ) -> None:
         self.url = url
         self.state: LinkState = "new"
-        self.last_heard: float | None = None
-        """When the last bytes came, including pongs, on the monotonic clock."""
+        self._socket: PacedConnection | None = None
+        self._heard: float | None = None
+        """When the last bytes of the socket before came."""
         self._liveness: Liveness | None = None
         self._opened = opened
         self._received = received
@@ -87,6 +73,11 @@ class Lane:
         self._task: asyncio.Task[None] | None = None
         self._unsent: deque[bytes] = deque()
         self._unsent_size = 0
+
+    @property
+    def last_heard(self) -> float | None:
+        """When the last bytes came, including pongs, on the monotonic clock."""
+        return self._heard if self._socket is None else self._socket.bytes_came
 
     @property
     def lag(self) -> float:
@@ -164,48 +155,41 @@ class Lane:
             self._closed(reason)
         return time.monotonic() - began
 
-    async def _serve(self, socket: "ClientConnection") -> str:
+    async def _serve(self, socket: "PacedConnection") -> str:
         """Send and receive frames until the connection ends; return the reason."""
-        from websockets.exceptions import ConnectionClosed
-
-        self.state, self.last_heard = "open", time.monotonic()
+        self.state, self._socket = "open", socket
         keeping = asyncio.create_task(self._keep_alive(socket))
         writing = asyncio.create_task(self._write(socket))
         try:
             self._opened()
-            count = 0
-            while True:
-                frame = await _whole_message(socket)
-                self.last_heard = time.monotonic()
-                self._deliver(frame)
-                if len(frame) > LARGE:
-                    await asyncio.sleep(len(frame) / RATE)
-                count += 1
-                if count % TURN == 0:  # reading does not yield if frames wait
-                    await asyncio.sleep(0)
-        except ConnectionClosed as error:
+            socket.deliver_to(self._deliver)
+            await socket.wait_closed()
             if keeping.done() and not keeping.cancelled() and not keeping.exception():
                 return f"no answer to a ping for {Liveness.LIMIT:g} s"
-            return _why(error)
+            return _why(socket.protocol.close_exc)
         finally:
+            socket.ignore_messages()
             keeping.cancel()
             writing.cancel()
             await asyncio.wait([keeping, writing])
 
     def _deliver(self, frame: bytes | bytearray) -> None:
+        if self._task is None:  # it is being stopped
+            return
         try:
             self._received(frame)
         except Exception:
             log.exception("%s: a frame of %d bytes was lost", self.url, len(frame))
 
-    def _forget_link(self, socket: "ClientConnection") -> None:
+    def _forget_link(self, socket: "PacedConnection") -> None:
         socket.transport.abort()
+        self._socket, self._heard = None, socket.bytes_came
         self._liveness = None
         self.state = "connecting" if self._again else "closed"
         self._unsent.clear()
         self._unsent_size = 0
 
-    async def _write(self, socket: "ClientConnection") -> None:
+    async def _write(self, socket: "PacedConnection") -> None:
         from websockets.exceptions import ConnectionClosed
 
         try:
@@ -219,13 +203,13 @@ class Lane:
         except ConnectionClosed:
             pass  # the reader reports it
 
-    async def _keep_alive(self, socket: "ClientConnection") -> None:
+    async def _keep_alive(self, socket: "PacedConnection") -> None:
         """Send pings; drop the connection and return when it is dead."""
         self._liveness = liveness = Liveness(time.monotonic())
         pinging: set[asyncio.Task[None]] = set()
         try:
             while not liveness.is_dead(
-                time.monotonic(), _bytes_came(socket), busy=self._busy()
+                time.monotonic(), socket.bytes_came, busy=self._busy()
             ):
                 if liveness.is_ping_due(time.monotonic()):
                     liveness.pinged(time.monotonic())
@@ -236,7 +220,7 @@ class Lane:
             for task in pinging:
                 task.cancel()
 
-    async def _ping(self, socket: "ClientConnection", liveness: "Liveness") -> None:
+    async def _ping(self, socket: "PacedConnection", liveness: "Liveness") -> None:
         from websockets.exceptions import ConnectionClosed
 
         try:
@@ -244,11 +228,10 @@ class Lane:
             await (await socket.ping())
         except ConnectionClosed:
             return
-        self.last_heard = time.monotonic()
-        liveness.ponged(self.last_heard)
+        liveness.ponged(time.monotonic())
 
 
-async def _connect(url: str) -> "ClientConnection":
+async def _connect(url: str) -> "PacedConnection":
     await load("webmap.ros.rosbridge.paced")
 
     from websockets.asyncio.client import connect
@@ -261,11 +244,10 @@ async def _connect(url: str) -> "ClientConnection":
         def process_redirect(self, exc: Exception) -> Exception | str:
             return exc
 
-    return await ConnectHere(
+    socket = await ConnectHere(
         url,
         compression=None,
         max_size=MAX_FRAME,
-        max_queue=MAX_WAITING,
         open_timeout=CONNECT_TIMEOUT,
         ping_interval=None,
         close_timeout=0.5,
@@ -273,35 +255,11 @@ async def _connect(url: str) -> "ClientConnection":
         user_agent_header=None,
         create_connection=PacedConnection,
     )
+    assert isinstance(socket, PacedConnection)
+    return socket
 
 
-async def _whole_message(socket: "ClientConnection") -> bytes | bytearray:
-    """Return the next message.
-
-    ``recv()`` joins the fragments of a message at once, which delays every other
-    thread, by 0.1 s for 64 MiB. So this function joins them itself.
-    """
-    message: bytes | bytearray = b""
-    number = 0
-    async for fragment in socket.recv_streaming(decode=False):
-        number += 1
-        if number == 1:
-            message = fragment
-        elif number == 2:
-            message = bytearray(message) + fragment
-        else:
-            message += fragment
-        if number == MOST_FRAGMENTS:
-            await socket.close(MESSAGE_TOO_BIG, "too many fragments")
-    return message
-
-
-def _bytes_came(socket: "ClientConnection") -> float:
-    """Return when the last bytes came over a socket of :func:`_connect`."""
-    return float(getattr(socket, "bytes_came", -inf))
-
-
-async def _close(socket: "ClientConnection") -> None:
+async def _close(socket: "PacedConnection") -> None:
     with suppress(TimeoutError):
         async with asyncio.timeout(0.5):
             await socket.close()

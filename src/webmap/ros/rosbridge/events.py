@@ -35,14 +35,14 @@ class Publish(ReceivedMessage):
     @property
     def is_binary(self) -> bool:
         """Whether it came as CBOR."""
-        return cbor.looks_like_cbor(self.frame)
+        return not self.frame.startswith(b"{") and cbor.looks_like_cbor(self.frame)
 
     def check_count(self) -> None:
         """Check the number of values before any of them is built."""
         check_count(self.frame)
 
     def _decode(self, type: type[msgspec.Struct] | None) -> Any:
-        if cbor.looks_like_cbor(self.frame):
+        if self.is_binary:
             if self._map is None:
                 self._map = cbor.decode(self.frame)
             self._verify(self._map.get("op"), self._map.get("topic"))

@@ -10,6 +10,7 @@ import binascii
 import io
 import math
 import re
+from functools import lru_cache
 from typing import Any
 
 import msgspec
@@ -28,7 +29,7 @@ from webmap.ros.rosbridge.events import (
     Unknown,
 )
 from webmap.ros.rosbridge.frame_limits import MAX_NUMBERS, MAX_OTHER, check_count
-from webmap.ros.rosbridge.pieces import SHORTENED
+from webmap.ros.rosbridge.incoming import SHORTENED
 
 
 def decode_png(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:
@@ -266,6 +267,8 @@ class Protocol:
         """
         if isinstance(frame, str):
             frame = frame.encode(errors="replace")
+        if len(frame) <= MAX_FRAME and (topic := topic_in_head(frame)) is not None:
+            return Publish(topic, frame)
         try:
             return self._read(frame, now, nested=False)
         except ProtocolError as error:
@@ -360,14 +363,20 @@ def topic_in_head(frame: bytes | bytearray) -> str | None:
     """
     match = _JSON_HEAD.match(frame)
     if match is not None:
-        name = match[1].replace(rb"\/", b"/")  # some bridges escape every slash
-        return None if b"\\" in name else _text(name)
+        return _topic_of(match[1])
     match = _CBOR_HEAD.match(frame)
     if match is None:
         return None
     length = match[1][0] - 0x60 if match[1] else match[2][0]
     name = frame[match.end() : match.end() + length]
     return _text(name) if len(name) == length else None
+
+
+@lru_cache(maxsize=1024)
+def _topic_of(name: bytes) -> str | None:
+    """Return the topic from its text in JSON; None if that has other escapes."""
+    name = name.replace(rb"\/", b"/")  # some bridges escape every slash
+    return None if b"\\" in name else _text(name)
 
 
 def _text(name: bytes | bytearray) -> str | None:

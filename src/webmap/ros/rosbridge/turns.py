@@ -7,6 +7,7 @@ connections get half of the time.
 """
 
 import asyncio
+import math
 import time
 from collections import deque
 from typing import Protocol
@@ -19,14 +20,44 @@ SHARE = 0.0005
 """Seconds of processor time for one connection at a time."""
 
 
+class Turn:
+    """The time that one connection has for its waiting data.
+
+    Args:
+        now: The processor time of this thread, in seconds.
+        seconds: How much of it the connection may use.
+
+    """
+
+    __slots__ = ("_end", "_least")
+
+    def __init__(self, now: float, seconds: float) -> None:
+        self._end = now + seconds
+        self._least = time.monotonic() + seconds
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time is used up.
+
+        Processor time is asked of the system, which may take longer than a frame. It
+        never runs faster than the clock, which costs much less to read.
+        """
+        now = time.monotonic()
+        if now < self._least:
+            return False
+        left = self._end - time.thread_time()
+        self._least = now + left
+        return left <= 0
+
+
 class Taker(Protocol):
     """An object that takes turns: a socket."""
 
-    def take(self, until: float) -> float | None:
+    def take(self, turn: Turn) -> float | None:
         """Process waiting data.
 
         Args:
-            until: When to end, by the clock of this thread's processor time.
+            turn: The turn; no frame is begun when it is over.
 
         Returns:
             Seconds until it needs another turn; ``None`` if it will ask for one.
@@ -38,6 +69,8 @@ class Turns:
     """Gives turns within one event loop."""
 
     def __init__(self) -> None:
+        self.longest_rest = math.inf
+        """The longest rest after a step, in seconds; without it, that of the step."""
         self._queue: deque[Taker] = deque()
         self._stepping = False
 
@@ -54,7 +87,7 @@ class Turns:
         loop = asyncio.get_running_loop()
         while self._queue and at < begun + STEP:
             taker = self._queue.popleft()
-            wait = taker.take(min(at + SHARE, begun + STEP))
+            wait = taker.take(Turn(at, min(SHARE, begun + STEP - at)))
             if wait == 0:
                 self._queue.append(taker)
             elif wait is not None:
@@ -62,7 +95,8 @@ class Turns:
             at = time.thread_time()
         self._stepping = bool(self._queue)
         if self._stepping:
-            loop.call_later(max(STEP, at - begun), self._step)
+            rest = max(STEP, at - begun)
+            loop.call_later(min(rest, self.longest_rest), self._step)
 
 
 _turns: WeakKeyDictionary[asyncio.AbstractEventLoop, Turns] = WeakKeyDictionary()
