@@ -1,9 +1,11 @@
-"""Main-thread time in Chromium: WebMap's page compared with a circle for each dot.
+"""Main-thread time in Chromium: WebMap's page compared with bare elements.
 
-Two hundred robots with scans of 360 points at 10 Hz and poses at 20 Hz. Both draw at
-most 20 frames a second, each in one animation frame; a page that is too slow draws
-fewer. WebMap's time includes the socket, the decoding and the acknowledgement; the
-other page has none of these.
+Robots with scans of 360 points at 10 Hz and poses at 20 Hz, compared with a circle for
+each dot; and many robots without scans, compared with a group for each robot whose
+``transform`` is set in each frame. Both draw at most 20 frames a second, each in one
+animation frame; a page that is too slow draws fewer. WebMap's time includes the socket,
+the decoding and the acknowledgement; the other page has none of these. The time is
+processor time of the thread, so other programs change it little.
 """
 
 import shutil
@@ -16,9 +18,12 @@ from playwright.sync_api import Page, sync_playwright
 from benchmarks.display import display
 from benchmarks.harness import Comparison, Contender, Figures, compare
 
+SOME = 50
 ROBOTS = 200
+MANY = 500
 BEAMS = 360
 CIRCLES = Path(__file__).parent / "circles.js"
+GROUPS = Path(__file__).parent / "groups.js"
 
 # A page acknowledges each drawn frame; the acknowledgements are counted.
 COUNT_FRAMES = """
@@ -32,7 +37,7 @@ WebSocket.prototype.send = function (data) {
 
 # Elements outside the window are not drawn, so they would cost too little.
 OUT_OF_SIGHT = """
-[...document.querySelectorAll("svg circle[r='0.3']")].filter((model) => {
+[...document.querySelectorAll("svg :not(.far) > circle[r='0.3']")].filter((model) => {
   const { left, top, right, bottom } = model.getBoundingClientRect();
   return left < 0 || top < 0 || right > innerWidth || bottom > innerHeight;
 }).length
@@ -75,7 +80,7 @@ def measure(page: Page, seconds: float) -> Figures:
     if hidden := page.evaluate(OUT_OF_SIGHT):
         raise RuntimeError(f"{hidden} robots are outside the window")
     session = page.context.new_cdp_session(page)
-    session.send("Performance.enable")
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
 
     def now() -> dict[str, float]:
         metrics = session.send("Performance.getMetrics")["metrics"]
@@ -94,11 +99,11 @@ def measure(page: Page, seconds: float) -> Figures:
     return figures | {"frames a second": frames / elapsed}
 
 
-def webmap_page(robots: int, seconds: float) -> Callable[[], Figures]:
+def webmap_page(robots: int, beams: int, seconds: float) -> Callable[[], Figures]:
     """Return a run of WebMap's own page."""
 
     def run() -> Figures:
-        with display(robots, BEAMS) as shown, browser_page() as page:
+        with display(robots, beams) as shown, browser_page() as page:
             page.add_init_script(COUNT_FRAMES)
             page.goto(shown.url)
             return measure(page, seconds)
@@ -118,11 +123,33 @@ def circle_page(robots: int, seconds: float) -> Callable[[], Figures]:
     return run
 
 
+def group_page(robots: int, seconds: float) -> Callable[[], Figures]:
+    """Return a run of a page with a group for each robot."""
+
+    def run() -> Figures:
+        with browser_page() as page:
+            page.add_script_tag(path=GROUPS)
+            page.evaluate(f"groups({robots})")
+            return measure(page, seconds)
+
+    return run
+
+
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
-    """Compare the two drawing methods."""
-    robots, seconds = (20, 2.0) if quick else (ROBOTS, 10.0)
+    """Compare WebMap's drawing with circles, and with groups."""
+    seconds = 2.0 if quick else 10.0
+    comparisons = []
+    for robots in (20,) if quick else (SOME, ROBOTS):
+        contenders = [
+            Contender("WebMap", webmap_page(robots, BEAMS, seconds)),
+            Contender("circles", circle_page(robots, seconds)),
+        ]
+        title = f"{robots} robots with scans of {BEAMS}"
+        comparisons.append(compare(title, contenders, rounds))
     contenders = [
-        Contender("WebMap", webmap_page(robots, seconds)),
-        Contender("circles", circle_page(robots, seconds)),
+        Contender("groups", group_page(MANY, seconds)),
+        Contender("WebMap", webmap_page(MANY, 0, seconds)),
     ]
-    return [compare(f"{robots} robots with scans of {BEAMS}", contenders, rounds)]
+    title = f"{MANY} robots that move, small on the screen"
+    comparisons.append(compare(title, contenders, rounds))
+    return comparisons

@@ -1,8 +1,9 @@
 """A program for ``webmap run``: robots that move and scan, without ROS.
 
 Their data is computed in advance, so that only the scene, the wire and the sockets are
-measured. ``FLEET_ROBOTS`` and ``FLEET_BEAMS`` are the numbers of robots and beams. The
-page is a plain map, or the console if ``FLEET_CONSOLE`` is set.
+measured. ``FLEET_ROBOTS`` and ``FLEET_BEAMS`` are the numbers of robots and beams;
+without beams there are no scans. The page is a plain map, or the console if
+``FLEET_CONSOLE`` is set.
 """
 
 import math
@@ -36,7 +37,8 @@ class Mover:
         model = webmap.svg.circle(r=0.3, fill="steelblue")
         self.robot = webmap.Robot(f"robot {number}", model)
         self.dots = webmap.svg.path(class_="dot", fill="crimson")
-        self.robot.svg.append(webmap.svg.g(self.dots, class_="laserscan"))
+        if BEAMS:
+            self.robot.svg.append(webmap.svg.g(self.dots, class_="laserscan"))
         side = math.ceil(math.sqrt(ROBOTS))
         self.x, self.y = number % side * 4.0, number // side * 4.0
         self.phase = number * 0.7
@@ -52,13 +54,13 @@ class Mover:
         """Show the state of one tick."""
         turn = self.phase + number % STEPS * math.tau / STEPS
         x, y = self.x + math.cos(turn), self.y + math.sin(turn)
-        if CONSOLE:  # whose list and card show the age of the pose too
+        if CONSOLE or not BEAMS:  # with the age of the pose
             turned = Quaternion.from_yaw(turn + math.pi / 2)
             pose = PoseReading(Vector3(x, y, 0.0), turned)
             self.robot.show_pose(pose, time.monotonic())
         else:
             self.robot.svg.set_pose(x, y, turn + math.pi / 2)
-        if number % 2 == 0:
+        if BEAMS and number % 2 == 0:
             self.dots.set_dots(self.scans[number % STEPS // 2], 0.001)
 
 

@@ -111,7 +111,8 @@ function northUp({ view, width, height }) {
  * @returns {Matrix | null} The view of the floor and of every robot, or of all drawn
  *     things where there is no floor, north up; null if there is nothing yet.
  */
-function showAll({ world, width, height }, bounds) {
+function showAll({ crowd, world, width, height }, bounds) {
+  crowd.drawAll();
   const box = world.getBBox();
   const all = bounds ?? [box.x, box.y, box.width, box.height];
   const [x, y, across, up] = placesOfRobots(world).reduce(withPlace, all);
@@ -238,6 +239,7 @@ function show(map, robot) {
   const element = map.world.querySelector(
     `.robot:not(.unplaced)[data-robot="${CSS.escape(robot)}"]`,
   );
+  if (element) map.crowd.draw(element);
   const place = element instanceof SVGGraphicsElement ? element.getScreenCTM() : null;
   if (!place || map.following || isFree(map, [place.e, place.f])) return;
   const free = nearest(map);

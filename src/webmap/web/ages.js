@@ -114,7 +114,10 @@ function showAge(item, age, now) {
   item.showAge(known ? seconds.toFixed(1) : "", age.shown ? formatAge(seconds) : null);
   const stale = seconds > age.limit;
   const changed = stale !== age.stale;
-  if (changed) item.element.classList.toggle("stale", stale);
+  if (changed) {
+    item.element.classList.toggle("stale", stale);
+    item.crowd?.changed(item.element);
+  }
   age.stale = stale;
   return changed;
 }

@@ -54,6 +54,8 @@ export class Item {
     this._dotSize = null;
     /** @type {Loading | null} */
     this._loading = null;
+    /** @type {import('./crowd.js').Crowd | null} Of its map, if it is a robot's group. */
+    this.crowd = null;
   }
 
   /**
@@ -142,8 +144,20 @@ export class Item {
     matrix.d = d;
     matrix.e = e;
     matrix.f = f;
+    if (!this.crowd?.defers(this)) this.drawPlace();
+  }
+
+  /** Write the newest pose or matrix into the document. */
+  drawPlace() {
+    const { matrix } = this;
+    if (!matrix) return;
     if (this._transform) this._transform.setMatrix(matrix);
     else this._startTransform(matrix);
+  }
+
+  /** The newest pose or matrix; null if there is none, or a transform as text. */
+  get matrix() {
+    return this._matrix;
   }
 
   /** @param {SVGMatrix} matrix */
@@ -159,6 +173,7 @@ export class Item {
   /** @param {string | null} value */
   _setTransform(value) {
     this._transform = null;
+    this._matrix = null;
     this._text = value;
     const { element } = this;
     // Chromium does not remove an attribute that was only set through its list.
@@ -234,7 +249,7 @@ export class Item {
    */
   showAge(seconds, text) {
     const { element } = this;
-    if (element.getAttribute("data-age") !== seconds) {
+    if (!this.crowd?.hides(this) && element.getAttribute("data-age") !== seconds) {
       element.setAttribute("data-age", seconds);
     }
     if (text !== null && element.textContent !== text) element.textContent = text;

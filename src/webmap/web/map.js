@@ -1,3 +1,4 @@
+import { Crowd } from "./crowd.js";
 import { LayoutParts } from "./layout.js";
 import {
   apply,
@@ -73,6 +74,8 @@ export class MapCanvas {
     this.restored = false;
     this._matrix = svg.createSVGMatrix();
     this._pictures = new FarPictures(world);
+    /** The robots. */
+    this.crowd = new Crowd(this);
 
     this._setSize(size);
     const { width, height } = contentSize(svg);
@@ -101,6 +104,7 @@ export class MapCanvas {
     this.svg.addEventListener("click", (event) => this._filterClick(event), options);
     this.svg.addEventListener("pointerdown", () => this._dragEnd.forget(), options);
     addEventListener("scroll", () => this.reportSoon(), { ...options, passive: true });
+    this.crowd.listen(signal);
     this._observer = new ResizeObserver(() => this._resized());
     this._observer.observe(this.svg);
   }
@@ -287,6 +291,7 @@ export class MapCanvas {
    * @param {boolean} reselected Whether the selected robot may have changed.
    */
   settle(reselected) {
+    this.crowd.settle();
     const shift = this._following.shift(this._followedPlace());
     if (shift) this._change(translate(this._view, shift.x, shift.y));
     if (reselected) this._checkSelection();
@@ -310,6 +315,7 @@ export class MapCanvas {
   _change(view) {
     this._view = view;
     this._show();
+    this.crowd.settle();
     this._reports.note();
     for (const fn of [...this._onView]) fn(view);
   }
@@ -345,6 +351,7 @@ export class MapCanvas {
     if (!this.following) return null;
     const element = this._surroundings.find(this.following);
     if (!(element instanceof SVGGraphicsElement)) return null;
+    this.crowd.draw(element);
     const matrix = element.getCTM();
     return matrix && { x: matrix.e, y: matrix.f };
   }

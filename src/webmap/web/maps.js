@@ -82,6 +82,11 @@ export class Maps {
     for (const svg of this._places.keys()) this.get(svg)?.settle(reselected);
   }
 
+  /** Draw the robots again whose looks have changed. */
+  settleRobots() {
+    for (const { crowd } of this.all) crowd.settle();
+  }
+
   /** @param {Item} item An item that is removed and may be a map. */
   end(item) {
     const place = this._places.get(item.id);

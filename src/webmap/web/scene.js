@@ -45,7 +45,7 @@ export class Scene {
   constructor(page) {
     this._page = page;
     this._clock = new DisplayClock();
-    this._ages = new Ages(this._clock, () => this.restyle());
+    this._ages = new Ages(this._clock, () => this._restale());
     this._dots = new Dots();
     this._maps = new Maps(
       (svg) => this._surroundings(svg),
@@ -62,6 +62,8 @@ export class Scene {
     /** @type {WeakMap<Mount, Map<number, Map<string, number>>>} */
     this._listening = new WeakMap();
     this._reselected = false;
+    /** @type {Set<Item>} Groups of robots that no map has yet. */
+    this._arrived = new Set();
     this._onGone = this._onGone.bind(this);
     /** @type {Set<string>} Paths of images that could not be loaded. */
     this._lost = new Set();
@@ -103,6 +105,7 @@ export class Scene {
       return this;
     });
     this._targets = [];
+    this._gather();
     // Maps are made after all their elements exist, with their final size.
     this._maps.settle(this._reselected);
     this._reselected = false;
@@ -120,10 +123,35 @@ export class Scene {
     this._page.recheckProblems();
   }
 
-  /** Note that sizes in styles may have changed. */
+  /** Note that styles may have changed. */
   restyle() {
+    for (const { crowd } of this.maps) crowd.restyle();
+    this._restale();
+  }
+
+  /** Note that data became stale or fresh, which may have other styles. */
+  _restale() {
     this._dots.restyle();
-    queueMicrotask(() => this._dots.draw());
+    queueMicrotask(() => {
+      this._maps.settleRobots();
+      this._dots.draw();
+    });
+  }
+
+  /** Give robots to their maps. */
+  _gather() {
+    for (const item of this._arrived) {
+      const robots = item.element.parentElement;
+      const map = this.maps.find(({ world }) => world === robots?.parentNode);
+      if (!map || !robots?.classList.contains("robots")) continue;
+      map.crowd.add(item);
+      this._arrived.delete(item);
+    }
+  }
+
+  /** Note that the drawing of the robots changes that the records apply to. */
+  _redraw() {
+    for (const { root } of this._targets) root?.crowd?.changed(root.element);
   }
 
   /** @returns {MapCanvas[]} The maps on the page. */
@@ -169,6 +197,8 @@ export class Scene {
     this._ages.forget(item);
     this._dots.forget(item);
     this._listeners.get(item)?.clear();
+    item.crowd?.forget(item);
+    this._arrived.delete(item);
   }
 
   // Records about the page -----------------------------------------------------
@@ -217,7 +247,9 @@ export class Scene {
    * @param {string} name
    */
   mountClass(id, on, name) {
-    this._mounts.get(id)?.root?.element.classList.toggle(name, on);
+    const root = this._mounts.get(id)?.root;
+    root?.element.classList.toggle(name, on);
+    root?.crowd?.changed(root.element);
     this._dots.restyle();
     this._reselected = true;
   }
@@ -348,6 +380,7 @@ export class Scene {
   create(id, parent, place, tag, svg) {
     for (const mount of this._targets) {
       const item = mount.create(id, parent, place, tag, svg);
+      mount.root?.crowd?.changed(mount.root.element);
       const listening = item && this._listening.get(mount)?.get(id);
       if (!listening) continue;
       for (const [kind, flags] of listening) {
@@ -386,6 +419,7 @@ export class Scene {
   /** @param {number} id */
   remove(id) {
     for (const mount of this._targets) mount.remove(id, this._onGone);
+    this._redraw();
   }
 
   /**
@@ -412,6 +446,7 @@ export class Scene {
         this._page.notice(`${name} of ${item.element.tagName} cannot be set: ${error}`);
       }
     });
+    this._redraw();
   }
 
   /**
@@ -419,7 +454,13 @@ export class Scene {
    * @param {string} classes
    */
   classes(id, classes) {
-    this._each(id, (item) => item.setClasses(classes));
+    this._each(id, (item, mount) => {
+      item.setClasses(classes);
+      if (item === mount.root && !item.crowd && item.element.classList.contains("robot")) {
+        this._arrived.add(item);
+      }
+    });
+    this._redraw();
     this._dots.restyle();
     this._reselected = true;
   }
@@ -431,6 +472,7 @@ export class Scene {
    */
   style(id, name, value) {
     this._each(id, (item) => item.setStyle(name, value));
+    this._redraw();
     this._dots.restyle();
   }
 
@@ -449,7 +491,10 @@ export class Scene {
    * @param {Matrix} matrix
    */
   matrix(id, matrix) {
-    this._each(id, (item) => item.setMatrix(matrix));
+    this._each(id, (item, { root }) => {
+      item.setMatrix(matrix);
+      if (item !== root) root?.crowd?.changed(root.element);
+    });
   }
 
   /**
@@ -459,6 +504,7 @@ export class Scene {
    */
   dots(id, unit, points) {
     this._each(id, (item) => this._dots.set(item, unit, points));
+    this._redraw();
   }
 
   /**
@@ -484,6 +530,7 @@ export class Scene {
    */
   data(id, data) {
     for (const mount of this._targets) mount.setText(id, data);
+    this._redraw();
   }
 
   /**

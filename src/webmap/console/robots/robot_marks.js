@@ -171,7 +171,7 @@ export function markRobots(map) {
   const update = () => {
     marks.wall = wallOf();
     const elements = [...map.world.querySelectorAll(".robot:not(.unplaced)")];
-    const robots = elements.map(drawn);
+    const robots = elements.map((element) => drawn(map, element));
     const places = robots.map(({ id, x, y }) => {
       const place = map.toScreen(x, y);
       return { x: place.x / marks.wall, y: place.y / marks.wall, alone: id === map.selected };
@@ -179,7 +179,7 @@ export function markRobots(map) {
     const far = scaleOf(map.view) < TRUE_SIZE;
     const clusters = far ? clustersOf(places) : [];
     const joined = new Set(clusters.flat());
-    robots.forEach(({ element }, index) => turn(element, "clustered", joined.has(index)));
+    robots.forEach(({ element }, index) => turn(map, element, "clustered", joined.has(index)));
     marks.show(clusters.map((cluster) => cluster.map((index) => robots[index])));
     showNames(map, robots, places, joined);
   };
@@ -204,7 +204,8 @@ function wallOf() {
  * @param {{x: number, y: number}[]} places
  * @param {Set<number>} joined Robots without a name of their own.
  */
-function showNames({ selected }, robots, places, joined) {
+function showNames(map, robots, places, joined) {
+  const { selected } = map;
   const names = robots.map((robot, index) => nameOf(robot, places[index], selected));
   const few = robots.length <= MOST;
   const asked = names.map((_, index) => index).filter((index) => {
@@ -214,7 +215,7 @@ function showNames({ selected }, robots, places, joined) {
   roomFor(asked.map((index) => names[index])).forEach((room, at) => {
     if (room) shown.add(asked[at]);
   });
-  robots.forEach(({ element }, index) => turn(element, "nameless", !shown.has(index)));
+  robots.forEach(({ element }, index) => turn(map, element, "nameless", !shown.has(index)));
 }
 
 /**
@@ -237,24 +238,27 @@ function nameOf({ element, id, rank }, { x, y }, selected) {
 }
 
 /**
+ * @param {MapCanvas} map
  * @param {Element} element
  * @returns {Drawn}
  */
-function drawn(element) {
-  const list = element instanceof SVGGraphicsElement ? element.transform.baseVal : null;
-  const { e: x, f: y } = list?.numberOfItems ? list.getItem(0).matrix : { e: 0, f: 0 };
+function drawn({ crowd }, element) {
+  const { x, y } = crowd.placeOf(element) ?? { x: 0, y: 0 };
   const id = element.getAttribute("data-robot") ?? "";
   const place = STATES.indexOf(element.getAttribute("data-state") ?? "");
   return { element, id, x, y, rank: place < 0 ? STATES.length : place };
 }
 
 /**
+ * @param {MapCanvas} map
  * @param {Element} element
  * @param {string} name
  * @param {boolean} on
  */
-function turn(element, name, on) {
-  if (element.classList.contains(name) !== on) element.classList.toggle(name, on);
+function turn({ crowd }, element, name, on) {
+  if (element.classList.contains(name) === on) return;
+  element.classList.toggle(name, on);
+  crowd.changed(element);
 }
 
 /** The marks of robots that overlap: a number, and the worst of their states. */

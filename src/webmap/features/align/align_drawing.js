@@ -118,8 +118,9 @@ export class AlignDrawing {
    * @returns {Point | null} The robot's position on the map.
    */
   _placeOf(robot) {
-    const { world } = this._map;
+    const { crowd, world } = this._map;
     const element = world.querySelector(`.robot[data-robot="${CSS.escape(robot)}"]`);
+    if (element) crowd.draw(element);
     const onMap = element instanceof SVGGraphicsElement ? element.getCTM() : null;
     const matrix = onMap && world.getCTM()?.inverse().multiply(onMap);
     return matrix ? { x: matrix.e, y: matrix.f } : null;

@@ -268,6 +268,7 @@ function placeOf(map, robot) {
   const element = map.world.querySelector(`.robot[data-robot="${CSS.escape(robot)}"]`);
   if (!(element instanceof SVGGraphicsElement)) return null;
   if (element.classList.contains("unplaced")) return null;
+  map.crowd.draw(element);
   // Read without consolidate(), because the scene keeps references to the list's items.
   const list = element.transform.baseVal;
   if (list.numberOfItems === 0) return null;

@@ -268,6 +268,7 @@ class Labels {
    */
   _wayTo(robot, place) {
     const element = this._map.world.querySelector(`[data-robot="${CSS.escape(robot)}"]`);
+    if (element) this._map.crowd.draw(element);
     const from = element instanceof SVGGraphicsElement ? placeOf(element) : null;
     return from ? Math.atan2(place.y - from.y, place.x - from.x) : 0;
   }

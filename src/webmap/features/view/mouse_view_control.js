@@ -170,7 +170,8 @@ class MouseViewControl {
   }
 
   _showAll() {
-    const { view, world, width, height } = this._map;
+    const { crowd, view, world, width, height } = this._map;
+    crowd.drawAll();
     const box = world.getBBox();
     if (box.width === 0 && box.height === 0) return;
     const [right, top] = [box.x + box.width, box.y + box.height];

@@ -309,6 +309,7 @@ export class PressAim {
 export function poseOf(map, robot) {
   const element = map.world.querySelector(`.robot[data-robot="${CSS.escape(robot)}"]`);
   if (!(element instanceof SVGGraphicsElement)) return null;
+  map.crowd.draw(element);
   const onMap = element.getCTM();
   const world = map.world.getCTM();
   if (!onMap || !world) return null;
