@@ -9,6 +9,7 @@ from webmap import Bridge, Robot, RobotConfig
 from webmap.base.errors import ConfigError
 from webmap.console import Console, make_robot, open_console
 from webmap.console.page import build
+from webmap.console.robot_list import RobotList
 from webmap.core.page import Page, PageEntry, Viewer, site
 from webmap.scene.element import Element
 from webmap.scene.wire.session import SceneSession
@@ -275,3 +276,17 @@ def test_a_page_shows_routers_and_why_no_robot_of_their_agents_is_there(bridge):
             page.close()
 
     asyncio.run(scenario())
+
+
+def test_robots_whose_state_is_the_same_set_no_attribute_of_their_lines(
+    bridge, robots, monkeypatch
+):
+    def scenario(page):
+        (listed,) = [m for m in page.maps[0].modules if isinstance(m, RobotList)]
+        listed.poll()
+        monkeypatch.setattr(Element, "set", lambda *args, **given: pytest.fail("set"))
+        listed.poll()
+        for robot in robots:
+            robot.notify_modules("on_report", None)
+
+    on_a_page(scenario, bridge, robots)

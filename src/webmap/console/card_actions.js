@@ -38,7 +38,7 @@ export function listenToActions(map, send, signal) {
   const timer = setInterval(show, 250);
   const offs = [
     map.onView(show),
-    map.drive.on("robot", show),
+    map.drive.on("robot", ({ robot }) => robot === map.selected && show()),
     map.onSelect(() => {
       if (map.following) map.follow(0);
       show();

@@ -60,6 +60,13 @@ function showConnection(drive) {
   const show = () => {
     link.dataset.link = drive.state;
   };
+  /** @type {Map<string, boolean>} */
+  const known = new Map();
+  const hear = (/** @type {{robot: string, mine?: boolean}} */ { robot, mine = false }) => {
+    // All elements of the page are searched only if something is new.
+    if ((known.get(robot) ?? false) !== mine) mark();
+    known.set(robot, mine);
+  };
   const mark = () => {
     for (const element of document.querySelectorAll("[data-robot]")) {
       if (!(element instanceof HTMLElement)) continue;
@@ -74,7 +81,7 @@ function showConnection(drive) {
   };
   look();
   const timer = setInterval(look, 500);
-  const offs = [drive.on("state", show), drive.on("robot", mark)];
+  const offs = [drive.on("state", show), drive.on("robot", hear)];
   return () => {
     clearInterval(timer);
     for (const off of offs) off();

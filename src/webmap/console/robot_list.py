@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from webmap import html, svg
 from webmap.config.robot import BATTERY_LOW
-from webmap.console.texts import GROUPS, battery_tone, look_of
+from webmap.console.texts import GROUPS, LOOKS, battery_tone
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
@@ -130,6 +130,7 @@ class Row:
         self.element = html.li(self._button, label, class_="row")
         self.element.set("data-robot", robot.id)
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
+        self._shown: tuple[object, ...] | None = None
 
     def destroy(self) -> None:
         """Remove the line."""
@@ -137,20 +138,26 @@ class Row:
 
     def on_state(self, state: object = None) -> None:
         """Show the state, and what the list is ordered and grouped by."""
-        robot = self.robot
-        now, look = robot.state, look_of(robot)
+        robot, now = self.robot, self.robot.state
+        charge, bridge = robot.charge, robot.pose_source.bridge
+        tag = next(iter(robot.tags), "")
+        address = "" if bridge is None else bridge.name or bridge.url
+        shown = (now, charge, robot.battery_low, tag, address)
+        if shown == self._shown:
+            return  # as nearly always, of each robot four times a second
+        self._shown = shown
+        look = LOOKS[now.name]
         self._shape.show(look.symbol)
         self._state.text, self._mine.text = now.text, now.mine
         self._words.set("title", now.text)
-        charge, bridge = robot.charge, robot.pose_source.bridge
         self._battery.show(charge, robot.battery_low)
         for name, value in {
             "tone": look.tone,
             "state": now.name,
             "group": look.group,
             "rank": str(GROUPS.index(look.group)),
-            "tag": next(iter(robot.tags), ""),
-            "bridge": "" if bridge is None else bridge.name or bridge.url,
+            "tag": tag,
+            "bridge": address,
             "charge": "" if charge is None else str(round(100 * charge)),
         }.items():
             self.element.set(f"data-{name}", value or None)

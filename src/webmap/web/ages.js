@@ -11,6 +11,9 @@
 /** Milliseconds between two updates. */
 const PERIOD = 250;
 
+/** With more ages than this, only every other update writes those that are not new. */
+const MANY = 200;
+
 /**
  * @param {number} seconds
  * @returns {string}
@@ -36,7 +39,13 @@ export class Ages {
     this._ages = new Map();
     /** @type {Set<Item>} */
     this._urgent = new Set();
-    this._timer = setInterval(() => this._show(this._ages.keys()), PERIOD);
+    this._looks = 0;
+    this._timer = setInterval(() => this._look(), PERIOD);
+  }
+
+  _look() {
+    this._looks++;
+    this._show(this._ages.keys(), this._ages.size <= MANY || this._looks % 2 === 0);
   }
 
   /**
@@ -69,7 +78,7 @@ export class Ages {
   /** Update urgent items immediately. */
   flush() {
     if (this._urgent.size === 0) return;
-    this._show(this._urgent);
+    this._show(this._urgent, true);
     this._urgent.clear();
   }
 
@@ -89,13 +98,16 @@ export class Ages {
     return age;
   }
 
-  /** @param {Iterable<Item>} items */
-  _show(items) {
+  /**
+   * @param {Iterable<Item>} items
+   * @param {boolean} all Whether to write ages of data that is as stale as before, too.
+   */
+  _show(items, all) {
     const now = this._clock.at(performance.now() / 1000);
     let changed = false;
     for (const item of items) {
       const age = this._ages.get(item);
-      if (age) changed = showAge(item, age, now) || changed;
+      if (age) changed = showAge(item, age, now, all) || changed;
     }
     if (changed) this._onStale();
   }
@@ -105,15 +117,18 @@ export class Ages {
  * @param {Item} item
  * @param {Age} age
  * @param {number | null} now The display's clock, in seconds.
+ * @param {boolean} all Whether to write it also if nothing became stale, or fresh.
  * @returns {boolean} Whether the data became stale, or fresh again.
  */
-function showAge(item, age, now) {
+function showAge(item, age, now, all) {
   const { measured } = age;
   const known = now !== null && measured !== null;
   const seconds = known ? Math.max(0, now - measured / 1000) : Infinity;
-  item.showAge(known ? seconds.toFixed(1) : "", age.shown ? formatAge(seconds) : null);
   const stale = seconds > age.limit;
   const changed = stale !== age.stale;
+  if (all || changed) {
+    item.showAge(known ? seconds.toFixed(1) : "", age.shown ? formatAge(seconds) : null);
+  }
   if (changed) {
     item.element.classList.toggle("stale", stale);
     item.crowd?.changed(item.element);

@@ -179,7 +179,9 @@ export function markRobots(map) {
     const far = scaleOf(map.view) < TRUE_SIZE;
     const clusters = far ? clustersOf(places) : [];
     const joined = new Set(clusters.flat());
-    robots.forEach(({ element }, index) => turn(map, element, "clustered", joined.has(index)));
+    robots.forEach(({ element }, index) => {
+      if (turn(element, "clustered", joined.has(index))) map.crowd.changed(element);
+    });
     marks.show(clusters.map((cluster) => cluster.map((index) => robots[index])));
     showNames(map, robots, places, joined);
   };
@@ -204,18 +206,17 @@ function wallOf() {
  * @param {{x: number, y: number}[]} places
  * @param {Set<number>} joined Robots without a name of their own.
  */
-function showNames(map, robots, places, joined) {
-  const { selected } = map;
-  const names = robots.map((robot, index) => nameOf(robot, places[index], selected));
+function showNames({ selected }, robots, places, joined) {
   const few = robots.length <= MOST;
-  const asked = names.map((_, index) => index).filter((index) => {
-    return !joined.has(index) && (few || names[index].first);
+  const asked = robots.map((_, index) => index).filter((index) => {
+    return !joined.has(index) && (few || robots[index].id === selected);
   });
+  const names = asked.map((index) => nameOf(robots[index], places[index], selected));
   const shown = new Set();
-  roomFor(asked.map((index) => names[index])).forEach((room, at) => {
+  roomFor(names).forEach((room, at) => {
     if (room) shown.add(asked[at]);
   });
-  robots.forEach(({ element }, index) => turn(map, element, "nameless", !shown.has(index)));
+  robots.forEach(({ element }, index) => turn(element, "nameless", !shown.has(index)));
 }
 
 /**
@@ -250,15 +251,15 @@ function drawn({ crowd }, element) {
 }
 
 /**
- * @param {MapCanvas} map
  * @param {Element} element
  * @param {string} name
  * @param {boolean} on
+ * @returns {boolean} Whether that is new.
  */
-function turn({ crowd }, element, name, on) {
-  if (element.classList.contains(name) === on) return;
-  element.classList.toggle(name, on);
-  crowd.changed(element);
+function turn(element, name, on) {
+  const before = element.classList.contains(name);
+  if (before !== on) element.classList.toggle(name, on);
+  return before !== on;
 }
 
 /** The marks of robots that overlap: a number, and the worst of their states. */

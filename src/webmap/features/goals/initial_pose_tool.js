@@ -78,7 +78,7 @@ class InitialPoseTool {
       map.onSelect(() => this._selected()),
       map.onView(() => this._draw()),
       this._drive.on("stop", () => this._aim.leave()),
-      this._drive.on("robot", () => this._show()),
+      this._drive.on("robot", ({ robot }) => robot === map.selected && this._show()),
     ];
     this._show();
   }
