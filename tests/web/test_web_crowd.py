@@ -1,5 +1,7 @@
 """Many robots on a map, in a real Chromium: together when small, else one by one."""
 
+import struct
+
 import pytest
 from scene_host import wait
 
@@ -34,6 +36,15 @@ COUNT = """() => {
 FAR = "document.querySelectorAll('.robots > .far').length"
 PATHS = "document.querySelectorAll('.far-robots > path').length"
 DRAWN = "document.querySelectorAll('.robots > .robot').length"
+
+
+RESTYLE = """async (text) => {
+  globalThis.sheet ??= new CSSStyleSheet();
+  sheet.replaceSync(text);
+  document.adoptedStyleSheets = [sheet];
+  const { page } = await import("/_webmap/web/page.js");
+  page.scene.restyle();
+}"""
 
 
 class Fleet:
@@ -192,6 +203,24 @@ def test_a_small_robot_is_hovered_and_clicked_like_any_other(host, tab):
     tab.mouse.click(x - 100, y + 100)
     host.until(lambda: len(host.events(ElementEvent)) == 3, tab=tab)
     assert host.events(ElementEvent)[2].element == host.one.fleet.root.id
+
+
+def test_robots_keep_their_groups_while_they_show_scans(host, tab):
+    def model():
+        dots = svg.path(class_="dot")
+        dots.set_dots(struct.pack("<4h", 5000, 0, -5000, 0), 0.001)
+        return svg.g(svg.circle(r=0.5), svg.g(dots, class_="laserscan"))
+
+    opened(host, tab, model=model)
+    drawn = "[...document.querySelectorAll('.dot')].filter(e => e.getAttribute('d'))"
+    wait(tab, f"{drawn}.length === {MANY}")
+    tab.wait_for_timeout(1500)
+    assert tab.evaluate(FAR) == 0
+    tab.evaluate(RESTYLE, ".laserscan { display: none }")
+    wait(tab, f"{FAR} === {MANY}")
+    wait(tab, f"{drawn}.length === 0")  # and the display sends none
+    tab.evaluate(RESTYLE, "")
+    wait(tab, f"{drawn}.length === {MANY} && {FAR} === 0")
 
 
 def test_what_a_robot_shows_besides_its_group_costs_few_elements(host, tab):

@@ -34,6 +34,8 @@ export class CrowdRobot {
     this.item = item;
     /** @type {Box | null} Its drawing; null if nothing of it is drawn. */
     this.box = null;
+    /** Whether it has dots to show that the page has not got yet. */
+    this.awaits = false;
     /** Greatest distance of its drawing from its position, in metres. */
     this.reach = 0;
     /** @type {Look | null} null until it was measured. */
@@ -56,8 +58,8 @@ export class CrowdRobot {
    * @returns {boolean} Whether something of it is drawn, and that is small.
    */
   isSmall(scale) {
-    const { box } = this;
-    return box !== null && Math.max(box.width, box.height) * scale < SMALL;
+    const { awaits, box } = this;
+    return !awaits && box !== null && Math.max(box.width, box.height) * scale < SMALL;
   }
 
   /** Write the newest pose into the document. */
@@ -161,6 +163,11 @@ export class Crowd {
   changed(element) {
     const robot = this._robots.get(element);
     if (robot) this._changed.add(robot);
+  }
+
+  /** @param {Element} element A robot with new dots, or none if it does not show them. */
+  changedDots(element) {
+    if (!this._robots.get(element)?.far) this.changed(element);
   }
 
   /**
@@ -374,6 +381,9 @@ function measure(robot, scale, now) {
   robot.box = width > 0 || height > 0 ? { x, y, width, height } : null;
   const [across, up] = [Math.max(-x, x + width), Math.max(-y, y + height)];
   robot.reach = robot.box ? Math.hypot(across, up) : 0;
+  robot.awaits = [...element.querySelectorAll(".dot")].some(
+    (dot) => !dot.getAttribute("d") && dot.getClientRects().length > 0,
+  );
   robot.look = lookOf(element);
   robot.chosen = CHOSEN.some((name) => element.classList.contains(name));
 }

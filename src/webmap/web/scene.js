@@ -456,6 +456,7 @@ export class Scene {
   classes(id, classes) {
     this._each(id, (item, mount) => {
       item.setClasses(classes);
+      for (const { svg, crowd } of this.maps) if (item.element.contains(svg)) crowd.restyle();
       if (item === mount.root && !item.crowd && item.element.classList.contains("robot")) {
         this._arrived.add(item);
       }
@@ -503,8 +504,10 @@ export class Scene {
    * @param {Int16Array} points
    */
   dots(id, unit, points) {
-    this._each(id, (item) => this._dots.set(item, unit, points));
-    this._redraw();
+    this._each(id, (item, { root }) => {
+      this._dots.set(item, unit, points);
+      root?.crowd?.changedDots(root.element);
+    });
   }
 
   /**

@@ -182,6 +182,7 @@ export function markRobots(map) {
     robots.forEach(({ element }, index) => {
       if (turn(element, "clustered", joined.has(index))) map.crowd.changed(element);
     });
+    map.crowd.settle();
     marks.show(clusters.map((cluster) => cluster.map((index) => robots[index])));
     showNames(map, robots, places, joined);
   };

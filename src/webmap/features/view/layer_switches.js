@@ -201,6 +201,8 @@ class LayerSwitches {
   _apply() {
     const scope = `[data-layers="${this._number}"]`;
     this._sheet.replaceSync(hiding(this._layers, this._shown, scope));
+    this._map.crowd.restyle();
+    this._map.crowd.settle();
   }
 }
 
