@@ -142,10 +142,21 @@ test-safety: $(DEV) $(NODE)
 docs: $(DEV)
 	$(BIN)/sphinx-build -n -W --keep-going -q -b html docs docs/_build/html
 
-## bench: compare with roslibpy and older methods of drawing; see benchmarks/README.md
+## bench: measure WebMap beside others, in 15 minutes; see benchmarks/README.md (ARGS="bridge")
 .PHONY: bench
 bench: $(DEV) $(NODE)
 	$(PY) -m benchmarks $(ARGS)
+
+## bench-quick: a rough look at the cheap benchmarks, in 2 minutes
+.PHONY: bench-quick
+bench-quick: $(DEV) $(NODE)
+	$(PY) -m benchmarks --quick $(ARGS)
+
+## bench-soak: an hour with 50 robots and 20 viewers; memory and ages must not grow (SECONDS=3600)
+.PHONY: bench-soak
+bench-soak: SECONDS := 3600
+bench-soak: $(DEV)
+	$(PY) -m benchmarks.soak --seconds $(SECONDS)
 
 ## screenshots: contact sheets of every state of the console, in test-results/screenshots
 .PHONY: screenshots

@@ -1,38 +1,91 @@
 """Run the benchmarks: ``python -m benchmarks [NAME ...] [--rounds N] [--quick]``."""
 
 import importlib
+import math
+import sys
+import time
+import traceback
+from dataclasses import dataclass
 
 import click
 
-from benchmarks.harness import report
+from benchmarks import harness
+from benchmarks.harness import Comparison, report
 
-BENCHES = [
-    "bridge",
-    "viewers",
-    "wire",
-    "grids",
-    "drawing",
-    "console",
-    "opening",
-    "agents",
-    "uplink",
-    "narrow",
-    "transports",
-    "router",
-    "idle",
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One benchmark, in the module of its name."""
+
+    name: str
+    seconds: float
+    """The time of each of its comparisons, so that all take less than 15 minutes."""
+
+    quick: bool = False
+    """Whether it is one of those that all together give a rough look in 2 minutes."""
+
+
+ROWS = [
+    Row("bridge", 30, quick=True),
+    Row("viewers", 45, quick=True),
+    Row("wire", 30, quick=True),
+    Row("grids", 40),
+    Row("drawing", 45, quick=True),
+    Row("console", 60),
+    Row("opening", 35),
+    Row("agents", 50),
+    Row("uplink", 50),
+    Row("narrow", 45),
+    Row("transports", 45),
+    Row("router", 25),
+    Row("idle", 40, quick=True),
 ]
+
+BENCHES = {row.name: row for row in ROWS}
+
+MOST_ROUNDS = 9
+"""Rounds of a comparison that is done sooner than its time is over."""
 
 
 @click.command()
-@click.argument("names", nargs=-1, type=click.Choice(BENCHES))
-@click.option("--rounds", default=5, show_default=True, help="Runs of each contender.")
-@click.option("--quick", is_flag=True, help="A tenth of the work: a look, no figures.")
-def main(names: tuple[str, ...], rounds: int, quick: bool) -> None:
-    """Run the benchmarks called NAMES, or all of them."""
-    for name in names or BENCHES:
-        bench = importlib.import_module(f"benchmarks.{name}").bench
-        path = report(name, bench(rounds=rounds, quick=quick))
-        click.echo(f"written to {path}\n", err=True)
+@click.argument("names", nargs=-1, type=click.Choice(list(BENCHES)))
+@click.option("--rounds", type=click.IntRange(1), help="Runs of each contender.")
+@click.option("--quick", is_flag=True, help="A tenth of the work: a rough look.")
+def main(names: tuple[str, ...], rounds: int | None, quick: bool) -> None:
+    """Run the benchmarks called NAMES, or all of them; with --quick, the cheap ones."""
+    rows = [BENCHES[name] for name in names] or [
+        row for row in ROWS if row.quick or not quick
+    ]
+    took: dict[str, float] = {}
+    failed = []
+    for row in rows:
+        begun = time.monotonic()
+        try:
+            comparisons = run(row, rounds, quick=quick)
+        except Exception:  # the other benchmarks are worth as much without it
+            traceback.print_exc()
+            failed.append(row.name)
+        took[row.name] = time.monotonic() - begun
+        if row.name not in failed:
+            path = report(row.name, comparisons, took[row.name], rough=quick)
+            click.echo(f"written to {path}\n", err=True)
+    click.echo("| benchmark | seconds |\n|---|---|")
+    for name, seconds in took.items():
+        click.echo(f"| {name} | {seconds:.0f}{' (failed)' * (name in failed)} |")
+    click.echo(f"| all | {sum(took.values()):.0f} |")
+    sys.exit(1 if failed else 0)
+
+
+def run(row: Row, rounds: int | None, *, quick: bool) -> list[Comparison]:
+    """Run one benchmark, with as many rounds as its time allows if none are given."""
+    harness.MOST_SECONDS = row.seconds if rounds is None else math.inf
+    rounds = 1 if quick else rounds or MOST_ROUNDS
+    bench = importlib.import_module(f"benchmarks.{row.name}").bench
+    comparisons: list[Comparison] = bench(rounds=rounds, quick=quick)
+    if quick:
+        for comparison in comparisons:
+            comparison.title += " (rough: a tenth of the work, once)"
+    return comparisons
 
 
 if __name__ == "__main__":

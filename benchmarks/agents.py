@@ -20,7 +20,7 @@ from webmap.agents.peer import close_peers
 from webmap.gate.protocol import RobotSpec
 from webmap.testing import WitnessRobot
 
-VELOCITIES = 300
+VELOCITIES = 200
 PERIOD = 0.05
 FULL = 1.0
 """The robot's highest speed, in m/s."""

@@ -1,4 +1,4 @@
-"""A display process that shows the fleet, for as long as a ``with`` block lasts."""
+"""A display process that shows a fleet, for as long as a ``with`` block lasts."""
 
 import os
 import subprocess
@@ -12,6 +12,7 @@ from pathlib import Path
 import psutil
 
 FLEET = Path(__file__).parent / "fleet.py"
+BRIDGED = Path(__file__).parent / "bridged.py"
 READY = "WebMap is ready at "
 
 
@@ -24,6 +25,11 @@ class Display:
 
     process: psutil.Process
 
+    @property
+    def gate(self) -> psutil.Process:
+        """The process of its gate."""
+        return next(p for p in self.process.children() if "webmap.gate" in p.cmdline())
+
     def cpu(self) -> float:
         """Return the seconds of processor time that it has used."""
         times = self.process.cpu_times()
@@ -33,26 +39,51 @@ class Display:
 @contextmanager
 def display(robots: int, beams: int, *, console: bool = False) -> Iterator[Display]:
     """Start the fleet on a free port, on a plain map or in the console, and end it."""
+    with running(
+        FLEET,
+        FLEET_ROBOTS=str(robots),
+        FLEET_BEAMS=str(beams),
+        FLEET_CONSOLE="1" if console else "",
+    ) as shown:
+        yield shown
+
+
+@contextmanager
+def bridged(robots: int, beams: int = 0) -> Iterator[Display]:
+    """Start a rosbridge with robots of ``stamped``, and a display that shows them."""
+    command = [sys.executable, "-m", "benchmarks.stamped", str(robots), str(beams)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as bridge:
+        try:
+            assert bridge.stdout is not None
+            url = bridge.stdout.readline().strip()
+            with running(
+                BRIDGED,
+                BRIDGED_URL=url,
+                BRIDGED_ROBOTS=str(robots),
+                BRIDGED_SCANS="1" if beams else "",
+            ) as shown:
+                yield shown
+        finally:
+            bridge.terminate()
+
+
+@contextmanager
+def running(program: Path, **environment: str) -> Iterator[Display]:
+    """Run a program of WebMap on a free port, and end it."""
     with tempfile.TemporaryDirectory() as state:
-        environment = os.environ | {
-            "FLEET_ROBOTS": str(robots),
-            "FLEET_BEAMS": str(beams),
-            "WEBMAP_STATE_DIR": state,
-            "FLEET_CONSOLE": "1" if console else "",
-        }
-        command = [sys.executable, "-m", "webmap", "run", str(FLEET)]
+        command = [sys.executable, "-m", "webmap", "run", str(program)]
         with subprocess.Popen(
             [*command, "--port", "0", "--no-browser"],
             stdout=subprocess.PIPE,
             text=True,
-            env=environment,
-        ) as running:
+            env={**os.environ, **environment, "WEBMAP_STATE_DIR": state},
+        ) as process:
             try:
-                assert running.stdout is not None
-                line = running.stdout.readline()
+                assert process.stdout is not None
+                line = process.stdout.readline()
                 if not line.startswith(READY):
                     raise RuntimeError(f"expected {READY!r}, got {line!r}")
                 url = line.removeprefix(READY).strip()
-                yield Display(url, psutil.Process(running.pid))
+                yield Display(url, psutil.Process(process.pid))
             finally:
-                running.terminate()
+                process.terminate()

@@ -137,7 +137,7 @@ def group_page(robots: int, seconds: float) -> Callable[[], Figures]:
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare WebMap's drawing with circles, and with groups."""
-    seconds = 2.0 if quick else 10.0
+    seconds = 2.0 if quick else 5.0
     comparisons = []
     for robots in (20,) if quick else (SOME, ROBOTS):
         contenders = [

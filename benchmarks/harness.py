@@ -6,18 +6,41 @@ counts: a slow machine slows both.
 """
 
 import json
+import math
 import os
 import platform
 import statistics
 import sys
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 Figures = dict[str, float]
 """Figures of one run by name; the name ends in its unit, such as ``"cpu (us)"``."""
 
 RESULTS = Path(__file__).parent / "results"
+
+LOAD_BEFORE = os.getloadavg()[0]
+"""Processes that ran on this machine before the first benchmark."""
+
+PACKAGES = (
+    "webmap",
+    "websockets",
+    "msgspec",
+    "numpy",
+    "cbor2",
+    "uvicorn",
+    "uvloop",
+    "eclipse-zenoh",
+    "roslibpy",
+    "nicegui",
+    "viser",
+    "playwright",
+)
+"""The packages whose versions are noted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +105,15 @@ def _short(ratio: float) -> str:
     return f"{ratio:.2f}" if ratio >= 0.1 else f"{ratio:.1g}"
 
 
+MOST_SECONDS = math.inf
+"""Seconds that a comparison may take, beyond its first round."""
+
+
 def compare(title: str, contenders: Sequence[Contender], rounds: int) -> Comparison:
     """Run the contenders in turn, ``rounds`` times.
 
     Every other round has the opposite order, so that no contender always runs second.
+    No round begins that would end after :data:`MOST_SECONDS`, except for the first.
 
     Raises:
         ValueError: If ``rounds`` is less than 1, or there is no contender.
@@ -94,26 +122,59 @@ def compare(title: str, contenders: Sequence[Contender], rounds: int) -> Compari
     if rounds < 1 or not contenders:
         raise ValueError(f"expected contenders and rounds, got {rounds} rounds")
     comparison = Comparison(title, {contender.name: [] for contender in contenders})
+    begun = time.monotonic()
     for number in range(rounds):
+        took = time.monotonic() - begun
+        if number and took + took / number > MOST_SECONDS:
+            break
         for contender in contenders if number % 2 == 0 else reversed(contenders):
             print(f"{title}: round {number + 1}, {contender.name}", file=sys.stderr)
             comparison.runs[contender.name].append(contender.run())
     return comparison
 
 
+def percentile(values: Sequence[float], percent: int) -> float:
+    """Return a percentile, NaN of nothing."""
+    if not values:
+        return math.nan
+    return sorted(values)[min(len(values) - 1, len(values) * percent // 100)]
+
+
 def machine() -> dict[str, object]:
     """Return the properties of the machine that affect the figures."""
     return {
+        "date": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.release()}",
         "processor": platform.machine(),
         "cores": os.cpu_count(),
-        "load before": os.getloadavg()[0],
+        "load before": LOAD_BEFORE,
+        "versions": {name: _version(name) for name in PACKAGES},
     }
 
 
-def report(name: str, comparisons: Sequence[Comparison]) -> Path:
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def report(
+    name: str,
+    comparisons: Sequence[Comparison],
+    seconds: float = 0.0,
+    *,
+    rough: bool = False,
+) -> Path:
     """Print the tables, and write everything as JSON.
+
+    Args:
+        name: The benchmark.
+        comparisons: What it found.
+        seconds: How long it took.
+        rough: Whether it did a part of the work only; such results have a folder of
+            their own.
 
     Returns:
         The file that was written.
@@ -121,10 +182,13 @@ def report(name: str, comparisons: Sequence[Comparison]) -> Path:
     """
     for comparison in comparisons:
         print(comparison.table(), end="\n\n", flush=True)
-    RESULTS.mkdir(exist_ok=True)
-    path = RESULTS / f"{name}.json"
+    folder = RESULTS / "rough" if rough else RESULTS
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}.json"
     content = {
         "machine": machine(),
+        "seconds": round(seconds, 1),
+        "rough": rough,
         "comparisons": [comparison.as_dict() for comparison in comparisons],
     }
     path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

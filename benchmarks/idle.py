@@ -154,7 +154,7 @@ def bare(robots: int, seconds: float) -> Callable[[], Figures]:
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare many idle robots with one, and their connections with bare ones."""
-    seconds = 2.0 if quick else 10.0
+    seconds = 2.0 if quick else 5.0
     many = [
         Contender(f"{robots} robots", gate_with(robots, seconds, apart=False))
         for robots in (1, MANY)

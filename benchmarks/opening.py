@@ -121,7 +121,7 @@ def measure(page: Page, url: str, *, slow: bool) -> Figures:
     while not page.evaluate("globalThis.firstRobot ?? 0"):
         page.wait_for_timeout(10)
     first: float = page.evaluate("firstRobot")
-    page.wait_for_timeout(3000)
+    page.wait_for_timeout(2000)
     return {
         "first robot (ms)": first,
         "requests in all": len(sizes),

@@ -262,7 +262,7 @@ def _keys(layout: Layout, number: int, way: str) -> list[str]:
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Measure the cost of messages, and compute large fleets from it."""
-    seconds = 2.0 if quick else 8.0
+    seconds = 2.0 if quick else 3.0
     small = [
         Contender(f"{count} sessions receive", passed_on(count, TICK_BYTES, seconds))
         for count in READERS

@@ -213,7 +213,7 @@ def in_json(scene: Callable[[], Scene], seconds: float) -> Callable[[], Figures]
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare one display and viewer with several, and with rosbridge in JSON."""
-    seconds = 2.0 if quick else 10.0
+    seconds = 2.0 if quick else 5.0
     scene = watched_scene()
     thinned: list[object] = []
     for topic in scene.scans:

@@ -44,7 +44,7 @@ def watched_by(viewers: int, seconds: float) -> Callable[[], Figures]:
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare one viewer with twenty."""
-    seconds = 2.0 if quick else 10.0
+    seconds = 2.0 if quick else 5.0
     contenders = [
         Contender(f"{viewers} viewers", watched_by(viewers, seconds))
         for viewers in (1, 20)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from benchmarks import bridge
+from benchmarks import bridge, harness
 from benchmarks.harness import Comparison, Contender, compare
 
 
@@ -37,6 +37,15 @@ def test_the_median_is_taken_over_all_rounds() -> None:
 
 def test_the_table_shows_medians_and_ratios() -> None:
     assert "| cpu (us) | 2 | 6 (3.00 x, 3.00 to 3.00) |" in compared()[0].table()
+
+
+def test_no_round_begins_that_would_end_too_late(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(harness, "MOST_SECONDS", 0.0)
+    calls: list[str] = []
+    compare("a title", [contender("a", calls, [1.0] * 9)], rounds=9)
+    assert calls == ["a"]
 
 
 def test_zero_rounds_are_refused() -> None:

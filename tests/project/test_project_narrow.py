@@ -2,7 +2,7 @@
 
 import xml.etree.ElementTree as ET
 
-from benchmarks.narrow import percentile
+from benchmarks.harness import percentile
 from benchmarks.plot import Curve, Plot
 
 
