@@ -11,6 +11,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from server_fakes import FakeGate, FakeModel, FakePage, FakeSite
 
+from webmap.base.errors import ConfigError
 from webmap.server import application, opening
 from webmap.server.app import WebApp
 
@@ -111,3 +112,28 @@ class FakeRuntime:
 
     def stop(self):
         pass
+
+
+def test_run_limits_the_pages_to_the_number_that_it_is_given(monkeypatch):
+    found = []
+
+    def make(settings, **_):
+        found.append(settings.max_pages)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(application, "_make_app", make)
+    monkeypatch.setattr(application, "has_run", False)
+    for options in ({}, {"max_pages": 500}):
+        with contextlib.suppress(KeyboardInterrupt):
+            application.run(port=0, **options)
+    assert found == [100, 500]
+
+
+def test_an_application_limits_the_pages_to_the_number_that_it_is_given():
+    assert application.asgi_app(max_pages=3).settings.max_pages == 3
+
+
+@pytest.mark.parametrize("start", [application.run, application.asgi_app])
+def test_no_pages_at_all_are_refused(start):
+    with pytest.raises(ConfigError, match="max_pages must be at least 1, got 0"):
+        start(max_pages=0)

@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import ExitStack, asynccontextmanager
 from typing import TYPE_CHECKING, Any
 
-from webmap.base.errors import WebMapError
+from webmap.base.errors import ConfigError, WebMapError
 from webmap.core.page import site
 from webmap.core.runtime import runtime
 
@@ -59,6 +59,7 @@ def asgi_app(
     authenticate: "Authenticate | None" = None,
     hosts: Iterable[str] = (),
     origins: Iterable[str] = (),
+    max_pages: int = 100,
 ) -> "WebApp":
     """Return the web interface as an ASGI application.
 
@@ -74,9 +75,11 @@ def asgi_app(
         hosts: Accepted names of the server in addition to those of loopback.
         origins: Origins that may open sockets in addition to the server's own, such as
             ``"https://robots.example.org"`` if a proxy ends TLS.
+        max_pages: The greatest number of open pages, at least 1.
 
     Raises:
-        ConfigError: If the token is too short, or a host or an origin is not valid.
+        ConfigError: If the token is too short, or a host, an origin or a number is not
+            valid.
 
     """
     from webmap.server.access import Settings
@@ -86,6 +89,7 @@ def asgi_app(
         "authenticate": authenticate,
         "hosts": Hosts.of_binding("127.0.0.1", hosts),
         "origins": frozenset(map(checked_origin, origins)),
+        "max_pages": _checked_pages(max_pages),
     }
     if token is not None:
         settings["token"] = token
@@ -99,6 +103,7 @@ def run(
     open_browser: bool = False,
     token: str | None = None,
     insecure_lan: bool = False,
+    max_pages: int = 100,
 ) -> None:
     """Start WebMap and serve its pages until Ctrl+C.
 
@@ -112,9 +117,10 @@ def run(
             opened browser gets a one-time code instead.
         insecure_lan: Whether other machines may be served without TLS, so that
             everybody on the network in between can read the token.
+        max_pages: The greatest number of open pages, at least 1.
 
     Raises:
-        ConfigError: If it cannot listen there.
+        ConfigError: If it cannot listen there, or the number is not valid.
 
     """
     global has_run
@@ -122,11 +128,23 @@ def run(
     options: dict[str, Any] = {"host": host, "port": port}
     options |= {"open_browser": open_browser, "insecure_lan": insecure_lan}
     options |= command_line
-    _serve(token=token, **options)
+    _serve(token=token, max_pages=_checked_pages(max_pages), **options)
+
+
+def _checked_pages(number: int) -> int:
+    if number < 1:
+        raise ConfigError(f"max_pages must be at least 1, got {number}")
+    return number
 
 
 def _serve(
-    *, host: str, port: int, open_browser: bool, insecure_lan: bool, token: str | None
+    *,
+    host: str,
+    port: int,
+    open_browser: bool,
+    insecure_lan: bool,
+    token: str | None,
+    max_pages: int,
 ) -> None:
     from webmap.server.access import Settings
     from webmap.server.opening import opened
@@ -135,7 +153,10 @@ def _serve(
 
     # Check everything that can be refused before anything starts.
     check_exposure(host, insecure_lan=insecure_lan)
-    settings: dict[str, Any] = {"hosts": Hosts.of_binding(host)}
+    settings: dict[str, Any] = {
+        "hosts": Hosts.of_binding(host),
+        "max_pages": max_pages,
+    }
     if token is not None:
         settings["token"] = token
     app = _make_app(Settings(**settings), with_lifespan=False)
