@@ -31,6 +31,7 @@ ROWS = [
     Row("wire", 30, quick=True),
     Row("grids", 40),
     Row("drawing", 45, quick=True),
+    Row("latency", 40),
     Row("console", 60),
     Row("opening", 35),
     Row("agents", 50),

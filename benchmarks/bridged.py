@@ -1,7 +1,8 @@
 """A program for ``webmap run``: the robots of a rosbridge of ``stamped``, on a map.
 
 ``BRIDGED_URL`` is the address of the rosbridge, ``BRIDGED_ROBOTS`` the number of its
-robots. They have scans if ``BRIDGED_SCANS`` is set.
+robots. They have scans if ``BRIDGED_SCANS`` is set. ``BRIDGED_VIEWERS`` is the greatest
+number of pages.
 """
 
 import os
@@ -29,6 +30,7 @@ def main(page: webmap.Page) -> None:
     map.fit(-3.0, -50.0, 103.0, 50.0)
     for robot in fleet:
         map.add_robot(robot)
+    map.set_selected(fleet[0])
 
 
-webmap.run()
+webmap.run(max_pages=int(os.environ.get("BRIDGED_VIEWERS", "100")))

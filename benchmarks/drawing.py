@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 from benchmarks.display import display
 from benchmarks.harness import Comparison, Contender, Figures, compare
@@ -43,6 +43,9 @@ OUT_OF_SIGHT = """
 }).length
 """
 
+WEBGL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""Arguments of Chromium."""
+
 FIGURES = {
     "main thread a frame (ms)": "TaskDuration",
     "script a frame (ms)": "ScriptDuration",
@@ -52,15 +55,22 @@ FIGURES = {
 
 
 @contextmanager
-def browser_page() -> Iterator[Page]:
-    """Open a page in a separate Chromium."""
+def browser_page(*, bypass_csp: bool = False, webgl: bool = False) -> Iterator[Page]:
+    """Open a page in a separate Chromium.
+
+    Args:
+        bypass_csp: Whether the page may connect to what its server does not allow.
+        webgl: Whether the page may draw with WebGL, which the processor computes.
+
+    """
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
             executable_path=shutil.which("chromium"),
-            args=["--no-sandbox", "--disable-gpu"],
+            args=["--no-sandbox", *(WEBGL if webgl else ("--disable-gpu",))],
         )
         try:
-            yield browser.new_page(viewport={"width": 1200, "height": 900})
+            size: ViewportSize = {"width": 1200, "height": 900}
+            yield browser.new_page(viewport=size, bypass_csp=bypass_csp)
         finally:
             browser.close()
 

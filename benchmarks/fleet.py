@@ -1,9 +1,9 @@
 """A program for ``webmap run``: robots that move and scan, without ROS.
 
 Their data is computed in advance, so that only the scene, the wire and the sockets are
-measured. ``FLEET_ROBOTS`` and ``FLEET_BEAMS`` are the numbers of robots and beams;
-without beams there are no scans. The page is a plain map, or the console if
-``FLEET_CONSOLE`` is set.
+measured. ``FLEET_ROBOTS`` and ``FLEET_BEAMS`` are the numbers of robots and beams, and
+``FLEET_TICK`` is the time between two poses; without beams there are no scans. The page
+is a plain map, or the console if ``FLEET_CONSOLE`` is set.
 """
 
 import math
@@ -23,7 +23,7 @@ BEAMS = int(os.environ.get("FLEET_BEAMS", "360"))
 
 CONSOLE = bool(os.environ.get("FLEET_CONSOLE"))
 
-TICK = 0.05
+TICK = float(os.environ.get("FLEET_TICK", "0.05"))
 """Seconds between two poses of a robot; scans come half as often."""
 
 STEPS = 40

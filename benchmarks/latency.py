@@ -1,0 +1,211 @@
+"""From a robot's socket to the attribute in the browser, and from a key to the robot.
+
+Robot, rosbridge and clock are in this process. The page reports over a socket of its
+own that it set a transform, or got a key. The report counts when it arrives here, so it
+adds the time of one hop to a pose, and leaves out one hop of a key. The reference is a
+bare relay with the same hops: browser, WebSocket, server in Python, WebSocket and
+rosbridge.
+"""
+
+import random
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+
+from playwright.sync_api import Page
+from websockets.asyncio.server import ServerConnection, serve
+
+from benchmarks.display import BRIDGED, running
+from benchmarks.drawing import browser_page
+from benchmarks.frames import odometry
+from benchmarks.harness import Comparison, Contender, Figures, compare, percentile
+from benchmarks.stamped import Y, topics
+from webmap.base.loop_thread import LoopThread
+from webmap.testing import WitnessRobot
+
+POSES = 100
+KEYS = 25
+
+TICK = 0.05
+"""Seconds between two frames of the display."""
+
+FIRST = 20.0
+"""x of the first pose, in metres; each is a centimetre farther."""
+
+PATIENCE = 30.0
+"""Seconds until the page must be ready."""
+
+REPORT = """(() => {
+  const marks = new WebSocket("ws://127.0.0.1:PORT");
+  const mark = (text) => marks.readyState === 1 && marks.send(text);
+  const { setMatrix } = SVGTransform.prototype;
+  SVGTransform.prototype.setMatrix = function (matrix) {
+    setMatrix.call(this, matrix);
+    mark(`x ${matrix.e}`);
+  };
+  addEventListener("keydown", ({ repeat }) => repeat || mark("key"), { capture: true });
+})();"""
+
+
+class Robot(WitnessRobot):
+    """The robot, with the topics that the pages know."""
+
+    ODOMETRY_TOPIC, TWIST_TOPIC, _ = topics(0)
+
+
+class Marks:
+    """What the page reports, with the time of arrival."""
+
+    def __init__(self) -> None:
+        self.found: list[tuple[float, str]] = []
+        self._thread = LoopThread("marks")
+        self.port = self._thread.call(self._listen())
+
+    async def _listen(self) -> int:
+        server = await serve(self._take, "127.0.0.1", 0, compression=None)
+        port: int = next(iter(server.sockets)).getsockname()[1]
+        return port
+
+    async def _take(self, link: ServerConnection) -> None:
+        async for text in link:
+            self.found.append((time.monotonic(), str(text)))
+
+    def end(self) -> None:
+        """Stop listening."""
+        self._thread.end()
+
+
+def pose(x: float) -> dict[str, object]:
+    """Return odometry at a place."""
+    message = odometry(0)
+    message["pose"]["pose"]["position"] = {"x": x, "y": Y, "z": 0.0}
+    return message
+
+
+def poses(page: Page, robot: WitnessRobot, marks: Marks) -> list[float]:
+    """Return the times from a robot's socket to the attribute, in ms."""
+    del page
+    robot.sends_telemetry = False
+    time.sleep(0.5)
+    marks.found.clear()
+    sent = {}
+    for number in range(POSES):
+        time.sleep(TICK + random.uniform(0.01, 0.06))
+        sent[number] = time.monotonic()
+        robot.publish(robot.ODOMETRY_TOPIC, pose(FIRST + number / 100))
+    time.sleep(0.5)
+    seen: dict[int, float] = {}
+    for at, text in marks.found:
+        if text.startswith("x "):
+            seen.setdefault(round((float(text[2:]) - FIRST) * 100), at)
+    return [1000 * (seen[n] - at) for n, at in sent.items() if n in seen]
+
+
+def keys(page: Page, robot: WitnessRobot, marks: Marks) -> list[float]:
+    """Return the times from a key to the velocity at the robot's socket, in ms."""
+    found = []
+    deadline = time.monotonic() + PATIENCE
+    while not _pressed(page, robot, marks, 2.0):  # the first ones take the robot
+        if time.monotonic() > deadline:
+            raise RuntimeError("the key does not drive the robot")
+    for _ in range(KEYS):
+        delay = _pressed(page, robot, marks, 1.0)
+        if delay is not None:
+            found.append(delay)
+    return found
+
+
+def _pressed(
+    page: Page, robot: WitnessRobot, marks: Marks, patience: float
+) -> float | None:
+    """Press the key until the robot gets a velocity; return the time in ms."""
+    page.wait_for_timeout(350 + random.uniform(0, 100))
+    marks.found.clear()
+    begun = time.monotonic()
+    page.keyboard.down("w")
+    while not (moving := robot.log.moving_since(begun)):
+        if time.monotonic() > begun + patience:
+            break
+        page.wait_for_timeout(5)
+    page.keyboard.up("w")
+    pressed = [at for at, text in marks.found if text == "key"]
+    return 1000 * (moving[0].at - pressed[0]) if moving and pressed else None
+
+
+Measure = Callable[[Page, WitnessRobot, Marks], list[float]]
+
+
+@contextmanager
+def relayed(robot: WitnessRobot, period: float) -> Iterator[str]:
+    """Run the relay; yield the address of its page."""
+    command = [sys.executable, "-m", "benchmarks.relay", robot.url, str(period)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as relay:
+        try:
+            assert relay.stdout is not None
+            yield relay.stdout.readline().strip()
+        finally:
+            relay.terminate()
+
+
+def bare(measure: Measure, period: float = 0.0) -> Callable[[], Figures]:
+    """Return a run of the bare relay."""
+
+    def run() -> Figures:
+        with Robot() as robot, relayed(robot, period) as url:
+            return measured(url, robot, measure)
+
+    return run
+
+
+def webmap(measure: Measure) -> Callable[[], Figures]:
+    """Return a run of a display and its gate."""
+
+    def run() -> Figures:
+        with (
+            Robot() as robot,
+            running(BRIDGED, BRIDGED_URL=robot.url, BRIDGED_ROBOTS="1") as shown,
+        ):
+            return measured(shown.url, robot, measure)
+
+    return run
+
+
+def measured(url: str, robot: WitnessRobot, measure: Measure) -> Figures:
+    """Open a page in Chromium and return the figures."""
+    with ExitStack() as opened:
+        marks = Marks()
+        opened.callback(marks.end)
+        page = opened.enter_context(browser_page(bypass_csp=True))
+        page.add_init_script(REPORT.replace("PORT", str(marks.port)))
+        page.goto(url)
+        page.locator(".robot.selected:not(.unplaced)").wait_for(state="attached")
+        found = measure(page, robot, marks)
+    if len(found) < 10:
+        raise RuntimeError(f"only {len(found)} were measured")
+    return {
+        "time, 50 % (ms)": statistics.median(found),
+        "time, 99 % (ms)": percentile(found, 99),
+        "measured": len(found),
+    }
+
+
+def bench(rounds: int, quick: bool = False) -> list[Comparison]:
+    """Compare both ways with a bare relay."""
+    name = f"bare relay, a pose every {1000 * TICK:.0f} ms"
+    shown = [
+        Contender("bare relay", bare(poses)),
+        Contender(name, bare(poses, TICK)),
+        Contender("WebMap", webmap(poses)),
+    ]
+    driven = [
+        Contender("bare relay", bare(keys)),
+        Contender("WebMap", webmap(keys)),
+    ]
+    del quick  # fewer would have no percentiles
+    return [
+        compare("from a robot's socket to the attribute in Chromium", shown, rounds),
+        compare("from a key in Chromium to the robot's socket", driven, rounds),
+    ]
