@@ -147,6 +147,14 @@ docs: $(DEV)
 bench: $(DEV) $(NODE)
 	$(PY) -m benchmarks $(ARGS)
 
+## bench-peers: install NiceGUI, viser and ros2d, which the benchmark "peers" shows beside WebMap
+.PHONY: bench-peers
+bench-peers: system
+	tools/make_venv.sh .venv-peers
+	.venv-peers/bin/python -m pip install --quiet --upgrade "pip>=25.1"
+	.venv-peers/bin/python -m pip install --quiet --group peers
+	npm install --no-save --no-audit --no-fund --loglevel=error --prefix .venv-peers ros2d@0.10.0 easeljs@1.0.2
+
 ## bench-quick: a rough look at the cheap benchmarks, in 2 minutes
 .PHONY: bench-quick
 bench-quick: $(DEV) $(NODE)
@@ -172,7 +180,7 @@ format: $(DEV)
 ## clean: remove what was built here, environments too
 .PHONY: clean
 clean:
-	rm -rf .venv node_modules docs/_build build dist \
+	rm -rf .venv .venv-peers node_modules docs/_build build dist \
 	  .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 
 $(MADE): tools/make_venv.sh

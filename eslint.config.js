@@ -54,7 +54,7 @@ const care = {
 };
 
 export default [
-  { ignores: ["**/_build/", ".venv/", "node_modules/", "dist/", "build/", "test-results/"] },
+  { ignores: ["**/_build/", ".venv/", ".venv-peers/", "node_modules/", "dist/", "build/", "test-results/"] },
   js.configs.recommended,
   { rules: { ...care, ...noCodeFromText } },
   {

@@ -32,6 +32,7 @@ ROWS = [
     Row("grids", 40),
     Row("drawing", 45, quick=True),
     Row("latency", 40),
+    Row("peers", 25),
     Row("console", 60),
     Row("opening", 35),
     Row("agents", 50),

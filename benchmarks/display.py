@@ -49,22 +49,38 @@ def display(robots: int, beams: int, *, console: bool = False) -> Iterator[Displ
 
 
 @contextmanager
-def bridged(robots: int, beams: int = 0) -> Iterator[Display]:
-    """Start a rosbridge with robots of ``stamped``, and a display that shows them."""
+def stamped(robots: int, beams: int = 0) -> Iterator[str]:
+    """Start a rosbridge with robots of ``stamped``; yield its address."""
     command = [sys.executable, "-m", "benchmarks.stamped", str(robots), str(beams)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as bridge:
         try:
             assert bridge.stdout is not None
-            url = bridge.stdout.readline().strip()
-            with running(
-                BRIDGED,
-                BRIDGED_URL=url,
-                BRIDGED_ROBOTS=str(robots),
-                BRIDGED_SCANS="1" if beams else "",
-            ) as shown:
-                yield shown
+            yield bridge.stdout.readline().strip()
         finally:
             bridge.terminate()
+
+
+@contextmanager
+def bridged(robots: int, beams: int = 0, viewers: int = 100) -> Iterator[Display]:
+    """Start a rosbridge with robots of ``stamped``, and a display that shows them.
+
+    Args:
+        robots: How many.
+        beams: Beams of each scan; 0 for robots without scans.
+        viewers: How many pages may be open.
+
+    """
+    with (
+        stamped(robots, beams) as url,
+        running(
+            BRIDGED,
+            BRIDGED_URL=url,
+            BRIDGED_ROBOTS=str(robots),
+            BRIDGED_SCANS="1" if beams else "",
+            BRIDGED_VIEWERS=str(viewers),
+        ) as shown,
+    ):
+        yield shown
 
 
 @contextmanager

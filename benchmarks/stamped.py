@@ -96,7 +96,7 @@ class Scans:
     def __init__(self, robot: int, beams: int) -> None:
         self._topic = topics(robot)[2]
         self._count = 0
-        self._messages = [scan(number, beams) for number in range(4)]
+        self._messages = [scan(number, beams) for number in range(4 if beams else 0)]
         for message in self._messages:
             ranges = [math.nan if r is None else r for r in message["ranges"]]
             message["ranges"] = cbor2.CBORTag(85, np.array(ranges, "<f4").tobytes())
