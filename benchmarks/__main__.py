@@ -33,6 +33,7 @@ ROWS = [
     Row("drawing", 45, quick=True),
     Row("latency", 40),
     Row("peers", 25),
+    Row("limits", 45),
     Row("console", 60),
     Row("opening", 35),
     Row("agents", 50),

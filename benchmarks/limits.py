@@ -1,0 +1,258 @@
+"""How many robots, and how many viewers, until what is shown is too old.
+
+Robots send odometry at 10 Hz; more and more of them, until the oldest percent of the
+poses is older than 150 ms: at a viewer of the display, and at the gate, where each but
+one was stopped and is watched, and where one is driven. Then more and more viewers of
+100 robots, with the setting for it, and with five that read nothing.
+"""
+
+import itertools
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+
+import psutil
+
+from benchmarks.agents import Hand
+from benchmarks.display import Display, bridged, stamped
+from benchmarks.harness import Comparison, Figures, percentile
+from benchmarks.processes import used
+from benchmarks.stamped import SPEEDS, topics
+from webmap.agents.gates import Gates
+from webmap.gate.protocol import Report, RobotReport, RobotSpec
+
+ROBOTS = (100, 200, 500, 1000, 2000, 4000)
+VIEWERS = (100, 200, 500)
+SHOWN = 100
+"""Robots that the viewers see."""
+
+STALLED = 5
+
+TOO_OLD = 150.0
+"""Milliseconds."""
+
+AGE_50, AGE_99 = "pose age, 50 % (ms)", "pose age, 99 % (ms)"
+ARRIVED = "poses that arrive (%)"
+CPU = "processor (% of a core)"
+FRAME_50, FRAME_99 = "frame age, 50 % (ms)", "frame age, 99 % (ms)"
+
+
+def busy(process: psutil.Process, seconds: float) -> float:
+    """Return the share of a core that a process uses in a time, in percent."""
+    before, begun = sum(process.cpu_times()[:2]), time.monotonic()
+    time.sleep(seconds)
+    spent = sum(process.cpu_times()[:2]) - before
+    return float(100 * spent / (time.monotonic() - begun))
+
+
+def seen(
+    shown: Display, viewers: int, seconds: float, stalled: int = 0
+) -> dict[str, float]:
+    """Return what viewers of a display receive, and its processor time."""
+    command = [sys.executable, "-m", "benchmarks.watchers", shown.url, str(viewers)]
+    with subprocess.Popen(
+        [*command, str(seconds), "1", str(stalled)], stdout=subprocess.PIPE, text=True
+    ) as watching:
+        assert watching.stdout is not None
+        if watching.stdout.readline().strip() != "ready":
+            raise RuntimeError("the viewers saw no frame")
+        cpu = busy(shown.process, 0.8 * seconds)
+        found: dict[str, float] = json.loads(watching.stdout.readline())
+    return found | {CPU: cpu}
+
+
+def display_with(robots: int, seconds: float) -> Figures:
+    """Return what one viewer sees of a number of robots."""
+    with bridged(robots) as shown:
+        found = seen(shown, 1, seconds)
+    return {
+        AGE_50: found["pose age, 50"],
+        AGE_99: found["pose age, 99"],
+        ARRIVED: 10 * found["poses"] / robots,
+        CPU: found[CPU],
+    }
+
+
+def viewed_by(viewers: int, seconds: float, stalled: int = 0) -> Figures:
+    """Return what many viewers see of some robots."""
+    with bridged(SHOWN, viewers=viewers + stalled) as shown:
+        found = seen(shown, viewers, seconds, stalled)
+    return {
+        FRAME_50: found["frame age, 50"],
+        FRAME_99: found["frame age, 99"],
+        "frames of the slowest viewer (a second)": found["least frames"],
+        "bytes to all viewers (MB a second)": found["bytes"] * viewers / 1e6,
+        CPU: found[CPU],
+    }
+
+
+class Watch:
+    """The ages of the odometry that the gate reports.
+
+    A report has the newest odometry, so that between two messages it becomes up to a
+    period older; only the first report of each message counts.
+    """
+
+    def __init__(self) -> None:
+        self.ages: list[float] = []
+        self.up: set[str] = set()
+        self.stopped: set[str] = set()
+        self._last: dict[str, float] = {}
+
+    def note(self, report: Report) -> None:
+        """Note a report."""
+        if not isinstance(report, RobotReport):
+            return
+        now = time.monotonic()
+        if report.link == "up":
+            self.up.add(report.robot)
+        if report.latched:
+            self.stopped.add(report.robot)
+        if report.measured is None:
+            return
+        sent = report.measured[0]
+        if self._last.get(report.robot) != sent:
+            self._last[report.robot] = sent
+            self.ages.append(1000 * ((now - sent) % SPEEDS))
+
+
+def _until(check: Callable[[], bool], what: str) -> None:
+    deadline = time.monotonic() + 60
+    while not check():
+        if time.monotonic() > deadline:
+            raise RuntimeError(f"never came: {what}")
+        time.sleep(0.05)
+
+
+def gate_with(robots: int, seconds: float) -> Figures:
+    """Return what the gate knows of robots that were stopped, and how it answers.
+
+    Each robot but the first was stopped, so the gate watches its odometry and keeps
+    sending zero to it. An operator holds the first one.
+    """
+    with ExitStack() as running:
+        os.environ["WEBMAP_STATE_DIR"] = running.enter_context(
+            tempfile.TemporaryDirectory()
+        )
+        url = running.enter_context(stamped(robots))
+        watch, gates = Watch(), Gates()
+        gates.on_report(watch.note)
+        gates.start()
+        running.callback(gates.stop)
+        for number in range(robots):
+            odometry, velocity, _ = topics(number)
+            gates.declare(
+                RobotSpec(
+                    id=f"r{number}",
+                    name=f"robot {number}",
+                    bridge_url=url,
+                    twist_topic=velocity,
+                    odometry_topic=odometry,
+                    odometry_type="nav_msgs/Odometry",
+                )
+            )
+        _until(lambda: len(watch.up) == robots, "the connections")
+        hand = Hand(gates, "r0")
+        stopping = gates.connect("Bob", "viewer", lambda _text: None, print)
+        for number in range(1, robots):
+            stopping.receive(json.dumps({"op": "stop", "robot": f"r{number}"}))
+        _until(lambda: len(watch.stopped) == robots - 1, "the stops")
+        hand.take()
+        gate = next(
+            process
+            for process in psutil.Process().children()
+            if "webmap.gate" in process.cmdline()
+        )
+        ended = threading.Event()
+        driving = threading.Thread(target=_drive, args=(hand, ended))
+        driving.start()
+        time.sleep(2.0)
+        watch.ages.clear()
+        hand.forget()
+        before, begun = used(gate), time.monotonic()
+        time.sleep(seconds)
+        cpu = 100 * (used(gate) - before) / (time.monotonic() - begun)
+        ages, trips = list(watch.ages), list(hand.trips)
+        ended.set()
+        driving.join()
+    return {
+        AGE_50: percentile(ages, 50),
+        AGE_99: percentile(ages, 99),
+        "from a command to its tick, 99 % (ms)": percentile(trips, 99),
+        CPU: cpu,
+    }
+
+
+def _drive(hand: Hand, ended: threading.Event) -> None:
+    while not ended.wait(0.05):
+        if hand.holds:
+            hand.drive(0.0)
+        else:
+            hand.take()
+
+
+def ramp(
+    title: str,
+    measure: Callable[[int, float], Figures],
+    counts: Iterable[int],
+    seconds: float,
+) -> Comparison:
+    """Measure more and more robots until their poses are too old, or none come."""
+    found: dict[str, list[Figures]] = {}
+    for count in counts:
+        print(f"{title}: {count} robots", file=sys.stderr)
+        try:
+            figures = measure(count, seconds)
+        except (RuntimeError, TimeoutError) as error:
+            print(f"{title}: {count} robots: {error}", file=sys.stderr)
+            if not found:
+                raise
+            names = next(iter(found.values()))[0]
+            figures = dict.fromkeys(names, math.nan)
+        found[f"{count} robots"] = [figures]
+        if not figures[AGE_99] <= TOO_OLD:
+            break
+    return Comparison(title, found)
+
+
+def end_of(comparison: Comparison) -> str:
+    """Return in words where the poses become older than allowed."""
+    ages = [
+        (int(name.split()[0]), comparison.median(name, AGE_99))
+        for name in comparison.runs
+    ]
+    well = max((count for count, age in ages if age <= TOO_OLD), default=0)
+    late = min((count for count, age in ages if not age <= TOO_OLD), default=math.inf)
+    end = f"between {well} and {late} robots" if late < math.inf else f"above {well}"
+    return f"{comparison.title}: poses are older than {TOO_OLD:.0f} ms {end}"
+
+
+def bench(rounds: int, quick: bool = False) -> list[Comparison]:
+    """Find the limits; one round, because each step is long enough."""
+    del rounds
+    seconds = 2.0 if quick else 4.0
+    robots = ROBOTS[:2] if quick else ROBOTS
+    viewers = VIEWERS[:1] if quick else VIEWERS
+    ramps = [
+        ramp(
+            "robots that a display shows to one viewer", display_with, robots, seconds
+        ),
+        ramp("robots that a gate watches", gate_with, robots, seconds),
+    ]
+    for each in ramps:
+        print(end_of(each), end="\n\n")
+    many = Comparison(f"viewers of {SHOWN} robots", {})
+    for count, stalled in itertools.chain(
+        zip(viewers, itertools.repeat(0)), [(viewers[0], STALLED)]
+    ):
+        print(f"{count} viewers, {stalled} stalled", file=sys.stderr)
+        name = f"{count} viewers" + (f" and {stalled} that stall" if stalled else "")
+        many.runs[name] = [viewed_by(count, seconds, stalled)]
+    return [*ramps, many]
