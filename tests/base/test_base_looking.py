@@ -1,8 +1,16 @@
 """Whether somebody looks: open pages, and a time of grace after the last one."""
 
-import asyncio
-
 from webmap.base.looking import GRACE, Looking
+
+
+class Timer:
+    """A timer that has not fired."""
+
+    def __init__(self):
+        self.is_cancelled = False
+
+    def cancel(self):
+        self.is_cancelled = True
 
 
 class Clock:
@@ -12,18 +20,16 @@ class Clock:
         self.timers = []
 
     def call_later(self, after, fn, *args):
-        handle = asyncio.TimerHandle(0, fn, args, asyncio.new_event_loop())
-        self.timers.append((after, fn, args, handle))
-        return handle
+        self.timers.append((after, fn, args, Timer()))
+        return self.timers[-1][-1]
 
     def pass_on(self):
         """Let the time of all timers pass."""
         timers, self.timers = self.timers, []
-        for after, fn, args, handle in timers:
+        for after, fn, args, timer in timers:
             assert after == GRACE
-            if not handle.cancelled():
+            if not timer.is_cancelled:
                 fn(*args)
-            handle._loop.close()
 
 
 class Follower:

@@ -268,8 +268,9 @@ async def test_a_flooded_lane_reconnects_after_growing_waits(monkeypatch, caplog
         with noting_lane(url, happened):
             await until(lambda: len(opened) == 6, "six attempts")
     waited = [b - a for a, b in itertools.pairwise(opened)]
-    # The first wait has 0.02 s at most, and the fifth 0.16 s at least.
-    assert waited[4] > 0.1
+    # The first wait has 0.02 s at most, and the fifth 0.16 s at least. A busy machine
+    # may notice the opening before it late.
+    assert waited[4] > 0.05
     assert caplog.text.count("a message in more than 4096 frames") >= 1
 
 

@@ -152,7 +152,7 @@ def test_the_rest_after_a_step_is_as_long_as_the_step_but_at_most_the_longest(lo
         return rested[0]
 
     delays = []
-    loop_type = type(asyncio.new_event_loop())
+    loop_type = asyncio.SelectorEventLoop
     call_later = loop_type.call_later
 
     def noted(loop, delay, callback, *args, **options):
