@@ -268,3 +268,64 @@ def test_few_poses_come_also_before_the_type_is_known():
         robot.destroy()
 
     asyncio.run(scenario())
+
+
+def test_a_trail_is_drawn_for_who_looks(monkeypatch):
+    async def script(stage):
+        robot = stage.robot
+        robot.remove_modules()
+        trail = robot.add_module("Trail", length=4.0)
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        looking._set(False)
+        for number in range(80):
+            stage.publish("/odom", odometry(0.1 * number, stamp=100.0 + 2 * number))
+            await stage.wait(2.0)
+        drawn = [line.get("points") for line in trail.svg.children]
+        assert drawn == [None] * len(trail.points)
+        looking._set(True)
+        texts = [line.get("points").split() for line in trail.svg.children]
+        assert [len(text) for text in texts] == [len(each) for each in trail.points]
+        robot.remove_module(trail)
+        looking._set(False)
+        looking._set(True)
+
+    play(script, monkeypatch)
+
+
+def test_a_trail_that_was_cleared_while_nobody_looks_stays_so(monkeypatch):
+    async def script(stage):
+        robot = stage.robot
+        robot.remove_modules()
+        trail = robot.add_module("Trail")
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        looking._set(False)
+        for number in range(3):
+            stage.publish("/odom", odometry(0.1 * number, stamp=100.0 + 2 * number))
+        trail.clear()
+        looking._set(True)
+        assert not trail.svg.children
+
+    play(script, monkeypatch)
+
+
+def test_who_begins_to_look_gets_the_state_of_now(monkeypatch):
+    async def script(stage):
+        robot = stage.robot
+        robot.remove_modules()
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        looking._set(False)
+        stage.publish("/odom", odometry(0.0, stamp=100.0))
+        await stage.wait(5.1)
+        assert robot.state.name == "lost"
+        assert robot.svg.get("data-state") == "watched"  # nobody needs it yet
+        looking._set(True)
+        assert robot.svg.get("data-state") == "lost"
+        looking._set(False)
+        stage.publish("/odom", odometry(0.0, stamp=106.0))
+        await stage.wait(2.1)
+        assert robot.svg.get("data-state") == "watched"
+
+    play(script, monkeypatch)

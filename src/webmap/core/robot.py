@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Quaternion, Twist, Vector3
+from webmap.base.looking import looking
 from webmap.base.scope import Removal, keep
 from webmap.config.reading import read_part
 from webmap.config.robot import OdometryConfig, RobotConfig, TfConfig
@@ -39,8 +40,8 @@ log = logging.getLogger("webmap.robot")
 POSE_LIMIT = 1.0
 """Seconds after which a pose is drawn as stale."""
 
-STATE_EVERY = 0.5
-"""Seconds between two checks of the state."""
+STATE_EVERY, STATE_UNWATCHED = 0.5, 2.0
+"""Seconds between two checks of the state, and the same while nobody looks."""
 
 robots: "weakref.WeakValueDictionary[str, Robot]" = weakref.WeakValueDictionary()
 """All robots that were created and not destroyed, by their id."""
@@ -99,6 +100,7 @@ class Robot(Listed):
         self.fragment = Fragment(self.svg)
         self.model_images = ModelImages(self.svg)
         robots[self.id] = self
+        looking.follow(self)
         keep(Removal(self.destroy))
 
     def _show_base(self, *, holonomic: bool) -> None:
@@ -168,6 +170,7 @@ class Robot(Listed):
         if self._destroyed:
             return
         self._destroyed = True
+        looking.forget(self)
         if self._state_timer is not None:
             self._state_timer.cancel()
         for map in tuple(self.maps):
@@ -410,12 +413,19 @@ class Robot(Listed):
         """
         self.pose_source.pipeline.jumps.expect(time.monotonic())
 
+    def looking_changed(self) -> None:
+        """Show the state of now to who begins to look."""
+        if looking.somebody and self._state_timer is not None:
+            self._state_timer.cancel()
+            self._watch_state()
+
     def _watch_state(self) -> None:
         """Update the shown state periodically: a lost robot sends no message."""
         self._show_state()
         with suppress(RuntimeError):  # outside of an event loop
             loop = asyncio.get_running_loop()
-            self._state_timer = loop.call_later(STATE_EVERY, self._watch_state)
+            every = STATE_EVERY if looking.somebody else STATE_UNWATCHED
+            self._state_timer = loop.call_later(every, self._watch_state)
 
     def _show_state(self) -> None:
         self.pose_source.keep_on(self._needs_poses())

@@ -210,7 +210,9 @@ def _state(name: str, facts: Facts) -> RobotState:
     report = facts.report
     holder = report.holder if report is not None else None
     who = holder.name or holder.connection if holder is not None else "Another operator"
-    text = STATE_TEXTS[name].format(who=who, since=since_when(facts.silent_for))
+    text = STATE_TEXTS[name]
+    since = since_when(facts.silent_for) if "{since}" in text else ""
+    text = text.format(who=who, since=since)
     mine = STATE_TEXTS.get(f"{name}_by_you", text)
     if (
         report is not None

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from webmap.base.lifecycle import lifecycle
+from webmap.base.looking import looking
 from webmap.features.alerts.alerts import KINDS, Alerts
 from webmap.poses.silence import PERIODS
 
@@ -15,8 +16,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("webmap.modules.alerts")
 
-PERIOD = 0.5
-"""Seconds between two looks at all robots."""
+PERIOD, UNWATCHED = 0.5, 2.0
+"""Seconds between two looks at all robots, and the same while no page is open."""
 
 LOST = 3.0
 """Seconds without a pose or a connection after which a robot is lost."""
@@ -71,7 +72,7 @@ def _reported(robot: "Robot") -> dict[str, str]:
 
 
 class AlertWatch:
-    """Looks at all robots twice a second, also while no page is open.
+    """Looks at all robots twice a second, and every two seconds without a page.
 
     Args:
         alerts: The list to fill.
@@ -133,4 +134,4 @@ class AlertWatch:
                 self.look(time.time())
             except Exception:
                 log.exception("the alerts were not updated")
-            await asyncio.sleep(PERIOD)
+            await asyncio.sleep(PERIOD if looking.somebody else UNWATCHED)

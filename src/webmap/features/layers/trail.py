@@ -5,6 +5,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from webmap.base.errors import ConfigError
+from webmap.base.looking import looking
 from webmap.core.registry import robot_modules
 from webmap.modules.drawing import rounded
 from webmap.modules.placed import Placed
@@ -60,6 +61,9 @@ class Trail:
         self._last: tuple[float, float] | None = None
         self._placed = Placed(robot, class_="trail")
         self.svg = self._placed.svg
+        self._undrawn: dict[_Piece, None] = {}
+        """The pieces that changed while nobody looked."""
+        looking.follow(self)
         if robot.valid:
             self.on_odometry_update()
 
@@ -68,10 +72,27 @@ class Trail:
         """The trail, oldest first, in pieces that may be connected."""
         return [list(piece.points) for piece in self._pieces]
 
+    def destroy(self) -> None:
+        """Draw no more."""
+        looking.forget(self)
+
+    def looking_changed(self) -> None:
+        """Draw what changed while nobody looked."""
+        undrawn, self._undrawn = self._undrawn, {}
+        for piece in undrawn:
+            piece.draw()
+
+    def _draw(self, piece: "_Piece") -> None:
+        if looking.somebody:
+            piece.draw()
+        else:
+            self._undrawn[piece] = None
+
     def clear(self) -> None:
         """Remove the trail so far."""
         self.svg.clear()
         self._pieces.clear()
+        self._undrawn.clear()
         self._last = None
 
     def on_seek(self) -> None:
@@ -91,6 +112,7 @@ class Trail:
             if len(self._pieces[-1].points) > PIECE:
                 self._begin(self._last)
             self._pieces[-1].go(at, far)
+            self._draw(self._pieces[-1])
             if self._pieces[-1].line.parent is None:
                 self.svg.append(self._pieces[-1].line)
             self._forget_old()
@@ -107,9 +129,10 @@ class Trail:
         while surplus >= self._pieces[0].length and len(self._pieces) > 1:
             old = self._pieces.popleft()
             old.line.remove()
+            self._undrawn.pop(old, None)
             surplus -= old.length
-        if surplus > 0:
-            self._pieces[0].shorten(surplus)
+        if surplus > 0 and self._pieces[0].shorten(surplus):
+            self._draw(self._pieces[0])
 
 
 class _Piece:
@@ -131,10 +154,13 @@ class _Piece:
         """Extend the line to a point at the given distance from the last."""
         self.points.append(at)
         self.length += far
-        self._draw()
 
-    def shorten(self, surplus: float) -> None:
-        """Remove points at the beginning while the rest stays long enough."""
+    def shorten(self, surplus: float) -> bool:
+        """Remove points at the beginning while the rest stays long enough.
+
+        Returns:
+            Whether there were such points.
+        """
         changed = False
         while len(self.points) > 2:
             first = math.dist(self.points[0], self.points[1])
@@ -144,8 +170,8 @@ class _Piece:
             self.length -= first
             surplus -= first
             changed = True
-        if changed:
-            self._draw()
+        return changed
 
-    def _draw(self) -> None:
+    def draw(self) -> None:
+        """Draw the line."""
         self.line.set(points=[(rounded(x), rounded(y)) for x, y in self.points])
