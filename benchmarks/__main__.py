@@ -42,6 +42,7 @@ ROWS = [
     Row("transports", 45),
     Row("router", 25),
     Row("idle", 40, quick=True),
+    Row("unwatched", 40),
 ]
 
 BENCHES = {row.name: row for row in ROWS}

@@ -1,0 +1,109 @@
+"""What robots cost the display while no page is open, compared with one viewer.
+
+A thousand robots with odometry at 10 Hz behind one rosbridge, and a hundred that have
+scans of 360 points at 10 Hz too. The console is the program, as with ``webmap view``.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import psutil
+
+from benchmarks.harness import Comparison, Contender, Figures, compare
+
+FLEETS = {"1,000 robots": (1000, 0), "100 robots with scans": (100, 360)}
+"""The robots, and the beams of their scans."""
+
+PROGRAM = Path(__file__).parent / "busy_fleet.py"
+
+BEGIN = 20.0
+"""Seconds until all robots have connected, and until nobody counts as looking."""
+
+
+@contextmanager
+def _running(*command: object, **environment: str) -> Iterator["subprocess.Popen[str]"]:
+    """Run a Python module."""
+    with subprocess.Popen(
+        [sys.executable, "-m", *map(str, command)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | environment,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
+
+
+def _line(process: "subprocess.Popen[str]") -> str:
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
+
+
+def _spent(display: "subprocess.Popen[str]") -> tuple[float, int]:
+    """Return the processor time of the display in seconds, and its messages."""
+    assert display.stdin is not None
+    times = psutil.Process(display.pid).cpu_times()
+    display.stdin.write("\n")
+    display.stdin.flush()
+    return times.user + times.system, int(_line(display))
+
+
+def shown_to(
+    viewers: int, robots: int, beams: int, seconds: float
+) -> Callable[[], Figures]:
+    """Return a run of the display with robots, and with or without a viewer."""
+
+    def run() -> Figures:
+        with ExitStack() as running:
+            folder = running.enter_context(tempfile.TemporaryDirectory())
+            server = running.enter_context(_running("benchmarks.busy_robots", beams))
+            display = running.enter_context(
+                _running(
+                    *("webmap", "run", PROGRAM, "--port", "0", "--no-browser"),
+                    FLEET_URL=f"ws://127.0.0.1:{_line(server)}",
+                    FLEET_ROBOTS=str(robots),
+                    FLEET_BEAMS=str(beams),
+                    WEBMAP_STATE_DIR=folder,
+                )
+            )
+            url = _line(display).rpartition(" at ")[2]
+            time.sleep(BEGIN)
+            if viewers:
+                watch = ("benchmarks.watchers", url, viewers, 2 * seconds)
+                if _line(running.enter_context(_running(*watch))) != "ready":
+                    raise RuntimeError("the viewer saw no frame")
+            cpu, messages = _spent(display)
+            began = time.monotonic()
+            time.sleep(seconds)
+            cpu_then, messages_then = _spent(display)
+            took = time.monotonic() - began
+        return {
+            "cpu of the display (% of a core)": 100 * (cpu_then - cpu) / took,
+            "messages (a second)": (messages_then - messages) / took,
+        }
+
+    return run
+
+
+def bench(rounds: int, quick: bool = False) -> list[Comparison]:
+    """Compare no viewer with one, for each fleet."""
+    seconds = 3.0 if quick else 10.0
+    return [
+        compare(
+            title,
+            [
+                Contender(name, shown_to(viewers, *fleet, seconds))
+                for name, viewers in (("1 viewer", 1), ("no viewer", 0))
+            ],
+            rounds,
+        )
+        for title, fleet in FLEETS.items()
+    ]
