@@ -1,20 +1,29 @@
-"""The cost of a frame from a robot: ``webmap.Bridge`` compared with roslibpy.
+"""The cost of a frame from a robot: ``webmap.Bridge``, roslibpy and roslib in Node.js.
 
 Each listens in its own process to the same player in another process. roslibpy returns
-dicts and lists; WebMap returns typed messages and numpy arrays, so it does more work.
-WebMap requests scans in CBOR, which roslibpy cannot read; the third contender is WebMap
-with a bridge that only has JSON. For odometry the reference is the floor: websockets
-and msgspec alone, which WebMap uses.
+dicts and lists, roslib objects; WebMap returns typed messages and compact arrays, so it
+does more work. The reference is the floor: websockets and msgspec alone, with JSON.
+WebMap requests scans in CBOR, which roslibpy cannot read and roslib reads if asked;
+``webmap-json`` is WebMap with a bridge that only has JSON.
 """
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
-from benchmarks.frames import ODOM, SCAN
+from benchmarks.frames import ODOM, SCAN, TYPES
 from benchmarks.harness import Comparison, Contender, Figures, compare
 from benchmarks.listener import WARM
+
+NODE = ("roslib", "roslib-cbor")
+"""The contenders that run in Node.js."""
+
+ROSLIB_PACKAGE = Path(__file__).parent.parent / "node_modules" / "roslib2"
+
+ROSLIB = str(Path(__file__).with_name("roslib_listener.mjs"))
 
 COUNTS = {ODOM: 10_000, SCAN: 2_000}
 
@@ -34,6 +43,9 @@ def listening(client: str, topic: str, count: int) -> Callable[[], Figures]:
                 assert player.stdout is not None
                 port = player.stdout.readline().strip()
                 command = [*module, "benchmarks.listener", client, port, topic]
+                if client in NODE:
+                    compression = "cbor" if client == "roslib-cbor" else "none"
+                    command = ["node", ROSLIB, compression, port, topic, TYPES[topic]]
                 finished = subprocess.run(
                     [*command, str(count)], capture_output=True, text=True, check=True
                 )
@@ -46,13 +58,32 @@ def listening(client: str, topic: str, count: int) -> Callable[[], Figures]:
 
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
-    """Compare the clients on odometry and on scans."""
+    """Compare the clients on odometry and on scans.
+
+    roslib is left out where Node.js or its packages are missing.
+    """
+    has_node = shutil.which("node") is not None and ROSLIB_PACKAGE.exists()
     comparisons = []
     for topic, title, clients in (
-        (ODOM, "Odometry of 1.9 kB", ["libraries", "webmap", "roslibpy"]),
-        (SCAN, "LaserScan of 720 ranges", ["webmap", "roslibpy", "webmap-json"]),
+        (ODOM, "Odometry of 1.9 kB", ["libraries", "webmap", "roslibpy", "roslib"]),
+        (
+            SCAN,
+            "LaserScan of 720 ranges",
+            [
+                "libraries",
+                "webmap-json",
+                "webmap",
+                "roslibpy",
+                "roslib",
+                "roslib-cbor",
+            ],
+        ),
     ):
         count = WARM + COUNTS[topic] // (10 if quick else 1)
-        contenders = [Contender(c, listening(c, topic, count)) for c in clients]
+        contenders = [
+            Contender(client, listening(client, topic, count))
+            for client in clients
+            if has_node or client not in NODE
+        ]
         comparisons.append(compare(title, contenders, rounds))
     return comparisons

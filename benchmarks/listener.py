@@ -117,16 +117,18 @@ async def _listen_with_libraries(port: int, topic: str, meter: Meter) -> None:
     from websockets.asyncio.client import connect
 
     from webmap.ros.arrays import dec_hook
-    from webmap.ros.messages import OdometryMsg
+    from webmap.ros.messages import LaserScanMsg, OdometryMsg
     from webmap.ros.rosbridge import ops
 
-    fields = [("op", str), ("topic", str), ("msg", OdometryMsg)]
+    type = OdometryMsg if topic == ODOM else LaserScanMsg
+    fields = [("op", str), ("topic", str), ("msg", type)]
     decode = msgspec.json.Decoder(msgspec.defstruct("Frame", fields), dec_hook=dec_hook)
     async with connect(f"ws://127.0.0.1:{port}", compression=None) as link:
         await link.send(ops.subscribe(topic, id="1", type=TYPES[topic]), text=True)
         while not meter.done.is_set():
             message: Any = decode.decode(await link.recv(decode=False))
-            _ = message.msg.pose.pose.position.x
+            _ = message.msg.pose.pose.position.x if topic == ODOM else None
+            _ = message.msg.ranges if topic != ODOM else None
             meter.frame()
 
 

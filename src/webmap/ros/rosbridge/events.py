@@ -35,25 +35,26 @@ class Publish(ReceivedMessage):
     @property
     def is_binary(self) -> bool:
         """Whether it came as CBOR."""
-        return not self.frame.startswith(b"{") and cbor.looks_like_cbor(self.frame)
+        return cbor.looks_like_cbor(self.frame)
 
     def check_count(self) -> None:
         """Check the number of values before any of them is built."""
         check_count(self.frame)
 
     def _decode(self, type: type[msgspec.Struct] | None) -> Any:
-        if self.is_binary:
+        frame = self.frame
+        if not frame.startswith(b"{") and cbor.looks_like_cbor(frame):
             if self._map is None:
-                self._map = cbor.decode(self.frame)
+                self._map = cbor.decode(frame)
             self._verify(self._map.get("op"), self._map.get("topic"))
             return convert(
                 self._map.get("msg"), dict[str, Any] if type is None else type
             )
-        frame = decode_json(self.frame, _frame_of(type))
-        self._verify(frame.op, frame.topic)
+        operation = decode_json(frame, _frame_of(type))
+        self._verify(operation.op, operation.topic)
         if type is None:
-            check_depth(frame.msg)
-        return frame.msg
+            check_depth(operation.msg)
+        return operation.msg
 
     def _verify(self, op: object, topic: object) -> None:
         if op != "publish" or topic != self.topic:

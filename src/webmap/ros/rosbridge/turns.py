@@ -29,10 +29,12 @@ class Turn:
 
     """
 
-    __slots__ = ("_end", "_least")
+    __slots__ = ("_end", "_least", "_pause")
 
     def __init__(self, now: float, seconds: float) -> None:
         self._end = now + seconds
+        self._pause = seconds / 4
+        """The shortest time between two questions for the processor time."""
         self._least = time.monotonic() + seconds
 
     @property
@@ -46,7 +48,7 @@ class Turn:
         if now < self._least:
             return False
         left = self._end - time.thread_time()
-        self._least = now + left
+        self._least = now + max(left, self._pause)
         return left <= 0
 
 
