@@ -16,7 +16,7 @@ from websockets.exceptions import ConnectionClosed
 
 from benchmarks.frames import TYPES, cbor_frames, json_frames
 
-BUFFER = 4 << 20
+BUFFER = 1 << 20
 """Bytes that may wait to be sent."""
 
 

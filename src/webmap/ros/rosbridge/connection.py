@@ -236,7 +236,7 @@ async def _connect(url: str) -> "PacedConnection":
 
     from websockets.asyncio.client import connect
 
-    from webmap.ros.rosbridge.paced import PacedConnection
+    from webmap.ros.rosbridge.paced import CLOSE_TIMEOUT, PacedConnection
 
     class ConnectHere(connect):
         """Connect to the given address, without redirects."""
@@ -250,7 +250,7 @@ async def _connect(url: str) -> "PacedConnection":
         max_size=MAX_FRAME,
         open_timeout=CONNECT_TIMEOUT,
         ping_interval=None,
-        close_timeout=0.5,
+        close_timeout=CLOSE_TIMEOUT,
         proxy=None,
         user_agent_header=None,
         create_connection=PacedConnection,

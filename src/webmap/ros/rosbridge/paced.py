@@ -25,6 +25,9 @@ MAX_WAITING = 1 << 20
 RATE = 128 << 20
 """Bytes per second of long messages read from a connection, on average."""
 
+CLOSE_TIMEOUT = 0.5
+"""Longest wait for the bridge to close its end, in seconds."""
+
 REST = SHARE
 """The longest rest between the turns of all connections, in seconds.
 
@@ -122,8 +125,7 @@ class PacedConnection(ClientConnection):
             try:
                 more = incoming.step()
             except ProtocolError as error:
-                self.protocol.fail(CloseCode.MESSAGE_TOO_BIG, str(error))
-                self._pass_on(b"")
+                self._refuse(str(error))
                 continue
             if not more:
                 self._read_all()
@@ -146,6 +148,12 @@ class PacedConnection(ClientConnection):
         self._incoming.shaken = state is not State.CONNECTING
         if state in (State.CLOSING, State.CLOSED):
             self._incoming.message = ignore
+
+    def _refuse(self, reason: str) -> None:
+        """Close the connection because of a message that is too long."""
+        self.protocol.fail(CloseCode.MESSAGE_TOO_BIG, reason)
+        self._pass_on(b"")
+        self.loop.call_later(CLOSE_TIMEOUT, self.transport.abort)
 
     def _read_all(self) -> None:
         """Go on after all bytes that came."""
