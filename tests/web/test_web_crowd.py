@@ -161,6 +161,8 @@ def test_selected_robots_and_robots_with_something_large_stay_themselves(host, t
     host.call(host.one.session.set_class, fleet.mounts[3], "selected", True)
     host.call(fleet.robots[4].append, svg.path(d="M0 0H9", stroke="red"))
     wait(tab, f"{FAR} === {MANY - 2}")
+    marked = tab.locator(".far-robots > [data-selected]")
+    assert marked.bounding_box()["width"] == pytest.approx(12, abs=1)
     assert not tab.locator("[data-robot=r3].far, [data-robot=r4].far").count()
     host.call(host.one.session.set_class, fleet.mounts[3], "selected", False)
     wait(tab, f"{FAR} === {MANY - 1}")

@@ -1,4 +1,4 @@
-import { FarPaths, lookOf } from "./far_paths.js";
+import { FarPaths, isChosen, LEAST, lookOf } from "./far_paths.js";
 import { apply, scaleOf } from "./view.js";
 
 /** @typedef {import('./far_paths.js').Box} Box */
@@ -21,11 +21,11 @@ const MARGIN = 100;
 const AGAIN = 1000;
 const MOST_AGAIN = 25;
 
+/** Milliseconds after which a robot is measured again that only has other dots. */
+const DOTS_AGAIN = 5000;
+
 /** Pixels from a small robot in which a press or a pointer means it. */
 const REACH = { mouse: 8, touch: 18 };
-
-/** Classes of robots that are never drawn together with others. */
-const CHOSEN = ["selected", "marked"];
 
 /** A robot on a map. */
 export class CrowdRobot {
@@ -55,11 +55,12 @@ export class CrowdRobot {
 
   /**
    * @param {number} scale Pixels per metre.
+   * @param {number} [size] Pixels.
    * @returns {boolean} Whether something of it is drawn, and that is small.
    */
-  isSmall(scale) {
+  isSmall(scale, size = SMALL) {
     const { awaits, box } = this;
-    return !awaits && box !== null && Math.max(box.width, box.height) * scale < SMALL;
+    return !awaits && box !== null && Math.max(box.width, box.height) * scale < size;
   }
 
   /** Write the newest pose into the document. */
@@ -167,7 +168,10 @@ export class Crowd {
 
   /** @param {Element} element A robot with new dots, or none if it does not show them. */
   changedDots(element) {
-    if (!this._robots.get(element)?.far) this.changed(element);
+    const robot = this._robots.get(element);
+    if (!robot || robot.far) return;
+    robot.draw(); // outside of the map, it was not moved
+    if (robot.awaits || performance.now() - robot.measuredAt > DOTS_AGAIN) this.changed(element);
   }
 
   /**
@@ -256,11 +260,14 @@ export class Crowd {
     };
     /** @type {CrowdRobot[]} */
     const small = [];
+    /** @type {CrowdRobot[]} Those of their own that are smaller than the others are drawn. */
+    const tiny = [];
     for (const robot of this._robots.values()) {
       const { matrix } = robot.item;
       if (!matrix || this._isNear(robot)) {
         robot.setFar(false);
         robot.draw();
+        if (robot.isSmall(scale, LEAST)) tiny.push(robot);
         continue;
       }
       const inside = seen(matrix.e, matrix.f, robot.reach);
@@ -270,14 +277,15 @@ export class Crowd {
         robot.draw();
       }
     }
-    this._drawSmall(small, scale);
+    this._drawSmall(small, tiny, scale);
   }
 
   /**
    * @param {CrowdRobot[]} small
+   * @param {CrowdRobot[]} tiny Robots with their own group that are marked, too.
    * @param {number} scale
    */
-  _drawSmall(small, scale) {
+  _drawSmall(small, tiny, scale) {
     const many = small.length > MANY;
     for (const robot of small) {
       // The styles of a page may keep it as large at this scale as at another.
@@ -293,6 +301,9 @@ export class Crowd {
       robot.setFar(far);
       if (!far) robot.draw();
       else if (box && look && matrix) this._paths.add(matrix, box, look);
+    }
+    for (const { box, look, item } of many ? tiny : []) {
+      if (box && look && item.matrix) this._paths.add(item.matrix, box, look);
     }
     this._paths.end();
   }
@@ -321,7 +332,7 @@ export class Crowd {
     let least = touched ? REACH.touch : REACH.mouse;
     for (const robot of this._robots.values()) {
       const { matrix } = robot.item;
-      if (!matrix || !(robot.far || robot === this._held)) continue;
+      if (!matrix || !(robot.far || robot.chosen || robot === this._held)) continue;
       const place = apply(this._map.view, matrix.e, matrix.f);
       const distance = Math.hypot(place.x - x, place.y - y);
       if (distance >= least) continue;
@@ -385,5 +396,5 @@ function measure(robot, scale, now) {
     (dot) => !dot.getAttribute("d") && dot.getClientRects().length > 0,
   );
   robot.look = lookOf(element);
-  robot.chosen = CHOSEN.some((name) => element.classList.contains(name));
+  robot.chosen = isChosen(element);
 }

@@ -15,12 +15,17 @@ import { scaleOf, unapply } from "./view.js";
  * @property {string} key
  * @property {Record<string, string>} attributes Of the path.
  * @property {boolean} round Whether it is drawn as a dot, not as an arrowhead.
+ * @property {number} least Least size in pixels.
  */
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** Least size of a robot, in pixels. */
-const LEAST = 6;
+/** Least size of a robot, and of one that is selected, in pixels. */
+export const LEAST = 6;
+const LEAST_CHOSEN = 12;
+
+/** Classes of robots that are selected. */
+const CHOSEN = ["selected", "marked"];
 
 /** Units of a path in a pixel: whole numbers are written and read faster. */
 const FINE = 8;
@@ -35,14 +40,14 @@ const CORNERS = 8;
 
 /**
  * @param {Box} box
- * @param {boolean} round
+ * @param {Look} look
  * @param {number} scale Pixels per metre.
  * @returns {(turn: number) => Outline} The outline of a robot by its heading, which is a
  *     whole number of `TURNS`.
  */
-export function outlines(box, round, scale) {
+function outlines(box, { round, least }, scale) {
   const size = Math.max(box.width, box.height) * scale;
-  const unit = FINE * scale * Math.max(1, LEAST / size);
+  const unit = FINE * scale * Math.max(1, least / size);
   const points = (round ? dot(box) : arrowhead(box)).map(([x, y]) => [x * unit, y * unit]);
   /** @type {Outline[]} */
   const known = [];
@@ -135,10 +140,10 @@ export class FarPaths {
    * @param {Look} look
    */
   add({ a, b, e, f }, box, look) {
-    const shape = `${look.round} ${box.x} ${box.y} ${box.width} ${box.height}`;
+    const shape = [look.round, look.least, box.x, box.y, box.width, box.height].join(" ");
     let outlineOf = this._outlines.get(shape);
     if (!outlineOf) {
-      outlineOf = outlines(box, look.round, this._scale);
+      outlineOf = outlines(box, look, this._scale);
       this._outlines.set(shape, outlineOf);
     }
     const turn = look.round ? 0 : Math.round((Math.atan2(b, a) / (2 * Math.PI) + 1) * TURNS);
@@ -223,10 +228,18 @@ export function lookOf(robot) {
   const { state } = robot.dataset;
   if (state) attributes["data-state"] = state;
   if (robot.classList.contains("stale")) attributes["data-stale"] = "";
+  const chosen = isChosen(robot);
+  if (chosen) attributes["data-selected"] = "";
   const circle = best?.shape instanceof SVGCircleElement || best?.shape instanceof SVGEllipseElement;
   // A circle with something else on it may show a heading.
   const round = circle && painted.length === 1;
-  return { key: Object.values(attributes).join(), attributes, round };
+  const least = chosen ? LEAST_CHOSEN : LEAST;
+  return { key: Object.entries(attributes).join(), attributes, round, least };
+}
+
+/** @param {Element} robot */
+export function isChosen({ classList }) {
+  return CHOSEN.some((name) => classList.contains(name));
 }
 
 /** @param {string} paint */
