@@ -23,6 +23,7 @@ import psutil
 from benchmarks.agents import Hand
 from benchmarks.display import Display, bridged, stamped
 from benchmarks.harness import Comparison, Figures, percentile
+from benchmarks.plot import Curve, Plot, save
 from benchmarks.processes import used
 from benchmarks.stamped import SPEEDS, topics
 from webmap.agents.gates import Gates
@@ -234,6 +235,18 @@ def end_of(comparison: Comparison) -> str:
     return f"{comparison.title}: poses are older than {TOO_OLD:.0f} ms {end}"
 
 
+def plot(ramps: Iterable[Comparison]) -> Plot:
+    """Return the age of poses against the number of robots."""
+    curves = [
+        Curve(
+            each.title,
+            [(int(name.split()[0]), each.median(name, AGE_99)) for name in each.runs],
+        )
+        for each in ramps
+    ]
+    return Plot("Age of poses, 99 %", "robots at 10 Hz", "ms", curves)
+
+
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Find the limits; one round, because each step is long enough."""
     del rounds
@@ -248,6 +261,7 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     ]
     for each in ramps:
         print(end_of(each), end="\n\n")
+    save("limits", plot(ramps))
     many = Comparison(f"viewers of {SHOWN} robots", {})
     for count, stalled in itertools.chain(
         zip(viewers, itertools.repeat(0)), [(viewers[0], STALLED)]

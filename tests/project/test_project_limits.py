@@ -1,7 +1,7 @@
 """Where the ramps of robots end, and what is left out where a peer is not installed."""
 
 from benchmarks import peers
-from benchmarks.limits import AGE_99, Watch, end_of, ramp
+from benchmarks.limits import AGE_99, Watch, end_of, plot, ramp
 
 
 def ages(**by_count):
@@ -35,6 +35,12 @@ def test_a_ramp_ends_where_nothing_can_be_measured_any_more():
 
     found = ramp("t", measure, [1, 2, 3], 0.0)
     assert end_of(found).endswith("between 1 and 2 robots")
+
+
+def test_the_plot_has_the_ages_of_each_ramp():
+    found = ramp("t", ages(n1=20.0, n2=30.0), [1, 2], 0.0)
+    (curve,) = plot([found]).curves
+    assert list(curve.points) == [(1, 20.0), (2, 30.0)]
 
 
 def test_an_age_of_the_gate_counts_once_for_each_message():
