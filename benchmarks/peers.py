@@ -37,6 +37,7 @@ SETTLED = 3.0
 HOW = "run `make bench-peers`"
 
 SCRIPTS = (
+    ROOT / "node_modules/eventemitter2/lib/eventemitter2.js",
     ROOT / "node_modules/roslib/build/roslib.min.js",
     PEERS / "node_modules/easeljs/lib/easeljs.min.js",
     PEERS / "node_modules/ros2d/build/ros2d.min.js",
