@@ -144,7 +144,9 @@ def key_in(html: str) -> str:
 class Running:
     """A server that runs in a thread of its own."""
 
-    def __init__(self, app: WebApp, port: int) -> None:
+    def __init__(self, app: WebApp, port: int, connections: set[object]) -> None:
+        self.connections = connections
+        """The open connections of the server, HTTP and WebSocket."""
         self.origin = f"http://127.0.0.1:{port}"
         self.port = port
         self._app = app
@@ -168,7 +170,7 @@ def running(app: WebApp) -> Iterator[Running]:
     thread.start()
     try:
         assert ready.wait(20)
-        yield Running(app, port)
+        yield Running(app, port, server.server_state.connections)
     finally:
         server.should_exit = True
         thread.join(20)

@@ -87,6 +87,28 @@ def test_the_page_shows_a_lost_link_and_reconnects(host, tab, opened):
     wait(tab, "document.querySelector('.robot').transform.baseVal.length")
 
 
+def test_a_page_that_is_connected_again_shows_why_it_was_not(host, tab, opened):
+    host.drop()
+    tab.wait_for_selector("[role=status]:has-text('Before: restarting')")
+    assert "Connected again" in tab.inner_text("[role=status]")
+    tab.wait_for_selector("[role=status]", state="detached")
+
+
+def test_a_page_that_was_hidden_soon_replaces_a_connection_that_was_lost(
+    host, tab, opened
+):
+    hide = "Object.defineProperty(document, 'hidden', {value: %s, configurable: true})"
+    tab.evaluate(hide % "true")
+    before = opened.frames
+    host.until(lambda: opened.frames > before + 1, tab=tab)
+    host.silent = True
+    tab.wait_for_timeout(500)
+    tab.evaluate(hide % "false")
+    # Sooner than a page that was in use all the time, which waits for 10 s.
+    host.until(lambda: len(opened.hellos) == 2, 7.0, tab=tab)
+    host.silent = False
+
+
 def test_the_view_is_kept_after_a_lost_link(host, tab, opened):
     drag(tab, 33)
     before = view(tab)

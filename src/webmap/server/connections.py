@@ -207,15 +207,42 @@ class Connection:
 
 
 class WebSocketProtocol(WebSocketsSansIOProtocol):
-    """Passes a text that is not UTF-8 to the application as bytes.
+    """Ends connections that do not answer, and passes on texts that are not UTF-8.
 
-    uvicorn ends the connection of such a text without informing the application, and
-    logs a traceback. The application refuses it like every binary message, and can
-    first check whether it is a STOP (S10).
+    uvicorn waits for a peer that reads nothing as long as the system does, and does not
+    inform the application meanwhile.
     """
 
+    def keepalive_timeout(self) -> None:
+        """End the connection at once, because a ping was not answered in time."""
+        self.pong_timer = None
+        if self.close_sent or self.transport.is_closing():
+            return
+        why = f"this page answered nothing for {self.ping_timeout:g} s"
+        self.queue.put_nowait(
+            {"type": "websocket.disconnect", "code": 1006, "reason": why}
+        )
+        self.conn.fail(1011, why)
+        self.transport.write(b"".join(self.conn.data_to_send()))
+        self.close_sent = True
+        if self.transport.get_write_buffer_size() > 0:
+            self.transport.abort()  # the page would not get the rest
+        else:
+            self.transport.close()
+
+    def on_task_complete(self, task: "asyncio.Task[None]") -> None:
+        """Give a page that does not read its close frame a limited time for that."""
+        super().on_task_complete(task)
+        if not self.disconnected:
+            self.loop.call_later(self.close_timeout + _FLUSH_S, self.transport.abort)
+
     def send_receive_event_to_app(self) -> None:
-        """Pass on a complete message."""
+        """Pass on a complete message; one that is not UTF-8 as bytes.
+
+        uvicorn ends the connection of such a text without informing the application,
+        and logs a traceback. The application refuses it like every binary message, and
+        can first check whether it is a STOP (S10).
+        """
         if self.curr_msg_data_type == "text":
             try:
                 b"".join(self.frames).decode()

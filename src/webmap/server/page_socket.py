@@ -217,6 +217,9 @@ class PageSocket:
             message = await self._socket.receive()
             if message["type"] == "websocket.disconnect":
                 self._gone = True
+                # No page can send this code: its ping was not answered.
+                if message.get("code") == 1006 and message.get("reason"):
+                    log.info("%s: closed, %s", self._name, message["reason"])
                 return
             text: str | None = message.get("text")
             if text is None:

@@ -1,6 +1,6 @@
 /** Milliseconds for which a dismissed failure is not shown again. */
 const SILENCE = 60_000;
-/** Milliseconds for which a solved problem stays visible, to be readable. */
+/** Milliseconds for which what is over stays visible, to be readable. */
 const LINGER = 2000;
 /** Most failures that are shown; the others are counted. */
 const SHOWN = 3;
@@ -22,7 +22,7 @@ export class Notices {
     this._shown = new Map();
     /** When each failure was dismissed. @type {Map<string, number>} */
     this._dismissed = new Map();
-    /** Solved problems that are removed soon. @type {Map<string, number>} */
+    /** Notices that are removed soon. @type {Map<string, number>} */
     this._leaving = new Map();
     /** The layout of the page when the notices were placed. */
     this._seen = "";
@@ -54,16 +54,16 @@ export class Notices {
   problem(number, text) {
     const key = problemKey(number);
     if (!text) {
-      this._leave(key);
+      this.leave(key);
       return;
     }
-    this._stay(key);
-    if (!this._dismissed.has(key)) this.show(key, text, "alert");
+    if (this._dismissed.has(key)) this._stay(key);
+    else this.show(key, text, "alert");
   }
 
   /** Remove every problem that is not reported again soon. */
   recheckProblems() {
-    for (const key of this._shown.keys()) if (isProblem(key)) this._leave(key);
+    for (const key of this._shown.keys()) if (isProblem(key)) this.leave(key);
   }
 
   /**
@@ -74,6 +74,7 @@ export class Notices {
    * @param {"status" | "alert"} [role]
    */
   show(key, text, role = "status") {
+    this._stay(key);
     const known = this._shown.get(key);
     if (known) {
       const words = known.firstElementChild;
@@ -100,8 +101,12 @@ export class Notices {
     if (this._shown.delete(key)) this._limit();
   }
 
-  /** @param {string} key */
-  _leave(key) {
+  /**
+   * Hide a notice when there was time to read it.
+   *
+   * @param {string} key
+   */
+  leave(key) {
     if (!this._shown.has(key) || this._leaving.has(key)) return;
     this._leaving.set(key, setTimeout(() => this.hide(key), LINGER));
   }

@@ -63,6 +63,10 @@ export class Page {
     this._drawing = 0;
     this._failures = 0;
     this._listening = performance.now();
+    /** Why the server ended the last connection, if it did. */
+    this._why = "";
+    /** Whether the page was hidden when it last received something. */
+    this._returned = false;
     this._theme = matchMedia("(prefers-color-scheme: dark)");
     this._theme.addEventListener("change", () => this.scene.restyle());
     this._link = new Link(() => socketAddress("scene", { page: this.path, id: this.id }), {
@@ -71,6 +75,8 @@ export class Page {
       closed: (reason, forGood) => this._closed(reason, forGood),
       refused: () => void this._askWhy(),
     });
+    // Whatever the frozen page did not read is old, and its connection may be dead.
+    document.addEventListener("resume", () => this._link.renew());
     setInterval(() => this._look(), LOOK_PERIOD);
   }
 
@@ -128,15 +134,22 @@ export class Page {
   /** @param {ArrayBuffer} data */
   _received(data) {
     this._listening = performance.now();
+    this._returned = document.hidden;
     this._frames.push({ data, received: performance.now() / 1000 });
     this._drawing ||= requestAnimationFrame(() => this._draw());
     this._connected();
   }
 
   _connected() {
-    document.documentElement.classList.remove("disconnected");
-    this.notices.hide("link");
     this._link.settle();
+    const { classList } = document.documentElement;
+    if (!classList.contains("disconnected")) return;
+    classList.remove("disconnected");
+    if (this._why) {
+      this.notices.show("link", `Connected again. Before: ${this._why}.`);
+      this.notices.leave("link");
+    } else this.notices.hide("link");
+    this._why = "";
   }
 
   /**
@@ -145,6 +158,7 @@ export class Page {
    */
   _closed(reason, forGood) {
     this._frames = [];
+    this._why = reason;
     const what = reason ? `No connection to WebMap: ${reason}.` : "No connection to WebMap.";
     this._disconnected(`${what} ${forGood ? "Reload the page." : "Reconnecting…"}`);
   }
@@ -172,7 +186,8 @@ export class Page {
     const silent = performance.now() - this._listening;
     if (silent < SILENT || !this._link.isOpen) return;
     this._disconnected("No data from WebMap. The page shows stale data.");
-    if (silent > DEAD) this._link.renew();
+    // A connection that was lost while the page was hidden needs no longer wait.
+    if (silent > (this._returned ? SILENT : DEAD)) this._link.renew();
   }
 
   // Frames ---------------------------------------------------------------------
