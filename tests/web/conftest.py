@@ -1,6 +1,8 @@
 """Real Chromium, and a small display for it."""
 
+import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 from fake_drive import FakeDrive
@@ -9,6 +11,9 @@ from playwright.sync_api import Browser, Page
 from scene_host import SceneHost
 
 from real_browser import watched_tab
+
+# A browser whose pages can be hidden is with the tests of the browser.
+sys.path.append(str(Path(__file__).parents[1] / "browser"))
 
 
 @pytest.fixture

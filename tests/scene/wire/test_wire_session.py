@@ -320,6 +320,34 @@ def test_pending_error_messages_of_an_inactive_page_are_limited():
     assert b"number 4999" in frame
 
 
+def test_the_bytes_that_wait_for_a_sleeping_page_are_limited():
+    session = SceneSession()
+    root, world = a_map()
+    outer = session.mount(Fragment(root), under=0)
+    session.attach(root.id, 5, "x.js", {})
+    next_frame(session)
+    for number in range(200):
+        session.send(5, {"number": number, "more": "x" * 50_000})
+    pending = session._pending
+    assert sum(map(len, pending.messages)) <= PendingRecords.MESSAGE_BYTES_KEPT
+    frame = next_frame(session)
+    assert b'"number":199,' in frame
+    # A single message may be longer.
+    session.send(5, {"more": "x" * 2_000_000})
+    assert len(next_frame(session)) > 2_000_000
+    session.frame(1.0)
+    session.frame(2.0)
+    for _ in range(1000):  # while the page acknowledges nothing
+        session.send(5, {"number": -1})
+        session.view(root.id, "translate", 1.0, 1.0)
+    for _ in range(100_000):
+        inner = session.mount(Fragment(svg.g()), under=world.id, within=outer)
+        pending.new.clear()  # as if the page had it
+        session.unmount(inner)
+        assert len(pending.gone) <= PendingRecords.BYTES_KEPT
+    assert pending.send_all
+
+
 def test_a_page_receives_the_current_state_of_each_problem():
     session = SceneSession()
     session.problem(7, "it is 1 m off")

@@ -154,6 +154,7 @@ class PendingRecords:
     """
 
     MESSAGES_KEPT: ClassVar = 1000
+    MESSAGE_BYTES_KEPT: ClassVar = 1024 * 1024
     BYTES_KEPT: ClassVar = 256 * 1024
     NOTICES_KEPT: ClassVar = 5
     PROBLEMS_KEPT: ClassVar = 100
@@ -165,12 +166,20 @@ class PendingRecords:
         self.new: list[int] = []
         """The numbers of mounts that the page does not have yet."""
         self.records = bytearray()
-        self.messages: list[bytes] = []
+        self.messages: deque[bytes] = deque()
+        self._message_bytes = 0
         self.current_problems: dict[int, bytes] = {}
         """The record of each current problem; of too many, the newest."""
         self.problems: dict[int, bytes] = {}
         """The record of each problem that changed."""
         self._notices: dict[bytes, None] = {}
+
+    def unmounted(self, number: int) -> None:
+        """Add the end of a mount that the page has."""
+        self.gone += bytes((Op.UNMOUNT, *varint(number)))
+        if len(self.gone) > self.BYTES_KEPT:
+            self.gone.clear()
+            self.send_all = True
 
     def record(self, record: bytes | bytearray) -> None:
         """Add a record that can be made again."""
@@ -182,10 +191,13 @@ class PendingRecords:
 
     def message(self, record: bytes) -> None:
         """Add a message, which is sent once; of too many, the newest are kept."""
-        if len(self.messages) >= self.MESSAGES_KEPT:
-            # A page that is inactive for this long needs the newest.
-            del self.messages[0]
         self.messages.append(record)
+        self._message_bytes += len(record)
+        # A page that is inactive for this long needs the newest.
+        while len(self.messages) > self.MESSAGES_KEPT or (
+            self._message_bytes > self.MESSAGE_BYTES_KEPT and len(self.messages) > 1
+        ):
+            self._message_bytes -= len(self.messages.popleft())
 
     def notice(self, text: str) -> None:
         """Add a notice; the newest ones are sent again after a reload of the page."""
@@ -218,4 +230,5 @@ class PendingRecords:
         """Discard the records, as the frame with all of them was made."""
         self.send_all = False
         self.gone, self.records = bytearray(), bytearray()
-        self.new, self.messages, self.problems = [], [], {}
+        self.new, self.problems = [], {}
+        self.messages, self._message_bytes = deque(), 0

@@ -124,7 +124,7 @@ class SceneSession:
         if mount in self._pending.new:
             self._pending.new.remove(mount)
         else:
-            self._pending.gone += bytes((Op.UNMOUNT, *varint(mount)))
+            self._pending.unmounted(mount)
 
     def _forget(self, map_view: MapView) -> None:
         del self._map_views[map_view.svg]
