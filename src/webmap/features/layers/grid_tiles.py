@@ -4,7 +4,7 @@ import asyncio
 import hashlib
 import math
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Affine, Pose
@@ -36,6 +36,10 @@ wide: there is no line while up to eight cells share a pixel of the screen.
 
 SMALL = 1 << 18
 """Cells up to which a grid is drawn at once; the worker process draws larger grids."""
+
+MOST = 1 << 24
+"""Cells up to which each cell is drawn as a pixel of its own; of a larger grid, a pixel
+shows the greatest value of several cells, so that an occupied cell is always seen."""
 
 BATCH = 4
 """Tiles that the worker process draws at a time, so that others get their turn."""
@@ -135,6 +139,8 @@ class GridTiles:
         self._first = (0, 0)
         """The cell of the lattice at the grid's lower left corner."""
         self._side = SIDE
+        self.coarse = 1
+        """The cells along each side of a pixel."""
         self._undrawn: dict[Place, None] = {}
         """The tiles to draw, the one that has waited longest first."""
         self._numbers = 0
@@ -176,7 +182,8 @@ class GridTiles:
         """
         self._cells = cells
         # The tiles to the left and below draw these cells too.
-        left, low = max(0, x - OVERLAP), max(0, y - OVERLAP)
+        overlap = OVERLAP * self.coarse
+        left, low = max(0, x - overlap), max(0, y - overlap)
         self._mark(self._places(left, low, x + width - left, y + height - low))
 
     def _lay(self, resolution: float, origin: Pose) -> None:
@@ -184,9 +191,11 @@ class GridTiles:
         assert self._cells is not None
         height, width = self._cells.shape
         self._side, first = max(width, height), None
+        self.coarse = max(1, math.ceil(math.sqrt(width * height / MOST)))
         if width * height > ONE:
-            self._side = SIDE
-            if self._lattice is not None:
+            self._side = SIDE * self.coarse
+            # The pixels of a coarse grid begin at its own first cell.
+            if self._lattice is not None and self.coarse == 1:
                 first = self._lattice.cell_of(origin, resolution)
         if first is None:
             self._lattice, first = Lattice(origin, resolution), (0, 0)
@@ -224,11 +233,12 @@ class GridTiles:
         assert self._lattice is not None
         height, width = self._cells.shape
         (column, row), (left, low) = place, self._first
-        x, end_x = _span(column, self._side, left, width)
-        y, end_y = _span(row, self._side, low, height)
-        cells = self._cells[y:end_y, x:end_x].copy()
+        overlap = OVERLAP * self.coarse
+        x, end_x = _span(column, self._side, left, width, overlap)
+        y, end_y = _span(row, self._side, low, height, overlap)
+        cells = coarser(self._cells[y:end_y, x:end_x], self.coarse, self.palette)
         tile = self.tiles[place]
-        matrix = self._lattice.place(x + left, y + low, end_y - y)
+        matrix = self._lattice.place(x + left, y + low, len(cells) * self.coarse)
         digest = hashlib.blake2b(repr(cells.shape).encode(), digest_size=16)
         digest.update(cells.data)
         taken = digest.digest(), matrix
@@ -236,7 +246,7 @@ class GridTiles:
             return None
         tile.taken = taken
         self._numbers += 1
-        resolution = self._lattice.resolution
+        resolution = self._lattice.resolution * self.coarse
         return _Drawing(place, self._numbers, cells, matrix, resolution)
 
     async def _draw_on(self) -> None:
@@ -303,7 +313,38 @@ class GridTiles:
         self._undrawn.clear()
 
 
-def _span(number: int, side: int, first: int, count: int) -> tuple[int, int]:
+def coarser(cells: "NDArray[np.int8]", times: int, palette: str) -> "NDArray[np.int8]":
+    """Return a copy of cells with the greatest value of each square of cells.
+
+    Args:
+        cells: Array of shape (height, width).
+        times: The side of a square, in cells; the squares at the end may be cut.
+        palette: The name of a palette; of ``"raw"``, 255 is the greatest value, else
+            100.
+    """
+    import numpy as np
+
+    if times == 1:
+        return cells.copy()
+    given = cells.view(np.uint8) if palette == "raw" else cells
+    rows = _greatest(given, times)
+    return _greatest(rows.T, times).T.copy().view(np.int8)
+
+
+def _greatest(cells: "NDArray[Any]", times: int) -> "NDArray[Any]":
+    """Return the greatest of each ``times`` rows."""
+    import numpy as np
+
+    out = cells[::times].copy()
+    for start in range(1, times):
+        some = cells[start::times]
+        np.maximum(out[: len(some)], some, out=out[: len(some)])
+    return out
+
+
+def _span(
+    number: int, side: int, first: int, count: int, overlap: int
+) -> tuple[int, int]:
     """Return the first cell of a tile in its grid, and the cell after its last.
 
     Args:
@@ -311,6 +352,7 @@ def _span(number: int, side: int, first: int, count: int) -> tuple[int, int]:
         side: The side of a tile.
         first: The cell of the lattice at the grid's first cell.
         count: The number of cells of the grid.
+        overlap: The further cells at the end of a tile.
     """
     start = max(0, number * side - first)
-    return start, min(count, (number + 1) * side - first + OVERLAP)
+    return start, min(count, (number + 1) * side - first + overlap)

@@ -10,7 +10,7 @@ from webmap.base.looking import RARELY
 from webmap.base.tasks import spawn
 from webmap.core.problems import refusing
 from webmap.features.layers.grid_picture import Palette, check_palette
-from webmap.features.layers.grid_tiles import SMALL, GridTiles
+from webmap.features.layers.grid_tiles import MOST, SMALL, GridTiles
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.modules.map_layer import MapLayer
 from webmap.ros.messages import (
@@ -101,7 +101,9 @@ class OccupancyGrid(MapLayer):
     must be -1 to 100; other values are refused, unless the palette is ``"raw"``.
 
     A grid of more than a million cells is drawn as tiles of 512 x 512 cells, each an
-    image. A tile is drawn and sent again only when its cells have changed.
+    image. A tile is drawn and sent again only when its cells have changed. Of a grid of
+    more than 16 million cells, several cells are drawn as one, with the greatest of
+    their values, so that an occupied cell stays visible; a notice reports that.
 
     Style it by CSS: ``.occupancy-grid``, with the palette's name as a further class:
     ``.occupancy-grid.costmap { opacity: 0.4 }``.
@@ -203,6 +205,14 @@ class OccupancyGrid(MapLayer):
         self.info, self.cells = found
         self._updates.clear()
         self.tiles.show(self.cells, self.info.resolution, self.info.origin.planar)
+        if self.tiles.coarse > 1:
+            height, width = self.cells.shape
+            side = self.tiles.coarse
+            self.complain(
+                f"the grid has {width} x {height} cells, more than {MOST // 1_000_000} "
+                f"million: each {side} x {side} cells are drawn as one, with the "
+                "greatest of their values"
+            )
 
     def on_update(self, update: OccupancyGridUpdateMsg) -> None:
         """Change a rectangle of the grid; does nothing without a grid.
