@@ -309,6 +309,10 @@ class _Writer:
     ) -> None:
         self._remarks = remarks
         self._below = below
+        self._with_remarks = {
+            path[:length] for path in remarks for length in range(len(path))
+        }
+        """The paths of tables and lists with a remark inside."""
 
     def pairs(self, path: KeyPath, table: Mapping[str, Any]) -> list[str]:
         """Return the lines of a table, one per key, without its header."""
@@ -323,8 +327,7 @@ class _Writer:
         return [f"# {each}" for each in self._below.get(path, ())]
 
     def _pair(self, path: KeyPath, name: str, value: Any) -> list[str]:
-        inner = [each[: len(path)] == path != each for each in self._remarks]
-        if isinstance(value, Mapping) and any(inner):
+        if isinstance(value, Mapping) and path in self._with_remarks:
             lines = []
             for key, each in value.items():
                 lines += self._pair((*path, key), f"{name}.{_key(key)}", each)

@@ -20,6 +20,9 @@ T = TypeVar("T", bound=Factory)
 BUILT_IN = "webmap.features"
 """The package of the built-in modules; each of its folders is a subpackage."""
 
+_imported: set[str] = set()
+"""The files of built-in modules that were imported, also those without a module."""
+
 
 class Namespace:
     """The modules that one kind of owner can add, by name.
@@ -117,8 +120,10 @@ class Namespace:
     def _look_for(self, name: object) -> None:
         """Import the built-in file of that name, which registers its class."""
         file = None if self._group is None else _built_in_files().get(name)
-        if file is not None and name not in self._registered:
-            importlib.import_module(file)
+        if file is None or name in self._registered or file in _imported:
+            return
+        importlib.import_module(file)
+        _imported.add(file)  # only now: another thread may import it too
 
     def _other_packages(self) -> dict[str, EntryPoint]:
         if self._entry_points is None:

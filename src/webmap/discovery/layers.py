@@ -212,7 +212,8 @@ def with_layers(
     if config.odometry is not None:
         taken.add(normalise_topic(config.odometry.topic))
     for layer in layers:
-        name = declared_kind(layer.kind)[0].name
+        declared = declared_kind(layer.kind)[0]
+        name = declared.name
         number = 1 + sum(module.name == name for module in modules)
         drawn = drawing(layer, namespace, frames, number)
         if drawn.shared or layer.topic in taken:
@@ -222,7 +223,7 @@ def with_layers(
             scans.append(layer.topic)
             continue
         args = [{"bridge": config.bridge}, layer.topic]
-        takes = inspect.signature(declared_kind(layer.kind)[0].layer).parameters
+        takes = inspect.signature(declared.layer).parameters
         options = {
             key: value
             for key, value in drawn.options.items()

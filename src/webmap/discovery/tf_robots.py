@@ -74,6 +74,10 @@ class Trees:
                 _forget_some(known)
             known[child] = parent
 
+    def copy(self) -> "Trees":
+        """Return a copy, which later frames do not change."""
+        return Trees({space: dict(known) for space, known in self.parents.items()})
+
     def bases(self) -> tuple[Base, ...]:
         """Return the robots in the trees, sorted by namespace and frame."""
         found = [

@@ -17,8 +17,10 @@ from webmap.discovery.frame_listening import late_frames
 from webmap.discovery.layers import role_of
 from webmap.discovery.newcomers import Newcomers, News, leads_further
 from webmap.discovery.robots import host_name
+from webmap.discovery.tf_robots import Trees
 from webmap.fleet.given import Offer, offer
 from webmap.fleet.overrides import MOST_CAMERAS
+from webmap.modules.declaration import declarations
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -52,6 +54,8 @@ class Looking(ABC):
         self.bridge = bridge
         self._given_topics = topics
         self._task: asyncio.Task[None] | None = None
+        self._known: tuple[object, ...] = ()
+        self._found = Findings()
         lifecycle.add(self)
 
     @property
@@ -90,6 +94,19 @@ class Looking(ABC):
                     pause = min(2 * pause, LONGEST)
             await asyncio.sleep(pause)
 
+    async def _discover(self, topics: dict[str, str], trees: Trees) -> Findings:
+        """Return what is behind the bridge, computed when topics or frames changed.
+
+        A thread does that, because thousands of topics take half a second.
+        """
+        trees = trees.copy()
+        known = topics, trees, declarations()
+        if known != self._known:
+            host = host_name(self.bridge.url)
+            self._found = await asyncio.to_thread(discover, topics, host, trees)
+            self._known = known
+        return self._found
+
     async def _topics(self) -> dict[str, str]:
         if self._given_topics is not None:
             return dict(self._given_topics)
@@ -123,7 +140,7 @@ class LookingForRobots(Looking):
     async def take(self, topics: dict[str, str]) -> None:
         """Report new robots and new topics of robots."""
         trees = await late_frames(self.bridge).listen(topics)
-        found = discover(topics, host_name(self.bridge.url), trees)
+        found = await self._discover(topics, trees)
         for news in self._newcomers.look(found):
             try:
                 self._came(news, self.bridge)
@@ -171,7 +188,7 @@ class LookingForLayers(Looking):
         if self._given:  # robots drawn by frames receive them anyway
             await frames.listen(topics)
         url, overrides = self.bridge.url, self._shown.overrides
-        behind = discover(topics, host_name(url), frames.trees)
+        behind = await self._discover(topics, frames.trees)
         self._take_given(topics, behind)
         for guessed in behind.robots:
             space = guessed.namespace

@@ -9,7 +9,7 @@ import logging
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, TypeVar
 
 import msgspec
@@ -256,7 +256,12 @@ def declarations() -> list[Declaration]:
     A kind whose name an earlier layer already has is left out, and logged once.
     """
     made = [*robot_modules, *map_modules]
-    found = (vars(each).get("declared") for each in made if isinstance(each, type))
+    return list(_declared(tuple(each for each in made if isinstance(each, type))))
+
+
+@lru_cache(maxsize=1)
+def _declared(made: tuple[type, ...]) -> list[Declaration]:
+    found = (vars(each).get("declared") for each in made)
     declared = {id(each): each for each in found if isinstance(each, Declaration)}
     ordered = sorted(declared.values(), key=lambda each: each.rank)
     first: dict[str, Declaration] = {}
