@@ -94,7 +94,7 @@ def test_a_viewer_gets_20_frames_a_second_of_robots_of_any_rate(clock, rate):
     fleet = Fleet(clock, 1)
     fleet.run(5.0, rate)
     assert len(fleet.sent) == 100
-    assert max(fleet.sent) <= 15 + 24 * ROBOTS
+    assert max(fleet.sent) <= 15 + 32 * ROBOTS
 
 
 def test_a_frame_for_one_more_viewer_takes_few_calls(clock):
@@ -165,5 +165,5 @@ def test_a_viewer_that_reads_nothing_keeps_the_memory_of_one_frame(clock):
     for number in range(1, session._frame + 1):
         session.receive(f'{{"op":"seen","frame":{number}}}')
     frame = session.frame(clock.now)
-    assert len(frame) <= 15 + 24 * ROBOTS
+    assert len(frame) <= 15 + 32 * ROBOTS
     assert session.frame(clock.now) is None, "one frame, and no burst"

@@ -1,0 +1,105 @@
+"""A robot at 1 kHz, behind a bridge that ignores how often it is asked to send."""
+
+import asyncio
+import sys
+import time
+from pathlib import Path
+
+from webmap import Robot
+from webmap.poses.frames import PERIOD
+from webmap.ros.tf import Transform
+from webmap.ros.tf.buffer import HISTORY
+from webmap.ros.tf.track import MOST, Track
+
+# The rosbridge that sends what a test wants is with the tests of the bridge.
+sys.path.append(str(Path(__file__).parents[1] / "ros"))
+from fake_rosbridge import bridged, until
+
+COUNT = 2000
+LEVEL = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+
+
+def header(number: int, frame: str) -> dict:
+    """Return a header with a stamp 1 ms after that of the previous number."""
+    secs, millis = divmod(100_000 + number, 1000)
+    return {"frame_id": frame, "stamp": {"secs": secs, "nsecs": millis * 1_000_000}}
+
+
+def odometry(number: int) -> dict:
+    zero = {"x": 0.0, "y": 0.0, "z": 0.0}
+    still = {"linear": zero, "angular": zero}
+    at = {"position": {**zero, "x": number / 1000}, "orientation": LEVEL}
+    return {
+        "header": header(number, "odom"),
+        "child_frame_id": "base_link",
+        "pose": {"pose": at},
+        "twist": {"twist": still},
+    }
+
+
+def frames(number: int) -> dict:
+    move = {"translation": {"x": number / 1000, "y": 0.0, "z": 0.0}, "rotation": LEVEL}
+    one = {"header": header(number, "map"), "child_frame_id": "base_link"}
+    return {"transforms": [{**one, "transform": move}]}
+
+
+async def publish(server, topic: str, message) -> None:
+    for number in range(COUNT + 1):
+        await server.publish(topic, message(number))
+        if number % 10 == 0:
+            await asyncio.sleep(0.01)
+
+
+def counted(robot: Robot, monkeypatch) -> list[float]:
+    """Return a list that grows with each pose that is drawn."""
+    drawn: list[float] = []
+    show = robot.pose_source._show_pose
+
+    def count(reading, stamp):
+        drawn.append(reading.position.x)
+        show(reading, stamp)
+
+    monkeypatch.setattr(robot.pose_source, "_show_pose", count)
+    return drawn
+
+
+def test_odometry_at_1_khz_is_requested_and_drawn_ten_times_a_second(monkeypatch):
+    async def scenario() -> None:
+        async with bridged() as (server, bridge):
+            robot = Robot("fast")
+            drawn = counted(robot, monkeypatch)
+            robot.set_odometry_topic(bridge, "/odom", type="nav_msgs/Odometry")
+            (asked,) = await server.wait_for("subscribe", topic="/odom")
+            assert asked["throttle_rate"] == 100
+            began = time.monotonic()
+            await publish(server, "/odom", odometry)
+            await until(lambda: drawn and drawn[-1] == COUNT / 1000)
+            took = time.monotonic() - began
+            assert len(drawn) <= 3 + 10 * took
+            robot.destroy()
+
+    asyncio.run(scenario())
+
+
+def test_frames_at_1_khz_move_the_robot_twenty_times_a_second(monkeypatch):
+    async def scenario() -> None:
+        async with bridged() as (server, bridge):
+            robot = Robot("fast")
+            drawn = counted(robot, monkeypatch)
+            robot.set_tf(bridge)
+            await server.wait_for("subscribe", topic="/tf")
+            began = time.monotonic()
+            await publish(server, "/tf", frames)
+            await until(lambda: drawn and drawn[-1] == COUNT / 1000)
+            took = time.monotonic() - began
+            assert len(drawn) <= 3 + took / PERIOD
+            robot.destroy()
+
+    asyncio.run(scenario())
+
+
+def test_the_frames_of_a_robot_at_1_khz_take_limited_memory():
+    track = Track("map")
+    for number in range(2 * MOST):
+        track.add(Transform(), number / 1000, HISTORY)
+    assert len(track._stamps) == len(track._transforms) == MOST
