@@ -34,6 +34,15 @@ def page(site: str, chromium: Browser) -> Iterator[Page]:
         yield page
 
 
+def test_a_robot_has_few_elements_on_the_map_and_in_the_list(page):
+    """An element of each robot costs every page memory, style and layout."""
+    count = "(all) => all.length"
+    on_map = page.eval_on_selector_all(".robot, .robot *", count) / 30
+    in_list = page.eval_on_selector_all("#robots > .row, #robots > .row *", count) / 30
+    assert on_map <= 15
+    assert in_list <= 21
+
+
 def names(page: Page) -> list[str]:
     return page.locator(ROWS).all_text_contents()
 
