@@ -11,6 +11,7 @@ import msgspec
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
 from webmap.base.loading import load_soon
+from webmap.base.looking import RARELY
 from webmap.core.problems import Owner, Refusing
 from webmap.core.registry import Namespace
 from webmap.modules.declaration import Declaration, FoundTopic, usual_options
@@ -160,10 +161,9 @@ class TopicLayer(LayerOptions):
     queue_length: ClassVar[int] = 1
     """The number of messages that the bridge may queue."""
 
-    unwatched: ClassVar[int] = 0
-    """The same as ``throttle`` while no page is open, as in
-    :meth:`webmap.Bridge.subscribe`; 0 for a layer that does more than draw, or whose
-    messages add to a drawing."""
+    only_draws: ClassVar[bool] = False
+    """Whether the newest message is enough for the drawing and nothing else is done
+    with the messages: while no page is open, they come every 5 s at most."""
 
     bridge: Bridge
     topic: str
@@ -257,7 +257,7 @@ class TopicLayer(LayerOptions):
             decode=view,
             encoding=self.encoding,
             queue_length=self.queue_length,
-            unwatched=self.unwatched,
+            unwatched=RARELY if self.only_draws else 0,
         )
 
     def _take_plain(self, message: Mapping[str, Any]) -> None:

@@ -387,7 +387,7 @@ class Bridge:
     def looking_changed(self) -> None:
         """Subscribe to what is only shown as often as somebody looks."""
         for topic in list(self._topics.values()):
-            topic.repace()
+            topic.change_pace()
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Open the connection and keep it open; called when WebMap starts."""

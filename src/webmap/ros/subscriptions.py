@@ -174,9 +174,9 @@ class Subscription:
     def set_unwatched(self, unwatched: int) -> None:
         """Change how often messages come while nobody looks; see ``subscribe``."""
         self.options = self.options._replace(unwatched=unwatched)
-        self._of.repace()
+        self._of.change_pace()
 
-    def repace(self) -> bool:
+    def change_pace(self) -> bool:
         """Use the throttle of now; return whether it has changed."""
         period = self.options.least / 1000
         if period == self.throttle.period:
@@ -318,9 +318,9 @@ class Topic:
         self._latest = None
         self._emptied(self)
 
-    def repace(self) -> None:
+    def change_pace(self) -> None:
         """Subscribe to more or less if somebody looks now, or nobody any more."""
-        if any([listener.repace() for listener in self.listeners]):
+        if any([listener.change_pace() for listener in self.listeners]):
             self._changed(self)
 
     def options(self) -> SubscriptionOptions:

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST
-from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import check_finite, in_space, thinned
 from webmap.modules.layer_options import Count, Frame
@@ -98,7 +97,7 @@ class GridCells(RobotLayer):
     ``.gridcells.frontiers > .cells``.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     frame: Frame = "map"
     """``"robot"`` for cells in the robot's own frame."""

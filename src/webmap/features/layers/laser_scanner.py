@@ -6,7 +6,6 @@ from typing import Annotated, Any
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST, Affine
-from webmap.base.looking import RARELY
 from webmap.config.robot import scan_name
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.modules.layer_options import Limit
@@ -63,7 +62,7 @@ class LaserScanner(RobotLayer):
     in metres.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     frame = "robot"
 

@@ -8,7 +8,6 @@ import msgspec
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
 from webmap.base.local_plane import LocalPlane
-from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.robot_layer import RobotLayer
 from webmap.ros.messages import Stamped
@@ -87,7 +86,7 @@ class NavSatFix(RobotLayer):
     ``.navsatfix.lost``.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     topic: str = "/fix"
 

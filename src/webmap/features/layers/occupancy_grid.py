@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST
-from webmap.base.looking import RARELY
 from webmap.base.tasks import spawn
 from webmap.core.problems import refusing
 from webmap.features.layers.grid_picture import Palette, check_palette
@@ -109,7 +108,7 @@ class OccupancyGrid(MapLayer):
     ``.occupancy-grid.costmap { opacity: 0.4 }``.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     topic: str = "/map"
 

@@ -5,7 +5,6 @@ from itertools import pairwise
 from typing import Annotated
 
 from webmap.base.geometry import Vector3
-from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import check_finite, flat, in_space, rounded, thinned
 from webmap.modules.layer_options import Limit
@@ -49,7 +48,7 @@ class Path(RobotLayer):
     > polyline``.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     topic: str = "/plan"
 

@@ -10,7 +10,6 @@ import msgspec
 
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
-from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import in_units, levelled
 from webmap.modules.layer_options import Count, Frame, Limit
@@ -240,7 +239,7 @@ class PointCloud(RobotLayer):
     size is the custom property ``--dot-size``, in metres.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     x: float = 0.0
     """Position of the sensor on the robot, in metres forward."""

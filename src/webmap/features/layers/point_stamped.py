@@ -4,7 +4,6 @@ import math
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST, Vector3
-from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import flat, rounded
 from webmap.modules.layer_options import Frame, Metres
@@ -48,7 +47,7 @@ class PointStamped(RobotLayer):
     ``.pointstamped.lookahead > .point``.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     frame: Frame = "map"
     """``"robot"`` for a point in the robot's own frame, as from Nav2's controllers."""

@@ -4,7 +4,6 @@ import msgspec
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Vector3
-from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import check_finite, flat, in_space, rounded
 from webmap.modules.layer_options import Frame, Seconds
@@ -66,7 +65,7 @@ class Polygon(RobotLayer):
     ``.polygon.footprint > polygon``.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     name: str = "footprint"
 

@@ -5,7 +5,6 @@ import math
 import msgspec
 
 from webmap.base.geometry import Pose
-from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import thinned
 from webmap.modules.layer_options import Count, Frame, Metres
@@ -67,7 +66,7 @@ class PoseArray(RobotLayer):
     Style them by CSS: ``.posearray > .arrow``.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     in_plane = True
 

@@ -3,7 +3,6 @@
 import math
 
 from webmap.base.geometry import Pose
-from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.layer_options import Frame, Metres
 from webmap.modules.robot_layer import RobotLayer
@@ -42,7 +41,7 @@ class PoseStamped(RobotLayer):
     ``.posestamped.goal > .arrow``.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     in_plane = True
 

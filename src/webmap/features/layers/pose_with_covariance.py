@@ -7,7 +7,6 @@ import msgspec
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST, Pose
-from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import sector
 from webmap.modules.layer_options import Limit
@@ -133,7 +132,7 @@ class PoseWithCovariance(RobotLayer):
     Style it by CSS: ``.covariance > .ellipse`` and ``.covariance > .heading``.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     in_plane = True
 

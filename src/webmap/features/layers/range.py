@@ -5,7 +5,6 @@ from dataclasses import KW_ONLY
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST
-from webmap.base.looking import RARELY
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import cone, sector
 from webmap.modules.robot_layer import RobotLayer
@@ -55,7 +54,7 @@ class Range(RobotLayer):
     Style it by CSS: ``.range > .cone`` and ``.range > .cone.clear``.
     """
 
-    unwatched = RARELY
+    only_draws = True
 
     encoding = "binary"  # JSON has no infinity, which is a reading
 
