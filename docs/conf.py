@@ -33,7 +33,7 @@ nitpick_ignore_regex = [
     ("py:class", r"webmap\.core\.pictures\.Publisher"),
     ("py:class", r"webmap\.scene\.wire\.session\.SceneSession"),
     ("py:class", r"webmap\.core\.given_pose\.(Position|Orientation)"),
-    ("py:class", r"webmap\.scene\.(node\.Node|live\.Live)"),
+    ("py:class", r"webmap\.scene\.(node\.Node|live\.(Live|Rays))"),
     ("py:class", r"webmap(\.\w+)+\.[A-Z]"),  # type variables
 ]
 

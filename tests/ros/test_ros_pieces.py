@@ -132,39 +132,35 @@ def test_a_turn_asks_for_processor_time_only_when_it_may_be_over(monkeypatch):
 @pytest.mark.parametrize("longest", [0.001, 0.5])
 def test_the_rest_after_a_step_is_as_long_as_the_step_but_at_most_the_longest(longest):
     async def story():
-        ended, rested = [], []
+        begun, turns_taken, rests = time.thread_time(), [], []
 
         class Long:
             def take(self, turn):
-                if ended:
-                    rested.append(time.monotonic() - ended[0])
+                turns_taken.append(turn)
+                if len(turns_taken) == 2:
                     return None
                 while time.thread_time() < begun + 0.05:
                     pass
-                ended.append(time.monotonic())
                 return 0.0
 
-        turns().longest_rest = longest
-        begun = time.thread_time()
-        turns().ask(Long())
-        while not rested:
-            await asyncio.sleep(0.001)
-        return rested[0]
+        loop = asyncio.get_running_loop()
+        call_later = loop.call_later
 
-    delays = []
-    loop_type = asyncio.SelectorEventLoop
-    call_later = loop_type.call_later
+        def noted(delay, callback, *args, **options):
+            if getattr(callback, "__name__", "") == "_step":
+                rests.append(delay)
+            return call_later(delay, callback, *args, **options)
 
-    def noted(loop, delay, callback, *args, **options):
-        if getattr(callback, "__name__", "") == "_step":
-            delays.append(delay)
-        return call_later(loop, delay, callback, *args, **options)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(loop, "call_later", noted)
+            turns().longest_rest = longest
+            turns().ask(Long())
+            while len(turns_taken) < 2:
+                await asyncio.sleep(0.001)
+        return rests
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loop_type, "call_later", noted)
-        asyncio.run(story())
-    (delay,) = delays
-    assert delay == longest if longest < 0.04 else 0.04 <= delay < longest
+    (rest,) = asyncio.run(story())
+    assert rest == longest if longest < 0.04 else 0.04 <= rest < longest
 
 
 def test_a_link_that_asks_for_a_delay_gets_its_next_turn_after_the_delay():
