@@ -8,6 +8,7 @@ from frames_only import TF, telling
 
 from webmap import Bridge
 from webmap.base.geometry import Pose
+from webmap.base.looking import looking
 from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.frame_listening import LateFrames, late_frames
@@ -151,3 +152,14 @@ def test_received_frames_are_kept_for_the_next_discovery():
                 await bridge.stop()
 
         asyncio.run(scenario())
+
+
+def test_no_frames_are_asked_for_while_nobody_looks(monkeypatch):
+    asked = []
+    bridge = Bridge("ws://127.0.0.1:9")
+    monkeypatch.setattr(
+        bridge, "subscribe", lambda topic, *_, **__: asked.append(topic)
+    )
+    monkeypatch.setattr(looking, "somebody", False)
+    trees = asyncio.run(LateFrames(bridge).listen({"/tf": TF}))
+    assert (asked, trees.parents) == ([], {})

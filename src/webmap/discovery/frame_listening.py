@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 
 from webmap.base.errors import BridgeClosed
+from webmap.base.looking import looking
 from webmap.base.scope import no_scope
 from webmap.discovery.tf_robots import Trees
 from webmap.ros.bridge import Bridge, TemporaryBridge
@@ -54,13 +55,16 @@ class LateFrames:
     ) -> Trees:
         """Listen for a short time, and return all frames received up to now.
 
+        While nobody looks, it does not listen: a robot that has only ``/tf`` is found
+        when a page is open.
+
         Args:
             topics: Types by topic, as the bridge lists them.
             seconds: How long to listen.
 
         """
         wanted = frame_topics(topics)[:MOST_TOPICS]
-        if not wanted:
+        if not wanted or not looking.somebody:
             return self.trees
         with no_scope():
             subscriptions = [
