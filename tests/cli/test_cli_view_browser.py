@@ -13,7 +13,7 @@ from webmap_process import simulator
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 
-def expect_two_robots_on_their_map(page, within=15_000):
+def expect_two_robots_on_their_map(page, within=40_000):
     expect(page.locator("#robots .row")).to_have_count(2, timeout=within)
     expect(page.locator(".robot:not(.unplaced)")).to_have_count(2, timeout=within)
     expect(page.locator(".occupancy-grid.map image")).to_have_count(1, timeout=within)
@@ -64,7 +64,7 @@ def test_robots_of_a_bridge_that_starts_later_appear_on_the_open_page(
     with shown(chromium, "view", url, "--wait", "0") as page:
         expect(page.locator("#robots .row")).to_have_count(0)
         with simulator("--port", str(later_port)):
-            expect_two_robots_on_their_map(page, 40_000)
+            expect_two_robots_on_their_map(page)
 
 
 def test_the_page_shows_the_robots_and_title_of_a_fleet_file(chromium, ros1, tmp_path):

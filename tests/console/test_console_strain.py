@@ -65,6 +65,8 @@ def test_five_hundred_robots_are_listed_found_and_counted(chromium):
         assert_free(page.locator(STOP_ALL))
         page.keyboard.press("Control+k")
         page.keyboard.type("robot 499")
+        found = page.get_by_role("option", name="Robot 499").first
+        expect(found).to_be_visible(timeout=60_000)
         page.keyboard.press("Enter")
         expect(page.locator("#card h2")).to_have_text("Robot 499", timeout=60_000)
         page.locator("#search").fill("robot 49")
