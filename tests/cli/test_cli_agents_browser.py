@@ -14,7 +14,7 @@ from webmap_process import page_of, simulator, webmap
 pytest.importorskip("zenoh")
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-SOON = 20_000
+SOON = 30_000
 
 
 TOMORROW = """

@@ -16,7 +16,7 @@ from webmap.base.errors import MotionError, NoLease
 from webmap.base.geometry import Pose, Twist
 from webmap.base.lifecycle import lifecycle
 from webmap.base.tasks import spawn
-from webmap.config.checks import Mistakes
+from webmap.config.checks import Mistakes, same_name
 from webmap.config.motion import (
     TWIST_TYPES,
     InitialPoseConfig,
@@ -85,6 +85,22 @@ def _id_of(name: str) -> str:
     id = f"r{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
     _used[id] += 1
     return id if _used[id] == 1 else f"{id}-{_used[id]}"
+
+
+def shown_name(name: str, agent: str) -> str:
+    """Return the name of a robot on every display, and in the reports of its gate.
+
+    It contains the name of its agent, whichever agents a display knows: operators of
+    several displays mean the same robot by the same name.
+
+    Args:
+        name: The name of the robot.
+        agent: The name of its agent; "" for none.
+
+    """
+    if not agent or same_name(name) == same_name(agent):
+        return name
+    return f"{name} ({agent})"
 
 
 class RobotMotion:
@@ -265,7 +281,7 @@ class RobotMotion:
         odometry = self._odometry
         return RobotSpec(
             id=self.id,
-            name=self._name,
+            name=shown_name(self._name, self.agent),
             bridge_url=link.url,
             twist_type=(twist.type if twist else None) or TWIST_TYPES[0],
             base_frame=self.base_frame,

@@ -25,12 +25,11 @@ from webmap.base.errors import WebMapError
 from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import no_scope
 from webmap.base.tasks import spawn
-from webmap.config.checks import same_name
 from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.console import Console, make_robot
 from webmap.console.fleet import draw_picture
 from webmap.core.configure import apply
-from webmap.core.motion import given_id
+from webmap.core.motion import given_id, shown_name
 from webmap.core.pictures import pictures
 from webmap.core.runtime import runtime
 from webmap.fleet.passed_on import accepted, received_picture
@@ -316,15 +315,6 @@ def _undrawn(agent: KnownAgent) -> list[_Shown]:
         if each.drawn != each.picture
         and (each.picture is None or agent.pictures.get(each.picture.file) != "")
     ]
-
-
-def shown_name(name: str, agent: str) -> str:
-    """Return the name of an agent's robot on every display.
-
-    It does not depend on which agents a display knows: operators of several displays
-    mean the same robot by the same name.
-    """
-    return name if same_name(name) == same_name(agent) else f"{name} ({agent})"
 
 
 def find_agents(routers: Sequence[str], bridges: "list[Bridge]") -> list[Agents]:
