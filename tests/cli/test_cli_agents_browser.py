@@ -103,6 +103,8 @@ def test_two_displays_drive_one_robot_in_turn_and_either_stops_it(chromium, yard
     with display(chromium, yard) as ann, display(chromium, yard) as ben:
         for page in (ann, ben):
             choose(page, "bay1")
+        stop = ben.locator(".stop-place .webmap-teleop-stop")
+        expect(stop).to_have_attribute("data-robot", "robot_0 (bay1)", timeout=SOON)
         title = ann.locator(".webmap-teleop-title")
         hold(ann.keyboard, "w", lambda: title.text_content() == "You are driving")
         state = ben.locator("#card")
