@@ -3,8 +3,9 @@
 import asyncio
 
 import pytest
-from gate_harness import Bench, spec
+from gate_harness import URL, Bench, spec
 
+from webmap.base.geometry import Twist
 from webmap.gate import actions, events, protocol
 from webmap.gate.disk import Disk, Records, path_of
 from webmap.gate.events import Key, LockState, Press, StopFileChanged
@@ -107,6 +108,28 @@ def test_a_page_that_comes_and_goes_concerns_only_the_machine_that_it_has(work):
     done = work_of(work, lambda: bench.tell(protocol.Disconnect("a")))
     assert (done["asked"], done["reports"]) == (1, 1)
     assert bench.state == "free"
+
+
+def test_odometry_of_a_stopped_robot_makes_no_report_of_other_stopped_robots(work):
+    names = [f"s{number}" for number in range(20)]
+    bench = Bench().begin(
+        *(
+            spec(id=name, twist_topic=f"/{name}/cmd_vel", odometry_topic=f"/{name}")
+            for name in names
+        )
+    )
+    keys = [Key(URL, f"/{name}/cmd_vel") for name in names]
+    bench.say("a", op="stop", robot="*")
+
+    def measure(speed):
+        for key in keys:
+            bench.tell(events.OdometryReceived(key, Twist(speed, 0.0, 0.0)))
+
+    measure(0.1)
+    done = work_of(work, lambda: measure(0.2))
+    assert done["reports"] == len(names)
+    bench.run(0.2)
+    assert [bench.report(name).measured[0] for name in names] == [0.2] * len(names)
 
 
 def test_a_stalled_link_among_many_is_closed_after_a_second():

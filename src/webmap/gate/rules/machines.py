@@ -60,6 +60,9 @@ class Machines:
         self._links: dict[tuple[str, events.Lane], LinkHealth] = {}
         self._reporters: dict[str, Reporter] = {}
         self._touched: set[events.Key] = set()
+        self._later: set[events.Key] = set()
+        """Machines with a report that the next step looks at again. After each event
+        it would cost a report of every other machine."""
         self._awake: set[Machine] = set()
         """The active machines; only an event changes that, or their own step."""
         self._oldest_answer = float("-inf")
@@ -170,6 +173,8 @@ class Machines:
                 machine.step(now)
                 self._touched.add(machine.key)
                 self._drop_if_empty(machine)
+        self._touched |= self._later
+        self._later.clear()
         if now - self._oldest_answer > STALL_LIMIT:
             self._cut_stalled(now)
 
@@ -216,7 +221,7 @@ class Machines:
         if due:
             self._emit(SendToDisplay(latest))
         elif due is None:
-            self._touched.add(machine.key)
+            self._later.add(machine.key)
 
     # Declarations of the display.
 
