@@ -78,6 +78,16 @@ def test_a_page_that_changes_its_speed_limit_receives_a_report_at_once(pages):
     assert cap_of(said) == (0.8, 1.2, ["limit of the page"])
 
 
+def test_a_page_that_sets_the_same_speed_limit_again_receives_nothing(pages):
+    connection, said = join(pages, 0.8, 1.2)
+    pages.on_report(free(v_max=None, w_max=None))
+    received = len(said)
+    connection.set_speeds(0.8, 1.2)
+    assert len(said) == received
+    connection.set_speeds(0.4, 1.2)
+    assert len(said) == received + 1
+
+
 def test_a_page_without_control_does_not_change_the_reported_speed(pages):
     bench = Bench().begin()
     bench.take("b")

@@ -249,21 +249,25 @@ class PageSocket:
             on_rest(message.get("text") or message.get("bytes") or "")
 
     async def _write(self) -> None:
+        loop = asyncio.get_running_loop()
         while True:
             item = self._queue.pop()
             if item is None:
                 self._wake.clear()
                 await self._wake.wait()
                 continue
+            # A timer costs a tenth of asyncio.timeout(), and nearly no message waits.
+            stalled = loop.call_later(STALLED_S, self._stalled)
             try:
-                async with asyncio.timeout(STALLED_S):
-                    await self._send(item)
-            except TimeoutError:
-                self._end(COME_BACK, f"this page read no message for {STALLED_S:.0f} s")
-                return
+                await self._send(item)
             except _GONE:
                 self._gone = True
                 return
+            finally:
+                stalled.cancel()
+
+    def _stalled(self) -> None:
+        self._end(COME_BACK, f"this page read no message for {STALLED_S:.0f} s")
 
     async def _send(self, item: bytes | str) -> None:
         if isinstance(item, str):

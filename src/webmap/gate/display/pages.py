@@ -85,7 +85,6 @@ A tick and a report of a robot whose gate is that of an agent have one more fiel
 """
 
 import itertools
-import json
 import logging
 import threading
 from collections.abc import Callable
@@ -148,7 +147,7 @@ def refused_text(refused: Refused) -> str:
 
 
 def _text(op: str, **fields: object) -> str:
-    return json.dumps({"op": op, **fields}, allow_nan=False, separators=(",", ":"))
+    return msgspec.json.encode({"op": op, **fields}).decode()
 
 
 log = logging.getLogger("webmap.gate")
@@ -184,9 +183,11 @@ class DriveConnection:
 
     def set_speeds(self, v: float, w: float) -> None:
         """Set the page's own speed limits, in m/s and rad/s."""
-        self._speeds = protocol.Speeds(self.id, v, w)
-        self.cap = page_cap(v, w)
-        self._pages.new_speeds(self, self._speeds)
+        speeds = protocol.Speeds(self.id, v, w)
+        if speeds != self._speeds:  # a page sets them several times while it opens
+            self._speeds = speeds
+            self.cap = page_cap(v, w)
+            self._pages.new_speeds(self, speeds)
 
     def close(self) -> None:
         """Remove the page, which has closed; the robots that it drove stop."""
@@ -371,6 +372,8 @@ class Pages:
                 connection.greeted = False
 
     def _show(self, connection: DriveConnection, report: protocol.RobotReport) -> None:
+        if not connection.greeted:
+            return
         holder = None if report.holder is None else report.holder.connection
         text = robot_text(
             report,
