@@ -3,10 +3,10 @@
 Robots send odometry at 10 Hz; more and more of them, until the oldest percent of the
 poses is older than 150 ms: at a viewer of the display, and at the gate, where each but
 one was stopped and is watched, and where one is driven. Then more and more viewers of
-100 robots, with the setting for it, and with five that read nothing.
+100 robots, with the setting for it, until frames are that old; and five more that read
+nothing.
 """
 
-import itertools
 import json
 import math
 import os
@@ -30,7 +30,7 @@ from webmap.agents.gates import Gates
 from webmap.gate.protocol import Report, RobotReport, RobotSpec
 
 ROBOTS = (100, 200, 500, 1000, 2000, 4000)
-VIEWERS = (100, 200, 500)
+VIEWERS = (50, 100, 200, 500)
 SHOWN = 100
 """Robots that the viewers see."""
 
@@ -204,35 +204,36 @@ def ramp(
     measure: Callable[[int, float], Figures],
     counts: Iterable[int],
     seconds: float,
+    what: str = "robots",
+    age: str = AGE_99,
 ) -> Comparison:
-    """Measure more and more robots until their poses are too old, or none come."""
+    """Measure more and more of something until an age is too high, or nothing comes."""
     found: dict[str, list[Figures]] = {}
     for count in counts:
-        print(f"{title}: {count} robots", file=sys.stderr)
+        print(f"{title}: {count} {what}", file=sys.stderr)
         try:
             figures = measure(count, seconds)
         except (RuntimeError, TimeoutError) as error:
-            print(f"{title}: {count} robots: {error}", file=sys.stderr)
+            print(f"{title}: {count} {what}: {error}", file=sys.stderr)
             if not found:
                 raise
             names = next(iter(found.values()))[0]
             figures = dict.fromkeys(names, math.nan)
-        found[f"{count} robots"] = [figures]
-        if not figures[AGE_99] <= TOO_OLD:
+        found[f"{count} {what}"] = [figures]
+        if not figures[age] <= TOO_OLD:
             break
     return Comparison(title, found)
 
 
-def end_of(comparison: Comparison) -> str:
-    """Return in words where the poses become older than allowed."""
+def end_of(comparison: Comparison, age: str = AGE_99) -> str:
+    """Return in words where an age becomes higher than allowed."""
     ages = [
-        (int(name.split()[0]), comparison.median(name, AGE_99))
-        for name in comparison.runs
+        (int(name.split()[0]), comparison.median(name, age)) for name in comparison.runs
     ]
     well = max((count for count, age in ages if age <= TOO_OLD), default=0)
     late = min((count for count, age in ages if not age <= TOO_OLD), default=math.inf)
-    end = f"between {well} and {late} robots" if late < math.inf else f"above {well}"
-    return f"{comparison.title}: poses are older than {TOO_OLD:.0f} ms {end}"
+    end = f"between {well} and {late}" if late < math.inf else f"above {well}"
+    return f"{comparison.title}: {age} exceeds {TOO_OLD:.0f} {end}"
 
 
 def plot(ramps: Iterable[Comparison]) -> Plot:
@@ -262,11 +263,10 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     for each in ramps:
         print(end_of(each), end="\n\n")
     save("limits", plot(ramps))
-    many = Comparison(f"viewers of {SHOWN} robots", {})
-    for count, stalled in itertools.chain(
-        zip(viewers, itertools.repeat(0)), [(viewers[0], STALLED)]
-    ):
-        print(f"{count} viewers, {stalled} stalled", file=sys.stderr)
-        name = f"{count} viewers" + (f" and {stalled} that stall" if stalled else "")
-        many.runs[name] = [viewed_by(count, seconds, stalled)]
+    many = ramp(
+        f"viewers of {SHOWN} robots", viewed_by, viewers, seconds, "viewers", FRAME_99
+    )
+    print(end_of(many, FRAME_99), end="\n\n")
+    stalled = viewed_by(viewers[0], seconds, STALLED)
+    many.runs[f"{viewers[0]} viewers and {STALLED} that stall"] = [stalled]
     return [*ramps, many]
