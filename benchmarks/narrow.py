@@ -1,6 +1,6 @@
 """A narrow uplink: does the lane of ticks and commands stay free while data suffers?
 
-Between an agent and its router is a line of 1 Mbit/s, each way, for both sessions of
+Between an agent and its router is a line of 1 Mbit/s, each way, for all sessions of
 the agent. A display subscribes to more and more of the robots' data. An operator at the
 same display holds a robot and sends commands, all of speed zero, 20 times a second.
 

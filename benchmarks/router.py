@@ -13,7 +13,7 @@ from typing import Any
 from benchmarks.harness import Comparison, Contender, Figures, compare
 from benchmarks.processes import started, used
 from webmap.agents.address import locator
-from webmap.agents.peer import zenoh_config
+from webmap.agents.peer import COPIES, zenoh_config
 
 RATE = 1000
 """Messages that the sender sends a second."""
@@ -130,8 +130,8 @@ class Layout:
 
 
 UP: dict[str, tuple[float, int]] = {
-    "ticks": (20.0, 140),
-    "reports": (2.0, 700),
+    "ticks": (20.0 * COPIES, 140),
+    "reports": (2.0 * COPIES, 700),
     "beacons": (2.0, 160),
     "poses": (10.0, 290),
     "scans": (10.0, 1370),
@@ -139,7 +139,10 @@ UP: dict[str, tuple[float, int]] = {
 }
 """What an agent of one robot sends: messages a second and bytes of each on the link."""
 
-DOWN: dict[str, tuple[float, int]] = {"answers": (20.0, 110), "pages": (2.0, 180)}
+DOWN: dict[str, tuple[float, int]] = {
+    "answers": (5.0 * COPIES, 110),
+    "pages": (2.0 * COPIES, 180),
+}
 """What a display sends to each agent that it shows."""
 
 

@@ -281,3 +281,20 @@ def test_a_program_takes_no_robot_of_an_agent(connected):
     (reply,) = connected.owner.of(TakeReply)
     assert (reply.request, reply.epoch) == (4, None)
     assert "an agent" in reply.why
+
+
+def answers(bench, begin, seconds=1.0):
+    """Return how many samples the display sends to an agent that sends ticks."""
+    bench.sent.clear()
+    for step in range(round(20 * seconds)):
+        now = begin + step / 20
+        bench.hears(Tick(2, {}), now)
+        bench.far.beat(now)
+    return len(bench.sent)
+
+
+def test_a_display_answers_more_often_while_a_page_sends_commands(connected):
+    assert answers(connected, 1.0) < 10
+    connected.far.send(FromPage(PAGE.connection, b'{"op":"drive"}'))
+    assert answers(connected, 2.0) > 20
+    assert answers(connected, 4.0) < 10

@@ -70,14 +70,14 @@ def test_an_agent_sends_as_itself_and_a_display_as_its_user(users):
     rules = {rule["id"]: rule for rule in access_rules(read_users(users))["rules"]}
     assert rules["bay3-sends"]["key_exprs"] == [
         "webmap/bay3/here",
-        "webmap/bay3/gate/out",
+        "webmap/bay3/gate/out/*",
         "webmap/bay3/data/out/**",
         "webmap/bay3/topics/**",
         "webmap/bay3/pictures/out/**",
         "webmap/bay3/pictures/of/*",
     ]
     assert rules["west-sends"]["key_exprs"] == [
-        "webmap/bay3/gate/in/west/*",
+        "webmap/bay3/gate/in/west/*/*",
         "webmap/bay3/data/in/west/*/*",
         "webmap/bay3/pictures/in/west/*",
     ]

@@ -83,6 +83,21 @@ def test_a_link_that_carries_nothing_stops_the_robot(bench, hop):
     back(bench)
 
 
+@pytest.mark.parametrize("number", range(3), ids=["first", "second", "third"])
+@pytest.mark.parametrize("hop", ["display_hop", "agent_hop"])
+def test_one_connection_that_stalls_does_not_stop_the_robot(bench, hop, number):
+    proxy = getattr(bench, hop)
+    assert proxy.links == 3, "two for the gate, one for data"
+    bench.drive_off()
+    at = time.monotonic()
+    proxy.hold_link(number)
+    pass_time(1.0)
+    proxy.release_link(number)
+    pass_time(0.5)
+    assert bench.robot.log.first_zero(at) is None, "the robot was stopped"
+    prove(bench, "letting go", lambda: bench.driver.order("x 0"), 0.15)
+
+
 @pytest.mark.parametrize("hop", ["display_hop", "agent_hop"])
 def test_a_link_that_is_reset_stops_the_robot(bench, hop):
     proxy = getattr(bench, hop)

@@ -88,7 +88,7 @@ class Sender(NamedTuple):
     instance: str
     """One process of the user."""
     lane: str = ""
-    """One connection of the process, for data."""
+    """One connection of the process."""
 
     @property
     def display(self) -> str:
@@ -118,12 +118,12 @@ def about(agent: str) -> str:
 
 
 def gate_out(agent: str) -> str:
-    """Return the key of the samples of an agent's gate."""
+    """Return the key of the samples of an agent's gate; each copy has one under it."""
     return f"webmap/{agent}/gate/out"
 
 
 def gate_in(agent: str, user: str, instance: str) -> str:
-    """Return the key of the samples of a display for a gate."""
+    """Return the key of a display's samples for a gate; each copy has one under it."""
     return f"webmap/{agent}/gate/in/{user}/{instance}"
 
 

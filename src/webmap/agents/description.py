@@ -4,7 +4,7 @@ from typing import Any
 
 import msgspec
 
-PROTOCOL = 1
+PROTOCOL = 2
 """The version of what agents and displays exchange."""
 
 

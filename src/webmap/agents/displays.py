@@ -50,7 +50,7 @@ MOST_DISPLAYS = 100
 
 
 class Answer(msgspec.Struct, frozen=True, tag="answer"):
-    """A display has received this sample of the agent; sent every 50 ms."""
+    """A display has received this sample of the agent; sent 5 to 20 times a second."""
 
     session: int
     number: int

@@ -32,6 +32,15 @@ LOST = 0.5
 AGAIN = 0.1
 """Seconds until a STOP that the agent has not acknowledged is sent again."""
 
+ANSWER = 0.2
+"""Seconds between two answers to the agent while no page sends commands."""
+
+COMMANDING = 1.0
+"""Seconds after a command of a page in which each step answers.
+
+The answers then help TCP to notice lost commands, and their age is known sooner.
+"""
+
 ALL_PAGES = 0.5
 """Seconds between two lists of all pages."""
 
@@ -85,7 +94,7 @@ class FarGate:
         self._stops: dict[int, tuple[float, protocol.FromPage]] = {}
         """The STOPs without an acknowledgement, by number, each with its time."""
         self._latest: dict[str, RobotReport] = {}
-        self._listed_at = float("-inf")
+        self._listed_at = self._answered_at = self._commanded_at = float("-inf")
 
     def start(self) -> None:
         """Do nothing: the gate runs already, or its agent is away."""
@@ -118,7 +127,9 @@ class FarGate:
                     if program is None:
                         return
                     message = program
-                case protocol.FromPage() | protocol.Speeds():
+                case protocol.FromPage():
+                    self._commanded_at = self._heard_at
+                case protocol.Speeds():
                     pass
                 case _:
                     return
@@ -159,7 +170,10 @@ class FarGate:
                 self._lose(f"no connection to the agent {self.agent}")
             if self._order.session is None:
                 return
-            self._put(Answer(self._order.session, self._order.newest))
+            pause = 0.0 if now - self._commanded_at < COMMANDING else ANSWER
+            if now - self._answered_at >= pause:
+                self._answered_at = now
+                self._put(Answer(self._order.session, self._order.newest))
             if not self.ready:
                 return
             for number, (at, stop) in list(self._stops.items()):

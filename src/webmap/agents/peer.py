@@ -1,7 +1,9 @@
 """The sessions of this process with one Zenoh router.
 
-Commands and ticks have a session of their own: on one session with data they waited
-for seconds over a narrow link, whatever their priority. Both are clients of the router,
+Commands and ticks have sessions of their own: on one session with data they waited for
+seconds over a narrow link, whatever their priority. There are two of them, each a
+connection with every sample, of which the first copy counts: while a lost packet of one
+connection is sent again, the other goes on. All sessions are clients of the router,
 find nobody by themselves and listen on nothing.
 """
 
@@ -27,6 +29,9 @@ log = logging.getLogger("webmap.agent")
 
 Handler = Callable[[str, bytes], None]
 """Called with the key and the bytes of a message, in a thread of Zenoh."""
+
+COPIES = 2
+"""Sessions for the gate; each carries every sample."""
 
 RETRY = 0.2
 """Seconds between two attempts to reach the router."""
@@ -114,11 +119,11 @@ class Peer:
         zenoh_config()  # to fail here, not in a thread
         self._lock = threading.Lock()
         self._ended = threading.Event()
-        self._gate: zenoh.Session | None = None
+        self._gate: list[zenoh.Session] = []
         self._data: zenoh.Session | None = None
         self._handlers: dict[int, tuple[str, Handler, bool]] = {}
         self._answers: dict[str, Callable[[], bytes]] = {}
-        self._declared: dict[int, Any] = {}
+        self._declared: dict[int, list[Any]] = {}
         self._number = 0
         self._waiting: OrderedDict[str, deque[bytes]] = OrderedDict()
         self._wake = threading.Condition()
@@ -145,13 +150,21 @@ class Peer:
             self._wake.notify_all()
         for thread in self._threads:
             thread.join(5.0)
-        for session in (self._gate, self._data):
+        for session in (*self._gate, self._data):
             if session is not None:
                 session.close()  # type: ignore[no-untyped-call]
-        self._gate = self._data = None
+        self._gate, self._data = [], None
 
     def listen(self, key: str, fn: Handler, *, gate: bool = False) -> int:
-        """Call ``fn`` with each message under a key; return a number to end it."""
+        """Call ``fn`` with each message under a key; return a number to end it.
+
+        Args:
+            key: The key; ``*`` and ``**`` match parts of keys.
+            fn: Receives the messages.
+            gate: Whether they are samples of :meth:`put_gate`. Each comes up to
+                :data:`COPIES` times, in as many threads.
+
+        """
         with self._lock:
             self._number += 1
             number = self._number
@@ -163,9 +176,9 @@ class Peer:
         """End :meth:`listen`."""
         with self._lock:
             self._handlers.pop(number, None)
-            declared = self._declared.pop(number, None)
-        if declared is not None:
-            declared.undeclare()
+            declared = self._declared.pop(number, [])
+        for each in declared:
+            each.undeclare()
 
     def answer(self, key: str, fn: Callable[[], bytes]) -> None:
         """Answer every question for a key with the result of ``fn``."""
@@ -188,10 +201,9 @@ class Peer:
         """Send a sample of the gate now, or not at all."""
         import zenoh
 
-        session = self._gate
-        if session is not None:
+        for copy, session in enumerate(self._gate):
             session.put(
-                key,
+                f"{key}/{copy}",
                 data,
                 congestion_control=zenoh.CongestionControl.DROP,
                 priority=zenoh.Priority.REAL_TIME,
@@ -279,7 +291,8 @@ class Peer:
         failures = 0
         while not self._ended.is_set():
             try:
-                self._gate = self._gate or zenoh.open(zenoh_config(**self._config))
+                while len(self._gate) < COPIES:
+                    self._gate.append(zenoh.open(zenoh_config(**self._config)))
                 self._data = self._data or zenoh.open(zenoh_config(**self._config))
                 break
             except zenoh.ZError:
@@ -298,10 +311,8 @@ class Peer:
 
     def _look(self) -> None:
         """Note whether the router is connected."""
-        there = all(
-            session is not None and session.info.routers_zid()
-            for session in (self._gate, self._data)
-        )
+        data = self._data is not None and self._data.info.routers_zid()
+        there = data and any(session.info.routers_zid() for session in self._gate)
         if there and not self.connected:
             self.trouble = None
             log.info("the router at %s is connected", self.locator)
@@ -322,8 +333,7 @@ class Peer:
 
     def _declare(self, number: int) -> None:
         key, fn, gate = self._handlers[number]
-        session = self._gate if gate else self._data
-        if session is None or number in self._declared:
+        if self._data is None or number in self._declared:
             return
 
         def call(sample: "zenoh.Sample") -> None:
@@ -332,7 +342,14 @@ class Peer:
             except Exception:
                 log.exception("%s: a message was lost", key)
 
-        self._declared[number] = session.declare_subscriber(key, call)
+        places = [(self._data, key)]
+        if gate:
+            places = [
+                (session, f"{key}/{copy}") for copy, session in enumerate(self._gate)
+            ]
+        self._declared[number] = [
+            session.declare_subscriber(place, call) for session, place in places
+        ]
 
     def _declare_answer(self, key: str) -> None:
         def call(query: "zenoh.Query") -> None:

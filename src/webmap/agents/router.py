@@ -17,7 +17,7 @@ from webmap.agents.address import EVERY, checked_name, here, locator
 from webmap.base.errors import ConfigError
 
 MOST_SESSIONS = 10_000
-"""Sessions of a router; each agent and each display has two."""
+"""Sessions of a router; each agent and each display has three."""
 
 LOOPBACK = ("127.0.0.1", "[::1]", "localhost")
 
@@ -201,7 +201,7 @@ def _keys_of_agent(agent: str) -> list[str]:
     root = f"webmap/{agent}"
     return [
         f"{root}/here",
-        f"{root}/gate/out",
+        f"{root}/gate/out/*",
         f"{root}/data/out/**",
         f"{root}/topics/**",
         f"{root}/pictures/out/**",
@@ -218,7 +218,7 @@ def _keys_for_agent(agent: str) -> list[str]:
 def _keys_of_display(agent: str, user: str) -> list[str]:
     root = f"webmap/{agent}"
     return [
-        f"{root}/gate/in/{user}/*",
+        f"{root}/gate/in/{user}/*/*",
         f"{root}/data/in/{user}/*/*",
         f"{root}/pictures/in/{user}/*",
     ]
@@ -228,7 +228,7 @@ def _keys_for_display(agent: str, user: str) -> list[str]:
     root = f"webmap/{agent}"
     return [
         f"{root}/here",
-        f"{root}/gate/out",
+        f"{root}/gate/out/*",
         f"{root}/data/out/{user}/*/*",
         f"{root}/topics/**",
         f"{root}/pictures/out/{user}/*",

@@ -1,11 +1,13 @@
 """Numbered samples: what is lost, doubled or out of order is noticed.
 
 A sample carries one message of the gate. It begins with the random number of its
-sender's session and with its own number, which grows by one.
+sender's session and with its own number, which grows by one. Copies of it come over
+several connections, each of which delivers in order; the first copy counts.
 """
 
 import secrets
 import struct
+from collections import deque
 
 from webmap.base.errors import WireError
 
@@ -13,6 +15,9 @@ _head = struct.Struct("<QQ")
 
 MAX_BYTES = 1 << 20
 """The longest sample, in bytes."""
+
+SESSIONS = 16
+"""Ended sessions that are remembered; a slow connection may bring more of them."""
 
 
 class Numbering:
@@ -40,13 +45,13 @@ class Order:
         """The number of the newest accepted sample."""
         self.lost = 0
         """How many samples never came."""
-        self.refused = 0
-        """How many samples came twice or too late."""
+        self._ended: deque[int] = deque(maxlen=SESSIONS)
 
     def take(self, sample: bytes) -> tuple[bytes | None, bool]:
         """Return the body of a sample, and whether its sender has restarted.
 
-        The body is None if the sample came twice or after a newer one.
+        The body is None if the sample came twice, after a newer one, or after the
+        session that followed its own.
 
         Raises:
             WireError: If the bytes are no sample.
@@ -58,11 +63,12 @@ class Order:
                 f"expected {_head.size} to {MAX_BYTES}"
             )
         session, number = _head.unpack_from(sample)
-        restarted = session != self.session
+        restarted = session != self.session and session not in self._ended
         if restarted:
+            if self.session is not None:
+                self._ended.append(self.session)
             self.session, self.newest = session, number - 1
-        if number <= self.newest:
-            self.refused += 1
+        if session != self.session or number <= self.newest:
             return None, False
         self.lost += number - self.newest - 1
         self.newest = number

@@ -109,7 +109,7 @@ class FaultProxy:
     def __init__(self, port: int) -> None:
         self.target = port
         self._thread = LoopThread("fault-proxy")
-        self._links: set[_Link] = set()
+        self._links: dict[_Link, None] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         # Weak, because a client that reconnects for days leaves thousands behind.
         self._writers: WeakSet[asyncio.StreamWriter] = WeakSet()
@@ -180,6 +180,19 @@ class FaultProxy:
 
         self._thread.do(release)
 
+    def hold_link(self, number: int) -> None:
+        """Hold all bytes of one link.
+
+        Args:
+            number: Its place among the links, in the order in which they were opened.
+
+        """
+        self._thread.do(lambda: list(self._links)[number].flowing.clear())
+
+    def release_link(self, number: int) -> None:
+        """Pass on all bytes that :meth:`hold_link` has held."""
+        self._thread.do(lambda: list(self._links)[number].flowing.set())
+
     def reset(self) -> None:
         """Reset every link (RST) at both ends; new ones are accepted."""
 
@@ -227,11 +240,11 @@ class FaultProxy:
             return
         self._writers.add(far[1])
         link = _Link((reader, writer), far, self._directions)
-        self._links.add(link)
+        self._links[link] = None
         try:
             await link.run()
         finally:
-            self._links.discard(link)
+            self._links.pop(link, None)
 
 
 class _Link:
@@ -241,10 +254,12 @@ class _Link:
         self, near: Stream, far: Stream, directions: dict[str, Direction]
     ) -> None:
         self._task = asyncio.current_task()
+        self.flowing = asyncio.Event()
+        self.flowing.set()
         self._writers = [near[1], far[1]]
         self._pumps = {
-            "up": _Pump(near[0], far[1], directions["up"]),
-            "down": _Pump(far[0], near[1], directions["down"]),
+            "up": _Pump(near[0], far[1], directions["up"], self.flowing),
+            "down": _Pump(far[0], near[1], directions["down"], self.flowing),
         }
 
     async def run(self) -> None:
@@ -279,7 +294,9 @@ class _Pump:
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
         direction: Direction,
+        flowing: asyncio.Event,
     ) -> None:
+        self._flowing = flowing
         self._reader = reader
         self._writer = writer
         self._direction = direction
@@ -303,9 +320,15 @@ class _Pump:
             self._waiting.extend(self._shaper.take(data, loop.time()))
             self._more.set()
             # A held link stops reading too, so that the sender's buffers fill.
-            await self._direction.flowing.wait()
+            await self._flow()
         self._ended = True
         self._more.set()
+
+    async def _flow(self) -> None:
+        """Wait until neither the direction nor the link is held."""
+        while not (self._direction.flowing.is_set() and self._flowing.is_set()):
+            await self._direction.flowing.wait()
+            await self._flowing.wait()
 
     async def write(self) -> None:
         loop = asyncio.get_running_loop()
@@ -320,7 +343,7 @@ class _Pump:
             due, _ = self._waiting[0]
             if (early := due - loop.time()) > 0:
                 await asyncio.sleep(early)
-            await self._direction.flowing.wait()
+            await self._flow()
             if self._waiting:  # not dropped in the meantime
                 self._writer.write(self._waiting.popleft()[1])
                 await self._writer.drain()
