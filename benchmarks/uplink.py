@@ -1,10 +1,12 @@
 """What displays and viewers cost an agent, and the bytes on its uplink.
 
 The agent of simulated robots with scans, with one display and with several, each a
-process with viewers that draw nothing. A line between agent and router counts the
-bytes: of data, ticks and everything else. They are compared with those of rosbridge in
-JSON: a client that subscribes to the same topics, as often. Figures are for each
+process that draws nothing (``far_display.py``). A line between agent and router counts
+the bytes: of data, ticks and everything else. They are compared with those of rosbridge
+in JSON: a client that subscribes to the same topics, as often. Figures are for each
 message of a topic, because a busy machine makes fewer of them.
+
+What a display subscribes to is found out with one that shows its robots to a viewer.
 """
 
 import asyncio
@@ -13,10 +15,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 
+import psutil
 from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
@@ -28,7 +31,7 @@ from webmap.agents.peer import Peer, User
 from webmap.base.loop_thread import LoopThread
 
 ROBOTS = 20
-SHAPES = ((1, 1), (1, 20), (4, 1), (4, 20))
+SHAPES = ((1, 1), (1, 50), (4, 1), (4, 50))
 """Displays, and viewers of each."""
 
 SLOW = 2.0
@@ -88,7 +91,11 @@ def watched_scene() -> Scene:
 
         near = f"ws://127.0.0.1:{thread.call(listen())}"
         router, _ = running.enter_context(started(*_router()))
-        _agent_and_displays(running, near, router, router, 1, 1, 5.0, [])
+        _agent(running, near, router, [])
+        view = ("view", router, "--port", 0, "--no-browser")
+        folder = running.enter_context(tempfile.TemporaryDirectory())
+        page, _ = running.enter_context(started(*view, state=folder))
+        _start(running, "benchmarks.watchers", page, "1", "5")
         time.sleep(3.0)
     if not scene.subscriptions:
         raise RuntimeError("the agent subscribed to nothing")
@@ -103,58 +110,59 @@ def _router() -> tuple[object, ...]:
     return ("router", "--listen", "tcp/127.0.0.1:0")
 
 
-def _agent_and_displays(
-    running: ExitStack,
-    bridge: str,
-    uplink: str,
-    router: str,
-    displays: int,
-    viewers: int,
-    seconds: float,
-    options: list[object],
-) -> tuple[Callable[[], float], list["subprocess.Popen[str]"]]:
-    """Start an agent and its displays; return its processor time, and the viewers."""
+def _agent(
+    running: ExitStack, bridge: str, router: str, options: list[object]
+) -> psutil.Process:
+    """Start an agent; return its process."""
     folder = running.enter_context(tempfile.TemporaryDirectory())
-    named = ("--router", uplink, "--name", "bay3", *options)
-    _, agent = running.enter_context(
-        started("agent", bridge, *named, state=f"{folder}/agent")
-    )
-    watching = []
-    for number in range(displays):
-        view = ("view", router, "--port", 0, "--no-browser")
-        page, _ = running.enter_context(started(*view, state=f"{folder}/{number}"))
-        command = (sys.executable, "-m", "benchmarks.watchers", page)
-        watching.append(
-            running.enter_context(
-                subprocess.Popen(
-                    [*command, str(viewers), str(seconds)],
-                    stdout=subprocess.PIPE,
-                    text=True,
-                )
-            )
+    named = ("--router", router, "--name", "bay3", *options)
+    return running.enter_context(started("agent", bridge, *named, state=folder))[1]
+
+
+def _start(running: ExitStack, *module: str, says: str = "") -> None:
+    """Run a module of the benchmarks until it is ready, and end it afterwards."""
+    process = running.enter_context(
+        subprocess.Popen(
+            [sys.executable, "-m", *module],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
         )
-        running.callback(watching[-1].terminate)
-    for each in watching:
-        assert each.stdout is not None
-        if each.stdout.readline().strip() != "ready":
-            raise RuntimeError("the viewers saw no frame")
-    return lambda: used(agent), watching
+    )
+    running.callback(process.terminate)
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(says + "\n")
+    process.stdin.flush()
+    if process.stdout.readline().strip() != "ready":
+        raise RuntimeError(f"{module[0]} got no message")
 
 
 def watched_by(
-    displays: int, viewers: int, seconds: float, options: Callable[[], list[object]]
+    displays: int,
+    pages: int,
+    scene: Scene,
+    seconds: float,
+    options: Sequence[object] = (),
 ) -> Callable[[], Figures]:
-    """Return a run with displays, viewers of each, and options of the agent."""
+    """Return a run with displays, pages of each, and options of the agent."""
 
     def run() -> Figures:
         with ExitStack() as running:
             url, _ = running.enter_context(started(*_simulator()))
             router, _ = running.enter_context(started(*_router()))
             line = running.enter_context(Line(int(router.rpartition(":")[2])))
-            uplink = f"zenoh://127.0.0.1:{line.port}"
-            cpu, watching = _agent_and_displays(
-                running, url, uplink, router, displays, viewers, 600.0, options()
+            agent = _agent(
+                running, url, f"zenoh://127.0.0.1:{line.port}", list(options)
             )
+            for _ in range(displays):
+                _start(
+                    running,
+                    "benchmarks.far_display",
+                    f"{router}/bay3",
+                    str(pages),
+                    says=json.dumps(scene.subscriptions),
+                )
             counted = 0
 
             def count(_key: str, _piece: bytes) -> None:
@@ -166,14 +174,12 @@ def watched_by(
             peer.start()
             peer.listen("webmap/bay3/topics/**", count)
             time.sleep(3.0)
-            before, sent, already = cpu(), line.up.bytes, counted
+            before, sent, already = used(agent), line.up.bytes, counted
             begun = time.monotonic()
             time.sleep(seconds)
             took = time.monotonic() - begun
-            spent, sent = cpu() - before, line.up.bytes - sent
+            spent, sent = used(agent) - before, line.up.bytes - sent
             messages = counted - already
-            if any(each.poll() is not None for each in watching):
-                raise RuntimeError("viewers ended early")
         return {
             MESSAGES: messages / took,
             BYTES: sent / messages,
@@ -183,7 +189,7 @@ def watched_by(
     return run
 
 
-def in_json(scene: Callable[[], Scene], seconds: float) -> Callable[[], Figures]:
+def in_json(scene: Scene, seconds: float) -> Callable[[], Figures]:
     """Return a run of one client of the rosbridge, in JSON and without an agent."""
 
     async def listen(url: str, subscriptions: list[dict[str, object]]) -> Figures:
@@ -206,7 +212,7 @@ def in_json(scene: Callable[[], Scene], seconds: float) -> Callable[[], Figures]
 
     def run() -> Figures:
         with started(*_simulator()) as (url, _):
-            return asyncio.run(listen(url, scene().subscriptions))
+            return asyncio.run(listen(url, scene.subscriptions))
 
     return run
 
@@ -220,17 +226,16 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
         thinned += ["--rate", f"{topic}={SLOW:g}"]
     shapes = [
         Contender(
-            f"{displays} displays, {viewers} viewers each",
-            watched_by(displays, viewers, seconds, list),
+            f"{displays} displays, {pages} viewers each",
+            watched_by(displays, pages, scene, seconds),
         )
-        for displays, viewers in (SHAPES[:2] if quick else SHAPES)
+        for displays, pages in (SHAPES[:2] if quick else SHAPES)
     ]
     ways = [
-        Contender("rosbridge, JSON", in_json(lambda: scene, seconds)),
-        Contender("agent", watched_by(1, 1, seconds, list)),
+        Contender("rosbridge, JSON", in_json(scene, seconds)),
+        Contender("agent", watched_by(1, 1, scene, seconds)),
         Contender(
-            f"agent, scans at {SLOW:g} Hz",
-            watched_by(1, 1, seconds, lambda: list(thinned)),
+            f"agent, scans at {SLOW:g} Hz", watched_by(1, 1, scene, seconds, thinned)
         ),
     ]
     return [

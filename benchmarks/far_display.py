@@ -1,0 +1,61 @@
+"""A display of an agent's robots that draws nothing, with pages that only look.
+
+It exchanges with the agent what a display exchanges: it subscribes to topics, connects
+its pages to the agent's gate, and answers that gate. It decodes no message, so several
+of them fit beside an agent on one machine.
+
+Run as ``python -m benchmarks.far_display AGENT PAGES``, with the subscriptions as a
+list in JSON on standard input. Prints ``ready`` when messages come, and ends at the end
+of its standard input.
+"""
+
+import asyncio
+import json
+import sys
+import threading
+
+from webmap.agents.gates import Gates
+from webmap.agents.link import AgentLane
+from webmap.agents.peer import close_peers
+from webmap.base.loop_thread import LoopThread
+from webmap.gate.protocol import RobotSpec
+
+
+def main(agent: str, pages: int) -> None:
+    """Look at an agent until the standard input ends."""
+    subscriptions = json.loads(sys.stdin.readline())
+    heard, thread, gates = threading.Event(), LoopThread("data"), Gates()
+
+    def subscribe() -> None:
+        for op in subscriptions:
+            lane.send(json.dumps(op).encode())
+
+    lane = AgentLane(
+        agent,
+        opened=subscribe,
+        received=lambda _: heard.set(),
+        closed=lambda why: print(f"the connection ended: {why}", file=sys.stderr),
+        failed=lambda error: print(error, file=sys.stderr),
+    )
+
+    async def begin() -> None:
+        lane.start(asyncio.get_running_loop())
+
+    try:
+        gates.declare(RobotSpec(id="looked-at", name="robot", bridge_url=agent))
+        for number in range(pages):
+            gates.connect(f"viewer {number}", "operator", lambda _: None, print)
+        thread.call(begin())
+        if not heard.wait(30):
+            raise TimeoutError(f"no message came from {agent}")
+        print("ready", flush=True)
+        sys.stdin.read()
+    finally:
+        thread.call(lane.stop())
+        thread.end()
+        gates.stop()
+        close_peers()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]))
