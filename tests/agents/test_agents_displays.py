@@ -117,10 +117,18 @@ def test_pages_that_ended_while_the_display_was_slow_are_asked_for(west):
 
 
 def test_a_display_that_lost_a_sample_gets_all_reports_once(west):
-    assert not west.displays.wants_reports()
+    assert not west.displays.wants_reports(1.0)
     assert west.says(ReportAll()) == []
-    assert west.displays.wants_reports()
-    assert not west.displays.wants_reports()
+    assert west.displays.wants_reports(1.0)
+    assert not west.displays.wants_reports(1.0)
+
+
+def test_displays_that_ask_for_all_reports_again_and_again_get_them_with_pauses(west):
+    sent = 0
+    for step in range(100):
+        assert west.says(ReportAll()) == []
+        sent += west.displays.wants_reports(1.0 + step / 100)
+    assert sent == 5
 
 
 def test_an_agent_remembers_a_bounded_number_of_displays(monkeypatch):

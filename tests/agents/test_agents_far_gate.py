@@ -6,7 +6,7 @@ import threading
 import msgspec
 import pytest
 
-from webmap.agents.displays import Displays, Took, Unknown
+from webmap.agents.displays import AllReports, Displays, Took, Unknown
 from webmap.agents.far_gate import FarGate
 from webmap.base.errors import WireError
 from webmap.gate import commands
@@ -233,11 +233,17 @@ def test_a_restart_ends_all_leases(connected, how):
 
 def test_lost_samples_make_the_display_ask_for_all_reports(connected):
     connected.arrive()
-    assert connected.displays.wants_reports(), "at the beginning"
+    assert connected.displays.wants_reports(0.0), "at the beginning"
     connected.displays.send(Tick(2, {}), 0.1)  # lost
-    connected.hears(Tick(3, {}), 0.15)
+    connected.hears(Tick(3, {}), 0.25)
     connected.arrive()
-    assert connected.displays.wants_reports()
+    assert connected.displays.wants_reports(0.25)
+
+
+def test_all_reports_come_as_one_sample(connected):
+    other = msgspec.structs.replace(REPORT, robot="r2")
+    connected.hears(AllReports((REPORT, other)), 0.1)
+    assert connected.owner.of(RobotReport) == [REPORT, other]
 
 
 def test_a_page_without_an_answer_is_introduced_again(bench):

@@ -4,7 +4,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 
-from webmap.agents.displays import Displays, ToDisplays, Took
+from webmap.agents.displays import AllReports, Displays, ToDisplays, Took
 from webmap.base.errors import WireError
 from webmap.gate import protocol
 from webmap.gate.commands import Stop, begins_like_stop
@@ -61,9 +61,8 @@ class AgentGate(GateClient):
             unknown = self.displays.unknown(display)
             if unknown is not None:
                 self._send_out(unknown)
-            if self.displays.wants_reports():
-                for report in self._pages.latest:
-                    self._send_out(report)
+            if self.displays.wants_reports(now):
+                self._send_out(AllReports(tuple(self._pages.latest)))
 
     def hear(self, message: FromGate) -> None:
         """Process a message from the gate, and pass it on to the displays."""

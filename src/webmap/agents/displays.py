@@ -24,6 +24,7 @@ from webmap.gate.protocol import (
     FromGate,
     FromPage,
     FromProgram,
+    RobotReport,
     Role,
     Speeds,
     Tick,
@@ -40,6 +41,9 @@ SILENT = 1.0
 
 The gate itself stops a robot 200 ms after the last command; this ends control.
 """
+
+PAUSE = 0.2
+"""The least time between two times that all reports are sent, in seconds."""
 
 MOST_PAGES = 200
 """The greatest number of pages of one display."""
@@ -69,6 +73,12 @@ class ReportAll(msgspec.Struct, frozen=True, tag="report-all"):
     """A display has lost a sample of the agent, and needs all reports again."""
 
 
+class AllReports(msgspec.Struct, frozen=True, tag="reports"):
+    """The newest report of each robot, in one sample: some of many would be lost."""
+
+    reports: tuple[RobotReport, ...]
+
+
 class Took(msgspec.Struct, frozen=True, tag="took"):
     """The agent has received this STOP of a display."""
 
@@ -84,7 +94,7 @@ class Unknown(msgspec.Struct, frozen=True, tag="unknown"):
     connections: tuple[str, ...]
 
 
-ToDisplays = FromGate | Took | Unknown
+ToDisplays = FromGate | AllReports | Took | Unknown
 """What an agent sends to all displays."""
 
 FromDisplay = Connect | Disconnect | FromPage | Speeds | Answer | AllPages | ReportAll
@@ -128,6 +138,7 @@ class Displays:
         self._displays: dict[str, Display] = {}
         self._numbering = Numbering()
         self._sent: deque[tuple[int, float]] = deque()
+        self._reported_at = float("-inf")
 
     @property
     def names(self) -> list[str]:
@@ -143,12 +154,18 @@ class Displays:
             for message in messages
         ]
 
-    def wants_reports(self) -> bool:
-        """Return whether a display needs all reports again; then no longer."""
+    def wants_reports(self, now: float) -> bool:
+        """Return whether a display needs all reports again; then no longer.
+
+        They go to all displays, so those that ask within :data:`PAUSE` get the same.
+        """
         wanting = [each for each in self._displays.values() if each.wants_reports]
+        if not wanting or now - self._reported_at < PAUSE:
+            return False
         for each in wanting:
             each.wants_reports = False
-        return bool(wanting)
+        self._reported_at = now
+        return True
 
     def unknown(self, name: str) -> Unknown | None:
         """Return the pages that a display must introduce again, if there are any."""

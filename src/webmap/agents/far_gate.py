@@ -12,6 +12,7 @@ import msgspec
 
 from webmap.agents.displays import (
     AllPages,
+    AllReports,
     Answer,
     FromDisplay,
     ReportAll,
@@ -222,6 +223,10 @@ class FarGate:
                 if message.connection not in self._pages:
                     return
                 self._greeted.add(message.connection)
+            case AllReports(reports):
+                for report in reports:
+                    self._hear(report)
+                return
             case protocol.RobotReport():
                 self._latest[message.robot] = message
                 self._reported = True
