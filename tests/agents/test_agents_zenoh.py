@@ -112,6 +112,13 @@ def test_a_peer_without_a_router_says_so_and_connects_when_there_is_one():
         peer.close()
 
 
+def test_a_sample_for_a_session_that_closes_is_dropped():
+    with router() as place, peers(place, User()) as (peer,):
+        for session in peer._gate:
+            session.close()
+        peer.put_gate("k", b"late")
+
+
 def test_a_user_with_a_wrong_password_is_not_let_in(users):
     with router(users=users) as place:
         peer = Peer(place, User("west", "wrong"))

@@ -15,6 +15,7 @@ import secrets
 import threading
 from collections import OrderedDict, deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Self
 
 from webmap.agents.address import ANYONE, checked_name, locator
@@ -150,10 +151,11 @@ class Peer:
             self._wake.notify_all()
         for thread in self._threads:
             thread.join(5.0)
-        for session in (*self._gate, self._data):
+        sessions = (*self._gate, self._data)
+        self._gate, self._data = [], None
+        for session in sessions:
             if session is not None:
                 session.close()  # type: ignore[no-untyped-call]
-        self._gate, self._data = [], None
 
     def listen(self, key: str, fn: Handler, *, gate: bool = False) -> int:
         """Call ``fn`` with each message under a key; return a number to end it.
@@ -202,13 +204,14 @@ class Peer:
         import zenoh
 
         for copy, session in enumerate(self._gate):
-            session.put(
-                f"{key}/{copy}",
-                data,
-                congestion_control=zenoh.CongestionControl.DROP,
-                priority=zenoh.Priority.REAL_TIME,
-                express=True,
-            )
+            with suppress(zenoh.ZError):  # it was closed just now
+                session.put(
+                    f"{key}/{copy}",
+                    data,
+                    congestion_control=zenoh.CongestionControl.DROP,
+                    priority=zenoh.Priority.REAL_TIME,
+                    express=True,
+                )
 
     def put_data(self, key: str, data: bytes, *, all: bool = False) -> None:
         """Send data as soon as the link accepts it.
