@@ -26,22 +26,22 @@ class Row:
 
 
 ROWS = [
-    Row("bridge", 30, quick=True),
-    Row("viewers", 45, quick=True),
+    Row("bridge", 25, quick=True),
+    Row("viewers", 40, quick=True),
     Row("wire", 30, quick=True),
     Row("grids", 40),
     Row("drawing", 45, quick=True),
-    Row("latency", 40),
+    Row("latency", 30),
     Row("peers", 25),
     Row("limits", 45),
     Row("console", 60),
     Row("opening", 35),
     Row("agents", 50),
-    Row("uplink", 50),
-    Row("narrow", 45),
-    Row("transports", 45),
-    Row("router", 25),
-    Row("idle", 40, quick=True),
+    Row("uplink", 40),
+    Row("narrow", 40),
+    Row("transports", 25),
+    Row("router", 15),
+    Row("idle", 20, quick=True),
     Row("unwatched", 40),
 ]
 

@@ -19,7 +19,6 @@ from benchmarks.display import display
 from benchmarks.harness import Comparison, Contender, Figures, compare
 
 SOME = 50
-ROBOTS = 200
 MANY = 500
 BEAMS = 360
 CIRCLES = Path(__file__).parent / "circles.js"
@@ -148,18 +147,16 @@ def group_page(robots: int, seconds: float) -> Callable[[], Figures]:
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare WebMap's drawing with circles, and with groups."""
     seconds = 2.0 if quick else 5.0
-    comparisons = []
-    for robots in (20,) if quick else (SOME, ROBOTS):
-        contenders = [
-            Contender("WebMap", webmap_page(robots, BEAMS, seconds)),
-            Contender("circles", circle_page(robots, seconds)),
-        ]
-        title = f"{robots} robots with scans of {BEAMS}"
-        comparisons.append(compare(title, contenders, rounds))
-    contenders = [
+    robots = 20 if quick else SOME
+    scans = [
+        Contender("WebMap", webmap_page(robots, BEAMS, seconds)),
+        Contender("circles", circle_page(robots, seconds)),
+    ]
+    small = [
         Contender("groups", group_page(MANY, seconds)),
         Contender("WebMap", webmap_page(MANY, 0, seconds)),
     ]
-    title = f"{MANY} robots that move, small on the screen"
-    comparisons.append(compare(title, contenders, rounds))
-    return comparisons
+    return [
+        compare(f"{robots} robots with scans of {BEAMS}", scans, rounds),
+        compare(f"{MANY} robots that move, small on the screen", small, rounds),
+    ]

@@ -31,7 +31,7 @@ ROBOTS = 16
 WIDTH = 125_000.0
 """Bytes a second: 1 Mbit/s."""
 
-LOADS = (4, 8, 16)
+LOADS = (8, 16)
 """Robots whose scans and odometry a display shows."""
 
 PERIOD = 0.05

@@ -28,7 +28,7 @@ ROOT = Path(__file__).parents[1]
 PEERS = ROOT / ".venv-peers"
 PYTHON = PEERS / "bin" / "python"
 
-COUNTS = (20, 100)
+ROBOTS = 100
 """Robots."""
 
 SETTLED = 3.0
@@ -200,21 +200,16 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
             servers.append(name)
         else:
             print(f"{name} is left out, because it is not installed: {HOW}")
-    found = []
-    for robots in COUNTS[:1] if quick else COUNTS:
-        contenders = [
-            Contender(name, served(name, robots, seconds)) for name in servers
-        ]
-        title = f"{robots} robots at {RATE} Hz, one viewer"
-        found.append(compare(title, contenders, rounds))
+    robots = 20 if quick else ROBOTS
+    contenders = [Contender(name, served(name, robots, seconds)) for name in servers]
+    title = f"{robots} robots at {RATE} Hz, one viewer"
+    found = [compare(title, contenders, rounds)]
     if not all(path.exists() for path in SCRIPTS):
         print(f"ros2d is left out, because it is not installed: {HOW}")
         return found
-    for robots in COUNTS[:1] if quick else COUNTS:
-        drawn = [
-            Contender("WebMap", drawn_by_webmap(robots, seconds)),
-            Contender("ros2d", drawn_by_ros2d(robots, seconds)),
-        ]
-        title = f"{robots} robots of a rosbridge at {RATE} Hz, one viewer"
-        found.append(compare(title, drawn, rounds))
-    return found
+    drawn = [
+        Contender("WebMap", drawn_by_webmap(robots, seconds)),
+        Contender("ros2d", drawn_by_ros2d(robots, seconds)),
+    ]
+    title = f"{robots} robots of a rosbridge at {RATE} Hz, one viewer"
+    return [*found, compare(title, drawn, rounds)]
