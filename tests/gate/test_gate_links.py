@@ -269,7 +269,7 @@ async def test_a_new_declaration_does_not_advertise_unchanged_topics_again():
 
 
 @in_loop
-async def test_cut_link_cuts_and_reopens_an_existing_link_only():
+async def test_cut_link_cuts_and_reopens_an_existing_link_only(caplog):
     async with noting_bridge() as bridge, Noting() as noting:
         noting.do(actions.CutLink(bridge.url))
         assert noting.events == []
@@ -278,6 +278,7 @@ async def test_cut_link_cuts_and_reopens_an_existing_link_only():
         noting.do(actions.CutLink(bridge.url))
         assert noting.events[-1] == LinkDown(bridge.url, "control")
         await noting.up("control", "control", "tasks")
+        assert "the bridge answered no ping for 1 s; next attempt" in caplog.text
 
 
 @in_loop

@@ -17,7 +17,10 @@ from webmap.gate.lanes.control import ControlLane
 from webmap.gate.lanes.odometry import OdometryLane
 from webmap.gate.lanes.tasks import Calls, TasksLane, Topic, goal_topics, hook_topics
 from webmap.gate.protocol import RobotSpec
+from webmap.gate.rules.health import STALL_LIMIT
 from webmap.gate.rules.motion import ZERO
+
+NO_ANSWER = f"the bridge answered no ping for {STALL_LIMIT:g} s"
 
 
 class Links:
@@ -63,7 +66,7 @@ class Links:
                     self._watch(key)
             case actions.CutLink(url):
                 if url in self._control:
-                    self._control[url].lane.cut("no longer used")
+                    self._control[url].lane.cut(NO_ANSWER)
             case actions.Attach(key, spec):
                 self._attach(key, spec)
             case actions.Detach(key, robot):
