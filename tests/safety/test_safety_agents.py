@@ -1,12 +1,17 @@
 """Everything that can fail between an operator and a robot that has an agent."""
 
 import json
+import random
 import signal
 import time
 
 import pytest
 from safety_agent_bench import ROBOT, AgentBench
 from safety_bench import pass_time, wait_for
+
+from webmap.agents import address
+from webmap.agents.peer import Peer, User
+from webmap.testing import Shape
 
 pytest.importorskip("zenoh")
 pytestmark = [pytest.mark.safety, pytest.mark.serial]
@@ -95,6 +100,48 @@ def test_one_connection_that_stalls_does_not_stop_the_robot(bench, hop, number):
     proxy.release_link(number)
     pass_time(0.5)
     assert bench.robot.log.first_zero(at) is None, "the robot was stopped"
+    prove(bench, "letting go", lambda: bench.driver.order("x 0"), 0.15)
+
+
+@pytest.mark.parametrize("hop", ["display_hop", "agent_hop"])
+def test_a_link_that_becomes_slow_stops_the_robot(bench, hop):
+    proxy = getattr(bench, hop)
+    slow = Shape(latency=0.4, bandwidth=50_000)
+    prove(bench, f"the {hop} becomes slow", lambda: proxy.shape(slow))
+    bench.driver.order("x 1")
+    at = time.monotonic()
+    pass_time(1.5)
+    moved = [t for t in bench.robot.log.twists if t.at > at and not t.is_zero]
+    assert not moved, "commands of a slow link moved the robot"
+    bench.driver.order("x 0")
+    proxy.shape(Shape())
+    pass_time(1.0)
+    back(bench)
+
+
+def test_repeated_and_disordered_samples_of_a_display_move_nothing(bench):
+    recorded = []
+    other = Peer(f"zenoh://127.0.0.1:{bench.port}", User())
+    try:
+        other.start()
+        key = address.gate_in("bay3", address.EVERY, address.EVERY)
+        number = other.listen(key, lambda *sample: recorded.append(sample), gate=True)
+        wait_for(lambda: other.connected, "the router")
+        bench.drive_off()
+        other.unlisten(number)
+        prove(bench, "letting go", lambda: bench.driver.order("x 0"), 0.15)
+        wait_for(lambda: bench.driver.now.get("mine"), "control of the robot")
+        at = time.monotonic()
+        assert any(b'"drive"' in sample for _, sample in recorded)
+        random.Random(1).shuffle(recorded)
+        for where, sample in recorded:
+            other.put_gate(where.rpartition("/")[0], sample)
+            time.sleep(0.001)
+        pass_time(1.0)
+    finally:
+        other.close()
+    moved = [t for t in bench.robot.log.twists if t.at > at and not t.is_zero]
+    assert not moved, "old samples moved the robot"
     prove(bench, "letting go", lambda: bench.driver.order("x 0"), 0.15)
 
 
