@@ -4,14 +4,13 @@ import asyncio
 import logging
 import secrets
 import time
-from collections.abc import Callable
+from typing import Any
 
 from webmap.agents import address, data
 from webmap.agents.heard import Heard
 from webmap.agents.peer import Peer, peer_of
 from webmap.base.errors import BridgeClosed, WireError
 from webmap.ros.bridge import LINKS
-from webmap.ros.received import LinkState
 from webmap.ros.rosbridge.connection import CLOSED_HERE, Lane, Liveness
 from webmap.ros.rosbridge.link import RosbridgeLink
 
@@ -28,73 +27,24 @@ Less than a service call waits, so that it fails with the reason of the attempt.
 
 
 class AgentLane(Lane):
-    """A connection to the rosbridge of an agent, with the methods of ``Lane``.
+    """A connection to the rosbridge of an agent.
 
     Args:
         url: The address of the agent, ``zenoh://host:7447/name``.
-        opened: Called when the connection is open.
-        received: Called with each frame.
-        closed: Called with the reason when an open connection has ended.
-        failed: Called with the error when the connection could not be opened.
-        again: Whether to reopen it whenever it ends or fails.
-        busy: Returns whether the rosbridge may be busy with a large message.
+        options: The other arguments of ``Lane``.
 
     """
 
-    last_heard: float | None = None
-    """When the last data came, on the monotonic clock."""
-
-    def __init__(
-        self,
-        url: str,
-        *,
-        opened: Callable[[], None],
-        received: Callable[[bytes | bytearray], None],
-        closed: Callable[[str], None],
-        failed: Callable[[BridgeClosed], None],
-        again: bool = True,
-        busy: Callable[[], bool] = lambda: False,
-    ) -> None:
-        self.url = url
-        self.state: LinkState = "new"
+    def __init__(self, url: str, **options: Any) -> None:
+        super().__init__(url, **options)
         self._agent = address.agent_in(url)
-        self._opened = opened
-        self._received = received
-        self._closed = closed
-        self._failed = failed
-        self._again = again
-        self._busy = busy
         self._id = secrets.token_hex(4)
         self._peer: Peer | None = None
-        self._task: asyncio.Task[None] | None = None
-        self._liveness: Liveness | None = None
         self._pings = 0
         self._session = ""
         self._trouble = ""
         self._listening: int | None = None
         self._topics: dict[str, Heard] = {}
-
-    @property
-    def lag(self) -> float:
-        """Approximate delay of the data that now comes, from pings, in seconds."""
-        if self._liveness is None:
-            return 0.0
-        return self._liveness.lag(time.monotonic())
-
-    def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begin to connect; a second call while it runs has no effect."""
-        if self._task is None and self.state in ("new", "closed"):
-            self.state = "connecting"
-            self._loop = loop
-            self._task = loop.create_task(self._run())
-
-    async def stop(self) -> None:
-        """Close the connection and do not reopen it."""
-        task, self._task = self._task, None
-        if task is not None:
-            task.cancel()
-            await asyncio.wait([task])
-        self.state = "closed"
 
     def send(self, frame: bytes) -> None:
         """Send an operation, now.
@@ -117,6 +67,7 @@ class AgentLane(Lane):
         self._put(data.pack_frame(frame))
 
     async def _run(self) -> None:
+        self._loop = asyncio.get_running_loop()
         reason = CLOSED_HERE
         try:
             if self._agent is None:
@@ -171,10 +122,10 @@ class AgentLane(Lane):
     async def _keep_open(self) -> str:
         """Keep the connection until it ends; return the reason."""
         session = self._session
-        self.state, self.last_heard = "open", time.monotonic()
+        self.state, self._heard = "open", time.monotonic()
         self._liveness = liveness = Liveness(time.monotonic())
         self._opened()
-        heard = self.last_heard
+        heard = self._heard
         while not liveness.is_dead(time.monotonic(), heard, busy=self._busy()):
             if self._session != session:
                 return self._why_no_bridge() or "the agent has connected again"
@@ -184,7 +135,7 @@ class AgentLane(Lane):
                 liveness.pinged(time.monotonic())
                 self._ask()
             await asyncio.sleep(LOOK)
-            heard = self.last_heard
+            heard = self._heard
         return f"no answer to a ping for {Liveness.LIMIT:g} s"
 
     def _why_no_bridge(self) -> str:
@@ -239,14 +190,14 @@ class AgentLane(Lane):
         except WireError as error:
             log.warning("%s: %s", self.url, error)
             return
-        self.last_heard = time.monotonic()
+        self._heard = time.monotonic()
         if isinstance(received, bytes):
             if self.state == "open":
                 self._deliver(received)
         elif isinstance(received, data.Pong):
             self._session, self._trouble = received.session, received.trouble
             if self._liveness is not None and received.number == self._pings:
-                self._liveness.ponged(self.last_heard)
+                self._liveness.ponged(self._heard)
 
     def _deliver(self, frame: bytes | bytearray) -> None:
         try:
