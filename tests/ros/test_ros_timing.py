@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import pytest
@@ -158,3 +159,32 @@ def test_the_mean_rate_never_exceeds_the_throttle_rate(gaps, period):
         now += gap
         passed += throttle.offer("x", now) is not None
     assert passed <= now / period + 2
+
+
+def played(throttle, times):
+    """Offer messages at some times; return when each listener's message came."""
+    passed, waited = [], 0
+    for now in times:
+        due = throttle.due
+        if due is not None and due <= now:
+            assert throttle.take(due) is not None
+            passed.append(due)
+            waited += 1
+        if throttle.offer("x", now) is not None:
+            passed.append(now)
+    return passed, waited
+
+
+@pytest.mark.parametrize("phase", [0.05, 0.3, 0.9, 1.4, 1.9])
+def test_a_topic_at_the_throttle_rate_soon_waits_for_no_timer(phase):
+    times = [0.0, 0.5, *(2.0 * n + phase for n in range(1, 40))]
+    passed, waited = played(Throttle(2.0), times)
+    assert waited <= 3
+    assert len(passed) >= 38
+
+
+@given(st.lists(st.floats(0.001, 0.5), min_size=50, max_size=200), st.floats(0.02, 0.5))
+def test_the_mean_rate_of_all_messages_is_at_most_a_tenth_above_the_rate(gaps, period):
+    times = list(itertools.accumulate(gaps))
+    passed, _ = played(Throttle(period), times)
+    assert len(passed) <= times[-1] / (0.9 * period) + 3

@@ -19,6 +19,10 @@ Encoding: TypeAlias = Literal["text", "binary", "raw"]
 
 T = TypeVar("T")
 
+EARLY = 0.1
+"""Part of its period by which a throttle lets a message through early, so that a topic
+at this rate waits for no timer."""
+
 _ENCODINGS = ("text", "binary", "raw")
 _LATCHED_TYPES = ("nav_msgs/OccupancyGrid",)
 _LATCHED_TOPICS = ("/tf_static", "/robot_description")
@@ -79,20 +83,26 @@ class Throttle(Generic[T]):
 
     """
 
-    __slots__ = ("_due", "_held", "period")
+    __slots__ = ("_came", "_due", "_held", "_waited", "period")
 
     def __init__(self, period: float) -> None:
         self.period = period
         self._due = -float("inf")
         self._held: T | None = None
+        self._came: float | None = None
+        """When the held message came, if no other came since the last release."""
+        self._waited: float | None = None
+        """How long the last message waited, if it was alone."""
 
     def offer(self, thing: T, now: float) -> T | None:
         """Return ``thing`` if it is due; else keep it in place of an older one."""
         if not self.period:
             return thing
-        if now < self._due:
+        if now < self._due - EARLY * self.period:
+            self._came = now if self._held is None else None
             self._held = thing
             return None
+        self._waited = None
         return self._release(thing, now)
 
     @property
@@ -105,7 +115,18 @@ class Throttle(Generic[T]):
         held = self._held
         if held is None or now < self._due:
             return None
-        return self._release(held, now)
+        before = self._waited
+        waited = None if self._came is None else self._due - self._came
+        self._release(held, now)
+        if (
+            before is not None
+            and waited is not None
+            and abs(before - waited) <= EARLY * self.period
+        ):  # the topic comes at this rate: the next message need not wait
+            self._due -= waited
+            waited = None
+        self._waited = waited
+        return held
 
     def change(self, period: float, now: float) -> None:
         """Use another period; what waits for a longer one is due at once."""
