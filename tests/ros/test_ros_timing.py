@@ -104,8 +104,25 @@ def test_a_busy_bridge_has_one_minute_to_answer_a_ping():
     liveness = Liveness(0.0)
     liveness.pinged(0.0)
     looks = [n / 4 for n in range(1, 400)]
-    dead = [now for now in looks if liveness.is_dead(now, busy=True)]
+    dead = [now for now in looks if liveness.is_dead(now, busy=lambda: True)]
     assert dead[0] == pytest.approx(60.25)
+
+
+def test_whether_a_bridge_is_busy_is_asked_only_when_a_link_seems_dead():
+    liveness, asked = Liveness(0.0), []
+    liveness.pinged(0.0)
+
+    def busy():
+        asked.append(None)
+        return True
+
+    for number in range(12):
+        liveness.is_dead(number / 4, busy=busy)
+    assert asked == []
+    liveness.is_dead(3.1, 3.0, busy=busy)
+    assert asked == []
+    liveness.is_dead(3.2, busy=busy)
+    assert asked == [None]
 
 
 def test_an_answered_ping_keeps_the_link_alive():

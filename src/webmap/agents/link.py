@@ -126,7 +126,7 @@ class AgentLane(Lane):
         self._liveness = liveness = Liveness(time.monotonic())
         self._opened()
         heard = self._heard
-        while not liveness.is_dead(time.monotonic(), heard, busy=self._busy()):
+        while not liveness.is_dead(time.monotonic(), heard, busy=self._busy):
             if self._session != session:
                 return self._why_no_bridge() or "the agent has connected again"
             if self._peer is not None and self._peer.trouble is not None:

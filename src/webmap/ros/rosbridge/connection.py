@@ -209,7 +209,7 @@ class Lane:
         pinging: set[asyncio.Task[None]] = set()
         try:
             while not liveness.is_dead(
-                time.monotonic(), socket.bytes_came, busy=self._busy()
+                time.monotonic(), socket.bytes_came, busy=self._busy
             ):
                 if liveness.is_ping_due(time.monotonic()):
                     liveness.pinged(time.monotonic())
@@ -341,7 +341,11 @@ class Liveness:
         return max(self._took, waiting)
 
     def is_dead(
-        self, now: float, bytes_came: float = -inf, *, busy: bool = False
+        self,
+        now: float,
+        bytes_came: float = -inf,
+        *,
+        busy: Callable[[], bool] = lambda: False,
     ) -> bool:
         """Return whether the last ping was unanswered for too long.
 
@@ -352,12 +356,13 @@ class Liveness:
         Args:
             now: The time of the check.
             bytes_came: When the last bytes came.
-            busy: Whether the bridge is known to encode a large message.
+            busy: Returns whether the bridge is known to encode a large message; called
+                only if nothing else shows that the connection lives.
 
         """
         late = now - self._looked > self.LATE
         self._looked = now
         if late or self._pinged is None or now - self._pinged <= self.LIMIT:
             return False
-        silent = now - bytes_came > self.LIMIT and not busy
+        silent = now - bytes_came > self.LIMIT and not busy()
         return silent or now - self._pinged > self.LONGEST
