@@ -11,7 +11,10 @@ def alerts() -> Alerts:
 
 
 def lost(alerts, active, now, robot="r1", text="No pose received"):
-    alerts.report(robot, f"Robot {robot}", "lost", text, active, now)
+    if active:
+        alerts.report(robot, f"Robot {robot}", "lost", text, now)
+    else:
+        alerts.end_others(set(alerts._newest) - {(robot, "lost")}, now)
 
 
 def only(alerts):
@@ -91,7 +94,7 @@ def test_a_long_text_of_a_robot_is_shortened(alerts):
 def test_the_alerts_of_a_robot_that_is_no_longer_shown_end(alerts):
     lost(alerts, True, 100, "r1")
     lost(alerts, True, 100, "r2")
-    alerts.end_others({"r2"}, 110)
+    alerts.end_others({("r2", "lost")}, 110)
     assert [alert.ended for alert in alerts.listed.values()] == [110, None]
 
 

@@ -17,7 +17,7 @@ PACKAGE = Path(webmap.__file__).parent
 @pytest.fixture
 def alerts():
     alerts = Alerts()
-    alerts.report("r1", "Bob", "lost", "No pose received", True, 100)
+    alerts.report("r1", "Bob", "lost", "No pose received", 100)
     return alerts
 
 
@@ -69,7 +69,7 @@ def test_a_page_gets_all_alerts_when_it_is_ready_and_then_the_changes(
     assert first["ids"] == list(alerts.listed)
     ann.panel.poll()
     assert len(ann.got) == 1
-    alerts.report("r2", "Eve", "lost", "No pose received", True, 101)
+    alerts.report("r2", "Eve", "lost", "No pose received", 101)
     ann.panel.poll()
     assert [alert["name"] for alert in ann.got[-1]["alerts"]] == ["Eve"]
     ann.panel.on_ready()

@@ -106,17 +106,16 @@ class AlertWatch:
 
     def look(self, now: float) -> None:
         """Report the conditions of all robots, at ``now`` in Unix seconds."""
-        robots = list(self._robots())
-        for robot in robots:
-            found = conditions(robot)
-            if not self._is_unlinked(robot.id, "commands" in found, now):
-                found.pop("commands", None)
-            for kind in KINDS:
-                text = found.get(kind)
-                self.alerts.report(
-                    robot.id, robot.name, kind, text or "", text is not None, now
-                )
-        self.alerts.end_others({robot.id for robot in robots}, now)
+        found = set()
+        for robot in list(self._robots()):
+            texts = conditions(robot)
+            if not self._is_unlinked(robot.id, "commands" in texts, now):
+                texts.pop("commands", None)
+            for kind in KINDS if texts else ():  # the most urgent first
+                if kind in texts:
+                    found.add((robot.id, kind))
+                    self.alerts.report(robot.id, robot.name, kind, texts[kind], now)
+        self.alerts.end_others(found, now)
 
     def _is_unlinked(self, robot: str, down: bool, now: float) -> bool:
         """Return whether the gate has had no connection to a robot for a while.

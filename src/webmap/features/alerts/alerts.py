@@ -81,25 +81,18 @@ class Alerts:
         # A page opened before a restart of WebMap has other ids.
         self._ids = itertools.count(secrets.randbits(31))
 
-    def report(
-        self, robot: str, name: str, kind: str, text: str, active: bool, now: float
-    ) -> None:
-        """Begin, update or end an alert; call it as often as you like.
+    def report(self, robot: str, name: str, kind: str, text: str, now: float) -> None:
+        """Begin or update the alert of a condition that is true now.
 
         Args:
             robot: The id of the robot.
             name: The name of the robot.
             kind: A key of ``KINDS``.
-            text: The condition as text; used only while it is active. A text that
-                differs only in its numbers is no change.
-            active: Whether the condition is true now.
+            text: The condition as text. A text that differs only in its numbers is no
+                change.
             now: Unix seconds.
         """
         alert = self._newest.get((robot, kind))
-        if not active:
-            if alert is not None and alert.ended is None:
-                self._end(alert, now)
-            return
         text = cut(text)
         if alert is None or _is_past(alert, now):
             self._begin(robot, name, kind, text, now)
@@ -111,10 +104,15 @@ class Alerts:
             alert.text = text
             self._changed(alert)
 
-    def end_others(self, robots: Collection[str], now: float) -> None:
-        """End the alerts of all robots except these, by id."""
-        for alert in list(self._newest.values()):
-            if alert.robot not in robots and alert.ended is None:
+    def end_others(self, found: Collection[tuple[str, str]], now: float) -> None:
+        """End all alerts except those of conditions that are true now.
+
+        Args:
+            found: The conditions, each by the id of its robot and its kind.
+            now: Unix seconds.
+        """
+        for condition, alert in list(self._newest.items()):
+            if alert.ended is None and condition not in found:
                 self._end(alert, now)
 
     def acknowledge(self, id: int, by: str, now: float) -> bool:
