@@ -186,12 +186,16 @@ class PoseSource:
     # Listeners.
 
     def join(self, listener: Callable[[], object]) -> Removal:
-        """Call ``listener`` when pose, frames or alignment change, until removed."""
+        """Call ``listener`` when pose, frames or alignment change, until removed.
+
+        It is also called when somebody begins to look.
+        """
         key = id(listener)
         self._listeners[key] = listener
         return Removal(lambda: self._listeners.pop(key, None))
 
-    def _notify(self) -> None:
+    def draw(self) -> None:
+        """Call the listeners, which draw by the pose."""
         for listener in tuple(self._listeners.values()):
             listener()
 
@@ -240,7 +244,7 @@ class PoseSource:
             self._show(step, came - frames.bridge.lag)
         else:
             self._show_problems(step)
-            self._notify()
+            self.draw()
 
     def _on_alignment(self) -> None:
         """Move the robot, and what is drawn by its pose, to a new alignment."""
@@ -251,14 +255,14 @@ class PoseSource:
         if pipeline.newest is not None:
             self._show_pose(pipeline.on_map(pipeline.newest), None)
         self._robot.motion.set_alignment(self.alignment)
-        self._notify()
+        self.draw()
 
     # Display.
 
     def _show(self, step: Step, stamp: float) -> None:
         assert step.pose is not None  # callers have one
         self._show_pose(step.pose, stamp)
-        self._notify()
+        self.draw()
         if step.problems is self.pipeline.problems:  # else a listener ended this source
             self._show_problems(step)
 

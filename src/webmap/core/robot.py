@@ -1,12 +1,10 @@
 """Robots: identity, pose and motion."""
 
-import asyncio
 import logging
 import math
 import time
 import weakref
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Self
 
 from webmap.base.errors import ConfigError
@@ -22,6 +20,7 @@ from webmap.core.problems import Problems
 from webmap.core.registry import Namespace, robot_modules
 from webmap.core.robot_model import ModelImages, checked_model
 from webmap.core.robot_state import Facts, RobotState, since_when, state_of
+from webmap.core.state_rounds import state_rounds
 from webmap.gate.protocol import RobotReport
 from webmap.gate.rules.goals import OVER
 from webmap.poses.alignment import alignment
@@ -39,9 +38,6 @@ log = logging.getLogger("webmap.robot")
 
 POSE_LIMIT = 1.0
 """Seconds after which a pose is drawn as stale."""
-
-STATE_EVERY, STATE_UNWATCHED = 0.5, 2.0
-"""Seconds between two checks of the state, and the same while nobody looks."""
 
 robots: "weakref.WeakValueDictionary[str, Robot]" = weakref.WeakValueDictionary()
 """All robots that were created and not destroyed, by their id."""
@@ -88,7 +84,8 @@ class Robot(Listed):
         self.measured_twist: Twist | None = None
         self.valid = False
         self._state_shown: RobotState | None = None
-        self._state_timer: asyncio.TimerHandle | None = None
+        self._is_looked_at = False
+        """Whether the shown state is updated regularly: a lost robot sends nothing."""
         self.pose_stamp: float | None = None
         """When the newest pose was sent, in seconds of ``time.monotonic()``; None
         before the first one."""
@@ -171,8 +168,7 @@ class Robot(Listed):
             return
         self._destroyed = True
         looking.forget(self)
-        if self._state_timer is not None:
-            self._state_timer.cancel()
+        state_rounds.leave(self._show_state)
         for map in tuple(self.maps):
             map.remove_robot(self)
         self.remove_modules()
@@ -414,18 +410,15 @@ class Robot(Listed):
         self.pose_source.pipeline.jumps.expect(time.monotonic())
 
     def looking_changed(self) -> None:
-        """Show the state of now to who begins to look."""
-        if looking.somebody and self._state_timer is not None:
-            self._state_timer.cancel()
-            self._watch_state()
-
-    def _watch_state(self) -> None:
-        """Update the shown state periodically: a lost robot sends no message."""
-        self._show_state()
-        with suppress(RuntimeError):  # outside of an event loop
-            loop = asyncio.get_running_loop()
-            every = STATE_EVERY if looking.somebody else STATE_UNWATCHED
-            self._state_timer = loop.call_later(every, self._watch_state)
+        """Show the pose and the state of now to who begins to look."""
+        if not looking.somebody:
+            return
+        if self.valid:
+            self._draw_pose()
+        if self.pose_stamp is not None:
+            self._draw_age(self.pose_stamp)
+            self._show_state()
+        self.pose_source.draw()
 
     def _show_state(self) -> None:
         self.pose_source.keep_on(self._needs_poses())
@@ -451,11 +444,11 @@ class Robot(Listed):
             goes = report.goal is not None and report.goal.state not in OVER
             if goes or report.holder is not None:
                 return True
-        return any(
-            hasattr(module, "on_odometry_update")
-            and not type(module).__module__.startswith("webmap.")
-            for module in self.modules
-        )
+        for module in self.modules:
+            own = type(module).__module__.startswith("webmap.")
+            if not own and hasattr(module, "on_odometry_update"):
+                return True
+        return False
 
     def show_pose(self, pose: PoseReading, stamp: float | None = None) -> None:
         """Draw the robot at a pose on the common map, and fire ``on_odometry_update``.
@@ -468,9 +461,11 @@ class Robot(Listed):
         """
         if stamp is not None:
             self.pose_stamp = stamp
-            self.svg.set_age(time.monotonic() - stamp, limit=POSE_LIMIT)
-            if self._state_timer is None:
-                self._watch_state()
+            if looking.somebody:
+                self._draw_age(stamp)
+            if not self._is_looked_at:
+                self._show_state()
+                self._is_looked_at = state_rounds.join(self._show_state)
         if (
             self.valid
             and pose.position == self.position
@@ -480,8 +475,15 @@ class Robot(Listed):
             return
         self.position, self.orientation = pose.position, pose.orientation
         self.measured_twist = pose.twist
-        self.svg.set_pose(pose.position.x, pose.position.y, pose.orientation.yaw)
+        if looking.somebody:
+            self._draw_pose()
         if not self.valid:
             self.valid = True
             self.svg.classes.remove("unplaced")
         self.notify_modules("on_odometry_update")
+
+    def _draw_age(self, stamp: float) -> None:
+        self.svg.set_age(time.monotonic() - stamp, limit=POSE_LIMIT)
+
+    def _draw_pose(self) -> None:
+        self.svg.set_pose(self.position.x, self.position.y, self.yaw)
