@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from webmap.base.errors import ConfigError
-from webmap.base.scope import Scope, no_scope
+from webmap.base.scope import Scope, enter_scope, leave_scope
 from webmap.base.tasks import begin
 from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import Namespace
@@ -134,16 +134,17 @@ class Extendable:
         method = getattr(module, name, None)
         if method is None:
             return
-        scope = self._scopes.get(id(module))
-        report = partial(self._report, f"{type(module).__name__}.{name}")
-        with scope.active() if scope is not None else no_scope():
-            try:
-                result = method(*args)
-                if inspect.isawaitable(result):
-                    begin(result, report)
-            except Exception as error:
-                report(error)
+        before = enter_scope(self._scopes.get(id(module)))
+        try:
+            result = method(*args)
+            if result is not None and inspect.isawaitable(result):
+                begin(result, partial(self._report, module, name))
+        except Exception as error:
+            self._report(module, name, error)
+        finally:
+            leave_scope(before)
 
-    def _report(self, what: str, error: Exception) -> None:
+    def _report(self, module: Any, name: str, error: Exception) -> None:
+        what = f"{type(module).__name__}.{name}"
         log.error("module %s of %r failed", what, self, exc_info=error)
         self.report_error(f"{what} failed: {type(error).__name__}: {error}")

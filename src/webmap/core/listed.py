@@ -53,8 +53,12 @@ class Listed(Driven):
     @property
     def charge(self) -> float | None:
         """The least charge of its batteries, from 0 to 1; None if unknown."""
-        charges = [getattr(module, "charge", None) for module in self.modules]
-        return min((each for each in charges if isinstance(each, float)), default=None)
+        least: float | None = None
+        for module in self.modules:
+            charge = getattr(module, "charge", None)
+            if isinstance(charge, float) and (least is None or charge < least):
+                least = charge
+        return least
 
     def _checked(self, key: str, value: Any) -> Any:
         mistakes = Mistakes()

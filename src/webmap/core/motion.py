@@ -103,6 +103,12 @@ def shown_name(name: str, agent: str) -> str:
     return f"{name} ({agent})"
 
 
+def _axes(twist: TwistConfig | None) -> Axes:
+    if twist is None:
+        return PLANE
+    return Axes(twist.z_max or 0.0, twist.rx_max or 0.0, twist.ry_max or 0.0)
+
+
 class RobotMotion:
     """The gate's description of one robot, updated as topics change.
 
@@ -124,6 +130,8 @@ class RobotMotion:
         self._complain = complain
         self.config = MotionConfig()
         """The configuration of the robot's motion; changed by :meth:`set`."""
+        self.axes = PLANE
+        """The axes out of the plane along which the robot moves, with their limits."""
         self._bridges: Links = {}
         self._odometry: tuple[Bridge, str, str | None] | None = None
         self._own_map = Pose()
@@ -136,14 +144,6 @@ class RobotMotion:
         """Whether the gate of an agent moves the robot, not that of this process."""
         links = (self._bridges.get(key) for key in WRITING)
         return any(link is not None and is_agent_url(link.url) for link in links)
-
-    @property
-    def axes(self) -> Axes:
-        """The axes out of the plane along which the robot moves, with their limits."""
-        twist = self.config.twist
-        if twist is None:
-            return PLANE
-        return Axes(twist.z_max or 0.0, twist.rx_max or 0.0, twist.ry_max or 0.0)
 
     def set(
         self, key: str, values: Mapping[str, Any] | None, bridge: Bridge | None = None
@@ -173,6 +173,7 @@ class RobotMotion:
                 bridge.protect(topic, carried)
         self.config, self._bridges = config, bridges
         if key == "twist":
+            self.axes = _axes(config.twist)
             self._ask_type(config.twist, bridge)
         self.declare()
 

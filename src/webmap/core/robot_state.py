@@ -133,15 +133,16 @@ def state_of(facts: Facts) -> RobotState:
     Stale data is left out: the page detects it by itself, even when it cannot reach
     this process.
     """
-    names = (
-        "watched" if facts.report is None else facts.report.doing,
+    first: str = "watched" if facts.report is None else facts.report.doing
+    for name in (
         _link_state(facts),
         _pose_state(facts),
         _own_motion(facts),
         *_reported(facts),
-    )
-    true = (name for name in names if name is not None)
-    return _state(min(true, key=PRECEDENCE.__getitem__), facts)
+    ):
+        if name is not None and PRECEDENCE[name] < PRECEDENCE[first]:
+            first = name
+    return _state(first, facts)
 
 
 def since_when(silent_for: float | None) -> str:

@@ -65,7 +65,7 @@ class OdometryFeed:
         self.topic = topic
         self.throttle = throttle
         self.type: str | None = None
-        self._unwatched = UNWATCHED
+        self._asked = SubscriptionOptions(throttle=throttle, unwatched=UNWATCHED)
         self._listener = listener
         self._typed = typed
         self._on_complaint = complain
@@ -86,15 +86,14 @@ class OdometryFeed:
     @property
     def period(self) -> float:
         """The least time between two messages now, in seconds."""
-        asked = SubscriptionOptions(throttle=self.throttle, unwatched=self._unwatched)
-        return asked.least / 1000
+        return self._asked.least / 1000
 
     def keep_on(self, needed: bool) -> None:
         """Receive all poses, or only some while nobody looks."""
         unwatched = 0 if needed else UNWATCHED
-        if unwatched == self._unwatched:
+        if unwatched == self._asked.unwatched:
             return
-        self._unwatched = unwatched
+        self._asked = self._asked._replace(unwatched=unwatched)
         if self._subscription is not None:
             self._subscription.set_unwatched(unwatched)
 
@@ -117,7 +116,7 @@ class OdometryFeed:
                     self.topic,
                     self._on_first,
                     throttle=self.throttle,
-                    unwatched=self._unwatched,
+                    unwatched=self._asked.unwatched,
                 )
 
     def _on_type(self, type: str) -> None:
@@ -165,7 +164,7 @@ class OdometryFeed:
                 self.type,
                 throttle=self.throttle,
                 decode=view,
-                unwatched=self._unwatched,
+                unwatched=self._asked.unwatched,
             )
 
     def _on_message(self, message: OdometryView) -> None:

@@ -51,6 +51,9 @@ OFTEN = 4
 """Jumps within a short time after which they are no localisation."""
 
 
+_HERE = Pose()
+
+
 class Problem(NamedTuple):
     """A current problem."""
 
@@ -144,7 +147,7 @@ class PosePipeline:
 
     def on_map(self, reading: PoseReading) -> PoseReading:
         """Transform a pose from the robot's own map to the common one."""
-        if self.alignment == Pose():
+        if self.alignment == _HERE:
             return reading
         return reading.moved(Transform.from_pose(self.alignment), reading.frame_id)
 

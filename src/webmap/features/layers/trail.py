@@ -58,6 +58,8 @@ class Trail:
         self.step = step
         self.jump = jump
         self._pieces: deque[_Piece] = deque()
+        self._driven = 0.0
+        """The length of all pieces, in metres."""
         self._last: tuple[float, float] | None = None
         self._placed = Placed(robot, class_="trail")
         self.svg = self._placed.svg
@@ -92,6 +94,7 @@ class Trail:
         """Remove the trail so far."""
         self.svg.clear()
         self._pieces.clear()
+        self._driven = 0.0
         self._undrawn.clear()
         self._last = None
 
@@ -112,6 +115,7 @@ class Trail:
             if len(self._pieces[-1].points) > PIECE:
                 self._begin(self._last)
             self._pieces[-1].go(at, far)
+            self._driven += far
             self._draw(self._pieces[-1])
             if self._pieces[-1].line.parent is None:
                 self.svg.append(self._pieces[-1].line)
@@ -125,13 +129,17 @@ class Trail:
 
     def _forget_old(self) -> None:
         """Keep the pieces within the length, and shorten the oldest."""
-        surplus = sum(piece.length for piece in self._pieces) - self.length
+        surplus = self._driven - self.length
+        if surplus <= 0:
+            return
         while surplus >= self._pieces[0].length and len(self._pieces) > 1:
             old = self._pieces.popleft()
             old.line.remove()
             self._undrawn.pop(old, None)
             surplus -= old.length
-        if surplus > 0 and self._pieces[0].shorten(surplus):
+            self._driven -= old.length
+        if cut := self._pieces[0].shorten(surplus):
+            self._driven -= cut
             self._draw(self._pieces[0])
 
 
@@ -155,13 +163,13 @@ class _Piece:
         self.points.append(at)
         self.length += far
 
-    def shorten(self, surplus: float) -> bool:
+    def shorten(self, surplus: float) -> float:
         """Remove points at the beginning while the rest stays long enough.
 
         Returns:
-            Whether there were such points.
+            The metres by which it is shorter.
         """
-        changed = False
+        cut = 0.0
         while len(self.points) > 2:
             first = math.dist(self.points[0], self.points[1])
             if first > surplus:
@@ -169,8 +177,8 @@ class _Piece:
             self.points.popleft()
             self.length -= first
             surplus -= first
-            changed = True
-        return changed
+            cut += first
+        return cut
 
     def draw(self) -> None:
         """Draw the line."""
