@@ -6,7 +6,8 @@ import pytest
 from webmap.agents.displays import AllPages, Answer, Displays, ReportAll, Unknown
 from webmap.agents.samples import Numbering, Order
 from webmap.base.errors import WireError
-from webmap.gate.commands import Stop
+from webmap.gate import commands
+from webmap.gate.commands import Stop, Take
 from webmap.gate.protocol import (
     Connect,
     Disconnect,
@@ -21,6 +22,7 @@ from webmap.gate.protocol import (
 )
 
 PAGE = Connect("west/c1", "Ann", "operator")
+PROGRAM = Connect("west/program", "the program", "operator", program=True)
 STOP = b'{"op":"stop","robot":"*"}'
 
 
@@ -66,7 +68,6 @@ def test_a_page_and_its_commands_reach_the_gate(west):
         Forget("r1"),
         WriterNodes("r1", ("/a",)),
         Heartbeat(),
-        FromProgram(Stop("r1")),
     ],
 )
 def test_a_display_can_declare_no_robot_and_send_nothing_else(west, message):
@@ -87,6 +88,112 @@ def test_a_display_gives_its_pages_at_most_its_own_role():
 def test_a_message_of_an_unknown_page_is_dropped_but_stop_is_obeyed(west):
     assert west.says(FromPage("west/c7", b'{"op":"take","robot":"r1"}')) == []
     assert west.says(FromPage("west/c7", STOP)) == [FromProgram(Stop(None))]
+
+
+def velocity(**changes):
+    fields = {
+        "robot": "r1",
+        "epoch": 3,
+        "tick": 5,
+        "velocity": (0.5, 0.0, 0.0, 0.0, 0.0, 0.0),
+    }
+    return commands.SetVelocity(**fields | changes)
+
+
+def from_program(command, connection="west/program"):
+    return FromProgram(command, 4, connection)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        Take("r1"),
+        commands.Release("r1"),
+        velocity(),
+        commands.Goal("r1", 3, 0, 5, 1.0, 2.0, 0.5),
+        commands.Locate("r1", 3, 0, 5, 1.0, 2.0, 0.5),
+    ],
+)
+def test_the_commands_of_a_program_reach_the_gate_under_its_connection(west, command):
+    assert west.says(PROGRAM) == [PROGRAM]
+    message = from_program(command)
+    assert west.says(message) == [message]
+    assert west.displays.introduction() == [PROGRAM]
+
+
+@pytest.mark.parametrize("connection", ["program", "east/program", "west/c1", "west/"])
+def test_a_program_uses_no_other_connection(west, connection):
+    west.says(PAGE)
+    west.says(PROGRAM)
+    hello = Connect(connection, "Ann", "operator", program=True)
+    for message in (hello, from_program(Take("r1"), connection)):
+        with pytest.raises(WireError, match="display west: got"):
+            west.says(message)
+    assert west.displays.introduction() == [PAGE, PROGRAM]
+
+
+def test_no_page_uses_the_connection_of_a_program(west):
+    with pytest.raises(WireError, match="got a page as 'west/program'"):
+        west.says(Connect("west/program", "Ann", "operator"))
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        Stop("r1"),
+        commands.Reset("r1", "5f"),
+        commands.Cancel("r1"),
+        Take("r" * 65),
+        Take(""),
+        velocity(epoch=-1),
+        velocity(robot="r\n1"),
+        commands.Goal("r1", 3, 0, 5, 1e9, 2.0, 0.5),
+        commands.Locate("r1", 3, 0, 5, float("nan"), 2.0, 0.5),
+    ],
+)
+def test_what_a_page_could_not_send_or_needs_no_control_is_refused(west, command):
+    west.says(PROGRAM)
+    with pytest.raises(WireError, match="got a command of its program"):
+        west.says(from_program(command))
+
+
+def test_a_velocity_of_another_form_is_refused(west):
+    west.says(PROGRAM)
+    for velocity_ in ((0.5, 0.0), ("a", 0, 0, 0, 0, 0), None):
+        with pytest.raises(WireError, match="got no message"):
+            west.says(from_program(velocity(velocity=velocity_)))
+
+
+def test_a_program_has_at_most_the_role_of_its_display():
+    west = West(west="viewer")
+    (got,) = west.says(PROGRAM)
+    assert (got.role, got.program) == ("viewer", True)
+
+
+def test_a_program_that_is_not_known_moves_nothing_and_is_asked_for(west):
+    assert west.says(from_program(Take("r1"))) == []
+    assert west.says(from_program(velocity())) == []
+    assert west.displays.unknown("west") is None, "each answer would end its control"
+    assert west.says(AllPages(("west/program",))) == []
+    assert west.displays.unknown("west") == Unknown("west", ("west/program",))
+    assert west.says(FromPage("west/program", STOP)) == [FromProgram(Stop(None))]
+
+
+def test_the_program_of_a_silent_display_ends_after_half_a_second(west):
+    west.says(PAGE, 0.0)
+    west.says(PROGRAM, 0.0)
+    west.hears(1, 0.05)
+    west.answers(0.1)
+    assert west.displays.look(0.55) == []
+    assert west.displays.look(0.56) == [Disconnect("west/program")]
+    assert west.displays.look(0.6) == []
+    assert west.says(from_program(velocity()), 0.7) == []
+    assert west.displays.look(1.06) == [Disconnect("west/c1")]
+
+
+def test_a_program_that_its_display_no_longer_lists_ends(west):
+    west.says(PROGRAM)
+    assert west.says(AllPages(())) == [Disconnect("west/program")]
 
 
 def test_the_role_is_that_of_the_user_and_counts_for_each_of_its_displays():

@@ -26,7 +26,7 @@ from webmap.gate.protocol import (
 
 NAME = "ann.4f"
 PAGE = Connect(f"{NAME}/c1", "Ann", "operator")
-PROGRAM = Connect(f"{NAME}/program", NAME, "operator")
+PROGRAM = Connect(f"{NAME}/program", f"program of {NAME}", "operator", program=True)
 STOP = FromPage(f"{NAME}/c1", b'{"op":"stop","robot":"r1"}')
 
 
@@ -281,12 +281,37 @@ def test_a_program_stops_resets_and_cancels_at_an_agent(connected, command, text
     assert json.loads(got.text) == text
 
 
-def test_a_program_takes_no_robot_of_an_agent(connected):
-    connected.far.send(FromProgram(commands.Take("r1"), 4))
-    assert connected.arrive() == []
-    (reply,) = connected.owner.of(TakeReply)
-    assert (reply.request, reply.epoch) == (4, None)
-    assert "an agent" in reply.why
+@pytest.mark.parametrize(
+    "command",
+    [
+        commands.Take("r1"),
+        commands.Release("r1"),
+        commands.SetVelocity("r1", 3, 5, (0.5, 0.0, 0.1, 0.0, 0.0, 0.0)),
+        commands.Goal("r1", 3, 0, 5, 1.0, 2.0, 0.5),
+        commands.Locate("r1", 3, 0, 5, 1.0, 2.0, 0.5),
+    ],
+)
+def test_a_program_controls_a_robot_of_an_agent_under_its_connection(
+    connected, command
+):
+    connected.far.send(FromProgram(command, 4))
+    assert connected.arrive() == [FromProgram(command, 4, PROGRAM.connection)]
+
+
+def test_the_reply_of_the_agent_to_a_program_is_passed_on(connected):
+    reply = TakeReply(4, "r1", 3, None, PROGRAM.connection)
+    connected.hears(reply)
+    assert connected.owner.of(TakeReply) == [reply]
+
+
+def test_an_agent_that_returns_hears_of_the_program_anew_which_ends_its_control(
+    connected,
+):
+    connected.arrive()
+    connected.far.beat(0.6)  # the agent was silent
+    connected.sent.clear()
+    connected.hears(Tick(9, {}), 0.7)
+    assert connected.arrive(0.7)[0] == PROGRAM
 
 
 def answers(bench, begin, seconds=1.0):
@@ -299,8 +324,12 @@ def answers(bench, begin, seconds=1.0):
     return len(bench.sent)
 
 
-def test_a_display_answers_more_often_while_a_page_sends_commands(connected):
+def test_a_display_answers_more_often_while_a_page_has_control_or_commands(connected):
     assert answers(connected, 1.0) < 10
     connected.far.send(FromPage(PAGE.connection, b'{"op":"drive"}'))
     assert answers(connected, 2.0) > 20
     assert answers(connected, 4.0) < 10
+    connected.hears(REPORT, 5.0)
+    assert answers(connected, 6.0) > 20, "a page has control"
+    connected.hears(msgspec.structs.replace(REPORT, holder=None), 7.0)
+    assert answers(connected, 8.0) < 10

@@ -9,9 +9,10 @@ import time
 import msgspec
 import psutil
 import pytest
-from cli_inside import run_inside
 
+from cli_inside import run_inside
 from webmap.agents import address
+from webmap.agents.description import PROTOCOL
 from webmap.agents.peer import Peer, User
 from webmap.fleet.agent import (
     About,
@@ -147,7 +148,7 @@ def test_an_agent_describes_the_robots_of_its_fleet_file_and_listens_on_nothing(
                 assert own == f"{router}/bay3"
                 key, piece = wait_for(lambda: beacons and beacons[-1])
                 assert key == "webmap/bay3/here"
-                assert msgspec.json.decode(piece, type=Beacon).protocol == 1
+                assert msgspec.json.decode(piece, type=Beacon).protocol == PROTOCOL
                 answer = peer.ask(address.about("bay3"))
                 about = msgspec.json.decode(answer, type=About)
                 topics = asyncio.run(ask_topics(own, wait=10.0))

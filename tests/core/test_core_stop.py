@@ -15,7 +15,6 @@ from webmap.base.errors import (
     ConfigError,
     MotionError,
     MotionRefused,
-    NoLease,
 )
 from webmap.base.lifecycle import lifecycle
 from webmap.core.motion import RobotMotion
@@ -55,6 +54,15 @@ class Gate:
     def forget(self, robot_id):
         pass
 
+    def twist(self, robot_id, twist):
+        self.asked.append(("twist", robot_id, twist))
+
+    def move(self, robot_id, *pose):
+        self.asked.append(("move", robot_id, *pose))
+
+    def locate(self, robot_id, *pose):
+        self.asked.append(("locate", robot_id, *pose))
+
     def stop_robot(self, robot_id):
         self.asked.append(("stop", robot_id))
 
@@ -89,31 +97,27 @@ class AgentLink(Link):
     url = "zenoh://hall:7447/bay3"
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        lambda robot: asyncio.run(robot.acquire_lease()),
-        lambda robot: robot.twist(0.5),
-        lambda robot: robot.twist(0.0),
-        lambda robot: robot.move(robot.position, robot.orientation),
-        lambda robot: robot.locate(robot.position, robot.orientation),
-    ],
-)
-def test_a_program_on_a_display_is_refused_the_control_of_an_agents_robot(
-    robot, gate, command
-):
-    gate.ready = False  # its agent is away: the reason is the same, and comes at once
+def test_the_commands_of_a_program_reach_an_agents_robot_as_any_other(robot, gate):
     robot.set_twist_topic(AgentLink(), "/cmd_vel", type="geometry_msgs/Twist")
     robot.set_move_topic(AgentLink(), "/goal")
-    with pytest.raises(NoLease, match="'Bob' is an agent's: a program on a display"):
-        command(robot)
-    assert gate.asked == []
+    robot.report = SimpleNamespace(
+        armable=True, latched=False, holder=None, epoch=7, reason=None
+    )
+    assert asyncio.run(robot.acquire_lease()) == 7
+    robot.twist(0.5)
+    robot.move(robot.position, robot.orientation)
+    robot.locate(robot.position, robot.orientation)
     robot.stop()
     robot.cancel()
-    assert gate.asked == [
-        ("stop", robot.motion.id),
-        ("cancel", robot.motion.id),
+    assert [what for what, *_ in gate.asked] == [
+        "take",
+        "twist",
+        "move",
+        "locate",
+        "stop",
+        "cancel",
     ]
+    assert {id for _, id, *_ in gate.asked} == {robot.motion.id}
 
 
 def test_stop_and_reset_stop_are_sent_to_the_gate(robot, gate):

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import math
 
 import pytest
 from hypothesis import given
@@ -11,10 +12,13 @@ from webmap.gate.commands import (
     Cancel,
     Drive,
     Goal,
+    Locate,
     Refusal,
     Release,
+    SetVelocity,
     Stop,
     Take,
+    check,
     parse,
 )
 
@@ -186,3 +190,38 @@ def test_a_drive_command_with_random_fields_is_refused_or_in_range(changes, miss
     if isinstance(understood, Drive):
         assert all(-1 <= v <= 1 for v in (understood.x, understood.y, understood.turn))
         assert set(command) == set(DRIVE)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        Take("r1"),
+        Release("r1"),
+        SetVelocity("r1", 3, 812, (9.0, 0.0, -1.0, 0.0, 0.0, 0.0)),
+        Goal("r1", 3, 0, 812, 1.0, -2.0, 9.0),
+        Locate("r1", 3, 0, 812, 1.0, -2.0, 9.0),
+    ],
+)
+def test_a_command_of_a_program_that_a_page_could_send_passes(command):
+    check(command)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        Take(""),
+        Take("r" * 65),
+        Release("r" * 2000),
+        Take("r\n1"),
+        SetVelocity("r" * 65, 3, 812, (0.0,) * 6),
+        SetVelocity("r1", -1, 812, (0.0,) * 6),
+        SetVelocity("r1", 3, 2**60, (0.0,) * 6),
+        Goal("r1", 3, 0, 812, 1e7, 0.0, 0.0),
+        Goal("r1", 3, 0, 812, math.nan, 0.0, 0.0),
+        Locate("r1", 3, -1, 812, 0.0, 0.0, 0.0),
+        Locate("r1", 3, 0, 812, 0.0, 0.0, math.inf),
+    ],
+)
+def test_a_command_of_a_program_that_a_page_could_not_send_is_refused(command):
+    with pytest.raises(Refusal):
+        check(command)

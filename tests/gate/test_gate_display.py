@@ -139,6 +139,103 @@ class TestProgramRate:
         assert self.speeds() == [0.2, 0.4], "with another lease it begins anew"
 
 
+class TestProgramAtAnAgent:
+    """One gate answers the programs of several displays, and each hears all of it."""
+
+    @pytest.fixture
+    def road(self):
+        self.now, self.received = 100.0, []
+        road = ProgramCommands(
+            self.received.append,
+            threading.RLock(),
+            lambda: self.now,
+            connection="ann.4f/program",
+        )
+        road.on_tick(7)
+        return road
+
+    def reply(self, connection, epoch=3):
+        return protocol.TakeReply(1, "r1", epoch, None, connection)
+
+    @pytest.mark.parametrize("other", [PROGRAM, "ben.5e/program"])
+    def test_the_answer_to_another_program_is_not_its_own(self, road, other):
+        future = road.take("r1", None)
+        road.on_take_reply(self.reply(other))
+        assert not future.done()
+        with pytest.raises(NoLease):
+            road.twist("r1", Twist(0.2))
+        road.on_take_reply(self.reply("ann.4f/program"))
+        assert future.result(1) == 3
+
+    @pytest.mark.parametrize("other", [PROGRAM, "ben.5e/program", "ann.4f/c1.1"])
+    def test_the_control_of_another_program_or_page_is_not_its_own(self, road, other):
+        road.on_report(report(Holder(other, "Ben"), 4))
+        with pytest.raises(NoLease):
+            road.twist("r1", Twist(0.2))
+        road.on_report(report(Holder("ann.4f/program", "Ann"), 4))
+        road.twist("r1", Twist(0.2))
+
+    def run(self, road, seconds):
+        self.received.clear()
+        for _ in range(round(seconds / 0.05)):
+            self.now += 0.05
+            road.on_tick(8)
+        return len(self.received)
+
+    def test_a_lost_request_is_sent_again_with_the_same_number(self, road):
+        future = road.take("r1", None)
+        asked = list(self.received)
+        assert self.run(road, 0.45) == 0
+        assert self.run(road, 0.1) == 1
+        assert self.received == asked
+        road.on_take_reply(self.reply("ann.4f/program"))
+        assert future.result(1) == 3
+        road.on_take_reply(self.reply("ann.4f/program", 4))  # to the first one
+        assert self.run(road, 5.0) == 0
+
+    def test_a_request_without_an_answer_fails_and_releases(self, road):
+        future = road.take("r1", None)
+        self.run(road, 1.0)
+        later = road.take("r2", None)
+        self.run(road, 2.1)
+        with pytest.raises(NoLease, match="'r1': no answer"):
+            future.result(1)
+        assert not later.done()
+        assert protocol.FromProgram(commands.Release("r1")) in self.received
+        road.on_take_reply(self.reply("ann.4f/program"))
+        with pytest.raises(NoLease):
+            road.twist("r1", Twist(0.2))
+
+    def test_a_release_is_sent_again_until_a_report_shows_it(self, road):
+        held = report(Holder("ann.4f/program", "Ann"), 4)
+        road.on_report(held)
+        road.release("r1")
+        road.on_report(held)
+        with pytest.raises(NoLease):
+            road.twist("r1", Twist(0.2))
+        assert self.run(road, 1.2) == 2
+        assert self.received[-1] == protocol.FromProgram(commands.Release("r1"))
+        road.on_report(report())
+        assert self.run(road, 5.0) == 0
+
+    def test_a_release_that_nothing_answers_is_sent_for_3_s(self, road):
+        road.release("r9")
+        assert 4 <= self.run(road, 10.0) <= 6
+
+    def test_a_robot_that_is_taken_again_is_not_released_late(self, road):
+        road.release("r1")
+        road.take("r1", None)
+        self.run(road, 1.2)
+        assert {type(each.command) for each in self.received} == {commands.Take}
+
+    def test_a_release_ends_the_requests_for_its_robot(self, road):
+        first, other = road.take("r1", None), road.take("r2", None)
+        road.release("r1")
+        with pytest.raises(NoLease, match="control was released"):
+            first.result(1)
+        assert not other.done()
+
+
 class TestProgram:
     def test_a_program_requests_uses_and_releases_a_lease(self, client, gate):
         future = client.take("r1")

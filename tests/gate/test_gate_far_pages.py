@@ -19,6 +19,7 @@ from webmap.gate.protocol import (
     RobotGone,
     RobotReport,
     Speeds,
+    TakeReply,
     Tick,
 )
 
@@ -162,3 +163,12 @@ def test_the_robots_of_a_lost_agent_stay_on_the_page(bench):
     assert bench.hear(RobotGone("r1")) == [{"op": "gone", "robot": "r1"}]
     assert bench.hear(Ready(0)) == []
     assert bench.client._pages.latest == []
+
+
+def test_the_program_knows_its_replies_by_its_name_at_the_agent(bench):
+    taken = bench.client.take("r1")
+    for other in ("program", "ben.5e/program"):
+        bench.hear(TakeReply(1, "r1", 3, None, other))
+    assert not taken.done()
+    bench.hear(TakeReply(1, "r1", 4, None, f"{PREFIX}program"))
+    assert taken.result(1) == 4

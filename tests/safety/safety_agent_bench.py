@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import zlib
 from contextlib import ExitStack
 from pathlib import Path
@@ -36,6 +37,7 @@ class FarDriver:
 
     def __init__(self, port, state):
         self.reports, self.refused = [], []
+        self.acquired, self.lost = [], []
         self.popen = subprocess.Popen(
             [sys.executable, DRIVER, f"zenoh://127.0.0.1:{port}/bay3", ROBOT],
             stdin=subprocess.PIPE,
@@ -51,6 +53,13 @@ class FarDriver:
     def now(self):
         """What the gate said last of the robot."""
         return self.reports[-1] if self.reports else {}
+
+    def acquire(self):
+        """Have the program take the robot; return the answer."""
+        before = len(self.acquired)
+        self.order("acquire")
+        wait_for(lambda: len(self.acquired) > before, "an answer", 20)
+        return self.acquired[-1]
 
     def order(self, line):
         self.popen.stdin.write(f"{line}\n")
@@ -71,12 +80,11 @@ class FarDriver:
             self.popen.stdin.close()
 
     def _read(self):
+        kinds = {"robot": self.reports, "acquired": self.acquired, "lost": self.lost}
         for line in self.popen.stdout:
             message = json.loads(line)
             if message.get("robot") in (ROBOT, None):
-                (self.reports if message["op"] == "robot" else self.refused).append(
-                    message
-                )
+                kinds.get(message["op"], self.refused).append(message)
 
 
 class AgentBench:
@@ -153,3 +161,24 @@ class AgentBench:
         wait_for(lambda: self.robot.velocity.vx > 0.1, "motion", within)
         pass_time(0.5)
         assert self.robot.velocity.vx > 0.1, "the robot does not go on"
+
+    def program_off(self, within=20.0):
+        """Have the program take the robot and drive it, until it moves steadily.
+
+        On a machine that holds the way to the robot up, the program loses control.
+        """
+        driver, deadline = self.driver, time.monotonic() + within
+        while time.monotonic() < deadline:
+            wait_for(
+                lambda: driver.now.get("armable"), "a robot that can be driven", within
+            )
+            driver.lost.clear()
+            if "epoch" not in driver.acquire():
+                continue
+            driver.order("v 0.3")
+            at = time.monotonic()
+            pass_time(1.0)
+            zeros = self.robot.log.first_zero(at)
+            if zeros is None and not driver.lost and self.robot.velocity.vx > 0.1:
+                return
+        raise AssertionError(f"no steady motion: {driver.acquired[-1]}, {driver.lost}")

@@ -3,8 +3,8 @@
 Its arguments are the address of the robot's bridge or agent, and the robot's id.
 
 A process of its own, so that it can be killed. It reads orders, one a line (``take``,
-``x 1.0``, ``stop``), and writes a line of JSON for each new report of the
-robot from the gate.
+``x 1.0``, ``stop``, and for its program ``acquire``, ``v 0.5`` and ``silent``), and
+writes a line of JSON for each new report of the robot from the gate.
 """
 
 import json
@@ -13,9 +13,17 @@ import threading
 
 from webmap.agents.gates import Gates
 from webmap.agents.peer import close_peers
+from webmap.base.errors import NoLease
+from webmap.base.geometry import Twist
 from webmap.gate.protocol import RobotSpec
 
 ROBOT = sys.argv[2] if len(sys.argv) > 2 else "r1"
+
+
+def write_line(text: str) -> None:
+    """Write a line, whole: several threads write."""
+    sys.stdout.write(f"{text}\n")
+    sys.stdout.flush()
 
 
 class Operator:
@@ -65,9 +73,36 @@ class Operator:
                 self._epoch = message["epoch"] or 0
                 self._gate = message.get("gate", "")
                 self._stop = (message["stop"] or {}).get("id", "")
-                print(text, flush=True)
+                write_line(text)
             case "refused":
-                print(text, flush=True)
+                write_line(text)
+
+
+class Program:
+    """Gives a velocity at 20 Hz while it has control, as Python code does."""
+
+    def __init__(self, client: Gates) -> None:
+        self.v: float | None = None
+        self._client = client
+
+    def acquire(self) -> None:
+        """Take the robot, and print what came of it."""
+        try:
+            answer = {"op": "acquired", "epoch": self._client.take(ROBOT).result(10)}
+        except NoLease as error:
+            answer = {"op": "acquired", "why": str(error)}
+        write_line(json.dumps(answer))
+
+    def step(self) -> None:
+        """Give the velocity, if there is one."""
+        if self.v is None:
+            return
+        try:
+            self._client.twist(ROBOT, Twist(self.v))
+        except NoLease as error:
+            self.v = None
+            answer = {"op": "lost", "why": str(error)}
+            write_line(json.dumps(answer))
 
 
 def main() -> None:
@@ -87,10 +122,12 @@ def main() -> None:
     )
     client.declare(spec)
     operator, ended = Operator(client), threading.Event()
+    program = Program(client)
 
     def stream() -> None:
         while not ended.wait(0.05):
             operator.step()
+            program.step()
 
     thread = threading.Thread(target=stream)
     thread.start()
@@ -100,6 +137,12 @@ def main() -> None:
                 operator.send(json.dumps({"op": "take", "robot": ROBOT}))
             case ["x", value]:
                 operator.x = float(value)
+            case ["acquire"]:
+                program.acquire()
+            case ["silent"]:
+                program.v = None
+            case ["v", value]:
+                program.v = float(value)
             case ["stop"]:
                 operator.send(
                     json.dumps({"op": "stop", "robot": ROBOT}, separators=(",", ":"))

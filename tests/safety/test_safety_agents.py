@@ -26,9 +26,12 @@ def bench(tmp_path_factory):
         yield bench
 
 
-def prove(bench, what, fail, within=PROMISED):
+def prove(bench, what, fail, within=PROMISED, *, program=False):
     """Drive, let something fail, and measure the time to the first zero."""
-    bench.drive_off()
+    if program:
+        bench.program_off()
+    else:
+        bench.drive_off()
     at = time.monotonic()
     fail()
     wait_for(
@@ -215,3 +218,90 @@ def test_two_displays_cannot_both_drive_and_the_loss_of_one_ends_only_its_own(be
     assert bench.driver.now["mine"]
     bench.driver.order("x 0")
     assert bench.driver.now["robot"] == ROBOT
+
+
+# A program on a display drives the robot of an agent.
+
+
+@pytest.fixture
+def program(bench):
+    """No page of the display drives; the program has no control afterwards."""
+    bench.driver.order("x 0")
+    renew_driver(bench)  # whatever its operator had is gone
+    yield bench.driver
+    renew_driver(bench)
+
+
+def has_no_control(bench):
+    """Wait until the program finds that it has no control, and cannot go on."""
+    wait_for(lambda: bench.driver.lost, "a program without control")
+    assert "does not have control" in bench.driver.lost[-1]["why"]
+
+
+def test_a_program_that_stops_sending_stops_an_agents_robot(bench, program):
+    prove(bench, "no velocity", lambda: program.order("silent"), program=True)
+    assert bench.driver.now["holder"]["connection"] == "program"
+
+
+def test_a_zero_of_a_program_stops_an_agents_robot_at_once(bench, program):
+    prove(bench, "zero", lambda: program.order("v 0"), 0.15, program=True)
+
+
+def test_a_killed_display_with_a_program_stops_an_agents_robot(bench, program):
+    prove(bench, "the display is killed", program.popen.kill, program=True)
+    renew_driver(bench)
+    wait_for(lambda: bench.driver.now.get("holder") is None, "a free robot")
+
+
+def test_a_program_has_no_control_after_its_display_was_suspended(bench, program):
+    popen = program.popen
+    prove(
+        bench,
+        "the display is stopped",
+        lambda: popen.send_signal(signal.SIGSTOP),
+        program=True,
+    )
+    pass_time(1.0)
+    popen.send_signal(signal.SIGCONT)
+    back(bench)
+    has_no_control(bench)
+    bench.program_off()
+
+
+@pytest.mark.parametrize("hop", ["display_hop", "agent_hop"])
+def test_a_program_has_no_control_after_its_link_carried_nothing(bench, program, hop):
+    proxy = getattr(bench, hop)
+    prove(bench, f"the {hop} carries nothing", proxy.hold, program=True)
+    pass_time(1.0)
+    proxy.release()
+    back(bench)
+    has_no_control(bench)
+    bench.program_off()
+
+
+def test_stop_stops_the_robot_of_a_program_and_ends_its_control(bench, program):
+    prove(bench, "STOP", lambda: program.order("stop"), 0.15, program=True)
+    wait_for(lambda: program.now.get("latched"), "a latched STOP")
+    program.order("reset")
+    wait_for(lambda: not program.now.get("latched"), "the reset")
+    has_no_control(bench)
+
+
+def test_a_program_takes_no_robot_from_that_of_another_display(bench, program):
+    other = bench.new_driver("east")
+    bench.program_off()
+    why = other.acquire()["why"]
+    assert "program of" in why
+    assert "has control" in why
+    other.popen.kill()
+    pass_time(1.5)
+    assert bench.robot.velocity.vx > 0.1, "the other display's loss stopped the robot"
+
+
+def test_an_operator_takes_an_agents_robot_from_a_program(bench, program):
+    other = bench.new_driver("east")
+    bench.program_off()
+    other.order("take")
+    wait_for(lambda: other.now.get("mine"), "control of the robot")
+    has_no_control(bench)
+    other.end()

@@ -1,8 +1,9 @@
 """The displays of an agent: which of their messages reach the gate, and when they end.
 
 No I/O: the agent passes samples and times in, and sends what is returned. The agent
-trusts no display. A display may connect pages and pass on their commands, and nothing
-else: it declares no robot, and the gate decides about every command as always.
+trusts no display. A display may connect pages and its program and pass on their
+commands, and nothing else: it declares no robot, and the gate decides about every
+command as always.
 
 A display is alive while it answers what the agent sends. An answer names the newest
 sample that has arrived, so its age is known by the agent's clock alone: an answer to an
@@ -17,8 +18,9 @@ import msgspec
 
 from webmap.agents.samples import Numbering, Order
 from webmap.base.errors import WireError
-from webmap.gate.commands import stop_in
+from webmap.gate.commands import ControlCommand, Refusal, check, stop_in
 from webmap.gate.protocol import (
+    PROGRAM,
     Connect,
     Disconnect,
     FromGate,
@@ -45,6 +47,13 @@ The gate itself stops a robot 200 ms after the last command; this ends control.
 PAUSE = 0.2
 """The least time between two times that all reports are sent, in seconds."""
 
+PROGRAM_SILENT = 0.5
+"""The same for the program of a display.
+
+A program has no inputs that it could release: after a pause of its display it would
+drive on where it was.
+"""
+
 MOST_PAGES = 200
 """The greatest number of pages of one display."""
 
@@ -61,7 +70,7 @@ class Answer(msgspec.Struct, frozen=True, tag="answer"):
 
 
 class AllPages(msgspec.Struct, frozen=True, tag="pages"):
-    """All pages that a display has now; sent twice a second.
+    """The program and all pages that a display has now; sent twice a second.
 
     A lost message about a page that has closed is made good by this.
     """
@@ -97,7 +106,16 @@ class Unknown(msgspec.Struct, frozen=True, tag="unknown"):
 ToDisplays = FromGate | AllReports | Took | Unknown
 """What an agent sends to all displays."""
 
-FromDisplay = Connect | Disconnect | FromPage | Speeds | Answer | AllPages | ReportAll
+FromDisplay = (
+    Connect
+    | Disconnect
+    | FromPage
+    | FromProgram
+    | Speeds
+    | Answer
+    | AllPages
+    | ReportAll
+)
 """What a display may send. Everything else is refused whole."""
 
 _decode = msgspec.msgpack.Decoder(FromDisplay).decode
@@ -109,6 +127,8 @@ class Display:
 
     def __init__(self, name: str) -> None:
         self.name = name
+        self.program = f"{name}/{PROGRAM}"
+        """The connection of its program."""
         self.order = Order()
         self.wants_reports = False
         """Whether it needs all reports again."""
@@ -117,7 +137,8 @@ class Display:
         self.alive_at = float("-inf")
         """When it was alive for certain."""
         self.pages: dict[str, list[Connect | Speeds]] = {}
-        """The messages that make each of its pages known to a gate, by connection."""
+        """The messages that make each of its pages and its program known to a gate, by
+        connection."""
 
     def owns(self, connection: str) -> bool:
         """Return whether a connection has the form that this display may use."""
@@ -233,9 +254,13 @@ class Displays:
         """Return what ends the pages of displays that give no sign of life."""
         ended: list[ToGate] = []
         for display in self._displays.values():
-            if display.pages and now - display.alive_at > SILENT:
+            silent = now - display.alive_at
+            if display.pages and silent > SILENT:
                 log.warning("display %s gives no sign of life", display.name)
                 ended += self._end(display)
+            elif display.program in display.pages and silent > PROGRAM_SILENT:
+                del display.pages[display.program]
+                ended.append(Disconnect(display.program))
         return ended
 
     def _make_room(self) -> None:
@@ -257,11 +282,12 @@ class Displays:
     def _pass_on(
         self,
         display: Display,
-        message: Connect | Disconnect | FromPage | Speeds,
+        message: Connect | Disconnect | FromPage | FromProgram | Speeds,
         now: float,
     ) -> list[ToGate]:
         match message:
             case Connect():
+                _check_kind(display, message.connection, program=message.program)
                 if not display.pages:  # it answers as soon as it gets hello
                     display.alive_at = max(display.alive_at, now)
                 if len(display.pages) >= MOST_PAGES:
@@ -278,6 +304,9 @@ class Displays:
                 known = display.pages.get(message.connection)
                 if known is not None:
                     known[1:] = [message]
+            case FromProgram():
+                _check_program(display, message)
+                known = display.pages.get(message.connection)
             case _:
                 known = display.pages.get(message.connection)
                 if known is None:  # it counts as lost: the display slept
@@ -313,3 +342,33 @@ class Displays:
         ended: list[ToGate] = [Disconnect(connection) for connection in display.pages]
         display.pages.clear()
         return ended
+
+
+def _check_kind(display: Display, connection: str, *, program: bool) -> None:
+    """Check that the program of a display, and no page, has the program's connection.
+
+    Raises:
+        WireError: If not.
+
+    """
+    if program != (connection == display.program):
+        kind = "a program" if program else "a page"
+        raise WireError(f"display {display.name}: got {kind} as {connection!r}")
+
+
+def _check_program(display: Display, message: FromProgram) -> None:
+    """Check a command of the program of a display.
+
+    Raises:
+        WireError: If it is none, or a page could not send its values.
+
+    """
+    _check_kind(display, message.connection, program=True)
+    try:
+        if not isinstance(message.command, ControlCommand):
+            raise Refusal("it needs no control, so it has the form of a page's")
+        check(message.command)
+    except Refusal as refusal:
+        raise WireError(
+            f"display {display.name}: got a command of its program: {refusal.why}"
+        ) from refusal

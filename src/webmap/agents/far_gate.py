@@ -34,10 +34,11 @@ AGAIN = 0.1
 """Seconds until a STOP that the agent has not acknowledged is sent again."""
 
 ANSWER = 0.2
-"""Seconds between two answers to the agent while no page sends commands."""
+"""Seconds between two answers to the agent while nothing of this display has control
+or sends commands."""
 
 COMMANDING = 1.0
-"""Seconds after a command of a page in which each step answers.
+"""Seconds after a command in which each step answers.
 
 The answers then help TCP to notice lost commands, and their age is known sooner.
 """
@@ -46,8 +47,6 @@ ALL_PAGES = 0.5
 """Seconds between two lists of all pages."""
 
 ASLEEP = "the agent heard nothing of this page for a moment: try again"
-
-NO_PROGRAM = "a program drives only robots of its own gate, not those of an agent"
 
 _decode = msgspec.msgpack.Decoder(ToDisplays).decode
 _encode = msgspec.msgpack.Encoder().encode
@@ -108,8 +107,8 @@ class FarGate:
 
     @property
     def connection(self) -> str:
-        """The connection of the programs of this display."""
-        return f"{self.display}/program"
+        """The connection of the program of this display."""
+        return f"{self.display}/{protocol.PROGRAM}"
 
     def send(self, message: protocol.ToGate) -> None:
         """Send a message to the gate, if it can be reached and takes it from displays.
@@ -124,10 +123,8 @@ class FarGate:
                     self._pages.pop(message.connection, None)
                     self._greeted.discard(message.connection)
                 case protocol.FromProgram():
-                    program = self._of_program(message)
-                    if program is None:
-                        return
-                    message = program
+                    self._commanded_at = self._heard_at
+                    message = self._of_program(message)
                 case protocol.FromPage():
                     self._commanded_at = self._heard_at
                 case protocol.Speeds():
@@ -171,8 +168,8 @@ class FarGate:
                 self._lose(f"no connection to the agent {self.agent}")
             if self._order.session is None:
                 return
-            pause = 0.0 if now - self._commanded_at < COMMANDING else ANSWER
-            if now - self._answered_at >= pause:
+            commanding = now - self._commanded_at < COMMANDING or self._has_control
+            if now - self._answered_at >= (0.0 if commanding else ANSWER):
                 self._answered_at = now
                 self._put(Answer(self._order.session, self._order.newest))
             if not self.ready:
@@ -189,6 +186,13 @@ class FarGate:
                 if not self._reported:
                     self._put(ReportAll())
                 self._put(AllPages((self.connection, *self._pages)))
+
+    @property
+    def _has_control(self) -> bool:
+        """Whether a page or the program of this display has control of a robot."""
+        holders = (each.holder for each in self._latest.values())
+        own = f"{self.display}/"
+        return any(each and each.connection.startswith(own) for each in holders)
 
     def _begin(self, now: float) -> None:
         self.ready, self.trouble, self._listed_at = True, None, now
@@ -236,10 +240,12 @@ class FarGate:
 
     @property
     def _program(self) -> protocol.Connect:
-        return protocol.Connect(self.connection, self.display, "operator")
+        return protocol.Connect(
+            self.connection, f"program of {self.display}", "operator", program=True
+        )
 
     def _introduce(self, connections: Collection[str]) -> None:
-        """Introduce pages again that the agent has ended, as this display was slow."""
+        """Introduce again what the agent has ended, as this display was slow."""
         for each in (self._program, *self._owner.introduction()):
             if (
                 isinstance(each, protocol.Connect | protocol.Speeds)
@@ -256,8 +262,14 @@ class FarGate:
             self._stops[self._numbering.sent] = (at, message)
         self._publish(sample)
 
-    def _of_program(self, message: protocol.FromProgram) -> protocol.FromPage | None:
-        """Return the command of a program in the form of a page's, if there is one."""
+    def _of_program(
+        self, message: protocol.FromProgram
+    ) -> protocol.FromPage | protocol.FromProgram:
+        """Return a command of the program as the agent takes it.
+
+        What needs no control has the form of a page's command: such a STOP is sent
+        again until the agent has it, and is for all robots if its own is unknown there.
+        """
         match message.command:
             case commands.Stop(robot):
                 fields = {"op": "stop", "robot": robot or "*"}
@@ -265,12 +277,8 @@ class FarGate:
                 fields = {"op": "reset", "robot": robot, "stop": stop}
             case commands.Cancel(robot):
                 fields = {"op": "cancel", "robot": robot}
-            case commands.Take(robot):
-                reply = protocol.TakeReply(message.request, robot, None, NO_PROGRAM)
-                self._owner.hear(reply)
-                return None
             case _:
-                return None
+                return msgspec.structs.replace(message, connection=self.connection)
         return protocol.FromPage(self.connection, json.dumps(fields).encode())
 
     def _lose(self, why: str) -> None:

@@ -316,8 +316,8 @@ class Driven(Extendable):
             The lease's epoch.
 
         Raises:
-            NoLease: If another operator or program has control, or the robot is an
-                agent's.
+            NoLease: If another operator or program has control, or the robot's agent
+                cannot be reached or does not let this display drive.
             MotionError: If the robot cannot be driven; the message has the reason.
 
         """
@@ -337,7 +337,7 @@ class Driven(Extendable):
     def _may_be_free_soon(self) -> bool:
         """Return whether the robot cannot be taken yet but probably can be soon."""
         gate, report = self.motion.gate, self.report
-        if gate is None or self.motion.spec() is None or self.motion.is_far:
+        if gate is None or self.motion.spec() is None:
             return False
         if not gate.ready or report is None or self._report_is_old:
             return True

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
 
-from webmap.base.errors import MotionError, NoLease
+from webmap.base.errors import MotionError
 from webmap.base.geometry import Pose, Twist
 from webmap.base.lifecycle import lifecycle
 from webmap.base.tasks import spawn
@@ -317,13 +317,8 @@ class RobotMotion:
         robot_motions.discard(self)
 
     def take(self) -> "Future[int]":
-        """Request control for this program.
-
-        Raises:
-            NoLease: If the robot belongs to an agent.
-
-        """
-        return self._own_gate().take(self.id)
+        """Request control for this program."""
+        return self._gate().take(self.id)
 
     def release(self) -> None:
         """Release the program's control; the robot is stopped."""
@@ -334,21 +329,20 @@ class RobotMotion:
 
         Raises:
             MotionError: If the twist topic has no limit for an axis of the command.
-            NoLease: If the robot belongs to an agent.
 
         """
-        gate = self._own_gate()
+        gate = self._gate()
         if why := self.axes.refusal(twist):
             raise MotionError(f"robot {self._name!r}: the velocity was not sent: {why}")
         gate.twist(self.id, twist)
 
     def move(self, x: float, y: float, yaw: float) -> None:
         """Send the gate one goal of this program."""
-        self._own_gate().move(self.id, x, y, yaw)
+        self._gate().move(self.id, x, y, yaw)
 
     def locate(self, x: float, y: float, yaw: float) -> None:
         """Send the gate the robot's pose, from this program."""
-        self._own_gate().locate(self.id, x, y, yaw)
+        self._gate().locate(self.id, x, y, yaw)
 
     def cancel(self) -> None:
         """Cancel the robot's goals through the gate."""
@@ -394,17 +388,6 @@ class RobotMotion:
                 f"robot {self._name!r} has no twist topic and no move topic"
             )
         return self.gate
-
-    def _own_gate(self) -> "Gates | GateClient":
-        """Return the gate for a command that needs control."""
-        gate = self._gate()
-        if self.is_far:
-            raise NoLease(
-                f"robot {self._name!r} is an agent's: a program on a display cannot "
-                "take control of it, drive it or send it goals; it can stop it, reset "
-                "its STOP and cancel its goals. Pages drive it"
-            )
-        return gate
 
     def _take_type(self, found: str) -> None:
         twist = self.config.twist

@@ -231,7 +231,10 @@ PageCommand = (
     | StopTest
 )
 
-ProgramCommand = Take | Release | SetVelocity | Goal | Locate | Cancel | Stop | Reset
+ControlCommand = Take | Release | SetVelocity | Goal | Locate
+"""What a program sends to get control of a robot, to use it and to release it."""
+
+ProgramCommand = ControlCommand | Cancel | Stop | Reset
 
 Command = PageCommand | ProgramCommand
 
@@ -256,6 +259,22 @@ def parse(data: bytes) -> PageCommand:
     if fields:
         _refuse(f"{_short(next(iter(fields)))} is not a field of {op!r}")
     return command
+
+
+def check(command: ControlCommand) -> None:
+    """Check a command of a program on another computer like that of a page.
+
+    Raises:
+        Refusal: If a value is not what a page could send.
+
+    """
+    if isinstance(command, SetVelocity):  # the gate checks the velocity itself
+        fields = _Fields(msgspec.structs.asdict(command))
+        fields.robot()
+        fields.whole("epoch")
+        fields.whole("tick")
+    else:
+        parse(msgspec.json.encode(command))
 
 
 def op_of(command: Command) -> str:

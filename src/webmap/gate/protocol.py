@@ -127,16 +127,24 @@ class Forget(msgspec.Struct, frozen=True, tag="forget"):
     robot: str
 
 
-class Connect(msgspec.Struct, frozen=True, tag="connect"):
+class Connect(
+    msgspec.Struct,
+    frozen=True,
+    tag="connect",
+    omit_defaults=True,
+    repr_omit_defaults=True,
+):
     """A page opened its socket; the gate answers with :class:`Hello`."""
 
     connection: str
     name: str
     role: Role
+    program: bool = False
+    """Whether it is not a page but the Python code of another display."""
 
 
 class Disconnect(msgspec.Struct, frozen=True, tag="disconnect"):
-    """The page's socket is closed: the robots that it drives stop."""
+    """The page or program is gone: the robots that it drives stop."""
 
     connection: str
 
@@ -167,12 +175,19 @@ class WriterNodes(msgspec.Struct, frozen=True, tag="writer-nodes"):
     nodes: tuple[str, ...]
 
 
-class FromProgram(msgspec.Struct, frozen=True, tag="from_program", omit_defaults=True):
-    """A command of the display's Python code; its ``seq`` is not checked."""
+class FromProgram(
+    msgspec.Struct,
+    frozen=True,
+    tag="from_program",
+    omit_defaults=True,
+    repr_omit_defaults=True,
+):
+    """A command of a display's Python code; its ``seq`` is not checked."""
 
     command: ProgramCommand
     request: int = 0
     """Number of a ``Take``, which :class:`TakeReply` answers."""
+    connection: str = PROGRAM
 
 
 ToGate = (
@@ -396,13 +411,21 @@ class CloseConnection(msgspec.Struct, frozen=True, tag="close"):
     why: str
 
 
-class TakeReply(msgspec.Struct, frozen=True, tag="take-reply"):
+class TakeReply(
+    msgspec.Struct,
+    frozen=True,
+    tag="take-reply",
+    omit_defaults=True,
+    repr_omit_defaults=True,
+):
     """The answer to :class:`FromProgram` with a ``Take``."""
 
     request: int
     robot: str
     epoch: int | None
     why: str | None
+    connection: str = PROGRAM
+    """The program that sent it; each numbers its own requests."""
 
 
 class SentTwist(msgspec.Struct, frozen=True, tag="sent-twist"):

@@ -76,12 +76,19 @@ describe("a press", () => {
     });
   }
 
-  test("that takes control from a program does not drive yet", () => {
-    say("r1", PROGRAM, 0);
-    assert.deepEqual(press(), TAKE);
-    say("r1", MINE, 50);
-    assert.equal(it.stream.lease?.robot, "r1");
-    assert.equal(it.inputs.blocked, true);
+  for (const connection of ["program", "west.4f/program"]) {
+    test(`that takes control from the program ${connection} does not drive yet`, () => {
+      say("r1", { ...PROGRAM, holder: { connection, name: "a program" } }, 0);
+      assert.deepEqual(press(), TAKE);
+      say("r1", MINE, 50);
+      assert.equal(it.stream.lease?.robot, "r1");
+      assert.equal(it.inputs.blocked, true);
+    });
+  }
+
+  test("takes no control from a person whose name is program", () => {
+    say("r1", { ...ANN, holder: { connection: "c2", name: "program" } }, 0);
+    assert.deepEqual(press(), []);
   });
 
   const endings = {

@@ -79,7 +79,7 @@ class GateClient:
         link: Makes the way to the gate, for its owner and with the lock to hold; a
             process of this computer by default.
         agent: The agent whose gate it is; "" for the display's own.
-        prefix: What the ids of the pages begin with.
+        prefix: What the ids of the pages and of the program begin with.
 
     """
 
@@ -94,7 +94,9 @@ class GateClient:
         self._pages = Pages(
             self.send, self._lock, self._keep_stop_of_page, agent, prefix
         )
-        self._program = ProgramCommands(self.send, self._lock)
+        self._program = ProgramCommands(
+            self.send, self._lock, connection=f"{prefix}{protocol.PROGRAM}"
+        )
         self._pending_stops = PendingStops()
         self._numbers = itertools.count(1)
         self._specs: dict[str, RobotSpec] = {}
@@ -185,7 +187,7 @@ class GateClient:
 
         Returns:
             A future of the lease's epoch; its exception is ``NoLease`` if the gate
-            refuses.
+            refuses or does not answer.
 
         """
         trouble = None

@@ -1,7 +1,8 @@
-"""Executes the commands of pages and of the program. No I/O."""
+"""Executes the commands of pages and programs. No I/O."""
 
 import logging
 import math
+from typing import NamedTuple
 
 from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, SendToDisplay
@@ -23,7 +24,7 @@ from webmap.gate.commands import (
     Take,
     op_of,
 )
-from webmap.gate.protocol import PROGRAM, FromProgram, TakeReply
+from webmap.gate.protocol import FromProgram, TakeReply
 from webmap.gate.rules.connections import (
     Connection,
     Connections,
@@ -40,6 +41,20 @@ log = logging.getLogger("webmap.gate")
 
 SETTLE = 1.5
 """Seconds for which a program waits at most until a robot that it took would move."""
+
+MOST_WAITING = 20
+"""Requests for one robot that may wait for one program."""
+
+
+class WaitingTake(NamedTuple):
+    """A program that waits until the robot that it took would move."""
+
+    program: Connection
+    request: int
+    robot: str
+    epoch: int
+    until: float
+    """When it waits no longer."""
 
 
 class CommandHandler:
@@ -60,11 +75,10 @@ class CommandHandler:
         self._connections = connections
         self._ticks = ticks
         self._emit = emit
-        self._takes: list[tuple[int, str, int, float]] = []
-        """Request, robot, epoch, and until when the reply may wait."""
+        self._takes: list[WaitingTake] = []
 
     def handle(self, connection: Connection, command: Command, now: float) -> None:
-        """Execute the command of a page or of the program.
+        """Execute the command of a page or of a program.
 
         Raises:
             Refusal: If the command is not executed.
@@ -245,10 +259,14 @@ class CommandHandler:
     # Programs.
 
     def handle_program(self, message: FromProgram, now: float) -> None:
-        """Execute a command of the program; a refusal is sent to the program."""
-        program, command = self._connections.program, message.command
+        """Execute a command of a program; a refusal is sent to the program."""
+        program, command = self._connections.find(message.connection), message.command
+        if program is None or not program.program:
+            if not isinstance(command, Stop):
+                return  # it is lost, and so is its control
+            program = self._connections.program
         if isinstance(command, Take):
-            self._take_for_program(message.request, command.robot, now)
+            self._take_for_program(program, message.request, command.robot, now)
             return
         self._connections.run_or_refuse(
             program.id,
@@ -258,38 +276,61 @@ class CommandHandler:
             now,
         )
 
-    def _take_for_program(self, request: int, robot: str, now: float) -> None:
+    def _take_for_program(
+        self, program: Connection, request: int, robot: str, now: float
+    ) -> None:
         try:
-            epoch = self.take(self._connections.program, robot, now)
+            if self._waiting(program, robot) >= MOST_WAITING:
+                raise Refusal("this program waits for the robot already")
+            epoch = self.take(program, robot, now)
         except Refusal as refusal:
-            self._emit(SendToDisplay(TakeReply(request, robot, None, refusal.why)))
+            self._reply(program, request, robot, None, refusal.why)
         else:
             assert epoch is not None  # a program never waits for a handover
-            self._takes.append((request, robot, epoch, now + SETTLE))
+            self._takes.append(
+                WaitingTake(program, request, robot, epoch, now + SETTLE)
+            )
             self.reply_to_takes(now)
 
+    def _waiting(self, program: Connection, robot: str) -> int:
+        return sum(
+            (each.program, each.robot) == (program, robot) for each in self._takes
+        )
+
     def reply_to_takes(self, now: float) -> None:
-        """Reply to the program when its robot can be driven, or after ``SETTLE``.
+        """Reply to a program when its robot can be driven, or after ``SETTLE``.
 
         A page waits until its inputs were seen released. A program that drives at once
         would lose its first commands to a link that has not answered a ping yet.
         """
         waiting, self._takes = self._takes, []
-        for request, robot, epoch, until in waiting:
+        for take in waiting:
+            program, request, robot, epoch, until = take
             try:
                 machine = self._machines.find(robot)
-                check_lease(machine.authority.lease, PROGRAM, epoch)
+                check_lease(machine.authority.lease, program.id, epoch)
             except Refusal as refusal:
-                self._emit(SendToDisplay(TakeReply(request, robot, None, refusal.why)))
+                self._reply(program, request, robot, None, refusal.why)
                 continue
             if (
                 now < until
                 and machine.robots.drivable
                 and machine.conditions.why_blocked(now)
             ):
-                self._takes.append((request, robot, epoch, until))
+                self._takes.append(take)
             else:
-                self._emit(SendToDisplay(TakeReply(request, robot, epoch, None)))
+                self._reply(program, request, robot, epoch, None)
+
+    def _reply(
+        self,
+        program: Connection,
+        request: int,
+        robot: str,
+        epoch: int | None,
+        why: str | None,
+    ) -> None:
+        reply = TakeReply(request, robot, epoch, why, program.id)
+        self._emit(SendToDisplay(reply))
 
 
 def _pose(command: Goal | Locate) -> tuple[float, float, float]:

@@ -118,7 +118,7 @@ def check_take(
     Args:
         lease: The current lease, of another connection, if there is one.
         role: The role of the connection that takes control.
-        program: Whether this connection is the program.
+        program: Whether this connection is a program.
 
     Raises:
         Refusal: If it may not take control.
@@ -199,13 +199,17 @@ class Connection:
         id: The display's name for the connection.
         name: Its name for people.
         role: Its role.
+        program: Whether it is a program, the Python code of a display.
 
     """
 
-    def __init__(self, id: str, name: str, role: Role) -> None:
+    def __init__(
+        self, id: str, name: str, role: Role, *, program: bool = False
+    ) -> None:
         self.id = id
         self.name = name
         self.role = role
+        self.program = program
         self.acked = -1
         """The newest accepted ``seq``."""
         self.cap = page_cap()
@@ -218,11 +222,6 @@ class Connection:
         self._last_refused = ""
         self._counted_at = float("-inf")
         self._sent_at: dict[tuple[str | None, str, str], float] = {}
-
-    @property
-    def program(self) -> bool:
-        """Whether this is the program, the Python code in the display."""
-        return self.id == PROGRAM
 
     def set_speeds(self, v: float, w: float) -> None:
         """Set the limits of the page's ``Teleop``; invalid ones mean speed 0."""
@@ -271,7 +270,8 @@ class Connections:
     """
 
     def __init__(self, emit: Emit) -> None:
-        self.program = Connection(PROGRAM, PROGRAM, "operator")
+        self.program = Connection(PROGRAM, PROGRAM, "operator", program=True)
+        """The Python code of the gate's own display."""
         self._emit = emit
         self._all = {PROGRAM: self.program}
 
@@ -285,14 +285,14 @@ class Connections:
         return self._all.get(id)
 
     def add(self, message: Connect) -> None:
-        """Add the connection of a page."""
+        """Add the connection of a page, or of a program of another display."""
         self._all[message.connection] = Connection(
-            message.connection, message.name, message.role
+            message.connection, message.name, message.role, program=message.program
         )
         self._emit(SendToDisplay(Hello(message.connection)))
 
     def remove(self, id: str) -> bool:
-        """Remove the connection of a page; return whether there was one."""
+        """Remove such a connection; return whether there was one."""
         connection = self._all.pop(id, None)
         if connection is None:
             return False

@@ -11,7 +11,16 @@ from typing import Any
 
 from webmap.gate import events, protocol
 from webmap.gate.actions import Action, SendToDisplay
-from webmap.gate.commands import Refusal, Stop, begins_like_stop, op_of, parse, robot_in
+from webmap.gate.commands import (
+    Cancel,
+    Refusal,
+    Reset,
+    Stop,
+    begins_like_stop,
+    op_of,
+    parse,
+    robot_in,
+)
 from webmap.gate.protocol import PROGRAM
 from webmap.gate.rules.command_handling import CommandHandler
 from webmap.gate.rules.connections import Connection, Connections, Epochs, Ticks
@@ -136,12 +145,14 @@ class Gate:
 
     def _from_page(self, message: protocol.FromPage, now: float) -> None:
         connection = self._connections.find(message.connection)
-        if connection is None or connection.program:
+        if connection is None or connection is self._connections.program:
             return
         try:
             command = parse(message.text)
             if isinstance(command, Stop):
                 self._machines.check_known(command.robot)
+            elif connection.program and not isinstance(command, Reset | Cancel):
+                raise Refusal("a program cannot send what needs control as a page does")
         except Refusal as refusal:
             self._refuse_invalid(connection, message.text, refusal.why, now)
         else:

@@ -104,9 +104,12 @@ export function heldByAnother(report) {
   return report.holder !== null && !report.mine;
 }
 
-/** @param {RobotReport} report */
+/**
+ * @param {RobotReport} report
+ * @returns {boolean} Whether the program of this display has control, or that of another.
+ */
 export function heldByProgram(report) {
-  return report.holder?.connection === "program" || report.holder?.name === "program";
+  return /(^|\/)program$/.test(report.holder?.connection ?? "");
 }
 
 /** @param {RobotReport} report */
