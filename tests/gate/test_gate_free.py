@@ -88,6 +88,16 @@ def test_a_page_that_sets_the_same_speed_limit_again_receives_nothing(pages):
     assert len(said) == received + 1
 
 
+def test_a_page_receives_no_report_before_hello(pages):
+    pages.on_report(free(v_max=None, w_max=None))
+    said = []
+    connection = pages.connect("Ann", "operator", said.append, print)
+    connection.set_speeds(0.8, 1.2)
+    assert said == []
+    pages.on_hello(protocol.Hello(connection.id))
+    assert cap_of(said) == (0.8, 1.2, ["limit of the page"])
+
+
 def test_a_page_without_control_does_not_change_the_reported_speed(pages):
     bench = Bench().begin()
     bench.take("b")
