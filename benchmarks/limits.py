@@ -232,8 +232,10 @@ def end_of(comparison: Comparison, age: str = AGE_99) -> str:
     ]
     well = max((count for count, age in ages if age <= TOO_OLD), default=0)
     late = min((count for count, age in ages if not age <= TOO_OLD), default=math.inf)
-    end = f"between {well} and {late}" if late < math.inf else f"above {well}"
-    return f"{comparison.title}: {age} exceeds {TOO_OLD:.0f} {end}"
+    what = next(iter(comparison.runs)).split()[1]
+    end = f"between {well} and {late} {what}" if late < math.inf else f"above {well}"
+    old = f"{age.split()[0]}s are older than {TOO_OLD:.0f} ms"
+    return f"{comparison.title}: {old} {end}"
 
 
 def plot(ramps: Iterable[Comparison]) -> Plot:
