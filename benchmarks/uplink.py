@@ -119,7 +119,7 @@ def _agent(
     return running.enter_context(started("agent", bridge, *named, state=folder))[1]
 
 
-def _start(running: ExitStack, *module: str, says: str = "") -> None:
+def _start(running: ExitStack, *module: str, text: str = "") -> None:
     """Run a module of the benchmarks until it is ready, and end it afterwards."""
     process = running.enter_context(
         subprocess.Popen(
@@ -132,7 +132,7 @@ def _start(running: ExitStack, *module: str, says: str = "") -> None:
     running.callback(process.terminate)
     assert process.stdin is not None
     assert process.stdout is not None
-    process.stdin.write(says + "\n")
+    process.stdin.write(text + "\n")
     process.stdin.flush()
     if process.stdout.readline().strip() != "ready":
         raise RuntimeError(f"{module[0]} got no message")
@@ -161,7 +161,7 @@ def watched_by(
                     "benchmarks.far_display",
                     f"{router}/bay3",
                     str(pages),
-                    says=json.dumps(scene.subscriptions),
+                    text=json.dumps(scene.subscriptions),
                 )
             counted = 0
 
