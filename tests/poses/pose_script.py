@@ -596,3 +596,13 @@ class Chance:
 
     async def mount_again(self) -> None:
         self.mount()
+
+
+class CountingLoop(VirtualLoop):
+    """A virtual loop that counts its timers."""
+
+    timers = 0
+
+    def call_at(self, *args, **options):
+        self.timers += 1
+        return super().call_at(*args, **options)

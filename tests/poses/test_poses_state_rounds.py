@@ -3,7 +3,7 @@
 import asyncio
 
 import pytest
-from pose_script import VirtualLoop
+from pose_script import CountingLoop
 
 from webmap.base.looking import looking
 from webmap.core.state_rounds import AT_ONCE, EVERY, UNWATCHED, StateRounds
@@ -13,16 +13,6 @@ from webmap.core.state_rounds import AT_ONCE, EVERY, UNWATCHED, StateRounds
 def somebody_looks():
     yield
     looking._set(True)
-
-
-class CountingLoop(VirtualLoop):
-    """A virtual loop that counts its timers."""
-
-    timers = 0
-
-    def call_at(self, *args, **options):
-        self.timers += 1
-        return super().call_at(*args, **options)
 
 
 def run(scenario):

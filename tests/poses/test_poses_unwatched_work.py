@@ -6,7 +6,7 @@ import sys
 import time
 
 import pytest
-from pose_script import VirtualLoop, odometry
+from pose_script import CountingLoop, odometry
 
 import webmap
 from webmap.base.looking import looking
@@ -24,16 +24,6 @@ ROBOTS = 40
 def somebody_looks():
     yield
     looking._set(True)
-
-
-class CountingLoop(VirtualLoop):
-    """A virtual loop that counts its timers."""
-
-    timers = 0
-
-    def call_at(self, *args, **options):
-        self.timers += 1
-        return super().call_at(*args, **options)
 
 
 class Fleet:
