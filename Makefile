@@ -47,7 +47,7 @@ check: lint types contracts
 ## lint: ruff, codespell, eslint
 .PHONY: lint
 lint: $(DEV) $(NODE)
-	$(BIN)/ruff check
+	$(BIN)/ruff check --no-cache
 	$(BIN)/ruff format --check
 	$(BIN)/codespell
 	node_modules/.bin/eslint .

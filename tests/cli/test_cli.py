@@ -8,9 +8,9 @@ import sys
 import time
 
 import pytest
-from cli_inside import run_inside
 
 import webmap
+from cli_inside import run_inside
 
 pytestmark = pytest.mark.slow
 

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from urllib.parse import urlsplit
 
 import pytest
-from cli_inside import run_inside
 
+from cli_inside import run_inside
 from webmap.cli import bad_link
 
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+
 from cli_inside import run_inside
 
 pytestmark = pytest.mark.slow

@@ -5,8 +5,8 @@ import sys
 import tomllib
 
 import pytest
-from cli_inside import run_inside
 
+from cli_inside import run_inside
 from webmap.base.errors import ConfigError
 from webmap.cli.options import parse_topics
 

@@ -7,9 +7,9 @@ import sys
 
 import psutil
 import pytest
-from cli_inside import run_inside
 
 from bag_making import ODOMETRY, TWIST, Made
+from cli_inside import run_inside
 from webmap.bags import need_rosbags
 from webmap.bags.playback import Command
 from webmap.base.errors import ConfigError

@@ -10,11 +10,11 @@ import threading
 import time
 
 import pytest
-from cli_inside import run_inside
 from rosbags.highlevel import AnyReader
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
+from cli_inside import run_inside
 from webmap.cli.play import replay
 from webmap_process import simulator
 

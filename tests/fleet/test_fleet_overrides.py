@@ -1,8 +1,8 @@
 """Settings of ``--set`` replace guesses."""
 
 import pytest
-from cli_inside import run_inside
 
+from cli_inside import run_inside
 from webmap import Bridge
 from webmap.base.errors import ConfigError
 from webmap.discovery import discover
