@@ -7,6 +7,7 @@ from page_loop import HELLO, make_model, objects_left, open_page, wait_for
 
 import webmap
 from webmap.base.scope import Removal, keep
+from webmap.core import runtime as runtime_module
 from webmap.core.layer import Layer
 from webmap.core.page import Viewer
 from webmap.features.layers.laser_scanner import LaserScanner, SweepMsg
@@ -26,6 +27,17 @@ def test_the_page_function_gets_the_container_size_and_a_frame_is_sent(loop):
     _, socket = open_page(model)
     wait_for(lambda: socket.frames)
     assert seen == [(700, 500, "Ann")]
+    loop.call(lambda: model.close() or True)
+
+
+def test_the_first_picture_of_a_page_waits_for_no_tick(loop, monkeypatch):
+    monkeypatch.setattr(runtime_module, "TICK", 60.0)
+    model = make_model(loop, lambda page: webmap.Map(page.element("map")))
+    _, first = open_page(model)
+    wait_for(lambda: first.frames)
+    _, second = open_page(model, "page0002")
+    loop.call(lambda: True)
+    assert len(second.frames) == 1
     loop.call(lambda: model.close() or True)
 
 

@@ -169,6 +169,8 @@ class PageHost:
             self._open(sizes)
         self._stop_watching()
         self._watching = self._pages.runtime.watch(self)
+        # The viewer sees nothing yet, so this frame waits for no tick.
+        self.tick(time.monotonic())
 
     def _view_report(self, report: ViewReport) -> None:
         r = report
