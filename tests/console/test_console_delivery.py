@@ -67,12 +67,15 @@ class Loading:
         self.redirects = 0
         self.first_picture = float("inf")
         """When the first frame of the scene came, by the browser's own time."""
+        self.asked: list[str] = []
+        """The messages that the page sent before the first frame of the scene came."""
         session = self._session = page.context.new_cdp_session(page)
         session.on("Network.requestWillBeSent", self._sent)
         session.on("Network.requestServedFromCache", self._from_cache)
         session.on("Network.responseReceived", self._answered)
         session.on("Network.loadingFinished", self._finished)
         session.on("Network.webSocketFrameReceived", self._received)
+        session.on("Network.webSocketFrameSent", self._wrote)
         session.send("Network.enable")
 
     def end(self) -> None:
@@ -110,6 +113,10 @@ class Loading:
     def _received(self, event: dict) -> None:
         if event["response"]["opcode"] == BINARY:
             self.first_picture = min(self.first_picture, event["timestamp"])
+
+    def _wrote(self, event: dict) -> None:
+        if event["timestamp"] < self.first_picture:
+            self.asked.append(event["response"]["payloadData"])
 
     def _finished(self, event: dict) -> None:
         if event["requestId"] not in self.answers:
@@ -154,6 +161,11 @@ def test_the_first_robot_is_shown_after_few_requests_and_bytes(opened: Opened) -
     assert requests <= MOST_REQUESTS, [one.url for one in before]
     sizes = {one.path: one.size for one in before}
     assert 0 < sum(sizes.values()) <= MOST_BYTES, sizes
+
+
+def test_the_first_picture_comes_without_a_message_of_the_page(opened: Opened) -> None:
+    assert opened.loading.asked == []
+    assert opened.again.asked == []
 
 
 def test_stop_and_driving_do_not_wait_for_the_first_picture(opened: Opened) -> None:

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 import socket as sockets
+from urllib.parse import urlencode
 
 import pytest
 from server_fakes import TOKEN, running, wait_for
@@ -104,6 +105,22 @@ def test_a_scene_socket_carries_messages_both_ways_and_reports_its_close_once(
     scene.socket.offer(b"too late")
     scene.socket.end(1011, "too late")
     assert scene.times_closed == 1
+
+
+def test_the_hello_of_a_page_is_part_of_the_address_of_its_scene_socket(
+    rooms, open_socket
+):
+    async def scenario():
+        query = urlencode({"page": "lab", "id": "p1", "hello": '{"op":"hello"}'})
+        async with open_socket(f"scene?{query}") as socket:
+            await asyncio.to_thread(wait_for, lambda: rooms.model.scenes)
+            scene = rooms.model.scenes[0]
+            await asyncio.to_thread(wait_for, lambda: scene.received)
+            await socket.send("later")
+            await asyncio.to_thread(wait_for, lambda: len(scene.received) == 2)
+
+    asyncio.run(scenario())
+    assert rooms.model.scenes[0].received == ['{"op":"hello"}', "later"]
 
 
 def test_a_drive_socket_carries_messages_both_ways_and_reports_its_close(

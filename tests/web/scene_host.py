@@ -175,7 +175,7 @@ class SceneHost:
         page_id = web_socket.query_params["id"]
         ticking: asyncio.Task[None] | None = None
         with contextlib.suppress(WebSocketDisconnect):
-            hello = read_message(await web_socket.receive_text())
+            hello = read_message(web_socket.query_params["hello"])
             assert isinstance(hello, Hello)
             shown = self.shown.get(page_id)
             if shown is None:

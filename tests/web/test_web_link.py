@@ -65,6 +65,34 @@ def test_a_page_under_a_prefix_sends_its_url_without_the_prefix(host, tab):
     assert host.one.hellos[0].url == "/"
 
 
+MANY = 300
+
+ADD_MANY = f"""
+document.addEventListener("readystatechange", () => {{
+  for (let n = 0; n < {MANY}; n++) {{
+    const box = document.createElement("p");
+    box.id = `${{n}} ${{"é".repeat(50)}}`;
+    box.textContent = "x";
+    document.body.append(box);
+  }}
+}}, {{ once: true }});
+"""
+
+
+def test_the_address_of_the_socket_is_not_too_long_with_the_sizes_of_many_elements(
+    host, tab
+):
+    addresses = []
+    tab.on("websocket", lambda socket: addresses.append(socket.url))
+    tab.add_init_script(ADD_MANY)
+    tab.goto(f"{host.url}?x={'%22' * 1000}")
+    host.until(lambda: host.shown and host.one.hellos and addresses, tab=tab)
+    sizes = host.one.hellos[0].containers
+    assert 2 < len(sizes) < MANY
+    assert sizes["map"] == (700, 500)
+    assert len(addresses[0]) < 6000
+
+
 def test_the_page_shows_a_lost_link_and_reconnects(host, tab, opened):
     # Written down in the page, as it may be connected again before anybody looks.
     tab.evaluate(

@@ -1,4 +1,8 @@
-"""The ``/_webmap/scene`` sockets: the scene to the page, its events back."""
+"""The ``/_webmap/scene`` sockets: the scene to the page, its events back.
+
+A page sends its hello in the address of the socket, so that the first frame takes one
+round trip less; other programs may send it as their first message.
+"""
 
 import logging
 
@@ -56,12 +60,18 @@ class SceneSockets:
         )
         async with self._open.holding((viewer.id, page_id), page_socket) as has_room:
             if has_room:
-                await self._carry(page_socket, entry.path, page_id, viewer)
+                hello = socket.query_params.get("hello")
+                await self._carry(page_socket, entry.path, page_id, viewer, hello)
             else:
                 await page_socket.refuse_full()
 
     async def _carry(
-        self, page_socket: PageSocket, path: str, page_id: str, viewer: Viewer
+        self,
+        page_socket: PageSocket,
+        path: str,
+        page_id: str,
+        viewer: Viewer,
+        hello: str | None,
     ) -> None:
         try:
             handle = self._pages.open_scene(path, page_id, viewer, page_socket)
@@ -71,6 +81,8 @@ class SceneSockets:
                 FAILED, "the page could not be opened; see the log of WebMap"
             )
             return
+        if hello is not None:
+            handle.receive(hello)
         try:
             await page_socket.run(
                 handle.receive, lambda why: self._pages.refused(viewer, why)

@@ -19,7 +19,7 @@ export const PAGE_ID = "^[A-Za-z0-9_-]{8,64}$";
 export const LONGEST_TEXTS = Object.freeze({
   "name": 64,
   "value": 8192,
-  "url": 2048,
+  "url": 500,
   "trouble": 2000,
 });
 

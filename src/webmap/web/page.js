@@ -24,6 +24,8 @@ const SILENT = 3000;
 const DEAD = 10_000;
 /** Milliseconds between two checks; the server sends at least every second. */
 const LOOK_PERIOD = 500;
+/** Characters for sizes in the socket's address; servers take some 8000 in all. */
+const SIZES_ROOM = 3000;
 /** Frames in a row that may fail before the page stops requesting new ones. */
 const FAILURES = 3;
 
@@ -69,7 +71,7 @@ export class Page {
     this._returned = false;
     this._theme = matchMedia("(prefers-color-scheme: dark)");
     this._theme.addEventListener("change", () => this.scene.restyle());
-    this._link = new Link(() => socketAddress("scene", { page: this.path, id: this.id }), {
+    this._link = new Link(() => this._address(), {
       opened: () => this._opened(),
       received: (data) => this._received(data),
       closed: (reason, forGood) => this._closed(reason, forGood),
@@ -116,10 +118,9 @@ export class Page {
 
   // The connection -------------------------------------------------------------
 
-  _opened() {
-    this._listening = performance.now();
-    this._frames = [];
-    this.send({
+  /** @returns {URL} Of the socket, with the hello: a message would take a round trip. */
+  _address() {
+    const hello = {
       op: "hello",
       page: this.id,
       url: (this.path + location.search).slice(0, LONGEST_TEXTS.url),
@@ -128,7 +129,14 @@ export class Page {
       dpr: devicePixelRatio,
       theme: this._theme.matches ? "dark" : "light",
       containers: containers(),
-    });
+    };
+    const query = { page: this.path, id: this.id, hello: JSON.stringify(hello) };
+    return socketAddress("scene", query);
+  }
+
+  _opened() {
+    this._listening = performance.now();
+    this._frames = [];
   }
 
   /** @param {ArrayBuffer} data */
@@ -230,10 +238,14 @@ export class Page {
 function containers() {
   /** @type {Record<string, [number, number]>} */
   const sizes = {};
-  const elements = [...document.body.querySelectorAll("[id]")];
-  for (const element of elements.filter(({ id }) => id.length <= LONGEST_TEXTS.name).slice(0, 100)) {
-    const { width, height } = contentSize(element);
-    sizes[element.id] = [Math.round(width), Math.round(height)];
+  let room = SIZES_ROOM;
+  for (const element of document.body.querySelectorAll("[id]:not(svg *)")) {
+    const { id } = element;
+    const [width, height] = Object.values(contentSize(element)).map(Math.round);
+    if (id.length > LONGEST_TEXTS.name || (width === 0 && height === 0)) continue;
+    room -= encodeURIComponent(JSON.stringify([id, width, height])).length;
+    if (room < 0) break;
+    sizes[id] = [width, height];
   }
   return sizes;
 }
