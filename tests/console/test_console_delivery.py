@@ -168,6 +168,17 @@ def test_the_first_picture_comes_without_a_message_of_the_page(opened: Opened) -
     assert opened.again.asked == []
 
 
+def test_only_stop_and_driving_are_loaded_before_the_first_robot_is_shown(
+    opened: Opened,
+) -> None:
+    before = [
+        one.path.partition("/features/")[2]
+        for one in opened.loading.answers.values()
+        if one.begun < opened.first_robot and "/features/" in one.path
+    ]
+    assert {one.partition("/")[0] for one in before} == {"stop", "drive"}, before
+
+
 def test_stop_and_driving_do_not_wait_for_the_first_picture(opened: Opened) -> None:
     begun = {
         one.path

@@ -93,6 +93,53 @@ def test_the_address_of_the_socket_is_not_too_long_with_the_sizes_of_many_elemen
     assert len(addresses[0]) < 6000
 
 
+def test_the_first_picture_waits_for_no_animation_frame_and_modules_wait_for_one(
+    host, tab
+):
+    def build(shown):
+        shown.root, shown.world, shown.mount = shown.add_map()
+        shown.add_robot(shown.world, shown.mount)
+        shown.session.attach(shown.root.id, 5, "test.js", {}, "half.css")
+
+    asked = []
+    tab.on("request", lambda request: asked.append(request.url.rpartition("/")[2]))
+    tab.add_init_script(
+        """
+        const asked = [];
+        const animate = requestAnimationFrame;
+        globalThis.requestAnimationFrame = (fn) => asked.push(fn);
+        globalThis.goOn = () => {
+          globalThis.requestAnimationFrame = animate;
+          for (const fn of asked) animate(fn);
+        };
+        """
+    )
+    host.build = build
+    tab.goto(host.url)
+    tab.wait_for_selector(".robot circle", state="attached")
+    tab.wait_for_timeout(300)
+    assert not {"test.js", "half.css"} & set(asked)
+    tab.evaluate("goOn()")
+    tab.wait_for_selector(".overlay > .half", state="attached")
+    assert {"test.js", "half.css"} <= set(asked)
+
+
+def test_style_sheets_that_load_together_are_read_once(host, tab, opened):
+    times = tab.evaluate(
+        """async () => {
+          const { page } = await import("/_webmap/web/page.js");
+          const { scene } = page;
+          let times = 0;
+          scene.restyle = () => (times += 1);
+          const sheets = ["a", "b", "c"].map((name) => page.parts._addStyle(name).link);
+          for (const sheet of sheets) sheet.dispatchEvent(new Event("load"));
+          await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+          return times;
+        }"""
+    )
+    assert times == 1
+
+
 def test_the_page_shows_a_lost_link_and_reconnects(host, tab, opened):
     # Written down in the page, as it may be connected again before anybody looks.
     tab.evaluate(

@@ -25,6 +25,9 @@ import { OWN_FILES, resolve } from "./addresses.js";
  * @property {() => void} onStyles Called when a style sheet was loaded.
  */
 
+/** Milliseconds for which the other parts wait for STOP and driving. */
+const FIRST_PATIENCE = 1000;
+
 /** Loads, attaches and detaches the browser parts of modules. */
 export class BrowserParts {
   /** @param {BrowserPartsPage} page */
@@ -34,6 +37,15 @@ export class BrowserParts {
     this._attached = new Map();
     /** @type {Set<string>} */
     this._styles = new Set();
+    const links = document.head.querySelectorAll('link[rel="modulepreload"]');
+    /** @type {Set<string | null>} What the page's HTML loads: STOP and driving. */
+    this._preloaded = new Set(
+      [...links].map((link) => resolve(link.getAttribute("href") ?? "", location.href)),
+    );
+    /** @type {Promise<void>[]} Parts of these modules that are being loaded. */
+    this._first = [];
+    /** @type {(() => Promise<void>)[]} Load the other parts. */
+    this._later = [];
   }
 
   /**
@@ -48,12 +60,25 @@ export class BrowserParts {
     /** @type {Attached} */
     const attached = { canvas, part: null, waiting: [] };
     this._attached.set(instance, attached);
-    if (css) this._addStyle(css);
-    this._load(attached, instance, module, options).catch((error) => {
-      // Not every browser loads a failed import of a module again.
-      const hint = error instanceof TypeError ? " Reload the page to try again." : "";
-      this._page.notice(`Module ${module} failed: ${error}.${hint}`);
-    });
+    const style = css ? this._addStyle(css) : null;
+    const load = () => {
+      if (style) style.link.href = style.url;
+      return this._load(attached, instance, module, options).catch((error) => {
+        // Not every browser loads a failed import of a module again.
+        const hint = error instanceof TypeError ? " Reload the page to try again." : "";
+        this._page.notice(`Module ${module} failed: ${error}.${hint}`);
+      });
+    };
+    if (this._preloaded.has(resolve(module, OWN_FILES))) this._first.push(load());
+    else if (this._later.push(load) === 1) void this._loadLater();
+  }
+
+  /** Load parts when the picture is on the screen, and STOP works. */
+  async _loadLater() {
+    await painted();
+    const patience = new Promise((done) => setTimeout(done, FIRST_PATIENCE));
+    await Promise.race([Promise.all(this._first.splice(0)), patience]);
+    for (const load of this._later.splice(0)) void load();
   }
 
   /**
@@ -110,17 +135,26 @@ export class BrowserParts {
     }
   }
 
-  /** @param {string} css */
+  /**
+   * @param {string} css
+   * @returns {{link: HTMLLinkElement, url: string} | null} In the order of the modules;
+   *     null if there is nothing to load.
+   */
   _addStyle(css) {
     const url = resolve(css, OWN_FILES);
-    if (url === null || this._styles.has(url)) return;
+    if (url === null || this._styles.has(url)) return null;
     this._styles.add(url);
     const link = document.createElement("link");
     link.rel = "stylesheet";
-    link.href = url;
     link.addEventListener("load", () => this._page.onStyles());
     document.head.append(link);
+    return { link, url };
   }
+}
+
+/** @returns {Promise<void>} Resolves when the browser has painted what is there now. */
+function painted() {
+  return new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
 }
 
 /** Milliseconds before each new attempt to load a module. */

@@ -40,7 +40,9 @@ export class Page {
       send: (message) => this.send(message),
       notice: (text) => this.trouble(text),
       ready: () => this._loadDrive(),
-      onStyles: () => this.scene.restyle(),
+      onStyles: () => {
+        this._restyling ||= requestAnimationFrame(() => this._restyle());
+      },
     });
     this.scene = new Scene({
       send: (message) => this.send(message),
@@ -63,6 +65,9 @@ export class Page {
     /** @type {Array<{data: ArrayBuffer, received: number}>} */
     this._frames = [];
     this._drawing = 0;
+    this._restyling = 0;
+    /** Whether nothing came yet over this connection. */
+    this._isNew = false;
     this._failures = 0;
     this._listening = performance.now();
     /** Why the server ended the last connection, if it did. */
@@ -137,6 +142,7 @@ export class Page {
   _opened() {
     this._listening = performance.now();
     this._frames = [];
+    this._isNew = true;
   }
 
   /** @param {ArrayBuffer} data */
@@ -144,8 +150,12 @@ export class Page {
     this._listening = performance.now();
     this._returned = document.hidden;
     this._frames.push({ data, received: performance.now() / 1000 });
-    this._drawing ||= requestAnimationFrame(() => this._draw());
     this._connected();
+    const first = this._isNew;
+    this._isNew = false;
+    // Before the first picture there is none, or an old one: do not wait to draw it.
+    if (first && !document.hidden) this._draw();
+    else this._drawing ||= requestAnimationFrame(() => this._draw());
   }
 
   _connected() {
@@ -205,6 +215,12 @@ export class Page {
     for (const { data, received } of this._frames.splice(0)) {
       if (!this._apply(data, received)) return;
     }
+  }
+
+  /** Sheets that load together are read once, because each reading computes styles. */
+  _restyle() {
+    this._restyling = 0;
+    this.scene.restyle();
   }
 
   /**
