@@ -6,7 +6,6 @@ The model's thread publishes and the web thread serves, hence the lock.
 import hashlib
 import threading
 import time
-from collections import deque
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -17,11 +16,8 @@ from webmap.scene import svg
 KEPT_FOR = 3.0
 """Seconds for which a picture is still served after it was replaced."""
 
-MOST_KEPT = 64
-"""The greatest number of such pictures, a bound for pictures that change often."""
-
 RETIRED_BYTES = 8 << 20
-"""The greatest total size of retired pictures that pages may still load, in bytes."""
+"""The greatest total size of such pictures, in bytes; the newest is always served."""
 
 PREFIX = "/_webmap/images/"
 """The start of the URL of every image without a name."""
@@ -111,7 +107,7 @@ class Pictures:
             self._retired[tag] = (image, now)
             size = sum(len(old.data) for old, _ in self._retired.values())
             for name, (old, since) in tuple(self._retired.items()):
-                if size <= RETIRED_BYTES and now - since <= KEPT_FOR:
+                if name == tag or (size <= RETIRED_BYTES and now - since <= KEPT_FOR):
                     break
                 del self._retired[name]
                 size -= len(old.data)
@@ -137,7 +133,7 @@ class Picture:
 
     def __init__(self) -> None:
         self.element = svg.image(preserveAspectRatio="none")
-        self._urls: deque[tuple[str, float]] = deque()
+        self._url: str | None = None
         keep(Removal(self._end))
 
     def show(
@@ -154,16 +150,12 @@ class Picture:
             cell: The width of one of its pixels, in metres.
 
         """
-        now = time.monotonic()
-        self._urls.append((pictures.publish(data), now))
-        self.element.set(href=self._urls[-1][0], width=width, height=height)
+        earlier, self._url = self._url, pictures.publish(data)
+        self.element.set(href=self._url, width=width, height=height)
         self.element.set("data-cell", cell)
         self.element.set_matrix(matrix)
-        # A page with a slow connection may still request earlier pictures.
-        while len(self._urls) > 2 and (
-            now - self._urls[0][1] > KEPT_FOR or len(self._urls) > MOST_KEPT
-        ):
-            pictures.withdraw(self._urls.popleft()[0])
+        if earlier is not None:
+            pictures.retire(earlier)
 
     def clear(self) -> None:
         """Show nothing."""
@@ -171,5 +163,6 @@ class Picture:
         self._end()
 
     def _end(self) -> None:
-        while self._urls:
-            pictures.retire(self._urls.popleft()[0])
+        if self._url is not None:
+            pictures.retire(self._url)
+        self._url = None

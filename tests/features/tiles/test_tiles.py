@@ -8,7 +8,7 @@ import pytest
 from scene_of_tiles import DATUM, EAST, made_tiles, number
 
 from webmap.base.errors import ConfigError
-from webmap.core.pictures import pictures
+from webmap.core.pictures import PREFIX, pictures
 from webmap.features.tiles import tile_layer
 
 
@@ -30,9 +30,12 @@ def test_removing_the_tile_layer_releases_its_tiles(map, tiles, channel):
                 break
         assert 4 <= len(layer.shown) <= 12
         assert len(pictures) > before
+        urls = [shown.url for shown in layer.shown.values() if shown]
         map.remove_module(layer)
         await asyncio.sleep(0)
         assert len(pictures) == before
+        for url in urls:  # a page that shows them may be about to load them
+            assert pictures.get(url.removeprefix(PREFIX)) is not None
         assert layer._fragment not in channel.mounted.values()
 
     asyncio.run(scenario())

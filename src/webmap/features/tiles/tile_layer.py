@@ -174,7 +174,7 @@ class TileLayer:
         shown = self.shown.pop(tile)
         if shown is not None:
             shown.element.remove()
-            pictures.withdraw(shown.url)
+            pictures.retire(shown.url)
 
     def _complain(self, text: str) -> None:
         if not self._is_reported:
