@@ -2,8 +2,9 @@
 
 import msgspec
 import pytest
+from agent_reports import REPORT
 
-from webmap.agents.displays import AllPages, Answer, Displays, ReportAll, Unknown
+from webmap.agents.displays import Answer, Displays, ReportAll, Unknown
 from webmap.agents.samples import Numbering, Order
 from webmap.base.errors import WireError
 from webmap.gate import commands
@@ -15,6 +16,8 @@ from webmap.gate.protocol import (
     FromPage,
     FromProgram,
     Heartbeat,
+    Holder,
+    RobotGone,
     RobotSpec,
     Speeds,
     Tick,
@@ -41,8 +44,14 @@ class West:
     def hears(self, tick, now):
         self.order.take(self.displays.send(Tick(tick, {}), now))
 
-    def answers(self, now):
-        return self.says(Answer(self.order.session, self.order.newest), now)
+    def answers(self, now, connections=None):
+        answer = Answer(self.order.session or 0, self.order.newest, connections)
+        return self.says(answer, now)
+
+    def reports_control_of(self, connection, now=0.0):
+        holder = None if connection is None else Holder(connection, "Ann")
+        report = msgspec.structs.replace(REPORT, holder=holder)
+        self.displays.send(report, now)
 
 
 @pytest.fixture
@@ -174,7 +183,7 @@ def test_a_program_that_is_not_known_moves_nothing_and_is_asked_for(west):
     assert west.says(from_program(Take("r1"))) == []
     assert west.says(from_program(velocity())) == []
     assert west.displays.unknown("west") is None, "each answer would end its control"
-    assert west.says(AllPages(("west/program",))) == []
+    assert west.answers(0.0, ("west/program",)) == []
     assert west.displays.unknown("west") == Unknown("west", ("west/program",))
     assert west.says(FromPage("west/program", STOP)) == [FromProgram(Stop(None))]
 
@@ -182,18 +191,20 @@ def test_a_program_that_is_not_known_moves_nothing_and_is_asked_for(west):
 def test_the_program_of_a_silent_display_ends_after_half_a_second(west):
     west.says(PAGE, 0.0)
     west.says(PROGRAM, 0.0)
+    west.reports_control_of("west/program")
     west.hears(1, 0.05)
     west.answers(0.1)
     assert west.displays.look(0.55) == []
     assert west.displays.look(0.56) == [Disconnect("west/program")]
     assert west.displays.look(0.6) == []
     assert west.says(from_program(velocity()), 0.7) == []
+    west.reports_control_of("west/c1")
     assert west.displays.look(1.06) == [Disconnect("west/c1")]
 
 
 def test_a_program_that_its_display_no_longer_lists_ends(west):
     west.says(PROGRAM)
-    assert west.says(AllPages(())) == [Disconnect("west/program")]
+    assert west.answers(0.0, ()) == [Disconnect("west/program")]
 
 
 def test_the_role_is_that_of_the_user_and_counts_for_each_of_its_displays():
@@ -210,14 +221,14 @@ def test_a_page_that_the_display_no_longer_lists_ends(west):
     other = Connect("west/c2", "Ben", "operator")
     west.says(PAGE)
     west.says(other)
-    assert west.says(AllPages(("west/c2",))) == [Disconnect("west/c1")]
+    assert west.answers(0.0, ("west/c2",)) == [Disconnect("west/c1")]
     assert west.displays.introduction() == [other]
 
 
 def test_pages_that_ended_while_the_display_was_slow_are_asked_for(west):
     west.says(PAGE, 0.0)
-    west.displays.look(1.1)
-    west.says(AllPages(("west/c1", "west/program")), 1.1)
+    west.displays.look(3.1)
+    west.answers(3.1, ("west/c1", "west/program"))
     unknown = west.displays.unknown("west")
     assert unknown == Unknown("west", ("west/c1", "west/program"))
     assert west.displays.unknown("west") is None
@@ -252,7 +263,7 @@ def test_an_agent_remembers_a_bounded_number_of_displays(monkeypatch):
     connect("b")
     with pytest.raises(WireError, match="more than 2 displays"):
         connect("c")
-    displays.look(1.1)
+    displays.look(3.1)
     assert connect("c")
 
 
@@ -264,8 +275,9 @@ def test_a_sample_that_comes_twice_or_late_is_dropped(west):
     assert west.displays.receive("west", second, 0.0) == []
 
 
-def test_the_pages_of_a_silent_display_end_after_1_s(west):
+def test_the_pages_of_a_silent_display_with_control_end_after_1_s(west):
     west.says(PAGE, 0.0)
+    west.reports_control_of("west/c1")
     west.hears(1, 0.05)
     west.answers(0.1)
     assert west.displays.look(1.05) == []
@@ -273,8 +285,38 @@ def test_the_pages_of_a_silent_display_end_after_1_s(west):
     assert west.displays.look(1.2) == []
 
 
+def test_control_that_begins_long_after_an_answer_is_not_ended_at_once(west):
+    west.says(PAGE, 0.0)
+    west.says(PROGRAM, 0.0)
+    west.hears(1, 0.05)
+    west.answers(0.1)
+    west.reports_control_of("west/program", 1.5)  # another display handed it over
+    west.reports_control_of("west/program", 1.7)
+    assert west.displays.look(2.0) == []
+    assert west.displays.look(2.01) == [Disconnect("west/program")]
+
+
+@pytest.mark.parametrize("end", ["released", "gone", "of another"])
+def test_the_pages_of_a_silent_display_without_control_end_after_3_s(west, end):
+    west.says(PAGE, 0.0)
+    west.says(PROGRAM, 0.0)
+    west.reports_control_of("east/c1" if end == "of another" else "west/c1")
+    match end:
+        case "released":
+            west.reports_control_of(None)
+        case "gone":
+            west.displays.send(RobotGone("r1"), 0.0)
+    west.hears(1, 0.05)
+    west.answers(0.1)
+    assert west.displays.look(3.05) == []
+    ended = [Disconnect("west/c1"), Disconnect("west/program")]
+    assert west.displays.look(3.06) == ended
+    assert west.displays.look(3.2) == []
+
+
 def test_an_answer_to_an_old_sample_is_no_sign_of_life(west):
     west.says(PAGE, 0.0)
+    west.reports_control_of("west/c1")
     for tick in range(30):
         west.hears(tick, 0.05 * tick)
     late = Answer(west.order.session, 2)  # sent at 0.05 s

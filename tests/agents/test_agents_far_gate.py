@@ -5,6 +5,7 @@ import threading
 
 import msgspec
 import pytest
+from agent_reports import NAME, REPORT
 
 from webmap.agents.displays import AllReports, Displays, Took, Unknown
 from webmap.agents.far_gate import FarGate
@@ -24,7 +25,6 @@ from webmap.gate.protocol import (
     Tick,
 )
 
-NAME = "ann.4f"
 PAGE = Connect(f"{NAME}/c1", "Ann", "operator")
 PROGRAM = Connect(f"{NAME}/program", f"program of {NAME}", "operator", program=True)
 STOP = FromPage(f"{NAME}/c1", b'{"op":"stop","robot":"r1"}')
@@ -83,42 +83,6 @@ def connected(bench):
     return bench
 
 
-REPORT = msgspec.convert(
-    {
-        "type": "robot",
-        "robot": "r1",
-        "name": "Bob",
-        "state": "driving",
-        "doing": "driven",
-        "latched": False,
-        "stop": None,
-        "holder": {"connection": f"{NAME}/c1", "name": "Ann"},
-        "epoch": 3,
-        "asker": None,
-        "changing": False,
-        "armed": True,
-        "v": 1.0,
-        "w": 1.5,
-        "why": [],
-        "link": "up",
-        "sent": [0.0] * 6,
-        "echoed": None,
-        "measured": None,
-        "alarm": None,
-        "age": None,
-        "reaction": 0.3,
-        "brake": 0.5,
-        "stop_time": None,
-        "stop_source": None,
-        "stop_date": None,
-        "test": None,
-        "armable": True,
-        "reason": None,
-    },
-    RobotReport,
-)
-
-
 def test_the_first_sample_introduces_the_pages_and_no_robot(bench):
     assert not bench.far.ready
     assert bench.far.trouble == "waiting for the agent bay3"
@@ -169,7 +133,7 @@ def test_a_stop_is_sent_again_until_the_agent_has_it(connected):
         connected.far.beat(now)
     assert connected.arrive(0.1) == [STOP]
     session, number = connected.displays.newest(NAME)
-    took = Took(NAME, session, number - 1)
+    took = Took(NAME, session, number)
     connected.hears(took, 0.12)  # of another sample
     connected.far.beat(0.25)
     assert STOP in connected.arrive(0.25)
@@ -325,11 +289,24 @@ def answers(bench, begin, seconds=1.0):
 
 
 def test_a_display_answers_more_often_while_a_page_has_control_or_commands(connected):
-    assert answers(connected, 1.0) < 10
-    connected.far.send(FromPage(PAGE.connection, b'{"op":"drive"}'))
-    assert answers(connected, 2.0) > 20
-    assert answers(connected, 4.0) < 10
-    connected.hears(REPORT, 5.0)
-    assert answers(connected, 6.0) > 20, "a page has control"
-    connected.hears(msgspec.structs.replace(REPORT, holder=None), 7.0)
-    assert answers(connected, 8.0) < 10
+    connected.hears(msgspec.structs.replace(REPORT, holder=None), 0.0)
+    assert answers(connected, 1.0) == 2, "each lists the pages"
+    connected.far.send(FromPage(PAGE.connection, b'{"op":"take"}'))
+    assert answers(connected, 1.95) == 20
+    assert answers(connected, 4.0) == 2
+    connected.hears(REPORT, 5.0)  # a page has control
+    assert answers(connected, 5.0) == 20
+
+
+def test_the_first_command_of_an_idle_display_follows_an_answer(connected):
+    """The agent may have no newer sign of life, and would end the control at once."""
+    connected.arrive()
+    take = FromPage(PAGE.connection, b'{"op":"take","robot":"r1"}')
+    connected.hears(Tick(2, {}), 2.9)
+    connected.far.send(take)
+    assert connected.arrive(2.95) == [take]
+    connected.hears(REPORT, 2.95)
+    assert connected.displays.look(3.0) == []
+    connected.sent.clear()
+    connected.far.send(take)
+    assert len(connected.sent) == 1

@@ -26,6 +26,8 @@ from webmap.gate.protocol import (
     FromGate,
     FromPage,
     FromProgram,
+    Holder,
+    RobotGone,
     RobotReport,
     Role,
     Speeds,
@@ -39,16 +41,20 @@ FRESH = 0.3
 """Seconds after which an answer to a sample is no sign of life any more."""
 
 SILENT = 1.0
-"""Seconds without a sign of life after which the pages of a display count as lost.
+"""Seconds without a sign of life after which the pages of a display count as lost, if
+one of them has control of a robot.
 
 The gate itself stops a robot 200 ms after the last command; this ends control.
 """
+
+IDLE_SILENT = 3.0
+"""The same for a display whose pages control nothing: it answers less often."""
 
 PAUSE = 0.2
 """The least time between two times that all reports are sent, in seconds."""
 
 PROGRAM_SILENT = 0.5
-"""The same for the program of a display.
+"""The same for the program of a display, if it has control of a robot.
 
 A program has no inputs that it could release: after a pause of its display it would
 drive on where it was.
@@ -63,19 +69,15 @@ MOST_DISPLAYS = 100
 
 
 class Answer(msgspec.Struct, frozen=True, tag="answer"):
-    """A display has received this sample of the agent; sent 5 to 20 times a second."""
+    """A display has received this sample of the agent; sent 2 to 20 times a second."""
 
     session: int
     number: int
-
-
-class AllPages(msgspec.Struct, frozen=True, tag="pages"):
-    """The program and all pages that a display has now; sent twice a second.
+    connections: tuple[str, ...] | None = None
+    """The program and all pages that the display has now; twice a second.
 
     A lost message about a page that has closed is made good by this.
     """
-
-    connections: tuple[str, ...]
 
 
 class ReportAll(msgspec.Struct, frozen=True, tag="report-all"):
@@ -107,14 +109,7 @@ ToDisplays = FromGate | AllReports | Took | Unknown
 """What an agent sends to all displays."""
 
 FromDisplay = (
-    Connect
-    | Disconnect
-    | FromPage
-    | FromProgram
-    | Speeds
-    | Answer
-    | AllPages
-    | ReportAll
+    Connect | Disconnect | FromPage | FromProgram | Speeds | Answer | ReportAll
 )
 """What a display may send. Everything else is refused whole."""
 
@@ -160,6 +155,8 @@ class Displays:
         self._numbering = Numbering()
         self._sent: deque[tuple[int, float]] = deque()
         self._reported_at = float("-inf")
+        self._holders: dict[str, tuple[str, float]] = {}
+        """The connection that has control of each robot, and since when."""
 
     @property
     def names(self) -> list[str]:
@@ -200,9 +197,14 @@ class Displays:
         A tick names only the pages that have sent a command: it would grow with every
         page that looks. :class:`FarGate` adds the others.
         """
-        if isinstance(message, Tick):
-            acks = {id: ack for id, ack in message.acks.items() if ack >= 0}
-            message = Tick(message.tick, acks)
+        match message:
+            case Tick(tick, acks):
+                message = Tick(tick, {id: ack for id, ack in acks.items() if ack >= 0})
+            case RobotReport(robot=robot, holder=Holder(connection)):
+                if self._holders.get(robot, ("", 0.0))[0] != connection:
+                    self._holders[robot] = (connection, now)
+            case RobotReport(robot=robot) | RobotGone(robot):
+                self._holders.pop(robot, None)
         sample = self._numbering.next(_encode(message))
         self._sent.append((self._numbering.sent, now))
         while now - self._sent[0][1] > FRESH:
@@ -236,13 +238,13 @@ class Displays:
         match message:
             case Answer():
                 self._answered(display, message)
-                return lost
-            case AllPages():
-                return lost + self._end_others(display, message)
+                if message.connections is None:
+                    return lost
+                return lost + self._end_others(display, message.connections)
             case ReportAll():
                 display.wants_reports = True
                 return lost
-        assert not isinstance(message, Answer | AllPages | ReportAll)
+        assert not isinstance(message, Answer | ReportAll)
         if not display.owns(message.connection):
             raise WireError(
                 f"display {name}: got the connection {message.connection!r}, "
@@ -253,12 +255,16 @@ class Displays:
     def look(self, now: float) -> list[ToGate]:
         """Return what ends the pages of displays that give no sign of life."""
         ended: list[ToGate] = []
+        holders = dict(self._holders.values())
         for display in self._displays.values():
-            silent = now - display.alive_at
-            if display.pages and silent > SILENT:
+            controls = holders.keys() & display.pages.keys()
+            # Control may begin long after the last answer of an idle display.
+            since = [display.alive_at, *(holders[id] for id in controls)]
+            silent = now - max(since)
+            if display.pages and silent > (SILENT if controls else IDLE_SILENT):
                 log.warning("display %s gives no sign of life", display.name)
                 ended += self._end(display)
-            elif display.program in display.pages and silent > PROGRAM_SILENT:
+            elif display.program in controls and silent > PROGRAM_SILENT:
                 del display.pages[display.program]
                 ended.append(Disconnect(display.program))
         return ended
@@ -321,11 +327,11 @@ class Displays:
         order = self._displays[name].order
         return order.session or 0, order.newest
 
-    def _end_others(self, display: Display, there: AllPages) -> list[ToGate]:
-        gone = [each for each in display.pages if each not in there.connections]
-        display.unknown = tuple(
-            each for each in there.connections if each not in display.pages
-        )
+    def _end_others(self, display: Display, there: tuple[str, ...]) -> list[ToGate]:
+        """End the pages that a display no longer has."""
+        listed = set(there)
+        gone = [each for each in display.pages if each not in listed]
+        display.unknown = tuple(each for each in there if each not in display.pages)
         for connection in gone:
             del display.pages[connection]
         return [Disconnect(connection) for connection in gone]

@@ -11,7 +11,6 @@ from collections.abc import Callable, Collection
 import msgspec
 
 from webmap.agents.displays import (
-    AllPages,
     AllReports,
     Answer,
     FromDisplay,
@@ -33,18 +32,15 @@ LOST = 0.5
 AGAIN = 0.1
 """Seconds until a STOP that the agent has not acknowledged is sent again."""
 
-ANSWER = 0.2
+ANSWER = 0.5
 """Seconds between two answers to the agent while nothing of this display has control
-or sends commands."""
+or sends commands, and between two answers with the list of all pages."""
 
 COMMANDING = 1.0
 """Seconds after a command in which each step answers.
 
 The answers then help TCP to notice lost commands, and their age is known sooner.
 """
-
-ALL_PAGES = 0.5
-"""Seconds between two lists of all pages."""
 
 ASLEEP = "the agent heard nothing of this page for a moment: try again"
 
@@ -94,7 +90,7 @@ class FarGate:
         self._stops: dict[int, tuple[float, protocol.FromPage]] = {}
         """The STOPs without an acknowledgement, by number, each with its time."""
         self._latest: dict[str, RobotReport] = {}
-        self._listed_at = self._answered_at = self._commanded_at = float("-inf")
+        self._listed_at = self._commanded_at = float("-inf")
 
     def start(self) -> None:
         """Do nothing: the gate runs already, or its agent is away."""
@@ -103,7 +99,7 @@ class FarGate:
         """Disconnect all pages, whose robots stop."""
         with self._lock:
             if self.ready:
-                self._put(AllPages(()))
+                self._answer(())
 
     @property
     def connection(self) -> str:
@@ -123,10 +119,10 @@ class FarGate:
                     self._pages.pop(message.connection, None)
                     self._greeted.discard(message.connection)
                 case protocol.FromProgram():
-                    self._commanded_at = self._heard_at
+                    self._begin_commands()
                     message = self._of_program(message)
                 case protocol.FromPage():
-                    self._commanded_at = self._heard_at
+                    self._begin_commands()
                 case protocol.Speeds():
                     pass
                 case _:
@@ -166,33 +162,48 @@ class FarGate:
         with self._lock:
             if self.ready and now - self._heard_at > LOST:
                 self._lose(f"no connection to the agent {self.agent}")
-            if self._order.session is None:
-                return
-            commanding = now - self._commanded_at < COMMANDING or self._has_control
-            if now - self._answered_at >= (0.0 if commanding else ANSWER):
-                self._answered_at = now
-                self._put(Answer(self._order.session, self._order.newest))
+            listing = now - self._listed_at >= ANSWER
+            if listing:
+                self._listed_at = now
             if not self.ready:
+                if listing:
+                    self._answer()
                 return
             for number, (at, stop) in list(self._stops.items()):
                 if now - at >= AGAIN:
                     del self._stops[number]
                     self._put(stop, now)
-            if now - self._listed_at >= ALL_PAGES:
-                self._listed_at = now
+            if listing:
                 missing = [id for id in self._pages if id not in self._greeted]
                 if missing:  # a message was lost
                     self._introduce(missing)
                 if not self._reported:
                     self._put(ReportAll())
-                self._put(AllPages((self.connection, *self._pages)))
+                self._answer((self.connection, *self._pages))
+            elif self._commands(now):
+                self._answer()
 
-    @property
-    def _has_control(self) -> bool:
-        """Whether a page or the program of this display has control of a robot."""
+    def _commands(self, now: float) -> bool:
+        """Return whether this display has control of a robot or sends commands."""
+        if now - self._commanded_at < COMMANDING:
+            return True
         holders = (each.holder for each in self._latest.values())
         own = f"{self.display}/"
         return any(each and each.connection.startswith(own) for each in holders)
+
+    def _begin_commands(self) -> None:
+        """Answer at once if this display was idle.
+
+        Its last answer may be too old for the control that it may get.
+        """
+        if self.ready and not self._commands(self._heard_at):
+            self._answer()
+        self._commanded_at = self._heard_at
+
+    def _answer(self, connections: tuple[str, ...] | None = None) -> None:
+        """Name the newest sample of the agent, if there was one."""
+        if self._order.session is not None:
+            self._put(Answer(self._order.session, self._order.newest, connections))
 
     def _begin(self, now: float) -> None:
         self.ready, self.trouble, self._listed_at = True, None, now
