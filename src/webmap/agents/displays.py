@@ -69,12 +69,12 @@ MOST_DISPLAYS = 100
 
 
 class Answer(msgspec.Struct, frozen=True, tag="answer"):
-    """A display has received this sample of the agent; sent 2 to 20 times a second."""
+    """A display has received this sample of the agent; sent 1 to 20 times a second."""
 
     session: int
     number: int
     connections: tuple[str, ...] | None = None
-    """The program and all pages that the display has now; twice a second.
+    """The program and all pages that the display has now; once a second.
 
     A lost message about a page that has closed is made good by this.
     """

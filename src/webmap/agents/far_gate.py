@@ -32,7 +32,7 @@ LOST = 0.5
 AGAIN = 0.1
 """Seconds until a STOP that the agent has not acknowledged is sent again."""
 
-ANSWER = 0.5
+ANSWER = 1.0
 """Seconds between two answers to the agent while nothing of this display has control
 or sends commands, and between two answers with the list of all pages."""
 
