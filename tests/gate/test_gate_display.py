@@ -342,6 +342,18 @@ class TestPages:
         gate.say(protocol.CloseConnection(page.id, "too much"))
         assert said[-1] == "too much"
 
+    def test_a_page_that_may_only_stop_gets_two_ticks_a_second(self, client, gate):
+        texts = {"viewer": [], "operator": []}
+        for role, said in texts.items():
+            page = client.connect("Ann", role, said.append, said.append)
+            gate.say(protocol.Hello(page.id))
+            for tick in range(20):
+                gate.say(protocol.Tick(tick, {page.id: -1}))
+        ticks = {role: self.ops(said).count("tick") for role, said in texts.items()}
+        assert ticks == {"viewer": 2, "operator": 20}
+        for role, said in texts.items():
+            assert json.loads(said[0])["ticks"] == ticks[role]
+
     def test_page_data_is_forwarded_and_closing_twice_disconnects_once(
         self, page, gate
     ):

@@ -66,3 +66,12 @@ test("the age of a loop is that of its oldest command without acknowledgement", 
   for (let seq = 0; seq < 1000; seq++) loop.sent(seq, seq * 50);
   assert.equal(loop.age(50_000), 50_000);
 });
+
+test("a loop of a page that may not drive waits longer for its ticks", () => {
+  const loop = opened();
+  loop.pause = 500;
+  assert.equal(loop.state(LATE + 450), "open");
+  assert.equal(loop.state(LATE + 451), "late");
+  assert.equal(loop.state(LOST + 450), "late");
+  assert.equal(loop.state(LOST + 451), "lost");
+});

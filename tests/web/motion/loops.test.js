@@ -82,3 +82,12 @@ test("a new connection forgets the ticks and acknowledgements of all gates", () 
   assert.equal(loops.of("r2").acknowledged(0), false);
   assert.equal(loops.of("r3"), loops.own);
 });
+
+test("all gates send as few ticks as the hello states", () => {
+  loops.greeted(2);
+  say("r5", "bay5", 0);
+  assert.deepEqual(
+    ["r1", "r2", "r5"].map((robot) => loops.of(robot).state(LOST + 450)),
+    ["late", "late", "late"],
+  );
+});

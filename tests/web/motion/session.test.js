@@ -56,6 +56,14 @@ describe("a connection", () => {
     assert.deepEqual(session.judge(110), [], "what is no news is not told");
   });
 
+  test("of a page that may not drive is open between two of its few ticks", () => {
+    session.receive({ ...HELLO, ticks: 2 }, 0);
+    session.receive({ op: "tick", tick: 100, ack: -1 }, 0);
+    assert.deepEqual(session.judge(700), []);
+    assert.equal(session.state, "open");
+    assert.equal(session.judge(951), null);
+  });
+
   test("is late without ticks and is then given up", () => {
     session.receive(HELLO, 0);
     assert.deepEqual(session.judge(301), [["state", "late"]]);

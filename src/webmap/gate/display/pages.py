@@ -2,7 +2,7 @@
 
 ::
 
-    {"op": "hello", "connection": "c5"}
+    {"op": "hello", "connection": "c5", "ticks": 20}
     {"op": "tick", "tick": 812, "ack": 16}
     {"op": "robot", "robot": "r1", "name": "Bob", "state": "held",
      "holder": {"connection": "c5", "name": "Ann"}, "mine": true, "epoch": 3,
@@ -20,10 +20,10 @@
     {"op": "refused", "robot": "r1", "what": "take", "why": "Ann drives it"}
 
 ``hello`` comes first, also after the gate was restarted (all leases have then ended),
-and after it a ``robot`` for every robot. ``tick`` comes at 20 Hz; ``ack`` is the newest
-accepted ``seq`` of this connection, -1 at first. ``gone`` means that the robot was
-removed. ``robot`` comes when something changed, velocities at 10 Hz at most. Its
-fields:
+and after it a ``robot`` for every robot. ``tick`` comes ``ticks`` times a second: 20,
+or 2 to a page of a viewer, which may only stop; ``ack`` is the newest accepted ``seq``
+of this connection, -1 at first. ``gone`` means that the robot was removed. ``robot``
+comes when something changed, velocities at 10 Hz at most. Its fields:
 
 ``state``, ``latched``, ``stop``
     While STOP is active, ``latched`` is true, ``state`` is ``"stopped"`` and ``stop``
@@ -98,9 +98,15 @@ from webmap.gate.limits import Cap, Speed, offered, page_cap
 from webmap.gate.protocol import Hello, Refused, RobotGone, RobotReport, Role
 
 
-def hello_text(hello: Hello) -> str:
-    """Return the first message of a connection."""
-    return _text("hello", connection=hello.connection)
+def hello_text(hello: Hello, ticks: int) -> str:
+    """Return the first message of a connection.
+
+    Args:
+        hello: The gate's hello.
+        ticks: Ticks a second.
+
+    """
+    return _text("hello", connection=hello.connection, ticks=ticks)
 
 
 def tick_text(tick: int, ack: int, agent: str = "") -> str:
@@ -152,6 +158,12 @@ def _text(op: str, **fields: object) -> str:
 
 log = logging.getLogger("webmap.gate")
 
+TICKS = 20
+"""Ticks a second."""
+
+TICKS_TO_VIEWERS = 2
+"""Ticks a second for a page that may not drive: they only show that it is connected."""
+
 
 class DriveConnection:
     """One page's socket at the gate; made by ``GateClient.connect``."""
@@ -168,6 +180,8 @@ class DriveConnection:
         """Whether the present gate has sent hello, which must be the first message."""
         self._pages = pages
         self._hello = hello
+        self.ticks = TICKS_TO_VIEWERS if hello.role == "viewer" else TICKS
+        """Ticks a second."""
         self._speeds: protocol.Speeds | None = None
         self.cap = page_cap()
         """The page's own limit."""
@@ -242,6 +256,7 @@ class Pages:
         self._numbers = itertools.count(1)
         self._connections: dict[str, DriveConnection] = {}
         self._latest: dict[str, protocol.RobotReport] = {}
+        self._ticks = 0
 
     @property
     def introduction(self) -> list[protocol.ToGate]:
@@ -304,9 +319,10 @@ class Pages:
 
     def on_tick(self, tick: protocol.Tick) -> None:
         """Send each page the newest tick, with its newest accepted ``seq``."""
+        self._ticks += 1
         for connection in self._all():
             ack = tick.acks.get(connection.id)
-            if ack is not None:
+            if ack is not None and self._ticks % (TICKS // connection.ticks) == 0:
                 connection.send_text(tick_text(tick.tick, ack, self._agent))
 
     def on_report(self, report: protocol.RobotReport) -> None:
@@ -355,7 +371,7 @@ class Pages:
                 return
             connection.greeted = True
             if not self._agent:  # a page is greeted by the display's own gate alone
-                connection.send_text(hello_text(hello))
+                connection.send_text(hello_text(hello, connection.ticks))
             for report in list(self._latest.values()):
                 self._show(connection, report)
 

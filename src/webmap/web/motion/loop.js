@@ -4,18 +4,23 @@ export const LATE = 300;
 /** Without a tick for this time the connection is given up; ms. */
 export const LOST = 500;
 
+/** The time between two ticks to a page that may drive; ms. */
+export const PAUSE = 50;
+
 /** The most commands that may wait for an acknowledgement. */
 const REMEMBERED = 256;
 
 /**
  * Measures the loop from this page to the gate and back.
  *
- * The gate sends ticks at 20 Hz, each with the number of the last command of this page that
- * it accepted. These show a stall; `WebSocket.bufferedAmount` stays 0 during a stall of
+ * The gate sends ticks at 20 Hz, or at 2 Hz to a page that may not drive, each with the
+ * number of the last command of this page that it accepted. These show a stall; `WebSocket.bufferedAmount` stays 0 during a stall of
  * seconds. Times are in milliseconds of the caller's clock.
  */
 export class Loop {
   constructor() {
+    /** Milliseconds between two ticks. */
+    this.pause = PAUSE;
     /**
      * The newest tick, which every command contains; null before the first.
      * @type {number | null}
@@ -106,9 +111,10 @@ export class Loop {
    * @returns {'open' | 'late' | 'lost'}
    */
   state(now) {
-    const silence = now - this._tickAt;
     // A clock that was set back would hide a silence.
-    if (silence > LOST || silence < 0) return "lost";
+    if (now < this._tickAt) return "lost";
+    const silence = now - this._tickAt - (this.pause - PAUSE);
+    if (silence > LOST) return "lost";
     return silence > LATE || this.age(now) > LATE ? "late" : "open";
   }
 }

@@ -36,6 +36,15 @@ export class Loops {
   }
 
   /**
+   * Expect ticks as often as the hello of the display's own gate states.
+   *
+   * @param {number} ticks Ticks a second.
+   */
+  greeted(ticks) {
+    for (const loop of [this.own, ...this._agents.values()]) loop.pause = 1000 / ticks;
+  }
+
+  /**
    * Process a tick.
    *
    * @param {{tick: number, ack: number, gate?: string}} message
@@ -81,6 +90,7 @@ export class Loops {
     let loop = this._agents.get(gate);
     if (!loop) {
       loop = new Loop();
+      loop.pause = this.own.pause;
       loop.open(now);
       this._agents.set(gate, loop);
     }

@@ -98,7 +98,7 @@ export class Session {
    * @returns {{send: Command[], events: DriveEvent[]}} What to send, then the events to emit.
    */
   receive(message, now) {
-    if (message.op === "hello") return this._greeted(message.connection, now);
+    if (message.op === "hello") return this._greeted(message, now);
     return { send: [], events: this._received(message, now) };
   }
 
@@ -142,14 +142,15 @@ export class Session {
   }
 
   /**
-   * @param {string} connection
+   * @param {{connection: string, ticks?: number}} hello
    * @param {number} now
    * @returns {{send: Command[], events: DriveEvent[]}}
    */
-  _greeted(connection, now) {
+  _greeted({ connection, ticks = 20 }, now) {
     // A second greeting on one connection: the gate was restarted.
     if (this.connection !== null) this._forget(now);
     this.connection = connection;
+    this.loops.greeted(ticks);
     const send = [...this._unsent].map((robot) => ({ op: "stop", robot }));
     for (const robot of this._unsent) this._unanswered.sent(robot, this.pilot.robots);
     this._unsent.clear();
