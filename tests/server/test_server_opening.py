@@ -137,3 +137,16 @@ def test_an_application_limits_the_pages_to_the_number_that_it_is_given():
 def test_no_pages_at_all_are_refused(start):
     with pytest.raises(ConfigError, match="max_pages must be at least 1, got 0"):
         start(max_pages=0)
+
+
+@pytest.mark.parametrize("start", [application.run, application.asgi_app])
+@pytest.mark.parametrize("rate", [0.5, 21.0, float("nan")])
+def test_a_frame_rate_that_is_none_is_refused(start, rate):
+    with pytest.raises(ConfigError, match="frame_rate must be from 1 to 20, got"):
+        start(frame_rate=rate)
+
+
+def test_the_frame_rate_is_that_of_the_model(monkeypatch):
+    monkeypatch.setattr(application.runtime, "frame_rate", 20.0)
+    application.asgi_app(frame_rate=5)
+    assert application.runtime.frame_rate == 5

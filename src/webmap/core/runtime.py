@@ -45,8 +45,8 @@ While the model's thread is busy, the web thread waits this long several times f
 message to a page. With 1 ms, the ticks to operators came up to 0.3 s late.
 """
 
-TICK = 0.05
-"""Seconds between two frames for viewers: 20 Hz."""
+FRAME_RATE = 20.0
+"""Frames a second for each viewer, at most."""
 
 
 class Watcher(Protocol):
@@ -66,6 +66,8 @@ class Runtime:
         self.gate: Gates | GateClient | None = None
         self.make_gate: Callable[[], Gates | GateClient] = _all_gates
         """Makes the gate's client at each start."""
+        self.frame_rate = FRAME_RATE
+        """Frames a second for each viewer, at most."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._thread: threading.Thread | None = None
         self._watchers: dict[int, Watcher] = {}
@@ -198,7 +200,7 @@ class Runtime:
         while True:
             await self._has_watchers.wait()
             now = loop.time()
-            due = max(due + TICK, now)
+            due = max(due + 1.0 / self.frame_rate, now)
             for watcher in list(self._watchers.values()):
                 try:
                     watcher.tick(now)

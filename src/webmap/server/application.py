@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.core.page import site
-from webmap.core.runtime import runtime
+from webmap.core.runtime import FRAME_RATE, runtime
 
 if TYPE_CHECKING:
     from webmap.gate.protocol import Role
@@ -60,6 +60,7 @@ def asgi_app(
     hosts: Iterable[str] = (),
     origins: Iterable[str] = (),
     max_pages: int = 100,
+    frame_rate: float = FRAME_RATE,
 ) -> "WebApp":
     """Return the web interface as an ASGI application.
 
@@ -76,6 +77,8 @@ def asgi_app(
         origins: Origins that may open sockets in addition to the server's own, such as
             ``"https://robots.example.org"`` if a proxy ends TLS.
         max_pages: The greatest number of open pages, at least 1.
+        frame_rate: Frames a second for each page, from 1 to 20. Fewer let one display
+            serve more pages; ticks and commands are as fast as ever.
 
     Raises:
         ConfigError: If the token is too short, or a host, an origin or a number is not
@@ -91,6 +94,7 @@ def asgi_app(
         "origins": frozenset(map(checked_origin, origins)),
         "max_pages": _checked_pages(max_pages),
     }
+    runtime.frame_rate = _checked_rate(frame_rate)
     if token is not None:
         settings["token"] = token
     return _make_app(Settings(**settings), with_lifespan=True)
@@ -104,6 +108,7 @@ def run(
     token: str | None = None,
     insecure_lan: bool = False,
     max_pages: int = 100,
+    frame_rate: float = FRAME_RATE,
 ) -> None:
     """Start WebMap and serve its pages until Ctrl+C.
 
@@ -118,9 +123,11 @@ def run(
         insecure_lan: Whether other machines may be served without TLS, so that
             everybody on the network in between can read the token.
         max_pages: The greatest number of open pages, at least 1.
+        frame_rate: Frames a second for each page, from 1 to 20. Fewer let one display
+            serve more pages; ticks and commands are as fast as ever.
 
     Raises:
-        ConfigError: If it cannot listen there, or the number is not valid.
+        ConfigError: If it cannot listen there, or a number is not valid.
 
     """
     global has_run
@@ -128,6 +135,7 @@ def run(
     options: dict[str, Any] = {"host": host, "port": port}
     options |= {"open_browser": open_browser, "insecure_lan": insecure_lan}
     options |= command_line
+    runtime.frame_rate = _checked_rate(frame_rate)
     _serve(token=token, max_pages=_checked_pages(max_pages), **options)
 
 
@@ -135,6 +143,12 @@ def _checked_pages(number: int) -> int:
     if number < 1:
         raise ConfigError(f"max_pages must be at least 1, got {number}")
     return number
+
+
+def _checked_rate(rate: float) -> float:
+    if not 1.0 <= rate <= FRAME_RATE:
+        raise ConfigError(f"frame_rate must be from 1 to {FRAME_RATE:g}, got {rate:g}")
+    return rate
 
 
 def _serve(
