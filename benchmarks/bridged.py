@@ -2,13 +2,16 @@
 
 ``BRIDGED_URL`` is the address of the rosbridge, ``BRIDGED_ROBOTS`` the number of its
 robots. They have scans if ``BRIDGED_SCANS`` is set. ``BRIDGED_VIEWERS`` is the greatest
-number of pages.
+number of pages. If ``BRIDGED_FRAME_RATE`` is set, pages get so many frames a second,
+and everybody may look and stop, and not drive.
 """
 
 import os
 
 import webmap
 from benchmarks.stamped import topics
+from webmap.core.page import Viewer
+from webmap.server.runner import serve
 
 bridge = webmap.Bridge(os.environ["BRIDGED_URL"])
 fleet = []
@@ -33,4 +36,13 @@ def main(page: webmap.Page) -> None:
     map.set_selected(fleet[0])
 
 
-webmap.run(max_pages=int(os.environ.get("BRIDGED_VIEWERS", "100")))
+pages = int(os.environ.get("BRIDGED_VIEWERS", "100"))
+rate = os.environ.get("BRIDGED_FRAME_RATE")
+if rate:
+    looks = Viewer("someone", "Someone", "viewer")
+    app = webmap.asgi_app(
+        authenticate=lambda scope: looks, max_pages=pages, frame_rate=float(rate)
+    )
+    serve(app, port=0)
+    raise SystemExit  # otherwise ``webmap run`` would serve the pages once more
+webmap.run(max_pages=pages)

@@ -61,13 +61,17 @@ def stamped(robots: int, beams: int = 0) -> Iterator[str]:
 
 
 @contextmanager
-def bridged(robots: int, beams: int = 0, viewers: int = 100) -> Iterator[Display]:
+def bridged(
+    robots: int, beams: int = 0, viewers: int = 100, frame_rate: float | None = None
+) -> Iterator[Display]:
     """Start a rosbridge with robots of ``stamped``, and a display that shows them.
 
     Args:
         robots: How many.
         beams: Beams of each scan; 0 for robots without scans.
         viewers: How many pages may be open.
+        frame_rate: Frames a second for each page, of people who may not drive; without
+            it the usual number, and everybody may drive.
 
     """
     with (
@@ -78,6 +82,7 @@ def bridged(robots: int, beams: int = 0, viewers: int = 100) -> Iterator[Display
             BRIDGED_ROBOTS=str(robots),
             BRIDGED_SCANS="1" if beams else "",
             BRIDGED_VIEWERS=str(viewers),
+            BRIDGED_FRAME_RATE="" if frame_rate is None else str(frame_rate),
         ) as shown,
     ):
         yield shown

@@ -81,9 +81,12 @@ def display_with(robots: int, seconds: float) -> Figures:
     }
 
 
-def viewed_by(viewers: int, seconds: float, stalled: int = 0) -> Figures:
+def viewed_by(
+    viewers: int, seconds: float, stalled: int = 0, frame_rate: float | None = None
+) -> Figures:
     """Return what many viewers see of some robots."""
-    with bridged(SHOWN, viewers=viewers + stalled) as shown:
+    pages = viewers + stalled
+    with bridged(SHOWN, viewers=pages, frame_rate=frame_rate) as shown:
         found = seen(shown, viewers, seconds, stalled)
     return {
         FRAME_50: found["frame age, 50"],

@@ -1,5 +1,7 @@
 """Pages as they come and go: what a page function makes lasts as long as its page."""
 
+import asyncio
+import gc
 import json
 
 import pytest
@@ -7,7 +9,6 @@ from page_loop import HELLO, make_model, objects_left, open_page, wait_for
 
 import webmap
 from webmap.base.scope import Removal, keep
-from webmap.core import runtime as runtime_module
 from webmap.core.layer import Layer
 from webmap.core.page import Viewer
 from webmap.features.layers.laser_scanner import LaserScanner, SweepMsg
@@ -31,7 +32,7 @@ def test_the_page_function_gets_the_container_size_and_a_frame_is_sent(loop):
 
 
 def test_the_first_picture_of_a_page_waits_for_no_tick(loop, monkeypatch):
-    monkeypatch.setattr(runtime_module, "TICK", 60.0)
+    monkeypatch.setattr(loop.runtime, "frame_rate", 1 / 60)
     model = make_model(loop, lambda page: webmap.Map(page.element("map")))
     _, first = open_page(model)
     wait_for(lambda: first.frames)
@@ -41,8 +42,32 @@ def test_the_first_picture_of_a_page_waits_for_no_tick(loop, monkeypatch):
     loop.call(lambda: model.close() or True)
 
 
+def test_a_page_gets_as_many_frames_as_the_frame_rate_allows(loop, monkeypatch):
+    slept, sleep = [], asyncio.sleep
+
+    def note(seconds):
+        slept.append(seconds)
+        return sleep(0)
+
+    monkeypatch.setattr(loop.runtime, "frame_rate", 4.0)
+    monkeypatch.setattr("webmap.core.runtime.asyncio.sleep", note)
+    model = make_model(loop, lambda page: webmap.Map(page.element("map")))
+    open_page(model)
+    wait_for(lambda: len(slept) > 1)
+    loop.call(lambda: model.close() or True)
+    assert 0.2 < slept[0] <= 0.25
+
+
+def test_a_full_collection_does_not_look_at_the_objects_of_open_pages(loop):
+    model = make_model(loop, lambda page: webmap.Map(page.element("map")))
+    _, socket = open_page(model)
+    wait_for(lambda: socket.frames)
+    assert loop.call(gc.get_freeze_count) > 0
+    loop.call(lambda: model.close() or True)
+    gc.unfreeze()
+
+
 def test_a_page_function_can_be_async(loop):
-    import asyncio
 
     done = []
 

@@ -5,6 +5,7 @@ only pass data to the model's thread. Everything else runs in the model's thread
 """
 
 import asyncio
+import gc
 import inspect
 import logging
 import time
@@ -59,6 +60,9 @@ DONE = ("click", "change")
 
 PageKey = tuple[str, str, str]
 """The path of a page, the page's own identifier, and its viewer's."""
+
+CLOSED = 10
+"""Closed pages after which a collection of garbage looks at all pages."""
 
 KEPT_FOR = 30.0
 """Seconds for which a page is kept for its viewer after its socket was lost."""
@@ -234,6 +238,7 @@ class PageHost:
         except Exception as error:
             self._failed(error)
         self.send_speeds()
+        self._pages.built()
 
     def _failed(self, error: Exception) -> None:
         if self._page is None:  # the viewer is gone, which may be the cause
@@ -320,6 +325,7 @@ class OpenPages:
         self.publisher = publisher
         self._max_pages = max_pages
         self._hosts: dict[PageKey, PageHost] = {}
+        self._closed = 0
         self._drives: dict[tuple[str, str], GateConnection] = {}
 
     # From the web thread.
@@ -366,6 +372,20 @@ class OpenPages:
         """Remove a page that was closed."""
         if self._hosts.get(key) is host:
             del self._hosts[key]
+        self._closed += 1
+
+    def built(self) -> None:
+        """Except the objects of all pages from collections of garbage.
+
+        A collection that looks at hundreds of pages stops every thread for half a
+        second, and the gate stops the robots of a display after half of that. What
+        remains of closed pages may be in cycles, so it is collected now and then.
+        """
+        if self._closed >= CLOSED:
+            self._closed = 0
+            gc.unfreeze()
+            gc.collect()
+        gc.freeze()
 
     def _make_room(self) -> None:
         """Close the pages that were lost first, if there are too many for one more."""
