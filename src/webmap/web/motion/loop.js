@@ -14,8 +14,9 @@ const REMEMBERED = 256;
  * Measures the loop from this page to the gate and back.
  *
  * The gate sends ticks at 20 Hz, or at 2 Hz to a page that may not drive, each with the
- * number of the last command of this page that it accepted. These show a stall; `WebSocket.bufferedAmount` stays 0 during a stall of
- * seconds. Times are in milliseconds of the caller's clock.
+ * number of the last command of this page that it accepted. These show a stall;
+ * `WebSocket.bufferedAmount` stays 0 during a stall of seconds. Times are in milliseconds
+ * of the caller's clock.
  */
 export class Loop {
   constructor() {
