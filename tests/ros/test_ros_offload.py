@@ -234,3 +234,14 @@ def test_large_arrays_of_an_answer_are_not_copied_and_small_ones_do_not_keep_it(
     cells, _ = answered(1000)
     assert isinstance(cells.values, array)
     assert bytes(cells) == b"\7" * 1000
+
+
+def test_an_answer_takes_memory_only_for_bytes_that_have_come():
+    async def scenario():
+        stream = asyncio.StreamReader()
+        stream.feed_data(b"abc")
+        stream.feed_eof()
+        with pytest.raises(EOFError):
+            await offload._read(stream, 1 << 50)  # far more than any machine has
+
+    asyncio.run(scenario())

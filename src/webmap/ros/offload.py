@@ -131,14 +131,16 @@ async def _start() -> asyncio.subprocess.Process:
 
 
 async def _read(stream: asyncio.StreamReader, size: int) -> bytearray:
-    """Read so many bytes in pieces, since one long copy would block the event loop."""
-    found, at = bytearray(size), 0
-    while at < size:
-        piece = await stream.read(min(CHUNK, size - at))
+    """Read so many bytes in pieces, since one long copy would block the event loop.
+
+    The result grows with the pieces: filling a large one with zeros first takes long.
+    """
+    found = bytearray()
+    while len(found) < size:
+        piece = await stream.read(min(CHUNK, size - len(found)))
         if not piece:
             raise EOFError("the worker has ended")
-        found[at : at + len(piece)] = piece
-        at += len(piece)
+        found += piece
     return found
 
 
