@@ -5,8 +5,8 @@ import asyncio
 import pytest
 from pose_script import CountingLoop
 
-from webmap.base.looking import looking
-from webmap.core.state_rounds import AT_ONCE, EVERY, UNWATCHED, StateRounds
+from webmap.base.looking import RARELY, looking
+from webmap.core.state_rounds import AT_ONCE, EVERY, StateRounds
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +32,7 @@ class Looks:
         self.counts[number] += 1
 
 
-@pytest.mark.parametrize(("somebody", "every"), [(True, EVERY), (False, UNWATCHED)])
+@pytest.mark.parametrize(("somebody", "every"), [(True, EVERY), (False, RARELY / 1000)])
 @pytest.mark.parametrize("robots", [1, AT_ONCE, AT_ONCE + 1, 10 * AT_ONCE])
 def test_each_robot_is_looked_at_regularly_with_few_timers(somebody, every, robots):
     async def scenario():

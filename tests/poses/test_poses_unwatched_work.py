@@ -9,14 +9,13 @@ import pytest
 from pose_script import CountingLoop, odometry
 
 import webmap
-from webmap.base.looking import looking
+from webmap.base.looking import RARELY, looking
 from webmap.console.fleet import make_robot
 from webmap.features.alerts.alert_watch import AlertWatch
 from webmap.features.alerts.alerts import Alerts
-from webmap.poses.odometry import UNWATCHED
 
 URL = "ws://robot:9090"
-PERIOD = UNWATCHED / 1000
+PERIOD = RARELY / 1000
 ROBOTS = 40
 
 

@@ -5,12 +5,12 @@ import logging
 from collections import deque
 from collections.abc import Callable
 
-from webmap.base.looking import looking
+from webmap.base.looking import RARELY, looking
 
 log = logging.getLogger("webmap.robot")
 
-EVERY, UNWATCHED = 0.5, 2.0
-"""Seconds between two looks at a robot, and the same while nobody looks."""
+EVERY = 0.5
+"""Seconds between two looks at a robot while somebody looks at the pages."""
 
 AT_ONCE = 50
 """Most robots at which it looks at once: more would delay a frame."""
@@ -67,7 +67,7 @@ class StateRounds:
 
     def _wait(self, loop: asyncio.AbstractEventLoop, count: int) -> None:
         """Set the timer, after the looks at some robots."""
-        every = EVERY if looking.somebody else UNWATCHED
+        every = EVERY if looking.somebody else RARELY / 1000
         part = min(1.0, count / len(self._looks))
         self._timer = loop.call_later(every * part, self._look, loop)
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
+from webmap.base.looking import RARELY
 from webmap.base.scope import Removable, Scope, no_scope
 from webmap.poses.placing import PoseReading
 from webmap.poses.type_query import TypeQuery
@@ -17,10 +18,6 @@ from webmap.ros.views import (
     odometry_view,
     odometry_view_by_shape,
 )
-
-UNWATCHED = 2000
-"""Least milliseconds between two poses while nobody looks: the last pose stays known,
-and a robot whose poses end is noticed."""
 
 ODOMETRY = "nav_msgs/Odometry"
 """The pose type that also has a velocity."""
@@ -65,7 +62,7 @@ class OdometryFeed:
         self.topic = topic
         self.throttle = throttle
         self.type: str | None = None
-        self._asked = SubscriptionOptions(throttle=throttle, unwatched=UNWATCHED)
+        self._asked = SubscriptionOptions(throttle=throttle, unwatched=RARELY)
         self._listener = listener
         self._typed = typed
         self._on_complaint = complain
@@ -90,7 +87,7 @@ class OdometryFeed:
 
     def keep_on(self, needed: bool) -> None:
         """Receive all poses, or only some while nobody looks."""
-        unwatched = 0 if needed else UNWATCHED
+        unwatched = 0 if needed else RARELY
         if unwatched == self._asked.unwatched:
             return
         self._asked = self._asked._replace(unwatched=unwatched)

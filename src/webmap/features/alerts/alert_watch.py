@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from webmap.base.lifecycle import lifecycle
-from webmap.base.looking import looking
+from webmap.base.looking import RARELY, looking
 from webmap.features.alerts.alerts import KINDS, Alerts
 from webmap.poses.silence import PERIODS
 
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("webmap.modules.alerts")
 
-PERIOD, UNWATCHED = 0.5, 2.0
-"""Seconds between two looks at all robots, and the same while no page is open."""
+PERIOD = 0.5
+"""Seconds between two looks at all robots while a page is open."""
 
 LOST = 3.0
 """Seconds without a pose or a connection after which a robot is lost."""
@@ -133,4 +133,4 @@ class AlertWatch:
                 self.look(time.time())
             except Exception:
                 log.exception("the alerts were not updated")
-            await asyncio.sleep(PERIOD if looking.somebody else UNWATCHED)
+            await asyncio.sleep(PERIOD if looking.somebody else RARELY / 1000)
