@@ -140,10 +140,10 @@ UP: dict[str, tuple[float, int]] = {
 """What an agent of one robot sends: messages a second and bytes of each on the link."""
 
 DOWN: dict[str, tuple[float, int]] = {
-    "answers": (5.0 * COPIES, 110),
-    "pages": (2.0 * COPIES, 180),
+    "answers": (1.0, 180),
+    "pings": (1.4, 110),
 }
-"""What a display sends to each agent that it shows."""
+"""What a display that controls nothing sends to each agent that it shows."""
 
 
 def flows(layout: Layout, cost: Costs) -> Figures:

@@ -53,10 +53,13 @@ class Bench:
     def __init__(self):
         self.owner = Owner()
         self.sent = []
+        self.ways = []
         self.displays = Displays()
-        self.far = FarGate(
-            "bay3", NAME, self.owner, threading.RLock(), self.sent.append
-        )
+        self.far = FarGate("bay3", NAME, self.owner, threading.RLock(), self.publish)
+
+    def publish(self, sample, only):
+        self.sent.append(sample)
+        self.ways.append(only)
 
     def hears(self, message, now=0.0):
         self.far.take(self.displays.send(message, now), now)
@@ -296,6 +299,17 @@ def test_a_display_answers_more_often_while_a_page_has_control_or_commands(conne
     assert answers(connected, 4.0) == 1
     connected.hears(REPORT, 5.0)  # a page has control
     assert answers(connected, 5.0) == 20
+
+
+def test_an_idle_display_answers_over_its_connections_in_turn(connected):
+    connected.hears(msgspec.structs.replace(REPORT, holder=None), 0.0)
+    connected.ways.clear()
+    assert answers(connected, 1.0, 4.0) == 4
+    assert [way % 2 for way in connected.ways] in ([0, 1, 0, 1], [1, 0, 1, 0])
+    connected.hears(REPORT, 5.0)  # a page has control
+    connected.ways.clear()
+    answers(connected, 5.0)
+    assert set(connected.ways) == {None}
 
 
 def test_the_first_command_of_an_idle_display_follows_an_answer(connected):

@@ -80,6 +80,20 @@ def test_messages_arrive_with_their_keys_and_questions_are_answered():
     assert sorted(map(str, got)) == sorted(map(str, expected))
 
 
+def test_a_sample_of_the_gate_is_sent_over_one_connection_alone():
+    got = []
+    with router() as place, peers(place, User(), User()) as (one, other):
+        other.listen("k", lambda key, data: got.append(data), gate=True)
+        wait_for(lambda: (one.put_gate("k", b"-"), time.sleep(0.05), got)[2])
+        got.clear()
+        for number in range(4):
+            one.put_gate("k", str(number).encode(), only=number)
+        one.put_gate("k", b"end")
+        wait_for(lambda: got.count(b"end") == 2)
+    assert sorted(set(got) - {b"-"}) == [b"0", b"1", b"2", b"3", b"end"]
+    assert len([one for one in got if one != b"-"]) == 6
+
+
 def test_an_ended_listener_gets_nothing():
     got = []
     with router() as place, peers(place, User(), User()) as (one, other):

@@ -56,7 +56,8 @@ class FarGate:
         display: The name of this display.
         owner: Receives the gate's messages.
         lock: Held while the state changes.
-        publish: Sends a sample to the agent, without waiting.
+        publish: Sends a sample to the agent, without waiting: over the connection of
+            the number, or over all.
 
     """
 
@@ -69,7 +70,7 @@ class FarGate:
         display: str,
         owner: GateListener,
         lock: "threading.RLock",
-        publish: Callable[[bytes], None],
+        publish: Callable[[bytes, int | None], None],
     ) -> None:
         self.agent = agent
         self.display = display
@@ -179,7 +180,8 @@ class FarGate:
                     self._introduce(missing)
                 if not self._reported:
                     self._put(ReportAll())
-                self._answer((self.connection, *self._pages))
+                idle = not self._commands(now)
+                self._answer((self.connection, *self._pages), idle=idle)
             elif self._commands(now):
                 self._answer()
 
@@ -200,10 +202,18 @@ class FarGate:
             self._answer()
         self._commanded_at = self._heard_at
 
-    def _answer(self, connections: tuple[str, ...] | None = None) -> None:
-        """Name the newest sample of the agent, if there was one."""
-        if self._order.session is not None:
-            self._put(Answer(self._order.session, self._order.newest, connections))
+    def _answer(
+        self, connections: tuple[str, ...] | None = None, *, idle: bool = False
+    ) -> None:
+        """Name the newest sample of the agent, if there was one.
+
+        An idle display sends it over one of the connections, in turn: each message
+        costs the agent, whatever the number of displays.
+        """
+        if self._order.session is None:
+            return
+        answer = Answer(self._order.session, self._order.newest, connections)
+        self._put(answer, only=self._numbering.sent if idle else None)
 
     def _begin(self, now: float) -> None:
         self.ready, self.trouble, self._listed_at = True, None, now
@@ -266,12 +276,14 @@ class FarGate:
         for connection in connections:
             self._owner.hear(protocol.Refused(connection, None, "drive", ASLEEP))
 
-    def _put(self, message: FromDisplay, now: float | None = None) -> None:
+    def _put(
+        self, message: FromDisplay, now: float | None = None, only: int | None = None
+    ) -> None:
         sample = self._numbering.next(_encode(message))
         if isinstance(message, protocol.FromPage) and begins_like_stop(message.text):
             at = self._heard_at if now is None else now
             self._stops[self._numbering.sent] = (at, message)
-        self._publish(sample)
+        self._publish(sample, only)
 
     def _of_program(
         self, message: protocol.FromProgram

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 
 from webmap.agents import address
 from webmap.agents.far_gate import FarGate
@@ -254,9 +255,7 @@ class Gates:
         def link(owner: object, lock: "threading.RLock") -> FarGate:
             assert isinstance(owner, GateClient)
             links.append(
-                FarGate(
-                    agent, display, owner, lock, lambda data: peer.put_gate(key, data)
-                )
+                FarGate(agent, display, owner, lock, partial(peer.put_gate, key))
             )
             return links[0]
 

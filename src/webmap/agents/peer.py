@@ -199,11 +199,20 @@ class Peer:
                 return reply.ok.payload.to_bytes()
         return None
 
-    def put_gate(self, key: str, data: bytes) -> None:
-        """Send a sample of the gate now, or not at all."""
+    def put_gate(self, key: str, data: bytes, only: int | None = None) -> None:
+        """Send a sample of the gate now, or not at all.
+
+        Args:
+            key: The key.
+            data: The sample.
+            only: The number of the connection that carries it; None for all of them.
+
+        """
         import zenoh
 
         for copy, session in enumerate(self._gate):
+            if only is not None and copy != only % len(self._gate):
+                continue
             with suppress(zenoh.ZError):  # it was closed just now
                 session.put(
                     f"{key}/{copy}",
