@@ -159,7 +159,10 @@ class AgentBench:
                 lambda: driver.now.get("armable"), "a robot that can be driven", within
             )
             driver.order("take")
-            wait_for(lambda: driver.now.get("mine"), "control of the robot", within)
+            try:
+                wait_for(lambda: driver.now.get("mine"), "control of the robot", 3.0)
+            except AssertionError:
+                continue  # the agent refused it: the display had slept
             pass_time(0.5)
             driver.order("x 1")
             at = time.monotonic()
@@ -167,7 +170,8 @@ class AgentBench:
             zeros = self.robot.log.first_zero(at)
             if zeros is None and self.robot.velocity.vx > 0.1:
                 return
-        raise AssertionError(f"no steady motion: {driver.now}")
+        refused = driver.refused[-3:]
+        raise AssertionError(f"no steady motion: {driver.now}, refused: {refused}")
 
     def program_off(self, within=20.0):
         """Have the program take the robot and drive it, until it moves steadily.
