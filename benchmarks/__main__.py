@@ -26,16 +26,16 @@ class Row:
 
 
 ROWS = [
-    Row("bridge", 25, quick=True),
+    Row("bridge", 20, quick=True),
     Row("viewers", 40, quick=True),
     Row("wire", 30, quick=True),
     Row("grids", 40),
-    Row("drawing", 45, quick=True),
-    Row("latency", 30),
+    Row("drawing", 35, quick=True),
+    Row("latency", 25),
     Row("peers", 25),
     Row("limits", 45),
     Row("console", 60),
-    Row("opening", 35),
+    Row("opening", 25),
     Row("agents", 50),
     Row("uplink", 40),
     Row("narrow", 40),

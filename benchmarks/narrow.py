@@ -165,7 +165,7 @@ def hold(hand: Hand, seconds: float) -> None:
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare a wide line with a narrow one, at each load."""
-    seconds = 3.0 if quick else 8.0
+    seconds = 3.0 if quick else 5.0
     comparisons = []
     for robots in LOADS[-1:] if quick else LOADS:
         contenders = [

@@ -22,7 +22,7 @@ FLEETS = {"1,000 robots": (1000, 0), "100 robots with scans": (100, 360)}
 
 PROGRAM = Path(__file__).parent / "busy_fleet.py"
 
-BEGIN = 20.0
+BEGIN = 16.0
 """Seconds until all robots have connected and nobody counts as looking; half of them
 for the robots alone."""
 

@@ -31,7 +31,7 @@ from webmap.agents.peer import Peer, User
 from webmap.base.loop_thread import LoopThread
 
 ROBOTS = 20
-SHAPES = ((1, 1), (1, 50), (4, 1), (4, 50))
+SHAPES = ((1, 1), (4, 1), (4, 50))
 """Displays, and viewers of each."""
 
 SLOW = 2.0
