@@ -132,6 +132,27 @@ def test_odometry_of_a_stopped_robot_makes_no_report_of_other_stopped_robots(wor
     assert [bench.report(name).measured[0] for name in names] == [0.2] * len(names)
 
 
+def test_a_stopped_robot_is_reported_at_the_rate_of_its_numbers(work):
+    bench = Bench().begin()
+    bench.say("a", op="stop", robot="r1")
+    bench.run(3.0)
+    done = work_of(work, lambda: bench.run(1.0))
+    assert done["asked"] > 100
+    assert 9 <= done["reports"] <= 11
+
+
+def test_a_verdict_on_a_stop_is_reported_in_the_step_that_finds_it():
+    bench = Bench().begin(spec(odometry_topic="/odom"))
+    confirmation = bench.gate._machines.find("r1").active_stop.confirmation
+    bench.say("a", op="stop", robot="r1")
+    verdicts = set()
+    for _ in range(300):
+        bench.run(0.01)
+        assert bench.report().stop.confirmed == confirmation.confirmed
+        verdicts.add(confirmation.confirmed)
+    assert verdicts == {None, False}, "no odometry came"
+
+
 def test_a_stalled_link_among_many_is_closed_after_a_second():
     bench = fleet()
     bench.tell(events.LinkUp(url(3), "control"))

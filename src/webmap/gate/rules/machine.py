@@ -105,6 +105,8 @@ class Machine:
         self.active_stop = ActiveStop(key, latch, self.robots, control, self.motion)
         self._emit = emit
         self._left_at = float("-inf")
+        self.reported_at = float("-inf")
+        """When its reports were made last, sent or not."""
 
     @property
     def state(self) -> State:
@@ -135,6 +137,21 @@ class Machine:
             or self.observation.on
             or self.other_writer.seen is not None
         )
+
+    @property
+    def rest(self) -> tuple[bool | None] | None:
+        """Whether the active STOP is confirmed, if nothing but the STOP goes on.
+
+        None if anything else may change without an event.
+        """
+        if (
+            not self.latch.on
+            or self.authority.lease is not None
+            or not self.silent
+            or self.authority.handover.going_on
+        ):
+            return None
+        return (self.active_stop.confirmation.confirmed,)
 
     def involves(self, connection: str) -> bool:
         """Return whether a connection has or wants control, or sent a goal."""

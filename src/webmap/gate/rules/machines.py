@@ -22,7 +22,7 @@ from webmap.gate.rules.connections import Epochs
 from webmap.gate.rules.goals import Goals
 from webmap.gate.rules.health import STALL_LIMIT, DisplayPulse, LinkHealth
 from webmap.gate.rules.machine import Machine
-from webmap.gate.rules.report import Reporter, report
+from webmap.gate.rules.report import INTERVAL, Reporter, report
 from webmap.gate.rules.stop import StopLatch
 from webmap.gate.specs import check_twist_type, checked, key_of
 
@@ -167,11 +167,18 @@ class Machines:
                     self._sort(there)
 
     def step(self, now: float) -> None:
-        """Do what is due for each active machine, and close stalled control links."""
+        """Do what is due for each active machine, and close stalled control links.
+
+        A report takes longer than a step. Machines that rest, as all do after STOP ALL,
+        are reported when something has changed, and their numbers at their own rate.
+        """
         if self._awake:
             for machine in [m for m in self._by_key.values() if m in self._awake]:
+                before = machine.rest
                 machine.step(now)
-                self._touched.add(machine.key)
+                rests = before is not None and machine.rest == before
+                if not rests or now >= machine.reported_at + INTERVAL:
+                    self._touched.add(machine.key)
                 self._drop_if_empty(machine)
         self._touched |= self._later
         self._later.clear()
@@ -200,6 +207,7 @@ class Machines:
             if machine is None:
                 continue
             self._sort(machine)
+            machine.reported_at = now
             # Until the shell reports the lock, it is unknown whether STOP is active.
             if machine.known:
                 for spec in list(machine.robots.specs.values()):
@@ -220,8 +228,8 @@ class Machines:
         due = reporter.is_due(latest, now)
         if due:
             self._emit(SendToDisplay(latest))
-        elif due is None:
-            self._later.add(machine.key)
+        elif due is None and (machine.rest is None or machine not in self._awake):
+            self._later.add(machine.key)  # of others, a step makes a report soon
 
     # Declarations of the display.
 
