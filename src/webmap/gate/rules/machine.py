@@ -139,19 +139,17 @@ class Machine:
         )
 
     @property
-    def rest(self) -> tuple[bool | None] | None:
-        """Whether the active STOP is confirmed, if nothing but the STOP goes on.
+    def rests(self) -> bool:
+        """Whether nothing goes on but an active STOP.
 
-        None if anything else may change without an event.
+        Then only numbers change without an event, and the verdict on the STOP.
         """
-        if (
-            not self.latch.on
-            or self.authority.lease is not None
-            or not self.silent
-            or self.authority.handover.going_on
-        ):
-            return None
-        return (self.active_stop.confirmation.confirmed,)
+        return (
+            self.latch.on
+            and self.authority.lease is None
+            and self.silent
+            and not self.authority.handover.going_on
+        )
 
     def involves(self, connection: str) -> bool:
         """Return whether a connection has or wants control, or sent a goal."""

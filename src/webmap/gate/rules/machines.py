@@ -174,10 +174,11 @@ class Machines:
         """
         if self._awake:
             for machine in [m for m in self._by_key.values() if m in self._awake]:
-                before = machine.rest
+                before = machine.rests, machine.active_stop.confirmation.confirmed
                 machine.step(now)
-                rests = before is not None and machine.rest == before
-                if not rests or now >= machine.reported_at + INTERVAL:
+                after = machine.rests, machine.active_stop.confirmation.confirmed
+                same = machine.rests and before == after
+                if not same or now >= machine.reported_at + INTERVAL:
                     self._touched.add(machine.key)
                 self._drop_if_empty(machine)
         self._touched |= self._later
@@ -228,8 +229,9 @@ class Machines:
         due = reporter.is_due(latest, now)
         if due:
             self._emit(SendToDisplay(latest))
-        elif due is None and (machine.rest is None or machine not in self._awake):
-            self._later.add(machine.key)  # of others, a step makes a report soon
+        elif due is None and not (machine.rests and machine in self._awake):
+            # A machine that is active and rests is reported by its steps.
+            self._later.add(machine.key)
 
     # Declarations of the display.
 
