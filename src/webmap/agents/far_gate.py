@@ -56,8 +56,8 @@ class FarGate:
         display: The name of this display.
         owner: Receives the gate's messages.
         lock: Held while the state changes.
-        publish: Sends a sample to the agent, without waiting: over the connection of
-            the number, or over all.
+        publish: Sends a sample to the agent, without waiting. The number chooses one
+            of the connections; None is for all of them.
 
     """
 

@@ -205,7 +205,8 @@ class Peer:
         Args:
             key: The key.
             data: The sample.
-            only: The number of the connection that carries it; None for all of them.
+            only: Chooses one of the connections, by the remainder of this number; None
+                is for all of them.
 
         """
         import zenoh

@@ -140,10 +140,7 @@ class Machine:
 
     @property
     def rests(self) -> bool:
-        """Whether nothing goes on but an active STOP.
-
-        Then only numbers change without an event, and the verdict on the STOP.
-        """
+        """Whether a STOP is active, and nobody has control or sends a velocity."""
         return (
             self.latch.on
             and self.authority.lease is None

@@ -170,14 +170,15 @@ class Machines:
         """Do what is due for each active machine, and close stalled control links.
 
         A report takes longer than a step. Machines that rest, as all do after STOP ALL,
-        are reported when something has changed, and their numbers at their own rate.
+        are reported after an event, when a step changes the verdict on the STOP, and
+        otherwise once in :data:`INTERVAL`.
         """
         if self._awake:
             for machine in [m for m in self._by_key.values() if m in self._awake]:
                 before = machine.rests, machine.active_stop.confirmation.confirmed
                 machine.step(now)
                 after = machine.rests, machine.active_stop.confirmation.confirmed
-                same = machine.rests and before == after
+                same = after == before and machine.rests
                 if not same or now >= machine.reported_at + INTERVAL:
                     self._touched.add(machine.key)
                 self._drop_if_empty(machine)
