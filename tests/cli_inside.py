@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from unittest.mock import patch
 
 from webmap.cli import main
+from webmap.core.motion import RobotMotion
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 LOGGERS = ("websockets", "uvicorn", "asyncio", "PIL")
@@ -31,7 +32,7 @@ def run_inside(*arguments: object, stdin: str = "") -> Done:
 
     Args:
         *arguments: What follows ``webmap``.
-        told: Its standard input.
+        stdin: Its standard input.
 
     """
     out, err = io.StringIO(), io.StringIO()
@@ -41,6 +42,8 @@ def run_inside(*arguments: object, stdin: str = "") -> Done:
         for name in LOGGERS:
             logger = logging.getLogger(name)
             after.callback(logger.setLevel, logger.level)
+        # `webmap agent` sets the agent of its process.
+        after.enter_context(patch.object(RobotMotion, "agent", ""))
         words = ["webmap", *map(str, arguments)]
         after.enter_context(patch.object(sys, "argv", words))
         stdin = io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8")
