@@ -55,7 +55,7 @@ import webmap.fleet.made  # isort: skip
 import webmap.cli.view  # isort: skip
 import webmap.modules.robot  # isort: skip
 
-AT_ONCE = 3
+AT_ONCE = 8
 """Processes that run beside each other; most of them wait."""
 
 PATIENCE = 30.0
