@@ -43,6 +43,26 @@ def test_a_robot_has_few_elements_on_the_map_and_in_the_list(page):
     assert in_list <= 21
 
 
+HIDDEN_AGAIN = """() => new Promise((done) => {
+  const found = new Set();
+  const observer = new MutationObserver((changes) => {
+    for (const { target, oldValue } of changes) {
+      if (target.getAttribute("hidden") === oldValue) found.add(target.className);
+    }
+  });
+  const options = { attributeOldValue: true, attributeFilter: ["hidden"] };
+  observer.observe(document, { subtree: true, ...options });
+  setTimeout(() => done([...found]), 1500);
+})"""
+"""The elements of a page that are hidden while they are hidden already."""
+
+
+def test_the_page_hides_nothing_that_is_hidden_already(page):
+    """The browser computes styles after each time, for ticks 20 times a second."""
+    page.locator("#robots > .row > button").first.click()
+    assert page.evaluate(HIDDEN_AGAIN) == []
+
+
 def names(page: Page) -> list[str]:
     return page.locator(ROWS).all_text_contents()
 

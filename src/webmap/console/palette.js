@@ -1,5 +1,5 @@
-import { byId, setText } from "../web/tools/dom.js";
-import { html } from "../web/tools/elements.js";
+import { byId } from "../web/tools/dom.js";
+import { html, setHidden, setText } from "../web/tools/elements.js";
 
 /**
  * The command palette: one field that finds robots, tools, layers, places and settings,
@@ -103,7 +103,7 @@ class Palette {
       return line;
     });
     this._list.replaceChildren(...lines);
-    this._list.hidden = lines.length === 0;
+    setHidden(this._list, lines.length === 0);
     setText(byId("palette-none"), lines.length > 0 ? "" : "Nothing on this page has this name.");
     this._mark();
   }

@@ -1,6 +1,6 @@
 import { checkedList } from "../../web/layout.js";
-import { byId, setText, typing } from "../../web/tools/dom.js";
-import { html, svg } from "../../web/tools/elements.js";
+import { byId, typing } from "../../web/tools/dom.js";
+import { html, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { arranged, AT_FIRST, countsOf, isShown, MANY, orderFor } from "./robot_order.js";
 
 /**
@@ -131,7 +131,7 @@ class RobotList {
   _update() {
     const rows = this._rows();
     const long = rows.length > MANY || rows.some(({ tag }) => tag);
-    byId("robot-tools").hidden = !long;
+    setHidden(byId("robot-tools"), !long);
     this._order.value = orderFor(this.choice.order, rows.length);
     this._group.value = this.choice.group;
     const states = long ? this.choice.states : [];
@@ -147,7 +147,7 @@ class RobotList {
     }
     const found = this._buttons().length;
     const filtered = wanted !== "" || states.length > 0;
-    byId("select-shown").hidden = !filtered || found < 2;
+    setHidden(byId("select-shown"), !filtered || found < 2);
     const none = rows.length > 0 && found === 0;
     setText(byId("not-found"), none ? noneText(wanted, states) : "");
   }

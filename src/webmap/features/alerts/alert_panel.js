@@ -1,4 +1,4 @@
-import { button, html, setText, svg } from "../../web/tools/elements.js";
+import { button, html, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 import { Pace, Signals } from "./alert_signal.js";
@@ -181,8 +181,8 @@ class AlertPanel {
     setText(this._headline, headline(open, this._kinds, dropped));
     setText(this._badge, open.length > 0 ? `${open.length}` : "");
     this._badge.title = open.length === 1 ? "1 new alert" : `${open.length} new alerts`;
-    this._all.hidden = !this._may || open.length < 2;
-    this._oldHead.hidden = this._old.childElementCount === 0;
+    setHidden(this._all, !this._may || open.length < 2);
+    setHidden(this._oldHead, this._old.childElementCount === 0);
   }
 
   _signal() {
@@ -250,7 +250,7 @@ class Row {
     setText(this._end, ended === null ? "" : `over after ${span(ended - began)}`);
     setText(this._by, by === null ? "" : `${by}, ${clock(acknowledged ?? 0)}`);
     if (this._act) {
-      this._act.hidden = by !== null;
+      setHidden(this._act, by !== null);
       this._act.setAttribute("aria-label", `Acknowledge ${name}: ${text}`);
     }
   }

@@ -1,4 +1,4 @@
-import { button, html, setText } from "../../web/tools/elements.js";
+import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('./align_drawing.js').Alignment} Alignment */
@@ -82,13 +82,13 @@ export class AlignPanel {
       html("option", "", { value: "whole" }, all),
       html("option", "", { value: "own" }, `Only ${name}`),
     );
-    this._body.removeAttribute("hidden");
+    setHidden(this._body, false);
     this._go.setAttribute("aria-pressed", "true");
     this.showMessage("");
   }
 
   close() {
-    this._body.setAttribute("hidden", "");
+    setHidden(this._body, true);
     this._go.setAttribute("aria-pressed", "false");
     this.showMessage("");
   }

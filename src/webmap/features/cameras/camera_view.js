@@ -1,4 +1,6 @@
-import { setText } from "../../web/tools/dom.js";
+import { setHidden, setText } from "../../web/tools/elements.js";
+
+
 
 /** @typedef {import('./camera_panel.js').Camera} Camera */
 /** @typedef {import('./camera_panel.js').Cameras} Cameras */
@@ -78,7 +80,7 @@ export class CameraView {
    * @param {Camera | null} camera
    */
   open(open, dock, there, camera) {
-    this.element.hidden = !open;
+    setHidden(this.element, !open);
     if (!open || camera === null) return;
     this.element.dataset.dock = dock;
     this.element.dataset.robot = there.robot;
@@ -106,7 +108,7 @@ export class CameraView {
         return button;
       });
       this._choice.replaceChildren(...buttons);
-      this._choice.hidden = cameras.length < 2;
+      setHidden(this._choice, cameras.length < 2);
     }
     for (const button of this._choice.querySelectorAll("button")) {
       const pressed = button.dataset.choice === String(chosen.id);

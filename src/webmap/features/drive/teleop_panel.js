@@ -2,7 +2,14 @@ import { Stick } from "../../web/inputs/stick.js";
 import { isTested, motions, ownStop, stopTestText, timings } from "../../web/motion/figures.js";
 import { heldByProgram, isLatched, stopKey } from "../../web/motion/report.js";
 import { capOf, speedOf } from "../../web/motion/status.js";
-import { button, html, setText, stopButton, TwiceButton } from "../../web/tools/elements.js";
+import {
+  button,
+  html,
+  setHidden,
+  setText,
+  stopButton,
+  TwiceButton,
+} from "../../web/tools/elements.js";
 
 /** @typedef {import('../../web/drive.js').Drive} Drive */
 /** @typedef {import('../../web/motion/requests.js').Request} Request */
@@ -109,9 +116,9 @@ export class Panel {
   showFigures(report, loop, moving) {
     setText(this._own, report ? ownStop(report) : "");
     setText(this._speed, report?.measured ? speedOf(report) : "");
-    this._fold.hidden = report === null || isLatched(report);
+    setHidden(this._fold, report === null || isLatched(report));
     setText(this._test, report ? stopTestText(report) : "");
-    this._figures.hidden = report === null || isLatched(report);
+    setHidden(this._figures, report === null || isLatched(report));
     this._figures.classList.toggle("idle", !report?.mine);
     if (report === null) return;
     const all = [...motions(report), ...timings(report, loop, moving)];
@@ -154,7 +161,7 @@ export class Panel {
     const name = report?.name ?? "";
     const robots = report === null ? [] : [report.robot];
     const act = actOf(report, asking);
-    this._lease.hidden = act === null;
+    setHidden(this._lease, act === null);
     if (act !== null) {
       setText(this._lease, act);
       // Begins with the button's text, for people who use speech control.
@@ -165,7 +172,7 @@ export class Panel {
     this._tester.show(report !== null && mayTest(report), robots);
     const known = report?.stop_time != null;
     this._tester.element.classList.toggle("known", known);
-    this._stick.hidden = stick === null;
+    setHidden(this._stick, stick === null);
     set(this._stick, "aria-pressed", String(stick === true));
     set(this.stop, "aria-label", name ? `STOP ${name}` : "STOP the selected robot");
     // Disabled only when there is nothing to stop, never because the state is unknown.
@@ -246,7 +253,7 @@ export class StickPad {
     if (this._mode.hidden !== holonomic) return;
     // The same stick position would suddenly mean another velocity.
     this._stick.release();
-    this._mode.hidden = !holonomic;
+    setHidden(this._mode, !holonomic);
   }
 
   /** Release the stick. */
@@ -261,7 +268,7 @@ export class StickPad {
   show(useful, dead) {
     const visible = useful && this.wanted;
     if (!visible) this._stick.release();
-    this.element.hidden = !visible;
+    setHidden(this.element, !visible);
     this._pad.classList.toggle("dead", dead);
   }
 
@@ -294,7 +301,7 @@ export class Requests {
       const { left } = this._items.get(keyOf(request)) ?? this._add(request);
       setText(left, `(${request.left} s)`);
     }
-    this.element.hidden = asked.length === 0;
+    setHidden(this.element, asked.length === 0);
   }
 
   /** @param {Request} request */

@@ -1,5 +1,5 @@
 import { onScreen } from "../../web/tools/aim.js";
-import { button, html, setText, svg } from "../../web/tools/elements.js";
+import { button, html, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { look } from "../../web/tools/goal_texts.js";
 import { lay } from "../../web/tools/overlay.js";
 
@@ -90,11 +90,11 @@ export class GoalMarks {
     mark.group.setAttribute("class", mine ? "webmap-goal-mark mine" : "webmap-goal-mark");
     mark.arrow.setAttribute("class", `webmap-goal-arrow ${kind}`);
     mark.sign.setAttribute("d", seen ? SIGNS[seen.shape] : "");
-    mark.label.hidden = seen === null;
+    setHidden(mark.label, seen === null);
     if (seen === null) return;
     mark.label.className = `webmap-goal-label ${kind}${mine ? " mine" : ""}`;
     setText(mark.text, mine ? seen.text : `${name}: ${seen.text.split(",")[0]}`);
-    mark.end.hidden = !mine || (!seen.over && !cancels) || goal?.state === "cancelling";
+    setHidden(mark.end, !mine || (!seen.over && !cancels) || goal?.state === "cancelling");
     const does = seen.over ? "Hide this goal" : "Cancel goal";
     mark.end.setAttribute("aria-label", does);
     mark.end.title = does;

@@ -1,6 +1,6 @@
 import { SPACING } from "../../web/constants.js";
 import { chosen, poseOf, PressAim } from "../../web/tools/aim.js";
-import { button, html, setText } from "../../web/tools/elements.js";
+import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { GoalMarks } from "./goal_marks.js";
 import { look, sendGoal, ShownGoals } from "../../web/tools/goal_texts.js";
 import { lay } from "../../web/tools/overlay.js";
@@ -279,8 +279,8 @@ class GoalTool {
     const words = robots.length > 1 ? `Send goal to ${robots.length} robots` : "Send goal";
     setText(/** @type {Element} */ (this._go.lastElementChild), words);
     this._go.setAttribute("aria-pressed", String(this._aim.active));
-    this._apart.hidden = robots.length < 2;
-    this._cancel.hidden = !robots.some((robot) => this._mayCancel(robot));
+    setHidden(this._apart, robots.length < 2);
+    setHidden(this._cancel, !robots.some((robot) => this._mayCancel(robot)));
     this._draw(robots);
   }
 

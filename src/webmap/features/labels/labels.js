@@ -1,7 +1,7 @@
 import { devicesOf } from "../../web/inputs/devices.js";
 import { attentive } from "../../web/motion/attention.js";
 import { scaleOf, unapply } from "../../web/view.js";
-import { button, html, setText } from "../../web/tools/elements.js";
+import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { LabelMove } from "./labels_move.js";
 import { lay } from "../../web/tools/overlay.js";
 import { tool, toolName } from "../../web/tools/tool.js";
@@ -53,7 +53,7 @@ class Labels {
     this._go = button("webmap-labels-go", "", () => this._activate(!this._active));
     this._go.append(...toolName("label", "Label"));
     this._go.title = `Add a label (${key.toUpperCase()})`;
-    this._go.hidden = !editable;
+    setHidden(this._go, !editable);
     this._message = html("span", "webmap-labels-word", { role: "status" });
     this._sheet = html("div", "webmap-labels-sheet");
     this._panel = tool("webmap-labels", "Labels", this._go, this._message, this._sheet);
@@ -193,8 +193,8 @@ class Labels {
       this._send({ remove: label.dataset.label ?? "" });
     });
     const move = button("webmap-labels-move wide", "Move", () => this._openMove(label));
-    remove.hidden = !this._editable || label.dataset.kept !== "true";
-    move.hidden = remove.hidden;
+    const fixed = !this._editable || label.dataset.kept !== "true";
+    for (const each of [remove, move]) setHidden(each, fixed);
     this._sheet.replaceChildren(title, send, move, close, remove);
   }
 

@@ -1,4 +1,4 @@
-import { html, setText, svg } from "../../web/tools/elements.js";
+import { html, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 
@@ -155,7 +155,7 @@ class RosoutPanel {
     let [shown, bad] = [0, 0];
     for (const book of this._books) {
       for (const { row, level } of book.rows.values()) {
-        row.hidden = this._levels.indexOf(level) < least;
+        setHidden(row, this._levels.indexOf(level) < least);
         if (!row.hidden) shown += 1;
         if (level === "error" || level === "fatal") bad += 1;
       }
@@ -230,7 +230,7 @@ class Book {
 
   /** @param {boolean} named Whether there are other bridges. */
   showState(named) {
-    this._head.hidden = !named;
+    setHidden(this._head, !named);
     const away = this._state !== "" && this._state !== "open";
     setText(this._note, away ? "No connection to this bridge: no new log lines." : "");
   }

@@ -1,7 +1,7 @@
 import { devicesOf } from "../../web/inputs/devices.js";
 import { attentive } from "../../web/motion/attention.js";
 import { apply } from "../../web/view.js";
-import { button, html, svg } from "../../web/tools/elements.js";
+import { button, html, setHidden, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { cleaned, MOST_CORNERS, problemOf } from "./polygon.js";
 import { PressAim } from "../../web/tools/aim.js";
@@ -333,11 +333,11 @@ class AreaPanel {
    */
   show({ active, closed, corners, ready }) {
     this._turn.setAttribute("aria-pressed", String(this.across));
-    this._how.hidden = this._take.hidden = !closed;
-    for (const each of [this._done, this._undo, this._here]) each.hidden = closed;
+    for (const each of [this._how, this._take]) setHidden(each, !closed);
+    for (const each of [this._done, this._undo, this._here]) setHidden(each, closed);
     this._undo.disabled = corners === 0;
     this._take.disabled = !ready;
-    this.element.hidden = !active;
+    setHidden(this.element, !active);
   }
 
   /** @param {boolean} possible Whether the robot's position can be added. */

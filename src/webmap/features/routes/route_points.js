@@ -1,6 +1,6 @@
 import { LONGEST_NAME } from "../../web/constants.js";
 import { onScreen } from "../../web/tools/aim.js";
-import { button, html, setText, svg } from "../../web/tools/elements.js";
+import { button, html, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -151,7 +151,7 @@ export class SavedRoutes {
         ...routes.map((name) => html("option", "", { value: name }, name)),
       );
       if (routes.includes(saved ?? value)) this._chosen.value = saved ?? value;
-      this._there.hidden = routes.length === 0;
+      setHidden(this._there, routes.length === 0);
       setText(this._message, saved ? `Saved as ${saved}.` : "");
     }
     if (loaded) {

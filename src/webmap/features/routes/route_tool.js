@@ -1,6 +1,6 @@
 import { MOST_POINTS } from "../../web/constants.js";
 import { poseOf, PressAim } from "../../web/tools/aim.js";
-import { button, html, setText } from "../../web/tools/elements.js";
+import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 import { RouteArea } from "./route_area.js";
@@ -239,7 +239,7 @@ class RouteTool {
     this._clear.disabled = this._points.length === 0;
     this._run.disabled = this._points.length === 0 || !report?.method || busy;
     setText(this._run, live ? "Run again" : "Start route");
-    for (const each of [this._pause, this._skip, this._end]) each.hidden = !live;
+    for (const each of [this._pause, this._skip, this._end]) setHidden(each, !live);
     for (const each of [this._pause, this._skip]) each.disabled = busy;
     setText(this._pause, run?.state === "going" ? "Pause" : "Resume");
     setText(this._message, this._text(run, report?.name ?? ""));

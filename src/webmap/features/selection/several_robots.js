@@ -1,5 +1,5 @@
 import { chosen, poseOf } from "../../web/tools/aim.js";
-import { button, html, setText, stopButton, svg } from "../../web/tools/elements.js";
+import { button, html, setHidden, setText, stopButton, svg } from "../../web/tools/elements.js";
 import { lay, ownPlace } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -111,12 +111,12 @@ class SeveralBar {
   _show() {
     const robots = chosen(this._map);
     const several = robots.length > 1;
-    this._panel.hidden = !several;
+    setHidden(this._panel, !several);
     if (!several) return;
     const reports = robots.map((robot) => this._map.drive.robots.get(robot));
     const many = robots.length > this._most;
     setText(this._count, `${robots.length} robots${many ? ": use STOP ALL" : ""}`);
-    this._stop.hidden = many;
+    setHidden(this._stop, many);
     this._cancel.disabled = many || this._cancellable().length === 0;
     this._send.disabled = !reports.some((report) => report?.method);
   }

@@ -1,7 +1,14 @@
 import { devicesOf } from "../../web/inputs/devices.js";
 import { isLatched, stopKey, stopOf } from "../../web/motion/report.js";
 import { Obedience, standingStops } from "../../web/motion/stopping.js";
-import { button, html, setText, stopButton, TwiceButton } from "../../web/tools/elements.js";
+import {
+  button,
+  html,
+  setHidden,
+  setText,
+  stopButton,
+  TwiceButton,
+} from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/drive.js').Drive} Drive */
@@ -131,8 +138,8 @@ class Stop {
     const latched = [...robots.values()].filter(isLatched).map(stopKey);
     const reset = latched.length > 1 ? "Reset all" : "Reset";
     this._reset.show(latched.length > 0, latched, reset);
-    this._close.hidden = verdicts.length === 0;
-    this._list.hidden = verdicts.length === 0 && standing === "";
+    setHidden(this._close, verdicts.length === 0);
+    setHidden(this._list, verdicts.length === 0 && standing === "");
     this._showVerdicts(verdicts.sort(byName));
   }
 
@@ -239,7 +246,7 @@ class Alarm {
   /** Put STOP at its place on the page, and everything else beside it. */
   _place() {
     const { all, top, bottom } = this._twins.place();
-    this._stop.hidden = all;
+    setHidden(this._stop, all);
     this._element.style.paddingBlock = `${Math.max(top, 24)}px ${Math.max(bottom, 24)}px`;
   }
 

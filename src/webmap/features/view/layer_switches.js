@@ -1,4 +1,4 @@
-import { html, setText } from "../../web/tools/elements.js";
+import { html, setHidden, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 
@@ -135,7 +135,7 @@ class LayerSwitches {
       this._note(name, names.length - MOST);
     }
     for (const key of there) if (!this._rows.has(key)) this._add(key);
-    for (const [key, row] of this._rows) row.hidden = !there.has(key);
+    for (const [key, row] of this._rows) setHidden(row, !there.has(key));
     setText(this._none, there.size > 0 ? "" : "No layers yet.");
   }
 
@@ -167,7 +167,7 @@ class LayerSwitches {
     if (more <= 0 && !known) return;
     const note = known ?? html("p", "webmap-layers-row one");
     setText(note, `${more} more: “${name}” switches all of them`);
-    note.hidden = more <= 0;
+    setHidden(note, more <= 0);
     if (known) return;
     this._notes.set(name, note);
     this._arrange();

@@ -1,4 +1,4 @@
-import { html, setText } from "../../web/tools/elements.js";
+import { html, setHidden, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -23,7 +23,7 @@ export default function attach(map, { digits = 2 }) {
   /** @type {{x: number, y: number} | null} */
   let pointer = null;
   const show = () => {
-    output.hidden = pointer === null;
+    setHidden(output, pointer === null);
     if (pointer === null) return;
     const { x, y } = map.toWorld(pointer.x, pointer.y);
     setText(output, `x ${metres(x, digits)}  y ${metres(y, digits)} m`);

@@ -1,5 +1,5 @@
 import { scaleOf } from "../../web/view.js";
-import { html, svg } from "../../web/tools/elements.js";
+import { html, setHidden, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -56,7 +56,7 @@ export default function attach(map, { width = 120 }) {
     if (scale === shown) return;
     shown = scale;
     const length = roundLength(scale, width);
-    element.hidden = length === null;
+    setHidden(element, length === null);
     if (length === null) return;
     const end = width + 1;
     line.setAttribute("d", `M${end - length * scale} 1v6H${end}v-6`);

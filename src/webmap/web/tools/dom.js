@@ -1,3 +1,5 @@
+import { setText } from "./elements.js";
+
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 
 /** @param {string} id */
@@ -5,16 +7,6 @@ export function byId(id) {
   const element = document.getElementById(id);
   if (element === null) throw new Error(`console.html has no element "${id}".`);
   return element;
-}
-
-/**
- * Set a text only if it differs: a screen reader reads a live region at every change.
- *
- * @param {Element} element
- * @param {string} text
- */
-export function setText(element, text) {
-  if (element.textContent !== text) element.textContent = text;
 }
 
 /** @param {KeyboardEvent} event */

@@ -102,6 +102,17 @@ export function setText(element, text) {
 }
 
 /**
+ * Hide or show an element, only if that differs: the browser computes styles after each
+ * writing of the attribute, also of the same value.
+ *
+ * @param {HTMLElement} element
+ * @param {boolean} hidden
+ */
+export function setHidden(element, hidden) {
+  if (element.hidden !== hidden) element.hidden = hidden;
+}
+
+/**
  * A button that acts when it is pressed twice, deliberately.
  *
  * After the first press its label requests the second, so that it works the same with a
@@ -146,7 +157,7 @@ export class TwiceButton {
   show(visible, robots = this._robots, label = this._label) {
     this._robots = robots;
     this._label = label;
-    this.element.hidden = !visible;
+    setHidden(this.element, !visible);
     this._doublePress.look(robots);
     if (!visible) this.forget();
     const waiting = visible && this._doublePress.waiting(performance.now());

@@ -1,5 +1,5 @@
 import { devicesOf } from "../inputs/devices.js";
-import { html, setText, svg } from "./elements.js";
+import { html, setHidden, setText, svg } from "./elements.js";
 import { lay, ownPlace } from "./overlay.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
@@ -154,7 +154,7 @@ class SaveMenu {
 
   /** @param {boolean} open */
   _open(open) {
-    this._menu.hidden = !open;
+    setHidden(this._menu, !open);
     this._go.setAttribute("aria-expanded", String(open));
     if (!open) return;
     const room = document.documentElement.clientWidth;
