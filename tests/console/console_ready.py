@@ -6,7 +6,7 @@ import time
 from playwright.sync_api import Locator, Page, expect
 
 READY = """async () => {
-  const { page } = await import(document.querySelector("script[type=module]").src);
+  const { page } = await import(document.querySelector('[src$="page.js"]').src);
   const parts = [...page.parts._attached.values()];
   const styles = [...document.querySelectorAll("link[rel=stylesheet]")];
   return parts.every(({ part }) => part) && styles.every(({ sheet }) => sheet);

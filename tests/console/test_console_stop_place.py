@@ -48,7 +48,7 @@ LOOK = """async () => {
 """Where both buttons are, and what is hit at the centre in place of a STOP button."""
 
 DRIVE = """async (change) => {
-  const { page } = await import(document.querySelector("script[type=module]").src);
+  const { page } = await import(document.querySelector('[src$="page.js"]').src);
   const { drive } = page;
   drive._told ??= drive._receive;
   drive._receive = (message) =>
@@ -60,7 +60,7 @@ DRIVE = """async (change) => {
 """Have the gate's reports say something else to this page."""
 
 LOSE_SIGN_IN = """async () => {
-  const { page } = await import(document.querySelector("script[type=module]").src);
+  const { page } = await import(document.querySelector('[src$="page.js"]').src);
   for (const name of Object.keys(localStorage)) {
     if (name.startsWith("webmap key")) localStorage.setItem(name, "lost");
   }
@@ -212,7 +212,7 @@ def test_the_stop_buttons_of_the_alarm_are_at_the_same_places_and_send_stop(
     seen = alarm.get_by_role("button", name="Acknowledge")
     expect(seen).to_be_in_viewport(ratio=1)
     sent = """async () => {
-      const { page } = await import(document.querySelector("script[type=module]").src);
+      const { page } = await import(document.querySelector('[src$="page.js"]').src);
       page.sentStops ??= [];
       page.drive.on("stop", (robot) => page.sentStops.push(robot));
     }"""
@@ -221,7 +221,7 @@ def test_the_stop_buttons_of_the_alarm_are_at_the_same_places_and_send_stop(
         page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     said = page.evaluate(
         """async () => (await import(
-          document.querySelector("script[type=module]").src)).page.sentStops"""
+          document.querySelector('[src$="page.js"]').src)).page.sentStops"""
     )
     assert said[0] == "*"
     assert len(said) == 2

@@ -7,7 +7,10 @@ PRELOADS = "".join(
     f'<link rel="modulepreload" href="/_webmap/{name}">' for name in STARTS
 )
 SHEET = '<link rel="stylesheet" href="/_webmap/web/webmap.css">' + PRELOADS
-SCRIPT = '<script type="module" src="/_webmap/web/page.js"></script>'
+SCRIPT = "".join(
+    f'<script type="module" src="/_webmap/web/{name}.js"></script>'
+    for name in ("opening", "page")
+)
 ICON = '<link rel="icon" href="/_webmap/icon.svg" type="image/svg+xml">'
 
 

@@ -9,6 +9,7 @@ from webmap.server.files import NoSuchFile
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     for name, text in {
+        "web/opening.js": "export const opening = 1;\n",
         "web/page.js": "export const page = 1;\n",
         "web/drive.js": "export const drive = 1;\n",
         "features/stop/stop_button.js": "export default function attach() {}\n",

@@ -5,6 +5,7 @@ import { mock, test } from "node:test";
 class Hanging {
   static CONNECTING = 0;
   static OPEN = 1;
+  static CLOSED = 3;
   static made = [];
 
   constructor() {
@@ -25,18 +26,18 @@ globalThis.addEventListener = (_, fn) => online.push(fn);
 globalThis.WebSocket = Hanging;
 const { Link } = await import("../../src/webmap/web/link.js");
 
-function makeLink(t) {
+function makeLink(t, first) {
   Hanging.made = [];
   mock.timers.enable({ apis: ["setTimeout"] });
   t.after(() => mock.timers.reset());
   const said = [];
   const events = {
     opened: () => said.push("opened"),
-    received: () => {},
+    received: (data, at) => said.push([data.byteLength, at]),
     closed: (reason) => said.push(reason),
     refused: () => {},
   };
-  return { link: new Link(() => new URL("ws://localhost/"), events), said };
+  return { link: new Link(() => new URL("ws://localhost/"), events, first), said };
 }
 
 test("a link that does not open is opened again with a longer timeout", (t) => {
@@ -64,4 +65,35 @@ test("a new connection replaces a pending one when the network is back", (t) => 
   online.at(-1)();
   assert.ok(Hanging.made[0].closed);
   assert.equal(Hanging.made.length, 2);
+});
+
+/** @returns A socket that was opened before the link was made, and two messages of it. */
+function firstSocket(readyState) {
+  const received = [
+    { data: new ArrayBuffer(3), at: 20 },
+    { data: new ArrayBuffer(4), at: 70 },
+  ];
+  return { socket: Object.assign(new Hanging(), { readyState }), received };
+}
+
+test("a link takes over an open socket, and what came before with its times", async (t) => {
+  const { link, said } = makeLink(t, firstSocket(Hanging.OPEN));
+  assert.ok(link.isOpen);
+  assert.deepEqual(said, [], "events come after the constructor");
+  await Promise.resolve();
+  assert.deepEqual(said, ["opened", [3, 20], [4, 70]]);
+});
+
+test("a link waits for a first socket that still opens", async (t) => {
+  const { link, said } = makeLink(t, firstSocket(Hanging.CONNECTING));
+  assert.ok(link.opens);
+  await Promise.resolve();
+  assert.deepEqual(said, []);
+  assert.equal(Hanging.made.length, 0);
+});
+
+test("a link replaces a first socket that has closed", (t) => {
+  const { link } = makeLink(t, firstSocket(Hanging.CLOSED));
+  assert.ok(link.opens);
+  assert.equal(Hanging.made.length, 1);
 });

@@ -29,7 +29,7 @@ _MADE = """<!doctype html>
 <link rel="stylesheet" href="{base}web/webmap.css">
 <link rel="stylesheet" href="{base}made_page.css">
 {preloads}
-<script type="module" src="{base}web/page.js"></script>
+{scripts}
 </head>
 <body>
 <div id="webmap_container"></div>
@@ -63,6 +63,7 @@ def make_page(title: str, base: str, key: str | None = None) -> str:
         base=escape(base),
         key=_key_element(key),
         preloads=_preloads(base),
+        scripts=_scripts(base),
     )
 
 
@@ -70,6 +71,14 @@ def _preloads(base: str) -> str:
     """Return the elements with which a browser loads all at once, not in turn."""
     return "".join(
         f'<link rel="modulepreload" href="{escape(base)}{name}">' for name in STARTS
+    )
+
+
+def _scripts(base: str) -> str:
+    """Return the elements that start the page, first the module with its socket."""
+    return "".join(
+        f'<script type="module" src="{escape(base)}{name}"></script>'
+        for name in STARTS[:2]
     )
 
 
@@ -102,7 +111,7 @@ def prepare_page(text: str, base: str, key: str | None = None) -> OwnPage:
         first += f'<link rel="stylesheet" href="{escape(base)}web/webmap.css">'
     first += _preloads(base)
     if not seen.has("web/page.js"):
-        last = f'<script type="module" src="{escape(base)}web/page.js"></script>'
+        last = _scripts(base)
     if not seen.icon:
         last += f'<link rel="icon" href="{escape(base)}icon.svg" type="image/svg+xml">'
     start, end = seen.head()

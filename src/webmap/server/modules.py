@@ -21,15 +21,17 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 STARTS = (
+    "web/opening.js",
     "web/page.js",
     "web/drive.js",
     "features/stop/stop_button.js",
     "features/drive/teleop.js",
 )
-"""What a page loads at once: the picture, the connection to the gate, STOP, driving.
+"""What a page loads at once: its first socket, the picture, the connection to the gate,
+STOP, driving.
 
-What one of them shares with any other module is served with the first, the only one
-that a page never loads a second time.
+The first one is small: it is served with what it needs itself. What one of the others
+shares with any other module is served with the second. A page loads these two once.
 """
 
 SHARED_SHEET = "web/style/controls.css"
@@ -178,10 +180,10 @@ def _owners(modules: Mapping[str, _Module], starts: tuple[str, ...]) -> dict[str
             users[module.name].append(entry)
     owners = {}
     for name, entries in users.items():
-        if len(entries) == 1:
+        if starts[0] in entries or len(entries) == 1:
             owners[name] = entries[0]
         else:
-            owners[name] = starts[0] if set(entries) & set(starts) else name
+            owners[name] = starts[1] if set(entries) & set(starts) else name
     return owners
 
 

@@ -11,9 +11,16 @@ const LONGEST_PATIENCE = 20_000;
 /**
  * @typedef {object} LinkEvents
  * @property {() => void} opened
- * @property {(data: ArrayBuffer) => void} received
+ * @property {(data: ArrayBuffer, at: number) => void} received With the time at which
+ *     it came, by `performance.now()`.
  * @property {(reason: string, forGood: boolean) => void} closed
  * @property {() => void} refused It did not open; `closed` has been called.
+ */
+
+/**
+ * @typedef {object} FirstSocket
+ * @property {WebSocket} socket
+ * @property {Array<{data: unknown, at: number}>} received What has come over it.
  */
 
 /** A WebSocket that reconnects; a message without a connection is dropped. */
@@ -21,8 +28,9 @@ export class Link {
   /**
    * @param {() => URL} address
    * @param {LinkEvents} events
+   * @param {FirstSocket} [first] A socket that was opened before.
    */
-  constructor(address, events) {
+  constructor(address, events, first) {
     this._address = address;
     this._events = events;
     this._wait = FIRST_WAIT;
@@ -35,7 +43,8 @@ export class Link {
     this._timer = undefined;
     onSignIn(() => this._hurry());
     addEventListener("online", () => this._hurry());
-    this._open();
+    if (first && first.socket.readyState <= WebSocket.OPEN) this._adopt(first);
+    else this._open();
   }
 
   get isOpen() {
@@ -85,25 +94,48 @@ export class Link {
 
   _open() {
     this._timer = undefined;
-    this._since = performance.now();
     const socket = new WebSocket(this._address(), protocols());
-    this._socket = socket;
     socket.binaryType = "arraybuffer";
+    this._listen(socket);
+  }
+
+  /** @param {FirstSocket} first */
+  _adopt({ socket, received }) {
+    const hear = this._listen(socket);
+    if (socket.readyState !== WebSocket.OPEN) return;
+    // Events come after the constructor, as those of a new socket.
+    queueMicrotask(() => {
+      hear.open();
+      for (const { data, at } of received) hear.message(data, at);
+    });
+  }
+
+  /** @param {WebSocket} socket */
+  _listen(socket) {
+    this._since = performance.now();
+    this._socket = socket;
     let opened = false;
-    socket.addEventListener("open", () => {
+    const open = () => {
       opened = true;
       this._events.opened();
-    });
-    socket.addEventListener("message", ({ data }) => {
+    };
+    /**
+     * @param {unknown} data
+     * @param {number} at
+     */
+    const message = (data, at) => {
       if (this._socket === socket && data instanceof ArrayBuffer) {
-        this._events.received(data);
+        this._events.received(data, at);
       }
-    });
+    };
+    socket.addEventListener("open", open);
+    socket.addEventListener("message", ({ data }) => message(data, performance.now()));
     socket.addEventListener("close", ({ code, reason }) => {
       const current = this._socket === socket;
       this._lost(socket, reason, code);
       if (current && !opened) this._events.refused();
     });
+    return { open, message };
   }
 
   /**

@@ -1,5 +1,6 @@
 import { Crowd } from "./crowd.js";
 import { LayoutParts } from "./layout.js";
+import { contentSize } from "./sizes.js";
 import {
   apply,
   FarPictures,
@@ -384,21 +385,6 @@ export class MapCanvas {
       applied: this._operations.applied,
     });
   }
-}
-
-/**
- * @param {Element} element
- * @returns {{width: number, height: number}} Pixels within border and padding.
- */
-export function contentSize(element) {
-  const style = getComputedStyle(element);
-  /** @param {string[]} names */
-  const sum = (...names) =>
-    names.reduce((all, name) => all + Number.parseFloat(style.getPropertyValue(name)), 0);
-  const { width, height } = element.getBoundingClientRect();
-  const across = sum("border-left-width", "border-right-width", "padding-left", "padding-right");
-  const down = sum("border-top-width", "border-bottom-width", "padding-top", "padding-bottom");
-  return { width: Math.max(0, width - across), height: Math.max(0, height - down) };
 }
 
 /** Most milliseconds between the end of a drag and its click. */

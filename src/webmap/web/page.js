@@ -6,14 +6,14 @@
  * and `tools/` has what tools share. What an operator can name is in `../features`.
  */
 
-import { BASE, pagePath, socketAddress } from "./addresses.js";
+import { BASE } from "./addresses.js";
 import { LONGEST_TEXTS } from "./constants.js";
 import { Reports } from "./events.js";
 import { BrowserParts, importOf } from "./browser_parts.js";
-import { takeIdentity, takeKey, whyRefused } from "./key.js";
+import { whyRefused } from "./key.js";
 import { Link } from "./link.js";
-import { contentSize } from "./map.js";
 import { Notices } from "./notices.js";
+import { dark, firstSocket, id, path, sceneAddress } from "./opening.js";
 import { Scene } from "./scene.js";
 import { VersionError } from "./wire.js";
 
@@ -24,17 +24,14 @@ const SILENT = 3000;
 const DEAD = 10_000;
 /** Milliseconds between two checks; the server sends at least every second. */
 const LOOK_PERIOD = 500;
-/** Characters for sizes in the socket's address; servers take some 8000 in all. */
-const SIZES_ROOM = 3000;
 /** Frames in a row that may fail before the page stops requesting new ones. */
 const FAILURES = 3;
 
 /** One open page: its connection to the display, its scene, its notices. */
 export class Page {
   constructor() {
-    takeKey();
-    this.path = pagePath();
-    this.id = takeIdentity(this.path);
+    this.path = path;
+    this.id = id;
     this.notices = new Notices();
     this.parts = new BrowserParts({
       send: (message) => this.send(message),
@@ -74,14 +71,16 @@ export class Page {
     this._why = "";
     /** Whether the page was hidden when it last received something. */
     this._returned = false;
-    this._theme = matchMedia("(prefers-color-scheme: dark)");
-    this._theme.addEventListener("change", () => this.scene.restyle());
-    this._link = new Link(() => this._address(), {
+    dark.addEventListener("change", () => this.scene.restyle());
+    const events = {
       opened: () => this._opened(),
-      received: (data) => this._received(data),
-      closed: (reason, forGood) => this._closed(reason, forGood),
+      received: (/** @type {ArrayBuffer} */ data, /** @type {number} */ at) =>
+        this._received(data, at),
+      closed: (/** @type {string} */ reason, /** @type {boolean} */ forGood) =>
+        this._closed(reason, forGood),
       refused: () => void this._askWhy(),
-    });
+    };
+    this._link = new Link(sceneAddress, events, firstSocket.take());
     // Whatever the frozen page did not read is old, and its connection may be dead.
     document.addEventListener("resume", () => this._link.renew());
     setInterval(() => this._look(), LOOK_PERIOD);
@@ -123,33 +122,20 @@ export class Page {
 
   // The connection -------------------------------------------------------------
 
-  /** @returns {URL} Of the socket, with the hello: a message would take a round trip. */
-  _address() {
-    const hello = {
-      op: "hello",
-      page: this.id,
-      url: (this.path + location.search).slice(0, LONGEST_TEXTS.url),
-      width: innerWidth,
-      height: innerHeight,
-      dpr: devicePixelRatio,
-      theme: this._theme.matches ? "dark" : "light",
-      containers: containers(),
-    };
-    const query = { page: this.path, id: this.id, hello: JSON.stringify(hello) };
-    return socketAddress("scene", query);
-  }
-
   _opened() {
     this._listening = performance.now();
     this._frames = [];
     this._isNew = true;
   }
 
-  /** @param {ArrayBuffer} data */
-  _received(data) {
+  /**
+   * @param {ArrayBuffer} data
+   * @param {number} at When it came, by `performance.now()`.
+   */
+  _received(data, at) {
     this._listening = performance.now();
     this._returned = document.hidden;
-    this._frames.push({ data, received: performance.now() / 1000 });
+    this._frames.push({ data, received: at / 1000 });
     this._connected();
     const first = this._isNew;
     this._isNew = false;
@@ -248,22 +234,6 @@ export class Page {
     if (hopeless) this._link.end();
     else this.send({ op: "resync" });
   }
-}
-
-/** @returns {Record<string, [number, number]>} The sizes of the page's own elements. */
-function containers() {
-  /** @type {Record<string, [number, number]>} */
-  const sizes = {};
-  let room = SIZES_ROOM;
-  for (const element of document.body.querySelectorAll("[id]:not(svg *)")) {
-    const { id } = element;
-    const [width, height] = Object.values(contentSize(element)).map(Math.round);
-    if (id.length > LONGEST_TEXTS.name || (width === 0 && height === 0)) continue;
-    room -= encodeURIComponent(JSON.stringify([id, width, height])).length;
-    if (room < 0) break;
-    sizes[id] = [width, height];
-  }
-  return sizes;
 }
 
 /** This page. */
