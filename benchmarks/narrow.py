@@ -35,7 +35,7 @@ LOADS = (8, 16)
 """Robots whose scans and odometry a display shows."""
 
 PERIOD = 0.05
-WARM = 3.0
+WARM = 2.0
 """Seconds for which queues may fill before anything is measured."""
 
 TRIP, TRIP_95, TRIP_99 = (f"command to its tick, {n} (ms)" for n in (50, 95, 99))
@@ -165,7 +165,7 @@ def hold(hand: Hand, seconds: float) -> None:
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare a wide line with a narrow one, at each load."""
-    seconds = 3.0 if quick else 5.0
+    seconds = 3.0 if quick else 4.0
     comparisons = []
     for robots in LOADS[-1:] if quick else LOADS:
         contenders = [
