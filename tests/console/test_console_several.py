@@ -1,6 +1,7 @@
 """Several robots at once in a real browser: the box, the search, STOP and goals."""
 
 import re
+from contextlib import suppress
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -77,15 +78,20 @@ def test_all_robots_of_a_search_are_sent_and_their_goals_cancelled(demo, open_co
     bar = page.locator(".webmap-several")
     expect(bar.locator(".webmap-several-count")).to_have_text(f"{demo.robots} robots")
     page.locator("#show-all").click()
-    bar.get_by_role("button", name="Send goal…").click()
-    expect(page.locator(".webmap-goal-word")).to_contain_text("Press on the map")
-    box = page.locator("svg.webmap").bounding_box()
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    page.mouse.down()
-    # The places of all robots are visible before the release.
-    expect(page.locator(".webmap-goal-arrow")).to_have_count(demo.robots)
-    page.mouse.up()
-    cancel = bar.get_by_role("button", name="Cancel goals")
-    expect(page.locator("#robots .row[data-state^=navigating]").first).to_be_attached()
-    cancel.click()
-    expect(page.locator("#robots .row[data-state^=navigating]")).to_have_count(0)
+    navigating = page.locator("#robots .row[data-state^=navigating]")
+    # A goal of a page that is too busy is too old, and is not sent.
+    for _ in range(5):
+        bar.get_by_role("button", name="Send goal…").click()
+        expect(page.locator(".webmap-goal-word")).to_contain_text("Press on the map")
+        box = page.locator("svg.webmap").bounding_box()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        page.mouse.down()
+        # The places of all robots are visible before the release.
+        expect(page.locator(".webmap-goal-arrow")).to_have_count(demo.robots)
+        page.mouse.up()
+        with suppress(AssertionError):
+            expect(navigating.first).to_be_attached(timeout=5000)
+            break
+    expect(navigating.first).to_be_attached()
+    bar.get_by_role("button", name="Cancel goals").click()
+    expect(navigating).to_have_count(0)
