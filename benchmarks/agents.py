@@ -5,6 +5,7 @@ the figures have the cost of the processes and none of a network.
 """
 
 import json
+import math
 import statistics
 import tempfile
 import threading
@@ -40,6 +41,8 @@ class Hand:
         self._waiting: dict[int, float] = {}
         self.trips: list[float] = []
         """Milliseconds from each command to the tick that acknowledged it."""
+        self.refused: list[str] = []
+        """Why requests were refused."""
         self.armable = threading.Event()
         self.armed = threading.Event()
         self._connection = gates.connect("Ann", "operator", self._hear, print)
@@ -89,6 +92,8 @@ class Hand:
             self._ticks[gate] = message["tick"]
             if gate == self._gate:
                 self._acknowledged(message["ack"])
+        elif message["op"] == "refused":
+            self.refused.append(message["why"])
         elif message["op"] == "robot":
             self._gate, self._epoch = message.get("gate", ""), message["epoch"]
             self._mine = self._epoch is not None
@@ -96,6 +101,20 @@ class Hand:
                 self.armable.set()
             if message["armed"]:
                 self.armed.set()
+
+
+def take_control(hand: Hand) -> None:
+    """Ask for control, again if nothing comes of it, until commands may move."""
+    deadline, asked = time.monotonic() + 20, -math.inf
+    while not hand.armed.is_set():
+        now = time.monotonic()
+        if now > deadline:
+            raise RuntimeError(f"no control of the robot; refused: {hand.refused}")
+        if now > asked + 2:
+            hand.take()
+            asked = now
+        hand.drive(0.0)
+        time.sleep(PERIOD)
 
 
 def delays(url: str, id: str, robot: WitnessRobot) -> list[float]:
@@ -117,11 +136,7 @@ def delays(url: str, id: str, robot: WitnessRobot) -> list[float]:
         hand = Hand(gates, id)
         if not hand.armable.wait(20):
             raise RuntimeError("the robot cannot be driven")
-        hand.take()
-        deadline = time.monotonic() + 20
-        while not hand.armed.is_set() and time.monotonic() < deadline:
-            hand.drive(0.0)
-            time.sleep(PERIOD)
+        take_control(hand)
         sent: dict[int, float] = {}
         for number in range(VELOCITIES):
             part = 0.2 + 0.001 * number

@@ -146,7 +146,7 @@ def group_page(robots: int, seconds: float) -> Callable[[], Figures]:
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare WebMap's drawing with circles, and with groups."""
-    seconds = 2.0 if quick else 4.0
+    seconds = 2.0 if quick else 3.0
     robots = 20 if quick else SOME
     scans = [
         Contender("WebMap", webmap_page(robots, BEAMS, seconds)),

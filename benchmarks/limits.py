@@ -262,7 +262,7 @@ def plot(ramps: Iterable[Comparison]) -> Plot:
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Find the limits; one round, because each step is long enough."""
     del rounds
-    seconds = 2.0 if quick else 3.0
+    seconds = 2.0 if quick else 2.5
     robots = ROBOTS[:2] if quick else ROBOTS
     viewers = VIEWERS[:1] if quick else VIEWERS
     ramps = [

@@ -96,7 +96,7 @@ def shown_to(
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare no viewer with one, for each fleet."""
-    seconds = 3.0 if quick else 5.0
+    seconds = 3.0 if quick else 4.0
     return [
         compare(
             title,
