@@ -20,7 +20,8 @@ const LONGEST_PATIENCE = 20_000;
 /**
  * @typedef {object} FirstSocket
  * @property {WebSocket} socket
- * @property {Array<{data: unknown, at: number}>} received What has come over it.
+ * @property {Array<{data: unknown, at: number}>} received What has come over it, with
+ *     the times of `performance.now()`.
  */
 
 /** A WebSocket that reconnects; a message without a connection is dropped. */

@@ -36,29 +36,24 @@ export function sceneAddress() {
   return socketAddress("scene", { page: path, id, hello: JSON.stringify(hello) });
 }
 
-/** A socket that stores what it receives until somebody takes it. */
-class StoringSocket {
-  /** @param {WebSocket} socket */
-  constructor(socket) {
-    socket.binaryType = "arraybuffer";
-    this._socket = socket;
-    /** @type {Array<{data: unknown, at: number}>} */
-    this._received = [];
-    this._store = (/** @type {MessageEvent} */ { data }) => {
-      this._received.push({ data, at: performance.now() });
-    };
-    socket.addEventListener("message", this._store);
-  }
+// It begins to open now.
+const socket = new WebSocket(sceneAddress(), protocols());
+socket.binaryType = "arraybuffer";
+/** @type {Array<{data: unknown, at: number}>} */
+const received = [];
 
-  /**
-   * @returns {{socket: WebSocket, received: Array<{data: unknown, at: number}>}} The
-   *     socket, and the messages so far with the times of `performance.now()`.
-   */
-  take() {
-    this._socket.removeEventListener("message", this._store);
-    return { socket: this._socket, received: this._received };
-  }
+/** @param {MessageEvent} message */
+function store({ data }) {
+  received.push({ data, at: performance.now() });
 }
+socket.addEventListener("message", store);
 
-/** The first socket of the page, which begins to open now. */
-export const firstSocket = new StoringSocket(new WebSocket(sceneAddress(), protocols()));
+/**
+ * Return the first socket, and store no more of its messages.
+ *
+ * @returns {import('./link.js').FirstSocket}
+ */
+export function takeFirstSocket() {
+  socket.removeEventListener("message", store);
+  return { socket, received };
+}

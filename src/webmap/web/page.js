@@ -13,7 +13,7 @@ import { BrowserParts, importOf } from "./browser_parts.js";
 import { whyRefused } from "./key.js";
 import { Link } from "./link.js";
 import { Notices } from "./notices.js";
-import { dark, firstSocket, id, path, sceneAddress } from "./opening.js";
+import { dark, id, path, sceneAddress, takeFirstSocket } from "./opening.js";
 import { Scene } from "./scene.js";
 import { VersionError } from "./wire.js";
 
@@ -72,15 +72,14 @@ export class Page {
     /** Whether the page was hidden when it last received something. */
     this._returned = false;
     dark.addEventListener("change", () => this.scene.restyle());
+    /** @type {import('./link.js').LinkEvents} */
     const events = {
       opened: () => this._opened(),
-      received: (/** @type {ArrayBuffer} */ data, /** @type {number} */ at) =>
-        this._received(data, at),
-      closed: (/** @type {string} */ reason, /** @type {boolean} */ forGood) =>
-        this._closed(reason, forGood),
+      received: (data, at) => this._received(data, at),
+      closed: (reason, forGood) => this._closed(reason, forGood),
       refused: () => void this._askWhy(),
     };
-    this._link = new Link(sceneAddress, events, firstSocket.take());
+    this._link = new Link(sceneAddress, events, takeFirstSocket());
     // Whatever the frozen page did not read is old, and its connection may be dead.
     document.addEventListener("resume", () => this._link.renew());
     setInterval(() => this._look(), LOOK_PERIOD);
