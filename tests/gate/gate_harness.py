@@ -79,7 +79,7 @@ class Bench:
     tick: int = -1
     seq: int = 0
 
-    def tell(self, event):
+    def handle(self, event):
         self.depth += 1
         self._do(self.gate.handle(event, self.now))
         self.depth -= 1
@@ -92,9 +92,9 @@ class Bench:
         for n in range(steps):
             self.now += step
             if self.beating:
-                self.tell(protocol.Heartbeat())
+                self.handle(protocol.Heartbeat())
             if self.answering and self.up:
-                self.tell(events.PingAnswered(URL, self.now - self.rtt))
+                self.handle(events.PingAnswered(URL, self.now - self.rtt))
             if each is not None and n % round(0.05 / step) == 0:
                 each()
             self._do(self.gate.step(self.now))
@@ -113,7 +113,7 @@ class Bench:
                         self.reports[message.robot] = message
                 case actions.Lock(key):
                     why = None if self.lock_held else "another has it"
-                    self.tell(
+                    self.handle(
                         events.LockState(
                             key,
                             self.lock_held,
@@ -139,21 +139,21 @@ class Bench:
                     write = Written(self.now, key, twist, epoch, by)
                     log.append(write)
                     self.attempts.append(write)
-                    self.tell(events.TwistWritten(key, twist, epoch, by, out))
+                    self.handle(events.TwistWritten(key, twist, epoch, by, out))
                 case actions.SendGoal(_, robot, id, x, y, yaw, by, _, until):
                     self.now += self.held_up
                     out = self.clear and self.now <= until
-                    self.tell(events.GoalWritten(robot, id, x, y, yaw, by, out))
+                    self.handle(events.GoalWritten(robot, id, x, y, yaw, by, out))
                 case actions.CutLink(url):
                     self.up = False
-                    self.tell(events.LinkDown(url, "control"))
+                    self.handle(events.LinkDown(url, "control"))
 
     def keep(self, latch):
         """Have the disk do as it is told, and say so."""
         if isinstance(latch, actions.SaveStopTest):
             record = events.StopRecord(latch.seconds, "2026-11-21")
             self.tests[latch.key] = record
-            self.tell(events.StopTestSaved(latch.key, record))
+            self.handle(events.StopTestSaved(latch.key, record))
             return
         error = "the disk is full" if self.full_disk else None
         if not self.full_disk and latch.press is not None:
@@ -162,13 +162,13 @@ class Bench:
             ours = self.disk[latch.key].id in latch.ids
             if ours:
                 del self.disk[latch.key]
-        self.tell(events.StopSaved(latch.key, latch.number, error))
+        self.handle(events.StopSaved(latch.key, latch.number, error))
 
     # What happens outside.
 
     def begin(self, *specs):
         for one in specs or (spec(),):
-            self.tell(one)
+            self.handle(one)
         self.connect_links()
         self.join("a")
         self.join("b")
@@ -177,21 +177,21 @@ class Bench:
 
     def connect_links(self):
         self.up = True
-        self.tell(events.LinkUp(URL, "control"))
-        self.tell(events.LinkUp(URL, "tasks"))
+        self.handle(events.LinkUp(URL, "control"))
+        self.handle(events.LinkUp(URL, "tasks"))
 
     def break_links(self):
         self.up = False
-        self.tell(events.LinkDown(URL, "control"))
-        self.tell(events.LinkDown(URL, "tasks"))
+        self.handle(events.LinkDown(URL, "control"))
+        self.handle(events.LinkDown(URL, "tasks"))
 
     def join(self, who, role="operator"):
-        self.tell(protocol.Connect(who, who.upper(), role))
+        self.handle(protocol.Connect(who, who.upper(), role))
 
     def say(self, who, **command):
         if command["op"] == "reset":
             command.setdefault("stop", self.stop_of(command["robot"]))
-        self.tell(protocol.FromPage(who, json.dumps(command).encode()))
+        self.handle(protocol.FromPage(who, json.dumps(command).encode()))
 
     def take(self, who="a", robot="r1"):
         """Take the robot and return the epoch, if it was given."""

@@ -34,9 +34,9 @@ class PacedBench(Bench):
             if self.now >= self.beat_at + BEAT - 1e-6:
                 self.beat_at = self.now
                 if self.beating:
-                    self.tell(protocol.Heartbeat())
+                    self.handle(protocol.Heartbeat())
                 if self.answering and self.up:
-                    self.tell(
+                    self.handle(
                         events.PingAnswered(
                             next(iter(self.gate._machines._by_key)).url, self.now
                         )

@@ -20,7 +20,7 @@ def run(bench, seconds, speed=0.0, x=None, turn=0.0):
     """Let time pass with odometry, driven or not."""
 
     def each():
-        bench.tell(events.OdometryReceived(KEY, Twist(speed, 0.0, turn)))
+        bench.handle(events.OdometryReceived(KEY, Twist(speed, 0.0, turn)))
         if x is not None:
             bench.drive(x=x)
 
@@ -110,7 +110,7 @@ def test_a_granted_request_for_control_is_reported_as_changing(bench):
 
 def test_a_free_robot_that_another_program_drives_is_reported_as_other(bench):
     bench.run(EXPECTED_FOR)
-    bench.run(0.5, lambda: bench.tell(events.EchoReceived(KEY, OTHERS)))
+    bench.run(0.5, lambda: bench.handle(events.EchoReceived(KEY, OTHERS)))
     assert bench.report().doing == "other"
     bench.take("a")
     assert run(bench, 0.1) == "held"
@@ -127,7 +127,7 @@ def test_a_robot_with_a_goal_is_navigating_until_the_goal_ends(bench, released):
     assert run(bench, 0.3, 0.5) == held
     assert run(bench, 0.3, 0.0) == held, "it may wait for a way"
     id = bench.report().goal.id
-    bench.tell(events.GoalEnded("r1", id, "reached", ""))
+    bench.handle(events.GoalEnded("r1", id, "reached", ""))
     rest = "free" if released else "held"
     assert run(bench, 0.1, 0.0) == rest
     if not released:  # else the gate does not look at the odometry

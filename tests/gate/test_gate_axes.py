@@ -25,7 +25,7 @@ limit = st.floats(0.0, 10.0)
 
 def begin(*specs, **changes):
     bench = Bench().begin(*specs or (spec(**{**FLYING, "holonomic": True, **changes}),))
-    bench.tell(protocol.FromProgram(commands.Take("r1"), 7))
+    bench.handle(protocol.FromProgram(commands.Take("r1"), 7))
     return bench
 
 
@@ -34,12 +34,12 @@ def twist(bench, wanted):
     command = protocol.FromProgram(
         commands.SetVelocity("r1", epoch, bench.tick, wanted.numbers)
     )
-    bench.tell(command)
+    bench.handle(command)
 
 
 def measure(bench, seconds, seen, drive=None):
     def each():
-        bench.tell(events.OdometryReceived(KEY, seen))
+        bench.handle(events.OdometryReceived(KEY, seen))
         if drive is not None:
             twist(bench, drive)
 
@@ -103,7 +103,7 @@ class TestWithoutALimit:
     def test_changing_a_limit_ends_the_lease(self):
         bench = begin()
         twist(bench, Twist(vz=0.1))
-        bench.tell(spec(holonomic=True))
+        bench.handle(spec(holonomic=True))
         assert bench.written[-1].twist == ZERO
         assert bench.report().holder is None
 
@@ -192,7 +192,7 @@ class TestWithLimits:
         bench = begin(assist=assist)
         ranges = [0.4] * 72
         sweep = Scan(-math.pi, math.tau / 72, 0.05, 8.0, ranges, bench.now)
-        bench.tell(events.ScanReceived(KEY, "/scan", sweep))
+        bench.handle(events.ScanReceived(KEY, "/scan", sweep))
         twist(bench, Twist(vz=0.4))
         assert bench.written[-1].twist == Twist(vz=0.4)
 
@@ -253,7 +253,7 @@ class TestStandstill:
         bench.take("a")
 
         def each():
-            bench.tell(events.OdometryReceived(KEY, self.CLIMBING))
+            bench.handle(events.OdometryReceived(KEY, self.CLIMBING))
             bench.drive()
 
         bench.run(0.5, each)
@@ -265,7 +265,7 @@ class TestStandstill:
         seen = [ZERO]
 
         def each():
-            bench.tell(events.OdometryReceived(KEY, seen[0]))
+            bench.handle(events.OdometryReceived(KEY, seen[0]))
             bench.drive()
 
         bench.run(0.5, each)

@@ -78,7 +78,7 @@ class TestTakeControl:
 
     def test_the_lease_ends_when_its_connection_closes(self, bench):
         bench.take("a")
-        bench.tell(protocol.Disconnect("a"))
+        bench.handle(protocol.Disconnect("a"))
         assert bench.state == "free"
         assert bench.take("b")
 
@@ -197,15 +197,15 @@ class TestDriving:
         assert twist.vy == pytest.approx(2**-0.5)
 
     def test_the_speed_limit_of_the_page_also_applies_while_driving(self, bench):
-        bench.tell(protocol.Speeds("a", 0.5, 9.0))
+        bench.handle(protocol.Speeds("a", 0.5, 9.0))
         bench.drive_off()
         assert bench.written[-1].twist.vx == 0.5
         assert bench.report().why == ("limit of the robot", "limit of the page")
-        bench.tell(protocol.Speeds("a", 0.2, 9.0))
+        bench.handle(protocol.Speeds("a", 0.2, 9.0))
         bench.hold(0.1, x=1.0)
         assert bench.written[-1].twist.vx == 0.2
-        bench.tell(protocol.Speeds("nobody", 0.1, 0.1))
-        bench.tell(protocol.Speeds("b", 0.1, 0.1))
+        bench.handle(protocol.Speeds("nobody", 0.1, 0.1))
+        bench.handle(protocol.Speeds("b", 0.1, 0.1))
         assert bench.report().v == 0.2
 
     def test_a_lower_speed_limit_also_applies_to_a_waiting_command(self, bench):
@@ -213,7 +213,7 @@ class TestDriving:
         bench.run(0.05)
         bench.drive(x=0.9)
         bench.drive(x=1.0)  # too soon: it waits
-        bench.tell(protocol.Speeds("a", 0.3, 0.3))
+        bench.handle(protocol.Speeds("a", 0.3, 0.3))
         bench.run(0.05)
         assert bench.written[-1].twist.vx == 0.3
 
@@ -276,7 +276,7 @@ class TestFreshness:
         old = driving.report().epoch - 1
         driving.drive("b", x=0.5, **stale)
         driving.drive("a", x=0.5, epoch=old, **stale)
-        driving.tell(
+        driving.handle(
             protocol.FromProgram(
                 commands.SetVelocity("r1", old + 1, 1, (0.0, 0.0, 0.0))
             )
@@ -348,7 +348,7 @@ class TestMalformed:
 
         def mixed():
             for _ in range(9):
-                bench.tell(protocol.FromPage("a", b'{"op":"drive","x":NaN}'))
+                bench.handle(protocol.FromPage("a", b'{"op":"drive","x":NaN}'))
 
         bench.run(0.4, mixed)
         first = next(w for w in bench.since(last) if w.twist == ZERO)
@@ -356,7 +356,7 @@ class TestMalformed:
 
     def test_many_invalid_commands_close_the_connection_once(self, bench):
         for _ in range(50):
-            bench.tell(protocol.FromPage("a", b"rubbish"))
+            bench.handle(protocol.FromPage("a", b"rubbish"))
         (close,) = bench.of(protocol.CloseConnection)
         assert close.connection == "a"
         refused = [r for r in bench.refusals() if r.what == "command"]
@@ -375,10 +375,10 @@ class TestMalformed:
         bench.say("nobody", op="take", robot="r1")
         bench.say(PROGRAM, op="take", robot="r1")
         assert bench.state == "free"
-        bench.tell(protocol.Connect(PROGRAM, "x", "viewer"))
-        bench.tell(protocol.Disconnect(PROGRAM))
-        bench.tell(protocol.Disconnect("nobody"))
-        bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
+        bench.handle(protocol.Connect(PROGRAM, "x", "viewer"))
+        bench.handle(protocol.Disconnect(PROGRAM))
+        bench.handle(protocol.Disconnect("nobody"))
+        bench.handle(protocol.FromProgram(commands.Take("r1"), 1))
         assert bench.state == "held"
 
 
@@ -429,15 +429,15 @@ class TestStop:
 
     def test_a_program_can_stop_and_reset_a_robot(self, bench):
         bench.drive_off()
-        bench.tell(protocol.FromProgram(commands.Stop(None)))
+        bench.handle(protocol.FromProgram(commands.Stop(None)))
         assert bench.written[-1].twist == ZERO
-        bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
+        bench.handle(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
         bench.drive_off()
         assert bench.written[-1].twist != ZERO
-        bench.tell(protocol.FromProgram(commands.Stop("r1")))
+        bench.handle(protocol.FromProgram(commands.Stop("r1")))
         assert bench.written[-1].twist == ZERO
-        bench.tell(protocol.FromProgram(commands.Stop("r9")))
-        bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
+        bench.handle(protocol.FromProgram(commands.Stop("r9")))
+        bench.handle(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
         assert bench.state == "stopping"
 
     def test_a_stop_without_a_link_is_sent_first_on_the_next_link(self, bench):
@@ -553,7 +553,7 @@ class TestLinks:
         released = bench.now
         assert bench.written[-1].twist == ZERO
         bench.now += 0.003
-        bench.tell(events.PingAnswered(URL, released - 0.03))
+        bench.handle(events.PingAnswered(URL, released - 0.03))
         bench.run(1.5)
         assert bench.did(actions.CutLink) == [actions.CutLink(URL)]
         assert bench.did(actions.MarkDriven) == [actions.MarkDriven(KEY, True)]
@@ -566,15 +566,15 @@ class TestLinks:
 
     def test_a_stop_is_confirmed_only_after_a_later_ping_is_answered(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
-        stands = lambda: bench.tell(events.OdometryReceived(KEY, ZERO))  # noqa: E731
+        stands = lambda: bench.handle(events.OdometryReceived(KEY, ZERO))  # noqa: E731
         bench.answering = False
         bench.say("b", op="stop", robot="r1")
         pressed = bench.now
         bench.run(0.1)
-        bench.tell(events.PingAnswered(URL, pressed - 0.01))
+        bench.handle(events.PingAnswered(URL, pressed - 0.01))
         bench.run(0.5, stands)
         assert bench.report().stop.confirmed is None
-        bench.tell(events.PingAnswered(URL, pressed + 0.01))
+        bench.handle(events.PingAnswered(URL, pressed + 0.01))
         bench.run(0.1, stands)
         assert bench.report().stop.confirmed
 
@@ -592,14 +592,14 @@ class TestLinks:
 
     def test_events_of_unknown_machines_write_nothing(self, bench):
         gone = Key(URL, "/gone")
-        bench.tell(events.TwistWritten(gone, ZERO, 1, "a", True))
-        bench.tell(events.EchoReceived(gone, ZERO))
-        bench.tell(events.OdometryReceived(gone, ZERO))
-        bench.tell(events.LockState(gone, held=True))
-        bench.tell(events.GoalWritten("r9", "g", 0, 0, 0, "a", True))
-        bench.tell(events.GoalEnded("r9", "g"))
-        bench.tell(events.LinkUp("ws://other", "odometry"))
-        bench.tell(events.LinkDown("ws://other", "odometry"))
+        bench.handle(events.TwistWritten(gone, ZERO, 1, "a", True))
+        bench.handle(events.EchoReceived(gone, ZERO))
+        bench.handle(events.OdometryReceived(gone, ZERO))
+        bench.handle(events.LockState(gone, held=True))
+        bench.handle(events.GoalWritten("r9", "g", 0, 0, 0, "a", True))
+        bench.handle(events.GoalEnded("r9", "g"))
+        bench.handle(events.LinkUp("ws://other", "odometry"))
+        bench.handle(events.LinkDown("ws://other", "odometry"))
         assert bench.written == []
 
 
@@ -619,7 +619,7 @@ class TestDisplay:
 
     def test_a_shutdown_stops_a_driven_robot_and_prevents_taking_control(self, bench):
         bench.drive_off()
-        bench.tell(events.Shutdown("the end"))
+        bench.handle(events.Shutdown("the end"))
         assert bench.written[-1].twist == ZERO
         assert not bench.gate.silent
         assert bench.refusals("a")[-1].why == "the end"
@@ -643,7 +643,7 @@ class TestOdometryLost:
     def moves(self, bench, *, seen):
         def each():
             if seen:
-                bench.tell(events.OdometryReceived(KEY, Twist(0.1)))
+                bench.handle(events.OdometryReceived(KEY, Twist(0.1)))
             bench.drive(x=x)
 
         at = bench.now
@@ -672,7 +672,7 @@ class TestOdometryLost:
         at = bench.now
 
         def each():
-            bench.tell(events.OdometryReceived(KEY, None))
+            bench.handle(events.OdometryReceived(KEY, None))
             bench.drive(x=1.0)
 
         bench.run(2.0, each)
@@ -680,19 +680,19 @@ class TestOdometryLost:
         assert bench.report().measured is None
 
     def test_a_robot_is_watched_only_while_an_operator_has_control(self, bench):
-        bench.tell(events.OdometryReceived(KEY, Twist(0.1)))
+        bench.handle(events.OdometryReceived(KEY, Twist(0.1)))
         assert bench.report().measured is None
         bench.take()
         assert bench.did(actions.Watch) == [actions.Watch(KEY, True)]
-        bench.tell(events.OdometryReceived(KEY, Twist(0.1)))
-        bench.tell(events.EchoReceived(KEY, Twist(0.2, 0, -0.0)))
+        bench.handle(events.OdometryReceived(KEY, Twist(0.1)))
+        bench.handle(events.EchoReceived(KEY, Twist(0.2, 0, -0.0)))
         bench.run(0.2)
         report = bench.report()
         assert report.measured == Twist(0.1).numbers
         assert report.echoed == Twist(0.2).numbers
         bench.say("a", op="release", robot="r1")
         assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
-        bench.tell(events.EchoReceived(KEY, Twist(0.2)))
+        bench.handle(events.EchoReceived(KEY, Twist(0.2)))
         bench.run(0.2)
         assert bench.report().measured is None
         assert bench.report().echoed is None
@@ -705,7 +705,7 @@ class TestReports:
         n = iter(range(1000))
 
         def each():
-            bench.tell(events.OdometryReceived(KEY, Twist(next(n) / 100)))
+            bench.handle(events.OdometryReceived(KEY, Twist(next(n) / 100)))
             bench.drive(x=1.0)
 
         bench.run(1.0, each)

@@ -64,7 +64,7 @@ def test_the_report_of_a_free_robot_includes_the_speed_limit_of_the_page(pages):
 
 def test_the_report_of_a_taken_robot_includes_the_speed_limit_of_the_page():
     bench = Bench().begin(spec(v_max=None, w_max=None))
-    bench.tell(protocol.Speeds("a", 0.8, 1.2))
+    bench.handle(protocol.Speeds("a", 0.8, 1.2))
     bench.take()
     report = bench.report()
     assert (report.v, report.w, report.why) == (0.8, 1.2, ("limit of the page",))

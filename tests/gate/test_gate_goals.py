@@ -96,7 +96,7 @@ def test_driving_cancels_goals_of_other_programs_but_not_on_every_input(bench):
     bench.take()
     bench.goal()
     (goal,) = goals(bench)
-    bench.tell(events.GoalEnded("r1", goal.id))
+    bench.handle(events.GoalEnded("r1", goal.id))
     bench.hold(0.3)
     bench.hold(0.1, x=1.0)
     assert cancels(bench) == 1, "RViz may have sent another since then"
@@ -113,7 +113,7 @@ def test_the_end_of_an_old_goal_does_not_end_the_newer_goal(bench):
     bench.take()
     bench.goal()
     bench.goal()
-    bench.tell(events.GoalEnded("r1", goals(bench)[0].id))
+    bench.handle(events.GoalEnded("r1", goals(bench)[0].id))
     bench.hold(0.3)
     bench.hold(0.1, x=1.0)
     assert cancels(bench) == 1
@@ -137,14 +137,14 @@ def test_stop_cancels_the_goal_and_sends_zero(bench):
 
 def test_without_a_link_goals_are_refused_and_a_cancel_is_sent_later(bench):
     bench.take()
-    bench.tell(events.LinkDown(URL, "tasks"))
+    bench.handle(events.LinkDown(URL, "tasks"))
     bench.goal()
     assert goals(bench) == []
     assert "no connection" in bench.refusals()[-1].why
     bench.say("a", op="cancel", robot="r1")
     assert cancels(bench) == 0
-    bench.tell(events.LinkUp(URL, "tasks"))
-    bench.tell(events.LinkUp(URL, "tasks"))
+    bench.handle(events.LinkUp(URL, "tasks"))
+    bench.handle(events.LinkUp(URL, "tasks"))
     assert cancels(bench) == 1
 
 
@@ -152,10 +152,10 @@ def test_an_action_is_cancelled_without_a_link_and_again_on_the_next_link():
     """Its service is called on a socket of its own, which may well get through."""
     bench = Bench().begin(spec(action="/go", cancel_topic=None))
     bench.take()
-    bench.tell(events.LinkDown(URL, "tasks"))
+    bench.handle(events.LinkDown(URL, "tasks"))
     bench.say("a", op="cancel", robot="r1")
     assert cancels(bench) == 1
-    bench.tell(events.LinkUp(URL, "tasks"))
+    bench.handle(events.LinkUp(URL, "tasks"))
     assert cancels(bench) == 2
 
 
@@ -173,8 +173,8 @@ def test_a_goal_that_could_not_be_sent_is_reported(bench):
     bench.goal()
     assert "too slow" in bench.refusals()[-1].why
     assert bench.of(protocol.SentGoal) == []
-    bench.tell(protocol.Disconnect("a"))
-    bench.tell(events.GoalWritten("r1", "g", 0, 0, 0, "a", False))
+    bench.handle(protocol.Disconnect("a"))
+    bench.handle(events.GoalWritten("r1", "g", 0, 0, 0, "a", False))
 
 
 def test_a_robot_without_a_goal_topic_or_action_refuses_goals():
@@ -204,15 +204,15 @@ def test_the_loss_of_the_sender_cancels_a_goal_only_if_configured(loss, policy):
     bench = Bench().begin(spec(on_operator_loss=policy))
     bench.take()
     bench.goal()
-    bench.tell(protocol.Disconnect("b"))  # somebody else
+    bench.handle(protocol.Disconnect("b"))  # somebody else
     assert cancels(bench) == 0
     if loss == "connection":
-        bench.tell(protocol.Disconnect("a"))
+        bench.handle(protocol.Disconnect("a"))
     elif loss == "display":
         bench.beating = False
         bench.run(0.5)
     else:
-        bench.tell(events.Shutdown("the end"))
+        bench.handle(events.Shutdown("the end"))
     assert cancels(bench) == (1 if policy == "cancel" else 0)
 
 
@@ -221,7 +221,7 @@ def test_a_goal_without_a_cancel_topic_is_not_cancelled_on_operator_loss():
     bench = Bench().begin(only)
     bench.take()
     bench.goal()
-    bench.tell(protocol.Disconnect("a"))
+    bench.handle(protocol.Disconnect("a"))
     assert cancels(bench) == 0
 
 
@@ -230,7 +230,7 @@ def test_removing_the_robot_cancels_a_goal_only_if_configured(policy):
     bench = Bench().begin(spec(on_operator_loss=policy))
     bench.take()
     bench.goal()
-    bench.tell(protocol.Forget("r1"))
+    bench.handle(protocol.Forget("r1"))
     kept = (actions.CancelGoals, actions.Detach)
     order = [type(a) for a in bench.done if isinstance(a, kept)]
     called_off = [actions.CancelGoals] if policy == "cancel" else []
@@ -246,7 +246,7 @@ class TestNewSettings:
         bench.take()
         bench.goal(**goal)
         bench.done.clear()
-        bench.tell(spec(**after))
+        bench.handle(spec(**after))
         return bench
 
     @pytest.mark.parametrize(
@@ -303,17 +303,17 @@ class TestNewSettings:
         bench = Bench().begin(spec(action="/go"))
         bench.take()
         bench.goal()
-        bench.tell(events.GoalEnded("r1", goals(bench)[0].id, "reached"))
-        bench.tell(spec(action="/come"))
+        bench.handle(events.GoalEnded("r1", goals(bench)[0].id, "reached"))
+        bench.handle(spec(action="/come"))
         assert cancels(bench) == 0
         assert bench.report().goal.state == "reached"
 
     def test_a_pending_cancel_is_not_sent_to_a_new_cancel_topic(self):
         bench = Bench().begin()
-        bench.tell(events.LinkDown(URL, "tasks"))
+        bench.handle(events.LinkDown(URL, "tasks"))
         bench.say("a", op="cancel", robot="r1")
-        bench.tell(spec(cancel_topic="/other"))
-        bench.tell(events.LinkUp(URL, "tasks"))
+        bench.handle(spec(cancel_topic="/other"))
+        bench.handle(events.LinkUp(URL, "tasks"))
         assert cancels(bench) == 0
 
 
@@ -343,7 +343,7 @@ class TestMethod:
         bench.take()
         bench.goal()
         (first,) = goals(bench)
-        bench.tell(
+        bench.handle(
             events.GoalEnded("r1", first.id, "failed", "too old", no_actions=True)
         )
         report = bench.report()
@@ -359,7 +359,7 @@ class TestMethod:
         bench.take()
         bench.goal()
         (first,) = goals(bench)
-        bench.tell(
+        bench.handle(
             events.GoalEnded("r1", first.id, "failed", "too old", no_actions=True)
         )
         assert bench.report().goal.why == "too old"
@@ -376,35 +376,37 @@ class TestProgress:
         bench.goal()
         return bench
 
-    def tell(self, bench, **word):
-        bench.tell(events.GoalProgress("r1", goals(bench)[-1].id, **word))
+    def progress(self, bench, **values):
+        bench.handle(events.GoalProgress("r1", goals(bench)[-1].id, **values))
         bench.run(0.2)
         return bench.report().goal
 
     def end(self, bench, *how):
-        bench.tell(events.GoalEnded("r1", goals(bench)[-1].id, *how))
+        bench.handle(events.GoalEnded("r1", goals(bench)[-1].id, *how))
         return bench.report().goal
 
     def test_a_goal_is_reported_as_sent_accepted_under_way_and_reached(self, bench):
         goal = bench.report().goal
         assert (goal.x, goal.y, goal.yaw, goal.by) == (1.0, 2.0, 0.5, "a")
         assert (goal.state, goal.left) == ("sent", None)
-        assert self.tell(bench, active=False).state == "accepted"
-        goal = self.tell(bench, active=True, left=2.5, time=1.0, eta=4.0, recoveries=1)
+        assert self.progress(bench, active=False).state == "accepted"
+        goal = self.progress(
+            bench, active=True, left=2.5, time=1.0, eta=4.0, recoveries=1
+        )
         assert goal.state == "under way"
         assert (goal.left, goal.time, goal.eta, goal.recoveries) == (2.5, 1.0, 4.0, 1)
-        goal = self.tell(bench, active=True)
-        assert goal.left == 2.5, "what a word does not tell was told before"
+        goal = self.progress(bench, active=True)
+        assert goal.left == 2.5, "a report without a value changes none"
         goal = self.end(bench, "reached", "")
         assert (goal.state, goal.why) == ("reached", "")
 
     def test_goal_progress_is_reported_about_ten_times_a_second_at_most(self, bench):
-        self.tell(bench, active=True, left=9.0)
+        self.progress(bench, active=True, left=9.0)
         before = len(bench.of(protocol.RobotReport))
         id = goals(bench)[-1].id
 
         def say():
-            bench.tell(events.GoalProgress("r1", id, active=True, left=bench.now))
+            bench.handle(events.GoalProgress("r1", id, active=True, left=bench.now))
 
         bench.run(1.0, say)
         assert len(bench.of(protocol.RobotReport)) - before <= 11
@@ -413,7 +415,7 @@ class TestProgress:
         goal = self.end(bench, "failed", "no path to the goal")
         assert (goal.state, goal.why) == ("failed", "no path to the goal")
         assert self.end(bench, "reached", "").state == "failed", "it ends once"
-        assert self.tell(bench, active=True).state == "failed"
+        assert self.progress(bench, active=True).state == "failed"
 
     def test_a_failed_goal_without_a_reason_reports_the_missing_reason(self, bench):
         assert self.end(bench, "failed", "").why == "the robot gave no reason"
@@ -421,33 +423,33 @@ class TestProgress:
     def test_a_goal_is_cancelling_until_the_robot_confirms_the_cancel(self, bench):
         bench.say("b", op="cancel", robot="r1")
         assert bench.report().goal.state == "cancelling"
-        goal = self.tell(bench, active=True, left=1.0)
+        goal = self.progress(bench, active=True, left=1.0)
         assert (goal.state, goal.left) == ("cancelling", 1.0)
         assert self.end(bench, "cancelled", "canceled").state == "cancelled"
 
     def test_a_goal_still_active_after_its_cancel_is_cancelled_again(self, bench):
         """They go by different sockets, and what is not there yet is not cancelled."""
-        self.tell(bench, active=False)
+        self.progress(bench, active=False)
         assert cancels(bench) == 0
         bench.say("b", op="cancel", robot="r1")
         assert cancels(bench) == 1
         for _ in range(8):
-            self.tell(bench, active=True)
+            self.progress(bench, active=True)
         assert cancels(bench) == 3, "at once, and then once a second"
         self.end(bench, "cancelled")
-        self.tell(bench, active=True)
+        self.progress(bench, active=True)
         assert cancels(bench) == 3
 
     def test_any_goal_that_is_active_during_a_stop_is_cancelled(self, bench):
         bench.say("b", op="stop", robot="r1")
         before = cancels(bench)
-        bench.tell(events.GoalProgress("r1", "an earlier one", active=True))
+        bench.handle(events.GoalProgress("r1", "an earlier one", active=True))
         assert cancels(bench) == before + 1
 
     def test_an_active_goal_without_a_cancel_topic_is_not_cancelled_during_a_stop(self):
         bench = Bench().begin(spec(cancel_topic=None))
         bench.say("b", op="stop", robot="r1")
-        bench.tell(events.GoalProgress("r1", "g", active=True))
+        bench.handle(events.GoalProgress("r1", "g", active=True))
         assert cancels(bench) == 0
 
     def test_a_goal_reached_before_the_cancel_is_reported_as_reached(self, bench):
@@ -489,37 +491,37 @@ class TestProgress:
 
     def test_a_lost_goal_is_unknown_until_new_progress_arrives(self, bench):
         id = goals(bench)[-1].id
-        bench.tell(events.GoalLost("r1", id, "no link"))
+        bench.handle(events.GoalLost("r1", id, "no link"))
         assert bench.report().goal.state == "unknown"
         assert bench.report().goal.why == "no link"
-        assert self.tell(bench, active=True).state == "under way"
+        assert self.progress(bench, active=True).state == "under way"
         self.end(bench, "reached")
-        bench.tell(events.GoalLost("r1", id, "no link"))
+        bench.handle(events.GoalLost("r1", id, "no link"))
         assert bench.report().goal.state == "reached"
 
     def test_a_cancel_sent_to_a_dead_link_is_sent_again_on_the_next_link(self, bench):
         """The link looked open for some seconds, and so the cancel looked written."""
         id = goals(bench)[-1].id
-        bench.tell(protocol.Disconnect("a"))
+        bench.handle(protocol.Disconnect("a"))
         bench.say("b", op="cancel", robot="r1")
         bench.run(4.0)
         assert cancels(bench) == 1
         bench.break_links()
         bench.done.clear()
-        bench.tell(events.GoalLost("r1", id, "no link"))
+        bench.handle(events.GoalLost("r1", id, "no link"))
         assert bench.report().goal.state == "cancelling"
         bench.done.clear()
         bench.connect_links()
         assert cancels(bench) == 1
         bench.connect_links()
         assert cancels(bench) == 1
-        bench.tell(events.GoalProgress("r1", id, active=True))
+        bench.handle(events.GoalProgress("r1", id, active=True))
         assert cancels(bench) == 2, "it goes on, and so it is told again"
 
     def test_a_lost_goal_that_is_being_cancelled_is_cancelled_again(self, bench):
         """Its socket is lost, and that of the next goals and cancels is not."""
         bench.say("b", op="cancel", robot="r1")
-        bench.tell(events.GoalLost("r1", goals(bench)[-1].id, "given up"))
+        bench.handle(events.GoalLost("r1", goals(bench)[-1].id, "given up"))
         assert cancels(bench) == 2
         assert bench.report().goal.state == "cancelling"
         bench.connect_links()
@@ -548,10 +550,10 @@ class TestProgress:
         bench.take()
         bench.goal()
         assert bench.report().goal.why == "this robot reports no progress"
-        bench.tell(events.LinkDown(URL, "tasks"))
+        bench.handle(events.LinkDown(URL, "tasks"))
         bench.say("a", op="cancel", robot="r1")
         assert bench.report().goal.state == "cancelling"
-        bench.tell(events.LinkUp(URL, "tasks"))
+        bench.handle(events.LinkUp(URL, "tasks"))
         assert bench.report().goal.state == "cancelled"
 
     @pytest.mark.parametrize("late", [False, True])
@@ -581,8 +583,8 @@ class TestProgress:
     def test_a_link_handed_over_to_a_goal_does_not_repeat_a_cancel(self):
         bench = Bench().begin()
         bench.say("a", op="cancel", robot="r1")
-        bench.tell(events.LinkDown(URL, "tasks", spent=True))
-        bench.tell(events.LinkUp(URL, "tasks"))
+        bench.handle(events.LinkDown(URL, "tasks", spent=True))
+        bench.handle(events.LinkUp(URL, "tasks"))
         assert cancels(bench) == 1
 
     def test_events_of_other_goals_and_other_robots_change_nothing(self, bench):
@@ -595,7 +597,7 @@ class TestProgress:
             events.GoalEnded("r9", "x"),
             events.GoalLost("r9", "x", "no"),
         ):
-            bench.tell(word)
+            bench.handle(word)
         assert bench.report() == before
 
 
@@ -622,11 +624,11 @@ class TestInitialPose:
             2.0,
             0.5,
         )
-        bench.tell(events.PoseWritten("r1", 1.0, 2.0, 0.5, "a", done=True))
+        bench.handle(events.PoseWritten("r1", 1.0, 2.0, 0.5, "a", done=True))
         assert bench.of(protocol.SentPose) == [
             protocol.SentPose("r1", 1.0, 2.0, 0.5, "a")
         ]
-        bench.tell(events.PoseWritten("r1", 1.0, 2.0, 0.5, "a", done=False))
+        bench.handle(events.PoseWritten("r1", 1.0, 2.0, 0.5, "a", done=False))
         assert "too slow" in self.why(bench)
 
     @pytest.mark.parametrize(
@@ -665,10 +667,10 @@ class TestInitialPose:
 
     def test_setting_the_pose_is_refused_during_a_stop_and_without_a_link(self, bench):
         bench.take()
-        bench.tell(events.LinkDown(URL, "tasks"))
+        bench.handle(events.LinkDown(URL, "tasks"))
         assert self.locate(bench) == []
         assert "no connection" in self.why(bench)
-        bench.tell(events.LinkUp(URL, "tasks"))
+        bench.handle(events.LinkUp(URL, "tasks"))
         bench.say("a", op="stop", robot="r1")
         assert self.locate(bench) == []
 
@@ -693,13 +695,13 @@ class TestInitialPose:
 
     def test_only_a_program_with_the_lease_sets_the_pose(self, bench):
         received = commands.Locate("r1", 0, 0, bench.tick, 1.0, 2.0, 0.5)
-        bench.tell(protocol.FromProgram(received))
+        bench.handle(protocol.FromProgram(received))
         assert bench.did(actions.SendPose) == []
-        bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
+        bench.handle(protocol.FromProgram(commands.Take("r1"), 1))
         bench.run(0.1)
         epoch = bench.report().epoch
         received = msgspec.structs.replace(received, epoch=epoch, tick=bench.tick)
-        bench.tell(protocol.FromProgram(received))
+        bench.handle(protocol.FromProgram(received))
         assert len(bench.did(actions.SendPose)) == 1
 
     @pytest.mark.parametrize(
@@ -748,7 +750,7 @@ class TestGoalsOnly:
         assert bench.written == bench.dropped == []
 
     def test_a_goals_only_robot_cannot_be_taken_without_its_link(self, bench):
-        bench.tell(events.LinkDown(URL, "tasks"))
+        bench.handle(events.LinkDown(URL, "tasks"))
         assert bench.take() is None
         assert bench.report().link == "down"
 

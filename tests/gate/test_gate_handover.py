@@ -38,7 +38,7 @@ def holder(bench):
 
 def moving(bench, seconds, speed, turn=0.0):
     twist = Twist(speed, 0.0, turn)
-    bench.run(seconds, lambda: bench.tell(events.OdometryReceived(KEY, twist)))
+    bench.run(seconds, lambda: bench.handle(events.OdometryReceived(KEY, twist)))
 
 
 class TestRequest:
@@ -102,12 +102,12 @@ class TestRequest:
         ask(bench)
         match loss:
             case "page":
-                bench.tell(protocol.Disconnect("b"))
+                bench.handle(protocol.Disconnect("b"))
             case "stop":
                 bench.say("a", op="stop", robot="r1")
                 assert bench.refusals("b")[-1].why == "STOP by A"
             case "declared":
-                bench.tell(spec(v_max=0.5))
+                bench.handle(spec(v_max=0.5))
         assert bench.report().asker is None
         bench.run(12.0)
         assert holder(bench) != "b"
@@ -118,7 +118,7 @@ class TestRequest:
         if going == "release":
             bench.say("a", op="release", robot="r1")
         else:
-            bench.tell(protocol.Disconnect("a"))
+            bench.handle(protocol.Disconnect("a"))
         assert bench.report().changing
         bench.run(1.1)
         assert holder(bench) == "b"
@@ -144,7 +144,7 @@ class TestRequest:
         assert "STOP by A is active" in bench.refusals("b")[-1].why
 
     def test_a_requester_without_a_name_is_named_by_its_connection(self, bench):
-        bench.tell(protocol.Connect("c9", "", "operator"))
+        bench.handle(protocol.Connect("c9", "", "operator"))
         ask(bench, "c9")
         ask(bench, "b")
         assert bench.refusals("b")[-1].why == "c9 has already requested control"
@@ -224,7 +224,7 @@ class TestTransfer:
         )
         ask(bench, "c")
         assert "control is being handed over to B" in bench.refusals("c")[-1].why
-        bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
+        bench.handle(protocol.FromProgram(commands.Take("r1"), 1))
         assert bench.of(protocol.TakeReply)[-1].epoch is None
 
     @pytest.mark.parametrize("going", ["release", "lost"])
@@ -236,7 +236,7 @@ class TestTransfer:
         if going == "release":
             bench.say("b", op="release", robot="r1")
         else:
-            bench.tell(protocol.Disconnect("b"))
+            bench.handle(protocol.Disconnect("b"))
         bench.run(2.0)
         assert bench.report().state == "free"
         assert not bench.report().changing
@@ -270,6 +270,6 @@ class TestTransfer:
     def test_the_speed_limit_of_the_new_page_applies_after_a_hand_over(self, bench):
         ask(bench)
         grant(bench)
-        bench.tell(protocol.Speeds("b", 0.2, 0.2))
+        bench.handle(protocol.Speeds("b", 0.2, 0.2))
         bench.run(1.1)
         assert bench.report().v == 0.2

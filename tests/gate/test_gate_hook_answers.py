@@ -176,7 +176,7 @@ def reset(bench):
 def end(bench, hook, why=None, robot="r1", since=-1):
     """Have the newest saying of a hook end, or an earlier one."""
     said = [run for run in bench.did(actions.RunHook) if run.hook == hook]
-    bench.tell(events.HookEnded(robot, hook, said[since].number, why))
+    bench.handle(events.HookEnded(robot, hook, said[since].number, why))
 
 
 class TestReport:
@@ -218,7 +218,7 @@ class TestReport:
     def test_the_report_lists_hooks_without_a_link_until_the_hooks_have_run(
         self, bench
     ):
-        bench.tell(events.LinkDown(URL, "tasks"))
+        bench.handle(events.LinkDown(URL, "tasks"))
         stop(bench)
         why = "not sent yet: no connection"
         assert bench.report().hooks == (
@@ -237,11 +237,11 @@ class TestReport:
         reset(bench)
         why = "not sent yet: no connection"
         assert bench.report().hooks == (f"reset of stop hook /lock: {why}",)
-        bench.tell(events.LinkUp(URL, "tasks"))
+        bench.handle(events.LinkUp(URL, "tasks"))
         end(bench, LOCK, "not sent: no connection")
         words = "reset of stop hook /lock: not sent: no connection"
         assert bench.report().hooks == (words,)
-        bench.tell(events.LinkUp(URL, "tasks"))
+        bench.handle(events.LinkUp(URL, "tasks"))
         end(bench, LOCK)
         assert bench.report().hooks == ()
         assert [run.stopped for run in bench.did(actions.RunHook)][2:] == [False] * 2
@@ -267,9 +267,9 @@ def test_a_failed_hook_runs_again_on_a_new_link_and_is_reported_until_it_succeed
 ):
     stop(bench)
     end(bench, E_STOP, REFUSED)
-    bench.tell(events.LinkDown(URL, "tasks"))
+    bench.handle(events.LinkDown(URL, "tasks"))
     before = len(bench.did(actions.RunHook))
-    bench.tell(events.LinkUp(URL, "tasks"))
+    bench.handle(events.LinkUp(URL, "tasks"))
     hooks = [run.hook for run in bench.did(actions.RunHook)[before:]]
     assert E_STOP in hooks
     assert bench.report().hooks == (f"stop hook /e_stop: {REFUSED}",)
@@ -278,36 +278,36 @@ def test_a_failed_hook_runs_again_on_a_new_link_and_is_reported_until_it_succeed
 
 
 def test_stop_hooks_do_not_run_for_a_stop_that_was_reset_elsewhere(bench):
-    bench.tell(events.LinkDown(URL, "tasks"))
+    bench.handle(events.LinkDown(URL, "tasks"))
     stop(bench)
-    bench.tell(events.LockState(KEY, held=False, why="it has", elsewhere=True))
-    bench.tell(events.StopFileChanged(KEY, None))
+    bench.handle(events.LockState(KEY, held=False, why="it has", elsewhere=True))
+    bench.handle(events.StopFileChanged(KEY, None))
     assert bench.report().hooks == ()
-    bench.tell(events.LinkUp(URL, "tasks"))
+    bench.handle(events.LinkUp(URL, "tasks"))
     assert bench.did(actions.RunHook) == []
 
 
 class TestNewDeclaration:
     def test_a_robot_that_is_declared_again_still_gets_its_hook_reset(self, bench):
         stop(bench)
-        bench.tell(events.LinkDown(URL, "tasks"))
+        bench.handle(events.LinkDown(URL, "tasks"))
         reset(bench)
-        bench.tell(spec(name="Robert", stop_hooks=(LOCK, E_STOP)))
+        bench.handle(spec(name="Robert", stop_hooks=(LOCK, E_STOP)))
         assert len(bench.report().hooks) == 1
-        bench.tell(events.LinkUp(URL, "tasks"))
+        bench.handle(events.LinkUp(URL, "tasks"))
         assert bench.did(actions.RunHook)[-1].stopped is False
 
     def test_a_robot_declared_with_other_hooks_runs_the_new_hooks(self, bench):
         stop(bench)
         end(bench, E_STOP, REFUSED)
-        bench.tell(spec(stop_hooks=(LOCK,)))
+        bench.handle(spec(stop_hooks=(LOCK,)))
         assert bench.report().hooks == ()
         assert bench.did(actions.RunHook)[-1].hook == LOCK
 
 
 def test_a_hook_answer_for_a_removed_robot_sends_no_report(bench):
     stop(bench)
-    bench.tell(protocol.Forget("r1"))
+    bench.handle(protocol.Forget("r1"))
     said = len(bench.of(protocol.RobotReport))
     end(bench, E_STOP, REFUSED)
     assert len(bench.of(protocol.RobotReport)) == said

@@ -91,7 +91,7 @@ def test_idle_robots_add_no_work_to_driving_another_robot(work):
 )
 def test_an_event_of_one_bridge_concerns_no_machine_of_another(work, event):
     bench = fleet()
-    done = work_of(work, lambda: bench.tell(event))
+    done = work_of(work, lambda: bench.handle(event))
     assert done["asked"] <= 1
     assert done["reports"] <= 1
 
@@ -101,11 +101,11 @@ def test_a_page_that_comes_and_goes_concerns_only_the_machine_that_it_has(work):
     bench.take("a")
     done = work_of(work, lambda: bench.join("c"))
     assert (done["asked"], done["reports"]) == (0, 0)
-    done = work_of(work, lambda: bench.tell(protocol.Speeds("c", 0.1, 0.1)))
+    done = work_of(work, lambda: bench.handle(protocol.Speeds("c", 0.1, 0.1)))
     assert (done["asked"], done["reports"]) == (0, 0)
-    done = work_of(work, lambda: bench.tell(protocol.Disconnect("c")))
+    done = work_of(work, lambda: bench.handle(protocol.Disconnect("c")))
     assert (done["asked"], done["reports"]) == (0, 0)
-    done = work_of(work, lambda: bench.tell(protocol.Disconnect("a")))
+    done = work_of(work, lambda: bench.handle(protocol.Disconnect("a")))
     assert (done["asked"], done["reports"]) == (1, 1)
     assert bench.state == "free"
 
@@ -123,7 +123,7 @@ def test_odometry_of_a_stopped_robot_makes_no_report_of_other_stopped_robots(wor
 
     def measure(speed):
         for key in keys:
-            bench.tell(events.OdometryReceived(key, Twist(speed, 0.0, 0.0)))
+            bench.handle(events.OdometryReceived(key, Twist(speed, 0.0, 0.0)))
 
     measure(0.1)
     done = work_of(work, lambda: measure(0.2))
@@ -155,12 +155,12 @@ def test_a_verdict_on_a_stop_is_reported_in_the_step_that_finds_it():
 
 def test_a_stalled_link_among_many_is_closed_after_a_second():
     bench = fleet()
-    bench.tell(events.LinkUp(url(3), "control"))
+    bench.handle(events.LinkUp(url(3), "control"))
     opened = bench.now
     bench.run(0.5)
     assert bench.report("other3").link == "up"
     for _ in range(200):
-        bench.tell(events.PingAnswered(url(4), bench.now))
+        bench.handle(events.PingAnswered(url(4), bench.now))
         bench.run(0.01)
         if bench.report("other3").link == "down":
             break
@@ -171,7 +171,7 @@ def test_a_stalled_link_among_many_is_closed_after_a_second():
 def test_a_link_that_opens_later_is_closed_a_second_after_that():
     bench = Bench().begin(spec(), spec(id="other", bridge_url=url(1)))
     bench.run(10.0)
-    bench.tell(events.LinkUp(url(1), "control"))
+    bench.handle(events.LinkUp(url(1), "control"))
     opened = bench.now
     bench.run(0.99)
     assert bench.report("other").link == "up"
@@ -184,9 +184,9 @@ def test_the_bridge_of_its_goals_concerns_a_machine_until_it_is_dropped():
     bench = Bench().begin(spec(goal_url=url(1)))
     bench.say("a", op="stop", robot="r1")
     assert bench.did(actions.CancelGoals) == []
-    bench.tell(events.LinkUp(url(1), "tasks"))
+    bench.handle(events.LinkUp(url(1), "tasks"))
     assert bench.did(actions.CancelGoals) != []
-    bench.tell(protocol.Forget("r1"))
+    bench.handle(protocol.Forget("r1"))
     bench.run(1.0)
     assert not any(bench.gate._machines._by_url.values())
 

@@ -26,7 +26,7 @@ def lagging(bench, seconds, lag, twist=CREEPING, x=None):
     """Have odometry come at 20 Hz that was said ``lag`` seconds before, or later."""
 
     def each():
-        bench.tell(OdometryReceived(KEY, twist, bench.now - lag))
+        bench.handle(OdometryReceived(KEY, twist, bench.now - lag))
         if x is not None:
             bench.drive(x=x)
 
@@ -56,7 +56,7 @@ class TestDriving:
         at = bench.now
 
         def each():
-            bench.tell(OdometryReceived(KEY, CREEPING, at))
+            bench.handle(OdometryReceived(KEY, CREEPING, at))
             bench.drive(x=1.0)
 
         bench.run(2.0, each)
@@ -73,7 +73,7 @@ class TestStandstill:
     def test_odometry_sent_before_a_stop_does_not_confirm_the_stop(self, bench):
         bench.say("b", op="stop", robot="r1")
         at = bench.now
-        bench.run(1.0, lambda: bench.tell(OdometryReceived(KEY, STANDING, at - 0.01)))
+        bench.run(1.0, lambda: bench.handle(OdometryReceived(KEY, STANDING, at - 0.01)))
         assert bench.report().stop.confirmed is None
         lagging(bench, 0.5, 0.1, STANDING)
         assert bench.report().stop.confirmed is True
@@ -91,7 +91,7 @@ class TestStandstill:
         bench.say("b", op="ask", robot="r1")
         bench.say("a", op="grant", robot="r1")
         at = bench.now
-        bench.run(0.6, lambda: bench.tell(OdometryReceived(KEY, STANDING, at - 0.01)))
+        bench.run(0.6, lambda: bench.handle(OdometryReceived(KEY, STANDING, at - 0.01)))
         assert bench.report().holder is None
         lagging(bench, 0.4, 0.0, STANDING)
         assert bench.report().holder.connection == "b"

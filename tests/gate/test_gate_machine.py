@@ -109,7 +109,7 @@ class Motion(RuleBasedStateMachine):
             return
         assert self._attempts()[-1].twist.is_zero
         seen = events.OdometryReceived(self.bench_key, Twist(speed))
-        self.bench.run(0.6, lambda: self.bench.tell(seen) if self.odometry else None)
+        self.bench.run(0.6, lambda: self.bench.handle(seen) if self.odometry else None)
         self._doubt()
         if speed or not self.odometry:
             assert self.bench.report().holder is None, "nobody has what moves"
@@ -125,7 +125,7 @@ class Motion(RuleBasedStateMachine):
             last = bench.written[-1] if bench.written else None
             moves = last is not None and not (stops and bench.now - last.at > 0.2)
             twist = last.twist if moves else Twist()
-            bench.tell(events.OdometryReceived(self.bench_key, twist))
+            bench.handle(events.OdometryReceived(self.bench_key, twist))
             if not lets_go:
                 self._command(who, 0.0)
 
@@ -259,7 +259,7 @@ class Motion(RuleBasedStateMachine):
         """Its file is found where this gate's own STOP may be."""
         self.others += 1
         self.bench.disk[KEY] = Press(by, f"other-{self.others}")
-        self.bench.tell(events.StopFileChanged(KEY, self.bench.disk[KEY]))
+        self.bench.handle(events.StopFileChanged(KEY, self.bench.disk[KEY]))
         self.stopped = True
         self._doubt()
 
@@ -290,26 +290,26 @@ class Motion(RuleBasedStateMachine):
 
     @rule(who=st.sampled_from(PEOPLE), v=st.sampled_from([0.2, 0.8, 9.0]))
     def speeds_of_page(self, who, v):
-        self.bench.tell(protocol.Speeds(who, v, v))
+        self.bench.handle(protocol.Speeds(who, v, v))
         self.speeds[who] = v
         self.paced = len(self.bench.written)
 
     @rule(who=st.sampled_from(PEOPLE))
     def page_is_reloaded(self, who):
-        self.bench.tell(protocol.Disconnect(who))
+        self.bench.handle(protocol.Disconnect(who))
         self.bench.join(who)
         self.last_seq[who], self.speeds[who] = -1, 9.0
 
     @rule(who=st.sampled_from(PEOPLE), words=st.binary(max_size=30))
     def garbage(self, who, words):
-        self.bench.tell(protocol.FromPage(who, words))
+        self.bench.handle(protocol.FromPage(who, words))
 
     # The program.
 
     @rule()
     def program_takes(self):
         self.request += 1
-        self.bench.tell(protocol.FromProgram(commands.Take("r1"), self.request))
+        self.bench.handle(protocol.FromProgram(commands.Take("r1"), self.request))
 
     @rule(vx=st.sampled_from([0.0, 0.4, 2.0]), old=st.sampled_from([0, 0, 8]))
     def program_twists(self, vx, old):
@@ -319,7 +319,7 @@ class Motion(RuleBasedStateMachine):
         age = bench.gate._ticks.age(tick, bench.now)
         valid = held and age is not None and age <= 0.3
         self.sent.append(Sent(bench.now, PROGRAM, epoch, vx == 0, valid))
-        bench.tell(
+        bench.handle(
             protocol.FromProgram(
                 commands.SetVelocity("r1", epoch, tick, (vx, 0.0, 0.0))
             )
@@ -328,12 +328,12 @@ class Motion(RuleBasedStateMachine):
     @rule(v_max=st.sampled_from([0.4, 1.0]))
     def declared_anew(self, v_max):
         self.v_max = v_max
-        self.bench.tell(self._spec())
+        self.bench.handle(self._spec())
 
     @rule()
     def forgotten_and_declared(self):
-        self.bench.tell(protocol.Forget("r1"))
-        self.bench.tell(self._spec())
+        self.bench.handle(protocol.Forget("r1"))
+        self.bench.handle(self._spec())
 
     # The world.
 
@@ -342,7 +342,7 @@ class Motion(RuleBasedStateMachine):
 
         def fiftieth():
             if sees:
-                self.bench.tell(events.OdometryReceived(self.bench_key, Twist()))
+                self.bench.handle(events.OdometryReceived(self.bench_key, Twist()))
             if each is not None:
                 each()
 

@@ -55,7 +55,7 @@ class TestSpecs:
 
     def test_the_gate_logs_and_ignores_an_invalid_robot_spec(self, caplog):
         bench = Bench()
-        bench.tell(spec(v_max=math.nan))
+        bench.handle(spec(v_max=math.nan))
         assert bench.done == []
         assert "v_max" in caplog.text
 
@@ -65,14 +65,14 @@ class TestDeclaration:
         bench = Bench().begin()
         epoch = bench.drive_off()
         done = len(bench.done)
-        bench.tell(spec())
+        bench.handle(spec())
         assert len(bench.done) == done
         assert bench.report().epoch == epoch
 
     def test_a_changed_declaration_ends_the_lease_and_sets_the_new_limits(self):
         bench = Bench().begin()
         bench.drive_off()
-        bench.tell(spec(v_max=0.5))
+        bench.handle(spec(v_max=0.5))
         assert bench.written[-1].twist == ZERO
         assert bench.report().holder is None
         assert bench.refusals()[-1].why == "the configuration of the robot was changed"
@@ -82,7 +82,7 @@ class TestDeclaration:
     def test_a_robot_declared_with_another_velocity_topic_is_another_machine(self):
         bench = Bench().begin()
         bench.drive_off()
-        bench.tell(spec(twist_topic="/other"))
+        bench.handle(spec(twist_topic="/other"))
         assert bench.written[-1].twist == ZERO
         other = Key(URL, "/other")
         assert bench.did(actions.Lock) == [actions.Lock(KEY), actions.Lock(other)]
@@ -96,7 +96,7 @@ class TestDeclaration:
     def test_a_removed_robot_gets_its_zeros_before_the_machine_is_detached(self):
         bench = Bench().begin()
         bench.drive_off()
-        bench.tell(protocol.Forget("r1"))
+        bench.handle(protocol.Forget("r1"))
         assert bench.of(protocol.RobotGone) == [protocol.RobotGone("r1")]
         bench.say("b", op="take", robot="r1")
         assert "no robot" in bench.refusals("b")[-1].why
@@ -106,7 +106,7 @@ class TestDeclaration:
         bench.run(1.0)
         assert len([w for w in bench.written if w.at >= at]) >= 10
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
-        bench.tell(protocol.Forget("r1"))
+        bench.handle(protocol.Forget("r1"))
         assert not bench.gate.busy
 
     @pytest.mark.parametrize("later", [10.0, None])
@@ -114,7 +114,7 @@ class TestDeclaration:
         bench = Bench().begin()
         bench.drive_off()
         bench.break_links()
-        bench.tell(protocol.Forget("r1"))
+        bench.handle(protocol.Forget("r1"))
         if later is None:  # the file on disk still says so, for the next gate
             bench.run(61.0)
             assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
@@ -131,15 +131,15 @@ class TestDeclaration:
 
     def test_a_removed_robot_that_was_not_driven_is_detached_at_once(self):
         bench = Bench().begin()
-        bench.tell(protocol.Forget("r1"))
+        bench.handle(protocol.Forget("r1"))
         assert bench.did(actions.Detach)
         assert bench.did(actions.Unlock)
 
     def test_a_robot_declared_again_during_its_last_zeros_is_not_detached(self):
         bench = Bench().begin()
         bench.drive_off()
-        bench.tell(protocol.Forget("r1"))
-        bench.tell(spec())
+        bench.handle(protocol.Forget("r1"))
+        bench.handle(spec())
         bench.run(1.0)
         assert bench.did(actions.Detach) == []
         bench.drive_off()
@@ -167,7 +167,7 @@ class TestSharedMachine:
         self, bench
     ):
         bench.drive_off(robot="r1")
-        bench.tell(protocol.Forget("r2"))
+        bench.handle(protocol.Forget("r2"))
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r2")]
         at = bench.now
         assert bench.written[-1].twist == ZERO
@@ -190,21 +190,21 @@ class TestSharedMachine:
     def test_removing_a_robot_with_settings_of_its_own_ends_the_lease(self, more):
         bench = Bench().begin(spec(), spec(id="r2", **more))
         assert bench.take("a", "r1")
-        bench.tell(protocol.Forget("r2"))
+        bench.handle(protocol.Forget("r2"))
         assert bench.report().holder is None
 
     def test_removing_one_of_two_equal_robots_does_not_stop_the_other(self):
         bench = Bench().begin(spec(), spec(id="r2", name="Bob again"))
         bench.drive_off(robot="r1")
-        bench.tell(protocol.Forget("r2"))
+        bench.handle(protocol.Forget("r2"))
         bench.hold(0.1, x=1.0)
         assert bench.written[-1].twist == Twist(1.0)
         assert bench.did(actions.Detach) == [actions.Detach(KEY, "r2")]
 
     def test_removing_both_robots_sends_zeros_before_they_are_detached(self, bench):
         bench.drive_off(robot="r1")
-        bench.tell(protocol.Forget("r2"))
-        bench.tell(protocol.Forget("r1"))
+        bench.handle(protocol.Forget("r2"))
+        bench.handle(protocol.Forget("r1"))
         assert bench.written[-1].twist == ZERO
         bench.run(1.0)
         assert len(bench.did(actions.Detach)) == 2
@@ -230,7 +230,7 @@ class TestTypes:
             "geometry_msgs/Twist for this topic; WebMap uses that type for both"
         ) in caplog.text
         # All else that it says holds for it, then and later.
-        bench.tell(spec(id="r2", name="Al", twist_type=self.STAMPED, v_max=0.2))
+        bench.handle(spec(id="r2", name="Al", twist_type=self.STAMPED, v_max=0.2))
         again = bench.did(actions.Attach)[-1].spec
         assert (again.v_max, again.twist_type_assumed) == (0.2, True)
         bench.say("b", op="stop", robot="r2")
@@ -239,7 +239,7 @@ class TestTypes:
     def test_two_robots_on_one_topic_can_both_change_to_another_type(self):
         bench = Bench().begin(spec(), spec(id="r2"))
         for robot in ("r1", "r2"):
-            bench.tell(spec(id=robot, twist_type=self.STAMPED))
+            bench.handle(spec(id=robot, twist_type=self.STAMPED))
             received = bench.did(actions.Attach)[-1].spec
             assert (received.twist_type, received.twist_type_assumed) == (
                 self.STAMPED,
@@ -249,7 +249,7 @@ class TestTypes:
     def test_confirming_the_assumed_type_does_not_interrupt_driving(self):
         bench = Bench().begin(spec(twist_type_assumed=True))
         bench.drive_off()
-        bench.tell(spec())
+        bench.handle(spec())
         bench.hold(0.1, x=1.0)
         assert bench.written[-1].twist == Twist(1.0)
         assert not bench.did(actions.Attach)[-1].spec.twist_type_assumed
@@ -271,7 +271,7 @@ class TestTypes:
 
     def test_a_robot_can_be_declared_again_with_another_type(self):
         bench = Bench().begin(spec())
-        bench.tell(spec(twist_type=self.STAMPED))
+        bench.handle(spec(twist_type=self.STAMPED))
         assert bench.did(actions.Attach)[-1].spec.twist_type == self.STAMPED
 
 
@@ -287,13 +287,13 @@ class TestSeveralMachines:
     def test_links_to_another_bridge_do_not_affect_driving(self):
         other = "ws://other:9090"
         bench = Bench().begin(spec(), spec(id="r2", bridge_url=other))
-        bench.tell(events.LinkUp(other, "control"))
-        bench.tell(events.LinkUp(other, "tasks"))
+        bench.handle(events.LinkUp(other, "control"))
+        bench.handle(events.LinkUp(other, "tasks"))
         bench.drive_off()
-        bench.tell(events.LinkDown(other, "control"))
+        bench.handle(events.LinkDown(other, "control"))
         assert bench.state == "driving"
         assert bench.report("r2").link == "down"
-        bench.tell(protocol.Speeds("a", 0.5, 0.5))
+        bench.handle(protocol.Speeds("a", 0.5, 0.5))
         assert bench.report("r2").v == 1.0
 
 
@@ -309,7 +309,7 @@ class TestCrash:
         bench = Bench(lock_held=False).begin()
         bench.run(1.0)
         assert bench.written == []
-        bench.tell(events.LockState(KEY, held=True, driven=True))
+        bench.handle(events.LockState(KEY, held=True, driven=True))
         assert bench.written[0].twist == ZERO
 
     def test_a_machine_not_marked_as_driven_gets_no_velocity(self):

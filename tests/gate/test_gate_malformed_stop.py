@@ -111,7 +111,7 @@ def two():
 
 
 def send(bench, data, who="b"):
-    bench.tell(protocol.FromPage(who, data))
+    bench.handle(protocol.FromPage(who, data))
 
 
 NAMES_ONE = [

@@ -188,7 +188,7 @@ def publish(bench, seconds=0.5, twist=THEIRS, key=KEY):
 
     def each():
         if next(turn) % 2:
-            bench.tell(events.EchoReceived(key, twist))
+            bench.handle(events.EchoReceived(key, twist))
 
     bench.run(seconds, each)
 
@@ -209,14 +209,14 @@ class TestReport:
 
         def each():
             bench.drive(x=1.0)
-            bench.tell(events.EchoReceived(KEY, bench.written[-1].twist))
+            bench.handle(events.EchoReceived(KEY, bench.written[-1].twist))
 
         bench.run(1.0, each)
         assert bench.report().other_writer is None
 
         def both():
             each()
-            bench.tell(events.EchoReceived(KEY, THEIRS))
+            bench.handle(events.EchoReceived(KEY, THEIRS))
 
         bench.run(0.5, both)
         report = bench.report()
@@ -228,8 +228,8 @@ class TestReport:
         seen = events.OdometryReceived(KEY, Twist(0.4))
 
         def each():
-            bench.tell(seen)
-            bench.tell(events.EchoReceived(KEY, THEIRS))
+            bench.handle(seen)
+            bench.handle(events.EchoReceived(KEY, THEIRS))
 
         bench.say("a", op="stop", robot="r1")
         bench.run(1.5, each)
@@ -237,11 +237,11 @@ class TestReport:
         assert bench.report().other_writer == SAID
 
     def test_the_report_names_the_nodes_that_the_display_found(self, bench):
-        bench.tell(protocol.WriterNodes("r1", ("/teleop",)))
+        bench.handle(protocol.WriterNodes("r1", ("/teleop",)))
         publish(bench)
         assert bench.report().other_writer == SAID
-        bench.tell(protocol.WriterNodes("r1", ("/teleop",)))
-        bench.tell(protocol.WriterNodes("r9", ("/other",)))
+        bench.handle(protocol.WriterNodes("r1", ("/teleop",)))
+        bench.handle(protocol.WriterNodes("r9", ("/other",)))
         assert bench.report().other_writer == f"{SAID}: /teleop"
 
     def test_changing_foreign_speeds_are_reported_at_most_about_10_times_a_second(
@@ -253,7 +253,7 @@ class TestReport:
 
         def each():
             for _ in range(5):
-                bench.tell(events.EchoReceived(KEY, Twist(0.1 + next(turn) / 1000)))
+                bench.handle(events.EchoReceived(KEY, Twist(0.1 + next(turn) / 1000)))
 
         bench.run(1.0, each)
         assert 5 <= len(bench.of(protocol.RobotReport)) <= 11
@@ -268,7 +268,7 @@ class TestReport:
 
     def test_velocities_of_another_gate_on_this_computer_are_not_reported(self, bench):
         why = "another WebMap on this computer uses this robot"
-        bench.tell(LockState(KEY, held=False, why=why, elsewhere=True))
+        bench.handle(LockState(KEY, held=False, why=why, elsewhere=True))
         publish(bench, 5.0)
         assert bench.report().other_writer is None
 
@@ -281,7 +281,7 @@ class TestReport:
         assert bench.report().goal.state == "sent"
         assert bench.report().other_writer is None
         goal = bench.report().goal
-        bench.tell(events.GoalEnded("r1", goal.id))
+        bench.handle(events.GoalEnded("r1", goal.id))
         publish(bench, EXPECTED_FOR - 0.2)
         assert bench.report().other_writer is None
         publish(bench, 1.0)

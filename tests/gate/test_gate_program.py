@@ -16,14 +16,16 @@ def bench():
 
 
 def take(bench):
-    bench.tell(protocol.FromProgram(commands.Take("r1"), 7))
+    bench.handle(protocol.FromProgram(commands.Take("r1"), 7))
     return bench.of(protocol.TakeReply)[-1]
 
 
 def twist(bench, *velocity, epoch=None, tick=None):
     epoch = bench.report().epoch or 0 if epoch is None else epoch
     tick = bench.tick if tick is None else tick
-    bench.tell(protocol.FromProgram(commands.SetVelocity("r1", epoch, tick, velocity)))
+    bench.handle(
+        protocol.FromProgram(commands.SetVelocity("r1", epoch, tick, velocity))
+    )
 
 
 def test_a_program_takes_control_and_gets_a_reply(bench):
@@ -92,7 +94,7 @@ def test_an_invalid_velocity_of_a_program_is_refused(bench, bad):
 
 def test_velocities_and_goals_of_a_program_without_a_lease_are_not_sent(bench):
     twist(bench, 0.5, 0.0, 0.0)
-    bench.tell(
+    bench.handle(
         protocol.FromProgram(commands.Goal("r1", 0, 0, bench.tick, 1.0, 2.0, 0.0))
     )
     assert bench.written == []
@@ -148,7 +150,7 @@ class TestTakeAnswer:
     def ask(self, bench):
         bench.answering = False
         bench.run(0.4)
-        bench.tell(protocol.FromProgram(commands.Take("r1"), 7))
+        bench.handle(protocol.FromProgram(commands.Take("r1"), 7))
         assert not bench.of(protocol.TakeReply)
 
     def test_the_reply_comes_as_soon_as_the_robot_can_move(self, bench):
@@ -159,7 +161,7 @@ class TestTakeAnswer:
 
     def test_the_reply_comes_after_a_timeout_even_without_odometry(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
-        bench.tell(protocol.FromProgram(commands.Take("r1"), 7))
+        bench.handle(protocol.FromProgram(commands.Take("r1"), 7))
         bench.run(1.4)
         assert not bench.of(protocol.TakeReply)
         bench.run(0.2)
@@ -181,30 +183,30 @@ class TestTakeAnswer:
 def test_a_program_releases_its_lease(bench):
     take(bench)
     twist(bench, 0.5, 0.0, 0.0)
-    bench.tell(protocol.FromProgram(commands.Release("r1")))
+    bench.handle(protocol.FromProgram(commands.Release("r1")))
     assert bench.written[-1].twist == ZERO
     assert bench.report().holder is None
-    bench.tell(protocol.FromProgram(commands.Release("r1")))
-    bench.tell(protocol.FromProgram(commands.Release("r9")))
+    bench.handle(protocol.FromProgram(commands.Release("r1")))
+    bench.handle(protocol.FromProgram(commands.Release("r9")))
 
 
 def test_a_program_with_a_lease_sends_and_cancels_goals(bench):
     epoch = take(bench).epoch
-    bench.tell(
+    bench.handle(
         protocol.FromProgram(commands.Goal("r1", epoch, 0, bench.tick, 1.0, 2.0, 0.5))
     )
     assert bench.of(protocol.SentGoal) == [
         protocol.SentGoal("r1", 1.0, 2.0, 0.5, PROGRAM)
     ]
-    bench.tell(
+    bench.handle(
         protocol.FromProgram(
             commands.Goal("r1", epoch, 0, bench.tick, math.nan, 2.0, 0.5)
         )
     )
     assert len(bench.did(actions.SendGoal)) == 1
-    bench.tell(protocol.FromProgram(commands.Cancel("r1")))
+    bench.handle(protocol.FromProgram(commands.Cancel("r1")))
     assert len(bench.did(actions.CancelGoals)) == 1
-    bench.tell(protocol.FromProgram(commands.Cancel("r9")))
+    bench.handle(protocol.FromProgram(commands.Cancel("r9")))
 
 
 def test_a_zero_velocity_of_a_program_stops_the_robot(bench):
@@ -229,10 +231,10 @@ class TestProgramsOfOtherDisplays:
         return bench
 
     def join(self, bench, who, role="operator"):
-        bench.tell(protocol.Connect(who, f"the program of {who[:3]}", role, True))
+        bench.handle(protocol.Connect(who, f"the program of {who[:3]}", role, True))
 
     def send(self, bench, command, who=ANN, request=0):
-        bench.tell(protocol.FromProgram(command, request, who))
+        bench.handle(protocol.FromProgram(command, request, who))
 
     def take(self, bench, who=ANN, request=7):
         self.send(bench, commands.Take("r1"), who, request)
@@ -277,7 +279,7 @@ class TestProgramsOfOtherDisplays:
     def test_its_loss_stops_the_robot_and_ends_its_control(self, bench):
         epoch = self.take(bench).epoch
         self.twist(bench)
-        bench.tell(protocol.Disconnect(ANN))
+        bench.handle(protocol.Disconnect(ANN))
         assert bench.written[-1].twist == ZERO
         assert bench.report().holder is None
         bench.run(0.01)
@@ -302,9 +304,9 @@ class TestProgramsOfOtherDisplays:
         goal = commands.Goal("r1", epoch, 0, bench.tick, 1.0, 2.0, 0.5)
         self.send(bench, goal)
         assert bench.of(protocol.SentGoal)[-1].by == ANN
-        bench.tell(protocol.Disconnect(BEN))
+        bench.handle(protocol.Disconnect(BEN))
         assert not bench.did(actions.CancelGoals)
-        bench.tell(protocol.Disconnect(ANN))
+        bench.handle(protocol.Disconnect(ANN))
         assert len(bench.did(actions.CancelGoals)) == 1
 
     @pytest.mark.parametrize("other", [PROGRAM, BEN])
@@ -384,7 +386,7 @@ class TestProgramsOfOtherDisplays:
         bench.answering = False
         bench.run(0.4)
         self.send(bench, commands.Take("r1"))
-        bench.tell(protocol.Disconnect(ANN))
+        bench.handle(protocol.Disconnect(ANN))
         bench.answering = True
         bench.run(0.02)
         assert bench.of(protocol.TakeReply)[-1].epoch is None

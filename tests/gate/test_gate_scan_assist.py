@@ -28,7 +28,7 @@ def scan(bench, reach, frame=""):
     step = math.tau / 72
     ranges = [reach] * 72
     sweep = Scan(-math.pi, step, 0.05, 8.0, ranges, bench.now, frame=frame)
-    bench.tell(events.ScanReceived(KEY, "/scan", sweep))
+    bench.handle(events.ScanReceived(KEY, "/scan", sweep))
 
 
 def hold_seeing(bench, reach, seconds, **axes):
@@ -82,7 +82,7 @@ def test_scan_assist_checks_the_ramped_velocity_and_not_the_command():
 
     def each(**axes):
         seen = msgspec.structs.replace(sweep, arrived=bench.now)
-        bench.tell(events.ScanReceived(KEY, "/scan", seen))
+        bench.handle(events.ScanReceived(KEY, "/scan", seen))
         bench.drive(**axes)
 
     bench.take()
@@ -170,7 +170,7 @@ def test_a_scan_with_another_frame_than_configured_stops_the_robot():
 
 def test_a_scan_for_an_unknown_machine_is_ignored(bench):
     key = events.Key("ws://other:9090", "/cmd_vel")
-    bench.tell(
+    bench.handle(
         events.ScanReceived(key, "/scan", Scan(0.0, 0.1, 0.1, 8.0, [], bench.now))
     )
 

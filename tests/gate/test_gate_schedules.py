@@ -29,7 +29,7 @@ def lose(bench, chance):
         case "bridge":
             bench.answering = False
         case "page":
-            bench.tell(protocol.Disconnect(chance.choice(PEOPLE)))
+            bench.handle(protocol.Disconnect(chance.choice(PEOPLE)))
         case "disk":
             bench.full_disk = not bench.full_disk
     bench.run(chance.choice([0.1, 0.4]))
@@ -39,7 +39,7 @@ def mend(bench, chance):
     bench.beating = bench.answering = True
     bench.connect_links()
     for who in PEOPLE:
-        bench.tell(protocol.Disconnect(who))
+        bench.handle(protocol.Disconnect(who))
         bench.join(who)
     bench.run(0.2)
 
@@ -69,7 +69,7 @@ def reset(bench, chance):
 
 def stop_elsewhere(bench, chance):
     bench.disk[KEY] = Press("Ann", f"other-{chance.randrange(1000)}")
-    bench.tell(events.StopFileChanged(KEY, bench.disk[KEY]))
+    bench.handle(events.StopFileChanged(KEY, bench.disk[KEY]))
 
 
 def goal(bench, chance):
@@ -78,22 +78,22 @@ def goal(bench, chance):
 
 def odometry(bench, chance):
     seen = events.OdometryReceived(KEY, Twist(chance.choice([0.0, 0.02, 0.3, 1.0])))
-    bench.run(chance.choice([0.3, 1.2]), lambda: bench.tell(seen))
+    bench.run(chance.choice([0.3, 1.2]), lambda: bench.handle(seen))
 
 
 def echo(bench, chance):
-    bench.tell(events.EchoReceived(KEY, Twist(chance.choice([0.0, 0.5]))))
+    bench.handle(events.EchoReceived(KEY, Twist(chance.choice([0.0, 0.5]))))
 
 
 def speeds(bench, chance):
     v = chance.choice([0.2, 0.8, 9.0])
-    bench.tell(protocol.Speeds(chance.choice(PEOPLE), v, v))
+    bench.handle(protocol.Speeds(chance.choice(PEOPLE), v, v))
 
 
 def program(bench, chance):
-    bench.tell(protocol.FromProgram(commands.Take("r1"), chance.randrange(1000)))
+    bench.handle(protocol.FromProgram(commands.Take("r1"), chance.randrange(1000)))
     epoch = bench.report().epoch or 0
-    bench.tell(
+    bench.handle(
         protocol.FromProgram(
             commands.SetVelocity("r1", epoch, bench.tick, (0.4, 0.0, 0.0))
         )
@@ -102,7 +102,7 @@ def program(bench, chance):
 
 def declare(bench, chance):
     odometry = chance.choice([None, "/odom"])
-    bench.tell(spec(v_max=chance.choice([0.4, 1.0]), odometry_topic=odometry))
+    bench.handle(spec(v_max=chance.choice([0.4, 1.0]), odometry_topic=odometry))
 
 
 def wait(bench, chance):

@@ -45,7 +45,7 @@ def watch_it(bench, seconds, *speeds):
 
     def each():
         now[0] = next(wanted, now[0])
-        bench.tell(events.OdometryReceived(KEY, Twist(now[0])))
+        bench.handle(events.OdometryReceived(KEY, Twist(now[0])))
 
     bench.run(seconds, each)
 
@@ -61,7 +61,7 @@ class TestLatch:
         assert bench.take("a") is None
         bench.run(5.0)
         assert bench.take("b") is None
-        bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
+        bench.handle(protocol.FromProgram(commands.Take("r1"), 1))
         assert bench.of(protocol.TakeReply)[-1].epoch is None
         assert bench.report().latched
 
@@ -71,12 +71,12 @@ class TestLatch:
         at = bench.now
         bench.run(1.0, lambda: bench.drive(x=1.0, epoch=epoch))
         bench.goal(epoch=epoch)
-        bench.tell(
+        bench.handle(
             protocol.FromProgram(
                 commands.SetVelocity("r1", epoch, bench.tick, (1.0, 0, 0))
             )
         )
-        bench.tell(
+        bench.handle(
             protocol.FromProgram(commands.Goal("r1", epoch, 0, bench.tick, 1.0, 0, 0))
         )
         assert bench.moving_since(at) == []
@@ -181,21 +181,21 @@ class TestLatch:
         assert bench.refusals("b") == []
 
     def test_a_program_can_stop_a_robot_and_reset_the_stop(self, bench):
-        bench.tell(protocol.FromProgram(commands.Stop("r1")))
+        bench.handle(protocol.FromProgram(commands.Stop("r1")))
         assert bench.report().stop.by == PROGRAM
-        bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
+        bench.handle(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
         assert not bench.report().latched
-        bench.tell(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
+        bench.handle(protocol.FromProgram(commands.Reset("r1", bench.stop_of())))
         assert bench.refusals(PROGRAM)[-1].what == "reset"
 
     def test_a_stop_stays_active_when_the_robot_is_declared_again(self, bench):
         stop(bench)
-        bench.tell(spec(v_max=0.5))
+        bench.handle(spec(v_max=0.5))
         assert bench.report().latched
-        bench.tell(protocol.Forget("r1"))
+        bench.handle(protocol.Forget("r1"))
         bench.run(1.0)
         assert bench.did(actions.Detach)
-        bench.tell(spec())
+        bench.handle(spec())
         assert bench.report().latched
         assert bench.take() is None
         reset(bench)
@@ -206,7 +206,7 @@ class TestLatch:
         stop(bench)
         bench.run(0.6)
         assert bench.did(actions.Watch)[-1].on
-        bench.tell(protocol.Forget("r1"))
+        bench.handle(protocol.Forget("r1"))
         kept = (actions.Watch, actions.Detach)
         last = [a for a in bench.done if isinstance(a, kept)][-2:]
         assert last == [actions.Watch(KEY, False), actions.Detach(KEY, "r1")]
@@ -216,7 +216,7 @@ class TestLatch:
         stop(bench)
         watch_it(bench, 0.5, 0.0)
         assert bench.report().stop.confirmed
-        bench.tell(events.LockState(KEY, held=False, why="another has it"))
+        bench.handle(events.LockState(KEY, held=False, why="another has it"))
         assert bench.report().stop.confirmed
 
     def test_two_robots_on_one_machine_share_a_stop(self):
@@ -231,7 +231,7 @@ class TestLatch:
         assert bench.report().latched
         assert bench.report().stop.why == "no odometry"
         assert bench.take() is None
-        bench.tell(events.LinkDown(URL, "tasks"))
+        bench.handle(events.LinkDown(URL, "tasks"))
         stop(bench)
         bench.run(0.2)
         assert bench.report().stop.why == f"no connection to {URL}"
@@ -251,7 +251,7 @@ class TestChangedKey:
         return bench
 
     def test_a_stopped_robot_that_gets_a_velocity_topic_stays_stopped(self, bench):
-        bench.tell(spec())
+        bench.handle(spec())
         assert bench.written[-1].twist == ZERO
         assert bench.stops == {self.GOALS: "B", KEY: "B"}
         assert bench.report().latched
@@ -268,7 +268,7 @@ class TestChangedKey:
         bench = Bench().begin()
         bench.drive_off()
         stop(bench)
-        bench.tell(self.ONLY_GOALS)
+        bench.handle(self.ONLY_GOALS)
         bench.run(1.0)
         assert bench.report().latched
         assert bench.take() is None
@@ -280,40 +280,40 @@ class TestChangedKey:
         bench = Bench().begin()
         bench.drive_off()
         stop(bench)
-        bench.tell(self.ONLY_GOALS)
+        bench.handle(self.ONLY_GOALS)
         reset(bench)
         assert bench.stops == {}
 
     def test_a_reset_ends_the_stop_under_every_earlier_key_of_the_robot(self, bench):
-        bench.tell(spec())
-        bench.tell(spec(twist_topic="/other"))
+        bench.handle(spec())
+        bench.handle(spec(twist_topic="/other"))
         bench.run(1.0)
         reset(bench)
         assert bench.stops == {}
-        bench.tell(self.ONLY_GOALS)
+        bench.handle(self.ONLY_GOALS)
         assert bench.take()
 
     def test_a_reset_does_not_end_the_stop_of_another_robot_with_the_old_key(self):
         bench = Bench().begin(self.ONLY_GOALS, spec(id="r2", twist_topic=None))
         stop(bench)
-        bench.tell(spec())
+        bench.handle(spec())
         reset(bench)
         assert not bench.report("r1").latched
         assert bench.report("r2").latched
         assert bench.stops == {self.GOALS: "B"}
 
     def test_a_stop_that_was_reset_under_the_old_key_is_not_reset_again(self, bench):
-        bench.tell(spec())
-        bench.tell(spec(id="r2", twist_topic=None))
+        bench.handle(spec())
+        bench.handle(spec(id="r2", twist_topic=None))
         reset(bench, robot="r2")
-        bench.tell(protocol.Forget("r2"))
+        bench.handle(protocol.Forget("r2"))
         kept = len(bench.did(actions.SaveStop))
         reset(bench)
         assert len(bench.did(actions.SaveStop)) == kept + 1
 
     def test_a_robot_that_was_not_stopped_is_not_stopped_under_its_new_key(self):
         bench = Bench().begin(self.ONLY_GOALS)
-        bench.tell(spec())
+        bench.handle(spec())
         assert not bench.report().latched
         assert bench.take()
 
@@ -374,10 +374,10 @@ class TestDisk:
     def test_the_stop_of_a_removed_robot_is_still_saved(self):
         bench = Bench(slow_disk=True).begin()
         stop(bench)
-        bench.tell(protocol.Forget("r1"))
+        bench.handle(protocol.Forget("r1"))
         bench.run(1.0)
         bench.keep(bench.did(actions.SaveStop)[-1])
-        bench.tell(spec())
+        bench.handle(spec())
         assert bench.report().latched
 
     def test_a_full_disk_is_reported_and_the_stop_stays_active(self):
@@ -415,9 +415,9 @@ class TestDisk:
         bench = Bench(disk={KEY: Press("B", "b1")}, lock_held=False).begin()
         bench.run(1.0)
         assert bench.written == []
-        bench.tell(events.LockState(KEY, held=True, latched=Press("B", "b1")))
+        bench.handle(events.LockState(KEY, held=True, latched=Press("B", "b1")))
         assert bench.written[0].twist == ZERO
-        bench.tell(events.LockState(KEY, held=True, latched=Press("Z", "z1")))
+        bench.handle(events.LockState(KEY, held=True, latched=Press("Z", "z1")))
         assert bench.report().stop.by == "Z", "another gate was told it meanwhile"
 
 
@@ -494,15 +494,19 @@ class TestConfirmation:
 
     def test_a_stop_of_a_turning_robot_is_not_confirmed(self, seen):
         stop(seen)
-        seen.run(1.0, lambda: seen.tell(events.OdometryReceived(KEY, Twist(0, 0, 0.1))))
+        seen.run(
+            1.0, lambda: seen.handle(events.OdometryReceived(KEY, Twist(0, 0, 0.1)))
+        )
         assert seen.report().stop.confirmed is None
-        seen.run(1.1, lambda: seen.tell(events.OdometryReceived(KEY, Twist(0, 0, 0.1))))
+        seen.run(
+            1.1, lambda: seen.handle(events.OdometryReceived(KEY, Twist(0, 0, 0.1)))
+        )
         assert seen.report().stop.why == "still turning at 0.10 rad/s"
 
     def test_odometry_with_long_gaps_does_not_confirm_a_stop(self, seen):
         stop(seen)
         for _ in range(3):
-            seen.tell(events.OdometryReceived(KEY, ZERO))
+            seen.handle(events.OdometryReceived(KEY, ZERO))
             seen.run(0.6)
         assert seen.report().stop.confirmed is None
 
@@ -517,7 +521,7 @@ class TestConfirmation:
     def test_missing_or_empty_odometry_does_not_confirm_a_stop(self, seen, received):
         stop(seen)
         for twist in received:
-            seen.tell(events.OdometryReceived(KEY, twist))
+            seen.handle(events.OdometryReceived(KEY, twist))
         seen.run(2.2)
         assert verdict(seen) == ("B", False, "no odometry")
 
@@ -608,7 +612,7 @@ class TestHooks:
         bench = Bench().begin(spec(stop_hooks=self.HOOKS, goal_url=other))
         stop(bench)
         assert len(self.said(bench)) == 2
-        bench.tell(events.LinkUp(other, "tasks"))
+        bench.handle(events.LinkUp(other, "tasks"))
         assert len(self.said(bench)) == 2
 
     @pytest.mark.parametrize(
@@ -680,7 +684,7 @@ class TestResetOfAStop:
         stop(bench)
         seen = bench.stop_of()
         bench.disk[KEY] = Press("Ann", "a1")
-        bench.tell(events.StopFileChanged(KEY, Press("Ann", "a1")))
+        bench.handle(events.StopFileChanged(KEY, Press("Ann", "a1")))
         assert bench.report().stop.by == "Ann"
         bench.say("b", op="reset", robot="r1", stop=seen)
         assert bench.report().latched
@@ -693,14 +697,14 @@ class TestResetOfAStop:
         bench.disk[KEY] = Press("Ann", "a1")
         reset(bench)
         assert bench.stops == {KEY: "Ann"}, "its file is not taken away"
-        bench.tell(events.StopFileChanged(KEY, Press("Ann", "a1")))
+        bench.handle(events.StopFileChanged(KEY, Press("Ann", "a1")))
         assert bench.report().latched
 
     def test_a_reset_by_a_program_does_not_end_a_newer_stop(self, bench):
-        bench.tell(protocol.FromProgram(commands.Stop("r1")))
+        bench.handle(protocol.FromProgram(commands.Stop("r1")))
         seen = bench.stop_of()
         stop(bench)
-        bench.tell(protocol.FromProgram(commands.Reset("r1", seen)))
+        bench.handle(protocol.FromProgram(commands.Reset("r1", seen)))
         assert bench.report().latched
         assert "B pressed STOP" in bench.refusals(PROGRAM)[-1].why
 
@@ -717,7 +721,7 @@ class TestResetOfAStop:
         stop(bench)
         for stated in ({}, {"stop": ""}, {"stop": 7}, {"stop": "x" * 65}):
             command = {"op": "reset", "robot": "r1", **stated}
-            bench.tell(protocol.FromPage("b", json.dumps(command).encode()))
+            bench.handle(protocol.FromPage("b", json.dumps(command).encode()))
             bench.run(1.1)
         assert len(bench.refusals("b")) == 4
         assert bench.report().latched
@@ -726,7 +730,7 @@ class TestResetOfAStop:
         bench = Bench(slow_disk=True).begin()
         stop(bench)
         stop(bench, "a")
-        bench.tell(events.StopFileChanged(KEY, bench.did(actions.SaveStop)[0].press))
+        bench.handle(events.StopFileChanged(KEY, bench.did(actions.SaveStop)[0].press))
         assert len(bench.did(actions.SaveStop)) == 1
         bench.keep(bench.did(actions.SaveStop)[0])
         bench.keep(bench.did(actions.SaveStop)[1])
@@ -734,7 +738,7 @@ class TestResetOfAStop:
 
     def test_a_reset_after_a_topic_change_does_not_end_a_newer_stop_all(self, bench):
         stop(bench)
-        bench.tell(spec(twist_topic="/other/cmd_vel"))
+        bench.handle(spec(twist_topic="/other/cmd_vel"))
         seen = bench.stop_of()
         stop(bench, "a", "*")
         bench.say("b", op="reset", robot="r1", stop=seen)
@@ -747,7 +751,7 @@ class TestResetOfAStop:
         self, bench
     ):
         stop(bench)
-        bench.tell(spec(twist_topic="/other/cmd_vel"))
+        bench.handle(spec(twist_topic="/other/cmd_vel"))
         bench.run(1.0)
         bench.disk[KEY] = Press("Ann", "a1")
         reset(bench)

@@ -33,7 +33,7 @@ class Machine:
                 self.said += 1
                 between = self.coarse and self.said % self.coarse == 0
                 speed = 0.0 if between else self.speed
-                self.bench.tell(events.OdometryReceived(KEY, Twist(speed)))
+                self.bench.handle(events.OdometryReceived(KEY, Twist(speed)))
             if x is not None:
                 self.bench.drive(who, x=x)
 
@@ -143,9 +143,9 @@ class TestRunning:
         base.run(0.1)
         assert state(bench) == "waiting"
         for write in bench.written:
-            bench.tell(events.EchoReceived(KEY, write.twist))
+            bench.handle(events.EchoReceived(KEY, write.twist))
         assert state(bench) == "waiting", "those are ours"
-        bench.tell(events.EchoReceived(KEY, foreign))
+        bench.handle(events.EchoReceived(KEY, foreign))
         assert "another program sent commands" in bench.report().test.text
         assert state(bench) == "failed"
         assert bench.written[-1].twist == ZERO
@@ -155,7 +155,7 @@ class TestRunning:
         self, bench, base
     ):
         begin(bench)
-        bench.tell(events.EchoReceived(KEY, ZERO))
+        bench.handle(events.EchoReceived(KEY, ZERO))
         assert state(bench) == "creeping"
 
     def test_a_base_with_a_long_command_timeout_keeps_the_low_speed_limit(self, bench):
@@ -176,10 +176,10 @@ class TestRunning:
         assert bench.report().stop_source is None
 
     def test_a_stop_test_cancels_goals_when_it_begins(self, bench, base):
-        bench.tell(protocol.Forget("r1"))
+        bench.handle(protocol.Forget("r1"))
         begin(bench)
         assert bench.did(actions.CancelGoals) == []
-        bench.tell(spec(odometry_topic="/odom", stops_within=None))
+        bench.handle(spec(odometry_topic="/odom", stops_within=None))
         bench.take("a")
         base.run(0.4)
         begin(bench)
@@ -206,7 +206,7 @@ class TestRunning:
     def test_odometry_without_a_velocity_does_not_end_the_stop_test(self, bench, base):
         begin(bench)
         base.run(0.2)
-        bench.tell(events.OdometryReceived(KEY, None))
+        bench.handle(events.OdometryReceived(KEY, None))
         assert state(bench) == "waiting"
 
 
@@ -249,7 +249,7 @@ class TestAbort:
             case "release":
                 bench.say("a", op="release", robot="r1")
             case "page":
-                bench.tell(protocol.Disconnect("a"))
+                bench.handle(protocol.Disconnect("a"))
             case "blind":
                 base.speaks = False
                 base.run(1.2)
@@ -274,8 +274,8 @@ class TestAbort:
         begin(bench)
         base.run(0.05)
         bench.now += 0.25
-        bench.tell(protocol.Heartbeat())
-        bench.tell(events.PingAnswered(KEY.url, bench.now))
+        bench.handle(protocol.Heartbeat())
+        bench.handle(events.PingAnswered(KEY.url, bench.now))
         bench.drive(x=0.0)
         assert bench.report().test.text == "the page stopped sending commands"
         assert bench.written[-1].twist == ZERO
@@ -318,7 +318,7 @@ class TestRefused:
     def test_a_stop_test_is_refused_while_the_robot_is_already_moving(
         self, bench, motion
     ):
-        bench.tell(events.OdometryReceived(KEY, motion))
+        bench.handle(events.OdometryReceived(KEY, motion))
         assert self.why(bench) == "the robot is already moving"
 
     def test_a_stop_test_is_refused_without_odometry(self):
@@ -349,9 +349,9 @@ class TestSavedResult:
         assert report.v <= 0.3
 
     def test_a_stop_test_result_for_a_removed_machine_is_ignored(self, bench):
-        bench.tell(protocol.Forget("r1"))
+        bench.handle(protocol.Forget("r1"))
         bench.run(1.0)
-        bench.tell(events.StopTestSaved(KEY, StopRecord(0.2, "2026-11-20")))
+        bench.handle(events.StopTestSaved(KEY, StopRecord(0.2, "2026-11-20")))
 
     def test_a_stated_command_timeout_is_reported_as_stated(self):
         bench = Bench().begin(spec(stops_within=0.25))
@@ -362,5 +362,5 @@ class TestSavedResult:
     def test_the_worse_command_timeout_of_two_robots_on_one_machine_applies(self):
         bench = Bench().begin(spec(stops_within=0.25), spec(id="r2", stops_within=0.4))
         assert bench.report().stop_time == 0.4
-        bench.tell(spec(id="r2", stops_within=None))
+        bench.handle(spec(id="r2", stops_within=None))
         assert bench.report().stop_time is None

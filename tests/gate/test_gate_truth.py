@@ -23,7 +23,7 @@ class TestAlarm:
 
     def run(self, bench, seconds, speed, x=None, turn=0.0):
         def each():
-            bench.tell(events.OdometryReceived(KEY, Twist(speed, 0.0, turn)))
+            bench.handle(events.OdometryReceived(KEY, Twist(speed, 0.0, turn)))
             if x is not None:
                 bench.drive(x=x)
 

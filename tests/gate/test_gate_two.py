@@ -28,7 +28,7 @@ def onlooker():
     """One that does not."""
     bench = Bench().begin()
     why = "another WebMap on this computer uses this robot"
-    bench.tell(LockState(KEY, held=False, why=why, elsewhere=True))
+    bench.handle(LockState(KEY, held=False, why=why, elsewhere=True))
     return bench
 
 
@@ -36,7 +36,7 @@ class TestOwner:
     def test_the_owner_enforces_a_stop_of_the_other_gate(self, owner):
         owner.drive_off()
         at = owner.now
-        owner.tell(StopFileChanged(KEY, ANN))
+        owner.handle(StopFileChanged(KEY, ANN))
         assert owner.written[-1].twist == ZERO
         assert (owner.state, owner.report().holder) == ("stopped", None)
         assert owner.report().stop.by == "Ann"
@@ -47,25 +47,25 @@ class TestOwner:
     def test_the_owner_cancels_goals_and_runs_hooks_for_a_stop_of_the_other_gate(self):
         hook = {"topic": "/lock", "type": "std_msgs/Bool"}
         bench = Bench().begin(spec(stop_hooks=(hook,)))
-        bench.tell(StopFileChanged(KEY, ANN))
+        bench.handle(StopFileChanged(KEY, ANN))
         assert bench.did(actions.CancelGoals)
         assert [hook.stopped for hook in bench.did(actions.RunHook)] == [True]
 
     def test_the_owner_stops_a_robot_without_a_velocity_topic(self):
         bench = Bench().begin(spec(twist_topic=None, cancel_topic=None))
-        bench.tell(StopFileChanged(Key(URL, "goal /goal"), ANN))
+        bench.handle(StopFileChanged(Key(URL, "goal /goal"), ANN))
         assert bench.state == "stopped"
 
     def test_the_owner_ignores_the_file_change_of_its_own_stop(self, owner):
         owner.say("a", op="stop", robot="r1")
         before = len(owner.done)
-        owner.tell(StopFileChanged(KEY, owner.disk[KEY]))
+        owner.handle(StopFileChanged(KEY, owner.disk[KEY]))
         assert owner.done[before:] == []
 
     def test_the_owner_keeps_a_stop_whose_file_is_gone(self, owner):
         owner.say("a", op="stop", robot="r1")
         owner.disk.clear()
-        owner.tell(StopFileChanged(KEY, None))
+        owner.handle(StopFileChanged(KEY, None))
         assert owner.stops == {KEY: "A"}
         assert owner.state == "stopped"
 
@@ -73,14 +73,14 @@ class TestOwner:
         owner.say("a", op="stop", robot="r1")
         owner.slow_disk = True
         owner.say("a", op="reset", robot="r1")
-        owner.tell(
+        owner.handle(
             StopFileChanged(KEY, owner.disk[KEY])
         )  # looked at before it was taken away
         owner.run(0.1)
         assert not owner.report().latched
 
     def test_the_owner_ignores_the_stop_file_of_an_unknown_machine(self, owner):
-        owner.tell(StopFileChanged(Key(URL, "/gone"), ANN))
+        owner.handle(StopFileChanged(Key(URL, "/gone"), ANN))
         assert owner.state == "free"
 
 
@@ -101,7 +101,7 @@ class TestSecondGate:
         onlooker.say("a", op="stop", robot="r1")
         onlooker.run(1.0)
         onlooker.disk.clear()
-        onlooker.tell(StopFileChanged(KEY, None))
+        onlooker.handle(StopFileChanged(KEY, None))
         at = onlooker.now
         onlooker.run(1.0)
         assert onlooker.since(at) == []
@@ -109,7 +109,7 @@ class TestSecondGate:
         assert not onlooker.report().latched
 
     def test_the_other_gate_sends_nothing_for_a_stop_of_the_owner(self, onlooker):
-        onlooker.tell(StopFileChanged(KEY, ANN))
+        onlooker.handle(StopFileChanged(KEY, ANN))
         onlooker.run(0.2)
         assert onlooker.written == []
 
@@ -117,7 +117,7 @@ class TestSecondGate:
         onlooker.say("a", op="stop", robot="r1")
         onlooker.run(1.0)
         onlooker.disk[KEY] = ANN
-        onlooker.tell(StopFileChanged(KEY, ANN))
+        onlooker.handle(StopFileChanged(KEY, ANN))
         assert onlooker.report().stop.by == "Ann"
         assert onlooker.stop_of() == ANN.id
 
@@ -126,13 +126,13 @@ class TestSecondGate:
     ):
         onlooker.slow_disk = True
         onlooker.say("a", op="stop", robot="r1")
-        onlooker.tell(StopFileChanged(KEY, None))
+        onlooker.handle(StopFileChanged(KEY, None))
         onlooker.keep(onlooker.did(actions.SaveStop)[-1])
         assert onlooker.report().latched
 
     def test_the_other_gate_keeps_its_stop_when_it_gets_the_lock(self, onlooker):
         onlooker.say("a", op="stop", robot="r1")
-        onlooker.tell(LockState(KEY, held=True, latched=onlooker.disk[KEY]))
+        onlooker.handle(LockState(KEY, held=True, latched=onlooker.disk[KEY]))
         assert onlooker.state == "stopped"
         onlooker.say("a", op="reset", robot="r1")
         onlooker.run(1.0)

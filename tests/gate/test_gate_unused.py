@@ -95,6 +95,6 @@ def test_an_operator_who_requests_control_gets_an_unused_lease(bench):
 
 def test_the_lease_of_a_program_does_not_expire():
     bench = Bench().begin()
-    bench.tell(protocol.FromProgram(commands.Take("r1"), 1))
+    bench.handle(protocol.FromProgram(commands.Take("r1"), 1))
     bench.run(2 * UNUSED)
     assert held(bench)

@@ -68,7 +68,7 @@ def filled(bench, text):
 
 def say(bench, text):
     data = text if isinstance(text, bytes) else text.encode(errors="surrogatepass")
-    bench.tell(protocol.FromPage("a", data))
+    bench.handle(protocol.FromPage("a", data))
 
 
 def good(bench, op="drive"):

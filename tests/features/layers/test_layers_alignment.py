@@ -4,7 +4,7 @@ import math
 
 import pytest
 from module_fakes import Link, pose, to_root
-from test_layers_frames import tell, transform
+from test_layers_frames import send_transforms, transform
 from test_layers_grid import CORNERS, grid
 
 from webmap import Robot
@@ -152,7 +152,7 @@ def test_a_costmap_in_the_odometry_frame_is_aligned_with_its_robot(map, link, bo
     bob.set_alignment(10.0, 0.0, 90.0)
     (layer,) = (m.layer for m in map.modules if hasattr(m, "layer"))
     link.say("/bob/costmap", {**grid(CORNERS, 1.0), "header": header(frame="odom")})
-    tell(link, transform("map", "odom", 3.0, 0.0, 0.0))
+    send_transforms(link, transform("map", "odom", 3.0, 0.0, 0.0))
     assert to_root(layer.svg).apply(1.0, 0.0) == pytest.approx((10.0, 4.0))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from module_fakes import dots, pose, to_root
 from test_layers_cloud import cloud
-from test_layers_frames import tell
+from test_layers_frames import send_transforms
 from test_layers_poses import sonar
 
 from webmap.base.geometry import Affine
@@ -123,7 +123,9 @@ def test_a_scan_of_another_clock_moves_with_the_robot_and_is_a_problem(
     link, scanner, robot
 ):
     robot.set_tf(link, quiet=True)
-    tell(link, transform("base_link", "laser", 0.0, 0.0, 0.0, 0), static=True)
+    send_transforms(
+        link, transform("base_link", "laser", 0.0, 0.0, 0.0, 0), static=True
+    )
     odometry(link, 100.0)
     odometry(link, 100.1)
     link.say("/scan", scan(WALL, 163.0))
@@ -188,11 +190,13 @@ def test_a_scan_is_corrected_for_the_rotation_during_its_sweep(link, scanner):
 @pytest.mark.parametrize("named", ["map", "nowhere"])
 def test_static_frames_place_a_sensor_on_a_turning_robot(link, scanner, robot, named):
     robot.set_tf(link, map_frame=named, quiet=True)
-    tell(link, transform("base_link", "laser", 0.5, 0.0, math.pi / 2, 0), static=True)
+    send_transforms(
+        link, transform("base_link", "laser", 0.5, 0.0, math.pi / 2, 0), static=True
+    )
     for step in range(3):
         yaw = step / 10
-        tell(link, transform("map", "odom", 0, 0, 0, 100 + yaw))
-        tell(link, transform("odom", "base_link", *AT, yaw, 100 + yaw))
+        send_transforms(link, transform("map", "odom", 0, 0, 0, 100 + yaw))
+        send_transforms(link, transform("odom", "base_link", *AT, yaw, 100 + yaw))
         odometry(link, 100 + yaw)
     link.say("/scan", scan([(2.0, 0.0)], 100.15))
     for seconds in (100.3, 101.0):
@@ -205,10 +209,12 @@ def test_static_frames_place_a_sensor_on_a_turning_robot(link, scanner, robot, n
 def test_a_scan_of_an_upside_down_sensor_is_mirrored(link, scanner, robot):
     robot.set_tf(link)
     over = transform("base_link", "laser", 0.2, 0.0, 0.0, 0, roll=math.pi)
-    tell(link, over, static=True)
+    send_transforms(link, over, static=True)
     for seconds in (100.0, 100.1):
-        tell(link, transform("map", "odom", 0, 0, 0, seconds))
-        tell(link, transform("odom", "base_link", *AT, seconds - 100, seconds))
+        send_transforms(link, transform("map", "odom", 0, 0, 0, seconds))
+        send_transforms(
+            link, transform("odom", "base_link", *AT, seconds - 100, seconds)
+        )
         odometry(link, seconds)
     link.say("/scan", scan([(2.0, 0.5), (1.0, -1.0)], 100.1))
     wanted = seen_from(0.1, (0.2, 0.0), points=[(2.0, -0.5), (1.0, 1.0)])
@@ -220,7 +226,9 @@ def test_a_configured_sensor_position_overrides_the_frames_for_a_scan(link, robo
     robot.set_odometry_topic(link, "/odom", 0, type="geometry_msgs/PoseStamped")
     robot.set_tf(link)
     scanner = robot.add_module("LaserScanner", link, "/scan", 0.3, 0.0, 180.0)
-    tell(link, transform("base_link", "laser", 9.0, 9.0, 1.0, 0), static=True)
+    send_transforms(
+        link, transform("base_link", "laser", 9.0, 9.0, 1.0, 0), static=True
+    )
     for seconds in (100.0, 100.1):
         odometry(link, seconds, "map")
     link.say("/scan", scan([(1.0, 0.0)], 100.05))

@@ -10,7 +10,7 @@ import types
 import numpy as np
 import pytest
 from module_fakes import pose, to_root, typed
-from test_layers_frames import tell
+from test_layers_frames import send_transforms
 from tilted_frames import frame
 
 import webmap
@@ -151,8 +151,8 @@ def test_a_refused_message_does_not_move_the_last_drawing(map, robot, link):
     on_robot = robot.add_module("OwnFlat", link, "/flat")
     for topic, sensor in (("/zones", "odom"), ("/flat", "base_link")):
         link.say(topic, {"header": header(sensor, 2.0), "x": 1.0})
-    tell(link, frame("map", "odom", (0.0, 0.0, 0.0), seconds=2.0))
-    tell(link, frame("map", "far", (50.0, 0.0, 0.0), seconds=2.0))
+    send_transforms(link, frame("map", "odom", (0.0, 0.0, 0.0), seconds=2.0))
+    send_transforms(link, frame("map", "far", (50.0, 0.0, 0.0), seconds=2.0))
     link.say("/zones", {"header": header("odom", 2.0), "x": 1.0})
     before = [to_root(each.svg).apply(0, 0) for each in (on_map, on_robot)]
     link.say("/zones", {"header": header("far", 2.0), "x": math.nan})

@@ -4,7 +4,7 @@ import math
 
 import pytest
 from module_fakes import header, pose, to_root
-from test_layers_frames import tell, transform
+from test_layers_frames import send_transforms, transform
 
 from webmap.base.errors import ConfigError
 
@@ -106,7 +106,7 @@ def test_the_first_fix_waits_until_frames_place_the_robot_on_the_map(
     module = in_odometry(quiet=quiet)
     link.say("/fix", fix(50.0, 14.0))
     assert module.position is None
-    tell(link, transform("map", "odom", 30, 20, 0))
+    send_transforms(link, transform("map", "odom", 30, 20, 0))
     link.say("/odom", {"header": header("odom"), "pose": pose(2, 0)})
     link.say("/fix", fix(50.001, 14.0))
     assert at(module) == pytest.approx((32, 20))
@@ -122,7 +122,7 @@ def test_a_fix_is_placed_by_odometry_until_the_robot_has_a_map_frame(
     assert at(module) == pytest.approx((1, 0))
     link.say("/fix", fix(50.001, 14.0))
     assert at(module) == pytest.approx((1, 111.229), abs=0.01)
-    tell(link, transform("map", "odom", 30, 20, 0))
+    send_transforms(link, transform("map", "odom", 30, 20, 0))
     link.say("/odom", {"header": header("odom"), "pose": pose(2, 0)})
     link.say("/fix", fix(50.002, 14.0))
     assert at(module) == pytest.approx((32, 20))

@@ -22,7 +22,7 @@ def transform(parent, child, x, y, yaw, secs=3) -> dict:
     }
 
 
-def tell(link, *transforms, static=False) -> None:
+def send_transforms(link, *transforms, static=False) -> None:
     topic = "/tf_static" if static else "/tf"
     link.say(topic, {"transforms": list(transforms)})
 
@@ -50,7 +50,7 @@ def odometry(link, x, y, yaw):
 
 def test_a_path_in_the_odometry_frame_is_placed_by_that_frame(link, robot):
     module = robot.add_module("Path", link, "/plan")
-    tell(link, transform("map", "odom", *ODOM))
+    send_transforms(link, transform("map", "odom", *ODOM))
     message = path([(1.0, 2.0), (3.0, 4.0)])
     message["header"] = header("odom")
     link.say("/plan", message)
@@ -64,8 +64,8 @@ def test_a_path_in_the_odometry_frame_is_placed_by_that_frame(link, robot):
 
 def test_a_frame_is_looked_up_at_the_stamp_of_the_message(link, robot):
     module = robot.add_module("Path", link, "/plan")
-    tell(link, transform("map", "odom", 1, 0, 0, secs=3))
-    tell(link, transform("map", "odom", 2, 0, 0, secs=4))
+    send_transforms(link, transform("map", "odom", 1, 0, 0, secs=3))
+    send_transforms(link, transform("map", "odom", 2, 0, 0, secs=4))
     message = path([(0.0, 0.0), (0.0, 4.0)])
     message["header"] = header("odom")
     link.say("/plan", message)
@@ -75,7 +75,7 @@ def test_a_frame_is_looked_up_at_the_stamp_of_the_message(link, robot):
 def test_sensor_data_is_placed_by_the_frame_of_the_sensor(link, robot):
     cone = robot.add_module("Range", link, "/sonar")
     points = robot.add_module("PointCloud", link, "/points")
-    tell(
+    send_transforms(
         link,
         transform("base_link", "sonar", 0.3, 0.1, math.pi),
         transform("base_link", "laser", 0.0, 0.5, -math.pi / 2),
@@ -92,7 +92,7 @@ def test_sensor_data_is_placed_by_the_frame_of_the_sensor(link, robot):
 
 def test_a_configured_sensor_position_overrides_the_frames(link, robot):
     cone = robot.add_module("Range", link, "/sonar", 0.2, 0.0, 0.0)
-    tell(link, transform("base_link", "sonar", 5, 5, 1), static=True)
+    send_transforms(link, transform("base_link", "sonar", 5, 5, 1), static=True)
     link.say("/sonar", sonar(1.0))
     on_robot = to_root(robot.svg).inverse @ to_root(cone.cone)
     assert on_robot.apply(0, 0) == pytest.approx((0.2, 0))
@@ -106,7 +106,7 @@ def test_an_unknown_frame_is_a_problem_until_it_is_known(link, robot):
     assert in_world(module.line) == near([(1, 2), (3, 4)])
     (problem,) = robot.problems.values()
     assert "the pose of 'odom' is unknown" in problem
-    tell(link, transform("map", "odom", *ODOM))
+    send_transforms(link, transform("map", "odom", *ODOM))
     link.say("/plan", message)
     assert robot.problems == {}
     assert len(numbers(module.line.get("points"))) == 4
@@ -140,7 +140,7 @@ def test_a_costmap_in_the_odometry_frame_moves_with_that_frame(map, link, channe
     assert "the pose of 'odom' on the map is unknown" in error
     (image,) = images(module.layer)
     for at in [ODOM, (0.0, 0.0, -1.0)]:
-        tell(link, transform("map", "odom", *at, secs=4 + int(at != ODOM)))
+        send_transforms(link, transform("map", "odom", *at, secs=4 + int(at != ODOM)))
         there = Affine.translation(*at[:2]) @ Affine.rotation(at[2])
         # The occupied cell is the lower left one of the grid, at (2, 3) of odom.
         assert colour(image, *there.apply(2.5, 3.5)) == BLACK

@@ -5,7 +5,7 @@ import math
 import pytest
 from module_fakes import pose, to_root
 from test_layers_at_stamp import stamp, transform
-from test_layers_frames import tell
+from test_layers_frames import send_transforms
 from test_layers_markers import CUBE, TEXT, marker
 
 from webmap.base.errors import ProtocolError
@@ -42,8 +42,8 @@ def say(link, *markers) -> None:
 
 def drive(link, x, seconds) -> None:
     """A robot that drives along the y of the map, as its odometry is turned."""
-    tell(link, transform("map", "odom", 10.0, 0.0, math.pi / 2, seconds))
-    tell(link, transform("odom", "base_link", x, 0.0, 0.0, seconds))
+    send_transforms(link, transform("map", "odom", 10.0, 0.0, math.pi / 2, seconds))
+    send_transforms(link, transform("odom", "base_link", x, 0.0, 0.0, seconds))
 
 
 def middle(layer, number) -> tuple[float, float]:

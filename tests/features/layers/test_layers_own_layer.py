@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from module_fakes import header, pose, to_root
-from test_layers_frames import tell
+from test_layers_frames import send_transforms
 from tilted_frames import frame
 
 from webmap import Bridge, Map
@@ -246,7 +246,7 @@ def test_a_map_layer_is_placed_by_its_frame_at_the_stamp(link, map):
     layer = map.add_module("Zones", link, "/zones", age_limit=2.0).layer
     link.say("/zones", zones((1, 2, 3), frame_id="odom"))
     for seconds, x in ((2.9, 4.9), (3.1, 5.1)):
-        tell(link, frame("map", "odom", (x, 0.0, 0.0), seconds=seconds))
+        send_transforms(link, frame("map", "odom", (x, 0.0, 0.0), seconds=seconds))
     link.say("/zones", zones((1, 2, 3), frame_id="odom"))
     (circle,) = layer.svg.children
     assert to_root(circle).apply(0, 0) == pytest.approx((5.0, 0.0), abs=1e-3)

@@ -6,7 +6,7 @@ import random
 import numpy as np
 import pytest
 from module_fakes import header, matrix_of, numbers, pose, to_root
-from test_layers_frames import tell
+from test_layers_frames import send_transforms
 from test_layers_tilted import MAP, SLOPE, mount, sensed
 from tilted_frames import frame, taken
 
@@ -55,7 +55,7 @@ def test_a_point_in_the_base_frame_is_placed_at_its_stamp(link, robot):
     module = robot.add_module("PointStamped", link, "/lookahead_point", frame="robot")
     turned = (0.0, 0.0, math.pi / 2)
     for seconds, x in ((2.9, 4.9), (3.1, 5.1)):
-        tell(link, frame("map", "base_link", (x, 0.0, 0.0), turned, seconds))
+        send_transforms(link, frame("map", "base_link", (x, 0.0, 0.0), turned, seconds))
     link.say("/lookahead_point", point(1.0, 0.5, frame="base_link"))
     assert spot(module) == pytest.approx((4.5, 1.0), abs=2e-3)
     assert robot.problems == {}
@@ -70,7 +70,7 @@ def test_without_frames_a_point_in_the_base_frame_is_placed_on_the_robot(link, r
 
 def test_a_point_of_a_tilted_sensor_is_rotated_in_3d_and_projected(link, robot):
     robot.set_tf(link)
-    tell(link, MAP, SLOPE)
+    send_transforms(link, MAP, SLOPE)
     mounted = mount(link, (0.3, 0.1, 0.8), (0.7, -0.9, 2.5))
     module = robot.add_module("PointStamped", link, "/seen")
     link.say("/seen", sensed({"point": at(1.0, 0.2, 2.0)}))
@@ -189,7 +189,7 @@ def test_rows_of_slightly_shifted_cells_stay_near_the_cells():
 
 def test_cells_of_a_tilted_sensor_are_rotated_in_3d_and_projected(link, robot):
     robot.set_tf(link)
-    tell(link, MAP, SLOPE)
+    send_transforms(link, MAP, SLOPE)
     mounted = mount(link, (0.3, 0.1, 0.8), (0.7, -0.9, 2.5))
     module = robot.add_module("GridCells", link, "/cells")
     link.say("/cells", sensed(cells([(1.0, 0.2, 2.0), (1.5, 0.2, 2.0)])))

@@ -105,12 +105,12 @@ async def placed(scene: Scene) -> None:
     """Give the robot frames, and wait until it is drawn by them."""
     scene.robots[0].set_tf(scene.bridges[0])
     await until(lambda: "/tf" in scene.servers[0].asked)
-    await tell(scene, at("", NOW))
+    await send_transforms(scene, at("", NOW))
     await say(scene, "/odom", odometry(1.0, header=at("odom", NOW)))
     await until(lambda: drawn_at(scene, 11.0))
 
 
-async def tell(scene: Scene, about: dict) -> None:
+async def send_transforms(scene: Scene, about: dict) -> None:
     chain = [("map", "odom", 10.0), ("odom", "base_link", 1.0)]
     transforms = [transform(*link, about) for link in chain]
     await say(scene, "/tf", {"transforms": transforms})
@@ -122,8 +122,8 @@ def test_a_transform_an_hour_off_gives_one_notice_and_does_not_move_the_robot(
 ):
     async def scenario(scene: Scene) -> None:
         await placed(scene)
-        await tell(scene, at("", NOW + WAYS[way]))
-        await tell(scene, at("", NOW))
+        await send_transforms(scene, at("", NOW + WAYS[way]))
+        await send_transforms(scene, at("", NOW))
         await until(lambda: scene.errors)
         await say(scene, "/odom", odometry(1.1, header=at("odom", NOW + 0.1)))
         await until(lambda: drawn_at(scene, 11.1))
@@ -137,7 +137,7 @@ def test_a_transform_with_invalid_nanoseconds_is_ignored_with_one_notice(map, ch
     async def scenario(scene: Scene) -> None:
         await placed(scene)
         for _ in range(3):
-            await tell(scene, header() | NANOSECONDS)
+            await send_transforms(scene, header() | NANOSECONDS)
         await until(lambda: scene.errors)
         await say(scene, "/odom", odometry(1.1, header=at("odom", NOW + 0.1)))
         await until(lambda: drawn_at(scene, 11.1))

@@ -7,7 +7,7 @@ import pytest
 from module_fakes import dots, numbers, to_root
 from test_layers_at_stamp import odometry, scan, stamp
 from test_layers_cloud import cloud
-from test_layers_frames import tell
+from test_layers_frames import send_transforms
 from test_layers_poses import sonar
 from test_layers_ways import in_world
 from tilted_frames import OPTICAL, OVER, frame, matrix, posed, quaternion, taken
@@ -32,13 +32,13 @@ def no_patience(monkeypatch):
 def base(request, robot, link):
     """The way to the base of a robot that stands, level or on a slope."""
     robot.set_tf(link)
-    tell(link, MAP, request.param)
+    send_transforms(link, MAP, request.param)
     return MAP, request.param
 
 
 def mount(link, place, turns) -> dict:
     found = frame("base_link", "sensor", place, turns)
-    tell(link, found, static=True)
+    send_transforms(link, found, static=True)
     return found
 
 
@@ -109,7 +109,7 @@ def test_colours_by_height_use_the_height_above_the_base(link, robot, base):
 
 def test_height_limits_in_the_map_frame_are_measured_above_the_map(link, robot):
     robot.set_tf(link)
-    tell(link, MAP, SLOPE)
+    send_transforms(link, MAP, SLOPE)
     mounted = mount(link, (0.0, 0.0, 0.5), OPTICAL)
     module = robot.add_module(
         "PointCloud", link, "/points", cell=0, frame="map", z_min=4.0, z_max=5.0
@@ -126,13 +126,13 @@ def test_a_cloud_newer_than_the_frames_is_redrawn_when_frames_arrive(link, robot
     still = (3.0, 1.0, 0.0)
     for seconds in (100.0, 100.1):
         level = frame("map", "base_link", still, (0.0, 0.0, 0.5), seconds)
-        tell(link, level)
+        send_transforms(link, level)
     mounted = mount(link, (0.3, 0.0, 0.8), OPTICAL)
     module = robot.add_module("PointCloud", link, "/points", cell=0)
     link.say("/points", sensed(cloud(POINTS), 100.2))
     assert on_map(*module.dots) == near(flat(taken(POINTS, level, mounted)))
     leaning = frame("map", "base_link", still, (0.2, 0.1, 0.5), 100.2)
-    tell(link, leaning)
+    send_transforms(link, leaning)
     assert on_map(*module.dots) == near(flat(taken(POINTS, leaning, mounted)))
 
 
@@ -182,7 +182,7 @@ def test_a_tilted_sweep_is_corrected_for_motion_in_its_own_plane(link, robot, tu
     for step in range(3):
         seconds = 100.0 + step / 10
         place = (2.0 + 0.5 * step, 1.0, 0.0)
-        tell(link, frame("map", "base_link", place, seconds=seconds))
+        send_transforms(link, frame("map", "base_link", place, seconds=seconds))
     mounted = mount(link, (0.0, 0.0, 0.3), turns)
     module = robot.add_module("LaserScanner", link, "/scan", max_dots=None)
     message = scan([(2.0, 0.0), (-2.0, 0.0)], 100.0, increment=0.1 / 360)
@@ -206,7 +206,7 @@ def outline(cone) -> np.ndarray:
 @pytest.mark.parametrize("roll", [0.0, math.pi / 2, math.pi, 2.0])
 def test_a_cone_does_not_depend_on_the_rotation_about_its_axis(link, robot, roll):
     robot.set_tf(link)
-    tell(link, MAP, BASE)
+    send_transforms(link, MAP, BASE)
     mount(link, (0.2, 0.1, 0.4), (roll, 0.0, 0.7))
     module = robot.add_module("Range", link, "/sonar")
     link.say("/sonar", sensed(sonar(2.0, view=0.5)))

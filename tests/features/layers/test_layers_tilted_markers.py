@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from module_fakes import numbers, to_root
 from test_layers_at_stamp import stamp
-from test_layers_frames import tell
+from test_layers_frames import send_transforms
 from test_layers_markers import (
     ARROW,
     CUBE,
@@ -51,8 +51,8 @@ def mounted(request, link, layer) -> dict:
         link, marker(CUBE, header={"frame_id": "sensor"})
     )  # who needs frames hears them
     found = frame("base_link", "sensor", (0.3, 0.1, 0.8), request.param)
-    tell(link, found, static=True)
-    tell(link, BODY)
+    send_transforms(link, found, static=True)
+    send_transforms(link, BODY)
     return found
 
 
@@ -180,7 +180,7 @@ def test_a_frame_locked_marker_is_redrawn_when_its_frame_tilts(link, layer):
         (100.2, (math.pi / 2, 0.0, 0.0), (1.0, 3.0)),
         (100.3, (0.0, 0.0, 0.0), (1.0, 1.0)),
     ):
-        tell(link, frame("map", "gripper", (2.0, 0.0, 1.0), turns, seconds))
+        send_transforms(link, frame("map", "gripper", (2.0, 0.0, 1.0), turns, seconds))
         (box,) = layer.shapes["test", 1].children
         if box.get("points") is None:
             found = np.array([[0.0, 0.0], [box.get("width"), box.get("height")]], float)
@@ -207,7 +207,9 @@ def test_a_frame_locked_marker_that_only_moves_is_not_redrawn(link, layer):
     shapes = []
     for step in range(4):
         turns = (*OVER[:2], 0.7 * step)
-        tell(link, frame("map", "camera", (step, 0.0, 1.0), turns, 100.0 + step / 10))
+        send_transforms(
+            link, frame("map", "camera", (step, 0.0, 1.0), turns, 100.0 + step / 10)
+        )
         shapes.append(layer.shapes["test", 1])
         assert to_root(shapes[-1]).apply(0, 0) == pytest.approx((step, 0.0))
     assert len({id(shape) for shape in shapes[0:]}) == 1
@@ -217,7 +219,7 @@ def test_a_marker_ahead_in_an_optical_frame_is_drawn_ahead_on_the_map(link, laye
     """With plain numbers: three metres ahead of the lens, and half a metre right."""
     header = {"stamp": stamp(0.0), "frame_id": "optical"}
     say(link, marker(CUBE, header=header))
-    tell(link, frame("map", "optical", (1.0, 2.0, 0.5), OPTICAL))
+    send_transforms(link, frame("map", "optical", (1.0, 2.0, 0.5), OPTICAL))
     say(link, marker(CUBE, header=header, pose=posed((0.5, 0.1, 3.0))))
     assert to_root(layer.shapes["test", 1]).apply(0, 0) == pytest.approx((4.0, 1.5))
     assert matrix(*OPTICAL) @ (0.5, 0.1, 3.0) == pytest.approx([3.0, -0.5, -0.1])

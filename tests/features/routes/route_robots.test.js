@@ -26,7 +26,7 @@ class FakeDrive {
     return () => delete this._listeners[kind];
   }
 
-  tell(kind, what) {
+  emit(kind, what) {
     this._listeners[kind]?.(what);
   }
 
@@ -45,13 +45,13 @@ class FakeDrive {
   async goal(robot, { x }) {
     await this.taking;
     this.said.push(x);
-    this.tell("goal", robot);
+    this.emit("goal", robot);
     if (this.refusal !== null) throw new Error(this.refusal);
   }
 
   report(word, more = {}) {
     this.robots.set("r1", { robot: "r1", latched: false, goal: word, ...more });
-    this.tell("robot", { robot: "r1" });
+    this.emit("robot", { robot: "r1" });
   }
 }
 
@@ -103,10 +103,10 @@ test("a waiting route is not busy", async () => {
 for (const [what, act, state] of [
   ["paused", ({ robots }) => robots.act("r1", "pause"), "paused"],
   ["ended", ({ robots }) => robots.act("r1", "end"), "ended"],
-  ["stopped", ({ drive }) => drive.tell("stop", "r1"), "halted"],
-  ["stopped with all robots", ({ drive }) => drive.tell("stop", "*"), "halted"],
+  ["stopped", ({ drive }) => drive.emit("stop", "r1"), "halted"],
+  ["stopped with all robots", ({ drive }) => drive.emit("stop", "*"), "halted"],
   ["stopped by another page", ({ drive }) => drive.report(null, { latched: true }), "halted"],
-  ["sent elsewhere by this page", ({ drive }) => drive.tell("goal", "r1"), "halted"],
+  ["sent elsewhere by this page", ({ drive }) => drive.emit("goal", "r1"), "halted"],
   ["sent elsewhere by another", ({ drive }) => drive.report(goal("g9")), "halted"],
 ]) {
   test(`a waiting route that is ${what} sends no more goals`, async () => {
@@ -124,7 +124,7 @@ for (const [what, act, state] of [
 
 test("a STOP of another robot does not halt a route", async () => {
   const { drive, run } = await waiting();
-  drive.tell("stop", "r2");
+  drive.emit("stop", "r2");
   assert.equal(run.state, "going");
 });
 
@@ -177,10 +177,10 @@ test("a removed robot halts its route", async () => {
 
 test("the page keeps control of a robot only while its route runs", async () => {
   const { drive, robots } = await waiting();
-  drive.tell("step", null);
+  drive.emit("step", null);
   assert.equal(drive.kept, 1);
   robots.act("r1", "end");
-  drive.tell("step", null);
+  drive.emit("step", null);
   assert.equal(drive.kept, 1);
 });
 
