@@ -5,7 +5,7 @@ import pytest
 from simulated import room
 
 from webmap.base.geometry import Pose
-from webmap.sim.obstacles import Obstacles, chebyshev_distance
+from webmap.sim.obstacles import Obstacles, chebyshev_distance, dilate
 from webmap.sim.scanner import Scanner, ScannerOptions, cast_rays
 
 
@@ -117,3 +117,14 @@ def test_chebyshev_distances_count_diagonal_steps_as_one():
     distance = chebyshev_distance(solid, 10)
     assert distance[2].tolist() == [1, 0, 1, 2, 3, 4, 5]
     assert distance[0, 6] == 5
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.5, 1.0, 2.5, 40.0])
+@pytest.mark.parametrize("part", [0.0, 0.01, 0.1, 1.0])
+def test_cells_near_a_solid_one_are_those_within_the_radius(radius, part):
+    solid = np.random.default_rng(7).random((17, 29)) < part
+    rows, columns = np.indices(solid.shape)
+    near = np.zeros_like(solid)
+    for row, column in np.argwhere(solid):
+        near |= np.hypot(rows - row, columns - column) <= radius
+    assert (dilate(solid, radius) == near).all()

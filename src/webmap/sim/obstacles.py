@@ -69,20 +69,26 @@ def chebyshev_distance(solid: NDArray[np.bool_], farthest: int) -> NDArray[np.in
 
 def dilate(solid: NDArray[np.bool_], radius: float) -> NDArray[np.bool_]:
     """Return the cells whose center is within ``radius`` cells of a solid one's."""
-    rows, columns = solid.shape
+    rows = len(solid)
     reach = min(math.floor(radius), rows - 1)
+    across = distance_in_row(solid)
     grown = np.zeros_like(solid)
     for up in range(-reach, reach + 1):
-        across = math.floor(math.sqrt(radius * radius - up * up))
-        # One row of the disc at a time: a running "any" over 2 * across + 1 columns.
-        sums: NDArray[np.int64] = np.cumsum(
-            np.pad(solid, ((0, 0), (across + 1, across))), axis=1
-        )
-        counts: NDArray[np.int64] = (
-            sums[:, 2 * across + 1 :] - sums[:, : -(2 * across + 1)]
-        )
-        row_hits = np.asarray(counts > 0)
+        # One row of the disc at a time.
+        row_hits = across <= math.floor(math.sqrt(radius * radius - up * up))
         source = slice(max(-up, 0), rows - max(up, 0))
         target = slice(max(up, 0), rows - max(-up, 0))
-        grown[target] |= row_hits[source, :columns]
+        grown[target] |= row_hits[source]
     return grown
+
+
+def distance_in_row(solid: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Return the distance of each cell to the nearest solid one of its row, in cells.
+
+    It is more than a million in a row without solid cells.
+    """
+    column = np.arange(solid.shape[1], dtype=np.int32)
+    none = np.int32(1 << 30)
+    before = np.maximum.accumulate(np.where(solid, column, -none), axis=1)
+    after = np.minimum.accumulate(np.where(solid, column, none)[:, ::-1], axis=1)
+    return np.minimum(column - before, after[:, ::-1] - column)
