@@ -1,11 +1,11 @@
-"""A report of a robot that a page of a display has under control."""
+"""A report of a robot that a page of a display controls."""
 
 import msgspec
 
 from webmap.gate.protocol import RobotReport
 
 NAME = "ann.4f"
-"""The display."""
+"""The name of the display."""
 
 REPORT = msgspec.convert(
     {

@@ -209,7 +209,7 @@ def test_the_age_of_a_picture_is_never_below_its_true_age():
     clock.asked(1, ahead)
     assert not clock.answered(2, 0.0, ahead)  # it answers another camera
     assert clock.answered(1, 0.3, ahead + 0.4)
-    # It came at 5.0, and comes here 0.8 s later.
+    # The agent got the picture at 5.0; the display gets it 0.8 s later.
     assert clock.age(5.0, ahead + 5.8) == pytest.approx(0.8 + 0.3)
     clock.asked(3, ahead + 6.0)
     clock.answered(3, 6.1, ahead + 6.2)

@@ -1,4 +1,4 @@
-"""What displays get from the rosbridge of an agent, and what they may not do."""
+"""Messages that displays get from an agent's rosbridge, and refused commands."""
 
 import json
 import zlib
@@ -26,11 +26,11 @@ class Bench:
         )
         self.clients.opened("s1")
 
-    def says(self, client, frame, now=0.0):
+    def send(self, client, frame, now=0.0):
         self.clients.receive(client, data.pack_frame(frame), now)
 
     def subscribe(self, client, topic="/map", now=0.0, **options):
-        self.says(client, ops.subscribe(topic, id="1", **options), now)
+        self.send(client, ops.subscribe(topic, id="1", **options), now)
 
     def took(self):
         taken, self.up[:] = list(self.up), []
@@ -48,9 +48,9 @@ def test_the_agent_subscribes_once_for_all_displays(bench):
     assert (op["op"], op["topic"], op["compression"]) == ("subscribe", "/map", "cbor")
     bench.subscribe(BEN, type="nav_msgs/OccupancyGrid", compression="cbor")
     assert bench.took() == []
-    bench.says(ANN, ops.unsubscribe("/map", id="1"))
+    bench.send(ANN, ops.unsubscribe("/map", id="1"))
     assert bench.took() == []
-    bench.says(BEN, ops.unsubscribe("/map", id="1"))
+    bench.send(BEN, ops.unsubscribe("/map", id="1"))
     assert [op["op"] for op in bench.took()] == ["unsubscribe"]
     assert bench.clients.topics == []
 
@@ -136,7 +136,7 @@ def test_a_display_that_is_gone_holds_no_subscription(bench, how):
 
 
 def test_a_display_calls_services_that_only_read(bench):
-    bench.says(ANN, ops.call_service("/rosapi/topics", {}, id="7"))
+    bench.send(ANN, ops.call_service("/rosapi/topics", {}, id="7"))
     (call,) = bench.calls
     assert (call.client, call.id, call.service) == (ANN, "7", "/rosapi/topics")
 
@@ -153,7 +153,7 @@ def test_a_display_calls_services_that_only_read(bench):
     ],
 )
 def test_everything_else_is_refused_and_reaches_no_robot(bench, frame):
-    bench.says(ANN, frame)
+    bench.send(ANN, frame)
     assert (bench.took(), bench.calls) == ([], [])
     ((client, answer),) = bench.replies
     status = json.loads(answer)
@@ -164,9 +164,9 @@ def test_everything_else_is_refused_and_reaches_no_robot(bench, frame):
 
 def test_the_buttons_of_the_agent_may_be_pressed_on_a_display():
     bench = Bench(publishes=lambda: {"/lamp"}, calls=lambda: {"/dock"})
-    bench.says(ANN, ops.call_service("/dock", id="7"))
-    bench.says(ANN, ops.advertise("/lamp", "std_msgs/Bool", id="8"))
-    bench.says(ANN, ops.publish("/lamp", {"data": True}))
+    bench.send(ANN, ops.call_service("/dock", id="7"))
+    bench.send(ANN, ops.advertise("/lamp", "std_msgs/Bool", id="8"))
+    bench.send(ANN, ops.publish("/lamp", {"data": True}))
     assert [call.service for call in bench.calls] == ["/dock"]
     assert [op["op"] for op in bench.took()] == ["advertise", "publish"]
     bench.clients.receive(ANN, data.pack_note(data.Bye()), 1.0)

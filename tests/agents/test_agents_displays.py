@@ -37,16 +37,16 @@ class West:
         self.numbering = Numbering()
         self.order = Order()
 
-    def says(self, message, now=0.0):
+    def send(self, message, now=0.0):
         sample = self.numbering.next(msgspec.msgpack.encode(message))
         return self.displays.receive("west", sample, now)
 
-    def hears(self, tick, now):
+    def receive(self, tick, now):
         self.order.take(self.displays.send(Tick(tick, {}), now))
 
     def answers(self, now, connections=None):
         answer = Answer(self.order.session or 0, self.order.newest, connections)
-        return self.says(answer, now)
+        return self.send(answer, now)
 
     def reports_control_of(self, connection, now=0.0):
         holder = None if connection is None else Holder(connection, "Ann")
@@ -62,7 +62,7 @@ def west():
 def test_a_page_and_its_commands_reach_the_gate(west):
     speeds = Speeds("west/c1", 1.0, 2.0)
     command = FromPage("west/c1", b'{"op":"take","robot":"r1"}')
-    assert [west.says(each) for each in (PAGE, speeds, command)] == [
+    assert [west.send(each) for each in (PAGE, speeds, command)] == [
         [PAGE],
         [speeds],
         [command],
@@ -81,22 +81,22 @@ def test_a_page_and_its_commands_reach_the_gate(west):
 )
 def test_a_display_can_declare_no_robot_and_send_nothing_else(west, message):
     with pytest.raises(WireError, match="display west: got no message"):
-        west.says(message)
+        west.send(message)
 
 
 def test_a_display_uses_only_connections_of_its_own(west):
     with pytest.raises(WireError, match="expected one that begins with west/"):
-        west.says(Connect("east/c1", "Ann", "operator"))
+        west.send(Connect("east/c1", "Ann", "operator"))
 
 
 def test_a_display_gives_its_pages_at_most_its_own_role():
     west = West(west="viewer")
-    assert west.says(PAGE) == [Connect("west/c1", "Ann", "viewer")]
+    assert west.send(PAGE) == [Connect("west/c1", "Ann", "viewer")]
 
 
 def test_a_message_of_an_unknown_page_is_dropped_but_stop_is_obeyed(west):
-    assert west.says(FromPage("west/c7", b'{"op":"take","robot":"r1"}')) == []
-    assert west.says(FromPage("west/c7", STOP)) == [FromProgram(Stop(None))]
+    assert west.send(FromPage("west/c7", b'{"op":"take","robot":"r1"}')) == []
+    assert west.send(FromPage("west/c7", STOP)) == [FromProgram(Stop(None))]
 
 
 def velocity(**changes):
@@ -124,26 +124,26 @@ def from_program(command, connection="west/program"):
     ],
 )
 def test_the_commands_of_a_program_reach_the_gate_under_its_connection(west, command):
-    assert west.says(PROGRAM) == [PROGRAM]
+    assert west.send(PROGRAM) == [PROGRAM]
     message = from_program(command)
-    assert west.says(message) == [message]
+    assert west.send(message) == [message]
     assert west.displays.introduction() == [PROGRAM]
 
 
 @pytest.mark.parametrize("connection", ["program", "east/program", "west/c1", "west/"])
 def test_a_program_uses_no_other_connection(west, connection):
-    west.says(PAGE)
-    west.says(PROGRAM)
+    west.send(PAGE)
+    west.send(PROGRAM)
     hello = Connect(connection, "Ann", "operator", program=True)
     for message in (hello, from_program(Take("r1"), connection)):
         with pytest.raises(WireError, match="display west: got"):
-            west.says(message)
+            west.send(message)
     assert west.displays.introduction() == [PAGE, PROGRAM]
 
 
 def test_no_page_uses_the_connection_of_a_program(west):
     with pytest.raises(WireError, match="got a page as 'west/program'"):
-        west.says(Connect("west/program", "Ann", "operator"))
+        west.send(Connect("west/program", "Ann", "operator"))
 
 
 @pytest.mark.parametrize(
@@ -161,49 +161,51 @@ def test_no_page_uses_the_connection_of_a_program(west):
     ],
 )
 def test_what_a_page_could_not_send_or_needs_no_control_is_refused(west, command):
-    west.says(PROGRAM)
+    west.send(PROGRAM)
     with pytest.raises(WireError, match="got a command of its program"):
-        west.says(from_program(command))
+        west.send(from_program(command))
 
 
 def test_a_velocity_of_another_form_is_refused(west):
-    west.says(PROGRAM)
+    west.send(PROGRAM)
     for velocity_ in ((0.5, 0.0), ("a", 0, 0, 0, 0, 0), None):
         with pytest.raises(WireError, match="got no message"):
-            west.says(from_program(velocity(velocity=velocity_)))
+            west.send(from_program(velocity(velocity=velocity_)))
 
 
 def test_a_program_has_at_most_the_role_of_its_display():
     west = West(west="viewer")
-    (got,) = west.says(PROGRAM)
+    (got,) = west.send(PROGRAM)
     assert (got.role, got.program) == ("viewer", True)
 
 
 def test_a_program_that_is_not_known_moves_nothing_and_is_asked_for(west):
-    assert west.says(from_program(Take("r1"))) == []
-    assert west.says(from_program(velocity())) == []
-    assert west.displays.unknown("west") is None, "each answer would end its control"
+    assert west.send(from_program(Take("r1"))) == []
+    assert west.send(from_program(velocity())) == []
+    assert west.displays.unknown("west") is None, (
+        "a new introduction would end its control"
+    )
     assert west.answers(0.0, ("west/program",)) == []
     assert west.displays.unknown("west") == Unknown("west", ("west/program",))
-    assert west.says(FromPage("west/program", STOP)) == [FromProgram(Stop(None))]
+    assert west.send(FromPage("west/program", STOP)) == [FromProgram(Stop(None))]
 
 
 def test_the_program_of_a_silent_display_ends_after_half_a_second(west):
-    west.says(PAGE, 0.0)
-    west.says(PROGRAM, 0.0)
+    west.send(PAGE, 0.0)
+    west.send(PROGRAM, 0.0)
     west.reports_control_of("west/program")
-    west.hears(1, 0.05)
+    west.receive(1, 0.05)
     west.answers(0.1)
     assert west.displays.look(0.55) == []
     assert west.displays.look(0.56) == [Disconnect("west/program")]
     assert west.displays.look(0.6) == []
-    assert west.says(from_program(velocity()), 0.7) == []
+    assert west.send(from_program(velocity()), 0.7) == []
     west.reports_control_of("west/c1")
     assert west.displays.look(1.06) == [Disconnect("west/c1")]
 
 
 def test_a_program_that_its_display_no_longer_lists_ends(west):
-    west.says(PROGRAM)
+    west.send(PROGRAM)
     assert west.answers(0.0, ()) == [Disconnect("west/program")]
 
 
@@ -219,14 +221,14 @@ def test_the_role_is_that_of_the_user_and_counts_for_each_of_its_displays():
 
 def test_a_page_that_the_display_no_longer_lists_ends(west):
     other = Connect("west/c2", "Ben", "operator")
-    west.says(PAGE)
-    west.says(other)
+    west.send(PAGE)
+    west.send(other)
     assert west.answers(0.0, ("west/c2",)) == [Disconnect("west/c1")]
     assert west.displays.introduction() == [other]
 
 
 def test_pages_that_ended_while_the_display_was_slow_are_asked_for(west):
-    west.says(PAGE, 0.0)
+    west.send(PAGE, 0.0)
     west.displays.look(3.1)
     west.answers(3.1, ("west/c1", "west/program"))
     unknown = west.displays.unknown("west")
@@ -236,7 +238,7 @@ def test_pages_that_ended_while_the_display_was_slow_are_asked_for(west):
 
 def test_a_display_that_lost_a_sample_gets_all_reports_once(west):
     assert not west.displays.wants_reports(1.0)
-    assert west.says(ReportAll()) == []
+    assert west.send(ReportAll()) == []
     assert west.displays.wants_reports(1.0)
     assert not west.displays.wants_reports(1.0)
 
@@ -244,7 +246,7 @@ def test_a_display_that_lost_a_sample_gets_all_reports_once(west):
 def test_displays_that_ask_for_all_reports_again_and_again_get_them_with_pauses(west):
     sent = 0
     for step in range(100):
-        assert west.says(ReportAll()) == []
+        assert west.send(ReportAll()) == []
         sent += west.displays.wants_reports(1.0 + step / 100)
     assert sent == 5
 
@@ -276,9 +278,9 @@ def test_a_sample_that_comes_twice_or_late_is_dropped(west):
 
 
 def test_the_pages_of_a_silent_display_with_control_end_after_1_s(west):
-    west.says(PAGE, 0.0)
+    west.send(PAGE, 0.0)
     west.reports_control_of("west/c1")
-    west.hears(1, 0.05)
+    west.receive(1, 0.05)
     west.answers(0.1)
     assert west.displays.look(1.05) == []
     assert west.displays.look(1.06) == [Disconnect("west/c1")]
@@ -286,11 +288,11 @@ def test_the_pages_of_a_silent_display_with_control_end_after_1_s(west):
 
 
 def test_control_that_begins_long_after_an_answer_is_not_ended_at_once(west):
-    west.says(PAGE, 0.0)
-    west.says(PROGRAM, 0.0)
-    west.hears(1, 0.05)
+    west.send(PAGE, 0.0)
+    west.send(PROGRAM, 0.0)
+    west.receive(1, 0.05)
     west.answers(0.1)
-    west.reports_control_of("west/program", 1.5)  # another display handed it over
+    west.reports_control_of("west/program", 1.5)  # from another display
     west.reports_control_of("west/program", 1.7)
     assert west.displays.look(2.0) == []
     assert west.displays.look(2.01) == [Disconnect("west/program")]
@@ -298,15 +300,15 @@ def test_control_that_begins_long_after_an_answer_is_not_ended_at_once(west):
 
 @pytest.mark.parametrize("end", ["released", "gone", "of another"])
 def test_the_pages_of_a_silent_display_without_control_end_after_3_s(west, end):
-    west.says(PAGE, 0.0)
-    west.says(PROGRAM, 0.0)
+    west.send(PAGE, 0.0)
+    west.send(PROGRAM, 0.0)
     west.reports_control_of("east/c1" if end == "of another" else "west/c1")
     match end:
         case "released":
             west.reports_control_of(None)
         case "gone":
             west.displays.send(RobotGone("r1"), 0.0)
-    west.hears(1, 0.05)
+    west.receive(1, 0.05)
     west.answers(0.1)
     assert west.displays.look(3.05) == []
     ended = [Disconnect("west/c1"), Disconnect("west/program")]
@@ -315,20 +317,20 @@ def test_the_pages_of_a_silent_display_without_control_end_after_3_s(west, end):
 
 
 def test_an_answer_to_an_old_sample_is_no_sign_of_life(west):
-    west.says(PAGE, 0.0)
+    west.send(PAGE, 0.0)
     west.reports_control_of("west/c1")
     for tick in range(30):
-        west.hears(tick, 0.05 * tick)
+        west.receive(tick, 0.05 * tick)
     late = Answer(west.order.session, 2)  # sent at 0.05 s
-    west.says(late, 1.5)
+    west.send(late, 1.5)
     assert west.displays.look(1.5) == [Disconnect("west/c1")]
 
 
 def test_a_display_that_restarts_loses_its_pages(west):
-    west.says(PAGE)
+    west.send(PAGE)
     west.numbering = Numbering()
     again = Connect("west/c2", "Ann", "operator")
-    assert west.says(again) == [Disconnect("west/c1"), again]
+    assert west.send(again) == [Disconnect("west/c1"), again]
 
 
 @pytest.mark.parametrize("sample", [b"", b"x" * 15, b"x" * 40, b"x" * 2_000_000])

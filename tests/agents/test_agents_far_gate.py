@@ -32,19 +32,19 @@ STOP = FromPage(f"{NAME}/c1", b'{"op":"stop","robot":"r1"}')
 
 class Owner:
     def __init__(self):
-        self.heard = []
+        self.received = []
 
     def introduction(self):
         return [RobotSpec(id="r1", name="Bob", bridge_url="zenoh://h/bay3"), PAGE]
 
     def hear(self, message):
-        self.heard.append(message)
+        self.received.append(message)
 
     def gone(self, down):
-        self.heard.append(down)
+        self.received.append(down)
 
     def of(self, kind):
-        return [message for message in self.heard if isinstance(message, kind)]
+        return [message for message in self.received if isinstance(message, kind)]
 
 
 class Bench:
@@ -61,7 +61,7 @@ class Bench:
         self.sent.append(sample)
         self.ways.append(only)
 
-    def hears(self, message, now=0.0):
+    def receive(self, message, now=0.0):
         self.far.take(self.displays.send(message, now), now)
 
     def arrive(self, now=0.0):
@@ -80,20 +80,20 @@ def bench():
 
 @pytest.fixture
 def connected(bench):
-    bench.hears(Tick(1, {}))
+    bench.receive(Tick(1, {}))
     assert bench.arrive() == [PROGRAM, PAGE]
-    bench.hears(Hello(PAGE.connection))
+    bench.receive(Hello(PAGE.connection))
     return bench
 
 
 def test_the_first_sample_introduces_the_pages_and_no_robot(bench):
     assert not bench.far.ready
     assert bench.far.trouble == "waiting for the agent bay3"
-    bench.hears(Tick(1, {}))
+    bench.receive(Tick(1, {}))
     assert bench.far.ready
     assert bench.far.trouble is None
     assert bench.arrive() == [PROGRAM, PAGE]
-    assert bench.owner.heard == [Ready(0), Tick(1, {})]
+    assert bench.owner.received == [Ready(0), Tick(1, {})]
 
 
 def test_a_tick_is_as_long_with_many_pages_that_only_look_and_reaches_each(connected):
@@ -101,21 +101,21 @@ def test_a_tick_is_as_long_with_many_pages_that_only_look_and_reaches_each(conne
     few = connected.displays.send(Tick(2, acks), 0.0)
     many = {f"east.{number}/c1": -1 for number in range(100)}
     assert len(connected.displays.send(Tick(3, acks | many), 0.0)) == len(few)
-    connected.hears(Tick(4, acks))
-    connected.hears(Tick(5, {**acks, PAGE.connection: 7}))
-    assert connected.owner.heard[-2:] == [
+    connected.receive(Tick(4, acks))
+    connected.receive(Tick(5, {**acks, PAGE.connection: 7}))
+    assert connected.owner.received[-2:] == [
         Tick(4, {PAGE.connection: -1}),
         Tick(5, {PAGE.connection: 7}),
     ]
 
 
 def test_a_page_that_the_agent_does_not_know_gets_no_tick(connected):
-    connected.hears(Unknown(NAME, (PAGE.connection,)))
-    connected.hears(Tick(2, {}))
-    assert connected.owner.heard[-1] == Tick(2, {})
-    connected.hears(Hello(PAGE.connection))
-    connected.hears(Tick(3, {}))
-    assert connected.owner.heard[-1] == Tick(3, {PAGE.connection: -1})
+    connected.receive(Unknown(NAME, (PAGE.connection,)))
+    connected.receive(Tick(2, {}))
+    assert connected.owner.received[-1] == Tick(2, {})
+    connected.receive(Hello(PAGE.connection))
+    connected.receive(Tick(3, {}))
+    assert connected.owner.received[-1] == Tick(3, {PAGE.connection: -1})
 
 
 def test_declarations_stay_here(connected):
@@ -137,12 +137,12 @@ def test_a_stop_is_sent_again_until_the_agent_has_it(connected):
     assert connected.arrive(0.1) == [STOP]
     session, number = connected.displays.newest(NAME)
     took = Took(NAME, session, number)
-    connected.hears(took, 0.12)  # of another sample
+    connected.receive(took, 0.12)  # of another sample
     connected.far.beat(0.25)
     assert STOP in connected.arrive(0.25)
     taken = [n for n in connected.far._stops]
     for number in taken:
-        connected.hears(Took(NAME, session, number), 0.3)
+        connected.receive(Took(NAME, session, number), 0.3)
     connected.far.beat(0.45)
     assert STOP not in connected.arrive(0.45)
 
@@ -151,13 +151,13 @@ def test_the_acknowledgement_of_another_display_ends_nothing(connected):
     connected.far.send(STOP)
     connected.arrive()
     session, number = connected.displays.newest(NAME)
-    connected.hears(Took("ben.5e", session, number), 0.05)
+    connected.receive(Took("ben.5e", session, number), 0.05)
     connected.far.beat(0.15)
     assert connected.arrive(0.15) == [STOP]
 
 
 def test_a_silent_agent_is_lost_and_its_robots_are_reported_as_unreachable(connected):
-    connected.hears(REPORT, 0.1)
+    connected.receive(REPORT, 0.1)
     connected.far.beat(0.59)
     assert connected.owner.of(GateDown) == []
     connected.far.beat(0.61)
@@ -180,19 +180,19 @@ def test_an_agent_that_returns_gets_the_pages_and_a_kept_stop_again(connected):
     connected.sent.clear()
     connected.far.beat(0.6)
     connected.sent.clear()
-    connected.hears(Tick(9, {}), 5.0)
+    connected.receive(Tick(9, {}), 5.0)
     connected.far.beat(5.05)
     assert connected.arrive(5.05) == [PROGRAM, PAGE, STOP]
 
 
 @pytest.mark.parametrize("how", ["agent", "gate"])
 def test_a_restart_ends_all_leases(connected, how):
-    connected.hears(REPORT, 0.1)
+    connected.receive(REPORT, 0.1)
     if how == "agent":
         connected.displays = Displays()
-        connected.hears(Tick(1, {}), 0.2)
+        connected.receive(Tick(1, {}), 0.2)
     else:
-        connected.hears(Ready(7), 0.2)
+        connected.receive(Ready(7), 0.2)
     (down,) = connected.owner.of(GateDown)
     assert down.why == "the gate of the agent bay3 has restarted"
     assert PAGE in connected.arrive(0.2)
@@ -202,29 +202,29 @@ def test_lost_samples_make_the_display_ask_for_all_reports(connected):
     connected.arrive()
     assert connected.displays.wants_reports(0.0), "at the beginning"
     connected.displays.send(Tick(2, {}), 0.1)  # lost
-    connected.hears(Tick(3, {}), 0.25)
+    connected.receive(Tick(3, {}), 0.25)
     connected.arrive()
     assert connected.displays.wants_reports(0.25)
 
 
 def test_all_reports_come_as_one_sample(connected):
     other = msgspec.structs.replace(REPORT, robot="r2")
-    connected.hears(AllReports((REPORT, other)), 0.1)
+    connected.receive(AllReports((REPORT, other)), 0.1)
     assert connected.owner.of(RobotReport) == [REPORT, other]
 
 
 def test_a_page_without_an_answer_is_introduced_again(bench):
-    bench.hears(Tick(1, {}))
+    bench.receive(Tick(1, {}))
     bench.sent.clear()  # all lost
-    bench.hears(Tick(2, {}), 0.9)
+    bench.receive(Tick(2, {}), 0.9)
     bench.far.beat(1.0)
     assert PAGE in bench.arrive(1.0)
 
 
 def test_a_page_that_the_agent_has_ended_is_introduced_again(connected):
-    connected.hears(Unknown(NAME, (PAGE.connection, PROGRAM.connection)), 0.1)
+    connected.receive(Unknown(NAME, (PAGE.connection, PROGRAM.connection)), 0.1)
     assert connected.arrive(0.1) == [PROGRAM, PAGE]
-    connected.hears(Unknown("ben.5e", (PAGE.connection,)), 0.2)
+    connected.receive(Unknown("ben.5e", (PAGE.connection,)), 0.2)
     assert connected.arrive(0.2) == []
 
 
@@ -267,7 +267,7 @@ def test_a_program_controls_a_robot_of_an_agent_under_its_connection(
 
 def test_the_reply_of_the_agent_to_a_program_is_passed_on(connected):
     reply = TakeReply(4, "r1", 3, None, PROGRAM.connection)
-    connected.hears(reply)
+    connected.receive(reply)
     assert connected.owner.of(TakeReply) == [reply]
 
 
@@ -277,7 +277,7 @@ def test_an_agent_that_returns_hears_of_the_program_anew_which_ends_its_control(
     connected.arrive()
     connected.far.beat(0.6)  # the agent was silent
     connected.sent.clear()
-    connected.hears(Tick(9, {}), 0.7)
+    connected.receive(Tick(9, {}), 0.7)
     assert connected.arrive(0.7)[0] == PROGRAM
 
 
@@ -286,40 +286,40 @@ def answers(bench, begin, seconds=1.0):
     bench.sent.clear()
     for step in range(round(20 * seconds)):
         now = begin + step / 20
-        bench.hears(Tick(2, {}), now)
+        bench.receive(Tick(2, {}), now)
         bench.far.beat(now)
     return len(bench.sent)
 
 
 def test_a_display_answers_more_often_while_a_page_has_control_or_commands(connected):
-    connected.hears(msgspec.structs.replace(REPORT, holder=None), 0.0)
+    connected.receive(msgspec.structs.replace(REPORT, holder=None), 0.0)
     assert answers(connected, 1.0) == 1, "with the list of pages"
     connected.far.send(FromPage(PAGE.connection, b'{"op":"take"}'))
     assert answers(connected, 1.95) == 20
     assert answers(connected, 4.0) == 1
-    connected.hears(REPORT, 5.0)  # a page has control
+    connected.receive(REPORT, 5.0)  # a page has control
     assert answers(connected, 5.0) == 20
 
 
 def test_an_idle_display_answers_over_its_connections_in_turn(connected):
-    connected.hears(msgspec.structs.replace(REPORT, holder=None), 0.0)
+    connected.receive(msgspec.structs.replace(REPORT, holder=None), 0.0)
     connected.ways.clear()
     assert answers(connected, 1.0, 4.0) == 4
     assert [way % 2 for way in connected.ways] in ([0, 1, 0, 1], [1, 0, 1, 0])
-    connected.hears(REPORT, 5.0)  # a page has control
+    connected.receive(REPORT, 5.0)  # a page has control
     connected.ways.clear()
     answers(connected, 5.0)
     assert set(connected.ways) == {None}
 
 
 def test_the_first_command_of_an_idle_display_follows_an_answer(connected):
-    """The agent may have no newer sign of life, and would end the control at once."""
+    """Without a recent answer the agent would end the control at once."""
     connected.arrive()
     take = FromPage(PAGE.connection, b'{"op":"take","robot":"r1"}')
-    connected.hears(Tick(2, {}), 2.9)
+    connected.receive(Tick(2, {}), 2.9)
     connected.far.send(take)
     assert connected.arrive(2.95) == [take]
-    connected.hears(REPORT, 2.95)
+    connected.receive(REPORT, 2.95)
     assert connected.displays.look(3.0) == []
     connected.sent.clear()
     connected.far.send(take)

@@ -1,4 +1,4 @@
-"""A page's socket at the gates of agents, and at that of its own computer."""
+"""A page's socket at the gates of agents and at the gate of its own computer."""
 
 import json
 
@@ -12,7 +12,7 @@ AGENT = "zenoh://127.0.0.1:7447/bay3"
 
 
 class Link:
-    """A way to a gate that keeps what is sent."""
+    """A link to a gate; keeps the frames that are sent."""
 
     ready, trouble, pid = True, None, None
 
@@ -52,15 +52,14 @@ class Page:
         return self.links[-1]
 
     def send(self, text):
-        """Send a frame; return whether the own gate and the agent's got it."""
+        """Send a frame; return whether the own gate and the agent's gate got it."""
         for link in self.links:
             link.texts.clear()
         self._socket.receive(text)
         data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
         for link in self.links:
-            assert all(
-                data.startswith(text) for text in link.texts
-            )  # long ones are cut
+            # Long frames are cut.
+            assert all(data.startswith(text) for text in link.texts)
         return tuple(bool(link.texts) for link in self.links)
 
 

@@ -1,4 +1,4 @@
-"""What a display receives of a topic that other displays may need more often."""
+"""Messages of a topic for a display, while other displays need them more often."""
 
 import asyncio
 import time
@@ -12,7 +12,7 @@ from webmap.ros.rosbridge import ops
 
 
 class Clock:
-    """A loop whose time a test lets pass."""
+    """An event loop with a clock that the test advances."""
 
     def __init__(self, monkeypatch):
         self.now = 100.0
@@ -34,7 +34,7 @@ class Clock:
         self.timers.append((self.now + after, fn, handle))
         return handle
 
-    def pass_on(self, seconds):
+    def advance(self, seconds):
         self.now += seconds
         due = [each for each in self.timers if each[0] <= self.now]
         self.timers = [each for each in self.timers if each[0] > self.now]
@@ -63,12 +63,12 @@ def test_of_what_is_needed_rarely_only_the_newest_piece_is_read(clock):
     heard.subscribe("1", 5000)
     for number in range(150):
         heard.arrived("key", b"%d" % number)
-        clock.pass_on(0.0625)
+        clock.advance(0.0625)
     assert taken == [b"0", b"80"]  # at once, and after five seconds
-    assert clock.calls < 10  # the model's thread is left alone
-    clock.pass_on(5.0)
-    assert taken[-1] == b"149"  # also the last of all
-    clock.pass_on(60.0)
+    assert clock.calls < 10  # the model's thread is rarely called
+    clock.advance(5.0)
+    assert taken[-1] == b"149"  # the last piece is passed on too
+    clock.advance(60.0)
     assert len(taken) == 3
 
 
@@ -77,7 +77,7 @@ def test_what_waits_comes_at_once_when_it_is_needed_more_often(clock):
     heard = Heard(taken.append, clock)
     heard.subscribe("1", 5000)
     heard.arrived("key", b"a")
-    clock.pass_on(0.0)
+    clock.advance(0.0)
     heard.arrived("key", b"b")
     assert taken == [b"a"]
     heard.subscribe("2", 100)
@@ -85,7 +85,7 @@ def test_what_waits_comes_at_once_when_it_is_needed_more_often(clock):
     heard.unsubscribe("1")
     heard.arrived("key", b"c")
     assert taken == [b"a", b"b", b"c"]
-    clock.pass_on(60.0)
+    clock.advance(60.0)
     assert len(taken) == 3
 
 
@@ -94,10 +94,10 @@ def test_what_waits_is_dropped_with_the_subscription(clock):
     heard = Heard(taken.append, clock)
     heard.subscribe("1", 5000)
     heard.arrived("key", b"a")
-    clock.pass_on(0.0)
+    clock.advance(0.0)
     heard.arrived("key", b"b")
     heard.forget()
-    clock.pass_on(60.0)
+    clock.advance(60.0)
     assert taken == [b"a"]
 
 
@@ -111,7 +111,7 @@ def test_nothing_is_passed_to_a_loop_that_has_ended(clock):
 
 
 class Peer:
-    """A session that keeps who listens, and what was sent."""
+    """A session that keeps the listeners and the sent data."""
 
     trouble = None
 
@@ -145,14 +145,14 @@ def test_a_connection_listens_to_a_topic_until_its_last_subscription_ends(clock)
     ((key, arrived),) = peer.listeners.values()
     lane.send(ops.subscribe("/scan", id="2", throttle_rate=5000))
     lane.send(ops.unsubscribe("/scan", id="1"))
-    assert len(peer.listeners) == 1  # and goes on with the second subscription
+    assert len(peer.listeners) == 1  # it remains for the second subscription
     arrived(key, data.pack_frame(b"{}"))
-    clock.pass_on(0.0)
+    clock.advance(0.0)
     arrived(key, data.pack_frame(b"[]"))
     assert taken == [b"{}"]
     lane.send(ops.unsubscribe("/other", id="9"))
     lane.send(ops.unsubscribe("/scan", id="2"))
     assert peer.listeners == {}
-    clock.pass_on(60.0)
+    clock.advance(60.0)
     assert taken == [b"{}"]
     assert len(peer.sent) == 5  # the agent gets each operation

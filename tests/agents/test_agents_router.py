@@ -1,4 +1,4 @@
-"""Addresses of routers and agents, users, and what the router lets them do."""
+"""Addresses of routers and agents, users, and the access rules of the router."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Scans over an uplink: what remains of the distances, and at which angles."""
+"""Scans over an uplink: the distances and angles that remain."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Peers and a real router: users, rules, TLS, and what is lost with a connection."""
+"""Peers and a real router: users, rules, TLS and lost connections."""
 
 import time
 from contextlib import ExitStack, contextmanager
@@ -55,7 +55,7 @@ def peers(place, *users):
 def wait_for(check, within=10.0):
     deadline = time.monotonic() + within
     while not check():
-        assert time.monotonic() < deadline, "it did not happen"
+        assert time.monotonic() < deadline, "timed out"
         time.sleep(0.01)
 
 

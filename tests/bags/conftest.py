@@ -1,4 +1,4 @@
-"""What the tests of recordings share."""
+"""Fixtures of the tests of recordings."""
 
 import pytest
 
@@ -7,5 +7,5 @@ from bag_making import Made
 
 @pytest.fixture(scope="module", params=["ros1", "ros2"])
 def made(request):
-    """What makes messages and bags, of either ROS."""
+    """An object that makes messages and bags of ROS 1 or ROS 2."""
     return Made(request.param)

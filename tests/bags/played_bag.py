@@ -1,4 +1,4 @@
-"""A recording that is played without sockets and in no time, and a client of it."""
+"""A recording that is played at once and without sockets, and its client."""
 
 import asyncio
 import json
@@ -46,7 +46,7 @@ class Client:
 
 @asynccontextmanager
 async def played(bag, **options):
-    """Play a bag to its end in no time, and give the player."""
+    """Play a bag to its end at once; return the player."""
     recording = Recording([bag])
     player = Player(recording, rate=1000.0, now=lambda: NOW, **options)
     player.replay.start()

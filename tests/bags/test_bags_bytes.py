@@ -1,4 +1,4 @@
-"""The bytes of messages, compared with those that rosbags makes for every type."""
+"""The bytes of messages, compared with those of rosbags for every type."""
 
 import random
 
@@ -11,7 +11,7 @@ from webmap.ros.rosbridge.server.encode import serialize
 
 
 def filled(field, some):
-    """A value that fits a field, other at each call."""
+    """Return a value that fits a field; each call returns another value."""
     if not field.is_array:
         return one(field, some)
     count = some.randrange(4) if field.size is None else field.size

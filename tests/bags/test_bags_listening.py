@@ -1,4 +1,4 @@
-"""What is listened to while it is recorded, and what is said on the way."""
+"""Which topics are recorded, and what is reported during the recording."""
 
 import asyncio
 import json
@@ -21,7 +21,7 @@ STRING = "std_msgs/String"
 
 
 class FakeBridge:
-    """A bridge whose topics and messages are the test's."""
+    """A bridge whose topics and messages come from the test."""
 
     def __init__(self, topics):
         self.now, self.callbacks, self.state = dict(topics), {}, "open"
@@ -40,7 +40,7 @@ class FakeBridge:
         self.callbacks[topic] = callback
         return SimpleNamespace()
 
-    def says(self, topic, message):
+    def feed(self, topic, message):
         operation = {"op": "publish", "topic": topic, "msg": message}
         self.callbacks[topic](Publish(topic, json.dumps(operation).encode()))
 
@@ -58,7 +58,7 @@ class FakeBridge:
 
 
 class FakeRecorder:
-    """Notes what it gets; it knows no type of ``acme_msgs``."""
+    """Records its messages; it does not know the types of ``acme_msgs``."""
 
     def __init__(self):
         self.got, self.times, self.dropped = [], [], []
@@ -84,13 +84,13 @@ def quick(monkeypatch):
 
 
 class Story:
-    """One recording, and what happens while it goes on."""
+    """One recording, and the events while it runs."""
 
     def __init__(self, topics, **options):
         self.bridge, self.recorder = FakeBridge(topics), FakeRecorder()
-        self.said, self.stop = [], asyncio.Event()
+        self.reported, self.stop = [], asyncio.Event()
         self.listening = Listening(
-            self.bridge, self.recorder, report=self.said.append, **options
+            self.bridge, self.recorder, report=self.reported.append, **options
         )
 
     def run(self, happens, **options):
@@ -118,7 +118,7 @@ def test_all_topics_except_the_replay_status_are_recorded():
     story = Story({"/odom": ODOMETRY, STATUS: STRING})
 
     async def happens():
-        story.bridge.says("/odom", {"x": 1})
+        story.bridge.feed("/odom", {"x": 1})
 
     story.run(happens)
     assert story.recorder.got == [("/odom", {"x": 1})]
@@ -134,7 +134,7 @@ def test_topics_that_appear_later_are_recorded():
             await asyncio.sleep(0.001)
 
     story.run(happens)
-    assert story.said == []
+    assert story.reported == []
 
 
 def test_only_the_named_topics_are_recorded():
@@ -156,7 +156,7 @@ def test_topics_with_unknown_types_are_reported_once():
             await asyncio.sleep(0.001)
 
     story.run(happens)
-    assert story.said == [
+    assert story.reported == [
         "Not recorded, since their types are unknown: /a (acme_msgs/Arm), "
         "/b (acme_msgs/Leg)"
     ]
@@ -170,7 +170,7 @@ def test_a_lost_and_restored_link_is_reported_with_the_gap():
         story.bridge.opened()
 
     story.run(happens)
-    lost, back = story.said
+    lost, back = story.reported
     assert lost.startswith("The connection was lost (the robot went to sleep)")
     assert back == "The connection is open again; 0.0 s are missing in the bag"
 
@@ -195,7 +195,7 @@ def test_a_full_disk_ends_recording_with_an_error():
 
     async def happens():
         story.recorder.full = True
-        story.bridge.says("/odom", {})
+        story.bridge.feed("/odom", {})
 
     with pytest.raises(OSError, match="No space left"):
         story.run(happens)
@@ -216,7 +216,7 @@ def test_a_link_that_never_opens_is_reported_with_the_reason(monkeypatch):
         )
 
     asyncio.run(ended())
-    assert story.said == [
+    assert story.reported == [
         "Nothing is recorded yet: the connection is not open (nothing listens there)",
         "Nothing is recorded: the connection was never open (nothing listens there)",
     ]
@@ -229,7 +229,7 @@ def test_slow_writing_does_not_change_the_arrival_time_of_messages():
 
     async def happens():
         for x in range(3):
-            story.bridge.says("/odom", {"x": x})
+            story.bridge.feed("/odom", {"x": x})
         all_came.append(time_module.time_ns())
 
     story.run(happens)
@@ -264,7 +264,7 @@ def test_messages_above_the_queue_limit_are_counted_as_dropped(monkeypatch):
 
     async def happens():
         for x in range(10):
-            story.bridge.says("/odom", {"x": x})
+            story.bridge.feed("/odom", {"x": x})
         all_came.set()
 
     story.run(happens)
@@ -276,18 +276,18 @@ def test_messages_above_the_queue_limit_are_counted_as_dropped(monkeypatch):
 
 
 class HandFed(Bridge):
-    """A bridge without a link, whose frames are the test's."""
+    """A bridge without a link, whose frames come from the test."""
 
     def start(self, loop):
         self._fan_out.begin(loop)
 
-    def says(self, topic, message):
+    def feed(self, topic, message):
         operation = {"op": "publish", "topic": topic, "msg": message}
         self._link._received(json.dumps(operation).encode())
 
 
 def test_large_messages_and_the_small_messages_between_them_are_all_recorded():
-    """For whoever shows messages the newest large one is enough; not for a bag."""
+    """A display needs only the newest large message; a bag needs all of them."""
     story = Story({"/map": "nav_msgs/OccupancyGrid"}, stated_types={})
     story.bridge = HandFed("ws://127.0.0.1:1")
     story.listening._bridge = story.bridge
@@ -307,7 +307,7 @@ def test_large_messages_and_the_small_messages_between_them_are_all_recorded():
         )
         await asyncio.sleep(0)
         for message in sent:
-            story.bridge.says("/map", message)
+            story.bridge.feed("/map", message)
         story.stop.set()
         await going
 

@@ -13,7 +13,7 @@ POSE, BOOL = "geometry_msgs/PoseStamped", "std_msgs/Bool"
 
 
 def found(topic, type_name, *messages):
-    """Return the marks of messages that come one a second."""
+    """Return the marks of messages that arrive once a second."""
     finder = MarkFinder()
     assert finder.wants(topic, type_name)
     for at, message in enumerate(messages):

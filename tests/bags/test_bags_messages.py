@@ -1,4 +1,4 @@
-"""Messages over rosbridge and what rosbags has in their place, there and back."""
+"""Conversions between rosbridge messages and rosbags messages, in both directions."""
 
 import base64
 import math
@@ -27,7 +27,7 @@ def version_of(made, type_name):
 
 
 def again(made, type_name, message):
-    """A message that went through rosbags' bytes."""
+    """Return a message after a conversion to rosbags' bytes and back."""
     version = version_of(made, type_name)
     read = (
         version.store.deserialize_ros1
@@ -40,7 +40,7 @@ def again(made, type_name, message):
 
 
 def plain(value):
-    """A message in which equal arrays and bytes compare equal."""
+    """Return a message in which equal arrays and bytes compare equal."""
     if isinstance(value, dict):
         return {name: plain(item) for name, item in value.items()}
     if isinstance(value, np.ndarray | bytes | array):

@@ -1,4 +1,4 @@
-"""When what is recorded is due, and what its stamps say then."""
+"""When recorded messages are due, and the stamps that they then have."""
 
 import pytest
 from hypothesis import given

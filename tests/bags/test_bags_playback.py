@@ -1,4 +1,4 @@
-"""The position in a recording: where commands lead, and which commands are valid."""
+"""The position in a recording: what commands do, and which commands are valid."""
 
 import contextlib
 import math

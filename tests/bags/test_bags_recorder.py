@@ -1,4 +1,4 @@
-"""What is written of messages that come, and what is said of those that are not."""
+"""Received messages are written; messages that are not written are reported."""
 
 from pathlib import Path
 
@@ -16,13 +16,13 @@ RANGE = "sensor_msgs/msg/Range"
 
 @pytest.fixture
 def recording(made, tmp_path):
-    """A recorder, its bag, and the sentences that it says."""
-    bag, said = new_bag(tmp_path / "office", made.dialect), []
-    return Recorder(bag, types_of(made.dialect), said.append), bag, said
+    """A recorder, its bag, and its reports."""
+    bag, reported = new_bag(tmp_path / "office", made.dialect), []
+    return Recorder(bag, types_of(made.dialect), reported.append), bag, reported
 
 
 def test_a_recorded_bag_is_readable_with_rosbags(made, recording):
-    recorder, bag, said = recording
+    recorder, bag, reported = recording
     assert recorder.add("/odom", made.schema.dialect.spell(ODOMETRY))
     recorder.take("/odom", made.odometry(0.0, 1.25), BEGIN)
     bag.close()
@@ -33,7 +33,7 @@ def test_a_recorded_bag_is_readable_with_rosbags(made, recording):
     assert odometry.pose.pose.position.x == 1.25
     assert odometry.header.frame_id == "odom"
     assert (recorder.messages, recorder.topics, recorder.dropped) == (1, 1, 0)
-    assert said == []
+    assert reported == []
 
 
 def test_maps_and_static_frames_are_recorded_as_latched(made, recording):
@@ -68,14 +68,14 @@ def test_a_topic_with_an_unknown_type_is_not_recorded(recording):
 def test_messages_that_do_not_fit_their_type_are_counted_and_reported_once(
     made, recording
 ):
-    recorder, bag, said = recording
+    recorder, bag, reported = recording
     recorder.add("/odom", ODOMETRY)
     recorder.take("/odom", {"pose": 3}, BEGIN)
     recorder.take("/odom", made.odometry(0.0, 1.0) | {"twist": 3}, BEGIN)
     recorder.take("/odom", made.odometry(0.0, 1.0), BEGIN)
     bag.close()
     assert (recorder.messages, recorder.dropped) == (1, 2)
-    (sentence,) = said
+    (sentence,) = reported
     assert "/odom: messages that do not fit the type" in sentence
 
 
@@ -84,13 +84,13 @@ def test_a_message_is_written_with_the_type_version_that_fits_its_fields(
     tmp_path, fields
 ):
     """Since Jazzy a Range has a variance, and before it had none."""
-    bag, said = new_bag(tmp_path / "office", "ros2"), []
-    recorder = Recorder(bag, types_of("ros2"), said.append)
+    bag, reported = new_bag(tmp_path / "office", "ros2"), []
+    recorder = Recorder(bag, types_of("ros2"), reported.append)
     sonar = Made("ros2").message("sensor_msgs/Range", range=1.5) | fields
     assert recorder.add("/sonar", RANGE)
     recorder.take("/sonar", sonar, BEGIN)
     bag.close()
-    assert said == []
+    assert reported == []
     with AnyReader([bag.path]) as reader:
         ((connection, _, data),) = reader.messages()
         read = reader.deserialize(data, connection.msgtype)
@@ -106,7 +106,7 @@ def test_an_existing_bag_is_not_overwritten(made, tmp_path):
 
 
 def test_a_bag_that_rosbags_cannot_create_is_an_error(made, tmp_path, monkeypatch):
-    monkeypatch.setattr(Path, "exists", lambda _: False)  # it comes in between
+    monkeypatch.setattr(Path, "exists", lambda _: False)  # made meanwhile
     (tmp_path / "office").mkdir()
     (tmp_path / "office.bag").touch()
     with pytest.raises(ConfigError, match=r"cannot be created: .* exists already"):

@@ -1,4 +1,4 @@
-"""What is read of a bag, and what is said of one that cannot be read."""
+"""Reading a bag, and the errors of a bag that cannot be read."""
 
 import os
 import re
@@ -15,7 +15,7 @@ from webmap.base.errors import ConfigError
 
 @pytest.fixture(scope="module")
 def bag(made, tmp_path_factory):
-    """A bag of four seconds: odometry, a map said once, a velocity."""
+    """A bag of four seconds: odometry, a map published once, a velocity."""
     return made.bag(
         tmp_path_factory.mktemp(made.dialect) / "office",
         ("/map", GRID, 0.0, made.grid([0, 100])),
@@ -166,9 +166,9 @@ def test_circular_symbolic_links_are_refused(tmp_path):
 def test_a_too_large_metadata_file_is_refused(tmp_path):
     with (tmp_path / "metadata.yaml").open("wb") as file:
         file.truncate(5 << 20)
-    said = refusal(tmp_path)
-    assert "got 5242880 bytes, expected at most" in said
-    assert "for the description of a bag" in said
+    error = refusal(tmp_path)
+    assert "got 5242880 bytes, expected at most" in error
+    assert "for the description of a bag" in error
 
 
 @pytest.mark.parametrize("name", ["empty.bag", "empty.mcap", "empty.db3"])
@@ -208,12 +208,12 @@ def test_a_topic_with_an_undefined_type_is_left_out_with_a_warning(tmp_path):
         )
         writer.write(arm, BEGIN, bytes(8))
         writer.write(odom, BEGIN + 1, version.bytes_of(Made("ros2").odometry(0.0, 1.0)))
-    said = []
-    # The file alone, since with its folder rosbags checks the definitions, too.
-    recording = Recording([tmp_path / "office" / "office.mcap"], warn=said.append)
+    warnings = []
+    # Only the file, as rosbags checks the definitions of a folder, too.
+    recording = Recording([tmp_path / "office" / "office.mcap"], warn=warnings.append)
     assert list(recording.topics) == ["/odom"]
     assert [one.topic for one in recording.messages(BEGIN)] == ["/odom"]
-    assert said == [
+    assert warnings == [
         "office.mcap: /arm (acme_msgs/msg/Arm) is left out: there is no definition of "
         "acme_msgs/msg/Joint"
     ]
@@ -232,10 +232,10 @@ def test_a_topic_with_a_recursive_type_is_left_out_with_a_warning(tmp_path):
         )
         writer.write(arm, BEGIN, bytes(8))
         writer.write(odom, BEGIN + 1, version.bytes_of(Made("ros2").odometry(0.0, 1.0)))
-    said = []
-    recording = Recording([tmp_path / "office" / "office.mcap"], warn=said.append)
+    warnings = []
+    recording = Recording([tmp_path / "office" / "office.mcap"], warn=warnings.append)
     assert list(recording.topics) == ["/odom"]
-    assert said == [
+    assert warnings == [
         "office.mcap: /arm (acme_msgs/msg/Arm) is left out: acme_msgs/Arm is nested "
         "too deep: in acme_msgs/Arm"
     ]
@@ -250,12 +250,12 @@ def test_messages_that_do_not_match_their_type_are_left_out_with_one_warning(tmp
         )
         for moment in range(3):
             writer.write(odom, BEGIN + moment, b"\x01\x02")
-    said = []
-    recording = Recording([tmp_path / "bad.bag"], warn=said.append)
+    warnings = []
+    recording = Recording([tmp_path / "bad.bag"], warn=warnings.append)
     assert [recording.message(one) for one in recording.messages(BEGIN)] == [None] * 3
-    assert len(said) == 1
+    assert len(warnings) == 1
     assert re.search(
-        r"messages of /odom that are not of the type .* are not played", said[0]
+        r"messages of /odom that are not of the type .* are not played", warnings[0]
     )
     recording.close()
 

@@ -1,4 +1,4 @@
-"""A recording that is played: what those who listen get, and what nobody can do."""
+"""Playing a recording: what subscribers receive, and which requests are refused."""
 
 import asyncio
 import threading
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def bag(made, tmp_path_factory):
-    """A map and two static frames at first, then a pose each second."""
+    """First a map and two static frames, then a pose each second."""
     return made.bag(
         tmp_path_factory.mktemp(made.dialect) / "office",
         ("/map", GRID, 0.0, made.grid([0, 100])),
@@ -53,7 +53,7 @@ def test_stamps_are_moved_to_the_time_of_playing(made, bag):
         player.replay.publish(first, player._playback.pace(NOW + SECOND))
         (message,) = client.messages("/odom")
         whole, rest = made.time(0)
-        # It was said, and came, a second after the begin.
+        # It was published, and arrived, one second after the begin.
         moved = NOW // SECOND + 2
         assert message["header"]["stamp"] == {whole: moved, rest: 0}
         recording.close()

@@ -19,7 +19,7 @@ LOG = {"ros1": "rosgraph_msgs/Log", "ros2": "rcl_interfaces/Log"}
 
 @pytest.fixture(scope="module")
 def bag(made, tmp_path_factory):
-    """Two maps, frames of two nodes, a pose each second, and an error in the log."""
+    """A bag with two maps, frames of two nodes, a pose each second, and a log error."""
     log = LOG[made.dialect]
     error = made.message(log, level=40, name="/base", msg="stuck")
     return made.bag(

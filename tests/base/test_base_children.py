@@ -1,4 +1,4 @@
-"""Child processes: what they import, and what ends them."""
+"""Child processes: what they import, and when they end."""
 
 import ast
 import asyncio
@@ -51,7 +51,7 @@ def bag(tmp_path):
 
 
 def gone(process):
-    """Wait until a process that is no child of this one has ended."""
+    """Wait until a process that is not a child of this process has ended."""
     _, alive = psutil.wait_procs([process], timeout=15)
     return not [one for one in alive if one.status() != psutil.STATUS_ZOMBIE]
 

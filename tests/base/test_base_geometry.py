@@ -1,4 +1,4 @@
-"""Poses, orientations and maps of the plane keep their laws."""
+"""Poses, orientations and affine maps obey their mathematical rules."""
 
 import math
 

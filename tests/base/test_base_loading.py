@@ -1,4 +1,4 @@
-"""Modules that are imported in another thread than that of the event loop."""
+"""Modules that are imported in another thread than the event loop's."""
 
 import asyncio
 import sys
@@ -35,7 +35,7 @@ def test_an_import_begins_without_being_awaited(heavy):
     async def scenario():
         load_soon(heavy)
 
-    asyncio.run(scenario())  # waits for its threads
+    asyncio.run(scenario())  # waits for the threads
     assert sys.modules[heavy].thread is not threading.current_thread()
 
 

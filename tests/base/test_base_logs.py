@@ -1,4 +1,4 @@
-"""What gets into a log, whoever has set it up."""
+"""The lines of a log, whichever program configured it."""
 
 import ast
 import io
@@ -29,7 +29,7 @@ EVIL = "bad\n2026-01-01 ERROR webmap.gate: forged\r\x1b[2J\x9b31m\u202e\u2028\ud
 
 @pytest.fixture
 def written():
-    """What a program's own handler writes, which knows nothing of WebMap."""
+    """The lines of a handler that does not belong to WebMap."""
     stream = io.StringIO()
     handler = logging.StreamHandler(stream)
     handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))

@@ -1,4 +1,4 @@
-"""Whether somebody looks: open pages, and a time of grace after the last one."""
+"""Robots are watched while pages are open, and for a short time afterwards."""
 
 from webmap.base.looking import GRACE, Looking
 

@@ -1,4 +1,4 @@
-"""What a map takes is given back when it goes, whatever small thing came after it."""
+"""The memory of a map is returned even if small objects were allocated after it."""
 
 import platform
 import subprocess
@@ -21,7 +21,7 @@ print(psutil.Process().memory_info().rss - before)
 
 
 def left_behind(*, returning: bool) -> int:
-    """Return the bytes that a process holds after a map of 16 MiB came and went."""
+    """Return the bytes that a process holds after it made and deleted a 16 MiB map."""
     program = LEFT_BEHIND.format(returning=returning)
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
@@ -29,7 +29,11 @@ def left_behind(*, returning: bool) -> int:
     return int(done.stdout)
 
 
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="glibc's own habit")
+@pytest.mark.skipif(
+    platform.libc_ver()[0] != "glibc", reason="only glibc keeps the memory"
+)
 def test_the_memory_of_a_deleted_map_is_returned_to_the_system():
-    assert left_behind(returning=False) > 15 << 20, "the habit is there to be ended"
+    assert left_behind(returning=False) > 15 << 20, (
+        "glibc keeps the memory without the measure"
+    )
     assert left_behind(returning=True) < 2 << 20

@@ -1,4 +1,4 @@
-"""Files that people name, and what is no file though it has a name."""
+"""Files that users name, and paths that are not regular files."""
 
 import errno
 import os
@@ -87,15 +87,15 @@ def test_a_failed_write_on_a_full_disk_keeps_the_old_file(tmp_path, monkeypatch)
 def test_yaml_errors_name_the_line_of_the_value(tmp_path):
     file = tmp_path / "a.yaml"
     file.write_text("# places\nlabels:\n  - name: A\n    x: 1\n  - {x: 2}\n")
-    said = LinedYaml(file)
-    assert said.data == {"labels": [{"name": "A", "x": 1}, {"x": 2}]}
+    parsed = LinedYaml(file)
+    assert parsed.data == {"labels": [{"name": "A", "x": 1}, {"x": 2}]}
     ways = [("labels",), ("labels", 0, "x"), ("labels", 1, "name"), ("none",)]
-    lines = [str(said.wrong(way, "?")).split(":")[1] for way in ways]
+    lines = [str(parsed.wrong(way, "?")).split(":")[1] for way in ways]
     assert lines == ["2", "4", "5", "2"]
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "expected"),
     [
         ("a: 1\nb: &x [1]\nc: *x\n", ":3: this is not YAML: aliases (*name) are not"),
         ("a: 1\na: 2\n", ':2: this is not YAML: the key "a" is defined twice'),
@@ -106,12 +106,12 @@ def test_yaml_errors_name_the_line_of_the_value(tmp_path):
         ("[" * 5000, ":1: this is not YAML: values are nested more than 50 deep"),
     ],
 )
-def test_invalid_yaml_is_refused_with_its_line(tmp_path, text, said):
+def test_invalid_yaml_is_refused_with_its_line(tmp_path, text, expected):
     file = tmp_path / "a.yaml"
     file.write_text(text)
     with pytest.raises(ConfigError) as error:
         LinedYaml(file)
-    assert str(error.value).startswith(f"{file}{said}")
+    assert str(error.value).startswith(f"{file}{expected}")
 
 
 def test_control_characters_are_escaped_in_yaml_errors(tmp_path):

@@ -1,4 +1,4 @@
-"""On which line of a TOML file something stands."""
+"""The line of each value in a TOML file."""
 
 import tomllib
 
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from webmap.config.toml_text import Lines
 
-# Each number is the line that it stands on.
+# Each number is the number of its own line.
 EVERYTHING = r'''# a comment with [brackets] = "and" {more}
 first = 2
 "quoted key" = 3

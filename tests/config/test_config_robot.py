@@ -160,7 +160,9 @@ def test_all_mistakes_are_reported_at_once_with_their_keys():
     }
     with pytest.raises(ConfigError) as refused:
         RobotConfig.from_dict(wrong)
-    said = [line.removeprefix("robot '?': ") for line in str(refused.value).split("\n")]
+    errors = [
+        line.removeprefix("robot '?': ") for line in str(refused.value).split("\n")
+    ]
     begun = [
         'nmae: there is no key "nmae" here; did you mean "name"?',
         'odometry.topic: got the text "/a b", expected the name of a topic',
@@ -172,8 +174,8 @@ def test_all_mistakes_are_reported_at_once_with_their_keys():
         'the key "name" is missing',
         'cameras[1]: a second camera is called "ARM"',
     ]
-    assert len(said) == len(begun)
-    for line, start in zip(said, begun, strict=True):
+    assert len(errors) == len(begun)
+    for line, start in zip(errors, begun, strict=True):
         assert line.startswith(start)
 
 
@@ -232,7 +234,7 @@ def test_applying_a_configuration_changes_only_different_parts(bridges):
     robot = Robot.from_config(old, bridges)
     try:
         kept = robot.modules[0]
-        robot.add_module("Trail")  # as a program does
+        robot.add_module("Trail")  # as a program writes it
         new = RobotConfig(
             name="Bob",
             bridge=URL,

@@ -1,4 +1,4 @@
-"""A warning about passwords in a fleet file that others can read."""
+"""A warning about passwords in a fleet file that other users can read."""
 
 import pytest
 
@@ -11,7 +11,7 @@ CAMERA = 'cameras = ["http://{}"]\n'
 
 @pytest.fixture
 def warned(tmp_path, caplog):
-    """Read a file with some rights, and return what is logged."""
+    """Read a file with this mode; return the log messages."""
 
     def read(text, mode, name="my fleet.toml"):
         file = tmp_path / name
@@ -34,11 +34,11 @@ def warned(tmp_path, caplog):
     ],
 )
 def test_a_password_readable_by_other_users_causes_a_warning(warned, text, mode):
-    (said,) = warned(text, mode)
-    assert "my fleet.toml contains a password, and other users of this comp" in said
-    assert f"(its mode is {mode:04o}): run chmod 600 '/" in said
-    assert said.endswith("/my fleet.toml'")
-    assert "word@" not in said
+    (warning,) = warned(text, mode)
+    assert "my fleet.toml contains a password, and other users of this comp" in warning
+    assert f"(its mode is {mode:04o}): run chmod 600 '/" in warning
+    assert warning.endswith("/my fleet.toml'")
+    assert "word@" not in warning
 
 
 @pytest.mark.parametrize(

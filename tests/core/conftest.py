@@ -1,4 +1,4 @@
-"""A page with a channel that writes down what it is asked."""
+"""A page with a channel that records its calls."""
 
 import itertools
 from dataclasses import dataclass, field
@@ -13,12 +13,12 @@ from webmap.core.page import Page, PageEntry
 
 @dataclass
 class Channel:
-    """Writes down every call, in order."""
+    """Records every call, in order."""
 
     calls: list[tuple[Any, ...]] = field(default_factory=list)
     mounted: dict[int, Any] = field(default_factory=dict)
     flags: dict[tuple[int, int, str], tuple[bool, bool]] = field(default_factory=dict)
-    """What is listened to: whether prevented, whether stopped."""
+    """For each event with a listener: whether it is prevented and stopped."""
     numbers: Any = field(default_factory=lambda: itertools.count(1))
 
     def mount(self, fragment, *, under, order=0, within=None):

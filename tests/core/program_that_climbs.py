@@ -1,4 +1,4 @@
-"""Flies a robot as a user's program does, and prints what came of it."""
+"""Flies a robot as a user's program does, and prints the results."""
 
 import asyncio
 import json
@@ -15,7 +15,7 @@ received: dict[str, object] = {}
 
 
 async def repeat(act, until, what: str) -> None:
-    """Do something at 20 Hz until it has its effect."""
+    """Call ``act`` at 20 Hz until the condition holds."""
     deadline = time.monotonic() + PATIENCE
     while not until():
         assert time.monotonic() < deadline, what
@@ -43,7 +43,7 @@ async def fly(base: WitnessRobot) -> None:
     def climb() -> None:
         try:
             bob.twist(0.05, z=0.9, rx=0.1, ry=-0.05, rz=0.2)
-        except NoLease:  # a machine that is busy: take it again
+        except NoLease:  # busy machine: take control again
             bob.motion.take()
 
     await repeat(climb, lambda: bob.position.z > 0.2, "odometry does not climb")
@@ -51,17 +51,19 @@ async def fly(base: WitnessRobot) -> None:
         received.twist.numbers for received in base.log.moving_since(0.0)
     ]
 
-    base.obeys = False  # what it was told last, it goes on with
+    base.obeys = False  # it keeps its last velocity
     bob.stop()
     stop = lambda: bob.report is not None and bob.report.stop  # noqa: E731
     await repeat(
-        lambda: None, lambda: stop() and stop().confirmed is not None, "no word of it"
+        lambda: None,
+        lambda: stop() and stop().confirmed is not None,
+        "no report of the stop",
     )
     received["a robot that climbs on"] = (stop().confirmed, stop().why)
     received["measured"] = bob.report.measured
     received["last"] = base.log.twists[-1].twist.numbers
     base.obeys = True
-    await repeat(lambda: None, lambda: stop().confirmed, "it does not stand")
+    await repeat(lambda: None, lambda: stop().confirmed, "the robot does not stop")
     received["standing"] = bob.report.measured
     received["wrong"] = check_invariants(
         base.log.twists, Bounds(v_max=1.0, z_max=0.5, zeros=PATIENCE)
@@ -76,13 +78,13 @@ def main() -> None:
         tasks.append(asyncio.get_running_loop().create_task(fly(base)))
         tasks[0].add_done_callback(lambda _: done.set())
 
-    # Without a timeout of its own, so that it climbs on when it does not obey.
+    # No timeout in the base, so it keeps climbing when it does not obey.
     with WitnessRobot(timeout=None, flies=True) as base:
         webmap.start()
         webmap.call(begin)
         done.wait(90)
         webmap.stop()
-    tasks[0].result()  # whatever went wrong
+    tasks[0].result()  # raises the error of the program, if any
     print(json.dumps(received))
 
 

@@ -1,4 +1,4 @@
-"""Drives a simulated robot as a user's program does, and prints what came of it."""
+"""Drives a simulated robot as a user's program does, and prints the results."""
 
 import asyncio
 import json
@@ -19,14 +19,14 @@ bob.set_odometry_topic(bridge, "/odom", 50)
 bob.set_twist_topic(bridge, "/cmd_vel", stops_within=0.25)
 bob.set_move_topic(bridge, GOAL, cancel_topic="/move_base/cancel")
 bob.set_alignment(10.0, 0.0, 90.0)
-# Navigation alone, of the same machine.
+# A robot on the same machine that can only navigate.
 ann = webmap.Robot("Ann")
 ann.set_move_topic(bridge, GOAL)
 received: dict[str, object] = {}
 
 
-class Ears:
-    """Hears what the gate wrote."""
+class SentCommands:
+    """Records the commands that the gate sent."""
 
     def __init__(self, robot) -> None:
         self.twists: list[dict] = []
@@ -40,9 +40,9 @@ class Ears:
 
 
 async def repeat(act, until, what: str) -> None:
-    """Do something at 20 Hz until it has its effect.
+    """Call ``act`` at 20 Hz until the condition holds.
 
-    On a machine that holds the way to the robot up, the gate may end the lease.
+    On a busy machine the way to the robot may be slow and the gate end the lease.
     """
     deadline = time.monotonic() + 20.0
     while not until():
@@ -54,8 +54,8 @@ async def repeat(act, until, what: str) -> None:
         await asyncio.sleep(0.05)
 
 
-def taken(act) -> str:
-    """Say whether the gate's client takes a command."""
+def outcome_of(act) -> str:
+    """Return "taken" if the gate's client accepts a command."""
     try:
         act()
     except NoLease as error:
@@ -64,10 +64,10 @@ def taken(act) -> str:
 
 
 async def drive() -> None:
-    ears = bob.add_module(Ears)
+    sent_commands = bob.add_module(SentCommands)
     seen: list[dict] = []
     bridge.subscribe(GOAL, seen.append, "geometry_msgs/PoseStamped")
-    # At once after the start: neither the gate nor a link is there yet.
+    # Directly after the start: the gate and the link are not ready yet.
     received["epoch"] = await bob.acquire_lease(timeout=20.0)
     begun = bob.yaw
     await repeat(
@@ -76,24 +76,24 @@ async def drive() -> None:
         "odometry does not turn",
     )
     received["twists"] = [
-        (msg["linear"]["x"], msg["angular"]["z"]) for msg in ears.twists
+        (msg["linear"]["x"], msg["angular"]["z"]) for msg in sent_commands.twists
     ]
-    # A metre ahead of the robot, wherever that is.
+    # One metre ahead of the robot.
     at = Pose(bob.position.x, bob.position.y, bob.yaw) @ Pose(1.0, 0.0, 0.0)
     place, turn = Vector3(at.x, at.y), Quaternion.from_yaw(at.yaw)
-    # What comes before the robot stands is refused.
+    # A goal is refused until the robot has stopped.
     await repeat(
-        lambda: ears.goals or bob.move(place, turn),
-        lambda: ears.goals and seen,
+        lambda: sent_commands.goals or bob.move(place, turn),
+        lambda: sent_commands.goals and seen,
         "no goal arrives",
     )
     received["asked"] = (at.x, at.y)
-    received["said"] = [ears.goals[0]["position"][axis] for axis in "xy"]
-    received["heard"] = [seen[0]["pose"]["position"][axis] for axis in "xy"]
+    received["sent goal"] = [sent_commands.goals[0]["position"][axis] for axis in "xy"]
+    received["published goal"] = [seen[0]["pose"]["position"][axis] for axis in "xy"]
     received["frame"] = seen[0]["header"]["frame_id"]
     bob.release_lease()
-    received["twist afterwards"] = taken(lambda: bob.twist(0.1))
-    received["move afterwards"] = taken(lambda: bob.move(place, turn))
+    received["twist afterwards"] = outcome_of(lambda: bob.twist(0.1))
+    received["move afterwards"] = outcome_of(lambda: bob.move(place, turn))
     received["epoch of goals alone"] = await ann.acquire_lease()
 
 
@@ -109,7 +109,7 @@ def main() -> None:
     webmap.call(begin)
     done.wait(90)
     webmap.stop()
-    tasks[0].result()  # whatever went wrong
+    tasks[0].result()  # raises the error of the program, if any
     print(json.dumps(received))
 
 

@@ -1,4 +1,4 @@
-"""What a button may never write, once a robot was told that it is moved by it."""
+"""A button must not publish to a topic that moves a robot."""
 
 import pytest
 
@@ -10,7 +10,7 @@ HALL = "ws://core-buttons:9090"
 
 
 def ways():
-    """Yield how a robot is told of a topic, the topic, and what it carries."""
+    """Yield a method that sets a topic, its arguments, the topic and its content."""
     hook = {"topic": "bob/lock", "type": "std_msgs/Bool"}
     yield "set_twist_topic", ["/bob/wheels"], {}, "/bob/wheels", "a velocity"
     yield (
@@ -39,17 +39,17 @@ def test_a_button_cannot_publish_to_a_topic_that_only_the_gate_publishes(
 ):
     bridge = webmap.Bridge(HALL)
     spec = ButtonSpec("Go", "topic", topic, "std_msgs/Bool")
-    assert declared_motion(spec, HALL) is None, "nobody knows the robot yet"
+    assert declared_motion(spec, HALL) is None, "no robot has the topic yet"
     robot = webmap.Robot("Bob")
     try:
         getattr(robot, setter)(bridge, *args, **options)
-        said = declared_motion(spec, HALL)
-        assert said is not None
-        assert said.startswith(f"{topic} carries {carried}, which only the gate")
+        reason = declared_motion(spec, HALL)
+        assert reason is not None
+        assert reason.startswith(f"{topic} carries {carried}, which only the gate")
         assert declared_motion(spec, "ws://another:9090") is None
     finally:
         robot.destroy()
-    assert declared_motion(spec, HALL) is None, "the robot is gone"
+    assert declared_motion(spec, HALL) is None, "the robot does not exist any more"
 
 
 def test_adding_a_button_that_publishes_an_initial_pose_is_refused():

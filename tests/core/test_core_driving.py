@@ -1,4 +1,4 @@
-"""A program takes a robot, drives it, sends it somewhere and lets it go: for real."""
+"""A program takes control of a robot, drives it, sends a goal and gives up control."""
 
 import json
 import subprocess
@@ -14,7 +14,7 @@ PROGRAM = Path(__file__).with_name("program_that_drives.py")
 
 @pytest.fixture(scope="module")
 def received():
-    """What came of a program that drove a simulated robot, through the real gate."""
+    """The results of a program that drove a simulated robot through the real gate."""
     with simulator("--flat", "--no-extras", "--seed", "7") as url:
         done = subprocess.run(
             [sys.executable, PROGRAM, url],
@@ -37,13 +37,13 @@ def test_on_send_twist_receives_the_velocity_that_the_gate_sent(received):
 
 
 def test_on_send_move_receives_the_goal_in_the_common_map(received):
-    assert received["said"] == pytest.approx(received["asked"])
+    assert received["sent goal"] == pytest.approx(received["asked"])
 
 
 def test_the_robot_receives_the_goal_in_its_own_map_and_frame(received):
     # Its map lies 10 m along x, turned by 90 degrees.
     x, y = received["asked"]
-    assert received["heard"] == pytest.approx([y, 10.0 - x])
+    assert received["published goal"] == pytest.approx([y, 10.0 - x])
     assert received["frame"] == "map"
 
 

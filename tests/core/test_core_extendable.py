@@ -1,4 +1,4 @@
-"""Modules: any object, by name, and never at another's cost."""
+"""Modules: any object, by name; a failing module does not affect others."""
 
 import asyncio
 
@@ -219,8 +219,8 @@ def test_an_exception_in_a_coroutine_trigger_is_reported(namespace):
         async with asyncio.timeout(10):
             while not owner.reported:
                 await asyncio.sleep(0)
-        (said,) = owner.reported
-        assert said.startswith("Slow.on_ring failed: ZeroDivisionError: ")
+        (message,) = owner.reported
+        assert message.startswith("Slow.on_ring failed: ZeroDivisionError: ")
 
     asyncio.run(scenario())
 

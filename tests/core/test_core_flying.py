@@ -12,7 +12,7 @@ PROGRAM = Path(__file__).with_name("program_that_climbs.py")
 
 @pytest.fixture(scope="module")
 def received():
-    """What came of a program that flew a robot behind a rosbridge of its own."""
+    """The results of a program that flew a robot behind a rosbridge of its own."""
     done = subprocess.run(
         [sys.executable, PROGRAM],
         capture_output=True,
@@ -32,7 +32,7 @@ def test_a_velocity_with_an_axis_without_a_limit_is_refused_as_a_whole(received)
 def test_the_robot_receives_all_six_velocity_components_within_its_limits(received):
     assert received["twists"]
     for x, y, turn, z, rx, ry in received["twists"]:
-        # 0.9 m/s upward is too fast, so all of the linear part is slower. How much
+        # 0.9 m/s upward is too fast, so the whole linear part is reduced. How much
         # depends on how quick this machine is.
         assert 0.1 < z <= 0.5
         assert x / z == pytest.approx(0.05 / 0.9)

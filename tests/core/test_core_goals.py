@@ -1,4 +1,4 @@
-"""Where goals and the initial pose go: what the gate is told, and what is refused."""
+"""Topics for goals and the initial pose: what the gate receives and refuses."""
 
 import pytest
 
@@ -11,7 +11,7 @@ SURE = (0.25, 0.25, 0.068)
 
 
 class Link:
-    """A bridge as far as goals need one."""
+    """A bridge with only the methods that goals need."""
 
     lag = 0.0
 
@@ -93,7 +93,7 @@ def test_set_move_topic_without_a_topic_or_an_action_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         (
             {"on_operator_loss": "cancle"},
@@ -104,11 +104,11 @@ def test_set_move_topic_without_a_topic_or_an_action_is_refused():
         ({"cancel_topic": "can cel"}, '"can cel", expected the name of a topic, such'),
     ],
 )
-def test_invalid_options_of_set_move_topic_are_refused(options, said):
+def test_invalid_options_of_set_move_topic_are_refused(options, expected):
     robot = Robot("Bob")
     with pytest.raises(ConfigError) as error:
         robot.set_move_topic(Link(), "/goal", **options)
-    assert said in str(error.value)
+    assert expected in str(error.value)
     assert robot.motion.config.move is None
 
 

@@ -17,7 +17,7 @@ class Link:
 
 
 class Circles(Layer):
-    """Draws a circle of the radius that each message says."""
+    """Draws a circle with the radius of each message."""
 
     drawn = 0
 

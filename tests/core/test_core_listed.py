@@ -1,4 +1,4 @@
-"""What lists of robots use: tags, the battery, and a failed goal."""
+"""Data for lists of robots: tags, the battery, and a failed goal."""
 
 from types import SimpleNamespace
 
@@ -81,7 +81,7 @@ def test_a_failed_goal_is_shown_until_someone_drives_the_robot_or_sends_another(
     assert after(report(goal="failed"))
     assert after(report("held", "failed"))
     assert not after(report("driving", "failed"))
-    assert not after(report("free", "failed")), "it was driven"
+    assert not after(report("free", "failed")), "driving clears the failed goal"
     assert after(report("free", "failed", "g2"))
     assert not after(report("stopped", "failed", "g2"))
     assert after(report("free", "failed", "g3"))

@@ -1,4 +1,4 @@
-"""What a page has whose HTML WebMap makes."""
+"""A page whose HTML is made by WebMap."""
 
 import asyncio
 from pathlib import Path

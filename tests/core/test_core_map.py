@@ -1,4 +1,4 @@
-"""What a map promises: the seed's chapter 5.2."""
+"""The specified behaviour of a map: chapter 5.2 of the seed."""
 
 import math
 
@@ -85,7 +85,7 @@ def test_a_robot_outside_the_view_is_centred_and_followed(container, channel):
 
 
 class Witness:
-    """A module that writes down the triggers that it hears."""
+    """A module that records its triggers."""
 
     def __init__(self, map) -> None:
         self.map = map
@@ -266,7 +266,7 @@ def test_teleop_refuses_invalid_speeds(container):
 def test_the_speeds_of_a_page_are_those_of_its_active_map(page):
     slow = Map(page.element("a"), 10, 10).add_module("Teleop", 0.2, 0.4)
     fast = Map(page.element("b"), 10, 10).add_module("Teleop", 1.0, 1.5)
-    assert page.speeds == (0.2, 0.4), "nobody knows yet, so the least"
+    assert page.speeds == (0.2, 0.4), "no map is active yet, so the lowest speeds"
     fast.on_message({"active": True})
     assert page.speeds == (1.0, 1.5)
     slow.on_message({"active": True})

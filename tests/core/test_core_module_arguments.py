@@ -27,7 +27,7 @@ def made(annotation):
 
 
 def named(value):
-    """Return what a value is called in the name of a test, in each process."""
+    """Return the name of a value for test ids, the same in each process."""
     return str(value).partition(" object at")[0]
 
 
@@ -54,7 +54,7 @@ ACCEPTED = [
     (Literal["a", 2], 2),
     (Annotated[int, "of something"], 2),
     (Callable[[], None], len),
-    (Bridge, object()),  # a stand-in, as tests have them
+    (Bridge, object()),  # a fake, as in tests
     (Speaks, "anything"),
     (Any, object()),
     ("Robot | None", object()),
@@ -136,8 +136,8 @@ def test_missing_unknown_and_extra_arguments_are_refused():
 def test_owner_is_refused_as_a_keyword_even_with_variable_keyword_arguments():
     def factory(owner, one=0, **others): ...
 
-    said = r'no argument "owner"; .* takes \(one, \*\*others\)'
-    with pytest.raises(WrongArguments, match=said):
+    pattern = r'no argument "owner"; .* takes \(one, \*\*others\)'
+    with pytest.raises(WrongArguments, match=pattern):
         check_arguments(factory, [1], {"owner": 2})
 
 

@@ -1,4 +1,4 @@
-"""The name of a robot that has an agent."""
+"""Names of robots that have an agent."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""While another program publishes velocities to a robot, rosapi is asked who it is."""
+"""While another program publishes velocities, rosapi is asked for its node."""
 
 import asyncio
 from types import SimpleNamespace
@@ -17,7 +17,9 @@ REST = {
     "alarm": None,
     "link": "up",
 }
-SAID = SimpleNamespace(other_writer="another program publishes to /cmd_vel", **REST)
+OTHER_WRITER = SimpleNamespace(
+    other_writer="another program publishes to /cmd_vel", **REST
+)
 NOTHING = SimpleNamespace(other_writer=None, **REST)
 NODES = ["/rosbridge_websocket", "/teleop", "/webmap_sim", "/joy"]
 
@@ -51,7 +53,7 @@ def robot():
 
 
 def driven(robot, answers):
-    """Give a robot a topic on a bridge whose rosapi answers so."""
+    """Give a robot a velocity topic on a bridge whose rosapi returns these answers."""
     asked = []
 
     async def nodes(kind, topic):
@@ -65,7 +67,7 @@ def driven(robot, answers):
     return asked
 
 
-def hear(robot, *reports):
+def receive_reports(robot, *reports):
     async def scenario():
         for report in reports:
             robot.on_gate_report(report)
@@ -79,12 +81,12 @@ def test_the_publishing_nodes_are_sent_to_the_gate_without_those_of_bridges(
     robot, gate
 ):
     asked = driven(robot, [NODES, []])
-    hear(robot, NOTHING)
+    receive_reports(robot, NOTHING)
     assert asked == []
-    hear(robot, SAID, SAID)
-    assert asked == ["/cmd_vel"], "once in a while is enough"
+    receive_reports(robot, OTHER_WRITER, OTHER_WRITER)
+    assert asked == ["/cmd_vel"], "rosapi is not asked for each report"
     assert gate.named == [(robot.id, ("/teleop", "/joy"))]
-    hear(robot, NOTHING, SAID)
+    receive_reports(robot, NOTHING, OTHER_WRITER)
     assert gate.named[1:] == [(robot.id, ())]
 
 
@@ -93,18 +95,18 @@ def test_rosapi_is_asked_again_while_another_program_publishes(
 ):
     monkeypatch.setattr(motion, "ASK_WRITERS", 0.0)
     asked = driven(robot, [NODES, NODES])
-    hear(robot, SAID, SAID)
+    receive_reports(robot, OTHER_WRITER, OTHER_WRITER)
     assert len(asked) == 2
 
 
 def test_no_nodes_are_sent_to_the_gate_when_rosapi_does_not_answer(robot, gate):
     asked = driven(robot, [None])
-    hear(robot, SAID)
+    receive_reports(robot, OTHER_WRITER)
     assert (len(asked), gate.named) == (1, [])
 
 
 def test_no_nodes_are_sent_to_the_gate_for_a_robot_without_a_velocity_topic(
     robot, gate
 ):
-    hear(robot, SAID)
+    receive_reports(robot, OTHER_WRITER)
     assert gate.named == []

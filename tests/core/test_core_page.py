@@ -1,4 +1,4 @@
-"""What a page hears of hands: who is told, and what is left when they are not."""
+"""Events of a page: which handlers are called, and what a removed handler leaves."""
 
 import asyncio
 
@@ -19,13 +19,13 @@ def click(page, mount, element):
 
 
 async def settled():
-    """Let every task go on until it waits for something that does not come."""
+    """Let every task run until it waits for something that does not happen."""
     for _ in range(20):
         await asyncio.sleep(0)
 
 
 class Work:
-    """An async handler that goes on until it is cancelled."""
+    """An async handler that runs until it is cancelled."""
 
     def __init__(self):
         self.began = self.cancelled = 0
@@ -159,7 +159,7 @@ def test_a_running_button_call_continues_when_the_page_is_closed(page, monkeypat
     asyncio.run(scenario())
 
 
-# What the browser is asked.
+# Requests to the browser.
 
 
 def test_prevent_and_stop_of_any_handler_apply_to_the_event_in_the_browser(
@@ -198,7 +198,7 @@ def test_a_refused_listener_is_not_kept(page, channel, monkeypatch):
     assert page._listening == {}
 
 
-# What is left.
+# What remains after removal.
 
 
 def test_a_removed_handler_leaves_nothing_in_its_scope(page):

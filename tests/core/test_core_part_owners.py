@@ -1,4 +1,4 @@
-"""Which of several robots a part belongs to, by its name."""
+"""The name of a part shows which of several robots it belongs to."""
 
 import pytest
 
@@ -42,7 +42,7 @@ def test_a_part_without_a_namespace_does_not_belong_to_a_robot_without_one():
 
 
 def test_robots_of_the_same_namespace_count_as_one():
-    """Each page may make a robot of its own for the same one."""
+    """Each page may make its own object for the same robot."""
     assert owners("a", "a").owner("base: Motors", "a") == "own"
 
 

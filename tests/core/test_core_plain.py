@@ -11,7 +11,7 @@ from webmap.core.motion import robot_motions
 
 
 def toml(value) -> str:
-    """Return a value as TOML has it, in one line; there is no word for None."""
+    """Return a value as TOML in one line; TOML has no value for None."""
     match value:
         case bool():
             return str(value).lower()

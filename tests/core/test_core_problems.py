@@ -1,4 +1,4 @@
-"""What fails of a thing that maps show: told once, numbers aside, and taken back."""
+"""Problems are reported once, whatever their numbers, and are cleared."""
 
 import logging
 
@@ -37,7 +37,7 @@ def lines(caplog) -> "Lines":
 
 
 class Lines:
-    """What the log has."""
+    """The lines of the log."""
 
     def __init__(self, caplog) -> None:
         self._caplog = caplog
@@ -110,7 +110,7 @@ def test_a_mended_problem_is_removed_from_the_page_once(problems, channel):
     number = received(channel)[0][2]
     problems.clear("plan")
     problems.clear("plan")
-    problems.clear("never said")
+    problems.clear("never set")
     assert received(channel)[1:] == [("mended", number)]
     assert problems.current == {}
 
@@ -121,7 +121,7 @@ def test_a_recurring_problem_is_logged_once_a_minute(problems, channel, lines, c
         clock.now += 0.1
         problems.clear("plan")
     assert len(lines.all) == 3, "at 0, 60 and 120 seconds"
-    assert len(received(channel)) == 2500, "but the page knows how it is"
+    assert len(received(channel)) == 2500, "the page receives each change"
     assert len({call[-1] for call in received(channel)}) == 1
 
 

@@ -1,4 +1,4 @@
-"""Refused messages, counted for people."""
+"""Refused messages are counted and shown to users."""
 
 from datetime import UTC, datetime
 

@@ -1,4 +1,4 @@
-"""What a robot promises: the seed's chapter 5.3."""
+"""The specified behaviour of a robot: chapter 5.3 of the seed."""
 
 import asyncio
 import contextlib
@@ -25,7 +25,7 @@ class Listening(Removal):
 
 
 class Link:
-    """A bridge that is open at once and says what it is told to say."""
+    """A bridge that is open at once and whose messages the test publishes."""
 
     url = "ws://test:9090"
     state = "open"
@@ -52,7 +52,7 @@ class Link:
     def protect(self, topic, carries):
         self.protected[topic] = carries
 
-    def say(self, topic, message):
+    def publish(self, topic, message):
         for name, callback, _, _, decode in tuple(self.subscribed):
             if name == topic:
                 if decode is not None:
@@ -100,7 +100,7 @@ def test_a_robot_takes_its_pose_from_each_pose_type(type_name, known):
         robot = Robot("Bob")
         robot.set_odometry_topic(link, "/odom", throttle=50)
         await settle()
-        link.say("/odom", SHAPES[type_name])
+        link.publish("/odom", SHAPES[type_name])
         assert robot.valid
         assert (robot.position.x, robot.position.y) == (1.0, 2.0)
         assert robot.angle == pytest.approx(90.0)
@@ -125,8 +125,8 @@ def test_a_ros_2_type_name_is_decoded_as_the_same_type():
     asyncio.run(scenario())
 
 
-def told_of_odometry(robot: Robot) -> tuple[str | None, str | None]:
-    """Return topic and type of the odometry that the gate is told to look at."""
+def odometry_in_spec(robot: Robot) -> tuple[str | None, str | None]:
+    """Return topic and type of the odometry in the robot's declaration to the gate."""
     spec = robot.motion.spec()
     return spec.odometry_topic, spec.odometry_type
 
@@ -139,9 +139,9 @@ def test_the_gate_gets_an_odometry_topic_before_its_first_message(type):
         robot.set_move_topic(link, "/goal")
         robot.set_odometry_topic(link, "/odom", type=type)
         await settle()
-        assert told_of_odometry(robot) == ("/odom", type)
+        assert odometry_in_spec(robot) == ("/odom", type)
         robot.unsubscribe_odometry_topic()
-        assert told_of_odometry(robot) == (None, None)
+        assert odometry_in_spec(robot) == (None, None)
         robot.destroy()
 
     asyncio.run(scenario())
@@ -153,9 +153,9 @@ def test_a_pose_topic_without_velocity_is_not_given_to_the_gate_as_odometry():
         robot = Robot("Bob")
         robot.set_move_topic(link, "/goal")
         robot.set_odometry_topic(link, "/pose")
-        assert told_of_odometry(robot) == ("/pose", None)
+        assert odometry_in_spec(robot) == ("/pose", None)
         await settle()
-        assert told_of_odometry(robot) == (None, None)
+        assert odometry_in_spec(robot) == (None, None)
         robot.destroy()
 
     asyncio.run(scenario())
@@ -169,8 +169,8 @@ def test_a_topic_without_a_pose_is_not_given_to_the_gate_as_odometry():
             robot.set_move_topic(link, "/goal")
             robot.set_odometry_topic(link, "/odom")
             await settle()
-            link.say("/odom", {"data": "hello"})
-            assert told_of_odometry(robot) == (None, None)
+            link.publish("/odom", {"data": "hello"})
+            assert odometry_in_spec(robot) == (None, None)
             robot.destroy()
 
     asyncio.run(scenario())
@@ -181,7 +181,7 @@ def test_a_refused_topic_is_not_given_to_the_gate_as_odometry():
     robot.set_move_topic(Link(), "/goal")
     with pytest.raises(ConfigError):
         robot.set_odometry_topic(Link(), "/odom", type="std_msgs/String")
-    assert told_of_odometry(robot) == (None, None)
+    assert odometry_in_spec(robot) == (None, None)
     robot.destroy()
 
 
@@ -196,9 +196,9 @@ def test_rosapi_gives_the_type_of_a_pose_topic_before_its_first_message(
         robot.set_move_topic(link, "/goal")
         robot.set_odometry_topic(link, "/pose")
         await settle()
-        assert told_of_odometry(robot) == ("/pose", None)
+        assert odometry_in_spec(robot) == ("/pose", None)
         link.types["/pose"] = "geometry_msgs/PoseStamped"
-        while told_of_odometry(robot) != (None, None):
+        while odometry_in_spec(robot) != (None, None):
             await asyncio.sleep(0.01)
         (topic, _, type, _, _) = link.subscribed[0]
         assert (len(link.subscribed), topic, type) == (1, "/pose", link.types["/pose"])
@@ -217,9 +217,9 @@ def test_odometry_with_invalid_poses_is_still_given_to_the_gate():
         await settle()
         nowhere = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
         bad = {**pose(), "orientation": nowhere}
-        link.say("/odom", {**SHAPES["nav_msgs/Odometry"], "pose": {"pose": bad}})
+        link.publish("/odom", {**SHAPES["nav_msgs/Odometry"], "pose": {"pose": bad}})
         assert not robot.valid
-        assert told_of_odometry(robot) == ("/odom", "nav_msgs/Odometry")
+        assert odometry_in_spec(robot) == ("/odom", "nav_msgs/Odometry")
         robot.destroy()
 
     asyncio.run(scenario())
@@ -244,7 +244,7 @@ def test_an_odometry_message_without_a_pose_is_reported_as_a_problem():
         robot = Robot("Bob")
         robot.set_odometry_topic(link, "/odom")
         await settle()
-        link.say("/odom", {"data": "hello"})
+        link.publish("/odom", {"data": "hello"})
         assert (
             "with the fields data has no pose of a robot" in robot.problems["odometry"]
         )
@@ -263,7 +263,7 @@ def test_a_robot_has_the_orientation_of_its_odometry():
     robot = Robot("Bob")
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
     q = {"x": 0.5, "y": -0.5, "z": 0.5, "w": 0.5}
-    link.say("/odom", {**pose(), "orientation": q})
+    link.publish("/odom", {**pose(), "orientation": q})
     o = robot.orientation
     assert (o.x, o.y, o.z, o.w) == (0.5, -0.5, 0.5, 0.5)
 
@@ -272,9 +272,9 @@ def test_a_robot_keeps_its_last_position_after_unsubscribing_odometry():
     link = Link()
     robot = Robot("Bob")
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
-    link.say("/odom", pose())
+    link.publish("/odom", pose())
     robot.unsubscribe_odometry_topic()
-    link.say("/odom", pose(x=3.0))
+    link.publish("/odom", pose(x=3.0))
     assert (robot.position.x, robot.position.y) == (1.0, 2.0)
     assert link.subscribed == []
     robot.unsubscribe_odometry_topic()
@@ -294,9 +294,9 @@ def test_on_odometry_update_fires_only_when_the_pose_changes():
     robot = Robot("Bob")
     robot.add_module(Listener)
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
-    link.say("/odom", pose())
-    link.say("/odom", pose())
-    link.say("/odom", pose(x=3.0))
+    link.publish("/odom", pose())
+    link.publish("/odom", pose())
+    link.publish("/odom", pose(x=3.0))
     assert len(seen) == 2
 
 
@@ -305,13 +305,13 @@ def test_an_invalid_pose_is_ignored_and_reported_as_a_problem(bad):
     link = Link()
     robot = Robot("Bob")
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
-    link.say("/odom", pose())
-    link.say("/odom", pose(x=bad))
+    link.publish("/odom", pose())
+    link.publish("/odom", pose(x=bad))
     zeros = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
-    link.say("/odom", {**pose(), "orientation": zeros})
+    link.publish("/odom", {**pose(), "orientation": zeros})
     assert (robot.position.x, robot.position.y) == (1.0, 2.0)
     assert "ignored" in robot.problems["odometry"]
-    link.say("/odom", pose(x=3.0))
+    link.publish("/odom", pose(x=3.0))
     assert not robot.problems
 
 
@@ -321,7 +321,7 @@ def test_a_robot_without_a_pose_has_the_class_unplaced():
     assert "unplaced" in robot.svg.classes
     assert robot.pose_age is None
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/Pose")
-    link.say("/odom", pose())
+    link.publish("/odom", pose())
     assert "unplaced" not in robot.svg.classes
     assert robot.pose_age < 10
 
@@ -441,7 +441,7 @@ def test_a_robot_is_restored_from_plain_data():
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    ("data", "expected"),
     [
         ({}, 'the key "name" is missing'),
         (
@@ -459,8 +459,8 @@ def test_a_robot_is_restored_from_plain_data():
         ({"name": "Bob", "model": {"r": 1}}, "with a tag"),
     ],
 )
-def test_invalid_plain_data_of_a_robot_are_refused_with_the_reason(data, said):
-    with pytest.raises(ConfigError, match=said):
+def test_invalid_plain_data_of_a_robot_are_refused_with_the_reason(data, expected):
+    with pytest.raises(ConfigError, match=expected):
         Robot.from_dict(data)
 
 
@@ -485,8 +485,8 @@ def test_the_id_of_a_robot_does_not_depend_on_other_robots():
 
     def ids(*names):
         command = [sys.executable, "-c", program, *names]
-        said = subprocess.run(command, capture_output=True, text=True, check=True)
-        return dict(zip(names, said.stdout.split(), strict=True))
+        process = subprocess.run(command, capture_output=True, text=True, check=True)
+        return dict(zip(names, process.stdout.split(), strict=True))
 
     before, after = ids("Bob", "Ann"), ids("Cid", "Ann", "Bob")
     assert before == {name: after[name] for name in before}

@@ -1,4 +1,4 @@
-"""What can be the model of a robot, and the image files in it."""
+"""Valid models of a robot, and the image files in a model."""
 
 import pytest
 
@@ -30,7 +30,7 @@ def test_the_model_of_a_destroyed_robot_can_be_used_again():
     bob.destroy()
 
 
-# Image files: found beside the program, and there while the model is shown.
+# Image files are found beside the program and served while the model is shown.
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What a robot is doing, in words."""
+"""The state of a robot as a text."""
 
 import itertools
 from datetime import datetime, timedelta
@@ -27,7 +27,7 @@ REPORT = {
 
 
 def robot(doing="free", *, seen=None, age=0.1, silent=0.1, over=None, **changes):
-    """Return what is known of a robot: its report, and what the display has seen."""
+    """Return the known data of a robot: the gate's report and the display's data."""
     report = None
     if doing is not None:
         report = SimpleNamespace(doing=doing, **{**REPORT, **changes})
@@ -177,7 +177,7 @@ def report(**changes):
 
 
 def seen(**changes):
-    """Return a change of what the display knows of a robot."""
+    """Return a change of the display's data about a robot."""
     return lambda facts: facts._replace(**changes)
 
 
@@ -207,7 +207,7 @@ BY_PRECEDENCE = {
 """A fact for each state, the state with the highest precedence first."""
 
 OF_THE_GATE = set(get_args(Activity)) - {"down", "other"}
-"""States of which the gate reports one, so that no two of them are true."""
+"""States of which the gate reports only one at a time."""
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The start: what is wrong with one robot is said, and the others start."""
+"""The start: the error of one robot is reported, and the others start."""
 
 import pytest
 
@@ -10,7 +10,7 @@ from webmap.core.runtime import Runtime
 
 
 class Gate:
-    """Notes whom it was told of; refuses one."""
+    """Records the declared robots; refuses one of them."""
 
     def __init__(self):
         self.declared = []
@@ -35,7 +35,7 @@ class Gate:
 
 @pytest.fixture
 def gate(monkeypatch):
-    """A gate in place of the process, which hears of nobody else's robots."""
+    """A fake gate, which does not receive robots of other tests."""
     gate = Gate()
     monkeypatch.setattr(runtime_module, "_all_gates", lambda: gate)
     monkeypatch.setattr(runtime_module, "lifecycle", Lifecycle())

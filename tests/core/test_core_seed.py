@@ -1,4 +1,4 @@
-"""Every row of the table of 2012's names holds."""
+"""Every row of the table of the names from 2012 is true."""
 
 import inspect
 import re
@@ -47,7 +47,7 @@ def test_the_table_contains_every_name_of_the_2012_report():
 @pytest.mark.parametrize(("section", "old", "new"), list(rows()))
 def test_each_new_name_of_the_table_exists_with_its_arguments(section, old, new):
     if new.startswith("class ") or new == "constructor(*args)":
-        return  # Python's own
+        return  # from Python
     if new == "the same":
         for name in re.findall(r'"(\w+)"', old):
             assert name in webmap.modules.map.namespace
@@ -87,7 +87,7 @@ def find(path):
 
 
 def source_of(cls):
-    """Return what stands in a class and in those that it is made from."""
+    """Return the source of a class and of its base classes."""
     return "".join(inspect.getsource(each) for each in cls.__mro__[:-1])
 
 
@@ -104,7 +104,7 @@ def check_trigger(section, name, arguments):
     count = len([text for text in arguments.split(",") if text.strip()])
     fired = 'f"on_send_{kind}"' if name.startswith("on_send") else f'"{name}"'
     call = re.search(rf"notify_modules\({re.escape(fired)}(.*?)\)", source)
-    assert call, f"nothing fires {name}"
+    assert call, f"no code calls the trigger {name}"
     assert call[1].count(",") == count
 
 

@@ -1,4 +1,4 @@
-"""What a robot is told wrongly is refused where it is said, and is not kept."""
+"""A wrong argument of a robot's setter is refused at the call and is not kept."""
 
 import pytest
 
@@ -19,7 +19,7 @@ def robot():
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         (
             {"stops_within": "0.25"},
@@ -36,16 +36,16 @@ def robot():
         ({"vmax": 1.0}, 'there is no argument "vmax"; did you mean "v_max"?'),
     ],
 )
-def test_a_wrong_option_of_set_twist_topic_is_refused(robot, bridge, options, said):
+def test_a_wrong_option_of_set_twist_topic_is_refused(robot, bridge, options, expected):
     with pytest.raises(ConfigError) as error:
         robot.set_twist_topic(bridge, "/cmd_vel", **options)
     assert str(error.value).startswith("robot 'Bob': ")
-    assert said in str(error.value)
+    assert expected in str(error.value)
     assert robot.motion.spec() is None
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         (
             {"action_type": 5},
@@ -57,15 +57,15 @@ def test_a_wrong_option_of_set_twist_topic_is_refused(robot, bridge, options, sa
         ),
     ],
 )
-def test_a_wrong_option_of_set_move_topic_is_refused(robot, bridge, options, said):
+def test_a_wrong_option_of_set_move_topic_is_refused(robot, bridge, options, expected):
     with pytest.raises(ConfigError) as error:
         robot.set_move_topic(bridge, "/goal", **options)
-    assert said in str(error.value)
+    assert expected in str(error.value)
     assert robot.motion.spec() is None
 
 
 @pytest.mark.parametrize(
-    "say",
+    "set_topic",
     [
         lambda robot: robot.set_twist_topic("ws://robot:9090", "/cmd_vel"),
         lambda robot: robot.set_move_topic("ws://robot:9090", "/goal"),
@@ -75,13 +75,13 @@ def test_a_wrong_option_of_set_move_topic_is_refused(robot, bridge, options, sai
     ],
     ids=["twist", "move", "odometry", "tf", "initial pose"],
 )
-def test_a_url_in_place_of_a_bridge_is_refused(robot, say):
+def test_a_url_in_place_of_a_bridge_is_refused(robot, set_topic):
     with pytest.raises(ConfigError, match="bridge: expected a Bridge, got 'ws://rob"):
-        say(robot)
+        set_topic(robot)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "expected"),
     [
         (
             ("bad topic",),
@@ -98,11 +98,11 @@ def test_a_url_in_place_of_a_bridge_is_refused(robot, say):
     ],
 )
 def test_invalid_arguments_of_set_odometry_topic_are_refused(
-    robot, bridge, arguments, said
+    robot, bridge, arguments, expected
 ):
     with pytest.raises(ConfigError) as error:
         robot.set_odometry_topic(bridge, *arguments)
-    assert said in str(error.value)
+    assert expected in str(error.value)
     assert robot.feed is None
 
 

@@ -1,4 +1,4 @@
-"""What a robot does on STOP, its reset, and scan assist: set, told, kept, refused."""
+"""STOP, its reset and scan assist of a robot: set, sent to the gate, refused."""
 
 import asyncio
 import json
@@ -35,7 +35,7 @@ class Link:
 
 
 class Gate:
-    """Notes what a robot asks of it."""
+    """Records the requests of a robot."""
 
     ready = True
 
@@ -44,9 +44,9 @@ class Gate:
 
     def take(self, robot_id):
         self.asked.append(("take", robot_id))
-        taken = Future()
-        taken.set_result(7)
-        return taken
+        future = Future()
+        future.set_result(7)
+        return future
 
     def declare(self, spec):
         self.spec = spec
@@ -171,8 +171,8 @@ def test_acquire_lease_waits_for_the_first_report_of_a_restarted_gate(robot, gat
         robot.on_gate_down()
         asking = asyncio.create_task(robot.acquire_lease(timeout=10.0))
         await asyncio.sleep(0.1)
-        assert gate.asked == [], "what the gate before said counts no more"
-        assert robot.report is free, "but it is what pages show"
+        assert gate.asked == [], "the report of the previous gate does not count"
+        assert robot.report is free, "pages still show it"
         robot.on_gate_report(free)
         assert await asking == 7
 
@@ -183,9 +183,9 @@ def test_acquire_lease_waits_for_the_first_report_of_a_restarted_gate(robot, gat
 def test_a_program_cannot_publish_to_the_topic_of_a_stop_hook(robot):
     bridge = Bridge("ws://robot:9090")
     robot.set_twist_topic(bridge, "/cmd_vel", stop_hooks=[LOCK, E_STOP])
-    for said in (True, False):
+    for locked in (True, False):
         with pytest.raises(MotionRefused) as refused:
-            bridge.publish("lock/", {"data": said}, "std_msgs/Bool")
+            bridge.publish("lock/", {"data": locked}, "std_msgs/Bool")
     assert str(refused.value) == (
         "/lock carries the STOP of a robot, which only the gate publishes: use "
         "Robot.stop() and Robot.reset_stop()"
@@ -276,7 +276,7 @@ def test_a_footprint_given_as_a_radius_is_restored_from_plain_data(robot):
 
 
 @pytest.mark.parametrize(
-    ("hooks", "said"),
+    ("hooks", "expected"),
     [
         (
             [{"topic": 5}],
@@ -303,9 +303,11 @@ def test_a_footprint_given_as_a_radius_is_restored_from_plain_data(robot):
         ([{"topic": "cmd_vel"}], "/cmd_vel is the velocity topic"),
     ],
 )
-def test_an_invalid_stop_hook_is_refused_and_the_old_one_is_kept(robot, hooks, said):
+def test_an_invalid_stop_hook_is_refused_and_the_old_one_is_kept(
+    robot, hooks, expected
+):
     drivable(robot, stop_hooks=[LOCK])
-    with pytest.raises(ConfigError, match=f"robot 'Bob': .*{said}"):
+    with pytest.raises(ConfigError, match=f"robot 'Bob': .*{expected}"):
         drivable(robot, stop_hooks=hooks)
     assert robot.motion.spec().stop_hooks == (LOCK,)
 
@@ -316,7 +318,7 @@ def test_relative_names_of_stop_hooks_are_resolved_at_once(robot):
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    ("data", "expected"),
     [
         ({"topic": "/scan"}, "footprint"),
         ({"topic": "/scan", "footprint": "round"}, "footprint"),
@@ -324,8 +326,8 @@ def test_relative_names_of_stop_hooks_are_resolved_at_once(robot):
         ({"topic": "/scan", "footprint": 0.2, "brakes": 1}, "brakes"),
     ],
 )
-def test_invalid_plain_data_of_scan_assist_are_refused_with_the_key(data, said):
-    with pytest.raises(ConfigError, match=said):
+def test_invalid_plain_data_of_scan_assist_are_refused_with_the_key(data, expected):
+    with pytest.raises(ConfigError, match=expected):
         Robot.from_dict({"name": "Bob", "scan_assist": data})
 
 

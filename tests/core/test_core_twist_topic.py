@@ -1,4 +1,4 @@
-"""Numbers that no base has are refused where they are said, and are not kept."""
+"""Limits that no base has are refused at the call and are not kept."""
 
 import math
 
@@ -45,9 +45,9 @@ def test_an_invalid_limit_or_command_timeout_of_a_base_is_refused(
     bridge = Bridge("ws://robot:9090")
     with pytest.raises(ConfigError) as error:
         robot.set_twist_topic(bridge, "/cmd_vel", **{name: value})
-    said = str(error.value)
-    assert said.startswith(f"robot 'Bob': twist.{name}: got the {expected}") or (
-        said == f"robot 'Bob': {name} is {expected}"  # which the gate said
+    text = str(error.value)
+    assert text.startswith(f"robot 'Bob': twist.{name}: got the {expected}") or (
+        text == f"robot 'Bob': {name} is {expected}"  # the message of the gate
     )
     assert robot.motion.spec() is None
 
@@ -62,7 +62,7 @@ def test_a_refused_set_twist_topic_keeps_the_previous_topic_and_limits(robot):
 
 
 class NotingGate:
-    """Notes the velocities that the gate would be handed."""
+    """Records the velocities that the gate would receive."""
 
     def __init__(self):
         self.twists = []

@@ -19,7 +19,7 @@ from webmap.sim.world import World, WorldOptions
 
 
 class Watched(Graph):
-    """A graph that notes what is asked of it, and loses what it is told to."""
+    """A graph that records the calls it receives and drops chosen messages."""
 
     def __init__(self, schema, clock, change):
         super().__init__(schema, clock=clock)
@@ -42,7 +42,7 @@ class Watched(Graph):
 
 
 class Site:
-    """The system, its server, and what was asked of them."""
+    """The system, its server, and the calls that they received."""
 
     def __init__(self, graph, server, url):
         self.graph, self.server, self.url = graph, server, url
@@ -67,10 +67,10 @@ async def site(
 
     Args:
         dialect: ``ros1`` or ``ros2``.
-        quirks: Of the server.
+        quirks: The quirks of the server.
         ahead: Seconds by which the robot's clock is ahead of this machine's.
-        change: Takes a topic and a message; returns the message, or None to lose it.
-        rosapi: Whether there is one.
+        change: Takes a topic and a message; returns the message, or None to drop it.
+        rosapi: Whether the system has rosapi.
         twist: The type of velocity.
         limit: The server's ``max_message_size``.
 

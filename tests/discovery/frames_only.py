@@ -1,4 +1,4 @@
-"""A rosbridge behind which robots tell of their frames, and of nothing else."""
+"""A rosbridge with robots that publish their frames and nothing else."""
 
 import asyncio
 import threading
@@ -21,15 +21,15 @@ Chain = list[tuple[str, str, Pose]]
 
 
 @contextmanager
-def telling(
+def publishing(
     received: Mapping[str, Chain], dialect: str = "ros1", extra: Mapping[str, str] = {}
 ) -> Iterator[str]:
-    """Serve topics with frames, told 20 times a second; yield the address.
+    """Publish frames on topics 20 times a second; yield the address.
 
     Args:
-        told: What is told on each topic.
+        received: The transforms that are published on each topic.
         dialect: ``ros1`` or ``ros2``.
-        extra: Types by name of topics that are there and carry nothing.
+        extra: The types of further topics, by name; nothing is published on them.
 
     """
     urls: list[str] = []

@@ -1,4 +1,4 @@
-"""The readiness check of robots that somebody configured."""
+"""The readiness check of configured robots."""
 
 import asyncio
 from dataclasses import replace
@@ -43,7 +43,7 @@ def laid(*configured, topics=TOPICS):
 
 
 def seen_of(*configured, topics=TOPICS, **more):
-    """What is seen of configured robots, on a link without any trouble."""
+    """What the check sees of configured robots on a link without faults."""
     findings, by_name = laid(*configured, topics=topics)
     known = {one.found_as for one in by_name.values()}
     others = [one.name for one in discover(topics).robots if one.name not in known]
@@ -60,8 +60,8 @@ def seen_of(*configured, topics=TOPICS, **more):
     return replace(seen, **more)
 
 
-def said(seen, words):
-    """The only finding that says these words."""
+def finding_with(seen, words):
+    """The only finding with this text."""
     (found,) = [each for each in judge(seen) if words in each.text]
     return found
 
@@ -84,7 +84,7 @@ def test_a_topic_that_is_configured_off_is_not_measured():
 def test_a_relative_topic_name_matches_the_topic_of_the_bridge():
     (bob,) = laid(ConfiguredRobot("Bob", {"odometry": (("a/odom/", ""),)}))[0].robots
     assert bob.first("odometry").topic == "/a/odom"
-    assert bob.topic("velocity") == "/a/cmd_vel", "it is the robot that was found"
+    assert bob.topic("velocity") == "/a/cmd_vel", "the found robot is used"
 
 
 def test_a_configured_robot_is_matched_by_its_topics_before_its_name():
@@ -134,7 +134,7 @@ def test_the_configured_velocity_type_is_compared_with_the_type_of_the_base(
 ):
     topics = TOPICS | {"/a/cmd_vel": takes}
     bob = ConfiguredRobot("Bob", {**DRIVEN, "velocity": (("/a/cmd_vel", sends),)})
-    found = said(seen_of(bob, topics=topics), words)
+    found = finding_with(seen_of(bob, topics=topics), words)
     assert found.level == level
     assert ("twist.type" in found.advice) is (level == "wrong")
 
@@ -142,14 +142,17 @@ def test_the_configured_velocity_type_is_compared_with_the_type_of_the_base(
 def test_a_configured_type_that_the_bridge_does_not_confirm_is_only_a_note():
     bob = ConfiguredRobot("Bob", {**DRIVEN, "velocity": (("/a/other", STAMPED),)})
     assert (
-        said(seen_of(bob), "/a/other has the stated type TwistStamped").level == "note"
+        finding_with(seen_of(bob), "/a/other has the stated type TwistStamped").level
+        == "note"
     )
 
 
 def test_a_robot_configured_without_velocity_is_a_note_and_no_mistake():
     seen = seen_of(ConfiguredRobot("Bob", {**DRIVEN, "velocity": ()}))
     assert (
-        said(seen, "without a velocity topic: it can be seen but not driven").level
+        finding_with(
+            seen, "without a velocity topic: it can be seen but not driven"
+        ).level
         == "note"
     )
     assert is_ready(judge(seen))
@@ -157,17 +160,17 @@ def test_a_robot_configured_without_velocity_is_a_note_and_no_mistake():
 
 def test_robots_that_are_not_configured_are_named_but_not_checked():
     seen = seen_of(ConfiguredRobot("Bob", DRIVEN))
-    assert said(seen, "they were not checked: b.").level == "note"
-    assert said(seen, "robots checked: Bob.").level == "good"
+    assert finding_with(seen, "they were not checked: b.").level == "note"
+    assert finding_with(seen, "robots checked: Bob.").level == "good"
     assert {each.about for each in judge(seen)} == {"bridge", "Bob"}
 
 
 def test_the_stop_test_advice_uses_the_discovered_name_of_the_robot():
     words = "This check does not find out whether the base stops by itself"
-    advice = said(seen_of(ConfiguredRobot("Bob", DRIVEN)), words).advice
+    advice = finding_with(seen_of(ConfiguredRobot("Bob", DRIVEN)), words).advice
     assert "--stop-test a, or the button on its card" in advice
     strange = {"odometry": (("/x/odom", ""),), "velocity": (("/x/cmd", ""),)}
-    advice = said(seen_of(ConfiguredRobot("Eve", strange)), words).advice
+    advice = finding_with(seen_of(ConfiguredRobot("Eve", strange)), words).advice
     assert "--stop-test" not in advice
     assert "the button on its card" in advice
 
@@ -209,7 +212,7 @@ BOB = {
 def test_a_configured_robot_is_measured_by_its_configured_topics(dialect):
     seen = looked_at(site(dialect), ConfiguredRobot("Bob", BOB))
     assert (
-        said(seen, "/robot_0/cmd_vel has the type Twist, but WebMap is").level
+        finding_with(seen, "/robot_0/cmd_vel has the type Twist, but WebMap is").level
         == "wrong"
     )
     assert seen.measured["/robot_0/odom"].count > 0
@@ -222,23 +225,26 @@ def test_configured_robots_are_measured_without_rosapi():
     seen = looked_at(site(rosapi=False), ConfiguredRobot("Bob", BOB))
     assert [robot.name for robot in seen.findings.robots] == ["Bob"]
     assert seen.measured["/robot_0/odom"].count > 0
-    sent = said(seen, "/robot_0/cmd_vel has the stated type TwistStamped, and")
+    sent = finding_with(seen, "/robot_0/cmd_vel has the stated type TwistStamped, and")
     assert sent.level == "note"
-    assert said(seen, "not known whether a service that hangs blocks").level == "note"
+    assert (
+        finding_with(seen, "not known whether a service that hangs blocks").level
+        == "note"
+    )
 
 
 def test_a_configured_topic_without_messages_is_wrong():
     seen = looked_at(
         site(), ConfiguredRobot("Bob", {**BOB, "odometry": (("/odometer", ""),)})
     )
-    assert said(seen, "No message was received on /odometer").level == "wrong"
+    assert finding_with(seen, "No message was received on /odometer").level == "wrong"
 
 
 def test_without_configured_robots_all_discovered_robots_are_measured():
     seen = looked_at(site())
     assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
     assert seen.configured == {}
-    assert said(seen, "robots found: robot_0.").level == "good"
+    assert finding_with(seen, "robots found: robot_0.").level == "good"
 
 
 def test_the_frame_path_starts_at_the_configured_map_frame():

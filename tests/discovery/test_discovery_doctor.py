@@ -1,4 +1,4 @@
-"""What the readiness check decides."""
+"""The decisions of the readiness check."""
 
 import asyncio
 import ipaddress
@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from frames_only import telling
+from frames_only import publishing
 
 from webmap.base.geometry import Pose
 from webmap.discovery import discover
@@ -44,11 +44,11 @@ GOOD = Observed(
 )
 
 
-def said(seen, words):
-    """The level of the only finding that says these words."""
+def level_of(seen, words):
+    """The level of the only finding with this text."""
     (found,) = [each for each in judge(seen) if words in each.text]
     if found.level in ("wrong", "warning"):
-        assert found.advice, "what to do is said"
+        assert found.advice, "the finding has no advice"
     return found.level
 
 
@@ -61,7 +61,7 @@ def test_a_good_robot_is_ready_and_the_unknown_command_timeout_is_a_note():
     findings = judge(GOOD)
     assert is_ready(findings)
     assert {each.level for each in findings} == {"good", "note"}
-    assert said(GOOD, "stops by itself") == "note"
+    assert level_of(GOOD, "stops by itself") == "note"
 
 
 AGENT = replace(GOOD, url="zenohs://fleet:7447/bay3", link=LinkFacts())
@@ -79,17 +79,17 @@ def test_the_doctor_reports_who_reaches_the_rosbridge_of_an_agent(
     open_at, words, level
 ):
     seen = replace(AGENT, open_at=open_at)
-    assert said(seen, words) == level
+    assert level_of(seen, words) == level
     texts = " ".join(f"{each.text} {each.advice}" for each in judge(seen))
     assert "compress" not in texts, "the display has no socket to that rosbridge"
     assert "not encrypted" not in texts
-    assert "--stop-test" not in texts, "only the agent's gate moves the robot"
+    assert "--stop-test" not in texts, "only the gate of the agent moves the robot"
     assert "button on its card" in texts
 
 
 def test_the_doctor_warns_of_a_router_without_tls_on_another_computer():
     plain = replace(AGENT, url="zenoh://fleet:7447/bay3")
-    assert said(plain, "not encrypted") == "warning"
+    assert level_of(plain, "not encrypted") == "warning"
     here = replace(AGENT, url="zenoh://127.0.0.1:7447/bay3")
     assert not any("not encrypted" in each.text for each in judge(here))
 
@@ -165,7 +165,7 @@ def test_an_unencrypted_bridge_reachable_from_the_network_is_a_warning(
 def test_a_local_bridge_that_listens_on_all_addresses_is_a_warning(
     listens, level, words
 ):
-    assert said(replace(GOOD, link=LinkFacts("127.0.0.1", listens)), words) == level
+    assert level_of(replace(GOOD, link=LinkFacts("127.0.0.1", listens)), words) == level
 
 
 TCP = """\
@@ -183,7 +183,7 @@ TCP6 = f"""\
 
 
 @pytest.mark.skipif(
-    sys.byteorder != "little", reason="the tables are of such a machine"
+    sys.byteorder != "little", reason="the tables are of a little-endian machine"
 )
 @pytest.mark.parametrize(
     ("port", "addresses"),
@@ -224,7 +224,7 @@ def test_only_loopback_addresses_count_as_loopback(address, here):
 def test_a_reachable_bridge_that_hides_no_topic_is_a_warning():
     link = LinkFacts("192.168.1.7")
     seen = replace(GOOD, url="ws://bob:9090", link=link, shown=("/rosout",))
-    assert said(seen, "No topic is hidden from its clients (/rosout") == "warning"
+    assert level_of(seen, "No topic is hidden from its clients (/rosout") == "warning"
     at_home = replace(GOOD, shown=("/rosout",))
     assert not any("hidden" in each.text for each in judge(at_home))
 
@@ -232,7 +232,7 @@ def test_a_reachable_bridge_that_hides_no_topic_is_a_warning():
 def test_a_note_says_that_only_the_first_ten_robots_are_measured():
     topics = {f"/r{n}/odom": "nav_msgs/Odometry" for n in range(12)}
     many = replace(GOOD, findings=discover(topics))
-    assert said(many, "Only the first 10 of 12 robots") == "note"
+    assert level_of(many, "Only the first 10 of 12 robots") == "note"
 
 
 def test_a_map_without_a_publisher_is_a_warning():
@@ -240,7 +240,7 @@ def test_a_map_without_a_publisher_is_a_warning():
     seen = replace(GOOD, findings=discover(topics, "bob"))
     assert not any("no map under it" in each.text for each in judge(seen))
     seen = replace(seen, publishers={**GOOD.publishers, "/map": ()})
-    assert said(seen, "No node publishes /map") == "warning"
+    assert level_of(seen, "No node publishes /map") == "warning"
 
 
 def test_a_slow_battery_topic_is_no_warning():
@@ -250,13 +250,20 @@ def test_a_slow_battery_topic_is_no_warning():
         seen, measured={**LISTENED, "/battery_state": Measurement(seconds=3.0)}
     )
     assert (
-        said(seen, "No message was received on /battery_state in 3 s; the topic may")
+        level_of(
+            seen, "No message was received on /battery_state in 3 s; the topic may"
+        )
         == "note"
     )
     slow = {**LISTENED, "/battery_state": Measurement(1, 3.0, 3.0)}
-    assert said(replace(seen, measured=slow), "/battery_state: 0.3 messages") == "good"
+    assert (
+        level_of(replace(seen, measured=slow), "/battery_state: 0.3 messages") == "good"
+    )
     broken = {**LISTENED, "/battery_state": Measurement(1, 3.0, trouble="not JSON")}
-    assert said(replace(seen, measured=broken), "cannot be read: not JSON") == "warning"
+    assert (
+        level_of(replace(seen, measured=broken), "cannot be read: not JSON")
+        == "warning"
+    )
 
 
 def test_an_old_battery_message_is_a_warning():
@@ -265,12 +272,12 @@ def test_an_old_battery_message_is_a_warning():
     came = Measurement(3, 3.0, 1.0, stamp=99.0, arrived=100.0)
     fresh = {**LISTENED, "/battery_state": came}
     assert (
-        said(replace(seen, measured=fresh), "1.0 messages a second, 1.0 s old")
+        level_of(replace(seen, measured=fresh), "1.0 messages a second, 1.0 s old")
         == "good"
     )
     old = {**LISTENED, "/battery_state": replace(came, stamp=10.0)}
     assert (
-        said(replace(seen, measured=old), "the shown value may be out of date")
+        level_of(replace(seen, measured=old), "the shown value may be out of date")
         == "warning"
     )
 
@@ -329,7 +336,7 @@ def shown(topic, came):
 def test_every_displayed_topic_is_judged_by_its_rate_and_age(
     topic, changes, level, words
 ):
-    assert said(shown(topic, replace(CAME, **changes)), words) == level
+    assert level_of(shown(topic, replace(CAME, **changes)), words) == level
 
 
 def test_the_goal_status_topic_belongs_to_the_action_of_the_robot():
@@ -351,13 +358,13 @@ def test_the_goal_status_topic_belongs_to_the_action_of_the_robot():
 
 def test_a_bridge_without_rosapi_is_a_warning_with_advice():
     bare = Observed("ws://localhost:9090", unlisted="no answer")
-    assert said(bare, "rosapi does not list") == "warning"
-    assert said(bare, "is not known") == "note"
+    assert level_of(bare, "rosapi does not list") == "warning"
+    assert level_of(bare, "is not known") == "note"
 
 
 def test_finding_no_robot_is_wrong():
     empty = replace(GOOD, findings=discover({}))
-    assert said(empty, "No robot was found") == "wrong"
+    assert level_of(empty, "No robot was found") == "wrong"
 
 
 @pytest.mark.parametrize(
@@ -370,18 +377,22 @@ def test_finding_no_robot_is_wrong():
     ],
 )
 def test_a_clock_difference_is_a_warning(ahead, level, words):
-    assert said(replace(GOOD, clock=Clock(ahead, 0.004)), words) == level
+    assert level_of(replace(GOOD, clock=Clock(ahead, 0.004)), words) == level
 
 
 @pytest.mark.parametrize(
     ("trip", "level"), [(0.02, "good"), (0.2, "warning"), (0.5, "wrong")]
 )
 def test_a_slow_service_call_is_a_warning_or_wrong(trip, level):
-    assert said(replace(GOOD, clock=Clock(0.0, trip)), "A service call takes") == level
+    assert (
+        level_of(replace(GOOD, clock=Clock(0.0, trip)), "A service call takes") == level
+    )
 
 
 def test_a_clock_offset_within_half_the_round_trip_is_accepted():
-    assert said(replace(GOOD, clock=Clock(0.6, 0.28)), "Both clocks agree") == "good"
+    assert (
+        level_of(replace(GOOD, clock=Clock(0.6, 0.28)), "Both clocks agree") == "good"
+    )
 
 
 @pytest.mark.parametrize(
@@ -417,12 +428,12 @@ def test_the_check_says_whether_a_hanging_call_blocks_its_socket(
 )
 def test_other_publishers_of_velocities_are_named(writers, level, words):
     publishers = {} if writers is None else {"/cmd_vel": writers}
-    assert said(replace(GOOD, publishers=publishers), words) == level
+    assert level_of(replace(GOOD, publishers=publishers), words) == level
 
 
 def test_a_velocity_topic_without_subscriber_is_wrong():
     assert (
-        said(replace(GOOD, subscribers={"/cmd_vel": ()}), "No node subscribes")
+        level_of(replace(GOOD, subscribers={"/cmd_vel": ()}), "No node subscribes")
         == "wrong"
     )
 
@@ -430,14 +441,14 @@ def test_a_velocity_topic_without_subscriber_is_wrong():
 def test_the_velocity_type_is_reported():
     stamped = TOPICS | {"/cmd_vel": "geometry_msgs/msg/TwistStamped"}
     seen = replace(GOOD, findings=discover(stamped, "bob"))
-    assert said(seen, "has the type TwistStamped") == "good"
+    assert level_of(seen, "has the type TwistStamped") == "good"
 
 
 def test_a_missing_pose_is_wrong_and_a_missing_velocity_topic_is_a_warning():
     blind = replace(GOOD, findings=discover({"/cmd_vel": "geometry_msgs/Twist"}))
-    assert said(blind, "No topic gives its pose") == "wrong"
+    assert level_of(blind, "No topic gives its pose") == "wrong"
     fixed = replace(GOOD, findings=discover({"/odom": "nav_msgs/Odometry"}))
-    assert said(fixed, "seen but not driven") == "warning"
+    assert level_of(fixed, "seen but not driven") == "warning"
 
 
 @pytest.mark.parametrize(
@@ -454,12 +465,12 @@ def test_a_missing_pose_is_wrong_and_a_missing_velocity_topic_is_a_warning():
     ],
 )
 def test_odometry_is_judged_by_its_rate_and_age(changes, level, words):
-    assert said(noted(**changes), words) == level
+    assert level_of(noted(**changes), words) == level
 
 
 def test_a_silent_scan_is_a_warning_and_the_robot_stays_ready():
     seen = replace(GOOD, measured={**LISTENED, "/scan": Measurement(seconds=3.0)})
-    assert said(seen, "No message was received on /scan") == "warning"
+    assert level_of(seen, "No message was received on /scan") == "warning"
     assert is_ready(judge(seen))
 
 
@@ -477,16 +488,18 @@ def test_the_report_counts_the_findings_and_removes_control_characters():
 
 def test_a_frame_path_from_the_map_is_good_and_a_missing_path_is_a_note():
     seen = replace(GOOD, frame_paths={"bob": FramePath("odom")})
-    assert said(seen, "Frames lead from map to odom") == "good"
+    assert level_of(seen, "Frames lead from map to odom") == "good"
     seen = replace(
         GOOD, frame_paths={"bob": FramePath("odom", "there is no frame 'map'")}
     )
-    assert said(seen, "at the pose from odometry: there is no frame 'map'") == "note"
+    assert (
+        level_of(seen, "at the pose from odometry: there is no frame 'map'") == "note"
+    )
 
 
 def test_the_frame_path_starts_in_the_map_frame_of_the_robot():
     seen = replace(GOOD, frame_paths={"bob": FramePath("bob/odom", start="world")})
-    assert said(seen, "Frames lead from world to bob/odom") == "good"
+    assert level_of(seen, "Frames lead from world to bob/odom") == "good"
     lost = FramePath("bob/odom", "there is no frame 'world'", start="world")
     seen = replace(GOOD, frame_paths={"bob": lost})
     (found,) = [each for each in judge(seen) if "no frame 'world'" in each.text]
@@ -502,8 +515,8 @@ def chain(*frames):
 
 
 def checked(seen, extra=None):
-    """What the check sees of robots that tell of their frames."""
-    with telling(seen, extra=extra or {}) as url:
+    """What the check sees of robots that publish their frames."""
+    with publishing(seen, extra=extra or {}) as url:
         return asyncio.run(observe(url, seconds=0.5))
 
 
@@ -535,7 +548,7 @@ def test_a_robot_with_only_frames_is_found_and_its_pose_is_good(
 ):
     seen = checked({topic: chain(*frames)})
     assert [robot.name for robot in seen.findings.robots] == [name]
-    assert said(seen, words) == "good"
+    assert level_of(seen, words) == "good"
     assert not [each for each in judge(seen) if each.level == "wrong"]
 
 
@@ -544,7 +557,7 @@ def test_a_robot_without_frame_messages_has_an_unknown_pose():
     words = (
         "Its pose is unknown: /bob/tf has no transform from map or odom to base_link"
     )
-    assert said(seen, words) == "wrong"
+    assert level_of(seen, words) == "wrong"
 
 
 def test_robots_with_their_own_maps_get_their_pose_in_the_world_frame():
@@ -556,14 +569,14 @@ def test_robots_with_their_own_maps_get_their_pose_in_the_world_frame():
     ]
     seen = checked({"/tf": seen})
     for name in names:
-        assert said(seen, f"from its frames, {name}/base_link in world") == "good"
+        assert level_of(seen, f"from its frames, {name}/base_link in world") == "good"
 
 
 def test_invalid_transforms_are_a_warning():
     seen = replace(
         GOOD, frame_paths={"bob": FramePath("odom", "", ("'a' -> 'a' would close",))}
     )
-    assert said(seen, "would close") == "warning"
+    assert level_of(seen, "would close") == "warning"
 
 
 def frames(*transforms, topic="/tf"):
@@ -617,7 +630,7 @@ def test_listening_counts_messages_and_measures_the_longest_gap():
     listening.received(message("/other"), 11.6, 1011.6)
     found = listening.end(13.0)["/odom"]
     assert (found.count, found.seconds, found.frame) == (4, 3.0, "odom")
-    assert found.longest_gap == pytest.approx(1.5), "to the end of listening"
+    assert found.longest_gap == pytest.approx(1.5), "the gap lasts until the end"
     assert found.stamp == 5.25
     assert found.arrived == 1011.5
     assert not found.binary
@@ -655,4 +668,6 @@ def test_sampling_leaves_a_large_topic_at_once_and_ends_at_the_size_limit():
         assert not sampling.done
         assert sampling.received(Publish(f"/{n}", large), 1.0, 1.0)
     assert sampling.done
-    assert set(sampling.end(1.0)) == {f"/{n}" for n in range(8)}, "silence is not told"
+    assert set(sampling.end(1.0)) == {f"/{n}" for n in range(8)}, (
+        "silent topics are included"
+    )

@@ -1,4 +1,4 @@
-"""Which form of goal a robot has, as its topics show it."""
+"""Which kind of goal a robot takes, according to its topics."""
 
 from dataclasses import replace
 

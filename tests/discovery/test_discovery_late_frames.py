@@ -1,10 +1,10 @@
-"""Robots of nothing but a shared ``/tf`` are found while others are shown already."""
+"""Robots with only a shared ``/tf`` are found while other robots are already shown."""
 
 import asyncio
 import time
 
 import pytest
-from frames_only import TF, telling
+from frames_only import TF, publishing
 
 from webmap import Bridge
 from webmap.base.geometry import Pose
@@ -22,7 +22,7 @@ CLOUD = "sensor_msgs/PointCloud2"
 
 
 def chain(name: str, x: float, y: float) -> list:
-    """The frames of a robot, whose names begin with its own."""
+    """The frames of a robot; their names begin with the robot's name."""
     odom, base = f"{name}/odom", f"{name}/base_footprint"
     return [("map", odom, Pose(x, 0.0, 0.0)), (odom, base, Pose(0.0, y, 0.5))]
 
@@ -36,7 +36,7 @@ async def until(condition, seconds: float = 30.0) -> None:
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Looks that follow one another quickly."""
+    """Make discovery look again after a short time."""
     monkeypatch.setattr(LookingForRobots, "period", 0.05)
     monkeypatch.setattr(LookingForLayers, "period", 0.05)
     monkeypatch.setitem(LateFrames.listen.__kwdefaults__, "seconds", 0.3)
@@ -48,7 +48,7 @@ def test_a_robot_whose_frames_appear_later_is_shown_at_the_pose_from_its_frames(
 ):
     received = {"/tf": chain("ann", 1.0, 2.0)}
     extra = {"/ann/points": CLOUD, "/bob/points": CLOUD}
-    with telling(received, dialect, extra) as url:
+    with publishing(received, dialect, extra) as url:
 
         async def scenario() -> None:
             loop = asyncio.get_running_loop()
@@ -75,12 +75,14 @@ def test_a_robot_whose_frames_appear_later_is_shown_at_the_pose_from_its_frames(
                 await until(lambda: bob.valid)
                 assert (bob.position.x, bob.position.y) == pytest.approx((5.0, 3.0))
                 assert bob.yaw == pytest.approx(0.5)
-                # What its name is in front of is drawn as its own.
+                # Topics in the robot's namespace are drawn for the robot.
                 await until(lambda: "/bob/points" in bridge._topics)
                 assert "/ann/points" not in bridge._topics
                 bob.destroy()
                 await looking.stop()
-                assert "/tf" not in bridge._topics, "it is heard for a moment only"
+                assert "/tf" not in bridge._topics, (
+                    "discovery is still subscribed to /tf"
+                )
             finally:
                 for service in (looking, drawing, bridge):
                     await service.stop()
@@ -93,10 +95,10 @@ def test_a_robot_whose_frames_appear_later_is_shown_at_the_pose_from_its_frames(
 def test_a_robot_that_is_localised_later_is_drawn_in_the_map_frame(
     quick, dialect, capsys
 ):
-    """As with a localiser that waits for its initial pose."""
+    """A localiser, for example, may wait for its initial pose."""
     base = ("odom", "base_link", Pose(0.0, 3.0, 0.5))
     received = {"/tf": [base]}
-    with telling(received, dialect) as url:
+    with publishing(received, dialect) as url:
 
         async def scenario() -> None:
             loop = asyncio.get_running_loop()
@@ -116,7 +118,7 @@ def test_a_robot_that_is_localised_later_is_drawn_in_the_map_frame(
                 received["/tf"] = [base]
                 seen = bridge._topics["/tf"].count
                 await until(lambda: bridge._topics["/tf"].count > seen + 20)
-                assert robot.tf["map_frame"] == "map", "never back"
+                assert robot.tf["map_frame"] == "map", "the map frame stays 'map'"
                 robot.destroy()
             finally:
                 for service in (looking, bridge):
@@ -137,7 +139,7 @@ def test_a_bridge_without_frame_topics_is_not_listened_to():
 
 
 def test_received_frames_are_kept_for_the_next_discovery():
-    with telling({"/tf": chain("ann", 1.0, 2.0)}) as url:
+    with publishing({"/tf": chain("ann", 1.0, 2.0)}) as url:
 
         async def scenario() -> None:
             bridge = Bridge(url)

@@ -1,4 +1,4 @@
-"""Which topics are drawn besides, by rules of names and types."""
+"""Which other topics are drawn, by rules for names and types."""
 
 import pytest
 
@@ -92,8 +92,10 @@ def test_each_topic_of_nav2_is_drawn_once():
     }
     local, whole = (drawing(layer, "/tb", None) for layer in found[:2])
     assert local.module == whole.module == "OccupancyGrid"
-    assert whole.options["order"] < 20.0, "it lies under the local one"
-    assert whole.options["throttle"] > local.options["throttle"], "and comes less often"
+    assert whole.options["order"] < 20.0, "it is drawn under the local costmap"
+    assert whole.options["throttle"] > local.options["throttle"], (
+        "it is requested less often"
+    )
 
 
 @pytest.mark.parametrize("space", ["", "/tb"])
@@ -174,7 +176,7 @@ def test_a_topic_with_an_unusual_name_is_drawn_by_its_type():
         "velodyne": "cloud",
         "trees": "poses",
         "zone": "polygon",
-        # The same goal a second time is left out; where a pose is told is no layer.
+        # A second topic with the same goal is left out; pose topics are no layers.
         "move_base/current_goal": "goal",
         "dock": "pose",
         "clicked_point": "point",
@@ -220,7 +222,7 @@ def test_every_layer_kind_has_a_module_that_accepts_its_arguments(kind, type):
         drawn.module
     ]
     check_arguments(factory, (Bridge(URL), "/a/topic"), drawn.options)
-    assert all(kind.names.values()), "they are shown to people"
+    assert all(kind.names.values()), "the names are shown to users"
 
 
 def test_each_robot_gets_its_own_range_and_the_shared_diagnostics():
@@ -235,7 +237,7 @@ def test_each_robot_gets_its_own_range_and_the_shared_diagnostics():
         drawn = [layer.topic for layer in layers.drawn]
         assert drawn == [f"{space}/sonar", "/diagnostics"]
     alone = find_layers({"/sonar": "sensor_msgs/Range"}, ["/a"])["/a"].drawn
-    assert [layer.topic for layer in alone] == ["/sonar"], "whose else could it be"
+    assert [layer.topic for layer in alone] == ["/sonar"], "there is only one robot"
 
 
 @pytest.mark.parametrize(

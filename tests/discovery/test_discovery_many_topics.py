@@ -1,4 +1,4 @@
-"""10,000 topics: few questions, work that grows with them, and none for nothing."""
+"""10,000 topics need few service calls and an amount of work linear in their number."""
 
 import asyncio
 import sys
@@ -19,7 +19,7 @@ from webmap.fleet.shown import ShownRobots
 from webmap.fleet.watch import LookingForLayers, LookingForRobots
 from webmap.modules import declaration
 
-# The rosbridge that records its messages is with the tests of the bridge.
+# The fake rosbridge is in the folder of the bridge's tests.
 sys.path.append(str(Path(__file__).parents[1] / "ros"))
 from fake_rosbridge import bridged
 

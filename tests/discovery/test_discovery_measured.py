@@ -1,4 +1,4 @@
-"""That each thing the readiness check says is measured, on systems with that fault."""
+"""Each finding of the readiness check is measured, on a system with that fault."""
 
 import asyncio
 import re
@@ -17,13 +17,13 @@ pytestmark = pytest.mark.slow
 
 SECONDS = 0.4
 LONG = 2.0
-"""Seconds in which a machine that stops for a moment does not change a rate much."""
+"""A time in which a short stop of the machine changes a rate only a little."""
 
 DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 
 
 def looked_at(system, look=None, *, seconds=SECONDS, **options):
-    """Observe a system; return it, the findings, and what was seen."""
+    """Observe a system; return the system, the findings and the observations."""
 
     async def run():
         async with system as there:
@@ -38,11 +38,11 @@ def looked_at(system, look=None, *, seconds=SECONDS, **options):
     return asyncio.run(run())
 
 
-def said(findings, words):
-    """The level of the only finding that says these words."""
+def level_of(findings, words):
+    """The level of the only finding with this text."""
     (found,) = [each for each in findings if words in each.text]
     if found.level in ("wrong", "warning"):
-        assert found.advice, "what to do is said"
+        assert found.advice, "the finding has no advice"
     return found.level
 
 
@@ -54,10 +54,10 @@ def test_a_good_robot_has_no_warnings_and_the_check_publishes_nothing(dialect):
         site(dialect), seconds=LONG, progress=progress.append
     )
     assert {each.level for each in findings} == {"good", "note"}, findings
-    assert there.graph.advertised == [], "something was published"
+    assert there.graph.advertised == [], "the check advertised a topic"
     assert not {"/rosapi/get_param_names", "/rosapi/message_details"} & {
         *there.called
-    }, "ends or hangs rosapi"
+    }, "these calls end rosapi or make it hang"
     assert all(name.startswith("/rosapi/") for name in there.called)
     assert progress[0].startswith("Requesting")
     assert progress[-2] == f"Listening for {LONG:g} s."
@@ -68,8 +68,8 @@ def test_a_good_robot_has_no_warnings_and_the_check_publishes_nothing(dialect):
 def test_every_displayed_topic_is_measured_with_only_a_few_messages(dialect):
     _, findings, seen = looked_at(site(dialect))
     camera = "/robot_0/camera/image_raw/compressed"
-    assert said(findings, f"{camera}: ") == "good"
-    assert said(findings, "/map: 1 message, ") == "good"
+    assert level_of(findings, f"{camera}: ") == "good"
+    assert level_of(findings, "/map: 1 message, ") == "good"
     words = r"No message was received on /robot_0/plan in \d+ s; messages may"
     (plan,) = [each for each in findings if re.match(words, each.text)]
     assert plan.level == "note"
@@ -108,7 +108,7 @@ def test_a_silent_camera_is_a_warning_about_driving_with_the_camera():
 
     _, findings, _ = looked_at(site("ros1", change=change))
     words = "can publish it, so driving with this camera stops"
-    assert said(findings, words) == "warning"
+    assert level_of(findings, words) == "warning"
 
 
 @pytest.mark.parametrize(
@@ -118,14 +118,16 @@ def test_the_check_reports_the_velocity_type_that_the_base_subscribes_to(
     dialect, twist
 ):
     _, findings, _ = looked_at(site(dialect, twist=twist))
-    assert said(findings, f"/robot_0/cmd_vel has the type {twist}, and") == "good"
+    assert level_of(findings, f"/robot_0/cmd_vel has the type {twist}, and") == "good"
 
 
-@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="Linux tells it there")
+@pytest.mark.skipif(
+    not Path("/proc/net/tcp").exists(), reason="only Linux has this file"
+)
 def test_the_check_finds_the_listening_address_of_a_local_bridge():
     _, findings, seen = looked_at(site())
     assert seen.link.listens == ("127.0.0.1",)
-    assert said(findings, "listens on this machine alone") == "good"
+    assert level_of(findings, "listens on this machine alone") == "good"
 
 
 @DIALECTS
@@ -137,7 +139,7 @@ def test_another_node_that_publishes_velocities_is_named(dialect):
 
     _, findings, _ = looked_at(site(dialect), joystick)
     assert (
-        said(findings, "Other nodes publish to /robot_0/cmd_vel too: /joy_teleop")
+        level_of(findings, "Other nodes publish to /robot_0/cmd_vel too: /joy_teleop")
         == "warning"
     )
 
@@ -150,8 +152,8 @@ def test_another_node_that_publishes_velocities_is_named(dialect):
 )
 def test_a_clock_difference_is_reported_and_does_not_change_ages(dialect, ahead, words):
     _, findings, seen = looked_at(site(dialect, ahead=ahead), seconds=LONG)
-    assert said(findings, words) == "warning"
-    assert said(findings, "/robot_0/odom:") == "good"
+    assert level_of(findings, words) == "warning"
+    assert level_of(findings, "/robot_0/odom:") == "good"
     assert seen.clock.ahead == pytest.approx(ahead, abs=0.2)
 
 
@@ -169,7 +171,7 @@ def test_old_stamps_are_reported_as_old_messages(dialect):
         return message
 
     _, findings, _ = looked_at(site(dialect, change=stuck))
-    assert said(findings, "s old when they arrive") == "warning"
+    assert level_of(findings, "s old when they arrive") == "warning"
 
 
 @DIALECTS
@@ -178,8 +180,10 @@ def test_a_silent_topic_is_reported_with_its_publisher_node(dialect):
         return None if name in ("/robot_0/odom", "/robot_0/base_scan") else message
 
     _, findings, _ = looked_at(site(dialect, change=mute))
-    assert said(findings, "No message was received on /robot_0/odom") == "wrong"
-    assert said(findings, "No message was received on /robot_0/base_scan") == "warning"
+    assert level_of(findings, "No message was received on /robot_0/odom") == "wrong"
+    assert (
+        level_of(findings, "No message was received on /robot_0/base_scan") == "warning"
+    )
     for topic in ("odom", "base_scan"):
         words = rf"No message was received on /robot_0/{topic} in \d+ s, "
         words += "although /robots can publish"
@@ -187,7 +191,7 @@ def test_a_silent_topic_is_reported_with_its_publisher_node(dialect):
 
 
 def without(*children):
-    """Lose the transforms of some frames."""
+    """Drop the transforms of some frames."""
 
     def change(name, message):
         if name not in ("/tf", "/tf_static"):
@@ -213,20 +217,20 @@ def without(*children):
 )
 def test_each_missing_frame_is_reported(dialect, lost, level, words):
     _, findings, _ = looked_at(site(dialect, change=without(lost)))
-    assert said(findings, words) == level
+    assert level_of(findings, words) == level
 
 
 @DIALECTS
 def test_complete_frames_are_good(dialect):
     _, findings, _ = looked_at(site(dialect))
-    assert said(findings, "Frames lead from map to robot_0/odom (/tf:") == "good"
-    assert said(
+    assert level_of(findings, "Frames lead from map to robot_0/odom (/tf:") == "good"
+    assert level_of(
         findings, "Frames lead further from robot_0/odom to robot_0/base_link"
     ) == ("good")
 
 
 def apart(name, message):
-    """Lay the robot's own map into a world, as several robots of ROS 1 have it."""
+    """Put the robot's own map into a world frame, as several ROS 1 robots have it."""
     if name != "/tf":
         return message
     own = [
@@ -246,7 +250,7 @@ def apart(name, message):
 @DIALECTS
 def test_the_frames_of_a_robot_with_its_own_map_frame_are_good(dialect):
     _, findings, _ = looked_at(site(dialect, change=apart))
-    assert said(findings, "Frames lead from world to robot_0/odom (/tf:") == "good"
+    assert level_of(findings, "Frames lead from world to robot_0/odom (/tf:") == "good"
     assert not any("at the pose from odometry" in each.text for each in findings)
 
 
@@ -262,7 +266,7 @@ def test_a_trial_call_shows_whether_a_hanging_call_blocks_its_socket(
     dialect, quirks, level, words
 ):
     there, findings, _ = looked_at(site(dialect, quirks=quirks), try_call=True)
-    assert said(findings, words) == level
+    assert level_of(findings, words) == level
     assert not any("webmap_doctor" in name for name in there.graph.services)
 
 
@@ -273,12 +277,12 @@ def test_a_bridge_without_client_services_leaves_the_blocking_unknown():
     _, findings, seen = looked_at(site("ros2"), deaf, try_call=True)
     assert seen.link.calls_in_threads is None
     words = "call gave no result: the bridge offers no services of its clients"
-    assert said(findings, words) == "note"
+    assert level_of(findings, words) == "note"
 
 
 def test_without_rosapi_no_trial_call_is_made_and_the_reason_is_reported():
     there, findings, _ = looked_at(site("ros2", rosapi=False), try_call=True)
-    assert said(findings, "gave no result: rosapi does not answer") == "note"
+    assert level_of(findings, "gave no result: rosapi does not answer") == "note"
     assert not any("webmap_doctor" in name for name in there.called)
 
 
@@ -296,7 +300,7 @@ def test_repeating_the_trial_call_keeps_the_other_measurements():
     assert again.measured == seen.measured
     ours = [name for name in called if name.startswith("/webmap_doctor_")]
     assert len(ours) == len(called) - 1, called
-    assert "/rosapi/get_time" in called, "nothing that hangs or ends a rosapi"
+    assert "/rosapi/get_time" in called, "the check calls no other service"
 
 
 def test_an_unreachable_bridge_resets_the_result_of_an_earlier_trial_call():
@@ -304,7 +308,7 @@ def test_an_unreachable_bridge_resets_the_result_of_an_earlier_trial_call():
     blocking = Observed("ws://127.0.0.1:1", link=facts)
     seen = asyncio.run(tried(blocking))
     assert (seen.link.calls_in_threads, seen.link.tried) == (None, False)
-    assert said(judge(seen), "slow service call gave no result") == "note"
+    assert level_of(judge(seen), "slow service call gave no result") == "note"
 
 
 TOPICS = {
@@ -320,10 +324,10 @@ def test_without_rosapi_a_given_topic_list_is_used(dialect):
         site(dialect, rosapi=False), seconds=LONG, topics=TOPICS
     )
     assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
-    assert said(findings, "rosapi does not list the topics") == "note"
-    assert said(findings, "The topics come from the given list") == "good"
-    assert said(findings, "/robot_0/odom:") == "good"
-    assert said(findings, "The bridge does not list the publishers of") == "note"
+    assert level_of(findings, "rosapi does not list the topics") == "note"
+    assert level_of(findings, "The topics come from the given list") == "good"
+    assert level_of(findings, "/robot_0/odom:") == "good"
+    assert level_of(findings, "The bridge does not list the publishers of") == "note"
 
 
 def test_without_rosapi_and_topic_list_the_check_advises_to_give_a_list():

@@ -13,7 +13,7 @@ BOTH = ODOM | {"/a/cmd_vel": "geometry_msgs/Twist"}
 
 
 def looks(newcomers, *topics):
-    """The names of what each look tells, with the roles that are new."""
+    """The robots that each look reports: their names and new roles."""
     return [
         [(news.robot.name, *news.roles) for news in newcomers.look(discover(each))]
         for each in topics
@@ -50,7 +50,7 @@ TF = ODOM | {"/a/tf": "tf2_msgs/TFMessage"}
 
 
 def with_frames(*chain):
-    """A robot whose frames hang from each other, the root first."""
+    """A robot with a chain of frames, the root first."""
     trees = Trees()
     for parent, child in pairwise(chain):
         trees.take("/a", parent, child)

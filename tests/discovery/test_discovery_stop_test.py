@@ -1,4 +1,4 @@
-"""``webmap doctor --stop-test`` against bases that stop by themselves, or do not."""
+"""``webmap doctor --stop-test`` with bases that stop by themselves and that do not."""
 
 import datetime
 import json
@@ -17,7 +17,7 @@ from webmap.gate.rules.stop_test import MOVES_ON
 from webmap.testing import WitnessRobot
 from webmap_process import simulator
 
-# Beside others the simulator's clock lags, and a driver falls silent.
+# On a busy machine the simulator's clock lags and a driver sends nothing.
 pytestmark = pytest.mark.serial
 
 TODAY = datetime.datetime.now().astimezone().date().isoformat()
@@ -27,11 +27,11 @@ def command(url, *arguments):
     return [sys.executable, "-m", "webmap", "doctor", url, "--stop-test", *arguments]
 
 
-def run(url, *arguments, says=""):
+def run(url, *arguments, typed=""):
     return subprocess.run(
         command(url, *arguments),
         capture_output=True,
-        input=says,
+        input=typed,
         text=True,
         timeout=60,
         check=False,
@@ -46,10 +46,10 @@ def folder(tmp_path, monkeypatch):
 
 def test_a_base_with_a_command_timeout_passes_and_the_result_is_stored(folder):
     with simulator("--port", "0", "--robot-timeout", "0.25") as url:
-        said = run(url, "robot_1", "--yes")
-    assert said.returncode == 0, said.stdout + said.stderr
-    found = re.search(r"of (\S+): the base stops by itself in (\S+) s", said.stdout)
-    assert found, said.stdout
+        result = run(url, "robot_1", "--yes")
+    assert result.returncode == 0, result.stdout + result.stderr
+    found = re.search(r"of (\S+): the base stops by itself in (\S+) s", result.stdout)
+    assert found, result.stdout
     assert found[1] == TODAY
     assert 0.25 <= float(found[2]) < 0.8
     kept = Records(folder).stop_test_of(Key(url, "/robot_1/cmd_vel"))
@@ -60,20 +60,20 @@ def test_a_base_without_a_command_timeout_fails_even_after_an_earlier_pass(folde
     with simulator("--port", "0", "--robot-timeout", "0") as url:
         key = Key(url, "/robot_0/cmd_vel")
         Records(folder).keep_stop_test(key, StopRecord(0.3, TODAY))
-        said = run(url, "robot_0", "--yes")
-    assert said.returncode == 1, said.stdout + said.stderr
-    assert "no more commands: waiting until the base stops" in said.stdout
-    assert f"Result of {TODAY}: the base does NOT stop by itself" in said.stdout
+        result = run(url, "robot_0", "--yes")
+    assert result.returncode == 1, result.stdout + result.stderr
+    assert "no more commands: waiting until the base stops" in result.stdout
+    assert f"Result of {TODAY}: the base does NOT stop by itself" in result.stdout
     assert Records(folder).stop_test_of(key).seconds is None
 
 
 def test_the_robot_does_not_move_if_the_user_declines(folder):
     with WitnessRobot() as robot:
-        said = run(robot.url, "robot", says="n\n")
+        result = run(robot.url, "robot", typed="n\n")
         moving = robot.log.moving_since(0.0)
-    assert said.returncode == 2
-    assert "will creep forward at 0.1 m/s" in said.stdout
-    assert "Nothing was moved." in said.stdout
+    assert result.returncode == 2
+    assert "will creep forward at 0.1 m/s" in result.stdout
+    assert "Nothing was moved." in result.stdout
     assert moving == []
 
 
@@ -105,24 +105,24 @@ def test_a_robot_with_an_active_stop_is_not_moved(folder):
         Records(folder).keep_latch(
             Key(robot.url, "/cmd_vel"), Press("Ann", "a1"), frozenset()
         )
-        said = run(robot.url, "robot", "--yes")
+        result = run(robot.url, "robot", "--yes")
         assert robot.log.moving_since(0.0) == []
-    assert said.returncode == 2
-    assert "The stop test gave no result: STOP" in said.stdout
+    assert result.returncode == 2
+    assert "The stop test gave no result: STOP" in result.stdout
 
 
 def test_an_unknown_robot_is_an_error_that_lists_the_known_robots(ros1, folder):
-    said = run(ros1, "robot_7", "--yes")
-    assert said.returncode == 2
-    assert "no robot 'robot_7'" in said.stderr
-    assert "robot_0, robot_1" in said.stderr
+    result = run(ros1, "robot_7", "--yes")
+    assert result.returncode == 2
+    assert "no robot 'robot_7'" in result.stderr
+    assert "robot_0, robot_1" in result.stderr
 
 
 def test_an_unreachable_bridge_gives_no_result_and_no_traceback():
-    said = run("ws://127.0.0.1:1", "robot_0", "--yes", "--wait", "0")
-    assert said.returncode == 2
-    assert "The stop test gave no result" in said.stderr
-    assert "Traceback" not in said.stderr
+    result = run("ws://127.0.0.1:1", "robot_0", "--yes", "--wait", "0")
+    assert result.returncode == 2
+    assert "The stop test gave no result" in result.stderr
+    assert "Traceback" not in result.stderr
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -140,12 +140,12 @@ def test_a_stop_test_interrupted_before_the_bridge_opens_gives_no_result(number)
 
 
 def test_two_urls_are_refused():
-    said = run("ws://127.0.0.1:1", "robot_0", "ws://127.0.0.1:2")
-    assert said.returncode == 2
-    assert "--stop-test takes one URL, got 2" in said.stderr
+    result = run("ws://127.0.0.1:1", "robot_0", "ws://127.0.0.1:2")
+    assert result.returncode == 2
+    assert "--stop-test takes one URL, got 2" in result.stderr
 
 
-# The client, without a gate.
+# Tests of the client without a gate.
 
 FREE = {
     "op": "robot",
@@ -164,7 +164,7 @@ MINE = {**FREE, "mine": True, "armed": True, "epoch": 3}
 
 
 def client_that_tests():
-    """Return a client whose robot creeps."""
+    """Return a client whose robot moves slowly."""
     client = StopTestClient(0.0)
     client.receive({"op": "tick", "tick": 7}, 0.0)
     client.receive(FREE, 0.0)
@@ -181,7 +181,7 @@ def test_the_client_takes_control_only_after_the_user_agrees():
     assert client.step(60.0) == []
     client.begin(60.0)
     assert client.step(60.0) == [{"op": "take", "robot": "r1"}]
-    assert client.step(60.05) == [], "it is not asked for at each step"
+    assert client.step(60.05) == [], "the client does not send it in each step"
 
 
 def test_the_client_sends_only_released_inputs():

@@ -1,4 +1,4 @@
-"""What was found, for people and as a file."""
+"""The found robots as a table for users and as a file."""
 
 import re
 import tomllib
@@ -77,8 +77,8 @@ def test_the_summary_line_lists_the_topics_in_use():
 def test_the_report_names_each_drawn_topic_with_its_rule_and_each_topic_left_out():
     more = {"/other/odom": "nav_msgs/Odometry", "/trajectory": "nav_msgs/Path"}
     more |= {f"/cloud_{n}": "sensor_msgs/PointCloud2" for n in range(3)}
-    said = report("ws://bob:9090", discover(TOPICS | more, "bob"))
-    lines = [" ".join(line.split()) for line in said.splitlines()]
+    report_text = report("ws://bob:9090", discover(TOPICS | more, "bob"))
+    lines = [" ".join(line.split()) for line in report_text.splitlines()]
     assert "/rear/scan LaserScanner the usual name" in lines
     assert "/trajectory Path named like a path" in lines
     assert "/cloud_1 PointCloud named points or a cloud" in lines
@@ -88,8 +88,8 @@ def test_the_report_names_each_drawn_topic_with_its_rule_and_each_topic_left_out
 
 def test_the_report_marks_the_used_one_of_several_topics_for_a_role():
     more = {"/odometry/filtered": "nav_msgs/Odometry"}
-    said = report("ws://bob:9090", discover(TOPICS | more, "bob"))
-    lines = [" ".join(line.split()) for line in said.splitlines()]
+    report_text = report("ws://bob:9090", discover(TOPICS | more, "bob"))
+    lines = [" ".join(line.split()) for line in report_text.splitlines()]
     used = "odometry /odometry/filtered nav_msgs/Odometry a filter's estimate, used"
     assert used in lines
     assert "/odom nav_msgs/Odometry the usual name, not used" in lines
@@ -115,8 +115,8 @@ def test_every_topic_rule_is_in_the_documentation():
 def test_every_layer_rule_is_in_the_documentation():
     page = PAGE.with_name("layers.md")
     rows = [line for line in page.read_text().splitlines() if line.startswith("| `")]
-    said = [(each, kind) for each in declarations() for kind in each.kinds]
-    for declared, kind in said:
+    declared_kinds = [(each, kind) for each in declarations() for kind in each.kinds]
+    for declared, kind in declared_kinds:
         named = f"`{kind.types[0]}`", f"`{declared.name}`"
         found = [row for row in rows if all(name in row for name in named)]
         assert any(row.endswith(f"| {kind.most} |") for row in found), kind

@@ -1,4 +1,4 @@
-"""Robots that tell of nothing but their frames."""
+"""Robots that publish only their frames."""
 
 import asyncio
 import subprocess
@@ -7,7 +7,7 @@ import time
 from itertools import pairwise
 
 import pytest
-from frames_only import telling
+from frames_only import publishing
 
 from webmap import Bridge, Robot
 from webmap.base.geometry import Pose
@@ -80,7 +80,7 @@ def test_a_robot_with_odometry_keeps_its_odometry_and_gets_its_base_frame():
 
 
 def test_robots_with_maps_in_one_world_frame_are_drawn_in_the_world_frame():
-    """As with several robots of ROS 1, each with a map of its own."""
+    """Several ROS 1 robots may each have a map of their own."""
     trees = shared(
         "world bob/map bob/odom bob/base_link", "world ann/map ann/odom ann/base_link"
     )
@@ -180,7 +180,7 @@ MAP_TO_BASE = [
 def test_the_discover_command_shows_a_robot_from_frames_and_writes_a_valid_file(
     tmp_path,
 ):
-    with telling({"/tf": MAP_TO_BASE}, "ros2") as url:
+    with publishing({"/tf": MAP_TO_BASE}, "ros2") as url:
         shown, kept = (
             subprocess.run(
                 [sys.executable, "-m", "webmap", "discover", url, *option],
@@ -207,7 +207,7 @@ def test_the_discover_command_shows_a_robot_from_frames_and_writes_a_valid_file(
 
 
 def test_a_robot_found_by_frames_has_the_pose_from_its_frames():
-    with telling({"/tf": MAP_TO_BASE}) as url:
+    with publishing({"/tf": MAP_TO_BASE}) as url:
 
         async def scenario() -> None:
             seen = await receive_frames(url, {"/tf": TF})
@@ -235,7 +235,7 @@ def test_ten_namespaces_with_their_own_tf_on_one_bridge_are_ten_robots(dialect):
         ]
         for n in range(10)
     }
-    with telling(received, dialect) as url:
+    with publishing(received, dialect) as url:
 
         async def scenario() -> None:
             bridge = Bridge(url)

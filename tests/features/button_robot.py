@@ -1,4 +1,4 @@
-"""A node of a robot behind a rosbridge, which answers services and hears topics."""
+"""A node of a robot behind a rosbridge, which answers services and receives topics."""
 
 import contextlib
 import json
@@ -12,12 +12,13 @@ Answer = Callable[[dict], dict | None]
 
 
 class RobotNode:
-    """Answers what it is told to, and keeps what it was asked and sent.
+    """Answers service calls, and records the calls and messages that it receives.
 
     Args:
-        link: To the rosbridge.
-        services: For each name its type, and what returns the answer: None for never.
-        topics: The type of each topic that it listens to.
+        link: The connection to the rosbridge.
+        services: For each name the type and a function that returns the response;
+            None sends no response.
+        topics: The type of each subscribed topic.
 
     """
 
@@ -32,11 +33,11 @@ class RobotNode:
         self._answers = {name: answer for name, (_, answer) in services.items()}
         self._link = link
         for name, (type, _) in services.items():
-            self._say(op="advertise_service", service=name, type=type)
+            self._send(op="advertise_service", service=name, type=type)
         for name, type in topics.items():
-            self._say(op="subscribe", id=f"s{name}", topic=name, type=type)
-        # What came before this answer was taken by then.
-        self._say(op="call_service", id="ready", service="/rosapi/get_time")
+            self._send(op="subscribe", id=f"s{name}", topic=name, type=type)
+        # The bridge has processed the earlier requests when this response arrives.
+        self._send(op="call_service", id="ready", service="/rosapi/get_time")
         while json.loads(self._link.recv(10)).get("id") != "ready":
             pass
         self._thread = threading.Thread(target=self._live, daemon=True)
@@ -46,7 +47,7 @@ class RobotNode:
         self._link.close()
         self._thread.join(5)
 
-    def _say(self, **op: Any) -> None:
+    def _send(self, **op: Any) -> None:
         self._link.send(json.dumps(op))
 
     def _live(self) -> None:
@@ -62,7 +63,7 @@ class RobotNode:
         self.calls.append((service, op["args"]))
         values = self._answers[service](op["args"])
         if values is not None:
-            self._say(
+            self._send(
                 op="service_response",
                 id=op["id"],
                 service=service,

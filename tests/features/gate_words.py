@@ -1,4 +1,4 @@
-"""What the gate says to a page that a busy machine held up."""
+"""The gate's messages to a page on a busy machine."""
 
 import re
 
@@ -6,4 +6,4 @@ TOO_LATE = re.compile(
     "older than|too old|does not respond|take control first|too slow|"
     "control of the robot"
 )
-"""Why a goal was not taken that is taken when it is sent again."""
+"""Why a goal was refused that the gate accepts when it is sent again."""

@@ -1,4 +1,4 @@
-"""A bridge whose frames a test writes, and a page that writes down its notices."""
+"""A bridge whose frames come from a test, and a page that records its notices."""
 
 import io
 import itertools
@@ -53,11 +53,11 @@ class Link:
         return keep(Listening(undo))
 
     def on_open(self, fn):
-        """It is open already, and nobody waits for what comes soon."""
+        """Do nothing: the bridge is already open."""
         return keep(Removal(lambda: None))
 
-    def say(self, topic: str, message: dict | str, *, cbor: bool = False) -> None:
-        """Let a frame come in as a rosbridge writes it."""
+    def publish(self, topic: str, message: dict | str, *, cbor: bool = False) -> None:
+        """Receive a frame in the form that a rosbridge sends."""
         if cbor:
             op = {"op": "publish", "topic": topic, "msg": message}
             frame = cbor2.dumps(op)
@@ -116,14 +116,14 @@ class Someone:
 
 
 def header(frame: str = "map", *, ros2: bool = False) -> dict:
-    """A header in either dialect."""
+    """Return a header in one of the dialects."""
     if ros2:
         return {"stamp": {"sec": 3, "nanosec": 5}, "frame_id": frame}
     return {"seq": 7, "stamp": {"secs": 3, "nsecs": 5}, "frame_id": frame}
 
 
 def pose(x: float, y: float, yaw: float = 0.0) -> dict:
-    """A ``geometry_msgs/Pose`` in the plane."""
+    """Return a ``geometry_msgs/Pose`` in the plane."""
     return {
         "position": {"x": x, "y": y, "z": 0.0},
         "orientation": {"x": 0, "y": 0, "z": np.sin(yaw / 2), "w": np.cos(yaw / 2)},
@@ -131,23 +131,23 @@ def pose(x: float, y: float, yaw: float = 0.0) -> dict:
 
 
 def typed(tag: int, numbers: np.ndarray) -> cbor2.CBORTag:
-    """A typed array as rosbridge writes it in CBOR."""
+    """Return a typed array as rosbridge sends it in CBOR."""
     return cbor2.CBORTag(tag, numbers.tobytes())
 
 
 def images(layer) -> list:
-    """The ``<image>`` elements of a layer."""
+    """Return the ``<image>`` elements of a layer."""
     return [each for each in layer.svg.children if each.tag == "image"]
 
 
 def image_of(element) -> Image.Image:
-    """The picture that an ``<image>`` shows."""
+    """Return the picture that an ``<image>`` shows."""
     tag = element.get("href").rpartition("/")[2]
     return Image.open(io.BytesIO(pictures.get(tag).data)).convert("RGBA")
 
 
 def pixel(element, x: float, y: float) -> tuple[int, int, int, int] | None:
-    """The colour that an ``<image>`` has at a place of the world; None beside it."""
+    """Return the colour of an ``<image>`` at a place of the world; None outside."""
     picture = image_of(element)
     u, v = element._transform.inverse.apply(x, y)
     width, height = float(element.get("width")), float(element.get("height"))
@@ -158,7 +158,7 @@ def pixel(element, x: float, y: float) -> tuple[int, int, int, int] | None:
 
 
 def matrix_of(element) -> Affine:
-    """What carries an element's own coordinates to those of its parent."""
+    """Return the transform from an element's coordinates to those of its parent."""
     placed = element._transform
     if placed is None:
         return Affine()
@@ -169,7 +169,7 @@ def matrix_of(element) -> Affine:
 
 
 def to_root(element) -> Affine:
-    """What carries an element's coordinates to those around its fragment."""
+    """Return the transform from an element to the outside of its fragment."""
     matrix = matrix_of(element)
     while element.parent is not None:
         element = element.parent
@@ -178,12 +178,12 @@ def to_root(element) -> Affine:
 
 
 def numbers(text: str) -> list[float]:
-    """Every number of a ``d`` or ``points``, in order."""
+    """Return every number of a ``d`` or ``points`` attribute, in order."""
     return [float(n) for n in re.findall(r"-?\d*\.?\d+(?:e-?\d+)?", text)]
 
 
 def dots(element) -> np.ndarray:
-    """Where a path has its dots, of shape (N, 2), in metres of its parent."""
+    """Return the dots of a path, of shape (N, 2), in metres of its parent."""
     shown = element._dots
     if isinstance(shown, Rays):
         return points_of(shown)

@@ -1,4 +1,4 @@
-"""Layers of a user's own, in one file, with public names alone."""
+"""Layers of a user in one file, with public names only."""
 
 import webmap
 from webmap import svg
@@ -17,7 +17,7 @@ class Temperature(webmap.RobotLayer):
     frame = "robot"
 
     size: webmap.options.Metres = 0.3
-    """How high the letters are, in metres."""
+    """The height of the letters, in metres."""
 
     age_limit: float = 5.0
 
@@ -36,7 +36,7 @@ class Spot(webmap.messages.Stamped, frozen=True, kw_only=True):
 
 @webmap.layer("my_msgs/Spot", kind="spot", view=Spot)
 class OwnSpot(webmap.RobotLayer):
-    """A spot in space, as it is seen from above."""
+    """A spot in space, drawn from above."""
 
     def build(self):
         self.spot = self.add(svg.circle(r=0.1))
@@ -52,7 +52,7 @@ class OwnSpot(webmap.RobotLayer):
     switch="Zones",
 )
 class Zones(webmap.MapLayer):
-    """Circles on the map, of as many robots as there are."""
+    """Circles on the map, of any number of robots."""
 
     colour: str = "orange"
     """The colour of the circles."""

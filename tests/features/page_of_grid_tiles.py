@@ -21,7 +21,7 @@ def build(page, yaw: float) -> None:
     )
     info = {"map_load_time": header()["stamp"], **size, "origin": at}
     grid = {"header": header(), "info": info, "data": typed(72, CELLS)}
-    link.say("/map", grid, cbor=True)
+    link.publish("/map", grid, cbor=True)
 
 
 @webmap.page("/")

@@ -1,7 +1,7 @@
-"""A page for each dialect with every layer there is, on the simulators of a test.
+"""A page for each dialect with all layers, on the simulators of a test.
 
-Run by ``webmap run``; ``LAYERS_ROS1`` and ``LAYERS_ROS2`` say where their rosbridges
-are.
+Run by ``webmap run``; ``LAYERS_ROS1`` and ``LAYERS_ROS2`` are the addresses of the
+rosbridges.
 """
 
 import os
@@ -11,7 +11,7 @@ from webmap import html
 
 ABOVE = {"ros1": "/robot_0/move_base", "ros2": "/robot_0"}
 FOOT = {"ros1": "footprint", "ros2": "published_footprint"}
-# In ROS 2 the names of parts do not tell robots apart.
+# In ROS 2 the names of parts do not distinguish robots.
 PARTS = {"ros1": "robot_0/", "ros2": ""}
 
 
@@ -58,7 +58,7 @@ def build(page: webmap.Page, dialect: str, bridge: webmap.Bridge) -> None:
 
 
 class Words:
-    """What is said beside the map: battery, health, logs and a picture."""
+    """The data beside the map: battery, health, logs and a picture."""
 
     def __init__(self, robot, page, bridge, parts) -> None:
         self.charge, self.view = html.p(id="charge"), html.img(id="view", alt="")

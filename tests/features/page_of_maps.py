@@ -1,6 +1,6 @@
 """A page that shows each map file of a folder, at ``/NAME``; run by ``webmap run``.
 
-``MAPS`` is the folder; ``bounds.json`` in it says what part of the world to show.
+``MAPS`` is the folder; ``bounds.json`` in it has the part of the world to show.
 """
 
 import json

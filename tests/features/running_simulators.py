@@ -1,4 +1,4 @@
-"""Simulators that run beside a test, which sees and moves what is in them."""
+"""Simulators that run beside a test; the test can read and change their worlds."""
 
 import asyncio
 import contextlib
@@ -20,11 +20,11 @@ from webmap.sim.world import World, WorldOptions
 
 
 class Running:
-    """One simulator, its world and what it said last."""
+    """A simulator, its world and its last message on each topic."""
 
     def __init__(self, dialect: str, *, tilted: bool = False) -> None:
         quirks = parse_quirks("real", dialect)
-        # Without any drift, odometry would be taken from the map at every step.
+        # Without drift, odometry would be the pose on the map.
         base = BaseOptions(drift=1e-9)
         options = WorldOptions(robots=2, seed=4, base=base)
         self.world = World(load_map(FLOOR), options)
@@ -32,11 +32,11 @@ class Running:
         graph = Graph(schema)
         Rosapi(graph, quirks).start()
         self.node = RobotsNode(self.world, graph, "Twist", quirks, tilted=tilted)
-        self.said: dict[str, dict[str, Any]] = {}
+        self.published: dict[str, dict[str, Any]] = {}
         publish = self.node.publish
 
         def publish_and_note(topic: str, message: dict[str, Any]) -> None:
-            self.said[topic] = message
+            self.published[topic] = message
             publish(topic, message)
 
         self.node.publish = publish_and_note
@@ -56,7 +56,7 @@ class Running:
 
 @contextlib.contextmanager
 def simulators(*dialects: str, tilted: bool = False) -> Iterator[dict[str, Running]]:
-    """Run a simulator of each dialect in a thread of their own."""
+    """Run a simulator of each dialect in a separate thread."""
     found = {dialect: Running(dialect, tilted=tilted) for dialect in dialects}
     ready, stop = threading.Event(), threading.Event()
 

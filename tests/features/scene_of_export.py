@@ -1,4 +1,4 @@
-"""A page with things that are styled in every way, to be saved as a picture.
+"""A page with all kinds of styled elements, to be saved as a picture.
 
 Run by ``webmap run``; nothing on it moves.
 """
@@ -40,11 +40,11 @@ def build(page) -> None:
     map.add_robot(robot)
     map.fit(-3.5, -2.5, 7, 5)
     map.rotate(20)
-    link.say("/odom", {"header": header(), "pose": pose(1.0, -1.0, 0.5)})
-    link.say("/map", plan(0))
-    link.say("/costs", costs(2))
+    link.publish("/odom", {"header": header(), "pose": pose(1.0, -1.0, 0.5)})
+    link.publish("/map", plan(0))
+    link.publish("/costs", costs(2))
     poses = [{"header": header(), "pose": pose(*at)} for at in [(1, -1), (2, 1)]]
-    link.say("/plan", {"header": header(), "poses": poses})
+    link.publish("/plan", {"header": header(), "poses": poses})
     cube = marker(1, 1, (-1.5, 0.25, 0.3), (0.5, 0.5, 0.5))
     words = marker(2, 9, (0, 0.4, 0), (0, 0, 0.3), "<b>Küche</b>")
-    link.say("/markers", {"markers": [cube, words]})
+    link.publish("/markers", {"markers": [cube, words]})

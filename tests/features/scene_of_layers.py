@@ -1,4 +1,4 @@
-"""A page with layers of every kind, over a link that this script writes itself.
+"""A page with layers of every kind, with a link whose messages this script makes.
 
 Run by ``webmap run``; the messages are decoded as those of a robot are.
 """
@@ -12,7 +12,7 @@ import webmap
 
 link = Link()
 UNSTAMPED = {"stamp": {"secs": 0, "nsecs": 0}, "frame_id": "base_link"}
-"""Of what goes along with the robot."""
+"""The header of messages in the frame of the robot."""
 
 bob = webmap.Robot("Bob")
 bob.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
@@ -29,7 +29,7 @@ def grid(cells, resolution, at) -> dict:
 
 
 def plan(value: int) -> dict:
-    """A floor of 6 x 4 m whose lower left metre is occupied, turned by 0.2 rad."""
+    """Return a turned floor of 6 x 4 m whose lower left metre is occupied."""
     cells = np.zeros((40, 60), np.int8)
     cells[:10, :10] = 100
     cells[-1, -1] = value
@@ -37,7 +37,7 @@ def plan(value: int) -> dict:
 
 
 def costs(column: int) -> dict:
-    """Ten square cells of 0.2 m; the one in ``column`` is lethal."""
+    """Return ten square cells of 0.2 m; the cell in ``column`` is lethal."""
     cells = np.zeros((1, 10), np.int8)
     cells[0, column] = 100
     return grid(cells, 0.2, (-1, 1, 0))
@@ -59,17 +59,17 @@ def marker(id, type, at, scale, text="") -> dict:
 
 
 def first() -> None:
-    link.say("/odom", {"header": header(), "pose": pose(1.0, -1.0, 0.5)})
-    link.say("/map", plan(0))
-    link.say("/costs", costs(2))
+    link.publish("/odom", {"header": header(), "pose": pose(1.0, -1.0, 0.5)})
+    link.publish("/map", plan(0))
+    link.publish("/costs", costs(2))
     poses = [{"header": header(), "pose": pose(*at)} for at in [(1, -1), (2, 1)]]
-    link.say("/plan", {"header": header(), "poses": poses})
+    link.publish("/plan", {"header": header(), "poses": poses})
     foot = [(0.3, 0.2), (0.3, -0.2), (-0.3, -0.2), (-0.3, 0.2)]
     points = [{"x": x, "y": y, "z": 0} for x, y in foot]
-    link.say("/footprint", {"header": UNSTAMPED, "polygon": {"points": points}})
+    link.publish("/footprint", {"header": UNSTAMPED, "polygon": {"points": points}})
     cube = marker(1, 1, (-1.5, 0.25, 0.3), (0.5, 0.5, 0.5))
     words = marker(2, 9, (0, 0.4, 0), (0, 0, 0.3), "<b>Küche</b>")
-    link.say("/markers", {"markers": [cube, words]})
+    link.publish("/markers", {"markers": [cube, words]})
     data = np.array([[1.0, 0.0, 0.2]], np.float32)
     fields = [
         {"name": name, "offset": 4 * i, "datatype": 7, "count": 1}
@@ -77,17 +77,17 @@ def first() -> None:
     ]
     step = {"point_step": 12, "row_step": 12, "is_bigendian": False}
     cloud = {"header": UNSTAMPED, "height": 1, "width": 1, "fields": fields, **step}
-    link.say("/points", {**cloud, "data": list(data.tobytes()), "is_dense": True})
+    link.publish("/points", {**cloud, "data": list(data.tobytes()), "is_dense": True})
 
 
 async def go_on() -> None:
-    """Say the map anew all the time, and move the robot there and back."""
+    """Publish the map again and again, and move the robot back and forth."""
     for number in range(10_000):
         await asyncio.sleep(0.05)
-        link.say("/map", plan(number % 100))
+        link.publish("/map", plan(number % 100))
         if number % 20 == 0:
             at = (0.5, -0.5, -2.0) if number % 40 else (1.0, -1.0, 0.5)
-            link.say("/odom", {"header": header(), "pose": pose(*at)})
+            link.publish("/odom", {"header": header(), "pose": pose(*at)})
 
 
 going: set[asyncio.Task] = set()
@@ -97,7 +97,7 @@ going: set[asyncio.Task] = set()
 def broken(page) -> None:
     build(page)
     for _ in range(3):
-        link.say("/costs", {**costs(5), "data": [0] * 3})
+        link.publish("/costs", {**costs(5), "data": [0] * 3})
 
 
 @webmap.page("/")

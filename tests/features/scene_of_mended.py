@@ -1,4 +1,4 @@
-"""A page whose robot sends plans with a NaN, until somebody presses a key.
+"""A page whose robot sends plans with a NaN until a key is pressed.
 
 Run by ``webmap run``; the messages are decoded as those of a robot are.
 """
@@ -19,7 +19,7 @@ PERIOD = 0.05
 
 
 def plan(number: int, last_y: float) -> dict:
-    """A plan that begins where the robot is, which moves all the time."""
+    """Return a plan that begins at the robot, which moves all the time."""
     points = [(number * 0.013, 0.5), (2.0 + number * 0.1, last_y)]
     poses = [{"header": header(), "pose": pose(*at)} for at in points]
     return {"header": header(), "poses": poses}
@@ -28,7 +28,7 @@ def plan(number: int, last_y: float) -> dict:
 async def go_on() -> None:
     for number in range(100_000):
         for topic, bad in broken.items():
-            link.say(topic, plan(number, math.nan if bad else 1.0))
+            link.publish(topic, plan(number, math.nan if bad else 1.0))
         await asyncio.sleep(PERIOD)
 
 
@@ -36,7 +36,7 @@ going: set[asyncio.Task] = set()
 
 
 def press(event) -> None:
-    """Break or mend the first plan, or break the second."""
+    """Break or repair the first plan, or break the second plan."""
     if event.key == "m":
         broken["/plan"] = not broken["/plan"]
     if event.key == "b":

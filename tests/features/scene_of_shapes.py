@@ -1,4 +1,4 @@
-"""A page with a marker of every type, over a link that this script writes itself.
+"""A page with a marker of every type, with a link whose messages this script makes.
 
 Run by ``webmap run``; the messages are decoded as those of a robot are.
 """
@@ -17,4 +17,4 @@ def build(page) -> None:
     map.add_module("Markers", link, "/shapes")
     map.fit(-3.5, -2.5, 7, 5)
     messages = [shape.message(n) for n, shape in enumerate(SHAPES.values())]
-    link.say("/shapes", {"markers": messages})
+    link.publish("/shapes", {"markers": messages})

@@ -16,7 +16,7 @@ LEVELS = range(15, 19)
 
 
 def number(z: int, lat: float, lon: float) -> tuple[float, float]:
-    """Where a place is, in tiles of a level."""
+    """Return a place in tiles of a level."""
     y = 1 - math.asinh(math.tan(math.radians(lat))) / math.pi
     return (lon + 180) / 360 * 2**z, y / 2 * 2**z
 
@@ -78,8 +78,8 @@ if __name__ == "__main__":
         for i, robot in enumerate(robots):
             map.add_robot(robot)
             lat, lon = FIXES[i]
-            link.say(f"/odom{i}", {"x": 300.0 + i, "y": -200.0, "theta": 1.0})
+            link.publish(f"/odom{i}", {"x": 300.0 + i, "y": -200.0, "theta": 1.0})
             status = {"status": 0, "service": 1}
             fix = {"latitude": lat, "longitude": lon, "status": status}
-            link.say(f"/fix{i}", {"header": header("gps"), **fix})
+            link.publish(f"/fix{i}", {"header": header("gps"), **fix})
         map.fit(-350, -270, 700, 540)

@@ -1,7 +1,7 @@
 """Markers of every type that is drawn, and which points they cover.
 
-Described twice: once as a message, and once in plain numbers in the frame of the
-marker, so that what is drawn can be compared with them.
+Each is described twice, as a message and in plain numbers in the frame of the marker,
+so that tests can compare the drawing with the numbers.
 """
 
 import math
@@ -13,7 +13,7 @@ Point = tuple[float, float]
 
 RED, BLUE = (255, 0, 0), (0, 0, 255)
 YAW = 0.5
-"""How far all of them are turned."""
+"""The rotation of all markers."""
 
 
 @dataclass(frozen=True)
@@ -22,21 +22,21 @@ class Shape:
 
     type: int
     at: Point
-    """Where it is in the world."""
+    """The place of the marker in the world."""
 
     scale: tuple[float, float, float]
     blue: tuple[Point, ...]
-    """What it covers, in its own frame; :attr:`red` too."""
+    """Points that the marker covers, in its own frame; :attr:`red` too."""
 
     beside: tuple[Point, ...]
-    """What it does not cover, though it is near."""
+    """Points near the marker that it does not cover."""
 
     points: tuple[Point, ...] = ()
     red: tuple[Point, ...] = ()
     colours: tuple[tuple[int, int, int], ...] = field(default=())
 
     def message(self, number: int) -> dict:
-        """It as ``visualization_msgs/Marker``."""
+        """Return the shape as a ``visualization_msgs/Marker``."""
         return {
             "header": header(),
             "ns": "shapes",
@@ -56,7 +56,7 @@ class Shape:
         }
 
     def in_world(self, points: tuple[Point, ...]) -> list[Point]:
-        """Where points of its own frame are."""
+        """Return points of the marker's frame in the world."""
         cos, sin = math.cos(YAW), math.sin(YAW)
         x, y = self.at
         return [(x + cos * u - sin * v, y + sin * u + cos * v) for u, v in points]
@@ -156,4 +156,4 @@ SHAPES = {
         beside=((0.4, 0.4), (0.75, 0.1), (-0.1, 0.2), (1.4, 0.3)),
     ),
 }
-"""By what each is called: the class, where there is but one of its type."""
+"""The shapes by name: the class, if there is only one of its type."""

@@ -1,6 +1,6 @@
-"""A page with robots of ROS 1 and of ROS 2, and every tool that sends them somewhere.
+"""A page with robots of ROS 1 and ROS 2 and every tool that sends goals or poses.
 
-Run by a test, with the two bridges' addresses in the environment.
+Run by a test, with the addresses of the two bridges in the environment.
 """
 
 import os
@@ -34,7 +34,7 @@ robots = [
 robots[0].set_move_topic(
     OLD, action="/robot_0/move_base", action_type="move_base_msgs/MoveBaseAction"
 )
-# Where the plain one is sent is drawn from its own topic too, whoever sends it there.
+# The plain robot's goal is also drawn from its topic, whichever program sends it.
 robots[3].add_module("PoseStamped", OLD, "/robot_1/move_base_simple/goal", name="goal")
 
 
@@ -47,5 +47,5 @@ def page(page):
         map.add_module(module)
     map.add_module("Teleop", 1.0, 1.5)
     map.add_module("StopButton")
-    # The hall of the test lies to the right of the tools, which unfold over the map.
+    # The hall is to the right of the tools, which open over the map.
     map.fit(-20, -10, 32, 20)

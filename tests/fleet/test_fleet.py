@@ -1,4 +1,4 @@
-"""Fleet files: read strictly, each mistake with its line."""
+"""Fleet files are read strictly; each mistake is reported with its line."""
 
 import pytest
 
@@ -127,7 +127,7 @@ def changed(old, new):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "expected"),
     [
         (
             changed("stops_within", "stops_witin"),
@@ -282,16 +282,18 @@ def changed(old, new):
         ("#" * (2 << 20), "FILE: the file is larger than 512 KiB"),
     ],
 )
-def test_a_mistake_is_reported_with_its_line_and_the_expected_value(write, text, said):
-    assert said in refused(write, text)
+def test_a_mistake_is_reported_with_its_line_and_the_expected_value(
+    write, text, expected
+):
+    assert expected in refused(write, text)
 
 
 def test_all_mistakes_are_reported_at_once(write):
     text = changed("v_max", "vmax").replace("w_max = 1", "w_max = false")
-    said = refused(write, text).splitlines()
-    assert len(said) == 2
-    assert said[0].startswith("FILE:22: ")
-    assert said[1].startswith("FILE:23: ")
+    errors = refused(write, text).splitlines()
+    assert len(errors) == 2
+    assert errors[0].startswith("FILE:22: ")
+    assert errors[1].startswith("FILE:23: ")
 
 
 def test_error_messages_escape_control_characters_of_the_fleet_file(write):
@@ -300,9 +302,9 @@ def test_error_messages_escape_control_characters_of_the_fleet_file(write):
 
 
 def test_a_missing_bridges_table_is_the_only_mistake_reported(write):
-    said = refused(write, '[[robots]]\nname = "Bob"\n').splitlines()
-    assert len(said) == 1
-    assert said[0].startswith(
+    errors = refused(write, '[[robots]]\nname = "Bob"\n').splitlines()
+    assert len(errors) == 1
+    assert errors[0].startswith(
         "FILE:1: bridges: got nothing, expected a table [bridges]"
     )
 

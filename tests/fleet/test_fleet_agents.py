@@ -74,7 +74,7 @@ def test_a_rosbridge_on_another_computer_is_reached_by_others():
 
 
 class FakePeer:
-    """The sessions with a router whose agents give these answers."""
+    """The sessions with a router whose agents send these answers."""
 
     trouble = None
 
@@ -90,7 +90,7 @@ class FakePeer:
 
 @pytest.fixture
 def shown(monkeypatch):
-    """A display that has heard of the agent bay3, and what it tells people."""
+    """A display that knows the agent bay3, and the display's messages to users."""
     peer, notices = FakePeer(), []
     monkeypatch.setattr(of_agents, "peer_of", lambda router: peer)
     monkeypatch.setattr(of_agents, "lifecycle", Lifecycle())

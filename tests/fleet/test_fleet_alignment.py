@@ -1,4 +1,4 @@
-"""Alignments of a fleet file: read strictly, and laid under what people saved."""
+"""Alignments of a fleet file are read strictly; saved alignments replace them."""
 
 import math
 
@@ -64,16 +64,16 @@ def test_bridges_and_robots_get_their_alignments_from_the_fleet_file(ready):
 def test_an_invalid_alignment_is_reported_with_its_line_and_key(
     ready, value, old, line, place
 ):
-    said = refused(ready, FILE.replace(old, value))
-    assert f"fleet.toml:{line}: {place}: got " in said
-    assert "expected x and y in metres and an angle in degrees" in said
+    refusal = refused(ready, FILE.replace(old, value))
+    assert f"fleet.toml:{line}: {place}: got " in refusal
+    assert "expected x and y in metres and an angle in degrees" in refusal
 
 
 def test_a_bridge_table_with_unknown_or_missing_keys_is_refused(ready):
-    said = refused(ready, FILE.replace("alignment = [12.5", "aligment = [12.5"))
-    assert 'did you mean "alignment"?' in said
-    said = refused(ready, FILE.replace('url = "ws://south:9090", ', ""))
-    assert 'bridges.south: the key "url" is missing' in said
+    refusal = refused(ready, FILE.replace("alignment = [12.5", "aligment = [12.5"))
+    assert 'did you mean "alignment"?' in refusal
+    refusal = refused(ready, FILE.replace('url = "ws://south:9090", ', ""))
+    assert 'bridges.south: the key "url" is missing' in refusal
 
 
 def test_a_saved_alignment_is_used_until_the_fleet_file_changes(

@@ -1,4 +1,4 @@
-"""Buttons in a fleet file: read strictly, each mistake with its line."""
+"""Buttons in a fleet file are read strictly; each mistake is reported with its line."""
 
 import pytest
 
@@ -55,7 +55,7 @@ value = 0.2
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "expected"),
     [
         (
             'label = "Go"\ntopic = "/go"\ntype = "geometry_msgs/Twist"',
@@ -82,10 +82,10 @@ value = 0.2
         ),
     ],
 )  # fmt: skip
-def test_an_invalid_button_is_reported_with_its_line(tmp_path, line, said):
+def test_an_invalid_button_is_reported_with_its_line(tmp_path, line, expected):
     with pytest.raises(ConfigError) as error:
         prepared(tmp_path, f"\n[[robots.buttons]]\n{line}\n")
-    assert said in str(error.value)
+    assert expected in str(error.value)
 
 
 def test_buttons_that_are_not_tables_are_refused(tmp_path):

@@ -12,7 +12,7 @@ HEAD = '[bridges]\nhall = "ws://hall:9090"\n\n[[robots]]\nname = "Bob"\n'
 
 @pytest.fixture
 def read(tmp_path):
-    """Read a file with these cameras, in its line 6, and return the robot's."""
+    """Read a file with these cameras in line 6; return the cameras of the robot."""
     robots = []
 
     def read_(cameras: str) -> list:
@@ -48,7 +48,7 @@ def test_several_cameras_get_different_names(read):
 
 
 @pytest.mark.parametrize(
-    ("cameras", "said"),
+    ("cameras", "expected"),
     [
         ('"rtsp://bob/stream"', 'cameras: got the text "rtsp://bob/stream", expected'),
         ('"front camera"', 'cameras: got the text "front camera", expected a topic'),
@@ -71,12 +71,12 @@ def test_several_cameras_get_different_names(read):
         ),
     ],
 )
-def test_an_invalid_camera_is_reported_with_its_line(read, cameras, said):
+def test_an_invalid_camera_is_reported_with_its_line(read, cameras, expected):
     with pytest.raises(ConfigError) as refused:
         read(cameras)
     (line,) = str(refused.value).splitlines()
     assert "fleet.toml:6: robots[0]." in line
-    assert said in line
+    assert expected in line
 
 
 def test_discovered_cameras_in_a_fleet_file_get_different_names(tmp_path):

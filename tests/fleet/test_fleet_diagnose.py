@@ -38,7 +38,7 @@ scan = ["/bob/front", "/bob/rear"]
 
 
 def looked_at(robots=(), settings=()):
-    """The robots behind a bridge that are checked."""
+    """Return the robots behind a bridge that are checked."""
     ((_, configured),) = bridges_of([URL], robots, settings)
     found = discover(TOPICS)
     findings, _ = merge_configured(found, configured(found), TOPICS)

@@ -1,4 +1,4 @@
-"""Robots of which frames, places and topics come while the console runs."""
+"""Robots whose frames, places and topics appear while the console runs."""
 
 import asyncio
 from itertools import pairwise
@@ -40,16 +40,16 @@ def trees(chain):
 
 
 class Watched:
-    """A console that looks again and again, at topics and frames as a test has them."""
+    """A console that looks repeatedly at the topics and frames of a test."""
 
     def __init__(self, bridge, *settings, given=()):
         self.bridge = bridge
-        said = Overrides([parse_setting(text) for text in settings])
-        self.late = ShownRobots(Console(), said, given=given)
+        overrides = Overrides([parse_setting(text) for text in settings])
+        self.late = ShownRobots(Console(), overrides, given=given)
         self.newcomers = Newcomers()
 
     def look(self, topics, chain=""):
-        """Look as often as news takes to settle, and once more."""
+        """Look until discovery reports the changes, and once more."""
         for _ in range(3):
             findings = discover(topics, "host", trees(chain))
             for news in self.newcomers.look(findings):
@@ -82,8 +82,8 @@ def test_a_robot_with_only_frames_is_drawn_in_the_map_frame_when_the_frame_appea
     capsys.readouterr()
     watched.look(TF, "map odom base_link")
     assert watched.robot.tf["map_frame"] == "map"
-    said = capsys.readouterr().err.splitlines()
-    assert said == ["host now is drawn by base_link in map"]
+    printed = capsys.readouterr().err.splitlines()
+    assert printed == ["host now is drawn by base_link in map"]
 
 
 def test_goals_use_a_map_frame_that_appears_later(watched, capsys):
@@ -139,7 +139,9 @@ def test_layers_in_the_old_map_frame_move_to_the_new_map_frame(watched, bridge):
     robot.add_module("OnMaps", "OccupancyGrid", bridge, "/bob/costmap", **old)
     robot.add_module("OnMaps", "OccupancyGrid", bridge, "/bob/as_it_comes")
     watched.look(TF | ODOM, LATER)
-    made = {args[2]: said for name, args, said in robot.module_arguments() if args[2:]}
+    made = {
+        args[2]: options for name, args, options in robot.module_arguments() if args[2:]
+    }
     assert made == {
         "/bob/costmap": {"map_frame": "bob/map", "palette": "costmap"},
         "/bob/as_it_comes": {},
@@ -165,8 +167,8 @@ def test_a_robot_without_a_pose_uses_a_pose_topic_that_appears_later(watched, ca
     assert watched.robot.feed is None
     watched.look(DRIVEN | POSE)
     assert watched.robot.feed.topic == "/bob/robot_pose"
-    said = capsys.readouterr().err.splitlines()[1:]
-    assert said == ["bob has new topics: pose /bob/robot_pose"]
+    printed = capsys.readouterr().err.splitlines()[1:]
+    assert printed == ["bob has new topics: pose /bob/robot_pose"]
 
 
 def test_a_pose_topic_that_appears_later_does_not_replace_odometry(watched, capsys):
@@ -236,7 +238,7 @@ def test_a_robot_option_is_drawn_in_a_map_frame_that_appears_later(
         asyncio.run(drawing.take(TF | ODOM))
         assert robot.tf["map_frame"] == "bob/map"
         assert robot.motion.spec().goal_frame == "bob/map"
-    assert len(received) == 3, "also once it is drawn by frames"
+    assert len(received) == 3, "the pose is also set when frames replace odometry"
     assert (
         capsys.readouterr().err.count("Al now is drawn by bob/base_link in bob/map")
         == 1

@@ -1,4 +1,4 @@
-"""Robots that are given by hand have what else is in their namespaces."""
+"""Robots given on the command line also get the other topics of their namespaces."""
 
 import asyncio
 
@@ -60,7 +60,7 @@ def made(robot):
 
 
 def drawn(bridge, topics, *given):
-    """Draw what is behind a bridge of robots that were given; return all of it."""
+    """Draw the given robots of a bridge; return the console."""
     console = Console([made(about) for about in given])
     known = [
         ShownRobot(*about, robot, about.found.config(about.bridge.url))
@@ -98,7 +98,7 @@ def test_a_robot_option_gets_the_layers_of_its_namespace_but_only_its_given_scan
     ]
     assert [type(module).__name__ for module in robot.modules].count("Trail") == 1
     assert list(console.grids) == [(bridge, "/map")]
-    assert robot.feed.topic == "/a/odom", "its odometry is as it was given"
+    assert robot.feed.topic == "/a/odom", "the given odometry is kept"
     robot.destroy()
 
 
@@ -127,7 +127,7 @@ def test_a_robot_option_with_odometry_is_drawn_in_the_map_frame(bridge):
     console = drawn(bridge, TOPICS | FRAMES, placed, nowhere)
     one, other = console.given
     assert (one.tf["map_frame"], one.tf["quiet"]) == ("map", True)
-    assert other.tf is None, "without odometry it was to be nowhere"
+    assert other.tf is None, "a robot without odometry gets no frames"
     one.destroy()
     other.destroy()
 
@@ -147,7 +147,9 @@ def test_only_the_first_robot_option_in_a_namespace_gets_its_layers(bridge):
     console = drawn(bridge, TOPICS, first, second)
     assert [len(what_of(robot)) for robot in console.given] == [4, 0]
     made = [[type(module).__name__ for module in r.modules] for r in console.given]
-    assert [names.count("Trail") for names in made] == [1, 1], "each goes its own way"
+    assert [names.count("Trail") for names in made] == [1, 1], (
+        "each robot has its own trail"
+    )
     behind = {bridge: Found(URL, "bob", discover(TOPICS), topics=TOPICS)}
     fleet = FoundFleet([first, second], behind=behind)
     assert fleet.table(grid=True, only_given=False).count("/a/points") == 1
@@ -166,7 +168,7 @@ def test_a_robot_option_on_another_bridge_gets_no_layers(bridge):
 @pytest.mark.parametrize(
     ("given", "namespace"),
     [
-        ({"odometry": "/a/ekf/odometry/filtered"}, "/a"),  # not the best of its role
+        ({"odometry": "/a/ekf/odometry/filtered"}, "/a"),  # not the best odometry
         ({"odometry": "a/odom/"}, "/a"),
         ({"velocity": "/b/cmd_vel"}, "/b"),
         ({"name": "b", "scan": "/scan"}, "/b"),
@@ -198,7 +200,7 @@ def test_the_namespace_of_a_robot_option_is_the_common_prefix_of_its_topics(
 
 
 @pytest.mark.parametrize(
-    ("texts", "said"),
+    ("texts", "expected"),
     [
         (
             ["Bob:/odom", "bob:/odom2"],
@@ -210,10 +212,10 @@ def test_the_namespace_of_a_robot_option_is_the_common_prefix_of_its_topics(
         (["Bob:/a:/c", "Al:/b:c/"], "c/ already drives 'Bob'; expected another topic"),
     ],
 )
-def test_an_invalid_robot_option_is_refused_with_its_text(bridge, texts, said):
+def test_an_invalid_robot_option_is_refused_with_its_text(bridge, texts, expected):
     with pytest.raises(ConfigError) as refused:
         given_robots(texts, [bridge])
-    assert said in str(refused.value)
+    assert expected in str(refused.value)
 
 
 def test_two_robots_with_equal_topics_on_different_bridges_are_accepted(bridge):

@@ -1,4 +1,4 @@
-"""Goals and the initial pose in a fleet file."""
+"""Topics for goals and the initial pose in a fleet file."""
 
 import pytest
 
@@ -42,7 +42,7 @@ def test_a_robot_without_goals_uses_the_initial_pose_frame_of_the_fleet_file(tmp
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "expected"),
     [
         ('move.frame = "map"', 'the key "topic" is missing'),
         ('move = { action = "/go", action_type = "a/Fibonacci" }', "NavigateToPose"),
@@ -53,7 +53,7 @@ def test_a_robot_without_goals_uses_the_initial_pose_frame_of_the_fleet_file(tmp
     ],
 )
 def test_the_error_for_an_invalid_goal_or_initial_pose_explains_the_mistake(
-    tmp_path, text, said
+    tmp_path, text, expected
 ):
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(ConfigError, match=expected):
         ready(tmp_path, text)

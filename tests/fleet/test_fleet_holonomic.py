@@ -1,4 +1,4 @@
-"""Bases of a fleet file that move sideways, and those that do not."""
+"""Holonomic and other bases in a fleet file."""
 
 import json
 import re
@@ -29,11 +29,11 @@ twist = { topic = "/robot_1/cmd_vel", stops_within = 0.5 }
 def test_the_q_key_moves_only_a_holonomic_robot_sideways(chromium, ros1, tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text(FLEET.replace("URL", ros1))
-    said, seen = [], []
+    sent_frames, seen = [], []
     with shown(chromium, "run", str(file)) as page:
 
         def listen(link):
-            link.on("framesent", lambda frame: said.append(frame))
+            link.on("framesent", lambda frame: sent_frames.append(frame))
             link.on("framereceived", lambda frame: seen.append(frame))
 
         page.on("websocket", listen)
@@ -49,10 +49,10 @@ def test_the_q_key_moves_only_a_holonomic_robot_sideways(chromium, ros1, tmp_pat
             )
 
         def drive(name, *keys):
-            """Hold keys until the gate wrote what they ask for; press again if not.
+            """Hold keys until the gate sends a velocity; press them again if needed.
 
-            Inputs must rest before a press counts, and a page that is too busy to
-            run at its pace drives nothing.
+            Inputs must be at rest before a press counts, and a page that is too slow
+            does not drive.
             """
             for _ in range(5):
                 page.wait_for_timeout(500)
@@ -65,13 +65,13 @@ def test_the_q_key_moves_only_a_holonomic_robot_sideways(chromium, ros1, tmp_pat
                     page.keyboard.up(key)
                 if written(name):
                     return
-            raise AssertionError(f"{keys} moved nothing: {said[-3:]}")
+            raise AssertionError(f"{keys} moved nothing: {sent_frames[-3:]}")
 
         def asked(axis):
-            return any(one[axis] for one in received(said, "drive"))
+            return any(one[axis] for one in received(sent_frames, "drive"))
 
         def written(name):
-            """What the gate wrote to a robot that is not zero."""
+            """Return the velocities other than zero that the gate sent to a robot."""
             words = [
                 one["sent"] for one in received(seen, "robot") if one["name"] == name
             ]
@@ -84,7 +84,7 @@ def test_the_q_key_moves_only_a_holonomic_robot_sideways(chromium, ros1, tmp_pat
         assert all(x == turn == 0 and y > 0 for x, y, turn, *_ in written("Omni"))
         select("Plain")
         expect(sideways).to_be_hidden()
-        said.clear()
+        sent_frames.clear()
         drive("Plain", "q", "w")
         assert not asked("y")
         assert all(x > 0 and y == 0 for x, y, *_ in written("Plain"))
@@ -94,6 +94,6 @@ def test_the_q_key_moves_only_a_holonomic_robot_sideways(chromium, ros1, tmp_pat
 
 
 def received(frames, op):
-    """The messages of one kind among the frames of a page."""
+    """Return the messages of one kind in the frames of a page."""
     found = (json.loads(frame) for frame in frames if str(frame)[:1] == "{")
     return [one for one in found if one.get("op") == op]

@@ -1,4 +1,4 @@
-"""What commands print of a bridge whose names and texts would steer a terminal."""
+"""Commands print names and texts that contain terminal control characters safely."""
 
 import functools
 import json
@@ -34,7 +34,7 @@ FRAME = {
     "child_frame_id": f"evil{EVIL}/base_link",
     "transform": {"translation": TURN, "rotation": TURN},
 }
-SAID = {
+MESSAGES = {
     "/tf": {"transforms": [FRAME]},
     "/bob/odom": {"header": {"frame_id": EVIL}, "child_frame_id": EVIL},
     "/bob/base_scan": {
@@ -48,12 +48,12 @@ def answered(socket, *, knows_topics):
     for frame in socket:
         asked = json.loads(frame)
         if asked["op"] == "subscribe":
-            message = SAID.get(asked["topic"], {})
-            said = {"op": "publish", "topic": asked["topic"], "msg": message}
+            message = MESSAGES.get(asked["topic"], {})
+            reply = {"op": "publish", "topic": asked["topic"], "msg": message}
         elif asked["op"] == "call_service":
             known = knows_topics and asked["service"] == "/rosapi/topics"
             values = {"topics": [*TOPICS], "types": [*TOPICS.values()]}
-            said = {
+            reply = {
                 "op": "service_response",
                 "service": asked["service"],
                 "id": asked.get("id"),
@@ -61,13 +61,13 @@ def answered(socket, *, knows_topics):
                 "values": values if known else f"there is no such service{EVIL}",
             }
         else:
-            said = {"op": "status", "level": "error", "msg": f"no{EVIL}"}
-        socket.send(json.dumps(said))
+            reply = {"op": "status", "level": "error", "msg": f"no{EVIL}"}
+        socket.send(json.dumps(reply))
 
 
 @contextmanager
 def bridge(*, knows_topics):
-    """Give the address of a bridge with such frames, or with such errors."""
+    """Yield the address of a bridge with such frames or such errors."""
     answer = functools.partial(answered, knows_topics=knows_topics)
     with serve(answer, "127.0.0.1", 0) as server:
         thread = threading.Thread(target=server.serve_forever)
@@ -87,9 +87,9 @@ def webmap(*arguments):
     return done.stdout.decode() + done.stderr.decode()
 
 
-def assert_harmless(said):
-    assert "evil" in said, said
-    lines = said.split("\n")
+def assert_harmless(output):
+    assert "evil" in output, output
+    lines = output.split("\n")
     assert [line for line in lines if not line.isprintable()] == []
     assert [line for line in lines if line.startswith("[[robots]]\\r")] == []
 
@@ -143,9 +143,9 @@ def test_commands_print_only_through_the_echo_function():
         if any(word in line.replace("_footprint(", "") for word in raw)
     }
     allowed = {
-        "discover.py": "click.echo(text, nl=False)",  # escaped as TOML has it
+        "discover.py": "click.echo(text, nl=False)",  # escaped as in TOML
         "echo.py": "click.echo((lines_of if lines",
-        "record.py": 'click.echo(f"\\r{text.ljust(',  # numbers alone
+        "record.py": 'click.echo(f"\\r{text.ljust(',  # only numbers
     }
     assert {name for name, _ in found} == set(allowed)
     assert all(line.startswith(allowed[name]) for name, line in found)

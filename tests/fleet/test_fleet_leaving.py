@@ -1,4 +1,4 @@
-"""Commands leave a bridge that hangs when a client leaves a queue of messages."""
+"""Commands close their link to a bridge that hangs if a client's queue is not empty."""
 
 import contextlib
 import signal
@@ -46,7 +46,7 @@ def running(name, url, folder):
 
 
 def wait_for_messages(process, url):
-    """Wait until a command has had a socket to the bridge for a moment."""
+    """Wait until a command has been connected to the bridge for a short time."""
     port = int(url.rpartition(":")[2])
     whole = psutil.Process(process.pid)
 
@@ -75,8 +75,8 @@ def lets_in(url):
 @pytest.mark.parametrize("name", ["record", "doctor", "discover"])
 def test_the_bridge_accepts_clients_after_a_command_ends(bridge, name, tmp_path):
     with running(name, bridge, tmp_path) as process:
-        _, said = process.communicate(timeout=60)
-    assert b"Traceback" not in said
+        _, output = process.communicate(timeout=60)
+    assert b"Traceback" not in output
     assert process.returncode in (0, 1)
     assert lets_in(bridge)
 

@@ -1,4 +1,4 @@
-"""Looking for robots goes on, whatever becomes of one look and of what is said."""
+"""Discovery continues after a failed look and after a failed notice."""
 
 import asyncio
 import errno
@@ -23,13 +23,13 @@ TOPICS = {"/bob/odom": "nav_msgs/Odometry", "/ann/odom": "nav_msgs/Odometry"}
 
 @pytest.fixture(autouse=True)
 def own_process(monkeypatch):
-    """Start nothing but what a test made."""
+    """Start only the objects that a test made."""
     monkeypatch.setattr(looking, "lifecycle", Lifecycle())
 
 
 @pytest.fixture
 def nobody_hears(monkeypatch):
-    """Standard error is a pipe that nobody reads."""
+    """Make standard error a broken pipe."""
 
     def broken(text):
         raise BrokenPipeError(errno.EPIPE, "Broken pipe")
@@ -48,7 +48,7 @@ class Open:
 
 
 class Failing(Looking):
-    """Fails at the first looks."""
+    """A source that fails in the first looks."""
 
     period = 0.001
 
@@ -76,8 +76,8 @@ def test_looking_continues_after_a_look_that_fails(error, caplog):
 
     with caplog.at_level(logging.ERROR, "webmap.cli"):
         asyncio.run(scenario())
-    said = [record.exc_info[1] for record in caplog.records]
-    assert said == ([] if isinstance(error, BridgeError) else [error, error])
+    logged = [record.exc_info[1] for record in caplog.records]
+    assert logged == ([] if isinstance(error, BridgeError) else [error, error])
 
 
 def test_a_new_robot_that_cannot_be_shown_does_not_hide_other_new_robots(caplog):

@@ -41,7 +41,7 @@ def refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "expected"),
     [
         (
             f'{SCAN}max_dots = "50"\n',
@@ -90,9 +90,9 @@ def refused(tmp_path):
     ],
 )
 def test_an_invalid_module_argument_is_reported_with_the_line_of_its_key(
-    refused, text, said
+    refused, text, expected
 ):
-    assert said in refused(text)
+    assert expected in refused(text)
 
 
 def test_all_invalid_module_arguments_are_reported_at_once(refused):
@@ -105,7 +105,7 @@ def test_all_invalid_module_arguments_are_reported_at_once(refused):
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "expected"),
     [
         ('palette = "foo"', 'options.palette: got the text "foo", expected "map" or "'),
         ("pallet = 1", 'there is no argument "pallet"; did you mean "palette"?'),
@@ -113,13 +113,13 @@ def test_all_invalid_module_arguments_are_reported_at_once(refused):
     ],
 )
 def test_arguments_of_an_on_maps_module_are_checked_before_a_map_exists(
-    refused, options, said
+    refused, options, expected
 ):
     args = '"OccupancyGrid", { bridge = "hall" }, "/c"'
     assert f"FILE:11: robots[0].modules[0].options.{options.split(' ')[0]}: " in (
         received := refused(module("OnMaps", options, args=args))
     )
-    assert said in received
+    assert expected in received
 
 
 def test_an_argument_index_in_an_error_counts_as_in_the_fleet_file(refused):

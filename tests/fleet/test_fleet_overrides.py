@@ -1,4 +1,4 @@
-"""Settings of ``--set`` replace guesses."""
+"""Settings of ``--set`` replace the topics that discovery chose."""
 
 import pytest
 
@@ -60,21 +60,21 @@ def test_the_error_for_an_invalid_setting_explains_the_mistake(text, words):
 
 
 def test_a_setting_replaces_one_topic_and_keeps_the_other_topics(found):
-    said = overrides("robot_1.scan=/robot_1/rear/scan", "robot_1.battery=")
-    robot = said.apply(URL, found)
-    config = said.config(URL, robot)
+    settings = overrides("robot_1.scan=/robot_1/rear/scan", "robot_1.battery=")
+    robot = settings.apply(URL, found)
+    config = settings.config(URL, robot)
     assert config.scan == ["/robot_1/rear/scan"]
     assert robot.first("scan").type == "sensor_msgs/LaserScan"
     assert config.battery == ""
     assert config.odometry.topic == "/robot_1/odom"
     assert config.motion.twist.topic == "/robot_1/cmd_vel"
-    assert said.fixed(URL, found) == {"scan", "battery"}
+    assert settings.fixed(URL, found) == {"scan", "battery"}
 
 
 def test_a_renamed_robot_is_recognised_by_its_namespace(found):
-    said = overrides("robot_1.name=Bob", "robot_1.base=base_footprint")
+    settings = overrides("robot_1.name=Bob", "robot_1.base=base_footprint")
     for _ in range(2):
-        robot = said.apply(URL, found)
+        robot = settings.apply(URL, found)
         assert (robot.name, robot.base_frame) == ("Bob", "base_footprint")
 
 
@@ -85,8 +85,8 @@ STAMPED = "geometry_msgs/msg/TwistStamped"
 def test_the_velocity_type_setting_applies_also_with_another_velocity_topic(
     found, last
 ):
-    said = overrides(f"robot_1.velocity_type={STAMPED}", f"robot_1.{last}")
-    about = said.apply(URL, found)
+    settings = overrides(f"robot_1.velocity_type={STAMPED}", f"robot_1.{last}")
+    about = settings.apply(URL, found)
     velocity = about.first("velocity")
     assert (velocity.topic, velocity.type) == (last.partition("=")[2], STAMPED)
 
@@ -138,12 +138,12 @@ def test_settings_add_topics_to_a_robot_option():
 
 
 def test_a_setting_for_an_unknown_robot_is_refused_unless_robots_may_still_appear():
-    said = overrides("robot_7.scan=/scan")
+    settings = overrides("robot_7.scan=/scan")
     with pytest.raises(ConfigError, match="did you mean 'robot_1'"):
-        said.check(["robot_1"], all_known=True)
-    (words,) = said.check(["robot_1"], all_known=False)
+        settings.check(["robot_1"], all_known=True)
+    (words,) = settings.check(["robot_1"], all_known=False)
     assert words == "--set robot_7.scan=/scan waits for a robot of that name."
-    assert said.check(["robot_7"], all_known=True) == []
+    assert settings.check(["robot_7"], all_known=True) == []
 
 
 def view(*arguments):
@@ -163,7 +163,7 @@ def test_view_show_lists_the_settings_and_refuses_settings_for_unknown_robots(ro
     ]
     drawn = bob.partition("drawn by webmap view:")[2]
     assert "/robot_1/points" in drawn
-    assert "/robot_1/base_scan" not in drawn, "another one was said"
+    assert "/robot_1/base_scan" not in drawn, "--set chose another topic"
     assert "--set ROBOT.ROLE=TOPIC" in shown.stdout
     refused = view(ros1, "--show", "--set", "robot_0.name=Robot_1")
     assert refused.returncode == 2
@@ -194,7 +194,7 @@ def test_view_show_lists_the_topics_and_layers_of_a_robot_option(ros1):
 
 def test_view_show_lists_only_the_given_topics_if_the_bridge_is_unreachable():
     shown = view("ws://127.0.0.1:1", "--show", "--wait", "0", "--robot", "Bob:/odom")
-    said = shown.stdout.splitlines()
-    assert said == ["Bob (from --robot)", "  odometry    /odom"]
+    lines = shown.stdout.splitlines()
+    assert lines == ["Bob (from --robot)", "  odometry    /odom"]
     assert "cannot reach the rosbridge" in shown.stderr
     assert "Only the topics of --robot can be drawn" in shown.stderr

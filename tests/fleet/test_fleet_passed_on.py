@@ -1,4 +1,4 @@
-"""Files and addresses of an agent's robots: what displays get, and what they open."""
+"""Which files and addresses of an agent's robots a display receives and opens."""
 
 import inspect
 

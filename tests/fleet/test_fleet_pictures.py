@@ -1,4 +1,4 @@
-"""What robots of a fleet file look like."""
+"""The pictures of robots in a fleet file."""
 
 import io
 import time
@@ -60,7 +60,7 @@ def test_the_picture_of_a_robot_has_its_position_size_and_angle(write):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         ('file = "bob.png"\n', "", 'FILE:8: robots[0].picture: the key "file" is miss'),
         ("width = 2\n", "", 'FILE:8: robots[0].picture: the key "width" is missing'),
@@ -77,12 +77,12 @@ def test_the_picture_of_a_robot_has_its_position_size_and_angle(write):
         ("bob.png", "large.png", "has 9000 x 9000 pixels; expected 67108864 at the"),
     ],
 )
-def test_an_invalid_picture_is_reported_with_its_line(write, old, new, said):
+def test_an_invalid_picture_is_reported_with_its_line(write, old, new, expected):
     assert old in GOOD
     file = write(GOOD.replace(old, new, 1))
     with pytest.raises(ConfigError) as error:
         prepare(file)
-    assert said in str(error.value).replace(str(file), "FILE")
+    assert expected in str(error.value).replace(str(file), "FILE")
 
 
 def test_a_picture_that_is_not_a_table_is_refused(write):
@@ -102,12 +102,12 @@ def test_the_page_draws_the_picture_at_the_robot(chromium, ros2, write):
             " return fetch(i.getAttribute('href')).then((r) => r.ok); }"
         )
         deadline = time.monotonic() + 15.0
-        while look(page, image) != [BLUE, RED]:  # the view moves at first
+        while look(page, image) != [BLUE, RED]:  # the view moves first
             assert time.monotonic() < deadline, look(page, image)
 
 
 def look(page, image):
-    """Return the colours of a picture's rear and nose, which is where it should be."""
+    """Return the colours of a picture's rear and nose; check the place of the nose."""
     rear, nose, there = image.evaluate(
         "(i) => [[i, -0.9], [i, 0.9], [i.closest('.model'), 1.4]].map(([e, x]) =>"
         " { const p = new DOMPoint(x, 0).matrixTransform(e.getScreenCTM());"

@@ -1,4 +1,4 @@
-"""Labels and tiles in a fleet file: read strictly, each mistake with its line."""
+"""Labels and tiles in a fleet file are read strictly; mistakes have a line number."""
 
 import io
 import os
@@ -65,7 +65,7 @@ def test_labels_are_read_from_the_fleet_file_or_from_a_separate_file(
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "expected"),
     [
         (
             "labels = 3\n",
@@ -101,10 +101,12 @@ def test_labels_are_read_from_the_fleet_file_or_from_a_separate_file(
         (TILES.replace('"tiles"', '"no"'), "no such folder and no such file"),
     ],
 )
-def test_invalid_labels_and_tiles_are_reported_with_their_line(prepared, text, said):
+def test_invalid_labels_and_tiles_are_reported_with_their_line(
+    prepared, text, expected
+):
     with pytest.raises(ConfigError) as error:
         prepared(text)
-    assert said in str(error.value)
+    assert expected in str(error.value)
 
 
 @pytest.mark.parametrize("key", ["floor", "labels"])

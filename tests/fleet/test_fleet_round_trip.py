@@ -1,4 +1,4 @@
-"""What discovery writes down, run from the file, shows what ``view`` shows."""
+"""A fleet file that discovery writes shows the same as ``webmap view``."""
 
 import asyncio
 
@@ -58,7 +58,7 @@ def topics(*spaces):
 
 
 def viewed(found):
-    """What ``webmap view`` makes of this: its robots, and the maps under them."""
+    """The robots and the maps that ``webmap view`` makes of these topics."""
     bridge, console = Bridge(URL), Console()
     late = ShownRobots(console)
     findings = discover(found, "bob")
@@ -69,7 +69,7 @@ def viewed(found):
 
 
 def shown(robot):
-    """What is drawn of a robot: names of modules, what of, and how it is classed."""
+    """The modules of a robot: their names, topics and classes."""
     listed = []
     for module in robot.modules:
         if isinstance(module, OnMaps):
@@ -97,7 +97,7 @@ def test_the_fleet_file_of_discover_shows_the_same_layers_as_view(tmp_path, spac
         for kept, seen in zip(ready.robots, robots, strict=True):
             assert kept.name == seen.name
             assert shown(kept) == shown(seen)
-            assert len(shown(seen)) > 20, "this is about all of it"
+            assert len(shown(seen)) > 20, "few modules were compared"
         assert {line.topic for line in ready.fleet.map} == maps
     finally:
         for robot in (*robots, *ready.robots):

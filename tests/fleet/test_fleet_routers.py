@@ -1,4 +1,4 @@
-"""What a display shows of a router: why it is not there, and which agents are."""
+"""A display shows why a router is unreachable and which agents are connected."""
 
 import msgspec
 
@@ -10,7 +10,7 @@ from webmap.fleet.of_agents import AWAY, Agents
 
 
 class FakePeer:
-    """A router that may be there, and signs of agents."""
+    """A router that may be unreachable, and the signs of its agents."""
 
     def __init__(self):
         self.trouble = "cannot reach the router: nothing listens there"

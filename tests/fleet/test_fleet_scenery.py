@@ -85,7 +85,7 @@ def test_maps_images_and_map_modules_of_the_fleet_file_are_shown(ready, tmp_path
 
 def test_open_pages_and_later_pages_get_all_maps_images_and_map_modules(ready):
     console, page = Console(), FakePage()
-    console.opened(page)  # before, and another one after
+    console.opened(page)  # before this map, and another map after it
     show_scenery(console, ready)
     after = FakePage()
     console.opened(after)
@@ -110,14 +110,16 @@ class FakeMap:
 
     def set(self, name, value):
         assert name == "data-layer"
-        assert value in ("/map (north)", "/map (south)"), "which map it is"
+        assert value in ("/map (north)", "/map (south)"), (
+            "the layer has the name of its map"
+        )
 
     def add_image(self, *image):
         self.images.append(image)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "expected"),
     [
         (
             'palette = "costmap"',
@@ -166,10 +168,10 @@ class FakeMap:
     ],
 )
 def test_an_invalid_map_image_or_module_is_reported_with_its_line_and_key(
-    write, old, new, said
+    write, old, new, expected
 ):
     assert old in GOOD
     file = write(GOOD.replace(old, new, 1))
     with pytest.raises(ConfigError) as error:
         prepare(file)
-    assert said in str(error.value).replace(str(file), "FILE")
+    assert expected in str(error.value).replace(str(file), "FILE")

@@ -66,7 +66,7 @@ def test_a_footprint_may_be_a_radius(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("hooks", "said"),
+    ("hooks", "expected"),
     [
         ('"/lock"', r"stop_hooks: got the text \"/lock\", expected an array such as"),
         ("[5]", r"stop_hooks\[0\]: got the whole number 5, expected a table such as"),
@@ -81,9 +81,9 @@ def test_a_footprint_may_be_a_radius(tmp_path):
         ),
     ],
 )
-def test_an_invalid_stop_hook_is_reported_with_its_line(tmp_path, hooks, said):
+def test_an_invalid_stop_hook_is_reported_with_its_line(tmp_path, hooks, expected):
     twist = f'[robots.twist]\ntopic = "/cmd_vel"\nstop_hooks = {hooks}\n'
-    with pytest.raises(ConfigError, match=said) as caught:
+    with pytest.raises(ConfigError, match=expected) as caught:
         check(tmp_path, HEAD + twist)
     assert "fleet.toml:7: robots[0].twist" in str(caught.value) or (
         "fleet.toml:5: robots[0].twist: " in str(caught.value)
@@ -91,7 +91,7 @@ def test_an_invalid_stop_hook_is_reported_with_its_line(tmp_path, hooks, said):
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "expected"),
     [
         ('footprint = "round"', r"footprint: got the text .*radius in metres"),
         ("footprint = 0", "footprint: got the whole number 0, expected the robot's"),
@@ -109,17 +109,19 @@ def test_an_invalid_stop_hook_is_reported_with_its_line(tmp_path, hooks, said):
         ("foot = 1", 'there is no key "foot" here; did you mean "footprint"'),
     ],
 )
-def test_an_invalid_scan_assist_setting_is_reported_with_its_line(tmp_path, line, said):
+def test_an_invalid_scan_assist_setting_is_reported_with_its_line(
+    tmp_path, line, expected
+):
     text = f'{DRIVEN}[robots.scan_assist]\ntopic = "/scan"\n{line}\n'
     if not line.startswith("footprint"):
         text += "footprint = 0.2\n"
-    with pytest.raises(ConfigError, match=said) as caught:
+    with pytest.raises(ConfigError, match=expected) as caught:
         check(tmp_path, text)
     assert "fleet.toml:8: robots[0].scan_assist." in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("footprint", "said"),
+    ("footprint", "expected"),
     [
         ("[[0.3, 0.2], [-0.3, -0.2], [0.3, -0.2], [-0.3, 0.2]]", "corner 1 meets the"),
         ("[[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, 0.2]]", "corners 1 and 4 are"),
@@ -127,9 +129,9 @@ def test_an_invalid_scan_assist_setting_is_reported_with_its_line(tmp_path, line
         ("[[1e-3, 0], [0, 1e-3], [-1e-3, 0]]", "has an area of 1e-06 m²; expected"),
     ],
 )
-def test_a_footprint_with_an_invalid_outline_is_refused(tmp_path, footprint, said):
+def test_a_footprint_with_an_invalid_outline_is_refused(tmp_path, footprint, expected):
     text = f'{DRIVEN}scan_assist = {{ topic = "/scan", footprint = {footprint} }}\n'
-    with pytest.raises(ConfigError, match=said) as caught:
+    with pytest.raises(ConfigError, match=expected) as caught:
         check(tmp_path, text)
     assert "robots[0].scan_assist: " in str(caught.value)
 

@@ -1,4 +1,4 @@
-"""Robots of a recording are seen, and nothing of them is told anything."""
+"""Robots of a recording are shown, and nothing is sent to them."""
 
 from webmap import Bridge
 from webmap.config.motion import MotionConfig

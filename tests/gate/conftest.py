@@ -1,4 +1,4 @@
-"""A robot's side, and a running gate in front of it."""
+"""A robot's side of a rosbridge, and a running gate that connects to it."""
 
 import pytest
 from decisions import Decisions
@@ -12,7 +12,7 @@ from webmap.gate.rules.machines import Machines
 
 @pytest.fixture(autouse=True)
 def state_folder(tmp_path, monkeypatch):
-    """Keep locks of tests out of everybody's way."""
+    """Keep the locks of each test in a folder of its own."""
     folder = tmp_path / "state"
     monkeypatch.setenv("WEBMAP_STATE_DIR", str(folder))
     return folder
@@ -20,7 +20,7 @@ def state_folder(tmp_path, monkeypatch):
 
 @pytest.fixture(autouse=True)
 def decisions(request, monkeypatch):
-    """Compare what the gate decides with what it decided when that was recorded."""
+    """Compare the decisions of the gate with the recorded decisions."""
     found = Decisions(request.node.nodeid.removeprefix("tests/gate/"))
     found.listen(monkeypatch)
     yield found
@@ -48,7 +48,7 @@ def awake(monkeypatch):
 
 @pytest.fixture(autouse=True)
 def not_measured(monkeypatch):
-    """Start gates as they are: what one has run that may be killed tells nothing."""
+    """Do not measure coverage in gates: a killed gate does not write its data."""
     monkeypatch.delenv("COVERAGE_PROCESS_CONFIG", raising=False)
 
 
@@ -66,7 +66,7 @@ def robot_spec(fake):
         bridge_url=fake.url,
         twist_topic="/cmd_vel",
         stops_within=0.25,
-        v_max=0.25,  # low enough for a slow loop to take nothing off it
+        v_max=0.25,  # so low that a slow loop does not reduce it
         w_max=1.5,
         odometry_topic="/odom",
         odometry_type="nav_msgs/Odometry",
@@ -77,7 +77,7 @@ def robot_spec(fake):
 
 @pytest.fixture
 def client():
-    """A gate that runs."""
+    """The client of a running gate."""
     gate = GateClient()
     gate.start()
     yield gate
@@ -86,7 +86,7 @@ def client():
 
 @pytest.fixture
 def page(client, robot_spec):
-    """A page at a gate that knows the robot."""
+    """A page of a gate to which the robot is declared."""
     client.declare(robot_spec)
     made = Page(client)
     yield made

@@ -1,8 +1,8 @@
-"""Records what the gate decides in a test, and compares it with an earlier record.
+"""Records the decisions of the gate in a test, and compares them with a record.
 
 The record of a test is a digest of every event, the time and the actions that followed.
-It shows that a change of the code's shape changes no decision. ``decisions.json`` has
-the digests of the tests that decide the same in every run.
+It shows that a refactoring changes no decision. ``decisions.json`` has the digests of
+the tests whose decisions are the same in every run.
 
 To record them again, run the tests twice and keep the tests that are equal::
 
@@ -53,7 +53,7 @@ class Decisions:
         self._ids: dict[str, str] = {}
 
     def listen(self, monkeypatch: Any) -> None:
-        """Note what gates decide from now on; identities of STOPs are numbered."""
+        """Record decisions from now on; the identities of STOPs become numbers."""
         numbers = itertools.count(1)
         known = SimpleNamespace(token_hex=lambda size: f"{next(numbers):0{2 * size}x}")
         monkeypatch.setattr(stop, "secrets", known)
@@ -96,7 +96,7 @@ class Decisions:
         """Compare the record, or write it.
 
         Raises:
-            AssertionError: If the gate decided otherwise than when it was recorded.
+            AssertionError: If the decisions differ from the recorded decisions.
 
         """
         if FOLDER:
@@ -111,7 +111,7 @@ class Decisions:
 
 
 def text_of(actions: Any) -> str:
-    """Return the actions as text that is the same whatever the order of a set is."""
+    """Return the actions as text that does not depend on the order of a set."""
     if not actions:
         return ""
     texts = []
@@ -137,7 +137,7 @@ def of_run(folder: Path) -> dict[str, str]:
 
 
 def keep_equal(folders: list[Path]) -> None:
-    """Record the tests in which the gate decided the same in all runs."""
+    """Record the tests whose decisions are the same in all runs."""
     first, *others = map(of_run, folders)
     same = {
         name: digest

@@ -1,4 +1,4 @@
-"""A bench for the gate's decisions: a virtual clock and a shell that only notes."""
+"""A bench for the gate's decisions: a virtual clock, and a shell that keeps actions."""
 
 import json
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ def spec(**changes):
         "name": "Bob",
         "bridge_url": URL,
         "twist_topic": "/cmd_vel",
-        "stops_within": 0.0,  # so that a short loop leaves all of the speed
+        "stops_within": 0.0,  # so that a short loop does not reduce the speed
         "v_max": 1.0,
         "w_max": 1.5,
         "cancel_topic": "/cancel",
@@ -41,29 +41,29 @@ class Written:
 
 @dataclass
 class Bench:
-    """Plays the shell and the display; what goes out to the robots is ``written``."""
+    """Plays the shell and the display; ``written`` has the velocities that are sent."""
 
     now: float = 1000.0
     beating: bool = True
-    """Whether the display sends its heartbeats by itself."""
+    """Whether the display sends heartbeats while time passes."""
     answering: bool = True
-    """Whether the bridge answers pings by itself."""
+    """Whether the bridge answers pings while time passes."""
     rtt: float = 0.0
-    """Seconds that a ping and its answer are under way."""
+    """Seconds between a ping and its answer."""
     clear: bool = True
     """Whether nothing waits to be sent on the control link."""
     held_up: float = 0.0
-    """Seconds for which the process stands still before what it decided is written."""
+    """Seconds for which the process pauses before it writes a decided message."""
     losing_zeros: bool = False
-    """Whether the control link drops every zero without saying so."""
+    """Whether the control link drops every zero without a report."""
     up: bool = True
     lock_held: bool = True
     was_driven: bool = False
     disk: dict[Key, Press] = field(default_factory=dict)
-    """The STOPs that stand, as the disk has it."""
+    """The active STOPs that are stored on disk."""
     tests: dict[Key, events.StopRecord] = field(default_factory=dict)
     slow_disk: bool = False
-    """Whether the disk says nothing by itself."""
+    """Whether the disk finishes a write only when the test calls ``keep``."""
     full_disk: bool = False
     depth: int = 0
     to_keep: list[actions.Action] = field(default_factory=list)
@@ -71,11 +71,11 @@ class Bench:
     written: list[Written] = field(default_factory=list)
     dropped: list[Written] = field(default_factory=list)
     attempts: list[Written] = field(default_factory=list)
-    """What was written and what was dropped, in order."""
+    """The written and the dropped velocities, in order."""
     done: list[actions.Action] = field(default_factory=list)
-    said: list[protocol.FromGate] = field(default_factory=list)
+    messages: list[protocol.FromGate] = field(default_factory=list)
     reports: dict[str, protocol.RobotReport] = field(default_factory=dict)
-    """The newest of each robot."""
+    """The newest report of each robot."""
     tick: int = -1
     seq: int = 0
 
@@ -106,7 +106,7 @@ class Bench:
             self.done.append(action)
             match action:
                 case actions.SendToDisplay(message):
-                    self.said.append(message)
+                    self.messages.append(message)
                     if isinstance(message, protocol.Tick):
                         self.tick = message.tick
                     elif isinstance(message, protocol.RobotReport):
@@ -124,7 +124,7 @@ class Bench:
                         )
                     )
                 case actions.SaveStop() | actions.SaveStopTest():
-                    # In a thread: never answered within an action.
+                    # The disk works in a thread: it never answers within an action.
                     if not self.slow_disk:
                         self.to_keep.append(action)
                 case actions.WriteTwist(_, twist) if (
@@ -149,7 +149,7 @@ class Bench:
                     self.handle(events.LinkDown(url, "control"))
 
     def keep(self, latch):
-        """Have the disk do as it is told, and say so."""
+        """Finish a write to the disk and report the result."""
         if isinstance(latch, actions.SaveStopTest):
             record = events.StopRecord(latch.seconds, "2026-11-21")
             self.tests[latch.key] = record
@@ -164,7 +164,7 @@ class Bench:
                 del self.disk[latch.key]
         self.handle(events.StopSaved(latch.key, latch.number, error))
 
-    # What happens outside.
+    # Events from outside.
 
     def begin(self, *specs):
         for one in specs or (spec(),):
@@ -188,14 +188,14 @@ class Bench:
     def join(self, who, role="operator"):
         self.handle(protocol.Connect(who, who.upper(), role))
 
-    def say(self, who, **command):
+    def send(self, who, **command):
         if command["op"] == "reset":
             command.setdefault("stop", self.stop_of(command["robot"]))
         self.handle(protocol.FromPage(who, json.dumps(command).encode()))
 
     def take(self, who="a", robot="r1"):
-        """Take the robot and return the epoch, if it was given."""
-        self.say(who, op="take", robot=robot)
+        """Take the robot; return the epoch, or None without control."""
+        self.send(who, op="take", robot=robot)
         report = self.report(robot)
         mine = report.holder is not None and report.holder.connection == who
         return report.epoch if mine else None
@@ -212,14 +212,14 @@ class Bench:
             "y": 0.0,
             "turn": turn,
         }
-        self.say(who, **{**fields, **changes})
+        self.send(who, **{**fields, **changes})
 
     def hold(self, seconds, who="a", **axes):
-        """Have a page send its state at 20 Hz for a while."""
+        """Let a page send its inputs at 20 Hz."""
         self.run(seconds, lambda: self.drive(who, **axes))
 
     def drive_off(self, who="a", x=1.0, robot="r1"):
-        """Take the robot, let go of everything, press, and be under way."""
+        """Take the robot, send released inputs, then drive."""
         epoch = self.take(who, robot)
         self.hold(0.3, who, robot=robot)
         self.hold(0.3, who, x=x, robot=robot)
@@ -237,12 +237,12 @@ class Bench:
             "y": 2.0,
             "yaw": 0.5,
         }
-        self.say(who, **{**fields, **changes})
+        self.send(who, **{**fields, **changes})
 
-    # What was seen.
+    # Results.
 
     def of(self, type):
-        return [message for message in self.said if isinstance(message, type)]
+        return [message for message in self.messages if isinstance(message, type)]
 
     def did(self, type):
         return [action for action in self.done if isinstance(action, type)]
@@ -263,7 +263,7 @@ class Bench:
 
     @property
     def stops(self):
-        """Whose STOPs stand, as the disk has it."""
+        """The user of each active STOP that is stored on disk."""
         return {key: press.by for key, press in self.disk.items()}
 
     @property

@@ -1,4 +1,4 @@
-"""A page with a hand on the keys: drives a robot through a GateClient."""
+"""A page of an operator, which drives a robot through a GateClient."""
 
 import json
 import threading
@@ -7,7 +7,7 @@ from gate_robot import eventually
 
 
 class Page:
-    """Speaks the pages' side of ``/drive`` at 20 Hz, as long as it is told to."""
+    """Sends the commands of a page at 20 Hz, as over ``/drive``."""
 
     def __init__(self, client, name="Ann", role="operator"):
         self.on_echo = []
@@ -15,14 +15,14 @@ class Page:
         self.robots = {}
         self.tick = self.ack = None
         self.x = None
-        """What the hand asks for; ``None`` sends nothing."""
+        """The forward input; ``None`` sends no commands."""
         self._seq = 0
         self._end = threading.Event()
-        self.connection = client.connect(name, role, self._hear, self.closed.append)
+        self.connection = client.connect(name, role, self._receive, self.closed.append)
         self._thread = threading.Thread(target=self._stream, daemon=True)
         self._thread.start()
 
-    def _hear(self, text):
+    def _receive(self, text):
         message = json.loads(text)
         match message["op"]:
             case "tick":
@@ -33,7 +33,7 @@ class Page:
             case _:
                 self.on_echo.append(message)
 
-    def say(self, **command):
+    def send(self, **command):
         if command["op"] == "reset" and "stop" not in command:
             robot = command["robot"]
             stop = eventually(lambda: self.robot(robot).get("stop"), "a STOP to reset")
@@ -42,7 +42,7 @@ class Page:
 
     def drive(self, x, robot="r1"):
         self._seq += 1
-        self.say(
+        self.send(
             op="drive",
             robot=robot,
             epoch=self.robots[robot]["epoch"] or 0,
@@ -55,7 +55,7 @@ class Page:
 
     def goal(self, robot="r1", op="goal"):
         self._seq += 1
-        self.say(
+        self.send(
             op=op,
             robot=robot,
             epoch=self.robots[robot]["epoch"] or 0,
@@ -78,18 +78,18 @@ class Page:
         return self.robots.get(robot, {})
 
     def take(self, robot="r1"):
-        eventually(lambda: self.robot(robot).get("armable"), "a robot to be had")
-        self.say(op="take", robot=robot)
+        eventually(lambda: self.robot(robot).get("armable"), "a free robot")
+        self.send(op="take", robot=robot)
         eventually(lambda: self.robot(robot).get("mine"), "the lease")
 
     def drive_off(self, fake):
-        """Take the robot, show that the keys are released, press, be under way."""
+        """Take the robot, send released inputs, then drive."""
         self.take()
         moves = len(fake.moving)
 
         def under_way():
-            # A busy machine may hold this thread up for longer than the dead-man
-            # waits; then the keys must be seen released again.
+            # A busy computer may delay this thread for longer than the dead-man
+            # limit; then the gate must see released inputs again.
             self.x = 1.0 if self.robot()["armed"] else 0.0
             return len(fake.moving) > moves
 

@@ -1,4 +1,4 @@
-"""A robot's side of a rosbridge that notes everything it is told, and when."""
+"""A robot's side of a rosbridge that records each received message and its time."""
 
 import asyncio
 import contextlib
@@ -14,11 +14,11 @@ from websockets.exceptions import ConnectionClosed
 class FakeRobot(Noting):
     """Serves in a thread, so that a test may block; used as a context manager.
 
-    It echoes what is published on a topic to whoever subscribes to it, and sends
-    odometry at 20 Hz to whoever subscribes to ``/odom``.
+    It sends each message that is published on a topic to the subscribers of the topic,
+    and odometry at 20 Hz to the subscribers of ``/odom``.
 
     Args:
-        port: Where it listens; 0 lets the kernel choose.
+        port: The port on which it listens; 0 lets the kernel choose.
         answers_services: Whether calls are answered.
 
     """
@@ -29,7 +29,7 @@ class FakeRobot(Noting):
         self.answers_services = answers_services
         self.sends_odometry = True
         self.at_rest = False
-        """Whether its odometry says that it stands."""
+        """Whether its odometry reports zero velocity."""
         self.deaf = threading.Event()
         """While set, the robot reads nothing from any link."""
         self._links = 0
@@ -111,16 +111,16 @@ class FakeRobot(Noting):
                     with contextlib.suppress(ConnectionClosed):  # its gate was killed
                         await socket.send(text)
 
-    # What a test asks for.
+    # For tests.
 
     def send(self, link, message):
-        """Send something to one link of the gate."""
+        """Send a message to one link of the gate."""
         text = message if isinstance(message, str) else json.dumps(message)
         socket, _ = self._sockets[link]
         asyncio.run_coroutine_threadsafe(socket.send(text), self._loop).result(5)
 
     def cut_all(self):
-        """Drop every link without a word."""
+        """Drop every link without a close frame."""
 
         def cut():
             for socket, _ in list(self._sockets.values()):
@@ -129,12 +129,12 @@ class FakeRobot(Noting):
         self._loop.call_soon_threadsafe(cut)
 
     def cut(self, link):
-        """Drop one link without a word."""
+        """Drop one link without a close frame."""
         socket, _ = self._sockets[link]
         self._loop.call_soon_threadsafe(socket.transport.abort)
 
     def hold(self):
-        """Stop reading, as a robot behind a stalled network."""
+        """Stop reading, like a robot behind a stalled network."""
         self._each(lambda transport: transport.pause_reading())
 
     def go_on(self):
@@ -150,7 +150,7 @@ class FakeRobot(Noting):
 
     @property
     def velocities(self):
-        """What was published on ``/cmd_vel``: (time, forward speed)."""
+        """The velocities published on ``/cmd_vel``: (time, forward speed)."""
         found = []
         for seen in self.of("publish", "/cmd_vel"):
             message = seen.message["msg"]
@@ -168,11 +168,11 @@ class FakeRobot(Noting):
 
 
 def eventually(check, what, seconds=10.0):
-    """Wait until ``check`` gives something true, and return that."""
+    """Wait until ``check`` returns a true value, and return the value."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
         found = check()
         if found:
             return found
         time.sleep(0.005)
-    raise AssertionError(f"never came: {what}")
+    raise AssertionError(f"timed out waiting for {what}")

@@ -1,4 +1,4 @@
-"""Bridges in a test's own event loop: a real one, and one that says any bytes."""
+"""Bridges in the event loop of a test: a real bridge, and one that sends any bytes."""
 
 import asyncio
 import base64
@@ -18,11 +18,11 @@ from webmap.gate.lanes.sockets import SocketHandlers
 from webmap.testing.witness import WitnessBridge
 
 TIMEOUT = 30.0
-"""Seconds until something that has not come is taken never to come."""
+"""Seconds until a wait times out."""
 
 
 def in_loop(test):
-    """Run an async test in an event loop of its own, and never for ever."""
+    """Run an async test in an event loop of its own, with a timeout."""
 
     @functools.wraps(test)
     def run(*args, **kwargs):
@@ -32,7 +32,7 @@ def in_loop(test):
 
         with warnings.catch_warnings():
             # asyncio drops a socket that has just connected when the attempt is
-            # cancelled, as it is of a lane that is closed while it connects.
+            # cancelled: a lane that closes while it connects does this.
             warnings.simplefilter("ignore", ResourceWarning)
             asyncio.run(within())
             gc.collect()
@@ -42,16 +42,16 @@ def in_loop(test):
 
 
 async def until(check, what):
-    """Wait until ``check`` gives something true, and return that."""
+    """Wait until ``check`` returns a true value, and return the value."""
     deadline = time.monotonic() + TIMEOUT
     while not (found := check()):
-        assert time.monotonic() < deadline, f"never came: {what}"
+        assert time.monotonic() < deadline, f"timed out waiting for {what}"
         await asyncio.sleep(0.002)
     return found
 
 
 class NotingBridge(Noting, WitnessBridge):
-    """The witness's rosbridge, which also notes what it was told."""
+    """The witness's rosbridge, which also records the received messages."""
 
     def __init__(self):
         self.received = []
@@ -94,7 +94,7 @@ class RawLink:
         self.writer = writer
 
     async def request(self):
-        """Read the request for a WebSocket and return what accepts it."""
+        """Read the request for a WebSocket and return the response that accepts it."""
         request = await self.reader.readuntil(b"\r\n\r\n")
         lines = request.decode().split("\r\n")
         key = next(
@@ -110,16 +110,16 @@ class RawLink:
         )
 
     async def accept(self, and_then=b""):
-        """Answer the request, with bytes that come in the same breath."""
-        self.say(await self.request() + and_then)
+        """Accept the request, and send bytes in the same write."""
+        self.send(await self.request() + and_then)
 
-    def say(self, data):
+    def send(self, data):
         self.writer.write(data)
 
 
 @contextlib.asynccontextmanager
 async def raw_bridge(talk):
-    """Serve with ``talk(link)`` for each link; gives the address."""
+    """Serve with ``talk(link)`` for each link; yield the address."""
     writers, talks = [], []
 
     async def serve(link):
@@ -140,7 +140,7 @@ async def raw_bridge(talk):
         for writer in writers:
             writer.transport.abort()
         await asyncio.gather(*talks, return_exceptions=True)
-        await asyncio.sleep(0.01)  # for the transports to say that they are closed
+        await asyncio.sleep(0.01)  # until the transports have closed
 
 
 def frame(opcode, body=b"", *, final=True):
@@ -155,20 +155,20 @@ TEXT, MORE, CLOSE, PING, PONG = 1, 0, 8, 9, 10
 
 @dataclass
 class Received:
-    """Notes what comes on a socket."""
+    """Records the messages of a socket."""
 
     texts: list[bytes] = field(default_factory=list)
     pongs: list[bytes] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
 
     @property
-    def ears(self):
+    def handlers(self):
         return SocketHandlers(self.texts.append, self.pongs.append, self.lost.append)
 
 
 @contextlib.contextmanager
 def noting_lane(url, happened, **more):
-    """A lane that notes what happens to it."""
+    """A lane that records its events."""
     lane = Lane(
         url,
         up=lambda: happened.append("up"),

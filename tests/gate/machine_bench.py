@@ -1,7 +1,7 @@
-"""The bench of the state machine: as the gate's own, with the pace of the real shell.
+"""The bench of the state machine: the gate's bench, with the pace of the real shell.
 
-Thousands of schedules run on it, so it keeps what is asked for again and again instead
-of looking for it: the newest report, the writes of this instant.
+Thousands of schedules run on it. So it keeps the newest report of each robot instead of
+searching for the report each time.
 """
 
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ BEAT = 0.05
 
 @dataclass
 class PacedBench(Bench):
-    """A bench whose clock ticks as the shell's does: slower where nothing is driven."""
+    """A bench with the steps of the shell: longer steps while no robot is driven."""
 
     beat_at: float = float("-inf")
     each_at: float = float("-inf")
@@ -53,9 +53,9 @@ class PacedBench(Bench):
             super()._do(todo)
 
     def report(self, robot="r1"):
-        """Return the newest report of a robot, of all that were said."""
-        for message in self.said:
+        """Return the newest report of a robot."""
+        for message in self.messages:
             if isinstance(message, protocol.RobotReport):
                 self.newest[message.robot] = message
-        self.said.clear()
+        self.messages.clear()
         return self.newest[robot]

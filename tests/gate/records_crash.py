@@ -1,7 +1,8 @@
-"""Kills itself after each line that keeps a STOP on disk, and says what is left of it.
+"""Is killed after each line of code that stores a STOP, and prints the stored STOP.
 
-Started as ``records_crash.py FOLDER``; a line of JSON for each death: after how many
-lines, whether the STOP had been acknowledged, and who says STOP to whoever asks then.
+Started as ``records_crash.py FOLDER``. Prints a line of JSON for each child process:
+the user, the number of lines, whether the STOP was acknowledged, whether the process
+ended normally, and the user of the STOP that is on disk afterwards.
 """
 
 import json
@@ -19,12 +20,12 @@ IDS = frozenset({"a1"})
 
 
 def press(by: str | None) -> Press | None:
-    """Return the STOP of somebody."""
+    """Return the STOP of a user, or None."""
     return None if by is None else Press(by, "a1")
 
 
 def die_after(lines: int) -> None:
-    """Have this process killed once it ran so many lines of the module."""
+    """Kill this process after it has run a number of lines of the module."""
     left = lines
 
     def trace(frame, event, _):
@@ -41,16 +42,16 @@ def die_after(lines: int) -> None:
 
 
 def keep(folder: Path, by: str | None, lines: int) -> tuple[bool, bool]:
-    """Keep or end a STOP in a child; returns whether it was acknowledged, and lived."""
-    received, said = os.pipe()
+    """Store or end a STOP in a child; return if it was acknowledged, and survived."""
+    received, sent = os.pipe()
     child = os.fork()
     if not child:
         die_after(lines)
         problem = Records(folder).keep_latch(KEY, press(by), IDS)
         sys.settrace(None)
-        os.write(said, b"ack" if problem is None else b"no")
+        os.write(sent, b"ack" if problem is None else b"no")
         os._exit(0)
-    os.close(said)
+    os.close(sent)
     _, status = os.waitpid(child, 0)
     acknowledged = os.read(received, 8) == b"ack"
     os.close(received)
@@ -58,7 +59,7 @@ def keep(folder: Path, by: str | None, lines: int) -> tuple[bool, bool]:
 
 
 def main() -> None:
-    """Die at every line of both, until one lives."""
+    """Kill storing and ending a STOP after every line, until a child survives."""
     folder = Path(sys.argv[1])
     for by, before in (("Ann", None), (None, "Ann")):
         lines, lived = 0, False
@@ -66,8 +67,8 @@ def main() -> None:
             assert Records(folder).keep_latch(KEY, press(before), IDS) is None
             acknowledged, lived = keep(folder, by, lines)
             left = Records(folder).latch_of(KEY)
-            stands = None if left is None else left.by
-            print(json.dumps([by, lines, acknowledged, lived, stands]))
+            stored = None if left is None else left.by
+            print(json.dumps([by, lines, acknowledged, lived, stored]))
             lines += 1
 
 

@@ -1,12 +1,12 @@
-"""Robots of which ``stored_state`` has files, as an earlier gate left them.
+"""Robots with files in ``stored_state``, as an earlier gate wrote them.
 
-The folder is not written anew with the code: a gate must read what is there. It was
-made with
+The folder is not written again when the code changes: a gate must read the old files.
+It was made with
 
     python tests/gate/stored_robots.py FOLDER
 
-by a gate that was told STOP, and that was killed while it drove. The STOPs that cannot
-be read, or were being lifted, were made of files that it wrote.
+by a gate that received STOPs, and that was killed while it drove a robot. The files of
+the STOP that cannot be read, and of the STOP that was being lifted, were then changed.
 """
 
 import os
@@ -20,7 +20,7 @@ from webmap.gate.protocol import RobotSpec
 FOLDER = Path(__file__).with_name("stored_state")
 
 PORT = 28461
-"""Where the robot was that was driven."""
+"""The port of the robot that was driven."""
 
 
 def robot(name, url, topic=None, **more):
@@ -60,7 +60,7 @@ STOPPED = {
     "Lifted": "Ann",
     "Unreadable": "Ann",
 }
-"""Who said STOP."""
+"""The user of each STOP."""
 
 IDENTITIES = {
     "Here": "b0143f9bae16426b",
@@ -79,11 +79,11 @@ TESTED = {
     "Tested": (0.305, "2026-02-28"),
     "Never": (None, "2026-01-31"),
 }
-"""What stop tests found: seconds, and the day."""
+"""The results of stop tests: seconds, and the date."""
 
 
 def main() -> None:
-    """Have a gate of this version write its files into a folder."""
+    """Let a gate of this version write its files to a folder."""
     from gate_page import Page
     from gate_robot import FakeRobot, eventually
 
@@ -104,7 +104,7 @@ def main() -> None:
             if by == "program":
                 client.stop_robot(name.lower())
             else:
-                people[by].say(op="stop", robot=name.lower())
+                people[by].send(op="stop", robot=name.lower())
         ann = people["Ann"]
         for name in STOPPED:
             eventually(lambda name=name: ann.robot(name.lower()).get("latched"), name)

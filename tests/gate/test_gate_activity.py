@@ -1,4 +1,4 @@
-"""What the gate reports that a robot does, in the words of an operator."""
+"""The activity of a robot that the gate reports, in terms of an operator."""
 
 import pytest
 from gate_harness import KEY, Bench, spec
@@ -17,7 +17,7 @@ def bench():
 
 
 def run(bench, seconds, speed=0.0, x=None, turn=0.0):
-    """Let time pass with odometry, driven or not."""
+    """Let time pass with odometry, and with commands if ``x`` is given."""
 
     def each():
         bench.handle(events.OdometryReceived(KEY, Twist(speed, 0.0, turn)))
@@ -54,7 +54,7 @@ def test_the_reported_activity_follows_control_driving_and_stop(bench):
     assert run(bench, 0.3, 0.5, x=0.5) == "driven"
     assert run(bench, 0.1, 0.4, x=0.0) == "stopping"
     assert run(bench, 2.0, 0.0, x=0.0) == "held"
-    bench.say("b", op="stop", robot="r1")
+    bench.send("b", op="stop", robot="r1")
     assert run(bench, 0.1) == "stopped"
     assert run(bench, 2.5) == "stopped"
     assert bench.report().stop.confirmed
@@ -103,8 +103,8 @@ def test_a_robot_without_odometry_is_not_reported_as_blocked(bench):
 
 def test_a_granted_request_for_control_is_reported_as_changing(bench):
     drive_off(bench)
-    bench.say("b", op="ask", robot="r1")
-    bench.say("a", op="grant", robot="r1")
+    bench.send("b", op="ask", robot="r1")
+    bench.send("a", op="grant", robot="r1")
     assert run(bench, 0.1, 0.4) == "changing"
 
 
@@ -123,14 +123,14 @@ def test_a_robot_with_a_goal_is_navigating_until_the_goal_ends(bench, released):
     bench.goal("a")
     held = "navigating" if released else "navigating_held"
     if released:
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
     assert run(bench, 0.3, 0.5) == held
-    assert run(bench, 0.3, 0.0) == held, "it may wait for a way"
+    assert run(bench, 0.3, 0.0) == held, "it may wait for a free path"
     id = bench.report().goal.id
     bench.handle(events.GoalEnded("r1", id, "reached", ""))
     rest = "free" if released else "held"
     assert run(bench, 0.1, 0.0) == rest
-    if not released:  # else the gate does not look at the odometry
+    if not released:  # else the gate does not use odometry
         assert run(bench, BRAKES - 0.5, 0.3) == "settling"
         assert run(bench, 0.6, 0.3) == "moving"
 

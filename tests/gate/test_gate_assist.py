@@ -1,4 +1,4 @@
-"""Scan assist: the robot slows down before what the scan sees."""
+"""Scan assist: the robot slows down before obstacles in the scan."""
 
 import math
 
@@ -119,7 +119,7 @@ def test_a_range_of_minus_infinity_is_an_obstacle():
 
 
 @pytest.mark.parametrize(
-    ("sweep", "said"),
+    ("sweep", "why"),
     [
         (None, "no scan yet"),
         (sweep_of(lambda b: math.inf, arrived=-0.5), "old"),
@@ -133,11 +133,11 @@ def test_a_range_of_minus_infinity_is_an_obstacle():
         (Scan(2.0, 0.01, 0.1, 8.0, [1.0] * 10, 0.0), "does not cover the direction"),
     ],
 )
-def test_a_robot_without_a_usable_scan_stops_or_creeps_as_configured(sweep, said):
+def test_a_robot_without_a_usable_scan_stops_or_creeps_as_configured(sweep, why):
     wanted = Twist(0.5, 0.0, 0.0)
     stop = assist(SPEC, sweep, wanted, 0.1)
     assert stop.scale == 0.0
-    assert said in stop.why
+    assert why in stop.why
     creeping = AssistSpec(topic="/scan", footprint=BOX, blind="creep")
     assert assist(creeping, sweep, wanted, 0.1).scale == pytest.approx(0.2)
     assert assist(creeping, sweep, Twist(0.05, 0.0, 0.0), 0.1).scale == 1.0
@@ -156,7 +156,7 @@ def test_a_scan_of_the_front_prevents_driving_backwards():
     turn=st.floats(-1.0, 1.0),
 )
 def test_a_robot_with_scan_assist_never_touches_a_wall(distance, speed, facing, turn):
-    # The worst that is assumed: it keeps its speed for the whole reaction, then brakes.
+    # The assumed worst case: full speed for the whole reaction time, then braking.
     gap_at_start = distance - max(
         x * math.cos(facing) + y * math.sin(facing) for x, y in BOX
     )
@@ -178,7 +178,7 @@ def test_a_robot_with_scan_assist_never_touches_a_wall(distance, speed, facing, 
             px = x + cx * math.cos(yaw) - cy * math.sin(yaw)
             py = y + cx * math.sin(yaw) + cy * math.cos(yaw)
             reach = px * math.cos(facing) + py * math.sin(facing)
-            # Between two rays the wall is not seen: what is allowed for that.
+            # A tolerance, because the wall is not seen between two rays.
             assert reach < distance + 0.02
 
 

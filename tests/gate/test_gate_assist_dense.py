@@ -1,4 +1,4 @@
-"""A scan of many beams costs scan assist no more than one of 720, and hides nothing."""
+"""Scan assist folds a scan of many beams into 720 at most, and misses no obstacle."""
 
 import math
 from array import array
@@ -37,7 +37,7 @@ def dense(ranges, *, low=-math.pi, span=math.tau, **more):
 
 
 def received(sweep):
-    """What the gate makes of a scan that a bridge sends."""
+    """Return a scan as the gate parses the message of a bridge."""
     numbers = cbor2.CBORTag(85, array("f", sweep.ranges).tobytes())
     fields = ("angle_min", "angle_increment", "range_min", "range_max")
     message = {field: getattr(sweep, field) for field in fields}
@@ -47,7 +47,7 @@ def received(sweep):
 
 
 def spread(profile, count, seed):
-    """A scan of ``count`` beams in which the profile comes in no regular order."""
+    """A scan of ``count`` beams with the values of the profile in irregular order."""
     return [profile[(ray * ray + seed * ray) % len(profile)] for ray in range(count)]
 
 
@@ -74,7 +74,7 @@ class TestFold:
     def test_folding_keeps_every_hit_at_its_distance_or_nearer(
         self, profile, count, seed, way
     ):
-        """Each lies between two beams that say at least as near, or on one."""
+        """Each hit is at a folded beam, or between two, that are at least as near."""
         sweep = dense(spread(profile, count, seed), span=way * math.tau)
         fold = folded(sweep)
         each = fold.fold.each
@@ -89,7 +89,7 @@ class TestFold:
     @given(PROFILES, COUNTS, st.integers(0, 99))
     @settings(max_examples=40, deadline=None)
     def test_folding_adds_no_hits(self, profile, count, seed):
-        """What a beam of the fold says, some beam less than a step aside said."""
+        """Each folded range is the range of a beam less than a step away."""
         sweep = dense(spread(profile, count, seed))
         fold = folded(sweep)
         each = fold.fold.each
@@ -105,7 +105,7 @@ class TestFold:
         fold = folded(dense(ranges))
         assert fold.fold.each == 3
         assert math.isnan(fold.ranges[0])
-        # The hit at 2 m lies between the third and the fourth, where one touches.
+        # The hit at 2 m lies between the third and the fourth beam, which has -inf.
         assert fold.ranges[1:6] == [inf, 2.0, -inf, 1.0, inf]
         assert fold.fold.known[:4] == [1, 2, 1, 2]
 
@@ -119,7 +119,7 @@ class TestFold:
         assert set(fold.ranges) <= {0.15, 0.19}
         points = points_of(SPEC, fold)
         assert len(points) == len(fold.ranges)
-        # The nearest of the ring at 0.6 m is the one at the way's very edge.
+        # The nearest point of the ring at 0.6 m is at the edge of the path.
         corner = math.sqrt(0.6**2 - 0.2**2) - 0.3
         assert free_way(BOX, points, AHEAD) == pytest.approx(corner, abs=0.01)
 
@@ -203,7 +203,7 @@ class TestVerdict:
             math.hypot(x, y) for x, y in footprint
         )
         if speed == 0.0 or (found.why and "something" not in found.why):
-            return  # it stands, or it is blind: no point is looked at
+            return  # not moving, or blind: no point is used
         gap = free_way(footprint, points_of(spec, sweep), twist) * speed
         room = gap - stop - 0.2 * speed
         allowed = math.sqrt(2 * brake * room) if room > 0 else 0.0

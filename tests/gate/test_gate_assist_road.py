@@ -1,4 +1,4 @@
-"""Scan assist on its whole way: a simulated scanner, the gate's process, the wheels."""
+"""Scan assist from end to end: a simulated scanner, the gate's process, the wheels."""
 
 import math
 import re
@@ -20,7 +20,7 @@ RADIUS = 0.25
 
 @pytest.fixture
 def bridge():
-    """One robot that looks along a corridor."""
+    """A simulator with one robot, which faces along a corridor."""
     command = [sys.executable, "-m", "webmap", "sim", "--flat", "--seed", "7"]
     with subprocess.Popen(
         [*command, "--port", "0"], stdout=subprocess.PIPE, text=True
@@ -41,7 +41,7 @@ def gate(tmp_path, monkeypatch):
 
 
 def ranges_seen(bridge):
-    """What the scanner sees now, by a client of its own."""
+    """Return the current ranges of the scanner, received by a separate client."""
     from websockets.sync.client import connect
 
     from webmap.gate.lanes.odometry import parse_scan, subscribe
@@ -55,7 +55,7 @@ def ranges_seen(bridge):
     return [reach for reach in received[1].ranges if math.isfinite(reach)]
 
 
-@pytest.mark.serial  # turns for a set time; a program that is kept waiting loses it
+@pytest.mark.serial  # turns for a fixed time; a delayed program loses control
 def test_scan_assist_stops_a_robot_that_is_driven_towards_a_wall(gate, bridge):
     newest = {}
     reports = gate.on_report(
@@ -84,8 +84,8 @@ def test_scan_assist_stops_a_robot_that_is_driven_towards_a_wall(gate, bridge):
         while not over.wait(0.05):
             gate.twist("r1", wanted[0])
 
-    hands = threading.Thread(target=drive)
-    hands.start()
+    driver = threading.Thread(target=drive)
+    driver.start()
     try:
         time.sleep(1.05)  # a quarter of a turn: towards the corridor's wall
         wanted[0] = Twist(0.8, 0.0, 0.0)
@@ -95,12 +95,12 @@ def test_scan_assist_stops_a_robot_that_is_driven_towards_a_wall(gate, bridge):
                 newest["report"].measured[0] == 0.0
                 and any("scan assist" in why for why in newest["report"].why)
             ),
-            "standing before the wall",
+            "a robot that stopped before the wall",
             seconds=20,
         )
         gap = min(ranges_seen(bridge)) - RADIUS
         assert 0.05 < gap < 0.5
     finally:
         over.set()
-        hands.join()
+        driver.join()
         reports.remove()

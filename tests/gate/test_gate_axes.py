@@ -1,4 +1,4 @@
-"""Velocities out of the plane: who takes them, what bounds them, and what stands."""
+"""Velocities out of the plane: refusals, limits and standstill."""
 
 import math
 
@@ -155,7 +155,7 @@ class TestWithLimits:
         bench = begin()
         twist(bench, EVERYTHING)
         at = bench.now
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         bench.run(1.0)
         assert {w.twist for w in bench.written if w.at > at} == {ZERO}
         assert bench.written[-1].twist == ZERO
@@ -216,7 +216,7 @@ class TestStandstill:
     def test_a_stop_is_not_confirmed_while_the_robot_moves_along_any_axis(
         self, bench, seen, words
     ):
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         measure(bench, 2.2, seen)
         stop = bench.report().stop
         assert (stop.confirmed, stop.why) == (False, words)
@@ -227,13 +227,13 @@ class TestStandstill:
 
     def test_odometry_of_an_axis_without_a_limit_does_not_prevent_standstill(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         measure(bench, 0.6, Twist(vz=0.3, wx=math.nan, wy=0.4))
         assert bench.report().stop.confirmed is True
         assert bench.report().measured == ZERO.numbers
 
     def test_odometry_with_nan_on_an_axis_with_a_limit_confirms_no_stop(self, bench):
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         measure(bench, 2.2, Twist(vz=math.nan))
         stop = bench.report().stop
         assert (stop.confirmed, stop.why) == (False, "no odometry")
@@ -242,8 +242,8 @@ class TestStandstill:
     def test_control_is_handed_over_only_after_the_climb_has_ended(self, bench):
         bench.take("a")
         measure(bench, 0.3, ZERO)
-        bench.say("b", op="ask", robot="r1")
-        bench.say("a", op="grant", robot="r1")
+        bench.send("b", op="ask", robot="r1")
+        bench.send("a", op="grant", robot="r1")
         measure(bench, 2.0, self.CLIMBING)
         assert bench.report().holder is None
         measure(bench, 0.6, ZERO)
@@ -257,7 +257,7 @@ class TestStandstill:
             bench.drive()
 
         bench.run(0.5, each)
-        bench.say("a", op="stop-test", robot="r1")
+        bench.send("a", op="stop-test", robot="r1")
         assert bench.refusals("a")[-1].why == "the robot is already moving"
 
     def test_a_stop_test_fails_if_the_robot_still_climbs_after_3_s(self, bench):
@@ -269,7 +269,7 @@ class TestStandstill:
             bench.drive()
 
         bench.run(0.5, each)
-        bench.say("a", op="stop-test", robot="r1")
+        bench.send("a", op="stop-test", robot="r1")
         bench.run(0.2, each)
         seen[0] = Twist(0.1)
         bench.run(0.2, each)

@@ -1,4 +1,4 @@
-"""What a link may send, when it is dropped, and when it is tried again."""
+"""The budget of a link, when a link is dropped, and when it connects again."""
 
 import pytest
 
@@ -9,9 +9,9 @@ from webmap.gate.lanes.lane import Attempts
 
 
 def send(budget, seconds, rate, *, size=100, work=0.00005, begin=1000.0, kept=0):
-    """Send what was kept and frames at a rate; return when it was dropped, or None.
+    """Send kept frames, then frames at a rate; return the time of the drop, or None.
 
-    Each frame is taken as soon as the budget allows it, as the socket does.
+    Each frame is read as soon as the budget allows it, as by the socket.
     """
     now, sent, end = begin, -kept, begin + seconds
     while now < end:
@@ -143,5 +143,5 @@ class TestAttempts:
 
     def test_a_bridge_with_many_different_errors_does_not_fill_the_log(self):
         attempts = Attempts()
-        news = sum(attempts.is_new(f"trouble {n}") for n in range(1000))
-        assert news == waits.MOST_TROUBLES
+        new = sum(attempts.is_new(f"trouble {n}") for n in range(1000))
+        assert new == waits.MOST_TROUBLES

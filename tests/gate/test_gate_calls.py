@@ -1,4 +1,4 @@
-"""Calls of services: each on a socket of its own, and none waits for another."""
+"""Service calls: each has a socket of its own and does not wait for other calls."""
 
 import json
 
@@ -66,7 +66,7 @@ async def test_only_the_answer_with_the_id_of_the_call_ends_the_call():
 async def test_a_call_without_a_connection_is_logged_as_failed(caplog):
     async def talk(link):
         await link.request()
-        link.say(b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\n\r\n")
+        link.send(b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\n\r\n")
 
     async with raw_bridge(talk) as url:
         made = Calls(url)

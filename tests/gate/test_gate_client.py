@@ -1,4 +1,4 @@
-"""The gate as the display has it: a process of its own, real peers around it."""
+"""The gate as a display uses it: a process of its own, with real peers."""
 
 import os
 import signal
@@ -17,7 +17,7 @@ from webmap.gate.display.client import GateClient
 pytestmark = pytest.mark.slow
 
 JITTER = 0.15
-"""What the machine that runs the tests may add to a bound, in seconds."""
+"""Seconds that the computer that runs the tests may add to a limit."""
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ class TestPages:
         assert report["state"] == "driving"
         assert report["sent"] == [0.25, 0, 0, 0, 0, 0]
         assert (report["v"], report["w"], report["link"]) == (0.25, 1.5, "up")
-        assert report["why"][0] == "limit of the robot"  # a busy machine adds another
+        assert report["why"][0] == "limit of the robot"  # a busy computer adds another
 
     def test_velocities_have_their_own_socket_that_subscribes_then_advertises(
         self, page, fake
@@ -65,7 +65,7 @@ class TestPages:
         assert len({t.link for t in received}) == 1
         velocity_link = received[0].link
         others = {t.topic for t in fake.received if t.link == velocity_link}
-        assert others == {"/cmd_vel"}, "velocity shares its socket with nothing"
+        assert others == {"/cmd_vel"}, "velocity has a socket of its own"
 
     @pytest.mark.serial
     def test_released_inputs_send_zeros_for_half_a_second_and_then_nothing(
@@ -107,11 +107,11 @@ class TestPages:
         viewer = Page(client, "Vic", "viewer")
         page.drive_off(fake)
         at = time.monotonic()
-        viewer.say(op="stop", robot="*")
+        viewer.send(op="stop", robot="*")
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at <= 0.05 + JITTER
         eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
-        eventually(lambda: page.robot()["latched"], "the word that STOP stands")
+        eventually(lambda: page.robot()["latched"], "a report of the active STOP")
         assert page.robot()["holder"] is None
         moves = len(fake.moving)
         page.x = 1.0
@@ -127,7 +127,7 @@ class TestPages:
         eventually(lambda: other.robot().get("state") == "driving", "the report")
         assert other.robot()["holder"]["name"] == "Ann"
         assert not other.robot()["mine"]
-        other.say(op="take", robot="r1")
+        other.send(op="take", robot="r1")
         refused = eventually(lambda: other.of("refused"), "a refusal")
         assert refused[0]["why"] == "Ann has control"
         other.end()
@@ -141,7 +141,7 @@ class TestPages:
         eventually(lambda: page.of("refused"), "a refusal")
         for _ in range(30):
             page.connection.receive("rubbish")
-        eventually(lambda: page.closed, "the wish to close the page")
+        eventually(lambda: page.closed, "the request to close the page")
         assert fake.velocities == []
 
     def test_the_speed_limit_of_the_page_applies(self, page, fake):
@@ -187,7 +187,7 @@ class TestGoals:
         assert pose["header"] == {"stamp": {"secs": 0, "nsecs": 0}, "frame_id": "map"}
         assert pose["pose"]["position"] == {"x": 1.0, "y": 2.0, "z": 0.0}
         eventually(lambda: of(reports, protocol.SentGoal), "the report of it")
-        page.say(op="cancel", robot="r1")
+        page.send(op="cancel", robot="r1")
         eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
         assert fake.of("publish", "/cancel")[0].message["msg"] == {}
 
@@ -212,11 +212,11 @@ class TestGoals:
                 "sec": 0,
                 "nanosec": 0,
             }
-            # The first may hang in its socket; the second has one of its own.
+            # The first goal may hang in its socket; the second has its own socket.
             eventually(lambda: self._goes(page, fake, 2), "a second goal")
             second = fake.of("send_action_goal")[1]
             assert second.link != first.link
-            page.say(op="stop", robot="r1")
+            page.send(op="stop", robot="r1")
             call = eventually(lambda: fake.of("call_service"), "the cancel")[0]
             assert call.message["service"] == "/navigate_to_pose/_action/cancel_goal"
             assert call.link not in (first.link, second.link)
@@ -253,21 +253,21 @@ class TestGoals:
 
             received = eventually(sent, "the goal")[0]
             seen = {t.topic: t for t in fake.of("subscribe")}
-            assert seen["/move_base/result"].at < received.at, "no word is missed"
+            assert seen["/move_base/result"].at < received.at, "no message is missed"
             id = received.message["msg"]["goal_id"]["id"]
             status = {"goal_id": {"id": id}, "status": 1, "text": ""}
-            word = {"op": "publish", "topic": "/move_base/status"}
-            fake.send(received.link, {**word, "msg": {"status_list": [status]}})
-            eventually(lambda: goal_of("under way"), "that it is under way")
-            page.say(op="cancel", robot="r1")
+            operation = {"op": "publish", "topic": "/move_base/status"}
+            fake.send(received.link, {**operation, "msg": {"status_list": [status]}})
+            eventually(lambda: goal_of("under way"), "a goal that is under way")
+            page.send(op="cancel", robot="r1")
             eventually(lambda: fake.of("publish", "/move_base/cancel"), "the cancel")
-            end = {**word, "topic": "/move_base/result"}
+            end = {**operation, "topic": "/move_base/result"}
             end["msg"] = {"status": {**status, "status": 2}, "result": {}}
             fake.send(received.link, end)
             eventually(lambda: goal_of("cancelled"), "its end")
             eventually(
                 lambda: fake.of("unsubscribe", "/move_base/status"),
-                "the end of listening: an idle robot costs nothing",
+                "the end of the subscription",
             )
             page.goal(op="locate")
             pose = eventually(lambda: fake.of("publish", "/initialpose"), "the pose")
@@ -305,7 +305,7 @@ class TestGoals:
             page.end()
 
     def _goes(self, page, fake, number):
-        """Ask again until the link is there: a goal never waits for one."""
+        """Send again until the link is open: a goal never waits for a link."""
 
         def goals():
             return len(fake.of("send_action_goal") + fake.of("publish", "/goal"))
@@ -435,7 +435,7 @@ class TestLinks:
         page.drive_off(fake)
         before = len(fake.velocities)
         fake.hold()
-        eventually(lambda: not page.robot()["armed"], "a gate that noticed")
+        eventually(lambda: not page.robot()["armed"], "a gate that noticed the stall")
         eventually(lambda: page.robot()["link"] == "down", "a link that is cut")
         fake.go_on()
         eventually(lambda: page.robot()["link"] == "up", "another link")
@@ -465,9 +465,9 @@ class TestLifecycle:
         eventually(lambda: len(page.of("hello")) == 2, "a new greeting")
         eventually(lambda: page.robot().get("link") == "up", "a new link")
         assert client.pid != pid
-        # The last report of the gate that died may be the newest that there is.
+        # The newest report may still be the last report of the killed gate.
         eventually(lambda: page.robot()["holder"] is None, "a robot without a holder")
-        # It was driven, so the new gate's first word is zero.
+        # The robot was driven, so the new gate first sends zero.
         eventually(lambda: fake.last_speed == 0, "a zero")
         page.drive_off(fake)
 
@@ -500,7 +500,7 @@ class TestLifecycle:
         self, client, page, fake
     ):
         page.drive_off(fake)
-        client._supervisor.end_heartbeat()  # and nothing else
+        client._supervisor.end_heartbeat()  # only the heartbeat ends
         at = time.monotonic()
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at <= 0.3 + JITTER
@@ -557,7 +557,7 @@ class TestActiveStop:
     def test_a_stop_stays_active_after_the_gate_was_killed(self, page, client, fake):
         page.drive_off(fake)
         client.stop_robot("r1")
-        eventually(lambda: page.robot().get("latched"), "the word that STOP stands")
+        eventually(lambda: page.robot().get("latched"), "a report of the active STOP")
         page.robots.clear()
         os.kill(client.pid, signal.SIGKILL)
         eventually(lambda: page.robot().get("latched"), "the STOP of the first gate")
@@ -565,15 +565,15 @@ class TestActiveStop:
         assert page.robot()["stop"]["by"] == "program"
         at, moves = time.monotonic(), len(fake.moving)
         page.x = 1.0
-        page.say(op="take", robot="r1")
+        page.send(op="take", robot="r1")
 
         def received():
             return [r["why"] for r in page.of("refused") if r["what"] == "take"]
 
         assert "reset it first" in eventually(received, "a refusal")[-1]
-        eventually(lambda: first_zero_after(fake, at), "zeros that go on")
-        page.say(op="reset", robot="r1")
-        eventually(lambda: page.robot().get("armable"), "a robot to be had")
+        eventually(lambda: first_zero_after(fake, at), "further zeros")
+        page.send(op="reset", robot="r1")
+        eventually(lambda: page.robot().get("armable"), "a free robot")
         assert len(fake.moving) == moves
         page.x = 0.0
         page.drive_off(fake)
@@ -589,14 +589,14 @@ class TestActiveStop:
         def latched():
             return [r for r in of(seen, protocol.RobotReport) if r.latched]
 
-        eventually(latched, "the word that STOP stands")
+        eventually(latched, "a report of the active STOP")
         client.stop()
         seen.clear()
         client.start()
-        eventually(latched, "the STOP of before")
+        eventually(latched, "the earlier STOP")
 
         def reset():
-            # The new gate may be told the STOP once more, which makes it a newer one.
+            # The new gate may receive the STOP again, which then has a new identity.
             client.reset("r1", latched()[-1].stop.id)
             return not of(seen, protocol.RobotReport)[-1].latched
 
@@ -611,10 +611,10 @@ class TestActiveStop:
         def confirmed():
             return (page.robot().get("stop") or {}).get("confirmed")
 
-        eventually(lambda: confirmed() is False, "the word that it moves on")
+        eventually(lambda: confirmed() is False, "a report of motion")
         assert page.robot()["stop"]["why"].startswith("still moving at 0.1")
         fake.at_rest = True
-        eventually(confirmed, "the word that it stands")
+        eventually(confirmed, "a confirmed STOP")
 
     def test_a_stop_stays_active_for_a_robot_that_is_removed_and_declared_again(
         self, page, client, robot_spec, fake
@@ -622,14 +622,14 @@ class TestActiveStop:
         page.drive_off(fake)
         pid = client.pid
         client.stop_robot("r1")
-        eventually(lambda: page.robot().get("latched"), "the word that STOP stands")
-        at = time.monotonic()  # so that it is dropped at once, while it is watched
-        eventually(lambda: fake.velocities[-1][0] - at > 0.6, "zeros that go on")
+        eventually(lambda: page.robot().get("latched"), "a report of the active STOP")
+        at = time.monotonic()  # then a removal takes effect at once
+        eventually(lambda: fake.velocities[-1][0] - at > 0.6, "further zeros")
         client.forget("r1")
         eventually(lambda: page.of("gone"), "the end of the robot")
         page.robots.clear()
         client.declare(robot_spec)
-        eventually(lambda: page.robot().get("latched"), "the STOP of before")
+        eventually(lambda: page.robot().get("latched"), "the earlier STOP")
         fake.at_rest = True
         eventually(lambda: (page.robot()["stop"] or {}).get("confirmed"), "standstill")
         assert client.pid == pid
@@ -648,20 +648,20 @@ class TestActiveStop:
         client.declare(spec)
         page = Page(client)
         eventually(lambda: page.robot().get("armable"), "a link")
-        page.say(op="stop", robot="r1")
+        page.send(op="stop", robot="r1")
 
-        def said():
+        def flags():
             return [t.message["msg"]["data"] for t in fake.of("publish", "/lock")]
 
-        eventually(lambda: said() == [True], "the flag")
+        eventually(lambda: flags() == [True], "the flag")
 
         def called():
             return {t.message["service"] for t in fake.of("call_service")}
 
         eventually(lambda: "/e_stop" in called(), "the call")
         assert "/go/_action/cancel_goal" in called()
-        page.say(op="reset", robot="r1")
-        eventually(lambda: said() == [True, False], "the flag taken back")
+        page.send(op="reset", robot="r1")
+        eventually(lambda: flags() == [True, False], "the cleared flag")
         page.end()
         client.forget("r1")
 
@@ -670,9 +670,9 @@ class TestInputs:
     def test_control_changes_from_page_to_page_at_standstill(self, page, client, fake):
         other = Page(client, "Ben")
         page.drive_off(fake)
-        other.say(op="ask", robot="r1")
-        eventually(lambda: page.robot().get("asker"), "the question")
-        page.say(op="grant", robot="r1")
+        other.send(op="ask", robot="r1")
+        eventually(lambda: page.robot().get("asker"), "the request for control")
+        page.send(op="grant", robot="r1")
         eventually(lambda: page.robot().get("changing"), "the change")
         page.x = None
         assert not other.robot()["mine"]
@@ -690,8 +690,8 @@ class TestInputs:
         page.take()
         page.x = 0.0
         eventually(lambda: page.robot().get("measured"), "odometry")
-        eventually(lambda: page.robot().get("armed"), "hands that were seen")
-        page.say(op="stop-test", robot="r1")
+        eventually(lambda: page.robot().get("armed"), "an armed driver")
+        page.send(op="stop-test", robot="r1")
         eventually(lambda: fake.moving, "creeping")
         assert fake.moving[0][1] == 0.1
         fake.at_rest = False
@@ -706,5 +706,5 @@ class TestInputs:
         assert page.robot()["stop_time"] < 2
         client.stop()
         client.start()
-        eventually(lambda: page.robot().get("stop_date"), "the result of before")
+        eventually(lambda: page.robot().get("stop_date"), "the earlier result")
         page.end()

@@ -1,4 +1,4 @@
-"""The strict reader of what a page says."""
+"""The strict parser of the commands of a page."""
 
 import contextlib
 import json
@@ -156,7 +156,7 @@ def test_any_other_data_is_refused_with_a_short_printable_reason(data):
     with pytest.raises(Refusal) as refused:
         parse(data)
     assert refused.value.garbage
-    # It goes to a log and to the page: printable, and short.
+    # The reason goes to a log and to the page: it is printable and short.
     assert refused.value.why.isprintable()
     assert len(refused.value.why) < 200
 

@@ -1,4 +1,4 @@
-"""The control lane: velocities out, what comes back, and nothing else."""
+"""The control lane: sent velocities, echoes and pings."""
 
 import asyncio
 import json
@@ -16,7 +16,7 @@ ZERO, SLOW = Twist(), Twist(0.1)
 
 
 class Noting:
-    """A control lane with one machine, and what it tells."""
+    """A control lane with one machine, and its events."""
 
     def __init__(self, url):
         self.events = []
@@ -66,7 +66,7 @@ async def test_a_ping_answer_carries_the_time_of_the_ping_not_of_the_answer():
     async def talk(link):
         await link.accept()
         await go_on.wait()
-        link.say(frame(PONG, (1).to_bytes(8, "big")))
+        link.send(frame(PONG, (1).to_bytes(8, "big")))
         await asyncio.Event().wait()
 
     before = now()
@@ -74,7 +74,7 @@ async def test_a_ping_answer_carries_the_time_of_the_ping_not_of_the_answer():
         lane = await noting.up()
         await until(lambda: lane.lane._pings, "a ping")
         asked_by = now()
-        await until(lambda: now() > asked_by, "another moment")
+        await until(lambda: now() > asked_by, "a later time")
         go_on.set()
         (alive,) = await until(lambda: noting.of(PingAnswered), "the answer")
         assert before < alive.asked_at <= asked_by
@@ -89,35 +89,37 @@ async def test_a_velocity_of_another_program_is_reported_but_proves_no_live_link
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
         lane.listen("/cmd_vel")
-        await until(lambda: bridge.of("subscribe"), "that it listens")
+        await until(lambda: bridge.of("subscribe"), "the subscription")
         await until(lambda: noting.of(PingAnswered), "the answer to the only ping")
         noting.events.clear()
         foreign = {"linear": {"x": 3.0, "y": 0.0}, "angular": {"z": 0.0}}
         await bridge.publish("/cmd_vel", foreign)
         received = [EchoReceived(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
-        await until(lambda: noting.events == received, "what was said, and only that")
+        await until(lambda: noting.events == received, "only the received velocity")
 
 
 @in_loop
 async def test_echoes_are_received_from_the_start_with_a_throttled_subscription():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
-        await until(lambda: bridge.of("advertise"), "what it says at first")
+        await until(lambda: bridge.of("advertise"), "the first operations")
         first = [
             received for received in bridge.received if received.topic == "/cmd_vel"
         ]
-        # A bridge of ROS 2 chooses how it listens by who publishes, itself too.
+        # A bridge of ROS 2 adapts its subscription to the publishers, also to itself.
         assert [received.op for received in first] == ["subscribe", "advertise"]
         assert first[0].message["throttle_rate"] == ECHO
         foreign = {"linear": {"x": 3.0, "y": 0.0}, "angular": {"z": 0.0}}
         await bridge.publish("/cmd_vel", foreign)
         received = [EchoReceived(Key(bridge.url, "/cmd_vel"), Twist(3.0))]
-        await until(lambda: noting.of(EchoReceived) == received, "what was said")
+        await until(
+            lambda: noting.of(EchoReceived) == received, "the received velocity"
+        )
         assert lane.lane.ping_period == IDLE_PING
         lane.listen("/cmd_vel")
         lane.ignore("/cmd_vel")
         lane.detach("/cmd_vel", "geometry_msgs/Twist")
-        await until(lambda: bridge.of("unsubscribe"), "that it listens no longer")
+        await until(lambda: bridge.of("unsubscribe"), "the end of the subscription")
         assert len(bridge.of("subscribe")) == 1
 
 
@@ -126,18 +128,18 @@ async def test_messages_that_are_no_velocity_for_a_machine_of_the_lane_are_ignor
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         lane = await noting.up()
         lane.listen("/cmd_vel")
-        await until(lambda: bridge.of("subscribe"), "that it listens")
+        await until(lambda: bridge.of("subscribe"), "the subscription")
         zero = {"linear": {"x": 0.0, "y": 0.0}, "angular": {"z": 0.0}}
         unknown = {**zero, "linear": {"x": 0.0, "y": 0.0, "z": None}}
-        for words in (
+        for text in (
             "rubbish",
             json.dumps({"op": "publish", "topic": "/other", "msg": zero}),
             json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": {"data": 1}}),
             json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": unknown}),
             json.dumps({"op": "publish", "topic": "/cmd_vel", "msg": zero}),
         ):
-            await bridge.send(1, words)
-        await until(lambda: noting.of(EchoReceived), "the last of them")
+            await bridge.send(1, text)
+        await until(lambda: noting.of(EchoReceived), "the last message")
         assert noting.of(EchoReceived) == [
             EchoReceived(Key(bridge.url, "/cmd_vel"), ZERO)
         ]
@@ -160,7 +162,9 @@ async def test_pings_are_more_frequent_while_the_lane_listens_to_a_topic():
         assert lane.lane.wanted
         lane.detach("/cmd_vel", "geometry_msgs/Twist")
         assert not lane.lane.wanted
-        await until(lambda: len(bridge.of("unadvertise")) == 2, "the goodbyes")
+        await until(
+            lambda: len(bridge.of("unadvertise")) == 2, "the end of both topics"
+        )
         assert {t.topic for t in bridge.of("unsubscribe")} == {"/cmd_vel", "/other"}
 
 
@@ -182,14 +186,16 @@ async def test_a_known_type_replaces_an_assumed_type_of_the_same_topic(stated_fi
         assert lane.write("/base", ZERO)
         await until(lambda: len(bridge.of("publish", "/base")) == 2, "the other zero")
         assert "linear" in bridge.of("publish", "/base")[1].message["msg"]
-        said = [
+        operations = [
             (t.op, t.message["type"] if t.op == "advertise" else "")
             for t in bridge.received
             if t.topic == "/base" and t.op in ("advertise", "unadvertise")
         ]
         alone = ("advertise", "geometry_msgs/Twist")
         known = [("advertise", STAMPED), ("unadvertise", ""), alone]
-        assert said == (known if stated_first else [alone, ("unadvertise", ""), *known])
+        assert operations == (
+            known if stated_first else [alone, ("unadvertise", ""), *known]
+        )
 
 
 @in_loop

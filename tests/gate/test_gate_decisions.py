@@ -1,4 +1,4 @@
-"""The gate's decisions on a virtual clock, story by story."""
+"""The gate's decisions on a virtual clock, one situation in each test."""
 
 import json
 
@@ -45,14 +45,14 @@ class TestTakeControl:
         self, bench
     ):
         first = bench.take("a")
-        bench.say("b", op="release", robot="r1")  # not b's to give
+        bench.send("b", op="release", robot="r1")  # b has no control to release
         assert bench.state == "held"
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
         assert bench.state == "free"
         assert bench.take("b") > first
 
     def test_taking_an_unknown_robot_is_refused_with_its_id(self, bench):
-        bench.say("a", op="take", robot="r9")
+        bench.send("a", op="take", robot="r9")
         assert "'r9'" in bench.refusals()[-1].why
 
     @pytest.mark.parametrize(
@@ -212,7 +212,7 @@ class TestDriving:
         bench.drive_off()
         bench.run(0.05)
         bench.drive(x=0.9)
-        bench.drive(x=1.0)  # too soon: it waits
+        bench.drive(x=1.0)  # too soon: the command waits
         bench.handle(protocol.Speeds("a", 0.3, 0.3))
         bench.run(0.05)
         assert bench.written[-1].twist.vx == 0.3
@@ -261,7 +261,7 @@ class TestFreshness:
         assert driving.moving_since(self.at)
 
     def test_a_gate_that_was_paused_sends_zero_before_anything_else(self, driving):
-        driving.held_up = 1.5  # just between what it decides and what it writes
+        driving.held_up = 1.5  # between the decision and the write
         driving.drive(x=1.0)
         driving.held_up = 0.0
         driving.hold(1.0, x=1.0)
@@ -293,7 +293,7 @@ class TestFreshness:
         seen = driving.tick
         driving.run(0.5, lambda: driving.drive(x=1.0, tick=seen))
         zero = next(w for w in driving.since(self.at) if w.twist == ZERO)
-        # The timeout from the last command that told of a new tick, which is the first.
+        # The timeout counts from the last command with a new tick: the first command.
         assert zero.at - self.at <= DEADMAN + 2 * 0.01 + 1e-9
         assert driving.moving_since(zero.at) == []
 
@@ -363,17 +363,17 @@ class TestMalformed:
         assert len(refused) == 1
 
     def test_a_few_invalid_commands_do_not_close_the_connection(self, bench):
-        bench.run(3.0, lambda: bench.say("a", op="nonsense"), step=0.06)
+        bench.run(3.0, lambda: bench.send("a", op="nonsense"), step=0.06)
         assert bench.of(protocol.CloseConnection) == []
 
     def test_a_flood_of_valid_commands_also_closes_the_connection(self, bench):
         for _ in range(500):
-            bench.say("a", op="take", robot="r9")
+            bench.send("a", op="take", robot="r9")
         assert len(bench.of(protocol.CloseConnection)) == 1
 
     def test_commands_of_unknown_connections_are_ignored(self, bench):
-        bench.say("nobody", op="take", robot="r1")
-        bench.say(PROGRAM, op="take", robot="r1")
+        bench.send("nobody", op="take", robot="r1")
+        bench.send(PROGRAM, op="take", robot="r1")
         assert bench.state == "free"
         bench.handle(protocol.Connect(PROGRAM, "x", "viewer"))
         bench.handle(protocol.Disconnect(PROGRAM))
@@ -389,7 +389,7 @@ class TestStop:
         bench.join("v", "viewer")
         epoch = bench.drive_off()
         before = len(bench.written)
-        bench.say(who, op="stop", robot=robot)
+        bench.send(who, op="stop", robot=robot)
         assert bench.written[before].twist == ZERO
         assert len(bench.written) == before + 1
         report = bench.report()
@@ -402,7 +402,7 @@ class TestStop:
         assert bench.state == "stopped"
 
     def test_stop_also_sends_zeros_to_a_robot_without_an_operator(self, bench):
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         assert bench.written[0].twist == ZERO
         bench.run(1.0)
         assert len(bench.written) in (15, 16, 17)
@@ -413,18 +413,18 @@ class TestStop:
         for _ in range(5):
             bench.run(0.02)
             before = len(bench.written)
-            bench.say("b", op="stop", robot="*")
-            bench.say("b", op="stop", robot="*")
+            bench.send("b", op="stop", robot="*")
+            bench.send("b", op="stop", robot="*")
             assert len(bench.written) == before + 1
 
     def test_the_operator_receives_the_name_of_the_person_who_pressed_stop(self, bench):
         bench.take("a")
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         refused = bench.refusals("a")[-1]
         assert (refused.what, refused.why) == ("lease", "STOP by B")
 
     def test_stop_of_an_unknown_robot_is_refused(self, bench):
-        bench.say("b", op="stop", robot="r9")
+        bench.send("b", op="stop", robot="r9")
         assert bench.refusals("b")[-1].what == "stop"
 
     def test_a_program_can_stop_and_reset_a_robot(self, bench):
@@ -442,7 +442,7 @@ class TestStop:
 
     def test_a_stop_without_a_link_is_sent_first_on_the_next_link(self, bench):
         bench.break_links()
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         assert bench.written == []
         bench.run(3.0)
         bench.connect_links()
@@ -453,7 +453,7 @@ class TestStop:
 class TestHandOver:
     def test_a_zero_separates_the_velocities_of_two_operators(self, bench):
         first = bench.drive_off("a")
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
         second = bench.drive_off("b", x=0.5)
         epochs = [w.epoch for w in bench.written if not w.twist.is_zero]
         assert set(epochs) == {first, second}
@@ -465,9 +465,9 @@ class TestHandOver:
         self, bench
     ):
         bench.drive_off("a")
-        # The socket takes nothing, although nobody has noticed yet that it is gone.
+        # The socket accepts no data, but its loss is not noticed yet.
         bench.up = False
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
         bench.take("b")
         bench.run(0.2)
         bench.up = True
@@ -480,7 +480,7 @@ class TestHandOver:
     def test_a_new_epoch_starts_with_zero_even_if_earlier_zeros_were_lost(self, bench):
         bench.drive_off("a")
         bench.losing_zeros = True
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
         bench.take("b")
         bench.hold(1.0, "b")
         before = len(bench.written)
@@ -549,7 +549,7 @@ class TestLinks:
     ):
         bench.drive_off()
         bench.answering = False
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
         released = bench.now
         assert bench.written[-1].twist == ZERO
         bench.now += 0.003
@@ -566,16 +566,16 @@ class TestLinks:
 
     def test_a_stop_is_confirmed_only_after_a_later_ping_is_answered(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
-        stands = lambda: bench.handle(events.OdometryReceived(KEY, ZERO))  # noqa: E731
+        not_moving = lambda: bench.handle(events.OdometryReceived(KEY, ZERO))  # noqa: E731
         bench.answering = False
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         pressed = bench.now
         bench.run(0.1)
         bench.handle(events.PingAnswered(URL, pressed - 0.01))
-        bench.run(0.5, stands)
+        bench.run(0.5, not_moving)
         assert bench.report().stop.confirmed is None
         bench.handle(events.PingAnswered(URL, pressed + 0.01))
-        bench.run(0.1, stands)
+        bench.run(0.1, not_moving)
         assert bench.report().stop.confirmed
 
     def test_a_command_that_cannot_be_sent_at_once_is_dropped_and_reported(self, bench):
@@ -666,7 +666,7 @@ class TestOdometryLost:
         assert bench.report().reason == "no odometry for 1 s"
 
     def test_odometry_without_velocity_is_no_motion_measurement(self, bench):
-        """As of a message without a twist, or one of NaN."""
+        """As from a message without a twist, or with NaN."""
         bench.take()
         assert self.moves(bench, seen=True)
         at = bench.now
@@ -690,7 +690,7 @@ class TestOdometryLost:
         report = bench.report()
         assert report.measured == Twist(0.1).numbers
         assert report.echoed == Twist(0.2).numbers
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
         assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
         bench.handle(events.EchoReceived(KEY, Twist(0.2)))
         bench.run(0.2)

@@ -1,4 +1,4 @@
-"""What nests deeply or holds very many values is left out, and the log says so."""
+"""Data that is nested deeply or has very many values is refused and logged."""
 
 import asyncio
 import struct
@@ -122,7 +122,7 @@ def test_deeply_nested_data_on_the_pipe_is_logged_and_skipped(caplog):
 async def test_a_link_with_deeply_nested_messages_stays_open_and_logs_once(caplog):
     received = Received()
 
-    def hear(data):
+    def receive(data):
         rosbridge.parse(data)
         received.texts.append(data)
 
@@ -133,9 +133,9 @@ async def test_a_link_with_deeply_nested_messages_stays_open_and_logs_once(caplo
         await link.reader.read()
 
     async with raw_bridge(talk) as url:
-        ears = SocketHandlers(hear, received.pongs.append, received.lost.append)
-        link = await open_socket(url, ears, Budget())
-        await until(lambda: received.texts == [b"{}"], "what came after it")
+        handlers = SocketHandlers(receive, received.pongs.append, received.lost.append)
+        link = await open_socket(url, handlers, Budget())
+        await until(lambda: received.texts == [b"{}"], "the next message")
         await asyncio.sleep(0)
         assert link.is_open
         link.close()

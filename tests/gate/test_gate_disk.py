@@ -1,4 +1,4 @@
-"""The disk is waited for by nobody, and tells when it has something."""
+"""Work on the disk blocks no caller; its end is reported."""
 
 import asyncio
 import datetime

@@ -1,4 +1,4 @@
-"""The files that outlive the gate: whatever befalls them, nothing moves by it."""
+"""The files that stay after the gate has ended: damage to them starts no motion."""
 
 import hashlib
 import json

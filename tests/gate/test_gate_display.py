@@ -1,4 +1,4 @@
-"""The display's end of the pipe, with a gate that says what a test has it say."""
+"""The display's end of the pipe, with a fake gate that sends messages of the test."""
 
 import json
 import math
@@ -19,14 +19,14 @@ from webmap.gate.protocol import PROGRAM, Holder
 
 
 class FakeGateProcess:
-    """A gate's process that notes what it is told."""
+    """A gate process that records the messages that it receives."""
 
     pid = 4711
     end_reason = "ended by SIGKILL"
     made: list["FakeGateProcess"] = []
 
-    def __init__(self, hear, ended):
-        self._hear, self._ended = hear, ended
+    def __init__(self, receive, ended):
+        self._receive, self._ended = receive, ended
         self.received, self.killed, self.stopped = [], [], False
         self.made.append(self)
 
@@ -42,9 +42,9 @@ class FakeGateProcess:
     def stop(self, timeout):
         self.stopped = True
 
-    def say(self, *said):
-        for message in said:
-            self._hear(self, message)
+    def deliver(self, *messages):
+        for message in messages:
+            self._receive(self, message)
 
     def die(self):
         self._ended(self)
@@ -80,7 +80,7 @@ def client(made):
 @pytest.fixture
 def gate(client, made):
     gate = eventually(lambda: client.pid and made[0], "a gate")
-    gate.say(protocol.Ready(1), protocol.Tick(7, {}))
+    gate.deliver(protocol.Ready(1), protocol.Tick(7, {}))
     return gate
 
 
@@ -95,7 +95,7 @@ def held():
 
 
 class TestProgramRate:
-    """One that gives velocities without a pause: each STOP would go behind them."""
+    """A program that sends velocities without a pause, which would delay each STOP."""
 
     @pytest.fixture
     def road(self):
@@ -136,11 +136,11 @@ class TestProgramRate:
             road.twist("r1", Twist(0.2))
         road.on_report(held())
         road.twist("r1", Twist(0.4))
-        assert self.speeds() == [0.2, 0.4], "with another lease it begins anew"
+        assert self.speeds() == [0.2, 0.4], "a new lease has no delay"
 
 
 class TestProgramAtAnAgent:
-    """One gate answers the programs of several displays, and each hears all of it."""
+    """A gate answers programs of several displays; each receives all messages."""
 
     @pytest.fixture
     def road(self):
@@ -240,7 +240,7 @@ class TestProgram:
     def test_a_program_requests_uses_and_releases_a_lease(self, client, gate):
         future = client.take("r1")
         (asked,) = gate.of(protocol.FromProgram)
-        gate.say(protocol.TakeReply(asked.request, "r1", 3, None))
+        gate.deliver(protocol.TakeReply(asked.request, "r1", 3, None))
         assert future.result(1) == 3
         client.twist("r1", Twist(0.5))
         assert gate.received[-1] == protocol.FromProgram(
@@ -266,17 +266,17 @@ class TestProgram:
     ):
         future = client.take("r1")
         (asked,) = gate.of(protocol.FromProgram)
-        gate.say(protocol.TakeReply(asked.request, "r1", None, "Ann has control"))
-        gate.say(protocol.TakeReply(99, "r1", None, "nobody asked"))
+        gate.deliver(protocol.TakeReply(asked.request, "r1", None, "Ann has control"))
+        gate.deliver(protocol.TakeReply(99, "r1", None, "nobody asked"))
         with pytest.raises(NoLease, match="Ann has control"):
             future.result(1)
 
     def test_a_program_loses_its_lease_when_a_report_names_another_holder(
         self, client, gate
     ):
-        gate.say(held())
+        gate.deliver(held())
         client.twist("r1", Twist(0.5))
-        gate.say(report(Holder("c1", "Ann"), 4))
+        gate.deliver(report(Holder("c1", "Ann"), 4))
         with pytest.raises(NoLease):
             client.twist("r1", Twist(0.5))
 
@@ -299,7 +299,7 @@ class TestProgram:
         assert made == []
 
     def test_a_gate_that_dies_ends_leases_and_pending_requests(self, client, gate):
-        gate.say(held())
+        gate.deliver(held())
         future = client.take("r1")
         gate.die()
         gate.die()
@@ -312,24 +312,28 @@ class TestProgram:
 
 class TestPages:
     @pytest.fixture
-    def said(self):
+    def received(self):
         return []
 
     @pytest.fixture
-    def page(self, client, gate, said):
-        page = client.connect("Ann", "operator", said.append, said.append)
-        gate.say(held(), protocol.Hello(page.id))
+    def page(self, client, gate, received):
+        page = client.connect("Ann", "operator", received.append, received.append)
+        gate.deliver(held(), protocol.Hello(page.id))
         return page
 
-    def ops(self, said):
-        return [json.loads(text)["op"] for text in said]
+    def ops(self, received):
+        return [json.loads(text)["op"] for text in received]
 
-    def test_a_new_page_receives_a_greeting_and_the_existing_robots(self, page, said):
-        assert self.ops(said) == ["hello", "robot"]
+    def test_a_new_page_receives_a_greeting_and_the_existing_robots(
+        self, page, received
+    ):
+        assert self.ops(received) == ["hello", "robot"]
 
-    def test_a_page_does_not_receive_messages_for_other_pages(self, page, gate, said):
-        del said[:]
-        gate.say(
+    def test_a_page_does_not_receive_messages_for_other_pages(
+        self, page, gate, received
+    ):
+        del received[:]
+        gate.deliver(
             protocol.Tick(8, {"c9": 1}),
             protocol.Tick(9, {page.id: 5}),
             protocol.Refused(page.id, "r1", "take", "Ben drives it"),
@@ -337,22 +341,24 @@ class TestPages:
             protocol.RobotGone("r1"),
             protocol.Hello("c9"),
         )
-        assert self.ops(said) == ["tick", "refused", "gone"]
-        gate.say(protocol.CloseConnection("c9", "x"))
-        gate.say(protocol.CloseConnection(page.id, "too much"))
-        assert said[-1] == "too much"
+        assert self.ops(received) == ["tick", "refused", "gone"]
+        gate.deliver(protocol.CloseConnection("c9", "x"))
+        gate.deliver(protocol.CloseConnection(page.id, "too much"))
+        assert received[-1] == "too much"
 
     def test_a_page_that_may_only_stop_gets_two_ticks_a_second(self, client, gate):
         texts = {"viewer": [], "operator": []}
-        for role, said in texts.items():
-            page = client.connect("Ann", role, said.append, said.append)
-            gate.say(protocol.Hello(page.id))
+        for role, received in texts.items():
+            page = client.connect("Ann", role, received.append, received.append)
+            gate.deliver(protocol.Hello(page.id))
             for tick in range(20):
-                gate.say(protocol.Tick(tick, {page.id: -1}))
-        ticks = {role: self.ops(said).count("tick") for role, said in texts.items()}
+                gate.deliver(protocol.Tick(tick, {page.id: -1}))
+        ticks = {
+            role: self.ops(received).count("tick") for role, received in texts.items()
+        }
         assert ticks == {"viewer": 2, "operator": 20}
-        for role, said in texts.items():
-            assert json.loads(said[0])["ticks"] == ticks[role]
+        for role, received in texts.items():
+            assert json.loads(received[0])["ticks"] == ticks[role]
 
     def test_page_data_is_forwarded_and_closing_twice_disconnects_once(
         self, page, gate
@@ -371,16 +377,16 @@ class TestPages:
             raise RuntimeError("the page is gone")
 
         page = client.connect("Ann", "operator", fail, fail)
-        gate.say(protocol.Hello(page.id), held())
+        gate.deliver(protocol.Hello(page.id), held())
         assert "a callback failed" in caplog.text
 
     def test_pages_with_equal_speed_limits_receive_equal_reports(self, client, gate):
         ann, ben, eve = [], [], []
-        for said in (ann, ben, eve):
-            page = client.connect("Ann", "operator", said.append, print)
-            page.set_speeds(0.2 if said is eve else 0.5, 1.0)
-            gate.say(protocol.Hello(page.id))
-        gate.say(report())
+        for received in (ann, ben, eve):
+            page = client.connect("Ann", "operator", received.append, print)
+            page.set_speeds(0.2 if received is eve else 0.5, 1.0)
+            gate.deliver(protocol.Hello(page.id))
+        gate.deliver(report())
         assert ann[-1] == ben[-1] != eve[-1]
 
     def test_an_unknown_role_is_refused(self, client):
@@ -414,6 +420,7 @@ class TestPages:
         assert list(client._pending_stops) == [(page.id, robot)]
         gate.die()
         second = eventually(lambda: client.pid and made[1], "a second gate")
+        eventually(lambda: second.of(protocol.FromPage), "the STOP")
         (again,) = second.of(protocol.FromPage)
         assert json.loads(again.text) == {"op": "stop", "robot": robot or "*"}
 
@@ -445,7 +452,7 @@ class TestLifecycle:
         assert second.of(protocol.Speeds)
         stops = second.of(protocol.FromProgram)
         assert stops == [protocol.FromProgram(commands.Stop("r1"))]
-        gate.say(protocol.Ready(1))  # it is dead, and counts no more
+        gate.deliver(protocol.Ready(1))  # this gate has ended, so the client ignores it
         assert not client.ready
 
     def test_a_reset_names_its_stop_and_keeps_stops_not_yet_confirmed_by_the_gate(
@@ -462,7 +469,7 @@ class TestLifecycle:
 
     def test_a_gate_that_sends_nothing_is_killed(self, client, gate, monkeypatch):
         monkeypatch.setattr(supervisor, "HUNG", 2)
-        eventually(lambda: gate.killed, "its end")
+        eventually(lambda: gate.killed, "the kill of the gate")
         assert gate.killed[0] == "it does not respond"
 
     def test_a_listener_receives_reports_until_removed(self, client, gate, caplog):
@@ -474,9 +481,9 @@ class TestLifecycle:
         client.on_report(fail)
         removal = client.on_report(reports.append)
         sent = protocol.SentTwist("r1", 0.5, 0.0, 0.0, None)
-        gate.say(sent, protocol.Tick(8, {}))
+        gate.deliver(sent, protocol.Tick(8, {}))
         removal.remove()
-        gate.say(sent)
+        gate.deliver(sent)
         assert reports == [sent]
         assert "a listener to the gate failed" in caplog.text
 

@@ -1,4 +1,4 @@
-"""A gate that ends at every start: what is said of it, and the STOPs of meanwhile."""
+"""A gate that ends at every start: the reports, and STOPs in the meantime."""
 
 import sys
 import time
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def broken(tmp_path, monkeypatch):
-    """Have every gate end at once, until it is mended; the times of its starts."""
+    """Let every gate end at once until ``mend`` is called; ``starts`` is the count."""
     starts = tmp_path / "starts"
     script = tmp_path / "python"
     script.write_text(
@@ -70,7 +70,7 @@ def test_a_failing_gate_is_restarted_at_growing_intervals(failing, broken):
     begun = time.monotonic()
     before = broken.starts
     eventually(lambda: broken.starts >= before + 3, "three more starts")
-    # After the second: 0.25, 0.5, 1 and 2 seconds, of which one may have passed.
+    # The waits after the second start: 0.25, 0.5, 1 and 2 s; one may have passed.
     assert time.monotonic() - begun > 1.2
 
 
@@ -93,14 +93,14 @@ def test_a_stop_pressed_without_a_gate_is_active_when_a_gate_runs(
     if by == "a program":
         failing.stop_robot(None if robot == "*" else robot)
     else:
-        page.say(op="stop", robot=robot)
+        page.send(op="stop", robot=robot)
     if by == "a page that is gone":
         page.end()
         page = Page(failing)
     before = broken.starts
-    eventually(lambda: broken.starts > before, "one more gate that ends")
+    eventually(lambda: broken.starts > before, "another gate that ends")
     mend(broken, monkeypatch, state_folder)
-    stop = eventually(lambda: page.robot().get("stop"), "a STOP that stands")
+    stop = eventually(lambda: page.robot().get("stop"), "an active STOP")
     assert stop["by"] == ("Ann" if by == "a page" else "program")
     page.end()
 

@@ -1,4 +1,4 @@
-"""A page at the gate of an agent: what the page gets, and its id there."""
+"""A page at the gate of an agent: its messages, and its id at the agent."""
 
 import json
 import threading
@@ -58,7 +58,7 @@ REPORT = RobotReport(
 
 
 class Link:
-    """A way to a gate that keeps what is sent."""
+    """A link to a gate; keeps the messages that are sent."""
 
     ready, trouble, pid = True, None, None
 
@@ -78,7 +78,7 @@ class Link:
 class Bench:
     def __init__(self):
         self.client = GateClient(self.make, "bay3", PREFIX)
-        self.told = []
+        self.messages = []
         self.page = self.connect()
         self.id = f"{PREFIX}c7.1"
 
@@ -88,15 +88,15 @@ class Bench:
         return self.link
 
     def connect(self):
-        def tell(text):
-            self.told.append(json.loads(text))
+        def note(text):
+            self.messages.append(json.loads(text))
 
-        return self.client.connect("Ann", "operator", tell, print, "c7")
+        return self.client.connect("Ann", "operator", note, print, "c7")
 
-    def hear(self, message):
-        self.told.clear()
+    def receive(self, message):
+        self.messages.clear()
         self.client.hear(message)
-        return list(self.told)
+        return list(self.messages)
 
 
 @pytest.fixture
@@ -122,7 +122,7 @@ def test_a_page_that_connects_again_has_another_id(bench):
 
 
 def test_a_tick_names_the_agent(bench):
-    (tick,) = bench.hear(Tick(5, {bench.id: 3}))
+    (tick,) = bench.receive(Tick(5, {bench.id: 3}))
     assert tick == {"op": "tick", "tick": 5, "ack": 3, "gate": "bay3"}
 
 
@@ -132,43 +132,43 @@ def test_a_report_names_the_agent_and_this_page_by_its_own_id(bench):
         holder=Holder(bench.id, "Ann"),
         asker=AskerReport("ben.5e/c1.1", "Ben", 5.0),
     )
-    (told,) = bench.hear(held)
-    assert (told["gate"], told["mine"]) == ("bay3", True)
-    assert told["holder"]["connection"] == "c7"
-    assert told["asker"]["connection"] == "ben.5e/c1.1"
+    (message,) = bench.receive(held)
+    assert (message["gate"], message["mine"]) == ("bay3", True)
+    assert message["holder"]["connection"] == "c7"
+    assert message["asker"]["connection"] == "ben.5e/c1.1"
 
 
 def test_the_hello_of_an_agent_is_not_for_the_page_but_its_robots_are(bench):
-    bench.hear(REPORT)
-    (told,) = bench.hear(Hello(bench.id))
-    assert (told["op"], told["robot"]) == ("robot", "r1")
-    bench.told.clear()
+    bench.receive(REPORT)
+    (message,) = bench.receive(Hello(bench.id))
+    assert (message["op"], message["robot"]) == ("robot", "r1")
+    bench.messages.clear()
     bench.client.show_again(bench.page)
-    assert [told["op"] for told in bench.told] == ["robot"]
+    assert [message["op"] for message in bench.messages] == ["robot"]
 
 
 def test_a_page_that_connects_later_is_told_of_the_robots_at_once(bench):
-    bench.hear(REPORT)
-    bench.told.clear()
+    bench.receive(REPORT)
+    bench.messages.clear()
     bench.connect()
-    assert [told["op"] for told in bench.told] == ["robot"]
+    assert [message["op"] for message in bench.messages] == ["robot"]
 
 
 def test_the_robots_of_a_lost_agent_stay_on_the_page(bench):
-    bench.hear(REPORT)
+    bench.receive(REPORT)
     bench.client.gone(GateDown("no connection"))
-    bench.told.clear()
+    bench.messages.clear()
     bench.client.show_again(bench.page)
-    assert [told["op"] for told in bench.told] == ["robot"]
-    assert bench.hear(RobotGone("r1")) == [{"op": "gone", "robot": "r1"}]
-    assert bench.hear(Ready(0)) == []
+    assert [message["op"] for message in bench.messages] == ["robot"]
+    assert bench.receive(RobotGone("r1")) == [{"op": "gone", "robot": "r1"}]
+    assert bench.receive(Ready(0)) == []
     assert bench.client._pages.latest == []
 
 
 def test_the_program_knows_its_replies_by_its_name_at_the_agent(bench):
     taken = bench.client.take("r1")
     for other in ("program", "ben.5e/program"):
-        bench.hear(TakeReply(1, "r1", 3, None, other))
+        bench.receive(TakeReply(1, "r1", 3, None, other))
     assert not taken.done()
-    bench.hear(TakeReply(1, "r1", 4, None, f"{PREFIX}program"))
+    bench.receive(TakeReply(1, "r1", 4, None, f"{PREFIX}program"))
     assert taken.result(1) == 4

@@ -1,4 +1,4 @@
-"""A bridge that sends without end: what its socket takes, and when it is dropped."""
+"""A bridge that sends without end: how its socket is read, and when it is dropped."""
 
 import asyncio
 import itertools
@@ -31,14 +31,14 @@ CHUNK = 1 << 18
 
 
 def flood(piece, *, reads=True):
-    """Return a bridge that repeats some bytes for ever."""
+    """Return a bridge that repeats some bytes without end."""
 
     async def talk(link):
         await link.accept()
         reading = asyncio.create_task(link.reader.read()) if reads else None
         try:
             while True:
-                link.say(piece * (CHUNK // len(piece)))
+                link.send(piece * (CHUNK // len(piece)))
                 await link.writer.drain()
                 await asyncio.sleep(0)
         finally:
@@ -50,7 +50,7 @@ def flood(piece, *, reads=True):
 
 @pytest.fixture
 def patient(monkeypatch):
-    """Let no link be dropped for its rates, which a slow computer may reach first."""
+    """Drop no link because of its rates, which a slow computer may reach first."""
     monkeypatch.setattr(budget, "PATIENCE", 60.0)
     monkeypatch.setattr(budget, "BEHIND", 60.0)
 
@@ -77,7 +77,7 @@ FLOODS = {
 async def test_a_flood_is_read_within_the_budget_and_then_dropped(name):
     seen = Received()
     async with raw_bridge(flood(FLOODS[name])) as url:
-        link = await open_socket(url, seen.ears, Budget())
+        link = await open_socket(url, seen.handlers, Budget())
         begun = time.monotonic()
         await until(lambda: seen.lost, "the drop")
         assert link.flooded
@@ -95,13 +95,13 @@ async def test_the_event_loop_responds_while_ten_links_are_flooded():
     seen = Received()
     with Sentinel() as sentinel:
         async with raw_bridge(flood(FLOODS["tiny texts"])) as url:
-            links = [await open_socket(url, seen.ears, Budget()) for _ in range(10)]
+            links = [await open_socket(url, seen.handlers, Budget()) for _ in range(10)]
             begun = time.monotonic()
             worst = await longest_wait(1.0)
             late = sentinel.worst(begun)
             for link in links:
                 link.abort("enough")
-    # The bridge floods within the same loop, which costs some time, too.
+    # The bridge runs in the same loop, which also takes some time.
     assert worst < 0.3 + late, (worst, late)
 
 
@@ -115,12 +115,12 @@ async def test_a_message_of_endless_frames_drops_the_link_with_a_reason(patient,
     async def talk(link):
         await link.accept(frame(TEXT, b"x", final=False))
         while True:
-            link.say(piece * 1000)
+            link.send(piece * 1000)
             await link.writer.drain()
             await asyncio.sleep(0)
 
     async with raw_bridge(talk) as url:
-        link = await open_socket(url, seen.ears, Budget())
+        link = await open_socket(url, seen.handlers, Budget())
         await until(lambda: seen.lost, "the drop")
     assert seen.lost == ["a message in more than 4096 frames"]
     assert (seen.texts, link.flooded) == ([], True)
@@ -130,7 +130,7 @@ async def test_a_message_of_endless_frames_drops_the_link_with_a_reason(patient,
 async def test_a_bridge_that_does_not_read_pongs_is_not_read_further(patient):
     seen = Received()
     async with raw_bridge(flood(FLOODS["pings"], reads=False)) as url:
-        link = await open_socket(url, seen.ears, Budget())
+        link = await open_socket(url, seen.handlers, Budget())
         sock = link._transport.get_extra_info("socket")
         sock.setsockopt(sockets.socket.SOL_SOCKET, sockets.socket.SO_SNDBUF, 4096)
         await until(lambda: link._choked, "a full buffer")
@@ -148,12 +148,12 @@ async def test_reading_resumes_when_writing_is_possible_again():
     async def talk(link):
         await link.accept()
         await go_on.wait()
-        link.say(frame(TEXT, b"meanwhile"))
+        link.send(frame(TEXT, b"meanwhile"))
         await link.reader.read()
 
     async with raw_bridge(talk) as url:
-        link = await open_socket(url, seen.ears, Budget())
-        link.pause_writing()  # as asyncio says that its buffer is full
+        link = await open_socket(url, seen.handlers, Budget())
+        link.pause_writing()  # as asyncio does when its buffer is full
         go_on.set()
         await until(lambda: link.is_behind, "a message")
         await asyncio.sleep(0.05)
@@ -170,13 +170,13 @@ async def test_a_message_that_arrives_byte_by_byte_is_received():
     async def talk(link):
         answer = await link.request()
         for byte in answer + frame(TEXT, b"slowly" * 20):
-            link.say(bytes([byte]))
+            link.send(bytes([byte]))
             await link.writer.drain()
             await asyncio.sleep(0)
         await link.reader.read()
 
     async with raw_bridge(talk) as url:
-        link = await open_socket(url, seen.ears, Budget())
+        link = await open_socket(url, seen.handlers, Budget())
         await until(lambda: seen.texts == [b"slowly" * 20], "the message")
         link.close()
 
@@ -186,15 +186,15 @@ async def test_a_message_that_arrives_byte_by_byte_is_received():
 async def test_endless_headers_are_refused(header):
     async def talk(link):
         await link.request()
-        link.say(b"HTTP/1.1 101 Switching Protocols\r\n")
+        link.send(b"HTTP/1.1 101 Switching Protocols\r\n")
         while True:
-            link.say(header * 10_000)
+            link.send(header * 10_000)
             await link.writer.drain()
             await asyncio.sleep(0)
 
     async with raw_bridge(talk) as url:
         with pytest.raises(BridgeClosed, match="no WebSocket at this address"):
-            await open_socket(url, Received().ears, Budget())
+            await open_socket(url, Received().handlers, Budget())
 
 
 @in_loop
@@ -206,7 +206,7 @@ async def test_messages_sent_before_the_end_of_the_link_are_received():
         link.writer.close()
 
     async with raw_bridge(talk) as url:
-        await open_socket(url, seen.ears, Budget())
+        await open_socket(url, seen.handlers, Budget())
         await until(lambda: seen.lost, "the end")
     assert len(seen.texts) == 2000
 
@@ -224,7 +224,7 @@ async def test_a_link_over_its_budget_is_read_later():
         await link.reader.read()
 
     async with raw_bridge(talk) as url:
-        await open_socket(url, seen.ears, Spent())
+        await open_socket(url, seen.handlers, Spent())
         await until(lambda: seen.texts, "the message")
     assert waits_left == []
 
@@ -236,15 +236,15 @@ async def test_an_exception_in_a_handler_drops_the_link_with_a_reason():
     def fail(data):
         raise RecursionError("maximum recursion depth exceeded")
 
-    ears = seen.ears
-    ears.text = fail
+    handlers = seen.handlers
+    handlers.text = fail
 
     async def talk(link):
         await link.accept(frame(TEXT, b"{}"))
         await link.reader.read()
 
     async with raw_bridge(talk) as url:
-        link = await open_socket(url, ears, Budget())
+        link = await open_socket(url, handlers, Budget())
         await until(lambda: seen.lost, "the drop")
     assert link.flooded
     assert seen.lost == [
@@ -268,8 +268,8 @@ async def test_a_flooded_lane_reconnects_after_growing_waits(monkeypatch, caplog
         with noting_lane(url, happened):
             await until(lambda: len(opened) == 6, "six attempts")
     waited = [b - a for a, b in itertools.pairwise(opened)]
-    # The first wait has 0.02 s at most, and the fifth 0.16 s at least. A busy machine
-    # may notice the opening before it late.
+    # The first wait is at most 0.02 s, and the fifth at least 0.16 s. A busy computer
+    # may notice the previous attempt late.
     assert waited[4] > 0.05
     assert caplog.text.count("a message in more than 4096 frames") >= 1
 
@@ -281,7 +281,7 @@ async def test_a_lane_that_is_cut_while_behind_counts_as_flooded(caplog):
         with noting_lane(url, happened) as lane:
             await until(lambda: happened[-1:] == [b"{}"], "the flood")
             link = await until(lambda: lane._socket, "the link")
-            await until(lambda: link.is_behind, "more than was dealt with")
+            await until(lambda: link.is_behind, "data that was not processed")
             lane.cut("no longer used")
             assert link.flooded
             await until(lambda: "more than WebMap can process" in caplog.text, "a line")
@@ -289,7 +289,7 @@ async def test_a_lane_that_is_cut_while_behind_counts_as_flooded(caplog):
 
 @in_loop
 async def test_zero_is_written_to_a_flooding_link_while_the_link_is_open():
-    """Reading from it ends; writing does not."""
+    """The gate stops reading from the link, but still writes to it."""
     seen, received = Received(), []
 
     async def talk(link):
@@ -302,15 +302,15 @@ async def test_zero_is_written_to_a_flooding_link_while_the_link_is_open():
         noting = asyncio.create_task(note())
         try:
             while True:
-                link.say(FLOODS["tiny texts"] * 10_000)
+                link.send(FLOODS["tiny texts"] * 10_000)
                 await link.writer.drain()
                 await asyncio.sleep(0)
         finally:
             noting.cancel()
 
     async with raw_bridge(talk) as url:
-        link = await open_socket(url, seen.ears, Budget())
-        await until(lambda: link.is_behind, "more than is taken")
+        link = await open_socket(url, seen.handlers, Budget())
+        await until(lambda: link.is_behind, "data that is not read")
         received.clear()
         assert link.send(b"zero")
         await until(lambda: received, "the zero")
@@ -321,8 +321,8 @@ async def test_zero_is_written_to_a_flooding_link_while_the_link_is_open():
 async def test_a_link_beside_a_flooding_link_is_served_at_once():
     flooded, seen = Received(), Received()
     async with raw_bridge(flood(FLOODS["tiny texts"])) as url, noting_bridge() as good:
-        bad = await open_socket(url, flooded.ears, Budget())
-        link = await open_socket(good.url, seen.ears, Budget())
+        bad = await open_socket(url, flooded.handlers, Budget())
+        link = await open_socket(good.url, seen.handlers, Budget())
         waited = []
         for number in range(20):
             begun = time.monotonic()

@@ -1,4 +1,4 @@
-"""What a page is told of the speeds of a robot that nobody has."""
+"""The speeds of a free robot that a page receives."""
 
 import json
 import math
@@ -19,7 +19,7 @@ LIMITS = st.sampled_from([0.0, 0.2, 0.3, 0.6, 1.0, INF])
 
 
 def free(**changes):
-    """The report of a robot that nobody has."""
+    """Return the report of a free robot."""
     return Bench().begin(spec(**changes)).report()
 
 
@@ -29,16 +29,16 @@ def pages():
 
 
 def join(pages, *speeds):
-    said = []
-    connection = pages.connect("Ann", "operator", said.append, print)
+    texts = []
+    connection = pages.connect("Ann", "operator", texts.append, print)
     if speeds:
         connection.set_speeds(*speeds)
     pages.on_hello(protocol.Hello(connection.id))
-    return connection, said
+    return connection, texts
 
 
-def cap_of(said):
-    text = json.loads(said[-1])
+def cap_of(texts):
+    text = json.loads(texts[-1])
     return text["v"], text["w"], text["why"]
 
 
@@ -71,42 +71,42 @@ def test_the_report_of_a_taken_robot_includes_the_speed_limit_of_the_page():
 
 
 def test_a_page_that_changes_its_speed_limit_receives_a_report_at_once(pages):
-    connection, said = join(pages)
+    connection, texts = join(pages)
     pages.on_report(free(v_max=None, w_max=None))
-    assert cap_of(said) == (0.3, 0.6, ["no limit stated"])
+    assert cap_of(texts) == (0.3, 0.6, ["no limit stated"])
     connection.set_speeds(0.8, 1.2)
-    assert cap_of(said) == (0.8, 1.2, ["limit of the page"])
+    assert cap_of(texts) == (0.8, 1.2, ["limit of the page"])
 
 
 def test_a_page_that_sets_the_same_speed_limit_again_receives_nothing(pages):
-    connection, said = join(pages, 0.8, 1.2)
+    connection, texts = join(pages, 0.8, 1.2)
     pages.on_report(free(v_max=None, w_max=None))
-    received = len(said)
+    received = len(texts)
     connection.set_speeds(0.8, 1.2)
-    assert len(said) == received
+    assert len(texts) == received
     connection.set_speeds(0.4, 1.2)
-    assert len(said) == received + 1
+    assert len(texts) == received + 1
 
 
 def test_a_page_receives_no_report_before_hello(pages):
     pages.on_report(free(v_max=None, w_max=None))
-    said = []
-    connection = pages.connect("Ann", "operator", said.append, print)
+    texts = []
+    connection = pages.connect("Ann", "operator", texts.append, print)
     connection.set_speeds(0.8, 1.2)
-    assert said == []
+    assert texts == []
     pages.on_hello(protocol.Hello(connection.id))
-    assert cap_of(said) == (0.8, 1.2, ["limit of the page"])
+    assert cap_of(texts) == (0.8, 1.2, ["limit of the page"])
 
 
 def test_a_page_without_control_does_not_change_the_reported_speed(pages):
     bench = Bench().begin()
     bench.take("b")
-    connection, said = join(pages, 0.2, 0.2)
+    connection, texts = join(pages, 0.2, 0.2)
     pages.on_report(bench.report())
-    assert cap_of(said) == (1.0, 1.5, ["limit of the robot"])
-    received = len(said)
+    assert cap_of(texts) == (1.0, 1.5, ["limit of the robot"])
+    received = len(texts)
     connection.set_speeds(0.1, 0.1)
-    assert len(said) == received
+    assert len(texts) == received
 
 
 def test_an_invalid_speed_limit_of_a_page_counts_as_zero():

@@ -15,8 +15,8 @@ from webmap.gate.specs import checked
 @pytest.fixture
 def bench():
     bench = Bench().begin()
-    # The first drive cancels what an earlier gate may have sent; not of interest here.
-    bench.say("a", op="cancel", robot="r1")
+    # The first drive cancels goals that an earlier gate may have sent; not tested here.
+    bench.send("a", op="cancel", robot="r1")
     bench.done.clear()
     return bench
 
@@ -99,11 +99,11 @@ def test_driving_cancels_goals_of_other_programs_but_not_on_every_input(bench):
     bench.handle(events.GoalEnded("r1", goal.id))
     bench.hold(0.3)
     bench.hold(0.1, x=1.0)
-    assert cancels(bench) == 1, "RViz may have sent another since then"
+    assert cancels(bench) == 1, "RViz may have sent another goal since then"
     for _ in range(3):
         bench.hold(0.3)
         bench.hold(0.1, x=1.0)
-    assert cancels(bench) == 1, "just now nobody has"
+    assert cancels(bench) == 1, "not again within a short time"
     bench.hold(2.0)
     bench.hold(0.1, x=1.0)
     assert cancels(bench) == 2
@@ -121,16 +121,16 @@ def test_the_end_of_an_old_goal_does_not_end_the_newer_goal(bench):
 
 def test_an_operator_cancels_a_goal_without_a_lease_but_a_viewer_cannot(bench):
     bench.join("v", "viewer")
-    bench.say("v", op="cancel", robot="r1")
+    bench.send("v", op="cancel", robot="r1")
     assert cancels(bench) == 0
-    bench.say("b", op="cancel", robot="r1")
+    bench.send("b", op="cancel", robot="r1")
     assert cancels(bench) == 1
 
 
 def test_stop_cancels_the_goal_and_sends_zero(bench):
     bench.take()
     bench.goal()
-    bench.say("b", op="stop", robot="r1")
+    bench.send("b", op="stop", robot="r1")
     assert cancels(bench) == 1
     assert bench.written[-1].twist == ZERO
 
@@ -141,7 +141,7 @@ def test_without_a_link_goals_are_refused_and_a_cancel_is_sent_later(bench):
     bench.goal()
     assert goals(bench) == []
     assert "no connection" in bench.refusals()[-1].why
-    bench.say("a", op="cancel", robot="r1")
+    bench.send("a", op="cancel", robot="r1")
     assert cancels(bench) == 0
     bench.handle(events.LinkUp(URL, "tasks"))
     bench.handle(events.LinkUp(URL, "tasks"))
@@ -149,11 +149,11 @@ def test_without_a_link_goals_are_refused_and_a_cancel_is_sent_later(bench):
 
 
 def test_an_action_is_cancelled_without_a_link_and_again_on_the_next_link():
-    """Its service is called on a socket of its own, which may well get through."""
+    """The cancel service is called on a socket of its own, which may still connect."""
     bench = Bench().begin(spec(action="/go", cancel_topic=None))
     bench.take()
     bench.handle(events.LinkDown(URL, "tasks"))
-    bench.say("a", op="cancel", robot="r1")
+    bench.send("a", op="cancel", robot="r1")
     assert cancels(bench) == 1
     bench.handle(events.LinkUp(URL, "tasks"))
     assert cancels(bench) == 2
@@ -182,10 +182,10 @@ def test_a_robot_without_a_goal_topic_or_action_refuses_goals():
     bench.take()
     bench.goal()
     assert bench.refusals()[-1].why == "no goal topic and no action is set"
-    bench.say("a", op="cancel", robot="r1")
+    bench.send("a", op="cancel", robot="r1")
     assert "no cancel topic" in bench.refusals()[-1].why
-    bench.say("a", op="stop", robot="r1")
-    bench.say("a", op="reset", robot="r1")
+    bench.send("a", op="stop", robot="r1")
+    bench.send("a", op="reset", robot="r1")
     bench.drive_off()
     assert bench.written[-1].twist == Twist(1.0)
 
@@ -204,7 +204,7 @@ def test_the_loss_of_the_sender_cancels_a_goal_only_if_configured(loss, policy):
     bench = Bench().begin(spec(on_operator_loss=policy))
     bench.take()
     bench.goal()
-    bench.handle(protocol.Disconnect("b"))  # somebody else
+    bench.handle(protocol.Disconnect("b"))  # not the sender
     assert cancels(bench) == 0
     if loss == "connection":
         bench.handle(protocol.Disconnect("a"))
@@ -234,15 +234,15 @@ def test_removing_the_robot_cancels_a_goal_only_if_configured(policy):
     kept = (actions.CancelGoals, actions.Detach)
     order = [type(a) for a in bench.done if isinstance(a, kept)]
     called_off = [actions.CancelGoals] if policy == "cancel" else []
-    assert order == [*called_off, actions.Detach], "before nothing reaches it any more"
+    assert order == [*called_off, actions.Detach], "before the detach"
 
 
 class TestNewSettings:
-    """What becomes of a goal when the robot is declared with other places for goals."""
+    """A goal whose robot is declared again with other topics or actions for goals."""
 
     def declare(self, before, after, **goal):
         bench = Bench().begin(spec(**before))
-        bench.say("a", op="cancel", robot="r1")
+        bench.send("a", op="cancel", robot="r1")
         bench.take()
         bench.goal(**goal)
         bench.done.clear()
@@ -287,7 +287,7 @@ class TestNewSettings:
         bench = self.declare({}, after)
         assert cancels(bench) == 0
         assert bench.report().goal.state == "sent"
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         assert cancels(bench) == 1
 
     def test_a_goal_is_also_cancelled_if_the_robot_becomes_another_machine(self):
@@ -311,7 +311,7 @@ class TestNewSettings:
     def test_a_pending_cancel_is_not_sent_to_a_new_cancel_topic(self):
         bench = Bench().begin()
         bench.handle(events.LinkDown(URL, "tasks"))
-        bench.say("a", op="cancel", robot="r1")
+        bench.send("a", op="cancel", robot="r1")
         bench.handle(spec(cancel_topic="/other"))
         bench.handle(events.LinkUp(URL, "tasks"))
         assert cancels(bench) == 0
@@ -350,7 +350,7 @@ class TestMethod:
         assert report.goal.state == "failed"
         assert report.goal.why == "too old; the next goal goes to /goal"
         assert report.method == "topic"
-        assert len(goals(bench)) == 1, "nothing is sent by itself"
+        assert len(goals(bench)) == 1, "no goal is sent automatically"
         bench.goal()
         assert goals(bench)[-1].method == "topic"
 
@@ -370,7 +370,7 @@ class TestProgress:
     @pytest.fixture
     def bench(self):
         bench = Bench().begin(spec(action="/go"))
-        bench.say("a", op="cancel", robot="r1")
+        bench.send("a", op="cancel", robot="r1")
         bench.done.clear()
         bench.take()
         bench.goal()
@@ -396,7 +396,7 @@ class TestProgress:
         assert goal.state == "under way"
         assert (goal.left, goal.time, goal.eta, goal.recoveries) == (2.5, 1.0, 4.0, 1)
         goal = self.progress(bench, active=True)
-        assert goal.left == 2.5, "a report without a value changes none"
+        assert goal.left == 2.5, "a report without a value changes no value"
         goal = self.end(bench, "reached", "")
         assert (goal.state, goal.why) == ("reached", "")
 
@@ -405,33 +405,33 @@ class TestProgress:
         before = len(bench.of(protocol.RobotReport))
         id = goals(bench)[-1].id
 
-        def say():
+        def report_progress():
             bench.handle(events.GoalProgress("r1", id, active=True, left=bench.now))
 
-        bench.run(1.0, say)
+        bench.run(1.0, report_progress)
         assert len(bench.of(protocol.RobotReport)) - before <= 11
 
     def test_a_failed_goal_reports_the_reason_and_stays_failed(self, bench):
         goal = self.end(bench, "failed", "no path to the goal")
         assert (goal.state, goal.why) == ("failed", "no path to the goal")
-        assert self.end(bench, "reached", "").state == "failed", "it ends once"
+        assert self.end(bench, "reached", "").state == "failed", "a goal ends only once"
         assert self.progress(bench, active=True).state == "failed"
 
     def test_a_failed_goal_without_a_reason_reports_the_missing_reason(self, bench):
         assert self.end(bench, "failed", "").why == "the robot gave no reason"
 
     def test_a_goal_is_cancelling_until_the_robot_confirms_the_cancel(self, bench):
-        bench.say("b", op="cancel", robot="r1")
+        bench.send("b", op="cancel", robot="r1")
         assert bench.report().goal.state == "cancelling"
         goal = self.progress(bench, active=True, left=1.0)
         assert (goal.state, goal.left) == ("cancelling", 1.0)
         assert self.end(bench, "cancelled", "canceled").state == "cancelled"
 
     def test_a_goal_still_active_after_its_cancel_is_cancelled_again(self, bench):
-        """They go by different sockets, and what is not there yet is not cancelled."""
+        """They use different sockets: a cancel may arrive before its goal."""
         self.progress(bench, active=False)
         assert cancels(bench) == 0
-        bench.say("b", op="cancel", robot="r1")
+        bench.send("b", op="cancel", robot="r1")
         assert cancels(bench) == 1
         for _ in range(8):
             self.progress(bench, active=True)
@@ -441,25 +441,25 @@ class TestProgress:
         assert cancels(bench) == 3
 
     def test_any_goal_that_is_active_during_a_stop_is_cancelled(self, bench):
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         before = cancels(bench)
         bench.handle(events.GoalProgress("r1", "an earlier one", active=True))
         assert cancels(bench) == before + 1
 
     def test_an_active_goal_without_a_cancel_topic_is_not_cancelled_during_a_stop(self):
         bench = Bench().begin(spec(cancel_topic=None))
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         bench.handle(events.GoalProgress("r1", "g", active=True))
         assert cancels(bench) == 0
 
     def test_a_goal_reached_before_the_cancel_is_reported_as_reached(self, bench):
-        bench.say("b", op="cancel", robot="r1")
+        bench.send("b", op="cancel", robot="r1")
         assert self.end(bench, "reached").state == "reached"
 
     def test_a_goal_that_fails_because_of_its_cancel_is_reported_as_cancelled(
         self, bench
     ):
-        bench.say("b", op="cancel", robot="r1")
+        bench.send("b", op="cancel", robot="r1")
         goal = self.end(bench, "failed", "superseded")
         assert (goal.state, goal.why) == ("cancelled", "by B")
 
@@ -468,14 +468,14 @@ class TestProgress:
         assert goal.why == "by the robot, or by another program"
 
     def test_a_goal_cancelled_by_an_operator_names_the_operator(self, bench):
-        bench.say("b", op="cancel", robot="r1")
+        bench.send("b", op="cancel", robot="r1")
         goal = self.end(bench, "cancelled", "canceled")
         assert (goal.state, goal.why) == ("cancelled", "by B")
 
     @pytest.mark.parametrize(
         ("act", "why"),
         [
-            (lambda bench: bench.say("b", op="stop", robot="r1"), "STOP"),
+            (lambda bench: bench.send("b", op="stop", robot="r1"), "STOP"),
             (
                 lambda bench: (bench.hold(0.3), bench.hold(0.1, x=1.0)),
                 "the robot is being driven",
@@ -500,10 +500,10 @@ class TestProgress:
         assert bench.report().goal.state == "reached"
 
     def test_a_cancel_sent_to_a_dead_link_is_sent_again_on_the_next_link(self, bench):
-        """The link looked open for some seconds, and so the cancel looked written."""
+        """The link seemed open for some seconds, so the cancel seemed to be written."""
         id = goals(bench)[-1].id
         bench.handle(protocol.Disconnect("a"))
-        bench.say("b", op="cancel", robot="r1")
+        bench.send("b", op="cancel", robot="r1")
         bench.run(4.0)
         assert cancels(bench) == 1
         bench.break_links()
@@ -516,11 +516,11 @@ class TestProgress:
         bench.connect_links()
         assert cancels(bench) == 1
         bench.handle(events.GoalProgress("r1", id, active=True))
-        assert cancels(bench) == 2, "it goes on, and so it is told again"
+        assert cancels(bench) == 2, "an active goal is cancelled again"
 
     def test_a_lost_goal_that_is_being_cancelled_is_cancelled_again(self, bench):
-        """Its socket is lost, and that of the next goals and cancels is not."""
-        bench.say("b", op="cancel", robot="r1")
+        """The socket of the goal is lost, the socket of cancels is not."""
+        bench.send("b", op="cancel", robot="r1")
         bench.handle(events.GoalLost("r1", goals(bench)[-1].id, "given up"))
         assert cancels(bench) == 2
         assert bench.report().goal.state == "cancelling"
@@ -531,7 +531,7 @@ class TestProgress:
     def test_a_cancel_is_sent_again_on_a_new_link_only_without_an_answer(
         self, bench, answer
     ):
-        bench.say("b", op="cancel", robot="r1")
+        bench.send("b", op="cancel", robot="r1")
         if answer:
             self.end(bench, "cancelled")
         bench.break_links()
@@ -551,7 +551,7 @@ class TestProgress:
         bench.goal()
         assert bench.report().goal.why == "this robot reports no progress"
         bench.handle(events.LinkDown(URL, "tasks"))
-        bench.say("a", op="cancel", robot="r1")
+        bench.send("a", op="cancel", robot="r1")
         assert bench.report().goal.state == "cancelling"
         bench.handle(events.LinkUp(URL, "tasks"))
         assert bench.report().goal.state == "cancelled"
@@ -563,7 +563,7 @@ class TestProgress:
         bench = Bench().begin()
         bench.take()
         bench.goal()
-        bench.say("b", op="cancel", robot="r1")
+        bench.send("b", op="cancel", robot="r1")
         bench.run((1.1 if late else 0.9) * IN_VAIN)
         bench.break_links()
         assert bench.report().goal.state == ("cancelled" if late else "cancelling")
@@ -573,7 +573,7 @@ class TestProgress:
 
     def test_a_lost_link_does_not_repeat_a_cancel_older_than_the_goal(self):
         bench = Bench().begin()
-        bench.say("a", op="cancel", robot="r1")
+        bench.send("a", op="cancel", robot="r1")
         bench.take()
         bench.goal()
         bench.break_links()
@@ -582,14 +582,14 @@ class TestProgress:
 
     def test_a_link_handed_over_to_a_goal_does_not_repeat_a_cancel(self):
         bench = Bench().begin()
-        bench.say("a", op="cancel", robot="r1")
+        bench.send("a", op="cancel", robot="r1")
         bench.handle(events.LinkDown(URL, "tasks", spent=True))
         bench.handle(events.LinkUp(URL, "tasks"))
         assert cancels(bench) == 1
 
     def test_events_of_other_goals_and_other_robots_change_nothing(self, bench):
         before = bench.report()
-        for word in (
+        for event in (
             events.GoalProgress("r1", "x", active=True),
             events.GoalEnded("r1", "x", "failed", "no"),
             events.GoalLost("r1", "x", "no"),
@@ -597,7 +597,7 @@ class TestProgress:
             events.GoalEnded("r9", "x"),
             events.GoalLost("r9", "x", "no"),
         ):
-            bench.handle(word)
+            bench.handle(event)
         assert bench.report() == before
 
 
@@ -651,7 +651,7 @@ class TestInitialPose:
         bench.goal()
         assert self.locate(bench) == []
         assert "is navigating" in self.why(bench)
-        bench.say("a", op="cancel", robot="r1")
+        bench.send("a", op="cancel", robot="r1")
         assert len(self.locate(bench)) == 1
 
     def test_setting_the_pose_is_refused_while_the_robot_is_driven_or_stopping(
@@ -671,7 +671,7 @@ class TestInitialPose:
         assert self.locate(bench) == []
         assert "no connection" in self.why(bench)
         bench.handle(events.LinkUp(URL, "tasks"))
-        bench.say("a", op="stop", robot="r1")
+        bench.send("a", op="stop", robot="r1")
         assert self.locate(bench) == []
 
     def test_setting_the_pose_is_refused_while_the_display_is_silent(self, bench):
@@ -744,7 +744,7 @@ class TestGoalsOnly:
     def test_stop_of_a_goals_only_robot_cancels_goals_and_sends_no_velocity(
         self, bench
     ):
-        bench.say("b", op="stop", robot="*")
+        bench.send("b", op="stop", robot="*")
         bench.run(0.5)
         assert cancels(bench) == 1
         assert bench.written == bench.dropped == []

@@ -1,4 +1,4 @@
-"""From one pair of hands to another: asked, granted, and only at standstill."""
+"""Control changes to another operator: on request, and only at standstill."""
 
 import pytest
 from gate_harness import KEY, ZERO, Bench, spec
@@ -9,7 +9,7 @@ from webmap.gate import actions, commands, events, protocol
 
 @pytest.fixture
 def bench():
-    """A drives, and there is no odometry."""
+    """A bench where A drives a robot without odometry."""
     bench = Bench().begin()
     bench.drive_off("a")
     return bench
@@ -17,18 +17,18 @@ def bench():
 
 @pytest.fixture
 def seen():
-    """A has a robot whose odometry is listened to."""
+    """A bench where A has control of a robot with odometry."""
     bench = Bench().begin(spec(odometry_topic="/odom"))
     bench.take("a")
     return bench
 
 
 def ask(bench, who="b"):
-    bench.say(who, op="ask", robot="r1")
+    bench.send(who, op="ask", robot="r1")
 
 
 def grant(bench, who="a"):
-    bench.say(who, op="grant", robot="r1")
+    bench.send(who, op="grant", robot="r1")
 
 
 def holder(bench):
@@ -71,7 +71,7 @@ class TestRequest:
 
     def test_a_denied_request_leaves_control_with_the_operator(self, bench):
         ask(bench)
-        bench.say("a", op="deny", robot="r1")
+        bench.send("a", op="deny", robot="r1")
         assert bench.report().asker is None
         refused = bench.refusals("b")[-1]
         assert (refused.what, refused.why) == ("ask", "A keeps control")
@@ -92,7 +92,7 @@ class TestRequest:
 
     def test_a_request_for_control_can_be_withdrawn(self, bench):
         ask(bench)
-        bench.say("b", op="release", robot="r1")
+        bench.send("b", op="release", robot="r1")
         assert bench.report().asker is None
         bench.hold(12.0)
         assert holder(bench) == "a"
@@ -104,7 +104,7 @@ class TestRequest:
             case "page":
                 bench.handle(protocol.Disconnect("b"))
             case "stop":
-                bench.say("a", op="stop", robot="r1")
+                bench.send("a", op="stop", robot="r1")
                 assert bench.refusals("b")[-1].why == "STOP by A"
             case "declared":
                 bench.handle(spec(v_max=0.5))
@@ -116,7 +116,7 @@ class TestRequest:
     def test_control_goes_to_the_requester_when_the_operator_leaves(self, bench, going):
         ask(bench)
         if going == "release":
-            bench.say("a", op="release", robot="r1")
+            bench.send("a", op="release", robot="r1")
         else:
             bench.handle(protocol.Disconnect("a"))
         assert bench.report().changing
@@ -136,10 +136,10 @@ class TestRequest:
             bench.refusals("b")[-1].why
             == "only the operator who has control can answer"
         )
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
         ask(bench)
         assert bench.refusals("b")[-1].why == "no operator has control: take control"
-        bench.say("a", op="stop", robot="r1")
+        bench.send("a", op="stop", robot="r1")
         ask(bench)
         assert "STOP by A is active" in bench.refusals("b")[-1].why
 
@@ -182,7 +182,7 @@ class TestTransfer:
         grant(bench)
         bench.run(0.95)
         assert holder(bench) is None
-        assert bench.written[-1].at > bench.now - 0.06, "zero all the while"
+        assert bench.written[-1].at > bench.now - 0.06, "zeros until the end"
         bench.run(0.1)
         assert holder(bench) == "b"
 
@@ -191,7 +191,7 @@ class TestTransfer:
         grant(seen)
         moving(seen, 5.0, 0.3)
         assert holder(seen) is None
-        assert seen.written[-1].at > seen.now - 0.06, "zero all the while"
+        assert seen.written[-1].at > seen.now - 0.06, "zeros until the end"
         moving(seen, 1.0, 0.0, turn=0.1)
         assert holder(seen) is None
         moving(seen, 0.4, 0.01)
@@ -234,7 +234,7 @@ class TestTransfer:
         ask(bench)
         grant(bench)
         if going == "release":
-            bench.say("b", op="release", robot="r1")
+            bench.send("b", op="release", robot="r1")
         else:
             bench.handle(protocol.Disconnect("b"))
         bench.run(2.0)
@@ -244,7 +244,7 @@ class TestTransfer:
     def test_stop_ends_a_hand_over(self, bench):
         ask(bench)
         grant(bench)
-        bench.say("a", op="stop", robot="r1")
+        bench.send("a", op="stop", robot="r1")
         bench.run(2.0)
         assert holder(bench) is None
         assert bench.refusals("b")[-1].why == "STOP by A"

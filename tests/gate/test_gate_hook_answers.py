@@ -1,4 +1,4 @@
-"""Stop hooks that fail: what a bridge answers, and what the gate says of it."""
+"""Stop hooks that fail: the answers of a bridge, and the reports of the gate."""
 
 import json
 
@@ -66,8 +66,8 @@ class TestAnswer:
         assert answer_to(data, "a") is None
 
     def test_a_long_answer_is_reduced_to_a_short_printable_line(self):
-        said = "no\n\x1b[31m\ud800 way " + "x" * 10**6
-        (why,) = answer_to(response(result=False, values=said), "a")
+        text = "no\n\x1b[31m\ud800 way " + "x" * 10**6
+        (why,) = answer_to(response(result=False, values=text), "a")
         assert why.isprintable()
         assert why.startswith("refused (no [31m way xxx")
         assert len(why) == len("refused ()") + navigation.MOST_WORDS
@@ -105,7 +105,7 @@ class TestCall:
 
 
 class Activity:
-    """The links of one robot with both kinds of hooks, and what they tell."""
+    """The links of one robot with both kinds of hooks, and their events."""
 
     def __init__(self, url):
         self.events = []
@@ -164,19 +164,19 @@ def bench():
 
 
 def stop(bench):
-    bench.say("a", op="stop", robot="r1")
+    bench.send("a", op="stop", robot="r1")
     bench.run(0.05)
 
 
 def reset(bench):
-    bench.say("a", op="reset", robot="r1")
+    bench.send("a", op="reset", robot="r1")
     bench.run(0.05)
 
 
 def end(bench, hook, why=None, robot="r1", since=-1):
-    """Have the newest saying of a hook end, or an earlier one."""
-    said = [run for run in bench.did(actions.RunHook) if run.hook == hook]
-    bench.handle(events.HookEnded(robot, hook, said[since].number, why))
+    """End the newest run of a hook, or an earlier run."""
+    runs = [run for run in bench.did(actions.RunHook) if run.hook == hook]
+    bench.handle(events.HookEnded(robot, hook, runs[since].number, why))
 
 
 class TestReport:
@@ -239,8 +239,8 @@ class TestReport:
         assert bench.report().hooks == (f"reset of stop hook /lock: {why}",)
         bench.handle(events.LinkUp(URL, "tasks"))
         end(bench, LOCK, "not sent: no connection")
-        words = "reset of stop hook /lock: not sent: no connection"
-        assert bench.report().hooks == (words,)
+        failed = "reset of stop hook /lock: not sent: no connection"
+        assert bench.report().hooks == (failed,)
         bench.handle(events.LinkUp(URL, "tasks"))
         end(bench, LOCK)
         assert bench.report().hooks == ()
@@ -308,6 +308,6 @@ class TestNewDeclaration:
 def test_a_hook_answer_for_a_removed_robot_sends_no_report(bench):
     stop(bench)
     bench.handle(protocol.Forget("r1"))
-    said = len(bench.of(protocol.RobotReport))
+    before = len(bench.of(protocol.RobotReport))
     end(bench, E_STOP, REFUSED)
-    assert len(bench.of(protocol.RobotReport)) == said
+    assert len(bench.of(protocol.RobotReport)) == before

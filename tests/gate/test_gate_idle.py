@@ -1,4 +1,4 @@
-"""Robots that nobody drives cost the gate next to nothing: its work is counted."""
+"""Robots that are not driven cause almost no work in the gate: the work is counted."""
 
 import asyncio
 
@@ -36,7 +36,7 @@ def fleet():
 
 @pytest.fixture
 def work(awake, monkeypatch):
-    """Count what is asked of machines and links, and the reports that are made."""
+    """Count the checks of machines and links, and the reports."""
     counts = {"asked": 0, "links": 0, "reports": 0}
 
     def counting(name, do):
@@ -46,7 +46,7 @@ def work(awake, monkeypatch):
 
         return counted
 
-    # Without the check of ``conftest``, which asks each machine too.
+    # Without the fixture of ``conftest``, which also checks each machine.
     monkeypatch.setattr(Machines, "report", awake)
     active = counting("asked", Machine.active.fget)
     monkeypatch.setattr(Machine, "active", property(active))
@@ -119,7 +119,7 @@ def test_odometry_of_a_stopped_robot_makes_no_report_of_other_stopped_robots(wor
         )
     )
     keys = [Key(URL, f"/{name}/cmd_vel") for name in names]
-    bench.say("a", op="stop", robot="*")
+    bench.send("a", op="stop", robot="*")
 
     def measure(speed):
         for key in keys:
@@ -134,7 +134,7 @@ def test_odometry_of_a_stopped_robot_makes_no_report_of_other_stopped_robots(wor
 
 def test_a_stopped_robot_is_reported_at_the_rate_of_its_numbers(work):
     bench = Bench().begin()
-    bench.say("a", op="stop", robot="r1")
+    bench.send("a", op="stop", robot="r1")
     bench.run(3.0)
     done = work_of(work, lambda: bench.run(1.0))
     assert done["asked"] > 100
@@ -144,13 +144,13 @@ def test_a_stopped_robot_is_reported_at_the_rate_of_its_numbers(work):
 def test_a_verdict_on_a_stop_is_reported_in_the_step_that_finds_it():
     bench = Bench().begin(spec(odometry_topic="/odom"))
     confirmation = bench.gate._machines.find("r1").active_stop.confirmation
-    bench.say("a", op="stop", robot="r1")
+    bench.send("a", op="stop", robot="r1")
     verdicts = set()
     for _ in range(300):
         bench.run(0.01)
         assert bench.report().stop.confirmed == confirmation.confirmed
         verdicts.add(confirmation.confirmed)
-    assert verdicts == {None, False}, "no odometry came"
+    assert verdicts == {None, False}, "no odometry was received"
 
 
 def test_a_stalled_link_among_many_is_closed_after_a_second():
@@ -182,7 +182,7 @@ def test_a_link_that_opens_later_is_closed_a_second_after_that():
 
 def test_the_bridge_of_its_goals_concerns_a_machine_until_it_is_dropped():
     bench = Bench().begin(spec(goal_url=url(1)))
-    bench.say("a", op="stop", robot="r1")
+    bench.send("a", op="stop", robot="r1")
     assert bench.did(actions.CancelGoals) == []
     bench.handle(events.LinkUp(url(1), "tasks"))
     assert bench.did(actions.CancelGoals) != []
@@ -196,7 +196,7 @@ def test_the_bridge_of_its_goals_concerns_a_machine_until_it_is_dropped():
 
 @pytest.fixture
 def looked(monkeypatch):
-    """Note the machines whose STOP file is looked at itself."""
+    """Record the machines whose STOP file is checked."""
     keys, stamp_of = [], Records.stamp_of
 
     def noted(records, key):
@@ -209,7 +209,7 @@ def looked(monkeypatch):
 
 @pytest.fixture
 def disk(tmp_path, looked):
-    """Return the disk of a gate with many machines, none of which has a STOP."""
+    """Return the disk of a gate with many machines and no STOP."""
     disk = Disk(Records(tmp_path))
     for key in KEYS:
         disk.recall(LockState(key, held=True))

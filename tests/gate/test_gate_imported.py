@@ -1,4 +1,4 @@
-"""The gate's process imports little from other folders; every branch of that runs."""
+"""The code of other folders that the gate imports: the tests run every branch."""
 
 import asyncio
 import logging

@@ -1,4 +1,4 @@
-"""What a link has kept back counts for as old as it may be (S16)."""
+"""Data that a link has delayed counts as old as it can be (S16)."""
 
 import json
 import time
@@ -14,7 +14,7 @@ from webmap.gate.events import LinkUp, OdometryReceived, ScanReceived
 from webmap.gate.lanes.odometry import OdometryLane
 from webmap.testing import FaultProxy, Shape
 
-STANDING, CREEPING = Twist(), Twist(0.1)
+NOT_MOVING, CREEPING = Twist(), Twist(0.1)
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def bench():
 
 
 def lagging(bench, seconds, lag, twist=CREEPING, x=None):
-    """Have odometry come at 20 Hz that was said ``lag`` seconds before, or later."""
+    """Let odometry arrive at 20 Hz that was sent at most ``lag`` seconds before."""
 
     def each():
         bench.handle(OdometryReceived(KEY, twist, bench.now - lag))
@@ -71,29 +71,33 @@ class TestDriving:
 
 class TestStandstill:
     def test_odometry_sent_before_a_stop_does_not_confirm_the_stop(self, bench):
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         at = bench.now
-        bench.run(1.0, lambda: bench.handle(OdometryReceived(KEY, STANDING, at - 0.01)))
+        bench.run(
+            1.0, lambda: bench.handle(OdometryReceived(KEY, NOT_MOVING, at - 0.01))
+        )
         assert bench.report().stop.confirmed is None
-        lagging(bench, 0.5, 0.1, STANDING)
+        lagging(bench, 0.5, 0.1, NOT_MOVING)
         assert bench.report().stop.confirmed is True
 
     def test_motion_in_late_odometry_revokes_the_confirmation_of_a_stop(self, bench):
-        bench.say("b", op="stop", robot="r1")
-        lagging(bench, 0.6, 0.1, STANDING)
+        bench.send("b", op="stop", robot="r1")
+        lagging(bench, 0.6, 0.1, NOT_MOVING)
         assert bench.report().stop.confirmed is True
         lagging(bench, 0.2, 5.0, CREEPING)
         assert bench.report().stop.confirmed is not True
 
     def test_odometry_sent_before_the_zero_does_not_complete_a_hand_over(self, bench):
         bench.take("a")
-        lagging(bench, 0.3, 0.0, STANDING)
-        bench.say("b", op="ask", robot="r1")
-        bench.say("a", op="grant", robot="r1")
+        lagging(bench, 0.3, 0.0, NOT_MOVING)
+        bench.send("b", op="ask", robot="r1")
+        bench.send("a", op="grant", robot="r1")
         at = bench.now
-        bench.run(0.6, lambda: bench.handle(OdometryReceived(KEY, STANDING, at - 0.01)))
+        bench.run(
+            0.6, lambda: bench.handle(OdometryReceived(KEY, NOT_MOVING, at - 0.01))
+        )
         assert bench.report().holder is None
-        lagging(bench, 0.4, 0.0, STANDING)
+        lagging(bench, 0.4, 0.0, NOT_MOVING)
         assert bench.report().holder.connection == "b"
 
 
@@ -126,7 +130,7 @@ async def test_a_slow_link_does_not_make_odometry_and_scans_look_newer():
             try:
                 witness.watch("/odom", None, KEY)
                 witness.watch_scan("/scan", KEY)
-                await until(lambda: bridge.of("subscribe", "/scan"), "that it listens")
+                await until(lambda: bridge.of("subscribe", "/scan"), "the subscription")
                 assert of(LinkUp)
                 watched = now()
                 await until(lambda: witness._sent_after > watched, "an answer")
@@ -140,10 +144,12 @@ async def test_a_slow_link_does_not_make_odometry_and_scans_look_newer():
                 for _ in range(60):
                     await bridge.send(link, ODOMETRY)
                 await bridge.send(link, cbor2.dumps(frame))
-                said, at = now(), time.monotonic()
-                await until(lambda: of(ScanReceived), "a scan behind sixty of odometry")
-                assert time.monotonic() - at > 1.0, "the link was narrow"
-                assert all(one.sent_after <= said for one in of(OdometryReceived))
-                assert of(ScanReceived)[0].sweep.arrived <= said + 0.05
+                sent_at, at = now(), time.monotonic()
+                await until(
+                    lambda: of(ScanReceived), "a scan after sixty odometry messages"
+                )
+                assert time.monotonic() - at > 1.0, "the link was slow"
+                assert all(one.sent_after <= sent_at for one in of(OdometryReceived))
+                assert of(ScanReceived)[0].sweep.arrived <= sent_at + 0.05
             finally:
                 witness.lane.close()

@@ -1,4 +1,4 @@
-"""A lane to a bridge: kept open, proved alive, cut, handed over, and tried again."""
+"""A lane to a bridge: its link is opened, checked, cut, handed over and reopened."""
 
 import asyncio
 
@@ -42,10 +42,10 @@ async def test_held_topics_are_advertised_on_every_link_and_unadvertised_once():
             lane.hold("silent")
             await until(lambda: happened == ["up"], "the link")
             lane.hold("b", advertise("/b"))
-            await until(lambda: len(bridge.received) == 2, "both hellos")
+            await until(lambda: len(bridge.received) == 2, "both topics")
             bridge.transport_of(1).abort()
             await until(lambda: happened == ["up", "down", "up"], "another link")
-            await until(lambda: len(bridge.received) == 4, "both hellos again")
+            await until(lambda: len(bridge.received) == 4, "both topics again")
             assert [t.topic for t in bridge.received] == ["/a", "/b", "/a", "/b"]
             lane.release_hold("a")
             lane.release_hold("b")
@@ -53,7 +53,9 @@ async def test_held_topics_are_advertised_on_every_link_and_unadvertised_once():
             assert lane.wanted, "it was held twice"
             lane.release_hold("a")
             assert not lane.wanted
-            await until(lambda: bridge.of("unadvertise", "/a"), "the goodbye")
+            await until(
+                lambda: bridge.of("unadvertise", "/a"), "the unadvertise message"
+            )
             assert len(bridge.received) == 5
 
 
@@ -101,10 +103,10 @@ async def test_only_the_answer_to_an_own_ping_proves_that_the_link_is_alive():
         await link.accept()
         await until(lambda: pings, "a ping")
         for data in unasked:
-            link.say(frame(PONG, data))
-        link.say(frame(TEXT, b"said"))
+            link.send(frame(PONG, data))
+        link.send(frame(TEXT, b"said"))
         await go_on.wait()
-        link.say(frame(PONG, (1).to_bytes(8, "big")) * 2)
+        link.send(frame(PONG, (1).to_bytes(8, "big")) * 2)
         await forever(link)
 
     happened = []
@@ -112,11 +114,11 @@ async def test_only_the_answer_to_an_own_ping_proves_that_the_link_is_alive():
         notes = {"pinged": pings.append, "pong": pongs.append}
         with noting_lane(url, happened, **notes) as lane:
             lane.ping_every(60.0)
-            await until(lambda: happened == ["up", b"said"], "all that nobody asked")
+            await until(lambda: happened == ["up", b"said"], "all unrequested messages")
             assert (pings, pongs) == ([1], [])
             go_on.set()
             await until(lambda: pongs, "the answer")
-            assert pongs == [1], "the second says nothing new"
+            assert pongs == [1], "the second answer does not count"
 
 
 @in_loop
@@ -127,10 +129,10 @@ async def test_a_shorter_ping_period_sends_a_ping_at_once():
             lane.ping_every(60.0)
             await until(lambda: pings == [1], "the first ping")
             lane.ping_every(0.01)
-            await until(lambda: len(pings) >= 5, "more of them")
+            await until(lambda: len(pings) >= 5, "more pings")
             await until(lambda: not lane._changed.is_set(), "a ping under way")
             lane.ping_every(30.0)
-            assert not lane._changed.is_set(), "slower: no reason to ping now"
+            assert not lane._changed.is_set(), "a longer period sends no ping now"
 
 
 @in_loop
@@ -162,7 +164,7 @@ async def test_each_reason_for_a_failed_connection_is_logged_once(monkeypatch, c
         attempts.append(link)
         await link.request()
         status = b"403 Forbidden" if len(attempts) < 4 else b"404 Not Found"
-        link.say(b"HTTP/1.1 " + status + b"\r\nContent-Length: 0\r\n\r\n")
+        link.send(b"HTTP/1.1 " + status + b"\r\nContent-Length: 0\r\n\r\n")
 
     async with raw_bridge(talk) as url:
         with noting_lane(url, []):
@@ -191,7 +193,7 @@ async def test_a_lane_waits_before_reconnecting_to_a_bridge_that_closes_at_once(
 
 @in_loop
 async def test_a_stalled_socket_is_cut_before_the_lane_opens_a_new_socket():
-    """What waits in it would arrive beside what is said on the next."""
+    """Data that waits in the old socket would arrive beside data of the new socket."""
     links, happened = [], []
 
     async def talk(link):
@@ -201,7 +203,7 @@ async def test_a_stalled_socket_is_cut_before_the_lane_opens_a_new_socket():
             await forever(link)
         link.writer.transport.pause_reading()
         await until(lambda: b"full" in happened, "a full link")
-        link.say(frame(CLOSE, b"\x03\xe9"))
+        link.send(frame(CLOSE, b"\x03\xe9"))
 
     async with raw_bridge(talk) as url:
         with noting_lane(url, happened) as lane:
@@ -212,8 +214,8 @@ async def test_a_stalled_socket_is_cut_before_the_lane_opens_a_new_socket():
             happened.append(b"full")
             lane.ping_every(0.01)
             await until(lambda: len(links) == 2, "another link")
-            assert first.unsent == 0, "it was thrown away"
-            await until(lambda: happened[-1] == "up", "the word of it")
+            assert first.unsent == 0, "the waiting data was dropped"
+            await until(lambda: happened[-1] == "up", "the report of the link")
             assert happened == ["up", b"full", "down", "up"]
 
 
@@ -231,7 +233,7 @@ async def test_a_socket_that_is_handed_over_stays_open_and_the_lane_reconnects()
             await until(lambda: happened == ["up", "down", "up"], "another")
             await until(lambda: bridge.received, "the subscription")
             await bridge.publish("/t", {"data": 1})
-            await until(lambda: texts, "what the first one is told")
+            await until(lambda: texts, "the message on the first socket")
             assert link.is_open
             assert len(bridge.links) == 2
             link.close()
@@ -243,7 +245,7 @@ async def test_a_closed_lane_stays_closed_with_or_without_a_link():
     happened = []
     async with noting_bridge() as bridge:
         with noting_lane(bridge.url, happened) as lane:
-            lane.close()  # before it was ever open
+            lane.close()  # before it was open
             await until(lane._task.done, "its end")
             assert (happened, bridge.links) == ([], set())
         with noting_lane(bridge.url, happened) as lane:

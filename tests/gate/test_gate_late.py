@@ -1,4 +1,4 @@
-"""What a stalled link delivers late, through a running gate."""
+"""Velocities that a stalled link delivers late, with a running gate."""
 
 import contextlib
 import time
@@ -19,13 +19,13 @@ def test_a_fast_program_leaves_only_a_few_velocities_on_a_stalled_link(
     client.take("r1").result(5)
 
     def push():
-        with contextlib.suppress(NoLease):  # the stall is noticed, and then it is gone
+        with contextlib.suppress(NoLease):  # the lease ends when the stall is noticed
             client.twist("r1", Twist(0.2))
 
     def under_way():
         try:
             client.twist("r1", Twist(0.2))
-        except NoLease:  # a computer that holds up the gate is doubt, too
+        except NoLease:  # a delay of the gate also ends the lease
             client.take("r1").result(5)
         return len(fake.moving) > 20
 
@@ -38,9 +38,9 @@ def test_a_fast_program_leaves_only_a_few_velocities_on_a_stalled_link(
         push()
         return time.monotonic() - held_at > 0.6
 
-    eventually(stalled, "the gate to have seen the stall")
+    eventually(stalled, "the time after which the gate notices the stall")
     fake.go_on()
     eventually(lambda: fake.last_speed == 0, "a zero")
-    # One more may have been read in the moment when the robot ceased to read.
+    # One more may have been read while the robot stopped reading.
     assert len(fake.moving) - before <= 6 + 1
     assert any(at > held_at + 0.5 for at, _ in fake.velocities)

@@ -1,4 +1,4 @@
-"""The gate leaves a bridge that hangs when a client leaves a queue of messages."""
+"""The gate leaves a bridge that hangs if a client leaves with queued messages."""
 
 import asyncio
 

@@ -1,4 +1,4 @@
-"""Which robot needs which lane to which bridge, and what is done through them."""
+"""The lanes that robots need to their bridges, and the actions over the lanes."""
 
 from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
@@ -22,7 +22,7 @@ MOVING = {"twist": {"twist": {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": 0
 
 
 class Noting:
-    """All links of a gate, and what they tell."""
+    """All links of a gate, and their events."""
 
     def __init__(self):
         self.events = []
@@ -66,9 +66,9 @@ async def test_links_are_open_only_while_a_robot_needs_them():
         noting.attach(spec(bridge_url=bridge.url, twist_topic=None, id="r2"))
         noting.do(actions.Detach(key, "r1"))
         await until(lambda: len(bridge.links) == 1, "the end of the control lane")
-        noting.links.zero_all()  # nobody is driven
+        noting.links.zero_all()  # no robot is driven
         noting.do(actions.Detach(Key(bridge.url, ""), "r2"))
-        await until(lambda: not bridge.links, "the end of the last one")
+        await until(lambda: not bridge.links, "the end of the last link")
 
 
 @in_loop
@@ -154,8 +154,8 @@ async def test_odometry_and_goals_may_use_other_bridges_than_velocity():
         noting.do(actions.RunHook(key, "r1", robot.stop_hooks[0], True, 1))
         await until(lambda: a.of("publish", "/lock"), "the hook")
         noting.do(actions.Watch(key, False))
-        await until(lambda: a.of("unsubscribe", "/scan"), "no scans any more")
-        await until(lambda: b.of("unsubscribe", "/odom"), "nor odometry")
+        await until(lambda: a.of("unsubscribe", "/scan"), "the end of scans")
+        await until(lambda: b.of("unsubscribe", "/odom"), "the end of odometry")
         noting.do(actions.Detach(key, "r1"))
         await until(lambda: not (a.links | b.links | c.links), "the end of all")
 
@@ -168,20 +168,20 @@ async def test_removing_one_robot_of_a_machine_keeps_the_other_robot_watched():
         key = noting.attach(first)
         noting.attach(second)
         noting.do(actions.Watch(key, True))
-        noting.do(actions.Watch(key, True))  # which is no other than once
-        await until(lambda: len(bridge.of("subscribe")) >= 3, "all of it")
+        noting.do(actions.Watch(key, True))  # the same as watching once
+        await until(lambda: len(bridge.of("subscribe")) >= 3, "all subscriptions")
         noting.do(actions.Detach(key, "r1"))
-        await until(lambda: bridge.of("unsubscribe", "/odom"), "the first one's end")
+        await until(lambda: bridge.of("unsubscribe", "/odom"), "the end of the first")
         noting.events.clear()
         await bridge.publish("/odom", MOVING)
         await bridge.publish("/odom2", MOVING)
         await bridge.publish("/cmd_vel", MOVING["twist"]["twist"])
-        await until(lambda: noting.of(EchoReceived), "what is said to the machine")
-        await until(lambda: noting.of(OdometryReceived), "how it moves")
+        await until(lambda: noting.of(EchoReceived), "the velocity of the machine")
+        await until(lambda: noting.of(OdometryReceived), "its odometry")
         seen = [(one.key, one.twist) for one in noting.of(OdometryReceived)]
-        assert seen == [(key, Twist(0.5))], "of the second only"
+        assert seen == [(key, Twist(0.5))], "odometry of the second only"
         noting.do(actions.Detach(key, "r2"))
-        await until(lambda: not bridge.links, "the end of it")
+        await until(lambda: not bridge.links, "the end of its links")
 
 
 @in_loop
@@ -204,7 +204,7 @@ async def test_a_new_declaration_ends_only_the_subscriptions_of_a_changed_action
         assert len(bridge.of("unsubscribe", "/move_base/status")) == 1
         listening = len(bridge.of("subscribe", "/cmd_vel"))
         ended = len(bridge.of("unsubscribe", "/cmd_vel"))
-        assert listening == ended + 1, "its echo is listened to"
+        assert listening == ended + 1, "the lane subscribes to its echo"
 
 
 def _fields(robot):
@@ -231,7 +231,7 @@ async def test_goals_poses_and_cancels_are_sent_to_the_topics_of_the_robot():
 
 @in_loop
 async def test_a_cancel_is_still_sent_when_the_goals_move_to_another_bridge():
-    """By topic and by service: the goals go elsewhere in the same breath."""
+    """By topic and by service; the goals move immediately after the cancel."""
     async with noting_bridge() as old, noting_bridge() as new, Noting() as noting:
         robot = spec(bridge_url=new.url, goal_url=old.url, action="/go")
         key = noting.attach(robot)
@@ -310,7 +310,7 @@ async def test_closing_the_links_closes_every_socket_without_a_link_down_event()
             noting.attach(spec(bridge_url=bridge.url, odometry_topic="/odom"))
             await noting.up("control", "odometry", "tasks")
             await until(lambda: len(bridge.links) == 3, "three sockets")
-        await until(lambda: not bridge.links, "the end of all of them")
+        await until(lambda: not bridge.links, "the end of all sockets")
         assert noting.of(LinkDown) == []
 
 

@@ -1,4 +1,4 @@
-"""One gate alone on a computer has a machine, and knows if it was being driven."""
+"""Only one gate on a computer has a machine; its lock file shows if it was driven."""
 
 import os
 from pathlib import Path
@@ -45,7 +45,7 @@ def test_all_spellings_of_this_computer_share_one_lock(locks):
     assert (other.held, other.elsewhere) == (False, True)
     assert other.why == "this WebMap already uses it as /cmd_vel of ws://127.0.0.1:9090"
     locks.release(two)
-    assert not locks.acquire(two).held, "who does not have it lets nothing go"
+    assert not locks.acquire(two).held, "only the owner can release a lock"
     locks.release(one)
     assert locks.acquire(two).held
     locks.release(two)
@@ -92,7 +92,7 @@ def test_tidy_removes_only_lock_files_of_machines_neither_driven_nor_locked(
     before.mark(driven, driven=True)
     before.release(resting)
     before.release(driven)
-    path_of(folder, KEY, "lock").mkdir()  # what cannot be opened is left
+    path_of(folder, KEY, "lock").mkdir()  # a lock that cannot be opened is kept
     locks.tidy()
     there = {path for path in folder.glob("*.lock")}
     assert there == {path_of(folder, key, "lock") for key in (driven, held, KEY)}
@@ -116,7 +116,7 @@ def test_a_lock_file_that_cannot_be_removed_is_left(locks, folder, monkeypatch):
 def test_a_lock_file_removed_before_locking_does_not_count_as_the_lock(
     locks, folder, monkeypatch, made_anew
 ):
-    """Between opening and locking, as if another gate tidied up then."""
+    """It is removed between opening and locking, as if another gate tidied up."""
     path, try_lock, removed = path_of(folder, KEY, "lock"), module._try_lock, []
 
     def try_later(file):
@@ -177,7 +177,7 @@ def test_tidy_keeps_a_lock_file_that_another_gate_has_just_locked(
     lock = module._try_lock
 
     def slow(opened: int) -> bool:
-        # Another gate tidies too, and a third one takes the machine.
+        # Another gate tidies too, and a third gate takes the machine.
         file.unlink()
         monkeypatch.setattr(module, "_try_lock", lock)
         assert other.acquire(KEY).held

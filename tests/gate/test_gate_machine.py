@@ -1,19 +1,20 @@
-"""Whatever happens in whatever order, what the robot is told keeps eight promises.
+"""No sequence of events breaks one of eight safety promises.
 
-1. A velocity is written only in answer to a command of the lease's holder that was
-   accepted just now, and when the newest such command is older than the limit, what is
-   written is zero, or nothing. (The stop test creeps in answer to released inputs.)
+1. A velocity is written only in answer to a command of the holder that was accepted
+   just now. When the newest such command is older than the limit, only zero is written,
+   or nothing. (The stop test creeps in answer to released inputs.)
 2. Between two epochs in the log of a robot there is a zero.
 3. No velocity of an old epoch comes after one of a newer epoch.
 4. No velocity exceeds the limit in force.
-5. After half a second of zeros there is silence, unless STOP stands.
-6. After a STOP nothing but zero is written, no goal is sent, and nobody has the robot,
-   until a reset that names the newest STOP; not even when the gate is
-   killed and started anew meanwhile.
+5. After half a second of zeros nothing is sent, unless a STOP is active.
+6. After a STOP only zeros are written, no goal is sent, and no user has control, until
+   a reset that names the newest STOP. This holds also when the gate is killed and
+   restarted in between.
 7. A reset writes nothing.
-8. While a robot changes hands and its odometry shows motion, nobody has it.
+8. While control changes and odometry shows motion, no user has control.
 
-And, of hands: after any doubt nothing moves before they were seen to be off.
+In addition, after any doubt about the inputs the robot does not move before the gate
+has received released inputs.
 """
 
 import os
@@ -70,7 +71,7 @@ class Motion(RuleBasedStateMachine):
         self.bench.begin(self._spec())
         self.sent: list[Sent] = []
         self.doubts = [self.bench.now]
-        """When hands were last known to be in doubt, for a reason outside of them."""
+        """The times after which the gate must receive released inputs again."""
         self.speeds = dict.fromkeys((*PEOPLE, PROGRAM), 9.0)
         self.last_seq = dict.fromkeys(PEOPLE, -1)
         self.seeing = True
@@ -80,7 +81,7 @@ class Motion(RuleBasedStateMachine):
     def _spec(self):
         return spec(v_max=self.v_max, odometry_topic=self.odometry, a_max=self.a_max)
 
-    # People.
+    # Users.
 
     @rule(who=st.sampled_from(PEOPLE))
     def take(self, who):
@@ -91,15 +92,15 @@ class Motion(RuleBasedStateMachine):
 
     @rule(who=st.sampled_from(PEOPLE))
     def ask(self, who):
-        self.bench.say(who, op="ask", robot="r1")
+        self.bench.send(who, op="ask", robot="r1")
 
     @rule(who=st.sampled_from(PEOPLE), answer=st.sampled_from(["grant", "deny"]))
     def answer(self, who, answer):
-        self.bench.say(who, op=answer, robot="r1")
+        self.bench.send(who, op=answer, robot="r1")
 
     @rule(other=st.sampled_from(PEOPLE), speed=st.sampled_from([0.0, 0.3]))
     def takes_over(self, other, speed):
-        """The usual way from hand to hand, perhaps of a robot that moves on."""
+        """The usual change of control, perhaps of a robot that is still moving."""
         holder = self.bench.report().holder
         if holder is None or holder.connection == other:
             return
@@ -112,11 +113,11 @@ class Motion(RuleBasedStateMachine):
         self.bench.run(0.6, lambda: self.bench.handle(seen) if self.odometry else None)
         self._doubt()
         if speed or not self.odometry:
-            assert self.bench.report().holder is None, "nobody has what moves"
+            assert self.bench.report().holder is None, "no user controls a moving robot"
 
     @rule(who=st.sampled_from(PEOPLE), stops=st.booleans(), lets_go=st.booleans())
     def tests_the_stop(self, who, stops, lets_go):
-        """A base that creeps, and then stops by itself, or does not."""
+        """A base that creeps, and then stops without a zero velocity, or does not."""
         if not self.odometry or not self.seeing:
             return
         bench = self.bench
@@ -131,13 +132,13 @@ class Motion(RuleBasedStateMachine):
 
         self.take(who)
         self._run(0.4, lambda: self._command(who, 0.0))
-        bench.say(who, op="stop-test", robot="r1")
+        bench.send(who, op="stop-test", robot="r1")
         self.creeping = bench.report().test is not None
         bench.run(1.0, each)
 
     @rule(who=st.sampled_from(PEOPLE))
     def release(self, who):
-        self.bench.say(who, op="release", robot="r1")
+        self.bench.send(who, op="release", robot="r1")
 
     @rule(
         who=st.sampled_from(PEOPLE),
@@ -166,7 +167,7 @@ class Motion(RuleBasedStateMachine):
         ),
     )
     def drives_off(self, who, x, neutral, then):
-        """The usual beginning, and then something that must not move the robot."""
+        """A normal start, and then an event after which the robot must not move."""
 
         def press():
             self._command(who, x)
@@ -193,7 +194,7 @@ class Motion(RuleBasedStateMachine):
             case "hands":
                 self._run(0.25)
             case "leave":
-                press()  # which may still wait to be written
+                press()  # the velocity may still wait to be written
                 self.page_is_reloaded(who)
                 return
         self._run(0.3, press)
@@ -222,21 +223,21 @@ class Motion(RuleBasedStateMachine):
         holder = self.bench.report().holder
         self.bench.goal(who)
         if len(self.bench.did(actions.SendGoal)) > before:
-            assert not self.stopped, "no goal starts while STOP stands"
+            assert not self.stopped, "no goal starts while a STOP is active"
             assert holder is not None
-            assert holder.connection == who, "only who has it sends it somewhere"
+            assert holder.connection == who, "only the holder sends goals"
             self.last_seq[who] = self.bench.seq
             self._doubt()
 
     @rule(who=st.sampled_from(PEOPLE), robot=st.sampled_from(["r1", "*"]))
     def stop(self, who, robot):
         at, before = self.bench.now, len(self._attempts())
-        self.bench.say(who, op="stop", robot=robot)
+        self.bench.send(who, op="stop", robot=robot)
         assert self.bench.report().holder is None
         self.stopped = True
         self._doubt()
         zeros = [w for w in self._attempts() if w.at == at and w.twist.is_zero]
-        assert zeros, "STOP is zero at once"
+        assert zeros, "STOP sends zero at once"
         assert len(self._attempts()) <= before + 1
 
     @rule()
@@ -245,18 +246,18 @@ class Motion(RuleBasedStateMachine):
 
     @rule(who=st.sampled_from(PEOPLE), late=st.booleans())
     def reset(self, who, late):
-        """End the STOP that is seen now, or (late) that was seen a while ago."""
+        """Reset the newest STOP, or (late) the STOP that a page saw earlier."""
         before, newest = len(self._attempts()), self.bench.stop_of()
         named = self.seen if late else newest
-        self.bench.say(who, op="reset", robot="r1", stop=named)
-        assert len(self._attempts()) == before, "reset moves nothing"
+        self.bench.send(who, op="reset", robot="r1", stop=named)
+        assert len(self._attempts()) == before, "a reset writes nothing"
         assert self.bench.report().holder is None or not self.stopped
         if named == newest:
             self.stopped = False
 
     @rule(by=st.sampled_from(["Ann", "Ben"]))
-    def another_gate_is_told_stop(self, by):
-        """Its file is found where this gate's own STOP may be."""
+    def another_gate_receives_stop(self, by):
+        """The other gate stores its STOP in the file that this gate also uses."""
         self.others += 1
         self.bench.disk[KEY] = Press(by, f"other-{self.others}")
         self.bench.handle(events.StopFileChanged(KEY, self.bench.disk[KEY]))
@@ -265,7 +266,7 @@ class Motion(RuleBasedStateMachine):
 
     @rule()
     def gate_is_killed_and_started_anew(self):
-        """Nothing is left of it but the disk."""
+        """Only the files on disk are left."""
         old = self.bench
         driven = [a.driven for a in old.did(actions.MarkDriven)]
         ticks, epochs = (
@@ -300,9 +301,9 @@ class Motion(RuleBasedStateMachine):
         self.bench.join(who)
         self.last_seq[who], self.speeds[who] = -1, 9.0
 
-    @rule(who=st.sampled_from(PEOPLE), words=st.binary(max_size=30))
-    def garbage(self, who, words):
-        self.bench.handle(protocol.FromPage(who, words))
+    @rule(who=st.sampled_from(PEOPLE), data=st.binary(max_size=30))
+    def garbage(self, who, data):
+        self.bench.handle(protocol.FromPage(who, data))
 
     # The program.
 
@@ -355,9 +356,9 @@ class Motion(RuleBasedStateMachine):
         return next(iter(self.bench.gate._machines._by_key))
 
     def _rest(self, seconds):
-        """Let time pass in which nobody does anything, and the gate is looked at less.
+        """Let time pass without commands, with longer steps.
 
-        What somebody did before still comes to its end at the usual pace.
+        The effects of earlier commands still end in steps of the usual length.
         """
         self._run(0.6)
         self._run(seconds - 1.3, step=0.05)
@@ -374,24 +375,24 @@ class Motion(RuleBasedStateMachine):
     epoch = 0
     """The newest epoch that was seen."""
     stopped = False
-    """Whether somebody said STOP, and nobody has reset it since."""
+    """Whether a STOP was sent that has not been reset."""
     seen = "none"
-    """The identity of the STOP that somebody looked at a while ago."""
+    """The identity of the STOP that a page saw earlier."""
     others = 0
-    """How many STOPs other gates were told."""
+    """How many STOPs other gates received."""
     moved_by, zero_since = None, True
-    """The epoch that the robot was moved by last, and whether a zero came since."""
+    """The epoch of the last motion, and whether a zero has followed."""
     parted = 0
-    """How many writes were looked at for that."""
+    """How many writes were checked for that."""
     paced = 0
-    """How many writes were made before anybody said how fast to go last."""
+    """How many writes were made before the last change of a speed limit."""
 
     @rule(seconds=st.sampled_from([0.01, 0.05, 0.15, 0.25, 0.5]))
     def time_passes(self, seconds):
         self._run(seconds)
 
     @rule(seconds=st.sampled_from([0.1, 0.5, 3.0]))
-    def gate_stands_still(self, seconds):
+    def gate_pauses(self, seconds):
         self.bench.now += seconds
         if seconds > 0.32:
             self._doubt()
@@ -400,15 +401,15 @@ class Motion(RuleBasedStateMachine):
     @rule()
     def everybody_rests(self):
         if self.bench.report().asker is not None:
-            self._rest(10.0)  # it is granted by itself
+            self._rest(10.0)  # the request is granted after this time
         self._rest(4.0)  # zeros on a new link go on for three seconds
         assert not self.bench.report().changing or not self.bench.up
         late = [w for w in self._attempts() if w.at > self.bench.now - 0.7]
         if self.stopped:
             assert all(w.twist.is_zero for w in late)
-            assert len(late) >= 6 or not self.bench.up, "zeros while STOP stands"
+            assert len(late) >= 6 or not self.bench.up, "zeros while a STOP is active"
         else:
-            assert late == [], "after zeros there is silence"
+            assert late == [], "nothing is sent after the zeros"
         assert self.bench.gate.silent
 
     @rule()
@@ -453,16 +454,16 @@ class Motion(RuleBasedStateMachine):
             if write.twist.is_zero:
                 continue
             cause = self._cause_of(write)
-            assert cause is not None, "nobody asked for this"
+            assert cause is not None, "no command caused this velocity"
             assert write.twist.vy == 0
             limit = max(self.v_max, 0.0)
             assert abs(write.twist.vx) <= limit + 1e-9
             if write.by != PROGRAM:
-                self._check_hands(write, cause)
+                self._check_released(write, cause)
         self.checked = len(self.bench.written)
 
     def _mine(self, write, begin, end):
-        """Return what the one who is written for sent in a time and was accepted."""
+        """Return the accepted commands of the sender of a velocity in a period."""
         first = bisect_left(self.sent, begin, key=lambda s: s.at)
         last = bisect_right(self.sent, end, key=lambda s: s.at)
         return [
@@ -478,8 +479,8 @@ class Motion(RuleBasedStateMachine):
                 return s
         return None
 
-    def _check_hands(self, write, cause):
-        """Since the last doubt the hands were off for 200 ms."""
+    def _check_released(self, write, cause):
+        """Check that the inputs were released for 200 ms since the last doubt."""
         since = self.doubts[bisect_right(self.doubts, write.at) - 1]
         mine = self._mine(write, since, cause.at)
         run_start = last = None
@@ -494,7 +495,7 @@ class Motion(RuleBasedStateMachine):
             elif s.at - run_start >= 0.2 - 1e-6:
                 seen = True
             last = s.at
-        assert seen, "the hands were not seen to be off"
+        assert seen, "no released inputs since the last doubt"
 
     @invariant()
     def epochs_only_grow(self):
@@ -504,7 +505,7 @@ class Motion(RuleBasedStateMachine):
             self.epoch = epoch
 
     @invariant()
-    def a_stop_stands_until_a_reset(self):
+    def a_stop_is_active_until_a_reset(self):
         assert self.bench.report().latched == self.stopped
         assert (KEY in self.bench.disk) == self.stopped
         if self.stopped:
@@ -524,10 +525,10 @@ class Motion(RuleBasedStateMachine):
         if not attempts or attempts[-1].twist.is_zero:
             return
         newest = next(s.at for s in reversed(self.sent) if s.valid)
-        assert self.bench.now - newest <= DEADMAN + LATE or self._stood_still(newest)
+        assert self.bench.now - newest <= DEADMAN + LATE or self._sends_zero(newest)
 
-    def _stood_still(self, since):
-        """Whether the gate has not had its say since the limit passed."""
+    def _sends_zero(self, since):
+        """Run a step that is still due; return whether the gate then sends zero."""
         self.bench._do(self.bench.gate.step(self.bench.now))
         return self._attempts()[-1].twist.is_zero
 
@@ -554,17 +555,18 @@ class Motion(RuleBasedStateMachine):
 
 
 TRIALS = int(os.environ.get("WEBMAP_SAFETY_TRIALS", "1"))
-"""As for the tests of whole processes: fifty are the full run."""
+"""As for the tests of whole processes: 50 for the full run."""
 
 SCHEDULES = 1000
-"""What is tried in one go: Hypothesis remembers all of it, which takes memory."""
+"""Schedules of one test: Hypothesis keeps all of them in memory."""
 
 
 @pytest.fixture
 def note_done(request):
-    """Skip what a run that is resumed has done already; the test notes that it passed.
+    """Return a function that notes that the test passed.
 
-    As the figures of whole processes are kept, and in a file beside theirs.
+    If a run is resumed, skip a test that passed before. The notes are in a file beside
+    the figures of whole processes.
     """
     name, figures = request.node.name, os.environ.get("WEBMAP_SAFETY_FIGURES")
     if not figures:
@@ -572,7 +574,7 @@ def note_done(request):
     path = Path(f"{figures}.schedules")
     resumed = os.environ.get("WEBMAP_SAFETY_RESUME") == "1" and path.exists()
     if resumed and name in path.read_text().split():
-        pytest.skip("the run that is resumed has done it")
+        pytest.skip("passed before the run was resumed")
 
     def note():
         with path.open("a") as file:

@@ -98,7 +98,7 @@ class TestDeclaration:
         bench.drive_off()
         bench.handle(protocol.Forget("r1"))
         assert bench.of(protocol.RobotGone) == [protocol.RobotGone("r1")]
-        bench.say("b", op="take", robot="r1")
+        bench.send("b", op="take", robot="r1")
         assert "no robot" in bench.refusals("b")[-1].why
         at = bench.now
         assert bench.gate.busy
@@ -115,7 +115,7 @@ class TestDeclaration:
         bench.drive_off()
         bench.break_links()
         bench.handle(protocol.Forget("r1"))
-        if later is None:  # the file on disk still says so, for the next gate
+        if later is None:  # the file on disk keeps the mark for the next gate
             bench.run(61.0)
             assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
             assert bench.did(actions.MarkDriven) == [actions.MarkDriven(KEY, True)]
@@ -147,7 +147,7 @@ class TestDeclaration:
 
 
 class TestSharedMachine:
-    """Two robots of the display that are one machine."""
+    """Two robots of the display that share one machine."""
 
     @pytest.fixture
     def bench(self):
@@ -210,12 +210,12 @@ class TestSharedMachine:
         assert len(bench.did(actions.Detach)) == 2
 
     def test_stop_all_sends_one_zero_to_a_shared_machine(self, bench):
-        bench.say("b", op="stop", robot="*")
+        bench.send("b", op="stop", robot="*")
         assert len(bench.written) == 1
 
 
 class TestTypes:
-    """The type that velocity has on a topic which two robots share."""
+    """The type of velocities on a topic that two robots share."""
 
     STAMPED = "geometry_msgs/msg/TwistStamped"
 
@@ -229,11 +229,11 @@ class TestTypes:
             f"robot 'Al': got {self.STAMPED} for /cmd_vel, but robot 'Bob' uses "
             "geometry_msgs/Twist for this topic; WebMap uses that type for both"
         ) in caplog.text
-        # All else that it says holds for it, then and later.
+        # The other settings of the second robot apply, also later.
         bench.handle(spec(id="r2", name="Al", twist_type=self.STAMPED, v_max=0.2))
         again = bench.did(actions.Attach)[-1].spec
         assert (again.v_max, again.twist_type_assumed) == (0.2, True)
-        bench.say("b", op="stop", robot="r2")
+        bench.send("b", op="stop", robot="r2")
         assert bench.report("r1").latched
 
     def test_two_robots_on_one_topic_can_both_change_to_another_type(self):
@@ -279,9 +279,9 @@ class TestSeveralMachines:
     def test_a_stop_of_one_robot_does_not_stop_another_robot(self):
         bench = Bench().begin(spec(), spec(id="r2", twist_topic="/r2/cmd_vel"))
         bench.drive_off("b", robot="r2")
-        bench.say("a", op="stop", robot="r1")
+        bench.send("a", op="stop", robot="r1")
         assert bench.report("r2").state == "driving"
-        bench.say("a", op="stop", robot="*")
+        bench.send("a", op="stop", robot="*")
         assert bench.report("r2").state == "stopped"
 
     def test_links_to_another_bridge_do_not_affect_driving(self):

@@ -1,4 +1,4 @@
-"""A STOP that is no valid command stops robots, whatever is wrong with it (S10)."""
+"""A STOP that is not a valid command stops robots, too (S10)."""
 
 import json
 
@@ -170,17 +170,17 @@ def test_a_malformed_stop_is_executed_before_the_page_is_closed_for_garbage(two)
     assert two.of(protocol.CloseConnection) == []
     send(two, b'{"op":"stop"')
     assert two.of(protocol.CloseConnection)
-    said = [
+    sent = [
         message
-        for message in two.said
+        for message in two.messages
         if isinstance(message, protocol.CloseConnection)
         or (isinstance(message, protocol.SentTwist) and message.by is None)
     ]
-    assert isinstance(said[-1], protocol.CloseConnection), "zero goes first"
+    assert isinstance(sent[-1], protocol.CloseConnection), "zero is sent first"
     assert two.report("r1").latched
     two.run(1.1)
     send(two, b'{"op":"stop"', "b")
-    assert two.report("r2").latched, "also of a page that is being closed"
+    assert two.report("r2").latched, "a STOP of a page that is being closed counts"
 
 
 def test_a_malformed_stop_does_not_keep_the_dead_man_of_another_robot_alive(two):

@@ -1,4 +1,4 @@
-"""What robots say of their goals, in both dialects, and what is no word of theirs."""
+"""Messages of robots about their goals, of ROS 1 and ROS 2, and other messages."""
 
 import json
 
@@ -52,17 +52,17 @@ class TestAction:
         ) == GoalProgress("r1", "g1", True, left=3.3, time=4.5, eta=6.0, recoveries=2)
 
     def test_nan_and_negative_numbers_in_feedback_are_left_out(self):
-        word = of_action(
+        event = of_action(
             '{"op": "action_feedback", "id": "g1", "values": '
             '{"distance_remaining": NaN, "estimated_time_remaining": {"sec": -1}}}'
         )
-        assert word == GoalProgress("r1", "g1", True)
+        assert event == GoalProgress("r1", "g1", True)
 
     @pytest.mark.parametrize("number", [-1, 2**31, 10**30, 10**400])
     def test_recovery_counts_out_of_range_are_left_out(self, number):
-        word = self.feedback(number_of_recoveries=number)
-        assert word == GoalProgress("r1", "g1", True)
-        assert pipe.pack(word)
+        event = self.feedback(number_of_recoveries=number)
+        assert event == GoalProgress("r1", "g1", True)
+        assert pipe.pack(event)
 
     def test_feedback_with_a_time_too_large_for_a_float_is_ignored(self):
         assert self.feedback(navigation_time={"sec": 10**400, "nanosec": 0}) is None
@@ -88,13 +88,13 @@ class TestAction:
         assert len(end.why) == navigation.MOST_WORDS
 
     def test_a_bridge_without_action_support_is_recognized(self):
-        said = "Unknown operation: send_action_goal.  Allowed operations: [...]"
-        end = of_action(op="status", level="error", msg=said)
+        message = "Unknown operation: send_action_goal.  Allowed operations: [...]"
+        end = of_action(op="status", level="error", msg=message)
         assert end.outcome == "failed"
         assert end.no_actions
-        said = "send_action_goal: wrong type"
-        end = of_action(op="status", level="error", msg=said)
-        assert end == GoalEnded("r1", "g1", "failed", said)
+        message = "send_action_goal: wrong type"
+        end = of_action(op="status", level="error", msg=message)
+        assert end == GoalEnded("r1", "g1", "failed", message)
 
     @pytest.mark.parametrize(
         "frame",
@@ -127,8 +127,8 @@ class TestTopics:
         self, status, active
     ):
         others = self.status(3, id="g0")
-        word = of_topics("status", {"status_list": [others, self.status(status)]})
-        assert word == GoalProgress("r1", "g1", active)
+        event = of_topics("status", {"status_list": [others, self.status(status)]})
+        assert event == GoalProgress("r1", "g1", active)
 
     @pytest.mark.parametrize(
         ("status", "text", "outcome", "why"),
@@ -145,15 +145,15 @@ class TestTopics:
         self, status, text, outcome, why
     ):
         end = GoalEnded("r1", "g1", outcome, why)
-        said = self.status(status, text)
-        assert of_topics("status", {"status_list": [said]}) == end
-        assert of_topics("result", {"status": said, "result": {}}) == end
+        message = self.status(status, text)
+        assert of_topics("status", {"status_list": [message]}) == end
+        assert of_topics("result", {"status": message, "result": {}}) == end
 
     def test_move_base_feedback_gives_the_straight_line_distance_to_the_goal(self):
         place = {"header": {"frame_id": "/map"}, "pose": {"position": {"x": 0, "y": 0}}}
-        said = {"status": self.status(1), "feedback": {"base_position": place}}
-        word = of_topics("feedback", said)
-        assert word == GoalProgress("r1", "g1", True, left=5.0)
+        message = {"status": self.status(1), "feedback": {"base_position": place}}
+        event = of_topics("feedback", message)
+        assert event == GoalProgress("r1", "g1", True, left=5.0)
 
     @pytest.mark.parametrize(
         "place",
@@ -168,8 +168,8 @@ class TestTopics:
         self, place
     ):
         feedback = {"base_position": place} if place else None
-        said = {"status": self.status(1), "feedback": feedback}
-        assert of_topics("feedback", said) == GoalProgress("r1", "g1", True)
+        message = {"status": self.status(1), "feedback": feedback}
+        assert of_topics("feedback", message) == GoalProgress("r1", "g1", True)
 
     def test_unrelated_messages_are_ignored(self):
         other = self.status(1, id="g0")

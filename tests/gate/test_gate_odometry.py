@@ -1,4 +1,4 @@
-"""The witness lane: odometry and scans, for whoever watches."""
+"""The witness lane: odometry and scans for the machines that are watched."""
 
 import cbor2
 from link_bench import in_loop, noting_bridge, until
@@ -44,7 +44,7 @@ async def test_odometry_is_reported_for_every_machine_that_uses_the_topic():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         noting.witness.watch("/odom", "nav_msgs/Odometry", ANN)
         noting.witness.watch("/odom", "nav_msgs/Odometry", BEN)
-        await until(lambda: bridge.of("subscribe", "/odom"), "that it listens")
+        await until(lambda: bridge.of("subscribe", "/odom"), "the subscription")
         assert noting.events == [LinkUp(bridge.url, "odometry")]
         assert bridge.of("subscribe")[0].message["throttle_rate"] == 50
         await bridge.publish("/odom", MOVING)
@@ -54,9 +54,11 @@ async def test_odometry_is_reported_for_every_machine_that_uses_the_topic():
             (BEN, Twist(0.5)),
         ]
         noting.witness.unwatch("/odom", ANN)
-        assert not bridge.of("unsubscribe"), "the other watches on"
+        assert not bridge.of("unsubscribe"), "the other machine still watches"
         noting.witness.unwatch("/odom", BEN)
-        await until(lambda: bridge.of("unsubscribe", "/odom"), "the end of it")
+        await until(
+            lambda: bridge.of("unsubscribe", "/odom"), "the end of the subscription"
+        )
         assert not noting.witness.lane.wanted
         bridge.transport_of(1).abort()
         await until(lambda: noting.of(LinkDown), "the loss of the link")
@@ -66,19 +68,19 @@ async def test_odometry_is_reported_for_every_machine_that_uses_the_topic():
 async def test_messages_that_are_not_odometry_are_ignored():
     async with noting_bridge() as bridge, Noting(bridge.url) as noting:
         noting.witness.watch("/odom", None, ANN)
-        await until(lambda: bridge.of("subscribe"), "that it listens")
-        for words in (
+        await until(lambda: bridge.of("subscribe"), "the subscription")
+        for data in (
             "rubbish",
             '{"op": "status", "topic": "/odom"}',
             '{"op": "publish"}',
             '{"op": "publish", "topic": "/other", "msg": {}}',
             '{"op": "publish", "topic": "/odom", "msg": {"data": 1}}',
         ):
-            await bridge.send(1, words)
-        await until(lambda: noting.of(OdometryReceived), "the last of them")
+            await bridge.send(1, data)
+        await until(lambda: noting.of(OdometryReceived), "the last message")
         assert [(m.key, m.twist) for m in noting.of(OdometryReceived)] == [
             (ANN, None)
-        ], "a robot that tells nothing"
+        ], "a message without a velocity"
 
 
 @in_loop
@@ -87,22 +89,24 @@ async def test_a_scan_is_reported_for_every_machine_that_uses_the_topic():
         noting.witness.watch("/odom", None, ANN)
         noting.witness.watch_scan("/scan", ANN)
         noting.witness.watch_scan("/scan", BEN)
-        await until(lambda: bridge.of("subscribe", "/scan"), "that it listens")
+        await until(lambda: bridge.of("subscribe", "/scan"), "the subscription")
         assert bridge.of("subscribe", "/scan")[0].message["compression"] == "cbor"
-        for words in (
+        for data in (
             scan_of("/elsewhere"),
             scan_of("/scan", {"ranges": "none"}),
             scan_of("/scan"),
         ):
-            await bridge.send(1, words)
+            await bridge.send(1, data)
         await until(lambda: len(noting.of(ScanReceived)) == 2, "the scan")
         assert [(s.key, s.topic) for s in noting.of(ScanReceived)] == [
             (ANN, "/scan"),
             (BEN, "/scan"),
         ]
         await bridge.publish("/odom", MOVING)
-        await until(lambda: noting.of(OdometryReceived), "odometry beside it")
+        await until(lambda: noting.of(OdometryReceived), "odometry as well")
         noting.witness.unwatch_scan("/scan", ANN)
         assert not bridge.of("unsubscribe")
         noting.witness.unwatch_scan("/scan", BEN)
-        await until(lambda: bridge.of("unsubscribe", "/scan"), "the end of it")
+        await until(
+            lambda: bridge.of("unsubscribe", "/scan"), "the end of the subscription"
+        )

@@ -1,4 +1,4 @@
-"""Another program that publishes velocities is told from the gate's own echoes."""
+"""Velocities of another program are distinguished from the gate's own echoes."""
 
 from collections import deque
 from itertools import count
@@ -23,7 +23,7 @@ from webmap.gate.rules.obedience import (
 )
 
 OURS, THEIRS = Twist(0.5, 0.0, 0.25), Twist(0.1, 0.0, -0.2)
-SAID = "another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s)"
+REPORTED = "another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s)"
 
 
 @pytest.fixture
@@ -31,32 +31,32 @@ def writer():
     return OtherWriter()
 
 
-def hear(writer, twist, times, now=100.0, every=0.1):
+def receive(writer, twist, times, now=100.0, every=0.1):
     for n in range(times):
         writer.on_echo(twist, now + n * every)
 
 
 class TestOtherProgram:
     def test_two_foreign_velocities_within_3_s_report_another_program(self, writer):
-        hear(writer, THEIRS, SURE - 1)
+        receive(writer, THEIRS, SURE - 1)
         assert writer.description("/cmd_vel") is None
-        hear(writer, THEIRS, 1, 100.0 + WITHIN)
-        assert writer.description("/cmd_vel") == SAID
+        receive(writer, THEIRS, 1, 100.0 + WITHIN)
+        assert writer.description("/cmd_vel") == REPORTED
         other = OtherWriter()
-        hear(other, THEIRS, 5, every=WITHIN + 0.1)
+        receive(other, THEIRS, 5, every=WITHIN + 0.1)
         assert other.seen is None
 
     def test_another_program_is_dropped_after_3_s_without_its_velocities(self, writer):
-        hear(writer, THEIRS, 3, every=0.0)
+        receive(writer, THEIRS, 3, every=0.0)
         writer.named(("/teleop",))
         writer.step(100.0 + WITHIN)
-        assert writer.description("/cmd_vel") == f"{SAID}: /teleop"
+        assert writer.description("/cmd_vel") == f"{REPORTED}: /teleop"
         writer.step(100.1 + WITHIN)
         assert writer.description("/cmd_vel") is None
         writer.named(("/teleop",))
-        hear(writer, THEIRS, 3, 200.0)
-        assert writer.description("/cmd_vel") == SAID, (
-            "who it was then is not known now"
+        receive(writer, THEIRS, 3, 200.0)
+        assert writer.description("/cmd_vel") == REPORTED, (
+            "the earlier node names do not apply"
         )
 
     def test_another_program_is_found_while_the_gate_writes_too(self, writer):
@@ -72,16 +72,16 @@ class TestOtherProgram:
         for n in range(200):
             now = 100.0 + n * 0.05
             writer.on_written(OURS, now)
-            hear(writer, OURS, ECHOES + 1, now, 0.0)
+            receive(writer, OURS, ECHOES + 1, now, 0.0)
         assert writer.seen == OURS
 
     def test_a_velocity_that_the_gate_wrote_long_ago_counts_as_foreign(self, writer):
         writer.on_written(OURS, 100.0)
-        hear(writer, OURS, 2, 100.0 + REMEMBERED + 0.1)
+        receive(writer, OURS, 2, 100.0 + REMEMBERED + 0.1)
         assert writer.seen == OURS
 
     def test_invalid_node_names_are_dropped_and_long_names_are_shortened(self, writer):
-        hear(writer, THEIRS, 2)
+        receive(writer, THEIRS, 2)
         writer.named(("/a\x1b[31m", " ", "/b" * 100, "/c", "/d", "/e"))
         assert writer.nodes == (("/b" * 100)[:80], "/c", "/d")
         writer.named(())
@@ -96,14 +96,14 @@ class TestOtherProgram:
         ],
     )
     def test_the_description_gives_the_speed_and_turn_rate(self, writer, twist, words):
-        hear(writer, twist, 2)
+        receive(writer, twist, 2)
         assert words in writer.description("/cmd_vel")
 
 
 class TestOwnEcho:
     def test_zeros_do_not_report_another_program(self, writer):
-        hear(writer, Twist(), 1000, every=0.01)
-        hear(writer, Twist(-0.0, 0.0, -0.0), 1000, every=0.01)
+        receive(writer, Twist(), 1000, every=0.01)
+        receive(writer, Twist(-0.0, 0.0, -0.0), 1000, every=0.01)
         assert writer.seen is None
 
     @pytest.mark.parametrize("late", [0.0, 0.4, 5.0, 30.0])
@@ -112,7 +112,7 @@ class TestOwnEcho:
     def test_late_doubled_and_rounded_echoes_do_not_report_another_program(
         self, writer, late, each, digits
     ):
-        """Driven for ten seconds at speeds that change, with echoes that come late."""
+        """The robot is driven for ten seconds at changing speeds, with late echoes."""
 
         def echo(part):
             if isinstance(digits, int):
@@ -147,11 +147,11 @@ class TestOwnEcho:
         )
     )
     def test_own_echoes_in_any_rhythm_do_not_report_another_program(self, written):
-        """However they are held up, and in whatever bursts they come."""
+        """Echoes may be delayed, and may arrive in bursts."""
         writer, way, clock = OtherWriter(), deque(), count(100, 0.05)
         for speed, held_up, each in written:
             now = next(clock)
-            # As many as a link and its bridge hold.
+            # The most echoes that a link and its bridge hold.
             if sum(not twist.is_zero for twist in way) < MOST_ECHOES - ECHOES:
                 writer.on_written(Twist(speed), now)
                 way.extend([Twist(speed)] * each)
@@ -163,9 +163,9 @@ class TestOwnEcho:
     def test_expected_foreign_velocities_do_not_report_another_program(self, writer):
         writer.expect(101.0)
         writer.expect(100.5)
-        hear(writer, THEIRS, 10)
+        receive(writer, THEIRS, 10)
         assert writer.seen is None
-        hear(writer, THEIRS, 2, 101.0)
+        receive(writer, THEIRS, 2, 101.0)
         assert writer.seen == THEIRS
 
     def test_velocities_written_long_ago_are_removed_from_memory(self, writer):
@@ -176,14 +176,14 @@ class TestOwnEcho:
 
 @pytest.fixture
 def bench():
-    """A robot whose link has been there for a while."""
+    """A robot whose link has been open for some seconds."""
     bench = Bench().begin()
     bench.run(EXPECTED_FOR)
     return bench
 
 
 def publish(bench, seconds=0.5, twist=THEIRS, key=KEY):
-    """Have another program publish at 10 Hz."""
+    """Let another program publish at 10 Hz."""
     turn = count()
 
     def each():
@@ -199,7 +199,7 @@ class TestReport:
     ):
         assert bench.report().other_writer is None
         publish(bench)
-        assert (bench.report().other_writer, bench.report().holder) == (SAID, None)
+        assert (bench.report().other_writer, bench.report().holder) == (REPORTED, None)
         bench.run(WITHIN + 0.2)
         assert bench.report().other_writer is None
         assert not bench.gate.busy
@@ -220,7 +220,7 @@ class TestReport:
 
         bench.run(0.5, both)
         report = bench.report()
-        assert (report.state, report.other_writer) == ("driving", SAID)
+        assert (report.state, report.other_writer) == ("driving", REPORTED)
 
     def test_another_program_and_the_motion_alarm_are_reported_together(self):
         bench = Bench().begin(spec(odometry_topic="/odom"))
@@ -231,24 +231,24 @@ class TestReport:
             bench.handle(seen)
             bench.handle(events.EchoReceived(KEY, THEIRS))
 
-        bench.say("a", op="stop", robot="r1")
+        bench.send("a", op="stop", robot="r1")
         bench.run(1.5, each)
         assert bench.report().alarm
-        assert bench.report().other_writer == SAID
+        assert bench.report().other_writer == REPORTED
 
     def test_the_report_names_the_nodes_that_the_display_found(self, bench):
         bench.handle(protocol.WriterNodes("r1", ("/teleop",)))
         publish(bench)
-        assert bench.report().other_writer == SAID
+        assert bench.report().other_writer == REPORTED
         bench.handle(protocol.WriterNodes("r1", ("/teleop",)))
         bench.handle(protocol.WriterNodes("r9", ("/other",)))
-        assert bench.report().other_writer == f"{SAID}: /teleop"
+        assert bench.report().other_writer == f"{REPORTED}: /teleop"
 
     def test_changing_foreign_speeds_are_reported_at_most_about_10_times_a_second(
         self, bench
     ):
         publish(bench)
-        bench.said.clear()
+        bench.messages.clear()
         turn = count()
 
         def each():
@@ -264,7 +264,7 @@ class TestReport:
         publish(bench, EXPECTED_FOR - 0.1)
         assert bench.report().other_writer is None
         publish(bench, 0.5)
-        assert bench.report().other_writer == SAID
+        assert bench.report().other_writer == REPORTED
 
     def test_velocities_of_another_gate_on_this_computer_are_not_reported(self, bench):
         why = "another WebMap on this computer uses this robot"
@@ -285,7 +285,7 @@ class TestReport:
         publish(bench, EXPECTED_FOR - 0.2)
         assert bench.report().other_writer is None
         publish(bench, 1.0)
-        assert bench.report().other_writer == SAID
+        assert bench.report().other_writer == REPORTED
 
     def test_velocities_after_a_goal_whose_end_is_unknown_are_reported(self):
         bench = Bench().begin(spec(cancel_topic=None))
@@ -293,7 +293,7 @@ class TestReport:
         bench.take()
         bench.goal()
         publish(bench, 5.0)
-        assert bench.report().other_writer == SAID
+        assert bench.report().other_writer == REPORTED
 
     def test_an_echo_of_an_unknown_machine_is_ignored(self, bench):
         publish(bench, key=Key("ws://gone:9090", "/cmd_vel"))

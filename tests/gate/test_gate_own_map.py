@@ -1,4 +1,4 @@
-"""What people point at on the common map is told to a robot in its own."""
+"""Goals on the common map are sent to a robot in its own map."""
 
 import math
 import time
@@ -71,7 +71,7 @@ def test_a_goal_from_a_page_arrives_in_the_own_map_of_the_robot(
 
     def received(topic, op):
         if not fake.of("publish", topic):
-            page.goal(op=op)  # at 1, 2 on the common map, looking along its x
+            page.goal(op=op)  # at 1, 2 on the common map, facing along its x
             time.sleep(0.05)
         return fake.of("publish", topic)
 

@@ -1,4 +1,4 @@
-"""The small parts that decide: ticks, leases, limits, dead-man, zeros, links."""
+"""The small parts of the rules: ticks, leases, limits, dead-man, zeros, links."""
 
 import itertools
 import math
@@ -288,7 +288,7 @@ class TestHealth:
         link = LinkHealth()
         assert not link.fresh(0.0)
         link.opened(0.0)
-        assert not link.fresh(0.0), "nothing was asked yet"
+        assert not link.fresh(0.0), "no ping was sent yet"
         link.answered(0.0, 0.0)
         assert link.fresh(0.3)
         assert not link.fresh(0.31)
@@ -318,7 +318,7 @@ class TestHealth:
     def test_a_ping_answer_confirms_only_what_was_sent_before_the_ping(self):
         link = LinkHealth()
         link.opened(1.0)
-        assert not link.answered_since(0.9), "a handshake says nothing of when"
+        assert not link.answered_since(0.9), "a handshake is no answer to a ping"
         link.answered(2.0, 2.5)
         link.answered(1.0, 2.6)
         assert link.answered_since(1.9)
@@ -326,7 +326,7 @@ class TestHealth:
         link.closed()
         assert not link.answered_since(1.9)
         link.opened(3.0)
-        assert not link.answered_since(1.9), "that was another link"
+        assert not link.answered_since(1.9), "the answer came over another link"
         assert link.trips.p95 is None
 
     def test_the_display_counts_as_alive_for_250_ms_after_a_heartbeat(self):
@@ -359,11 +359,11 @@ class TestConnection:
 
     def test_an_equal_refusal_is_reported_at_most_once_a_second(self):
         connection = Connection("c1", "Ann", "operator")
-        news = connection.is_new_refusal
-        assert news("r1", "drive", "why", 0.0)
-        assert not news("r1", "drive", "why", 0.9)
-        assert news("r1", "drive", "another", 0.9)
-        assert news("r1", "drive", "why", 1.0)
+        is_new = connection.is_new_refusal
+        assert is_new("r1", "drive", "why", 0.0)
+        assert not is_new("r1", "drive", "why", 0.9)
+        assert is_new("r1", "drive", "another", 0.9)
+        assert is_new("r1", "drive", "why", 1.0)
 
 
 def test_restarting_a_burst_of_zeros_never_shortens_the_burst():

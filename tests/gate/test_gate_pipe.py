@@ -1,4 +1,4 @@
-"""What the gate says to the display and to its log holds nothing up."""
+"""Messages to the display and to the log do not block the gate."""
 
 import logging
 import os
@@ -20,7 +20,7 @@ def pipe():
 
 
 def shut(end):
-    """Close an end of a pipe, and keep its number from being given to another."""
+    """Close an end of a pipe, and keep its number in use."""
     nothing = os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, end)
     os.close(nothing)
@@ -80,7 +80,7 @@ class TestLog:
         handler = BackgroundHandler(Stopped())
         for number in range(50):
             handler.emit(self.record(str(number)))
-        handler.drain(0.0)  # there is no room even for that
+        handler.drain(0.0)  # the queue is too full even for its end
         go_on.set()
         handler.drain(0.0)
         while not written or handler._thread.is_alive():

@@ -1,4 +1,4 @@
-"""The gate's process itself, at both ends of its pipes; it tells what it has run."""
+"""The gate's process, at both ends of its pipes; its coverage is measured."""
 
 import asyncio
 import gc
@@ -21,12 +21,12 @@ from webmap.gate.rules.gate import Gate
 
 @pytest.fixture
 def not_measured():
-    """Have what these processes run counted: each comes to an end of its own."""
+    """Measure the coverage of these processes: each of them ends normally."""
 
 
 @pytest.fixture
 def gate():
-    """A gate's process."""
+    """A gate process."""
     started = subprocess.Popen(
         python_command("webmap.gate"),
         stdin=subprocess.PIPE,
@@ -40,31 +40,31 @@ def gate():
             started.kill()
 
 
-def said_until_ready(gate):
-    unpacker, said = pipe.Unpacker(FromGate), []
+def messages_until_ready(gate):
+    unpacker, messages = pipe.Unpacker(FromGate), []
 
     def ready():
-        said.extend(unpacker.feed(os.read(gate.stdout.fileno(), 1 << 16)))
-        return said
+        messages.extend(unpacker.feed(os.read(gate.stdout.fileno(), 1 << 16)))
+        return messages
 
-    eventually(ready, "its first word", 60.0)
-    return said
+    eventually(ready, "its first message", 60.0)
+    return messages
 
 
 def test_the_gate_reports_its_process_id_and_exits_when_the_pipe_closes(gate):
-    assert said_until_ready(gate)[0] == Ready(gate.pid)
+    assert messages_until_ready(gate)[0] == Ready(gate.pid)
     _, err = gate.communicate(pipe.pack(Heartbeat()), timeout=60)
     assert (gate.returncode, err) == (0, b"")
 
 
 def test_an_error_in_the_reader_thread_shuts_the_gate_down():
-    """Whatever kept it from reading: one that hears no STOP must not go on."""
+    """A gate that cannot receive a STOP must not go on, whatever the error is."""
 
     class Loop:
         def __init__(self):
             self.received = []
 
-        def call_soon_threadsafe(self, tell, event):
+        def call_soon_threadsafe(self, fn, event):
             self.received.append(event)
             if isinstance(event, Heartbeat):
                 raise LookupError(event)
@@ -84,13 +84,13 @@ def test_an_error_in_the_reader_thread_shuts_the_gate_down():
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_makes_the_gate_exit_with_code_0(gate, number):
-    said_until_ready(gate)
+    messages_until_ready(gate)
     gate.send_signal(number)
-    assert gate.wait(60) == 0, "and not by the signal itself"
+    assert gate.wait(60) == 0, "the signal itself does not end the gate"
 
 
 def test_invalid_data_on_the_pipe_makes_the_gate_exit(gate):
-    said_until_ready(gate)
+    messages_until_ready(gate)
     gate.stdin.write(b"\xff" * 8)
     gate.stdin.flush()
     assert gate.wait(60) == 0, "although the pipe is still open"
@@ -108,8 +108,8 @@ def test_an_internal_error_is_logged_and_ends_the_gate_with_code_1(monkeypatch, 
         assert asyncio.run(process._serve(pipe_in, box)) == 1
         assert "the gate has failed" in caplog.text
         box.close(30.0)
-        said = pipe.Unpacker(FromGate).feed(os.read(out, 1 << 16))
-        assert said == [Ready(os.getpid())]
+        messages = pipe.Unpacker(FromGate).feed(os.read(out, 1 << 16))
+        assert messages == [Ready(os.getpid())]
     finally:
         gc.unfreeze()
         for number, handler in kept.items():
@@ -119,7 +119,7 @@ def test_an_internal_error_is_logged_and_ends_the_gate_with_code_1(monkeypatch, 
         reader.join(30)
         for end in (pipe_in, pipe_out, out):
             os.close(end)
-    assert not reader.is_alive(), "a loop that has ended is told nothing more"
+    assert not reader.is_alive(), "the reader ends after the loop"
 
 
 def test_importing_the_main_module_does_not_start_a_gate(monkeypatch):

@@ -1,4 +1,4 @@
-"""The gate is not kept waiting for a processor, where it may ask for that."""
+"""The gate gets realtime priority where the system permits it."""
 
 import os
 import sys
@@ -11,11 +11,13 @@ from gate_robot import eventually
 from webmap.gate import process
 from webmap.gate.display.client import GateClient
 
-linux = pytest.mark.skipif(sys.platform != "linux", reason="Linux's way to say it")
+linux = pytest.mark.skipif(
+    sys.platform != "linux", reason="needs the scheduler of Linux"
+)
 
 
 def in_a_thread(fn):
-    """Call it where what it changes ends with the thread."""
+    """Call a function in a thread of its own, so that its changes end with it."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(fn).result()
 

@@ -1,4 +1,4 @@
-"""The road of the display's own Python code."""
+"""The commands of a program: the display's own Python code."""
 
 import math
 
@@ -45,7 +45,7 @@ def test_a_program_cannot_take_a_robot_from_an_operator(bench):
 def test_an_operator_takes_a_robot_from_a_program_after_standstill(bench):
     epoch = take(bench).epoch
     twist(bench, 0.5, 0.0, 0.0)
-    assert bench.take("a") is None  # not before it stands
+    assert bench.take("a") is None  # not before standstill
     assert bench.written[-1].twist == ZERO
     assert bench.take("a") is None
     bench.run(1.1)
@@ -122,7 +122,7 @@ def test_a_velocity_that_arrives_after_the_display_timeout_ends_the_lease(bench)
 
 
 def test_a_program_cannot_drive_with_its_old_lease_after_the_display_paused(bench):
-    """Its dead-man ends before the silence of the display shows, as by SIGSTOP."""
+    """The dead-man expires before the display counts as silent, as with SIGSTOP."""
     take(bench)
     epoch = bench.report().epoch
     twist(bench, 0.5, 0.0, 0.0)
@@ -171,7 +171,7 @@ class TestTakeAnswer:
         self, bench
     ):
         self.ask(bench)
-        bench.say("a", op="take", robot="r1")
+        bench.send("a", op="take", robot="r1")
         bench.run(0.02)
         assert "no operator has control" in bench.of(protocol.TakeReply)[-1].why
 
@@ -324,7 +324,7 @@ class TestProgramsOfOtherDisplays:
     def test_an_operator_takes_its_robot(self, bench):
         epoch = self.take(bench).epoch
         self.twist(bench)
-        bench.say("a", op="take", robot="r1")
+        bench.send("a", op="take", robot="r1")
         assert bench.written[-1].twist == ZERO
         bench.run(1.1)
         assert bench.report().holder.connection == "a"
@@ -334,7 +334,7 @@ class TestProgramsOfOtherDisplays:
     def test_that_of_a_viewer_takes_nothing_and_can_stop(self, bench):
         self.join(bench, BEN, "viewer")
         assert "viewers can only look" in self.take(bench, BEN).why
-        bench.say(BEN, op="stop", robot="r1")
+        bench.send(BEN, op="stop", robot="r1")
         assert bench.report().stop.by == "the program of ben"
 
     @pytest.mark.parametrize("who", ["cat.6d/program", "a"])
@@ -355,18 +355,18 @@ class TestProgramsOfOtherDisplays:
             bench.run(0.05)
         bench.drive(ANN, x=1.0)
         bench.goal(ANN)
-        bench.say(BEN, op="ask", robot="r1")
+        bench.send(BEN, op="ask", robot="r1")
         assert bench.written == []
         assert not bench.did(actions.SendGoal)
         assert bench.report().asker is None
         assert "as a page does" in bench.refusals(ANN)[-1].why
 
     def test_it_sends_what_needs_no_control_as_a_page_does(self, bench):
-        bench.say(ANN, op="cancel", robot="r1")
+        bench.send(ANN, op="cancel", robot="r1")
         assert len(bench.did(actions.CancelGoals)) == 1
-        bench.say(ANN, op="stop", robot="nobody")  # for all, as that of a page
+        bench.send(ANN, op="stop", robot="nobody")  # for all robots, as from a page
         assert bench.state == "stopped"
-        bench.say(ANN, op="reset", robot="r1")
+        bench.send(ANN, op="reset", robot="r1")
         assert not bench.report().latched
 
     def test_requests_for_a_robot_that_cannot_move_yet_are_bounded(self, bench):

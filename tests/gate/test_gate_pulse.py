@@ -1,4 +1,4 @@
-"""What pages are told while the display stands still for a moment, and afterwards."""
+"""The reports to pages while the display process pauses, and afterwards."""
 
 import pytest
 from gate_harness import Bench
@@ -15,5 +15,5 @@ def test_a_robot_can_be_taken_again_as_soon_as_the_display_is_back(taken):
     assert bench.report().reason == "the display process does not respond"
     bench.beating = True
     bench.run(0.05)
-    assert bench.report().armable, "pages would not even ask for it"
+    assert bench.report().armable, "else pages do not request control"
     assert bench.report().reason is None

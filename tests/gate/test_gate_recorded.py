@@ -1,4 +1,4 @@
-"""A hand, a running gate and a robot that notes what it is told."""
+"""A page, a running gate and a robot that records the messages that it receives."""
 
 import json
 import random
@@ -31,7 +31,7 @@ def witness():
 
 @pytest.fixture
 def driven(client: GateClient, robot_spec, witness):
-    """Declare the witness with some settings; returns a page that may drive it."""
+    """Declare the witness with some settings; return a page that may drive it."""
     pages = []
 
     def declare(kind=Recorder, **changes):
@@ -54,15 +54,15 @@ def driven(client: GateClient, robot_spec, witness):
 
 
 class Recorder(Page):
-    """Keeps every word that it said."""
+    """A page that keeps every command that it sent."""
 
     def __init__(self, client):
-        self.said = []
+        self.sent = []
         super().__init__(client)
 
-    def say(self, **command):
-        self.said.append(command)
-        super().say(**command)
+    def send(self, **command):
+        self.sent.append(command)
+        super().send(**command)
 
 
 def moving(witness, since=0.0):
@@ -74,7 +74,7 @@ def moving(witness, since=0.0):
 
 
 def press(page, reached, what):
-    """Press until it is so; a busy machine may ask for a release in between."""
+    """Press until ``reached`` returns true; a busy computer may require a release."""
 
     def under_way():
         page.x = 1.0 if page.robot()["armed"] else 0.0
@@ -91,23 +91,23 @@ def test_replayed_commands_of_an_old_session_do_not_move_the_robot(
     page.take()
     press(page, lambda: len(moving(witness)) > 10, "a drive")
     page.end()
-    recorded = [word for word in page.said if word["op"] == "drive"]
-    assert any(word["x"] for word in recorded)
+    recorded = [command for command in page.sent if command["op"] == "drive"]
+    assert any(command["x"] for command in recorded)
     other = Recorder(client)
     other.take()
     before = time.monotonic()
-    for number, word in enumerate(recorded, 1):
+    for number, command in enumerate(recorded, 1):
         now = {"epoch": other.robot()["epoch"], "seq": number}
         other.connection.receive(
-            json.dumps(word | {name: now[name] for name in forged})
+            json.dumps(command | {name: now[name] for name in forged})
         )
         witness_has_time = time.monotonic() + 0.05
         eventually(lambda until=witness_has_time: time.monotonic() > until, "50 ms")
     assert not moving(witness, before)
     other.x = 0.0
-    eventually(lambda: other.robot()["armed"], "a hand at rest")
+    eventually(lambda: other.robot()["armed"], "released inputs")
     other.x = 1.0
-    eventually(lambda: moving(witness, before), "its own words to move it")
+    eventually(lambda: moving(witness, before), "motion by its own commands")
     other.end()
 
 
@@ -128,11 +128,11 @@ def test_a_robot_does_not_accelerate_faster_than_its_limit(driven, witness):
     )
     assert not wrong
     speeds = [received.speed for received in witness.log.twists]
-    assert any(0.0 < speed < 0.2 for speed in speeds), "it was sped up by and by"
+    assert any(0.0 < speed < 0.2 for speed in speeds), "the speed rose gradually"
 
 
 class LatePage(Recorder):
-    """Hears each tick late, by fits and starts, as over a link with jitter."""
+    """Receives each tick late, after a varying delay, as over a link with jitter."""
 
     def __init__(self, client, latency, jitter):
         self._lateness = random.Random(1)
@@ -140,8 +140,8 @@ class LatePage(Recorder):
         self._ticks = []
         super().__init__(client)
 
-    def _hear(self, text):
-        super()._hear(text)
+    def _receive(self, text):
+        super()._receive(text)
         message = json.loads(text)
         if message["op"] == "tick":
             self._ticks.append((time.monotonic(), message["tick"]))
@@ -160,8 +160,8 @@ def test_a_slow_page_connection_with_jitter_reduces_the_speed(driven, witness):
     page = driven(kind=lambda client: LatePage(client, 0.12, 0.03))
     page.take()
     press(page, lambda: len(moving(witness)) > 60, "a drive")
-    # A quarter of a metre until anything takes effect: the loop, the dead-man timeout
-    # and 250 ms of the robot's own. The first words are from before it is known.
+    # A quarter of a metre during the age of the loop, the dead-man timeout and the
+    # 250 ms of the robot. The first velocities were sent before the age was known.
     fastest = max(received.speed for received in moving(witness)[30:])
     assert fastest <= 0.25 / (DEADMAN + 0.25 + 0.15)
 
@@ -171,7 +171,7 @@ def test_a_page_connection_slower_than_300_ms_does_not_move_the_robot(driven, wi
     page.take()
     for x in (0.0, 1.0):
         page.x = x
-        said = len(page.said)
-        eventually(lambda until=said + 40: len(page.said) > until, "two seconds", 30)
-    assert any(word.get("x") for word in page.said)
+        count = len(page.sent)
+        eventually(lambda until=count + 40: len(page.sent) > until, "two seconds", 30)
+    assert any(command.get("x") for command in page.sent)
     assert not moving(witness)

@@ -1,4 +1,4 @@
-"""What is refused is counted for the display, each message once."""
+"""Refused messages are counted for the display, each message once."""
 
 import pytest
 
@@ -15,8 +15,10 @@ def gate() -> Gate:
 
 
 def counts(actions):
-    said = [action.message for action in actions if isinstance(action, SendToDisplay)]
-    return [message for message in said if isinstance(message, RefusedCount)]
+    messages = [
+        action.message for action in actions if isinstance(action, SendToDisplay)
+    ]
+    return [message for message in messages if isinstance(message, RefusedCount)]
 
 
 def garbage(gate, texts, at):

@@ -1,4 +1,4 @@
-"""What the gate says to a robot's ROS, and what it understands of the answers."""
+"""The messages of the gate to a robot's ROS, and the parsing of the answers."""
 
 import json
 import math
@@ -11,13 +11,13 @@ from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.lanes import rosbridge
 
 
-def said(data):
+def decoded(data):
     return json.loads(data)
 
 
 def goal_by(way, **changes):
     goal = SendGoal(KEY, "r1", "g1", 1.0, 2.0, math.pi, "a", way)
-    return said(rosbridge.goal(spec(**changes), goal))
+    return decoded(rosbridge.goal(spec(**changes), goal))
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_a_stamped_velocity_has_a_zero_stamp_in_the_format_of_its_ros_version(
     type, stamp
 ):
     velocity = rosbridge.velocity("/cmd_vel", type, Twist(0.5, 0.25, -1.0), "base")
-    message = said(velocity)["msg"]
+    message = decoded(velocity)["msg"]
     assert message["header"] == {"stamp": stamp, "frame_id": "base"}
     assert message["twist"]["linear"] == {"x": 0.5, "y": 0.25, "z": 0.0}
     assert message["twist"]["angular"] == {"x": 0.0, "y": 0.0, "z": -1.0}
@@ -40,7 +40,7 @@ def test_a_stamped_velocity_has_a_zero_stamp_in_the_format_of_its_ros_version(
 @pytest.mark.parametrize("type", ["Twist", "TwistStamped", "msg/TwistStamped"])
 def test_a_velocity_has_all_six_numbers(type):
     twist = Twist(1.0, 2.0, 6.0, vz=3.0, wx=4.0, wy=5.0)
-    message = said(rosbridge.velocity("/cmd_vel", f"geometry_msgs/{type}", twist))[
+    message = decoded(rosbridge.velocity("/cmd_vel", f"geometry_msgs/{type}", twist))[
         "msg"
     ]
     message = message.get("twist", message)
@@ -48,7 +48,7 @@ def test_a_velocity_has_all_six_numbers(type):
     assert message["angular"] == {"x": 4.0, "y": 5.0, "z": 6.0}
 
 
-def heard_with(**changes):
+def parsed_with(**changes):
     numbers = {"x": 1.0, "y": 2.0, "z": 3.0, "rx": 4.0, "ry": 5.0, "rz": 6.0, **changes}
     message = {
         "linear": {axis: numbers[axis] for axis in "xyz"},
@@ -59,26 +59,26 @@ def heard_with(**changes):
 
 
 def test_odometry_is_read_with_all_six_numbers():
-    assert heard_with() == Twist(1.0, 2.0, 6.0, vz=3.0, wx=4.0, wy=5.0)
+    assert parsed_with() == Twist(1.0, 2.0, 6.0, vz=3.0, wx=4.0, wy=5.0)
 
 
 @pytest.mark.parametrize(("axis", "field"), [("z", "vz"), ("rx", "wx"), ("ry", "wy")])
 @pytest.mark.parametrize("nothing", [None, math.nan])
 def test_a_missing_number_outside_the_plane_is_read_as_nan(axis, field, nothing):
-    twist = heard_with(**{axis: nothing})
+    twist = parsed_with(**{axis: nothing})
     assert math.isnan(getattr(twist, field))
     assert (twist.vx, twist.vy, twist.wz) == (1.0, 2.0, 6.0)
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "rz"])
 def test_odometry_with_a_missing_number_in_the_plane_has_no_velocity(axis):
-    assert heard_with(**{axis: None}) is None
+    assert parsed_with(**{axis: None}) is None
 
 
 def test_a_plain_velocity_has_no_header():
-    message = said(rosbridge.velocity("/cmd_vel", "geometry_msgs/Twist", Twist(0.5)))[
-        "msg"
-    ]
+    message = decoded(
+        rosbridge.velocity("/cmd_vel", "geometry_msgs/Twist", Twist(0.5))
+    )["msg"]
     assert message.keys() == {"linear", "angular"}
 
 
@@ -108,18 +108,18 @@ def test_an_action_goal_is_sent_with_send_action_goal():
 
 
 def test_cancels_hooks_and_poses_are_encoded():
-    assert said(rosbridge.cancel_by_topic("/cancel"))["msg"] == {}
-    cancel = said(rosbridge.cancel_by_service("/go", "c1"))
+    assert decoded(rosbridge.cancel_by_topic("/cancel"))["msg"] == {}
+    cancel = decoded(rosbridge.cancel_by_service("/go", "c1"))
     assert cancel["service"] == "/go/_action/cancel_goal"
-    assert said(rosbridge.flag("/lock", True))["msg"] == {"data": True}
-    call = said(rosbridge.trigger("/e_stop", "std_srvs/Trigger", "t1"))
+    assert decoded(rosbridge.flag("/lock", True))["msg"] == {"data": True}
+    call = decoded(rosbridge.trigger("/e_stop", "std_srvs/Trigger", "t1"))
     assert (call["op"], call["service"], call["id"]) == (
         "call_service",
         "/e_stop",
         "t1",
     )
     located = spec(pose_topic="/initialpose", pose_covariance=(0.1, 0.2, 0.3))
-    pose = said(
+    pose = decoded(
         rosbridge.pose_estimate(located, SendPose(KEY, "r1", 1.0, 2.0, 0.0, "a"))
     )
     covariance = pose["msg"]["pose"]["covariance"]

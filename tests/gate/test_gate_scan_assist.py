@@ -1,4 +1,4 @@
-"""Scan assist within the gate: commands are slowed, and people are told why."""
+"""Scan assist within the gate: it reduces velocities and reports the reason."""
 
 import itertools
 import math
@@ -44,7 +44,7 @@ def speeds(bench, at):
 
 
 def under_way(bench):
-    """Take the robot, let go of everything, press, with nothing in sight."""
+    """Take the robot, send released inputs, then drive, without obstacles."""
     bench.take()
     hold_seeing(bench, math.inf, 0.3)
     hold_seeing(bench, math.inf, 0.3, x=1.0)
@@ -71,7 +71,7 @@ def test_a_robot_slows_down_before_a_wall_and_reports_the_reason(bench):
 
 
 def test_scan_assist_checks_the_ramped_velocity_and_not_the_command():
-    """It could pass the point on the wide arc that is asked for, not on the ramp's."""
+    """The robot would pass the point on the commanded arc, not on the ramped arc."""
     tail = ((0.3, 0.3), (-0.9, 0.3), (-0.9, -0.3), (0.3, -0.3))
     point = (-0.91, 0.23)
     about = AssistSpec(topic="/scan", footprint=tail)
@@ -113,9 +113,9 @@ def test_a_robot_stops_when_its_scans_end(bench):
 
 def test_a_scan_from_before_taking_control_does_not_allow_motion(bench):
     under_way(bench)
-    bench.say("a", op="release", robot="r1")
+    bench.send("a", op="release", robot="r1")
     bench.run(1.0)
-    scan(bench, math.inf)  # nobody listens any more
+    scan(bench, math.inf)  # the machine is not watched
     bench.take()
     bench.hold(0.3)
     since = bench.now
@@ -124,7 +124,7 @@ def test_a_scan_from_before_taking_control_does_not_allow_motion(bench):
 
 
 def see_frames(bench, frames, seconds, x=1.0):
-    """Have scans come that name these frames, over and over, one with each command."""
+    """Let scans with these frames arrive in turn, one with each command."""
     start, names = bench.now, itertools.cycle(frames)
 
     def each():
@@ -161,11 +161,11 @@ def test_a_scan_with_another_frame_than_configured_stops_the_robot():
     start = bench.now
     bench.run(0.3, lambda: (scan(bench, math.inf, "camera"), bench.drive(x=1.0)))
     assert bench.moving_since(start + 0.05) == []
-    said = "scan assist: the scan has frame 'camera', expected 'laser'"
-    assert said in bench.report().why
+    why = "scan assist: the scan has frame 'camera', expected 'laser'"
+    assert why in bench.report().why
     bench.run(0.3, lambda: (scan(bench, math.inf, ""), bench.drive(x=1.0)))
-    said = "scan assist: the scan has no frame, expected 'laser'"
-    assert said in bench.report().why
+    why = "scan assist: the scan has no frame, expected 'laser'"
+    assert why in bench.report().why
 
 
 def test_a_scan_for_an_unknown_machine_is_ignored(bench):
@@ -176,7 +176,7 @@ def test_a_scan_for_an_unknown_machine_is_ignored(bench):
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "why"),
     [
         ({"footprint": ((0.0, 0.0), (1.0, 0.0))}, "3 to 100 corners"),
         ({"footprint": (BOX[0], BOX[2], BOX[1], BOX[3])}, "meets the edge"),
@@ -188,9 +188,9 @@ def test_a_scan_for_an_unknown_machine_is_ignored(bench):
         ({"sensor": (math.inf, 0.0, 0.0)}, "finite"),
     ],
 )
-def test_an_invalid_scan_assist_configuration_raises_config_error(changed, said):
+def test_an_invalid_scan_assist_configuration_raises_config_error(changed, why):
     about = {"topic": "/scan", "footprint": BOX, **changed}
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(ConfigError, match=why):
         checked(spec(assist=AssistSpec(**about)))
 
 

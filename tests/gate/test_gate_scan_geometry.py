@@ -1,4 +1,4 @@
-"""Scan assist asks whether the scan looks where the robot is about to go."""
+"""Scan assist checks whether the scan covers the path of the robot."""
 
 import math
 import time
@@ -23,7 +23,7 @@ def spec(**more):
 
 
 def scan(first, last, *, step=1.0):
-    """A scan that sees nothing between two angles in degrees."""
+    """A scan without obstacles between two angles in degrees."""
     count = round((last - first) / step) + 1
     ranges = [math.inf] * count
     low, each = math.radians(first), math.radians(step)
@@ -45,7 +45,7 @@ class TestAhead:
         assert verdict(scan(-20, 20), AHEAD, blind="creep").scale == pytest.approx(0.2)
 
     def test_a_scan_of_one_side_does_not_allow_driving_ahead(self):
-        # Its rays are most of what is asked for ahead, and all of them are free.
+        # The scan covers most of the path, without obstacles.
         assert verdict(scan(-90, 5), AHEAD).why == PART
         assert verdict(scan(-5, 90), AHEAD).why == PART
 
@@ -57,7 +57,7 @@ class TestAhead:
         behind = (-0.3, 0.0, math.pi)
         assert verdict(scan(-90, 90), AHEAD, sensor=behind).scale == 0.0
         assert verdict(scan(90, 270), AHEAD, sensor=behind).scale == 1.0
-        # Close behind its front it must look more to the sides.
+        # A scanner at the front of the robot needs a wider scan.
         assert verdict(scan(-35, 35), AHEAD).scale == 1.0
         assert verdict(scan(-35, 35), AHEAD, sensor=(0.3, 0.0, 0.0)).why == PART
 

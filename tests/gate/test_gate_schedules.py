@@ -1,7 +1,7 @@
-"""Random schedules of people, links, disks and the display, always the same ones.
+"""Random schedules of users, links, disks and the display, with fixed seeds.
 
-What the gate decides in each is recorded (see ``decisions.py``): these are schedules
-that nobody wrote by hand, in the order in which nobody would try them.
+The decisions of the gate in each schedule are recorded (see ``decisions.py``): random
+schedules have sequences of events that the other tests do not have.
 """
 
 import random
@@ -54,17 +54,17 @@ def drive_off(bench, chance):
     bench.drive_off(chance.choice(PEOPLE), x=chance.choice([0.5, 1.0]))
 
 
-def say(bench, chance):
+def send_command(bench, chance):
     op = chance.choice(["take", "release", "ask", "grant", "deny", "cancel"])
-    bench.say(chance.choice(PEOPLE), op=op, robot="r1")
+    bench.send(chance.choice(PEOPLE), op=op, robot="r1")
 
 
 def stop(bench, chance):
-    bench.say(chance.choice(PEOPLE), op="stop", robot=chance.choice(["r1", "*"]))
+    bench.send(chance.choice(PEOPLE), op="stop", robot=chance.choice(["r1", "*"]))
 
 
 def reset(bench, chance):
-    bench.say(chance.choice(PEOPLE), op="reset", robot="r1")
+    bench.send(chance.choice(PEOPLE), op="reset", robot="r1")
 
 
 def stop_elsewhere(bench, chance):
@@ -112,7 +112,7 @@ def wait(bench, chance):
 EVENTS = (
     lose,
     mend,
-    *(hold, drive_off, say, odometry) * 3,
+    *(hold, drive_off, send_command, odometry) * 3,
     stop,
     *(reset,) * 2,
     stop_elsewhere,

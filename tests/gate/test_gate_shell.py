@@ -1,4 +1,4 @@
-"""The gate whole, in the test's own process: decisions, links, disk and locks."""
+"""The whole gate in the process of the test: decisions, links, disk and locks."""
 
 import asyncio
 import contextlib
@@ -19,32 +19,32 @@ pytestmark = pytest.mark.slow
 
 
 class Running:
-    """A gate that runs, the display that it talks to, and a page with a hand."""
+    """A running gate, its display, and a page that drives."""
 
     def __init__(self, folder):
-        self.said = []
+        self.messages = []
         self.locks = Locks(folder)
         self.shell = Shell(self, self.locks, Disk(Records(folder)))
         self.x = None
-        """What the hand asks for; ``None`` sends nothing."""
+        """The forward input; ``None`` sends no commands."""
         self._seq = 0
 
     def put(self, message):
-        """Take what the display is told."""
-        self.said.append(message)
+        """Receive a message to the display."""
+        self.messages.append(message)
 
     async def __aenter__(self):
         self.work = asyncio.create_task(self.shell.run())
-        self._hand = asyncio.create_task(self._stream())
+        self._driver = asyncio.create_task(self._stream())
         self.shell.deliver(protocol.Connect("a", "Ann", "operator"))
         return self
 
     async def __aexit__(self, *_):
-        self._hand.cancel()
+        self._driver.cancel()
         await self.end()
 
     async def end(self):
-        """End it as the end of the pipe does."""
+        """End the gate as the end of its pipe does."""
         if not self.work.done():
             self.shell.deliver(events.Shutdown("the display process has ended"))
         await self.work
@@ -56,7 +56,7 @@ class Running:
             report, tick = self.report(), self.tick
             if self.x is not None and report is not None and tick is not None:
                 self._seq += 1
-                self.say(
+                self.send(
                     op="drive",
                     robot="r1",
                     epoch=report.epoch or 0,
@@ -67,17 +67,19 @@ class Running:
                     turn=0.0,
                 )
 
-    def say(self, **command):
+    def send(self, **command):
         text = json.dumps(command).encode()
         self.shell.deliver(protocol.FromPage("a", text))
 
     @property
     def tick(self):
-        ticks = (m.tick for m in reversed(self.said) if isinstance(m, protocol.Tick))
+        ticks = (
+            m.tick for m in reversed(self.messages) if isinstance(m, protocol.Tick)
+        )
         return next(ticks, None)
 
     def report(self):
-        for message in reversed(self.said):
+        for message in reversed(self.messages):
             if isinstance(message, protocol.RobotReport):
                 return message
         return None
@@ -86,8 +88,8 @@ class Running:
         await until(lambda: (r := self.report()) is not None and check(r), what)
 
     async def drive_off(self, bridge):
-        await self.reported(lambda r: r.armable, "a robot to be had")
-        self.say(op="take", robot="r1")
+        await self.reported(lambda r: r.armable, "a free robot")
+        self.send(op="take", robot="r1")
         self.x = 1.0
         await until(lambda: any(speeds(bridge)), "motion")
 
@@ -126,15 +128,15 @@ async def test_goals_are_cancelled_before_the_gate_ends(tmp_path, monkeypatch):
         gate.shell.deliver(
             robot(bridge, action="/go", cancel_topic=None, on_operator_loss="cancel")
         )
-        await gate.reported(lambda r: r.armable, "a robot to be had")
+        await gate.reported(lambda r: r.armable, "a free robot")
         await until(lambda: bridge.of("advertise", "/goal"), "the link of goals")
-        gate.say(op="take", robot="r1")
+        gate.send(op="take", robot="r1")
         await gate.reported(lambda r: r.holder is not None, "the lease")
         epoch, tick = gate.report().epoch, gate.tick
         goal = {"op": "goal", "robot": "r1", "epoch": epoch, "seq": 1, "tick": tick}
-        gate.say(**goal, x=1.0, y=2.0, yaw=0.0)
+        gate.send(**goal, x=1.0, y=2.0, yaw=0.0)
         await until(lambda: bridge.of("send_action_goal"), "the goal")
-        # Its socket is spent: whether there is another yet makes no difference.
+        # The goal has used its socket; the cancel works with or without a new socket.
         await gate.end()
         assert [t.message["service"] for t in bridge.of("call_service")] == [
             "/go/_action/cancel_goal"
@@ -148,7 +150,7 @@ async def test_a_hanging_stop_hook_does_not_prevent_the_end_of_the_gate(tmp_path
         bridge.answers_services = False
         gate.shell.deliver(robot(bridge, stop_hooks=(hook,)))
         await gate.reported(lambda r: r.armable, "a link")
-        gate.say(op="stop", robot="r1")
+        gate.send(op="stop", robot="r1")
         await until(lambda: bridge.of("call_service"), "the call")
         before = asyncio.get_running_loop().time()
         await gate.end()
@@ -175,14 +177,14 @@ async def test_a_failed_gate_sends_zero_and_ends(tmp_path, monkeypatch, caplog, 
         await until(lambda: speeds(bridge)[-1] == 0.0, "the zero")
         await until(lambda: not bridge.links, "the end of the links")
         assert 0.0 in speeds(bridge)[moves:]
-        gate._hand.cancel()
+        gate._driver.cancel()
 
 
 @in_loop
 async def test_an_error_while_sending_one_last_zero_does_not_prevent_the_others(
     tmp_path, monkeypatch, caplog
 ):
-    """The first machine's link is broken; the second and the end do not wait for it."""
+    """The link of the first machine fails; the second machine still gets its zero."""
     write, broken = ControlLane.write, []
 
     def break_on_the_first(lane, topic, twist, *until):
@@ -195,8 +197,8 @@ async def test_an_error_while_sending_one_last_zero_does_not_prevent_the_others(
         gate.x = None
         gate.shell.deliver(robot(bridge, id="r2", twist_topic="/second"))
         await gate.reported(lambda r: r.robot == "r2" and r.armable, "the second")
-        gate.say(op="take", robot="r2")
-        await until(lambda: len(gate.shell._watched) == 2, "both that are watched")
+        gate.send(op="take", robot="r2")
+        await until(lambda: len(gate.shell._watched) == 2, "two watched machines")
         assert next(iter(gate.shell._links._watched)).topic == "/cmd_vel"
         before = len(bridge.of("publish", "/second"))
         monkeypatch.setattr(ControlLane, "write", break_on_the_first)
@@ -214,7 +216,7 @@ async def test_an_error_while_sending_one_last_zero_does_not_prevent_the_others(
 async def test_a_failed_gate_sends_only_zeros_while_the_page_continues_to_drive(
     tmp_path, monkeypatch
 ):
-    """While it waits for a hook that hangs, hand and display go on as before."""
+    """While the gate waits for a hook that hangs, page and display go on as before."""
     hook = {"service": "/e_stop", "type": "std_srvs/Trigger"}
     async with driving(tmp_path, stop_hooks=(hook,)) as (bridge, gate):
         bridge.answers_services = False
@@ -232,7 +234,7 @@ async def test_a_failed_gate_sends_only_zeros_while_the_page_continues_to_drive(
         late = speeds(bridge)[before:]
         assert late[late.index(0.0) :] == [0.0] * late.count(0.0)
         assert late.count(0.0) >= 2
-        gate._hand.cancel()
+        gate._driver.cancel()
 
 
 @in_loop
@@ -257,7 +259,7 @@ async def test_a_stalled_link_is_cut_and_zero_is_sent_first_on_the_new_link(tmp_
 
 @contextlib.asynccontextmanager
 async def robot_of_another_gate(tmp_path, monkeypatch):
-    """Run a gate and tell it of a robot for which another one has the lock."""
+    """Run a gate and declare a robot whose lock another gate has."""
     monkeypatch.setattr(shell, "LOCK_RETRY", 0.05)
     other = Locks(tmp_path)
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
@@ -277,19 +279,19 @@ async def test_a_gate_retries_the_lock_of_a_robot_until_another_gate_releases_it
         )
         assert not gate.report().armable
         other.release(key)
-        await gate.reported(lambda r: r.armable, "a robot to be had")
+        await gate.reported(lambda r: r.armable, "a free robot")
 
 
 @in_loop
 async def test_removing_a_robot_ends_the_wait_for_its_lock(tmp_path, monkeypatch):
     async with robot_of_another_gate(tmp_path, monkeypatch) as (gate, other, key):
-        await gate.reported(lambda r: not r.armable, "that it is not to be had")
+        await gate.reported(lambda r: not r.armable, "a robot that cannot be taken")
         gate.shell.deliver(protocol.Forget("r1"))
         gone = protocol.RobotGone("r1")
-        await until(lambda: gone in gate.said, "the end of the robot")
+        await until(lambda: gone in gate.messages, "the end of the robot")
         assert gate.shell._waiting_for_lock == {}
         other.release(key)
-        assert other.acquire(key).held, "nobody else asks for it"
+        assert other.acquire(key).held, "the gate no longer waits for the lock"
 
 
 @in_loop
@@ -297,7 +299,7 @@ async def test_removing_a_robot_releases_its_lock_for_another_gate(tmp_path):
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         key = Key(bridge.url, "/cmd_vel")
         gate.shell.deliver(robot(bridge))
-        await gate.reported(lambda r: r.armable, "a robot to be had")
+        await gate.reported(lambda r: r.armable, "a free robot")
         assert not Locks(tmp_path).acquire(key).held
         gate.shell.deliver(protocol.Forget("r1"))
         await until(lambda: Locks(tmp_path).acquire(key).held, "the lock")
@@ -315,7 +317,7 @@ async def test_an_unreadable_stop_file_means_an_active_stop(tmp_path, caplog):
         gate.shell.deliver(
             protocol.FromProgram(commands.Reset("r1", gate.report().stop.id))
         )
-        await gate.reported(lambda r: r.armable, "a robot to be had")
+        await gate.reported(lambda r: r.armable, "a free robot")
         await until(lambda: not path.exists(), "no file")
         assert not any(speeds(bridge))
 
@@ -333,7 +335,7 @@ async def test_a_gate_follows_stops_of_another_gate_and_saves_its_own(tmp_path):
         )
         await gate.reported(lambda r: not r.latched, "the reset")
         await until(lambda: Records(tmp_path).latch_of(key) is None, "no file")
-        gate.say(op="stop", robot="r1")
+        gate.send(op="stop", robot="r1")
         await until(lambda: Records(tmp_path).latch_of(key), "the file")
         assert Records(tmp_path).latch_of(key).by == "Ann"
 
@@ -344,12 +346,10 @@ async def test_all_spellings_of_this_computer_name_the_same_machine(tmp_path):
         url = bridge.url.replace("127.0.0.1", "localhost")
         assert url != bridge.url
         gate.shell.deliver(spec(id="r2", bridge_url=url))
-        await gate.reported(
-            lambda r: r.robot == "r2" and r.reason, "why it is not to be had"
-        )
+        await gate.reported(lambda r: r.robot == "r2" and r.reason, "the reason")
         second = gate.report()
         gate.x = None
-        gate.say(op="stop", robot="r2")
+        gate.send(op="stop", robot="r2")
         await gate.reported(
             lambda r: r.robot == "r1" and r.latched and r.stop.by == "Ann", "its STOP"
         )

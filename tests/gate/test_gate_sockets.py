@@ -29,7 +29,7 @@ from webmap.gate.lanes.sockets import Socket, open_socket
 
 
 async def opened(url, seen):
-    return await open_socket(url, seen.ears, Budget())
+    return await open_socket(url, seen.handlers, Budget())
 
 
 async def forever(link):
@@ -53,7 +53,7 @@ class TestOpen:
             link.close()
             await until(lambda: not bridge.links, "its end")
         assert not link.is_open
-        assert seen.lost == [], "what is closed on purpose is not lost"
+        assert seen.lost == [], "closing a link is no loss"
 
     @in_loop
     async def test_a_fragmented_message_is_received_once_and_complete(self):
@@ -61,9 +61,9 @@ class TestOpen:
 
         async def talk(link):
             await link.accept()
-            link.say(frame(TEXT, b"on", final=False))
-            link.say(frame(PONG, b"between"))
-            link.say(frame(MORE, b"e") + frame(TEXT, b"two"))
+            link.send(frame(TEXT, b"on", final=False))
+            link.send(frame(PONG, b"between"))
+            link.send(frame(MORE, b"e") + frame(TEXT, b"two"))
             await forever(link)
 
         async with raw_bridge(talk) as url:
@@ -102,11 +102,11 @@ class TestOpen:
 
         monkeypatch.setattr(ssl, "create_default_context", slow_disk)
         asking = asyncio.create_task(opened("wss://127.0.0.1:1", Received()))
-        await until(reading.is_set, "the reading")  # which another robot's loop sees
+        await until(reading.is_set, "the reading")  # the loop is not blocked
         may_end.set()
         with pytest.raises(BridgeClosed):
             await asking
-        assert ended == [True], "the loop stood still while it was read"
+        assert ended == [True], "the loop was blocked by the reading"
 
     def test_a_tls_bridge_is_accepted_only_with_a_trusted_certificate(
         self, tmp_path, monkeypatch
@@ -136,7 +136,7 @@ class TestOpen:
                 seen = Received()
                 link = await opened(url, seen)
                 link.send(b"hello")
-                await until(lambda: seen.lost, "the end of it")
+                await until(lambda: seen.lost, "the end of the link")
                 assert not link.is_open
 
         in_loop(story)()
@@ -165,13 +165,13 @@ class TestRefused:
 
         async def talk(link):
             await link.request()
-            link.say(answer)
+            link.send(answer)
             await forever(link)
 
         async with raw_bridge(talk) as url:
             with pytest.raises(BridgeClosed, match="no WebSocket at this address"):
                 await opened(url, seen)
-        assert seen.lost == [], "what was never open cannot be lost"
+        assert seen.lost == [], "a link that was never open is not lost"
 
     @in_loop
     async def test_a_bridge_that_closes_before_the_handshake_is_refused(self):
@@ -230,7 +230,7 @@ class TestRefused:
     @in_loop
     async def test_closing_a_socket_that_never_connected_reports_no_loss(self):
         seen = Received()
-        link = Socket("ws://127.0.0.1:1", seen.ears, Budget())
+        link = Socket("ws://127.0.0.1:1", seen.handlers, Budget())
         assert link.unsent == 0
         link.close()
         assert not link.is_open
@@ -266,7 +266,7 @@ class TestEnd:
             await until(lambda: "reset" in arrived, "the reset")
             assert sum(arrived[:-1]) < sent
             link.abort("again")
-        assert seen.lost == ["no longer used"], "it is lost once"
+        assert seen.lost == ["no longer used"], "the loss is reported once"
 
     @in_loop
     async def test_closing_sends_a_close_frame_and_ignores_later_messages(self):
@@ -281,10 +281,10 @@ class TestEnd:
             link = await opened(url, seen)
             link.close()
             link.data_received(frame(TEXT, b"late"))
-            await until(lambda: goodbyes, "the goodbye")
+            await until(lambda: goodbyes, "the close frame")
             assert goodbyes[0][0] == 0x80 | CLOSE
             go_on.set()
-            link.close()  # again, which is nothing
+            link.close()  # a second close does nothing
         assert (seen.texts, seen.lost) == ([], [])
 
     @in_loop
@@ -293,7 +293,7 @@ class TestEnd:
 
         async def talk(link):
             await link.accept()
-            link.say(frame(CLOSE, b"\x03\xe9"))
+            link.send(frame(CLOSE, b"\x03\xe9"))
             await forever(link)
 
         async with raw_bridge(talk) as url:
@@ -312,7 +312,9 @@ class TestEnd:
 
         async with raw_bridge(talk) as url:
             await opened(url, seen)
-            await until(lambda: seen.lost == ["the bridge closed the connection"], "it")
+            await until(
+                lambda: seen.lost == ["the bridge closed the connection"], "loss"
+            )
 
     @in_loop
     async def test_a_connection_reset_reports_a_loss_with_the_system_error(self):
@@ -320,7 +322,7 @@ class TestEnd:
         async with noting_bridge() as bridge:
             link = await opened(bridge.url, seen)
             link.send(b'{"op": "x"}')
-            await until(lambda: bridge.received, "the first word")
+            await until(lambda: bridge.received, "the first message")
             raw = bridge.transport_of(1).get_extra_info("socket")
             raw.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, sockets._LINGER)
             bridge.transport_of(1).abort()
@@ -334,7 +336,7 @@ class TestEnd:
 
         async def talk(link):
             await link.accept()
-            link.say(frame(TEXT, b"x" * 101))
+            link.send(frame(TEXT, b"x" * 101))
             await forever(link)
 
         async with raw_bridge(talk) as url:

@@ -1,4 +1,4 @@
-"""What makes the outline of a robot, and what does not."""
+"""Valid and invalid outlines of a robot."""
 
 import math
 
@@ -22,7 +22,7 @@ def test_outlines_in_both_directions_and_concave_outlines_are_accepted(corners):
 
 
 @pytest.mark.parametrize(
-    ("corners", "said"),
+    ("corners", "why"),
     [
         ((), "expected 3 to 100 corners, got 0"),
         (BOX[:2], "expected 3 to 100 corners, got 2"),
@@ -39,8 +39,8 @@ def test_outlines_in_both_directions_and_concave_outlines_are_accepted(corners):
         (((0, 0), (9e-3, 0), (9e-3, 9e-3)), "it has an area of 4.05e-05 m²; expected"),
     ],
 )
-def test_an_invalid_outline_is_refused_with_a_reason(corners, said):
-    assert said in why_no_outline(corners)
+def test_an_invalid_outline_is_refused_with_a_reason(corners, why):
+    assert why in why_no_outline(corners)
 
 
 @given(st.permutations(polygon_around(0.5, 7)))

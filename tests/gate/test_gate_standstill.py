@@ -1,4 +1,4 @@
-"""What a standstill is made of."""
+"""How a standstill is detected."""
 
 from webmap.base.geometry import Twist
 from webmap.gate.rules.health import STILL_FOR, Standstill

@@ -1,4 +1,4 @@
-"""STOP: it stands until a reset, outlives the gate, and is confirmed or it is not."""
+"""STOP: it is active until a reset, also in a new gate, and odometry confirms it."""
 
 import json
 
@@ -20,26 +20,26 @@ def bench():
 
 @pytest.fixture
 def seen():
-    """A robot whose odometry is listened to."""
+    """A bench with a robot that has odometry."""
     return Bench().begin(spec(odometry_topic="/odom"))
 
 
 def stop(bench, who="b", robot="r1"):
-    bench.say(who, op="stop", robot=robot)
+    bench.send(who, op="stop", robot=robot)
 
 
 def reset(bench, who="b", robot="r1"):
-    bench.say(who, op="reset", robot=robot)
+    bench.send(who, op="reset", robot=robot)
 
 
 def verdict(bench):
-    """Return what a page is told of the STOP that stands: by whom, confirmed, why."""
+    """Return the user, the confirmation and the reason of the active STOP."""
     stop = bench.report().stop
     return stop.by, stop.confirmed, stop.why
 
 
 def watch_it(bench, seconds, *speeds):
-    """Let odometry tell ``speeds``, one every 50 ms, the last one over and over."""
+    """Let odometry report ``speeds``, one every 50 ms; the last one is repeated."""
     wanted = iter(speeds)
     now = [0.0]
 
@@ -239,7 +239,7 @@ class TestLatch:
 
 
 class TestChangedKey:
-    """A robot that takes goals only is known by those, else by its velocity topic."""
+    """The key of a robot is its velocity topic, or else its goal topic."""
 
     ONLY_GOALS = spec(twist_topic=None)
     GOALS = Key(URL, "goal /goal")
@@ -361,7 +361,7 @@ class TestDisk:
         bench = Bench(slow_disk=True).begin()
         stop(bench)
         (only,) = bench.did(actions.SaveStop)
-        bench.say("b", op="reset", robot="r1", stop=only.press.id)
+        bench.send("b", op="reset", robot="r1", stop=only.press.id)
         stop(bench)
         first, second, third = bench.did(actions.SaveStop)
         bench.keep(first)
@@ -418,7 +418,7 @@ class TestDisk:
         bench.handle(events.LockState(KEY, held=True, latched=Press("B", "b1")))
         assert bench.written[0].twist == ZERO
         bench.handle(events.LockState(KEY, held=True, latched=Press("Z", "z1")))
-        assert bench.report().stop.by == "Z", "another gate was told it meanwhile"
+        assert bench.report().stop.by == "Z", "another gate received a STOP meanwhile"
 
 
 class TestConfirmation:
@@ -470,7 +470,7 @@ class TestConfirmation:
         assert seen.report().stop.confirmed is True
 
     def test_later_silence_or_motion_revokes_the_confirmation_of_a_stop(self, seen):
-        """By a goal that begins late, by a ramp, or by another that publishes."""
+        """The cause may be a late goal, a ramp or another program."""
         stop(seen)
         watch_it(seen, 0.4, 0.0)
         seen.run(60.0)
@@ -573,15 +573,15 @@ class TestHooks:
     def bench(self):
         return Bench().begin(spec(stop_hooks=self.HOOKS))
 
-    def said(self, bench):
+    def runs(self, bench):
         hooks = bench.did(actions.RunHook)
         return [(h.hook.get("topic") or h.hook["service"], h.stopped) for h in hooks]
 
     def test_hooks_run_on_stop_and_a_reset_clears_only_the_topic_hook(self, bench):
         stop(bench)
-        assert self.said(bench) == [("/lock", True), ("/e_stop", True)]
+        assert self.runs(bench) == [("/lock", True), ("/e_stop", True)]
         reset(bench)
-        assert self.said(bench)[2:] == [("/lock", False)]
+        assert self.runs(bench)[2:] == [("/lock", False)]
 
     def test_hooks_run_after_the_zero_is_sent(self, bench):
         bench.drive_off()
@@ -594,7 +594,7 @@ class TestHooks:
         stop(bench)
         bench.break_links()
         bench.connect_links()
-        assert self.said(bench)[2:] == [("/lock", True), ("/e_stop", True)]
+        assert self.runs(bench)[2:] == [("/lock", True), ("/e_stop", True)]
 
     def test_a_topic_hook_not_cleared_by_reset_is_cleared_once_on_the_next_link(
         self, bench
@@ -602,18 +602,18 @@ class TestHooks:
         stop(bench)
         bench.break_links()
         reset(bench)
-        assert len(self.said(bench)) == 2
+        assert len(self.runs(bench)) == 2
         bench.connect_links()
         bench.connect_links()
-        assert self.said(bench)[2:] == [("/lock", False)]
+        assert self.runs(bench)[2:] == [("/lock", False)]
 
     def test_hooks_run_on_the_velocity_bridge_and_not_on_the_goal_bridge(self):
         other = "ws://nav:9090"
         bench = Bench().begin(spec(stop_hooks=self.HOOKS, goal_url=other))
         stop(bench)
-        assert len(self.said(bench)) == 2
+        assert len(self.runs(bench)) == 2
         bench.handle(events.LinkUp(other, "tasks"))
-        assert len(self.said(bench)) == 2
+        assert len(self.runs(bench)) == 2
 
     @pytest.mark.parametrize(
         "hook",
@@ -655,7 +655,7 @@ class TestResetOfAStop:
         stop(bench, "a")
         seen = bench.stop_of()
         stop(bench, "b")
-        bench.say("a", op="reset", robot="r1", stop=seen)
+        bench.send("a", op="reset", robot="r1", stop=seen)
         assert bench.report().latched
         assert bench.refusals("a")[-1].why == (
             "B pressed STOP meanwhile; look at the robot, then press Reset again"
@@ -667,7 +667,7 @@ class TestResetOfAStop:
         stop(bench)
         seen = bench.stop_of()
         stop(bench)
-        bench.say("b", op="reset", robot="r1", stop=seen)
+        bench.send("b", op="reset", robot="r1", stop=seen)
         assert bench.report().latched
 
     def test_a_repeated_reset_does_not_end_a_stop_pressed_after_the_first_reset(
@@ -677,7 +677,7 @@ class TestResetOfAStop:
         seen = bench.stop_of()
         reset(bench)
         stop(bench, "a")
-        bench.say("b", op="reset", robot="r1", stop=seen)
+        bench.send("b", op="reset", robot="r1", stop=seen)
         assert bench.report().latched
 
     def test_a_reset_does_not_end_a_newer_stop_that_another_gate_saved(self, bench):
@@ -686,7 +686,7 @@ class TestResetOfAStop:
         bench.disk[KEY] = Press("Ann", "a1")
         bench.handle(events.StopFileChanged(KEY, Press("Ann", "a1")))
         assert bench.report().stop.by == "Ann"
-        bench.say("b", op="reset", robot="r1", stop=seen)
+        bench.send("b", op="reset", robot="r1", stop=seen)
         assert bench.report().latched
         reset(bench)
         assert not bench.report().latched
@@ -696,7 +696,7 @@ class TestResetOfAStop:
         stop(bench)
         bench.disk[KEY] = Press("Ann", "a1")
         reset(bench)
-        assert bench.stops == {KEY: "Ann"}, "its file is not taken away"
+        assert bench.stops == {KEY: "Ann"}, "its file is not removed"
         bench.handle(events.StopFileChanged(KEY, Press("Ann", "a1")))
         assert bench.report().latched
 
@@ -714,7 +714,7 @@ class TestResetOfAStop:
         seen = old.stop_of()
         bench = Bench(disk=old.disk).begin()
         assert bench.stop_of() == seen
-        bench.say("b", op="reset", robot="r1", stop=seen)
+        bench.send("b", op="reset", robot="r1", stop=seen)
         assert not bench.report().latched
 
     def test_a_reset_without_a_valid_stop_identity_is_refused(self, bench):
@@ -741,11 +741,11 @@ class TestResetOfAStop:
         bench.handle(spec(twist_topic="/other/cmd_vel"))
         seen = bench.stop_of()
         stop(bench, "a", "*")
-        bench.say("b", op="reset", robot="r1", stop=seen)
+        bench.send("b", op="reset", robot="r1", stop=seen)
         assert bench.report().latched
         reset(bench)
         assert not bench.report().latched
-        assert bench.disk == {}, "by either topic"
+        assert bench.disk == {}, "under both topics"
 
     def test_a_reset_does_not_delete_a_stop_of_another_gate_on_the_old_topic(
         self, bench

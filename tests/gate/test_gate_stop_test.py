@@ -1,4 +1,4 @@
-"""The stop test: creep, say nothing more, and see whether the base stops by itself."""
+"""The stop test: creep, send nothing more, and measure when the base stops."""
 
 import pytest
 from gate_harness import KEY, ZERO, Bench, spec
@@ -9,15 +9,15 @@ from webmap.gate.events import StopRecord
 
 
 class Machine:
-    """A base behind the bench that has, or has not, a timeout of its own."""
+    """A simulated base, with or without a command timeout."""
 
     def __init__(self, bench, timeout=0.3):
         self.bench = bench
         self.timeout = timeout
         self.speaks = True
         self.coarse = 0
-        """Every so many messages say that it stands, as a coarse encoder's do."""
-        self.said = 0
+        """Every so many odometry messages report zero, as from a coarse encoder."""
+        self.sent = 0
 
     @property
     def speed(self):
@@ -30,8 +30,8 @@ class Machine:
     def run(self, seconds, x=0.0, who="a"):
         def each():
             if self.speaks:
-                self.said += 1
-                between = self.coarse and self.said % self.coarse == 0
+                self.sent += 1
+                between = self.coarse and self.sent % self.coarse == 0
                 speed = 0.0 if between else self.speed
                 self.bench.handle(events.OdometryReceived(KEY, Twist(speed)))
             if x is not None:
@@ -42,7 +42,7 @@ class Machine:
 
 @pytest.fixture
 def bench():
-    """A has the robot, its hands were seen, and nobody knows whether it stops."""
+    """A bench where A has control and is armed; the robot has no verified stop."""
     bench = Bench().begin(spec(odometry_topic="/odom", stops_within=None))
     bench.take("a")
     Machine(bench).run(0.4)
@@ -55,7 +55,7 @@ def base(bench):
 
 
 def begin(bench, who="a"):
-    bench.say(who, op="stop-test", robot="r1")
+    bench.send(who, op="stop-test", robot="r1")
 
 
 def state(bench):
@@ -73,7 +73,7 @@ class TestRunning:
         assert state(bench) == "waiting"
         assert {w.twist for w in bench.written} == {Twist(0.1)}
         base.run(0.15)
-        assert len(bench.written) == crept, "not even zero"
+        assert len(bench.written) == crept, "not even a zero is sent"
         base.run(0.6)
         report = bench.report()
         assert report.test.state == "done"
@@ -144,7 +144,7 @@ class TestRunning:
         assert state(bench) == "waiting"
         for write in bench.written:
             bench.handle(events.EchoReceived(KEY, write.twist))
-        assert state(bench) == "waiting", "those are ours"
+        assert state(bench) == "waiting", "these echoes are the gate's own"
         bench.handle(events.EchoReceived(KEY, foreign))
         assert "another program sent commands" in bench.report().test.text
         assert state(bench) == "failed"
@@ -245,9 +245,9 @@ class TestAbort:
             case "silence":
                 base.run(0.25, x=None)
             case "stop":
-                bench.say("b", op="stop", robot="r1")
+                bench.send("b", op="stop", robot="r1")
             case "release":
-                bench.say("a", op="release", robot="r1")
+                bench.send("a", op="release", robot="r1")
             case "page":
                 bench.handle(protocol.Disconnect("a"))
             case "blind":

@@ -1,7 +1,7 @@
-"""A gate reads what an earlier version left on the disk, for every robot.
+"""A gate reads the files that an earlier version stored, for every robot.
 
-The names of the files are made of the bridge's address and the velocity topic: if one
-of them came out otherwise, a STOP would be forgotten.
+The names of the files are derived from the bridge's address and the velocity topic: if
+a name changed, a STOP would be forgotten.
 """
 
 import asyncio
@@ -24,14 +24,14 @@ from webmap.gate.rules.motion import ZERO
 
 @pytest.fixture
 def stored(state_folder):
-    """The folder of a new gate, with what an earlier one left there."""
+    """The folder of a new gate, with the files of an earlier gate."""
     shutil.copytree(FOLDER, state_folder)
     return state_folder
 
 
 @contextlib.contextmanager
 def new_gate():
-    """Start a gate that finds the folder; give a page that knows the robots."""
+    """Start a gate with the folder; yield a page with a report of each robot."""
     client = GateClient()
     client.start()
     for spec in ROBOTS:
@@ -45,7 +45,7 @@ def new_gate():
 
 @pytest.fixture(scope="module")
 def reports(tmp_path_factory):
-    """What a new gate reports of each robot, by the robot's name."""
+    """The report of a new gate about each robot, by the robot's name."""
     folder = tmp_path_factory.mktemp("stored") / "state"
     shutil.copytree(FOLDER, folder)
     with pytest.MonkeyPatch.context() as patched:
@@ -85,17 +85,17 @@ def test_a_reset_deletes_a_stored_stop_file_and_a_new_stop_gets_the_same_file_na
     before = {name.removesuffix(".lifted") for name in stops()}
     with new_gate() as page:
         for name in STOPPED:
-            page.say(op="reset", robot=name.lower())
+            page.send(op="reset", robot=name.lower())
         eventually(lambda: not stops(), "a folder without STOPs")
         for name in STOPPED:
-            page.say(op="stop", robot=name.lower())
+            page.send(op="stop", robot=name.lower())
         eventually(lambda: stops() == before, "a file for each STOP")
 
 
 class Links:
-    """Notes what would be written to robots; every link of theirs is up."""
+    """Records the velocities to robots; every link is up."""
 
-    def __init__(self, tell):
+    def __init__(self, report):
         self.written = []
 
     def perform(self, action):
@@ -132,7 +132,7 @@ def test_a_machine_marked_as_driven_gets_a_zero_for_every_name_of_localhost(
 
 
 def test_tidy_keeps_only_lock_files_of_machines_marked_as_driven(stored):
-    """A gate that starts removes the files of machines that rest."""
+    """A gate that starts removes the lock files of all other machines."""
     Locks(stored).tidy()
     left = [path.read_text().split()[:3] for path in stored.glob("*.lock")]
     assert {driven for driven, *_ in left} == {"1"}

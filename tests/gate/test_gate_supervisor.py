@@ -1,4 +1,4 @@
-"""When a gate is started again, and which STOPs it is told then."""
+"""When a gate is restarted, and which STOPs are then sent to it."""
 
 import pytest
 

@@ -1,6 +1,6 @@
-"""One process as the display sees it: written to without waiting, read, and ended.
+"""A gate process of a display: messages to the process, from the process, and its end.
 
-The processes here are not gates but programs that do what a gate may do at its worst.
+The processes here are not gates but programs that behave like a faulty gate.
 """
 
 import sys
@@ -16,17 +16,17 @@ from webmap.gate.protocol import Ready, RefusedCount, Tick
 
 
 class Watched:
-    """A process, and what it said."""
+    """A process, and its messages."""
 
     def __init__(self, *command):
         self.on_echo = []
         self.ends = []
         self.may_go_on = threading.Event()
         self.may_go_on.set()
-        self.child = GateProcess(self._hear, self._ended, command)
+        self.child = GateProcess(self._receive, self._ended, command)
         self.child.start()
 
-    def _hear(self, child, message):
+    def _receive(self, child, message):
         self.may_go_on.wait(60)
         self.on_echo.append(message)
 
@@ -36,7 +36,7 @@ class Watched:
 
 @pytest.fixture
 def run():
-    """Start a program as a gate; it is ended with the test."""
+    """Start a program as a gate; it ends with the test."""
     started = []
 
     def start(*command):
@@ -60,7 +60,7 @@ def test_messages_are_sent_and_received_complete_and_in_order(run):
     mirror = run("/bin/cat")
     mirror.child.send(Ready(1), Ready(2))
     mirror.child.send(Tick(3, {}))
-    eventually(lambda: len(mirror.on_echo) == 3, "all of them")
+    eventually(lambda: len(mirror.on_echo) == 3, "all messages")
     assert mirror.on_echo == [Ready(1), Ready(2), Tick(3, {})]
     assert mirror.child.pid > 0
 
@@ -113,7 +113,7 @@ def test_a_process_that_does_not_read_is_ended_when_its_unsent_data_is_too_large
     text = "x" * (1 << 16)
     for _ in range(4):
         gate.child.send(RefusedCount("a", 1, text))
-    assert gate.ends == [], "as yet it may only be slow"
+    assert gate.ends == [], "the process may only be slow so far"
     monkeypatch.setattr(supervisor_module, "MAX_UNSENT", 1 << 16)
     gate.child.send(RefusedCount("a", 1, text))
     eventually(lambda: gate.ends, "its end")
@@ -134,7 +134,7 @@ def test_unread_messages_are_delivered_later_and_in_order(run):
         mirror.child.send()  # as the next heartbeat does
         return len(mirror.on_echo) == len(sent)
 
-    eventually(through, "all of it")
+    eventually(through, "all messages")
     assert mirror.on_echo == sent
 
 
@@ -155,13 +155,13 @@ def test_a_process_that_sends_invalid_data_is_killed(run, caplog):
 
 def test_a_process_whose_message_raises_an_error_is_killed(run, caplog):
     data = pipe.pack(Ready(5)).hex()
-    words = f"import os, time; os.write(1, bytes.fromhex('{data}')); time.sleep(600)"
+    code = f"import os, time; os.write(1, bytes.fromhex('{data}')); time.sleep(600)"
 
-    def hear(child, message):
+    def receive(child, message):
         raise LookupError(message)
 
     ended = threading.Event()
-    gate = GateProcess(hear, lambda _: ended.set(), (sys.executable, "-c", words))
+    gate = GateProcess(receive, lambda _: ended.set(), (sys.executable, "-c", code))
     gate.start()
     assert ended.wait(30)
     gate.stop(30.0)
@@ -171,13 +171,13 @@ def test_a_process_whose_message_raises_an_error_is_killed(run, caplog):
 
 
 def test_a_gate_whose_message_raises_an_error_exits_with_code_0():
-    """It is this side that failed; the other still has robots to send zero to."""
+    """The display has failed; the gate still sends zeros to its robots."""
 
-    def hear(child, message):
+    def receive(child, message):
         raise LookupError(message)
 
     ended = threading.Event()
-    gate = GateProcess(hear, lambda _: ended.set())
+    gate = GateProcess(receive, lambda _: ended.set())
     gate.start()
     assert ended.wait(60)
     gate.stop(30.0)
@@ -185,12 +185,12 @@ def test_a_gate_whose_message_raises_an_error_exits_with_code_0():
 
 
 def test_the_ended_callback_may_stop_the_process():
-    epitaphs = []
+    reasons = []
 
     def ended(gate):
         gate.stop(30.0)
-        epitaphs.append(gate.end_reason)
+        reasons.append(gate.end_reason)
 
     gate = GateProcess(lambda *_: None, ended, shell("echo 'full disk' >&2; exit 1"))
     gate.start()
-    eventually(lambda: epitaphs == ["full disk"], "its last words")
+    eventually(lambda: reasons == ["full disk"], "the reason")

@@ -1,4 +1,4 @@
-"""The tasks lane: goals and their cancelling, hooks, and what is heard of them."""
+"""The tasks lane: goals, cancels, hooks, and the reports about them."""
 
 import json
 
@@ -21,7 +21,7 @@ def goal(id="g1", way="topic", robot="r1"):
 
 
 class Noting:
-    """A tasks lane and what it tells."""
+    """A tasks lane and its events."""
 
     def __init__(self, url):
         self.events = []
@@ -45,13 +45,13 @@ class Noting:
         await until(lambda: len(self.of(LinkUp)) == times, "the link")
 
     async def send(self, robot, id):
-        """Have an action goal sent, as soon as there is a link for it."""
+        """Send an action goal, and wait for the next link of the lane."""
         count = len(self.of(LinkUp))
         assert self.tasks.send(robot, goal(id, "navigate_to_pose", robot.id))
         await self.up(count + 1)
 
 
-def action_word(op, id, **more):
+def action_message(op, id, **more):
     return json.dumps({"op": op, "id": id, **more})
 
 
@@ -118,7 +118,7 @@ class TestTopicGoals:
     @in_loop
     async def test_goals_are_cancelled_by_every_topic_and_service_of_the_robot(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
-            noting.tasks.cancel(spec(cancel_topic=None))  # it has none
+            noting.tasks.cancel(spec(cancel_topic=None))  # no cancel topic
             noting.tasks.cancel(spec(cancel_topic="/stop_it", action="/go"))
             await noting.calls.settle()
             noting.tasks.cancel(
@@ -129,7 +129,7 @@ class TestTopicGoals:
                 )
             )
             noting.tasks.cancel(MOVE_BASE)
-            await until(lambda: len(bridge.of("publish")) == 3, "all words")
+            await until(lambda: len(bridge.of("publish")) == 3, "all cancels")
             assert [t.topic for t in bridge.of("publish")] == [
                 "/stop_it",
                 "/move_base/cancel",
@@ -184,16 +184,16 @@ class TestActionGoals:
             (sent,) = await until(lambda: bridge.of("send_action_goal"), "the goal")
             for distance in (2.0, 1.9, 1.8):
                 values = {"distance_remaining": distance}
-                word = action_word("action_feedback", "g1", values=values)
-                await bridge.send(sent.link, word)
+                message = action_message("action_feedback", "g1", values=values)
+                await bridge.send(sent.link, message)
             await bridge.send(sent.link, "rubbish")
-            await bridge.send(sent.link, action_word("action_result", "g0"))
-            result = action_word("action_result", "g1", status=4, values={})
+            await bridge.send(sent.link, action_message("action_result", "g0"))
+            result = action_message("action_result", "g1", status=4, values={})
             await bridge.send(sent.link, result)
             await until(lambda: noting.of(GoalEnded), "its end")
             assert noting.of(GoalEnded) == [GoalEnded("r1", "g1", "reached")]
-            received = [word.left for word in noting.of(GoalProgress)]
-            assert received == [2.0], "thinned out"
+            received = [event.left for event in noting.of(GoalProgress)]
+            assert received == [2.0], "only one report in each period"
             await until(lambda: sent.link not in bridge.links, "the end of its socket")
             assert noting.of(GoalLost) == []
 
@@ -207,9 +207,9 @@ class TestActionGoals:
             (sent,) = await until(lambda: bridge.of("send_action_goal"), "the goal")
             for distance in (2.0, 1.0):
                 values = {"distance_remaining": distance}
-                word = action_word("action_feedback", "g1", values=values)
-                await bridge.send(sent.link, word)
-            await until(lambda: len(noting.of(GoalProgress)) == 2, "both words")
+                message = action_message("action_feedback", "g1", values=values)
+                await bridge.send(sent.link, message)
+            await until(lambda: len(noting.of(GoalProgress)) == 2, "both reports")
 
     @in_loop
     async def test_a_goal_whose_socket_breaks_is_reported_as_lost(self):
@@ -217,7 +217,7 @@ class TestActionGoals:
             await noting.send(NAVIGATES, "g1")
             (sent,) = await until(lambda: bridge.of("send_action_goal"), "the goal")
             bridge.transport_of(sent.link).abort()
-            (lost,) = await until(lambda: noting.of(GoalLost), "the word of it")
+            (lost,) = await until(lambda: noting.of(GoalLost), "the report")
             assert (lost.robot, lost.id) == ("r1", "g1")
             assert lost.why.startswith("connection lost: ")
 
@@ -249,16 +249,16 @@ class TestActionGoals:
                 noting.tasks.close()
                 await until(lambda: bridge.links == {call.link}, "the end of the rest")
             bridge.unblock()
-            await until(lambda: not bridge.links, "the end of all of them")
+            await until(lambda: not bridge.links, "the end of all sockets")
             assert noting.of(GoalLost) == []
 
 
 class TestMoveBase:
-    def word(self, part, id="g1", status=1):
+    def message(self, part, id="g1", status=1):
         state = {"goal_id": {"id": id}, "status": status, "text": "aborted"}
-        said = {"status_list": [state]} if part == "status" else {"status": state}
-        message = {"op": "publish", "topic": f"/move_base/{part}", "msg": said}
-        return json.dumps(message)
+        msg = {"status_list": [state]} if part == "status" else {"status": state}
+        operation = {"op": "publish", "topic": f"/move_base/{part}", "msg": msg}
+        return json.dumps(operation)
 
     @in_loop
     async def test_move_base_topics_are_subscribed_from_before_the_goal_until_its_end(
@@ -269,12 +269,15 @@ class TestMoveBase:
             await until(lambda: bridge.of("publish", "/move_base/goal"), "the goal")
             assert [t.op for t in bridge.received] == ["subscribe"] * 3 + ["publish"]
             await bridge.send(1, "rubbish")
-            await bridge.send(1, self.word("status"))
-            await until(lambda: noting.of(GoalProgress), "that it is under way")
-            await bridge.send(1, self.word("result", status=4))
+            await bridge.send(1, self.message("status"))
+            await until(lambda: noting.of(GoalProgress), "progress")
+            await bridge.send(1, self.message("result", status=4))
             await until(lambda: noting.of(GoalEnded), "its end")
             assert noting.of(GoalEnded) == [GoalEnded("r1", "g1", "failed", "aborted")]
-            await until(lambda: len(bridge.of("unsubscribe")) == 3, "that it is over")
+            await until(
+                lambda: len(bridge.of("unsubscribe")) == 3,
+                "the end of the subscriptions",
+            )
             noting.tasks.forget("r1")  # there is nothing to forget
 
     @in_loop
@@ -295,11 +298,11 @@ class TestMoveBase:
             await until(lambda: bridge.of("publish"), "the goal")
             bridge.transport_of(1).abort()
             why = f"no connection to {bridge.url}"
-            await until(lambda: noting.of(GoalLost), "the word of it")
+            await until(lambda: noting.of(GoalLost), "the report")
             assert noting.of(GoalLost) == [GoalLost("r1", "g1", why)]
-            await until(lambda: len(bridge.of("subscribe")) == 6, "that it listens")
-            await bridge.send(2, self.word("status"))
-            await until(lambda: noting.of(GoalProgress), "that it is under way")
+            await until(lambda: len(bridge.of("subscribe")) == 6, "new subscriptions")
+            await bridge.send(2, self.message("status"))
+            await until(lambda: noting.of(GoalProgress), "progress")
 
     @in_loop
     async def test_a_move_base_goal_is_not_lost_when_another_robot_gets_an_action_goal(
@@ -309,5 +312,5 @@ class TestMoveBase:
             noting.tasks.send(MOVE_BASE, goal("g1", "move_base"))
             noting.tasks.send(NAVIGATES, goal("g2", "navigate_to_pose", "r2"))
             await noting.up(2)
-            assert noting.of(GoalLost) == [], "the socket only went to another use"
-            await until(lambda: len(bridge.of("subscribe")) == 6, "that it listens on")
+            assert noting.of(GoalLost) == [], "the socket only has another use"
+            await until(lambda: len(bridge.of("subscribe")) == 6, "new subscriptions")

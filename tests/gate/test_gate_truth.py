@@ -1,4 +1,4 @@
-"""What a page is told of a robot's obedience, and of how late everything is."""
+"""The reports of motion after a zero, and of the age of the control loop."""
 
 import pytest
 from gate_harness import KEY, ZERO, Bench, spec
@@ -48,7 +48,7 @@ class TestAlarm:
         assert bench.report().alarm is None
 
     def test_motion_after_the_release_of_control_raises_an_alarm(self, bench):
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
         self.run(bench, 1.1, 0.31)
         assert bench.report().alarm
         self.run(bench, 0.5, 0.0)
@@ -56,7 +56,7 @@ class TestAlarm:
         assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
 
     def test_motion_during_a_stop_raises_an_alarm(self, bench):
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         self.run(bench, 1.1, 0.31)
         assert bench.report().alarm
 
@@ -76,7 +76,7 @@ class TestAlarm:
         assert bench.report().alarm is None
 
     def test_watching_ends_soon_for_a_released_robot_without_odometry(self, bench):
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
         bench.run(3.0)
         assert bench.did(actions.Watch)[-1] == actions.Watch(KEY, False)
         assert bench.report().alarm is None
@@ -113,7 +113,7 @@ class TestAlarm:
         assert bench.report().alarm == "zero sent, still moving at 0.31 m/s"
 
     def test_motion_first_measured_late_during_a_stop_raises_an_alarm(self, bench):
-        bench.say("b", op="stop", robot="r1")
+        bench.send("b", op="stop", robot="r1")
         bench.run(9.0)
         assert bench.report().alarm is None
         self.run(bench, 0.2, 0.31)
@@ -161,7 +161,7 @@ class TestAlarm:
         obedience.observe(Twist(0.04), 1.85)
         assert obedience.alarm(1.85) is None
         obedience.observe(Twist(0.5), 1.9)
-        assert obedience.alarm(2.0) is None, "it is somebody else's business"
+        assert obedience.alarm(2.0) is None, "the motion has another cause"
 
     def test_a_standstill_in_time_raises_no_alarm_until_the_robot_moves_again(self):
         obedience = Obedience()
@@ -198,7 +198,7 @@ class TestLoopAge:
         assert bench.report().age is None
         bench.hold(1.0)
         assert 0 <= bench.report().age <= 50
-        bench.say("a", op="release", robot="r1")
+        bench.send("a", op="release", robot="r1")
         assert bench.report().age is None
 
     @pytest.mark.parametrize("ms", [151, 180, 200, 250, 300])
@@ -258,13 +258,15 @@ class TestLoopAge:
         trips = Ages()
         ages = LoopAge(trips)
         trips.add(0.12, 0.0)
-        assert ages.p95 is None, "nobody drives"
+        assert ages.p95 is None, "no commands arrive"
         ages.add(0.05, 0.0)
         assert ages.p95 == pytest.approx(0.17)
         assert ages.slow == ages.p95
         ages.clear()
         ages.add(0.02, 1.0)
-        assert ages.p95 == pytest.approx(0.14), "another driver has the same robot"
+        assert ages.p95 == pytest.approx(0.14), (
+            "the round trip does not depend on the driver"
+        )
         ages.forget_old(2.5)
         assert ages.p95 == 0.02
 

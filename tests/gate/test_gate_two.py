@@ -1,4 +1,4 @@
-"""Two gates on one computer: one has the machine, and a STOP to either one counts."""
+"""Two gates on one computer: one has the machine, and a STOP to either gate counts."""
 
 import asyncio
 import time
@@ -25,7 +25,7 @@ def owner():
 
 @pytest.fixture
 def onlooker():
-    """One that does not."""
+    """A gate that does not have the machine."""
     bench = Bench().begin()
     why = "another WebMap on this computer uses this robot"
     bench.handle(LockState(KEY, held=False, why=why, elsewhere=True))
@@ -57,25 +57,24 @@ class TestOwner:
         assert bench.state == "stopped"
 
     def test_the_owner_ignores_the_file_change_of_its_own_stop(self, owner):
-        owner.say("a", op="stop", robot="r1")
+        owner.send("a", op="stop", robot="r1")
         before = len(owner.done)
         owner.handle(StopFileChanged(KEY, owner.disk[KEY]))
         assert owner.done[before:] == []
 
     def test_the_owner_keeps_a_stop_whose_file_is_gone(self, owner):
-        owner.say("a", op="stop", robot="r1")
+        owner.send("a", op="stop", robot="r1")
         owner.disk.clear()
         owner.handle(StopFileChanged(KEY, None))
         assert owner.stops == {KEY: "A"}
         assert owner.state == "stopped"
 
     def test_the_owner_ignores_a_file_change_during_its_own_disk_write(self, owner):
-        owner.say("a", op="stop", robot="r1")
+        owner.send("a", op="stop", robot="r1")
         owner.slow_disk = True
-        owner.say("a", op="reset", robot="r1")
-        owner.handle(
-            StopFileChanged(KEY, owner.disk[KEY])
-        )  # looked at before it was taken away
+        owner.send("a", op="reset", robot="r1")
+        # The file was read before it was removed.
+        owner.handle(StopFileChanged(KEY, owner.disk[KEY]))
         owner.run(0.1)
         assert not owner.report().latched
 
@@ -88,17 +87,17 @@ class TestSecondGate:
     def test_the_other_gate_can_stop_the_robot_but_cannot_reset_the_stop(
         self, onlooker
     ):
-        onlooker.say("a", op="stop", robot="r1")
+        onlooker.send("a", op="stop", robot="r1")
         assert onlooker.stops == {KEY: "A"}
         assert onlooker.written[-1].twist == ZERO
-        onlooker.say("a", op="reset", robot="r1")
+        onlooker.send("a", op="reset", robot="r1")
         assert onlooker.refusals()[-1].why == (
             "another WebMap on this computer uses this robot: reset the STOP there"
         )
         assert onlooker.stops == {KEY: "A"}
 
     def test_the_other_gate_sends_no_zeros_after_a_reset_by_the_owner(self, onlooker):
-        onlooker.say("a", op="stop", robot="r1")
+        onlooker.send("a", op="stop", robot="r1")
         onlooker.run(1.0)
         onlooker.disk.clear()
         onlooker.handle(StopFileChanged(KEY, None))
@@ -114,7 +113,7 @@ class TestSecondGate:
         assert onlooker.written == []
 
     def test_the_other_gate_shows_a_newer_stop_of_the_owner(self, onlooker):
-        onlooker.say("a", op="stop", robot="r1")
+        onlooker.send("a", op="stop", robot="r1")
         onlooker.run(1.0)
         onlooker.disk[KEY] = ANN
         onlooker.handle(StopFileChanged(KEY, ANN))
@@ -125,16 +124,16 @@ class TestSecondGate:
         self, onlooker
     ):
         onlooker.slow_disk = True
-        onlooker.say("a", op="stop", robot="r1")
+        onlooker.send("a", op="stop", robot="r1")
         onlooker.handle(StopFileChanged(KEY, None))
         onlooker.keep(onlooker.did(actions.SaveStop)[-1])
         assert onlooker.report().latched
 
     def test_the_other_gate_keeps_its_stop_when_it_gets_the_lock(self, onlooker):
-        onlooker.say("a", op="stop", robot="r1")
+        onlooker.send("a", op="stop", robot="r1")
         onlooker.handle(LockState(KEY, held=True, latched=onlooker.disk[KEY]))
         assert onlooker.state == "stopped"
-        onlooker.say("a", op="reset", robot="r1")
+        onlooker.send("a", op="reset", robot="r1")
         onlooker.run(1.0)
         assert onlooker.state == "free"
 
@@ -145,7 +144,7 @@ def test_every_changed_stop_file_is_reported_once(tmp_path):
         mine.recall(LockState(KEY, held=True))
         assert await mine.check() == []
         theirs.keep_latch(KEY, ANN, IDS)
-        # Recalled again, it is news all the same.
+        # The STOP is recalled first; the change is still reported.
         assert mine.recall(LockState(KEY, held=False)).latched == ANN
         assert await mine.check() == [StopFileChanged(KEY, ANN)]
         assert await mine.check() == []
@@ -200,13 +199,13 @@ def test_a_stop_on_another_gate_stops_the_driven_robot(client, page, robot_spec,
     other = Page(second, name="Ben")
     reason = "another WebMap on this computer uses this robot"
     eventually(lambda: other.robot().get("reason") == reason, "the other's reason")
-    other.say(op="stop", robot="r1")
+    other.send(op="stop", robot="r1")
     at = time.monotonic()
     eventually(lambda: page.robot()["latched"], "a STOP here")
     assert page.robot()["stop"]["by"] == "Ben"
     eventually(lambda: other.robot()["latched"], "a STOP there")
     assert all(moved < at + 1.0 for moved, _ in fake.moving)
-    page.say(op="reset", robot="r1")
+    page.send(op="reset", robot="r1")
     eventually(lambda: not page.robot()["latched"], "no STOP here")
     eventually(lambda: not other.robot()["latched"], "no STOP there")
     other.end()

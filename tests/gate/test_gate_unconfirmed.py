@@ -1,4 +1,4 @@
-"""No more moving velocities are on their way to a robot than may come late."""
+"""The number of nonzero velocities that are on their way to a robot is limited."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -77,7 +77,7 @@ def test_an_echo_of_a_velocity_already_confirmed_by_a_ping_makes_no_room():
         unproven.on_written("/cmd_vel", AHEAD)
     for _ in range(MOST):
         unproven.echoed("/cmd_vel", AHEAD)
-        assert not unproven.room("/cmd_vel"), "it is that of an earlier one"
+        assert not unproven.room("/cmd_vel"), "the echo of an earlier velocity"
     unproven.echoed("/cmd_vel", AHEAD)
     assert unproven.room("/cmd_vel")
 
@@ -141,7 +141,7 @@ def test_a_new_link_forgets_the_velocities_of_the_old_link():
         assert unproven.room("/cmd_vel")
         unproven.on_written("/cmd_vel", TURN)
     unproven.echoed("/cmd_vel", AHEAD)
-    assert not unproven.room("/cmd_vel"), "that was said on the link before"
+    assert not unproven.room("/cmd_vel"), "an echo of the old link"
 
 
 @given(
@@ -151,7 +151,7 @@ def test_a_new_link_forgets_the_velocities_of_the_old_link():
     )
 )
 def test_a_link_of_any_latency_never_holds_more_than_six_nonzero_velocities(steps):
-    """The link takes in order, and answers in order, whenever it likes."""
+    """The link delivers and answers in order, after any delay."""
     unproven, link, back = UnconfirmedWrites(), [], []
     pings = 0
     twists = {"ahead": AHEAD, "turn": TURN, "zero": ZERO}

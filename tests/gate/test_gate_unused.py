@@ -1,4 +1,4 @@
-"""A lease that its driver has forgotten expires, so that nobody waits for it."""
+"""An unused lease expires, so that other operators can take control."""
 
 import pytest
 from gate_harness import Bench, spec
@@ -9,7 +9,7 @@ from webmap.gate.rules import authority
 pytestmark = pytest.mark.slow
 
 UNUSED = 15.0
-"""Seconds here, since two minutes at 20 Hz take long even on a virtual clock."""
+"""Seconds here: two minutes at 20 Hz take long even on a virtual clock."""
 
 
 @pytest.fixture(autouse=True)
@@ -19,7 +19,7 @@ def soon(monkeypatch):
 
 @pytest.fixture
 def bench():
-    """A has the robot and shows open hands, as a page does as long as it lives."""
+    """A bench where A has control and sends released inputs, as an open page does."""
     bench = Bench().begin(spec(pose_topic="/initialpose"))
     bench.take("a")
     bench.hold(1.0)
@@ -67,10 +67,10 @@ def test_every_use_of_the_lease_restarts_its_expiry_time(bench, act):
         case "locate":
             bench.goal(op="locate")
         case "renew":
-            bench.say("a", op="renew", robot="r1", epoch=bench.report().epoch)
+            bench.send("a", op="renew", robot="r1", epoch=bench.report().epoch)
         case "deny":
-            bench.say("b", op="ask", robot="r1")
-            bench.say("a", op="deny", robot="r1")
+            bench.send("b", op="ask", robot="r1")
+            bench.send("a", op="deny", robot="r1")
     assert bench.refusals("a") == []
     bench.hold(UNUSED - 2.0)
     assert held(bench)
@@ -80,15 +80,15 @@ def test_every_use_of_the_lease_restarts_its_expiry_time(bench, act):
 
 def test_only_the_holder_can_renew_the_lease_and_only_with_the_current_epoch(bench):
     epoch = bench.report().epoch
-    bench.say("b", op="renew", robot="r1", epoch=epoch)
+    bench.send("b", op="renew", robot="r1", epoch=epoch)
     assert bench.refusals("b")[-1].why == "A has control"
-    bench.say("a", op="renew", robot="r1", epoch=epoch - 1)
+    bench.send("a", op="renew", robot="r1", epoch=epoch - 1)
     assert "changed: got epoch 0, expected 1" in bench.refusals("a")[-1].why
 
 
 def test_an_operator_who_requests_control_gets_an_unused_lease(bench):
     bench.hold(UNUSED - 2.0)
-    bench.say("b", op="ask", robot="r1")
+    bench.send("b", op="ask", robot="r1")
     bench.hold(12.0)
     assert bench.report().holder.connection == "b"
 

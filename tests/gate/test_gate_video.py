@@ -1,4 +1,4 @@
-"""A driver who goes by a camera does not drive by an old picture (S16)."""
+"""An operator who drives by a camera cannot drive with an old picture (S16)."""
 
 import pytest
 from gate_harness import Bench
@@ -9,7 +9,7 @@ from webmap.gate.rules.health import Video
 
 @pytest.fixture
 def bench():
-    """A robot that is driven by a camera whose pictures come."""
+    """A bench where A drives a robot by a camera with new pictures."""
     bench = Bench().begin()
     bench.take("a")
     look(bench, 0.3, 100)
@@ -19,12 +19,12 @@ def bench():
 
 
 def look(bench, seconds, video, **axes):
-    """Hold inputs for a while with a picture that stays so many ms old."""
+    """Hold inputs with a picture that always has the same age in ms."""
     bench.run(seconds, lambda: bench.drive(video=video, **axes))
 
 
 def freeze(bench, seconds, **axes):
-    """Hold inputs for a while with a picture that ages."""
+    """Hold inputs with a picture that gets older."""
     frozen = bench.now - 0.1
     bench.run(
         seconds,
@@ -36,7 +36,7 @@ def test_a_robot_stops_when_the_camera_picture_is_one_second_old(bench):
     before = bench.now
     freeze(bench, 3.0, x=1.0)
     last = max(w.at for w in bench.moving_since(before))
-    assert 0.7 < last - before <= 0.95  # it was 100 ms old before
+    assert 0.7 < last - before <= 0.95  # the picture was 100 ms old before
     assert bench.written[-1].twist.is_zero
     assert not bench.report().armed
     assert bench.report().reason == "no picture from the camera for 1 s"
@@ -83,7 +83,7 @@ def test_commands_without_a_picture_age_can_drive_the_robot(bench):
 
 def test_the_next_operator_does_not_inherit_an_old_picture(bench):
     freeze(bench, 2.0, x=0.0)
-    bench.say("a", op="release", robot="r1")
+    bench.send("a", op="release", robot="r1")
     bench.run(1.0)
     bench.drive_off("b")
     assert bench.state == "driving"

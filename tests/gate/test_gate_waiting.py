@@ -1,4 +1,4 @@
-"""A command that waits for its turn on the wire while the gate itself stands still."""
+"""A command that waits to be written while the gate process pauses."""
 
 import pytest
 from gate_harness import Bench
@@ -12,9 +12,9 @@ def test_a_waiting_command_is_written_after_30_ms_but_not_after_100_ms(
     bench.drive_off()
     bench.drive(x=0.5)
     last = bench.written[-1]
-    assert last.at == bench.now, "it has just been written to"
+    assert last.at == bench.now, "a velocity was just written"
     bench.drive(x=0.25)
-    assert bench.written[-1] is last, "so the next one waits"
+    assert bench.written[-1] is last, "the next command waits"
     bench.now += seconds
     bench._do(bench.gate.step(bench.now))
     assert bool(bench.moving_since(last.at + 0.001)) is written

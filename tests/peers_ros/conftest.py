@@ -1,4 +1,4 @@
-"""A real ROS 2 graph for the tests, where one can be installed."""
+"""A real ROS 2 graph for the tests, on machines where ROS can be installed."""
 
 import sys
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page
 
 from real_browser import watched_tab
 
-# The helpers that run our commands and read what is drawn are shared.
+# The helpers that run commands and read the page are shared with other tests.
 sys.path.append(str(Path(__file__).parents[1] / "browser"))
 
 

@@ -1,4 +1,4 @@
-"""Starts a real ROS 2 graph, and in front of it a rosbridge that is not ours."""
+"""Starts a real ROS 2 graph and a rosbridge of another project."""
 
 import contextlib
 import json
@@ -20,13 +20,13 @@ from webmap.testing import FaultProxy
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 FOLDER = Path(sys.prefix) / "ros"
-"""Beside the tests' own environment, with which it goes."""
+"""A folder beside the environment of the tests, removed together with it."""
 
 CANNOT = 3
 
 
 def installed():
-    """Install ROS unless it is there; return what is where, or why it cannot be."""
+    """Install ROS if it is missing; return the paths, or why it cannot be installed."""
     if sys.prefix == sys.base_prefix:
         return None, "the tests do not run in a virtual environment to put it into"
     done = subprocess.run(
@@ -47,10 +47,10 @@ class Twist(NamedTuple):
     speed: float
     turn: float
     at: float
-    """When, on the monotonic clock, which all processes here share."""
+    """The time on the monotonic clock, which all processes share."""
 
     pose: tuple[float, float, float]
-    """Where the robot was then: x, y, yaw."""
+    """The place of the robot at that time: x, y, yaw."""
 
     @property
     def is_zero(self):
@@ -85,7 +85,7 @@ class Program:
                     return match
             assert self.popen.poll() is None, "".join(self.lines)
             time.sleep(0.02)
-        raise AssertionError(f"never said {pattern!r}, but:\n{''.join(self.lines)}")
+        raise AssertionError(f"no line with {pattern!r}, but:\n{''.join(self.lines)}")
 
     def end(self, sig=signal.SIGINT):
         self.popen.send_signal(sig)
@@ -103,7 +103,7 @@ class Ros:
 
     def __init__(self, about):
         self._about = about
-        # Another domain for each process, so that runs side by side stay apart.
+        # A separate domain for each process, so that parallel runs do not mix.
         domain = str(os.getpid() % 100 + 1)
         self._environment = {**about["environment"], "ROS_DOMAIN_ID": domain}
         python = FOLDER / "bin" / "python"
@@ -114,20 +114,20 @@ class Ros:
 
     @property
     def url(self):
-        """Where the rosbridge is reached, however often it is started."""
+        """The address of the rosbridge, the same after each start."""
         return f"ws://127.0.0.1:{self._door.port}"
 
     def start_bridge(self):
         """Start a rosbridge, and let clients in when it has found the robot.
 
-        On a busy machine that takes seconds after it began to listen. What is published
-        before then is lost, a zero too.
+        On a busy machine this takes seconds after the bridge began to listen. Messages
+        that are published before then are lost, also a zero.
         """
         self.graph.wait_for("ready")
         self.bridge = Program(
             [self._about["bridge"], "--bind", "127.0.0.1:0", "--no-rosapi",
              "--log-ansi", "false", "--log-directory", FOLDER / "log"],
-            # ROS's libraries expect to be loaded by a Python.
+            # The libraries of ROS must be loaded by Python.
             {**self._environment, "LD_PRELOAD": self._about["library"]},
         )  # fmt: skip
         found = self.bridge.wait_for(r"listening address=127\.0\.0\.1:(\d+)")

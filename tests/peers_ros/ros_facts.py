@@ -1,15 +1,15 @@
-"""What the robot of the real graph has; its tests and its nodes read it."""
+"""Facts about the robot of the real graph, for its tests and its nodes."""
 
 import math
 
 ROBOT = "/robot_0"
 START = (2.0, 1.5, 0.5)
-"""Where it begins, by its odometry: x, y, yaw."""
+"""The start of the robot in its odometry frame: x, y, yaw."""
 
 ANGLE_MIN, ANGLE_STEP = -0.35, 0.1
 RANGES = (1.0, math.nan, 2.0, math.inf, -math.inf, 0.01, 3.0, 99.0)
 DRAWN = {0: 1.0, 2: 2.0, 6: 3.0}
-"""The rays that hit something within limits, and where."""
+"""The rays with a valid range, and their ranges."""
 
 CELL = 0.1
 CELLS = (60, 40)
@@ -24,4 +24,4 @@ TOPICS = f"""\
 {ROBOT}/scan [sensor_msgs/msg/LaserScan]
 /rosout [rcl_interfaces/msg/Log]
 """
-"""As ``ros2 topic list -t`` prints them."""
+"""The topics in the form of ``ros2 topic list -t``."""

@@ -1,7 +1,7 @@
 """A robot as nodes of a real ROS 2, run by Python 3.12 in an environment of its own.
 
 It has odometry, a scanner with rays of every odd kind, a battery and a latched map. It
-drives as the last velocity says, without a timeout: only a zero ends its motion. Each
+drives with the last velocity, without a timeout: only a zero stops the robot. Each
 velocity that reaches it becomes a line on standard output.
 """
 
@@ -41,7 +41,7 @@ class Robot:
 
     def drive(self, twist):
         self.twist = (twist.linear.x, twist.angular.z)
-        say(twist=self.twist, at=time.monotonic(), pose=self.pose)
+        print_json(twist=self.twist, at=time.monotonic(), pose=self.pose)
 
     def step(self):
         speed, turn = self.twist
@@ -96,7 +96,7 @@ def floor():
     return grid
 
 
-def say(**what):
+def print_json(**what):
     print(json.dumps(what), flush=True)
 
 
@@ -104,7 +104,7 @@ def main():
     rclpy.init(args=sys.argv)
     node = rclpy.create_node("robots")
     Robot(node)
-    say(ready=True)
+    print_json(ready=True)
     with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
         rclpy.spin(node)
 

@@ -1,6 +1,6 @@
 """A real ROS 2 graph behind a rosbridge that this project did not write.
 
-The robot is told by ``--robot``, for discovery has nothing to ask there: the bridge's
+The robot is given by ``--robot``, as discovery gets no answers there: the bridge's
 own rosapi needs the types of ``rosapi_msgs``, and the graph has no ``/tf``, which needs
 those of ``tf2_msgs``. No registry has wheels of either. Discovery by rosapi and frames
 are tested with the simulator, and with frames captured from real bridges.
@@ -29,7 +29,7 @@ from ros_facts import (
 
 from real_browser import hold
 
-# Installing what is real may take its time, once.
+# The first run installs ROS, which may take minutes.
 pytestmark = [
     pytest.mark.peer,
     pytest.mark.browser,
@@ -37,7 +37,7 @@ pytestmark = [
     pytest.mark.timeout(300),
 ]
 
-TOLD = f"Bob:{ROBOT}/odom:{ROBOT}/cmd_vel:{ROBOT}/scan"
+ROBOT_OPTION = f"Bob:{ROBOT}/odom:{ROBOT}/cmd_vel:{ROBOT}/scan"
 BOB = '.robot[data-name="Bob"]'
 
 SOON = 1.0
@@ -46,7 +46,7 @@ SOON = 1.0
 
 @pytest.fixture(scope="module")
 def server(ros):
-    command = ("view", ros.url, "--robot", TOLD, "--port", 0, "--no-browser")
+    command = ("view", ros.url, "--robot", ROBOT_OPTION, "--port", 0, "--no-browser")
     with running(*command, pattern=WEB) as process:
         yield process
 
@@ -82,20 +82,20 @@ def dots(tab):
 
 
 def drive(tab, ros):
-    """Hold the key that drives forward until the robot's own node has come along."""
+    """Hold the key that drives forward until the robot's node reports motion."""
     tab.locator("#robots .row button").click()
     tab.locator("svg.webmap").focus()
     x, y = place(ros)
 
-    def comes_along():
+    def has_moved():
         newest = ros.twists()[-1:]
         return bool(newest) and not newest[0].is_zero and away(ros, x, y) > 0.05
 
-    hold(tab.keyboard, "w", comes_along)
+    hold(tab.keyboard, "w", has_moved)
 
 
 def place(ros):
-    """Where the robot was when it last heard of a velocity."""
+    """Return where the robot was when it last received a velocity."""
     twists = ros.twists()
     return twists[-1].pose[:2] if twists else START[:2]
 
@@ -104,13 +104,13 @@ def away(ros, x, y):
     return math.dist(place(ros), (x, y))
 
 
-def stands(ros):
+def is_stopped(ros):
     twists = ros.twists()
     return bool(twists) and twists[-1].is_zero
 
 
 def expect_drawn_where_it_is(tab, ros):
-    """Check the drawn pose of a standing robot against its own, and wait for it."""
+    """Wait until the drawn pose of a robot that does not move is its true pose."""
     x, y, yaw = ros.twists()[-1].pose
     here = pytest.approx([math.cos(yaw), math.sin(yaw), x, y], abs=0.002)
 
@@ -131,7 +131,7 @@ def test_the_robot_and_its_scan_are_drawn_at_the_positions_from_its_ros_nodes(op
         for ray, reach in DRAWN.items()
     ]
     drawn = dots(opened)
-    assert len(drawn) == len(expected), "what is NaN, infinite or out of range is not"
+    assert len(drawn) == len(expected), "invalid ranges are not drawn"
     for dot, place in zip(drawn, expected, strict=True):
         assert dot == pytest.approx(place, abs=0.003)
 
@@ -140,32 +140,36 @@ def test_a_held_key_drives_the_robot_and_its_release_sends_zero(opened, ros):
     drive(opened, ros)
     opened.keyboard.up("w")
     released = time.monotonic()
-    wait_until(lambda: stands(ros), what="zero")
+    wait_until(lambda: is_stopped(ros), what="zero")
     speeds = {t.speed for t in ros.twists() if not t.is_zero}
-    assert 0.05 < max(speeds) <= 0.3 + 1e-9, "a base that nobody vouches for is slow"
+    assert 0.05 < max(speeds) <= 0.3 + 1e-9, "a base without a stated stop time is slow"
     assert min(speeds) > 0
     zero = next(t for t in ros.twists() if t.is_zero and t.at > released - SOON)
     assert zero.at - released < SOON
     expect_drawn_where_it_is(opened, ros)
     wait_until(
         lambda: time.monotonic() - ros.twists()[-1].at > SOON,
-        what="silence, which leaves other writers in peace,",
+        what="silence, so that other programs can publish,",
     )
-    assert stands(ros)
+    assert is_stopped(ros)
 
 
 def test_after_a_restart_of_the_bridge_the_robot_receives_zero_first(opened, ros):
     drive(opened, ros)
     ros.kill_bridge()
     killed = len(ros.twists())
-    assert not stands(ros), "nothing can tell the robot to stop now"
+    assert not is_stopped(ros), "without the bridge the robot does not stop"
     row = opened.locator("#robots > li")
     expect(row).to_contain_text("No connection to the bridge")
     opened.wait_for_timeout(500)  # the key is still held
     ros.start_bridge()
-    wait_until(lambda: len(ros.twists()) > killed, within=20.0, what="the next word")
-    wait_until(lambda: stands(ros), what="zero")
-    assert all(t.is_zero for t in ros.twists()[killed:]), "the held key drove on"
+    wait_until(
+        lambda: len(ros.twists()) > killed, within=20.0, what="the next velocity"
+    )
+    wait_until(lambda: is_stopped(ros), what="zero")
+    assert all(t.is_zero for t in ros.twists()[killed:]), (
+        "the held key still drove the robot"
+    )
     opened.keyboard.up("w")
     drawn_now(opened).wait_for(state="attached")
     scan = opened.locator(f"{BOB} > .laserscan:not(.stale)")
@@ -173,11 +177,11 @@ def test_after_a_restart_of_the_bridge_the_robot_receives_zero_first(opened, ros
     expect_drawn_where_it_is(opened, ros)
     drive(opened, ros)
     opened.keyboard.up("w")
-    wait_until(lambda: stands(ros), what="zero after it drove again")
+    wait_until(lambda: is_stopped(ros), what="zero after the robot drove again")
 
 
 def webmap(*arguments):
-    """Run a command of ours that is given the topics as ROS itself lists them."""
+    """Run a WebMap command with the topic list of ROS itself."""
     done = subprocess.run(
         [sys.executable, "-m", "webmap", *arguments, "--topics", "-"],
         input=TOPICS,
@@ -190,7 +194,7 @@ def webmap(*arguments):
 
 
 def box_in_world(picture):
-    """Where an image is drawn: its left, low, right and high edge in metres."""
+    """Return the left, low, right and high edge of an image on the map, in metres."""
     return picture.evaluate(
         """image => {
             const world = image.closest(".world");
@@ -208,8 +212,8 @@ def box_in_world(picture):
 def test_a_fleet_file_from_a_topic_list_shows_the_map_published_earlier(
     ros, tab, tmp_path
 ):
-    code, fleet, said = webmap("discover", ros.url, "--toml")
-    assert code == 0, said
+    code, fleet, output = webmap("discover", ros.url, "--toml")
+    assert code == 0, output
     file = tmp_path / "fleet.toml"
     file.write_text(fleet)
     with running("run", file, "--port", 0, "--no-browser", pattern=WEB) as process:
@@ -228,11 +232,11 @@ def test_a_fleet_file_from_a_topic_list_shows_the_map_published_earlier(
 
 
 def test_the_readiness_check_measures_the_real_robot(ros):
-    code, said, _ = webmap("doctor", ros.url, "--seconds", "2")
-    assert code == 0, said
-    assert "The topics come from the given list; robots found: robot_0." in said
-    rate = re.search(rf"{ROBOT}/odom: (\d+\.\d) messages a second", said)
-    assert rate, said
+    code, output, _ = webmap("doctor", ros.url, "--seconds", "2")
+    assert code == 0, output
+    assert "The topics come from the given list; robots found: robot_0." in output
+    rate = re.search(rf"{ROBOT}/odom: (\d+\.\d) messages a second", output)
+    assert rate, output
     assert float(rate[1]) == pytest.approx(20, abs=8)
-    assert f"{ROBOT}/cmd_vel has the stated type Twist" in said
-    assert re.search(rf"Scans come packed as CBOR \({ROBOT}/scan\)", said)
+    assert f"{ROBOT}/cmd_vel has the stated type Twist" in output
+    assert re.search(rf"Scans come packed as CBOR \({ROBOT}/scan\)", output)

@@ -1,4 +1,4 @@
-"""Where a real ROS cannot be installed, that is said in a sentence."""
+"""If a real ROS cannot be installed, a sentence states the reason."""
 
 import os
 import subprocess

@@ -1,12 +1,12 @@
-"""Scripted robots: what their poses, frames and clocks do, and what is drawn of it.
+"""Scripted robots: their poses, frames and clocks, and what is drawn.
 
-Time is virtual: a loop that has nothing to do goes on to its next timer at once, and
-``time.monotonic`` is that loop's time. ``recorded_poses.json`` has a digest of what is
-seen of each script, which shows that a change of the code's shape changes no picture.
+Time is virtual: a loop that has nothing to do jumps to its next timer at once, and
+``time.monotonic`` returns the loop's time. ``recorded_poses.json`` has a digest of the
+output of each script, which shows that a refactoring changes no picture.
 
-- ``WEBMAP_POSES=write pytest tests/poses/test_poses_recorded_poses.py`` writes it anew.
-- ``WEBMAP_POSES=FOLDER pytest ...`` writes all that was seen to files of the folder, to
-  be compared between two versions of the code.
+- ``WEBMAP_POSES=write pytest tests/poses/test_poses_recorded_poses.py`` writes it.
+- ``WEBMAP_POSES=FOLDER pytest ...`` writes the whole output to files of the folder, to
+  compare two versions of the code.
 """
 
 import asyncio
@@ -47,7 +47,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
 
 class Jumping(selectors.SelectSelector):
-    """A selector that lets the loop's time go on where another would wait."""
+    """A selector that advances the loop's time instead of waiting."""
 
     def __init__(self, loop: VirtualLoop) -> None:
         super().__init__()
@@ -68,7 +68,7 @@ class Listening(Removal):
 
 
 class Link:
-    """A bridge whose frames, state and lag a script gives."""
+    """A bridge whose frames, state and lag come from a script."""
 
     def __init__(self, name: str) -> None:
         self.url = self.name = name
@@ -169,10 +169,10 @@ class Channel:
 
 
 class Stage(logging.Handler):
-    """A script's robots, its links, and all that was seen.
+    """The robots and links of a script, and its whole output.
 
     Args:
-        names: What the robots are called.
+        names: The names of the robots.
 
     """
 
@@ -194,7 +194,7 @@ class Stage(logging.Handler):
         self._seen = {robot: robot.fragment.revision for robot in self.robots}
         self._facts: dict[Robot, str] = {}
 
-    # What happens.
+    # The steps of a script.
 
     @property
     def loop(self) -> VirtualLoop:
@@ -203,24 +203,24 @@ class Stage(logging.Handler):
         return loop
 
     async def wait(self, seconds: float) -> None:
-        """Let time pass, and look every half a second."""
+        """Let time pass, and record changes every half a second."""
         until = self.loop.now + seconds
         while (rest := until - self.loop.now) > 1e-6:
             await asyncio.sleep(min(rest, 0.5))
             self.look()
 
     async def stall(self, seconds: float) -> None:
-        """Let time pass in which nothing is done."""
+        """Let time pass without running the loop."""
         self.loop.now += seconds
         await asyncio.sleep(0)
         self.look()
 
     def publish(self, topic: str, message: dict, link: Link | None = None) -> None:
-        """Publish a message on a link, and look."""
+        """Publish a message on a link, and record changes."""
         (link or self.link).publish(topic, message)
         self.look()
 
-    # What is seen.
+    # The output of a script.
 
     def emit(self, record: logging.LogRecord) -> None:
         error = "" if record.exc_info is None else f" ({record.exc_info[1]})"
@@ -230,7 +230,7 @@ class Stage(logging.Handler):
         self.lines.append(f"{time.monotonic() - BEGIN:.3f} {line}")
 
     def look(self) -> None:
-        """Note what changed since the last look."""
+        """Record the changes since the last look."""
         for robot in self.robots:
             for line in self._drawn(robot):
                 self.note(f"{robot.name}, {line}")
@@ -292,7 +292,7 @@ def rounded(numbers: Any) -> str:
 
 
 def play(script: Callable[[Stage], Any], monkeypatch: Any, *names: str) -> list[str]:
-    """Return all that is seen of a script."""
+    """Return the whole output of a script."""
 
     async def run() -> list[str]:
         loop = asyncio.get_running_loop()
@@ -321,7 +321,7 @@ def play(script: Callable[[Stage], Any], monkeypatch: Any, *names: str) -> list[
 
 
 def _without_ties(lines: list[str]) -> Iterator[str]:
-    """Put lines of timers that are due at one time, in any order, into one order."""
+    """Sort the lines of timers that are due at the same time."""
     for silent, group in itertools.groupby(lines, lambda line: ": no pose for" in line):
         each = list(group)
         yield from sorted(each) if silent else each
@@ -399,15 +399,15 @@ def planned_path(stamp: float, frame="odom") -> dict:
     return {"header": header(frame, stamp), "poses": each}
 
 
-# One robot that does at random what robots and networks do.
+# A robot and a network with random behaviour.
 
 
 class Chance:
-    """Robots on links of which anything may come next.
+    """Robots on links with random messages and faults.
 
     Args:
-        stage: Where they are.
-        seed: Of what comes.
+        stage: The stage of the robots.
+        seed: The seed of the random choices.
 
     """
 
@@ -415,7 +415,7 @@ class Chance:
         self.stage = stage
         self.random = random.Random(seed)
         self.ahead = self.random.choice([0.0, 0.0, 3600.0])
-        """By how much the robots' clock is ahead of this one."""
+        """The time by which the robots' clock is ahead, in seconds."""
         self.x = self.yaw = 0.0
         self.clear = True
         for link in stage.links:

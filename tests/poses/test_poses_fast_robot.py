@@ -1,4 +1,4 @@
-"""A robot at 1 kHz, behind a bridge that ignores how often it is asked to send."""
+"""A robot at 1 kHz, behind a bridge that ignores the requested rate."""
 
 import asyncio
 import sys
@@ -11,7 +11,7 @@ from webmap.ros.tf import Transform
 from webmap.ros.tf.buffer import HISTORY
 from webmap.ros.tf.track import MOST, Track
 
-# The rosbridge that sends what a test wants is with the tests of the bridge.
+# The fake rosbridge is in the folder of the bridge's tests.
 sys.path.append(str(Path(__file__).parents[1] / "ros"))
 from fake_rosbridge import bridged, until
 

@@ -1,4 +1,4 @@
-"""What fails while poses and frames come leaves nothing behind."""
+"""A failure while poses and frames arrive leaves no wrong state."""
 
 import math
 
@@ -10,7 +10,7 @@ from webmap.core.registry import robot_modules
 
 
 def tilted(parent, child, roll, stamp):
-    """Return a frame that is turned about its parent's x."""
+    """Return a frame that is turned about the x axis of its parent."""
     found = transform(parent, child, 0.2, stamp=stamp)
     half = roll / 2
     turn = {"x": math.sin(half), "y": 0.0, "z": 0.0, "w": math.cos(half)}
@@ -20,7 +20,7 @@ def tilted(parent, child, roll, stamp):
 
 @pytest.fixture
 def fussy(monkeypatch):
-    """A layer that fails to draw while it is told to."""
+    """A layer whose drawing fails while the test sets ``fails``."""
     monkeypatch.setattr(robot_modules, "_registered", dict(robot_modules._registered))
 
     @layer("geometry_msgs/PointStamped")
@@ -66,7 +66,7 @@ def test_a_failed_redraw_keeps_the_old_drawing_and_its_problem_is_cleared(
             return any("no such tilt" in words for words in robot.problems.values())
 
         await go(60)
-        point(stage.loop.now + 2.0)  # newer than the frames, so it is drawn anew
+        point(stage.loop.now + 2.0)  # newer than the frames, so it is drawn again
         await go(14, roll=0.5)
         assert drawn.placed._on_robot
         fussy.fails = True

@@ -1,4 +1,4 @@
-"""A reading, frames and the time become a pose and what is wrong with it."""
+"""A reading, frames and the time become a pose and its problems."""
 
 import math
 from types import SimpleNamespace
@@ -23,7 +23,7 @@ def frames():
 
 @pytest.fixture
 def pipeline(frames):
-    """A robot with a topic, whose poses are placed by frames."""
+    """A robot with a pose topic; frames place its poses on the map."""
     pipeline = PosePipeline()
     pipeline.placing = Placing(frames, "map", "base_link")
     pipeline.restart(0.1)
@@ -78,7 +78,9 @@ def test_without_a_topic_the_pose_comes_from_the_base_frame(pipeline, frames):
     pipeline.restart(None)
     frames.buffer.add("map", "base_link", at(3.0), 5.0)
     assert pipeline.step(None, frames, 100.0).pose == reading(3.0, 5.0, "map")
-    assert pipeline.step(None, frames, 100.1).pose is None, "that is no news"
+    assert pipeline.step(None, frames, 100.1).pose is None, (
+        "the same reading is no new pose"
+    )
 
 
 def test_a_restart_of_the_pipeline_clears_the_pose_history(pipeline):

@@ -1,4 +1,4 @@
-"""Poses, problems, log lines and what is drawn of them are as they were recorded."""
+"""Poses, problems, log lines and drawings are the same as the recorded ones."""
 
 import hashlib
 import json
@@ -29,7 +29,7 @@ SEEDS = range(40)
 
 
 async def drive(stage, seconds, x=0.0, *, localised=True, ahead=0.0, step=0.1):
-    """Let odometry and frames come for a while, as of a robot that drives along x."""
+    """Publish the odometry and frames of a robot that drives along x."""
     until = stage.loop.now + seconds
     while stage.loop.now < until - 1e-6:
         await stage.wait(step)
@@ -178,7 +178,7 @@ SCRIPTS = {
 
 
 def compare(name, lines):
-    """Compare what was seen with the record, or write it."""
+    """Compare the output with the record, or write the record."""
     digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()[:12]
     found = json.loads(FILE.read_text()) if FILE.exists() else {}
     if MODE == "write":

@@ -1,4 +1,4 @@
-"""A robot that falls silent while its link is up is said in the log, both ways."""
+"""The log reports a robot that sends no poses over an open link, and its return."""
 
 import asyncio
 import logging
@@ -17,7 +17,7 @@ from webmap.ros.bridge import BridgeStats
 
 @pytest.fixture
 def received():
-    """A robot that was heard at 100 s."""
+    """The silence of a robot whose last pose arrived at 100 s."""
     received = Silence()
     received.record(100.0)
     return received
@@ -44,14 +44,14 @@ def test_no_silence_is_reported_during_a_link_loss_and_shortly_after(
 
 
 def test_repeated_silences_are_reported_at_most_once_per_minute():
-    flickering, said, again = Silence(), [], []
+    flickering, reported, again = Silence(), [], []
     for start in range(0, 600, 5):
         if flickering.record(float(start)) is not None:
             again.append(start)
         if flickering.look(start + LIMIT + 1.0, linked=True) is not None:
-            said.append(start)
-    assert said == [AGAIN * n for n in range(10)]
-    assert again == [start + 5 for start in said]
+            reported.append(start)
+    assert reported == [AGAIN * n for n in range(10)]
+    assert again == [start + 5 for start in reported]
 
 
 def test_a_second_lasting_silence_is_reported_one_minute_after_the_first(received):
@@ -69,7 +69,7 @@ def test_the_silence_limit_can_be_longer_for_a_slow_topic(received):
 
 
 class Link:
-    """A bridge that is open, and hands over what a test says."""
+    """An open bridge whose messages the test publishes."""
 
     url = "ws://test:9090"
     name = "hall"
@@ -88,9 +88,9 @@ class Link:
         return Removal(lambda: self.listeners.pop(topic))
 
     def protect(self, topic, carries):
-        """Nobody publishes here."""
+        """Do nothing: no program publishes here."""
 
-    def say(self, topic, message):
+    def publish(self, topic, message):
         callback, decode = self.listeners[topic]
         callback(msgspec.convert(message, decode, strict=False))
 
@@ -121,14 +121,14 @@ def robots():
 
 @pytest.fixture
 def log(caplog, monkeypatch):
-    """What the log has of robots, with a silence of a twentieth of a second."""
+    """The log lines about robots, with a silence limit of a twentieth of a second."""
     monkeypatch.setattr(silence, "LIMIT", 0.05)
     caplog.set_level(logging.INFO, "webmap.robot")
     return caplog
 
 
 async def lines_of(log, count: int) -> None:
-    """Wait for so many lines."""
+    """Wait for a number of lines."""
     async with asyncio.timeout(10):
         while len(log.messages) < count:
             await asyncio.sleep(0.005)
@@ -141,14 +141,14 @@ def follow(robot, link, topic="/odom", type="nav_msgs/Odometry"):
 def test_the_end_and_the_return_of_odometry_are_each_logged_once(robots, link, log):
     async def scenario() -> None:
         follow(robots[1], link)
-        link.say("/odom", ODOM)
+        link.publish("/odom", ODOM)
         await lines_of(log, 1)
-        link.say("/odom", ODOM)
+        link.publish("/odom", ODOM)
 
     asyncio.run(scenario())
-    said = [re.sub(r"\d+ s", "N s", message) for message in log.messages]
+    lines = [re.sub(r"\d+ s", "N s", message) for message in log.messages]
     assert [line.levelname for line in log.records] == ["WARNING", "INFO"]
-    assert said == [
+    assert lines == [
         "Bob: no pose for N s from /odom on hall, although the connection is open",
         "Bob: poses again, after N s",
     ]
@@ -159,11 +159,11 @@ def test_a_blocked_process_reports_no_robot_as_silent(robots, link, log, monkeyp
 
     async def scenario() -> None:
         follow(robots[1], link)
-        link.say("/odom", ODOM)
-        time.sleep(0.2)  # nothing is taken in, and nothing looked at
-        for _ in range(3):  # timers come before what a link has for them
+        link.publish("/odom", ODOM)
+        time.sleep(0.2)  # the loop is blocked
+        for _ in range(3):  # timers run before received messages
             await asyncio.sleep(0)
-        link.say("/odom", ODOM)
+        link.publish("/odom", ODOM)
 
     asyncio.run(scenario())
     assert log.messages == []
@@ -178,7 +178,7 @@ def test_a_destroyed_robot_or_a_replaced_topic_is_not_reported_as_silent(
     async def scenario() -> None:
         for robot in (gone, bob, ann):
             follow(robot, link, f"/{robot.name}")
-            link.say(f"/{robot.name}", ODOM)
+            link.publish(f"/{robot.name}", ODOM)
         gone.destroy()
         follow(bob, link, "/other")
         await lines_of(log, 1)
@@ -193,9 +193,9 @@ def test_an_amcl_pose_topic_is_not_reported_as_silent(robots, link, log):
 
     async def scenario() -> None:
         follow(bob, link, "/amcl_pose", "geometry_msgs/PoseWithCovarianceStamped")
-        link.say("/amcl_pose", {"header": HEADER, "pose": POSE})
+        link.publish("/amcl_pose", {"header": HEADER, "pose": POSE})
         follow(ann, link)
-        link.say("/odom", ODOM)
+        link.publish("/odom", ODOM)
         await lines_of(log, 1)
 
     asyncio.run(scenario())
@@ -216,7 +216,7 @@ def test_a_robot_without_odometry_is_reported_when_its_frames_fall_silent(
 
     async def scenario() -> None:
         bob.set_tf(link, namespace="/bob")
-        link.say("/bob/tf", {"transforms": [transform]})
+        link.publish("/bob/tf", {"transforms": [transform]})
         await lines_of(log, 1)
 
     asyncio.run(scenario())

@@ -1,4 +1,4 @@
-"""Regular looks at all robots: few timers, and no robot is left out."""
+"""Regular checks of all robots use few timers and leave out no robot."""
 
 import asyncio
 
@@ -21,7 +21,7 @@ def run(scenario):
 
 
 class Looks:
-    """Counts the looks at some robots."""
+    """Counts the checks of some robots."""
 
     def __init__(self, rounds, robots):
         self.counts = [0] * robots
@@ -42,9 +42,9 @@ def test_each_robot_is_looked_at_regularly_with_few_timers(somebody, every, robo
         await asyncio.sleep(2 * every)  # the first round
         before, loop.timers = looks.counts[:], 0
         await asyncio.sleep(20 * every)
-        taken = [now - then for now, then in zip(looks.counts, before, strict=True)]
-        assert min(taken) >= 19
-        assert max(taken) <= 21
+        increases = [now - then for now, then in zip(looks.counts, before, strict=True)]
+        assert min(increases) >= 19
+        assert max(increases) <= 21
         assert loop.timers <= 20 * max(1, robots / AT_ONCE) + 3
 
     run(scenario)

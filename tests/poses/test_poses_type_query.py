@@ -1,4 +1,4 @@
-"""The type of a velocity topic is asked for until somebody knows it."""
+"""The type of a velocity topic is requested until rosapi knows the type."""
 
 import asyncio
 from types import SimpleNamespace
@@ -21,7 +21,7 @@ STAMPED = "geometry_msgs/msg/TwistStamped"
 
 
 class Link:
-    """A bridge whose rosapi says the type that it is told to say, and counts."""
+    """A bridge whose rosapi returns the type of the test and counts its calls."""
 
     url = "ws://test:9090"
 
@@ -50,7 +50,7 @@ class Link:
 
 
 class Gate:
-    """Notes the type that each declaration has."""
+    """Records the type of each declaration."""
 
     def __init__(self) -> None:
         self.types: list[str] = []
@@ -63,7 +63,7 @@ class Gate:
 
 
 class Time:
-    """Time that passes when it is told to, for what waits on a loop."""
+    """A loop time that passes when the test advances it."""
 
     def __init__(self, loop) -> None:
         self.pauses: list[float] = []
@@ -90,10 +90,10 @@ async def settle():
 
 @pytest.fixture
 def received(monkeypatch):
-    """Run what is done with a robot whose velocity topic nobody knows yet."""
+    """Run actions on a robot whose velocity topic rosapi does not know yet."""
     gate = Gate()
     monkeypatch.setattr(RobotMotion, "gate", gate)
-    clock = SimpleNamespace(monotonic=lambda: 0.0)  # an answer takes no time
+    clock = SimpleNamespace(monotonic=lambda: 0.0)  # rosapi answers at once
     monkeypatch.setattr("webmap.poses.type_query.time", clock)
 
     def run(scenario):

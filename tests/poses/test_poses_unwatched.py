@@ -1,4 +1,4 @@
-"""Poses while nobody looks: some are enough, and none is missed because of that."""
+"""Without an open page fewer poses are enough, and no robot counts as lost."""
 
 import asyncio
 from types import SimpleNamespace
@@ -12,7 +12,7 @@ from webmap.features.alerts.alert_watch import conditions
 from webmap.poses.silence import PERIODS
 
 LOST_AFTER = PERIODS * RARELY / 1000
-"""Seconds without a pose after which a robot is lost while nobody looks."""
+"""Seconds without a pose after which an unwatched robot is lost."""
 
 
 @pytest.fixture(autouse=True)
@@ -143,7 +143,7 @@ def test_a_robot_with_few_poses_is_not_lost(monkeypatch):
         looking._set(True)  # the bridge has sent nothing for 4.9 s
         assert "lost" not in conditions(robot)
         assert robot.state.name != "lost"
-        assert robot.pose_age == pytest.approx(4.9)  # and is shown so
+        assert robot.pose_age == pytest.approx(4.9)  # and the page shows that age
         stage.publish("/odom", odometry(0.5, stamp=113.6))
         await stage.wait(2.9)
         assert "lost" not in conditions(robot)
@@ -323,7 +323,7 @@ def test_who_begins_to_look_gets_the_state_of_now(monkeypatch):
         stage.publish("/odom", odometry(0.0, stamp=100.0))
         await stage.wait(LOST_AFTER + 0.1)
         assert robot.state.name == "lost"
-        assert robot.svg.get("data-state") == "watched"  # nobody needs it yet
+        assert robot.svg.get("data-state") == "watched"  # no page is open yet
         looking._set(True)
         assert robot.svg.get("data-state") == "lost"
         looking._set(False)

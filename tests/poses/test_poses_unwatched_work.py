@@ -1,4 +1,4 @@
-"""What a robot costs at which nobody looks, in timers and calls, not in seconds."""
+"""The work for an unwatched robot, in timers and calls instead of seconds."""
 
 import asyncio
 import json
@@ -51,7 +51,7 @@ class Fleet:
         }
 
     async def send(self, seconds):
-        """Send the poses that a bridge sends while nobody looks, spread over time."""
+        """Send the poses of a bridge while no page is open, spread over time."""
         until = self.loop.now + seconds
         while self.loop.now < until:
             for number in range(ROBOTS):
@@ -80,7 +80,7 @@ def test_a_robot_at_which_nobody_looks_needs_few_timers_and_calls(monkeypatch):
         monkeypatch.setattr(time, "monotonic", loop.time)
         fleet = Fleet(loop)
         looking._set(False)
-        for topic in fleet.bridge._topics.values():  # what came late before
+        for topic in fleet.bridge._topics.values():  # messages that were late before
             for listener in topic.listeners:
                 listener.throttle.offer("first", loop.now - 0.4 * PERIOD)
                 listener.throttle.offer("second", loop.now + 0.1 * PERIOD)
@@ -92,7 +92,7 @@ def test_a_robot_at_which_nobody_looks_needs_few_timers_and_calls(monkeypatch):
         sys.setprofile(None)
         poses = fleet.bridge.stats.frames - before
         assert poses == 4 * ROBOTS
-        # One timer is this test's own; the log needs one to notice that poses end.
+        # One timer is of this test; the log needs one to notice the end of the poses.
         assert (loop.timers - poses) / poses < 1.3
         assert calls / poses < 130
         looking._set(True)

@@ -1,4 +1,4 @@
-"""Arrays of numbers from other processes, which come as views of memory."""
+"""Arrays of numbers from other processes arrive as views of memory."""
 
 from array import array
 

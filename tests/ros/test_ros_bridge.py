@@ -304,14 +304,14 @@ def test_a_message_of_the_wrong_type_is_reported_once_with_both_types():
 
 
 class Shown:
-    """What people are shown of one module, and what is taken back."""
+    """Records the problems of a module that are reported and cleared."""
 
     def __init__(self):
-        self.said, self.standing = [], {}
+        self.reported, self.standing = [], {}
         self.scope = Scope("module", self.report, self.standing.pop)
 
     def report(self, text, about):
-        self.said.append(text)
+        self.reported.append(text)
         self.standing[about] = text
 
 
@@ -328,17 +328,17 @@ def test_undecodable_messages_are_a_problem_until_a_message_decodes_again():
                 await until(lambda: shown.standing)
                 await server.publish("/a", {"data": False})
                 await until(lambda c=count: len(plain) == 3 * c - 1)
-                assert shown.standing, "one who takes all sorts takes nothing back"
+                assert shown.standing, "a callback for any type clears no problem"
                 await server.publish("/a", {"data": "good"})
                 await until(lambda c=count: len(got) == c)
                 assert shown.standing == {}
-            assert len(shown.said) == 3
-            assert {*shown.said} == {str(error) for error in errors}
-            assert len(errors) == 1, "why is found out once"
+            assert len(shown.reported) == 3
+            assert {*shown.reported} == {str(error) for error in errors}
+            assert len(errors) == 1, "the reason is reported once"
             await server.send('{"op": "publish", "topic": "/a", "msg": {"data": "x"')
             await until(lambda: shown.standing)
             shown.scope.close()
-            assert shown.standing == {}, "and it ends with who was told"
+            assert shown.standing == {}, "closing the scope clears the problem"
 
     run(scenario)
 
@@ -385,7 +385,7 @@ def test_the_problem_of_a_silent_topic_is_cleared_by_its_next_message(monkeypatc
             with shown.scope.active():
                 bridge.subscribe("/a", got.append, "std_msgs/String", decode=Text)
             await until(lambda: shown.standing)
-            assert "no messages come" in shown.said[0]
+            assert "no messages come" in shown.reported[0]
             await server.publish("/a", {"data": "good"})
             await until(lambda: got)
             assert shown.standing == {}
@@ -471,9 +471,9 @@ def test_statuses_of_a_hostile_bridge_do_not_forge_or_flood_the_log(caplog):
             assert len(str(errors[0])) < 1100
 
     run(scenario)
-    said = [r.getMessage() for r in caplog.records if "forged" in r.getMessage()]
-    assert 1 < len(said) < 40
-    assert all(one.isprintable() and len(one) < 1200 for one in said)
+    lines = [r.getMessage() for r in caplog.records if "forged" in r.getMessage()]
+    assert 1 < len(lines) < 40
+    assert all(one.isprintable() and len(one) < 1200 for one in lines)
 
 
 def test_publishing_advertises_the_topic_once_before_the_first_message():

@@ -1,4 +1,4 @@
-"""The catalogue of message definitions, compared with three releases in rosbags."""
+"""The message definitions, compared with those of three releases in rosbags."""
 
 import pytest
 from rosbags.interfaces import Nodetype
@@ -10,11 +10,11 @@ from webmap.ros.definitions import Definitions, UnknownType, shipped, split_text
 FILLER = "structure_needs_at_least_one_member"
 TIMES = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}
 NEWER = {"sensor_msgs/Range": [("variance", "float32", None, None)]}
-"""What Jazzy has behind the fields of Humble."""
+"""The fields that Jazzy adds after those of Humble."""
 
 
 def plain(name):
-    """A name without the kind that rosbags writes into it."""
+    """A type name without the ``msg`` part that rosbags adds."""
     name = name.replace("/msg/", "/")
     return TIMES.get(name, name)
 

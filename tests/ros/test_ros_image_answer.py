@@ -1,4 +1,4 @@
-"""What cameras on the web answer, and their addresses."""
+"""The responses and the addresses of HTTP cameras."""
 
 import contextlib
 
@@ -62,7 +62,7 @@ def answer_of(status="200 OK", kind="image/jpeg", more="", body=b"") -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    ("data", "expected"),
     [
         (answer_of("302 Found", more="Location: http://10.0.0.1/\r\n"), "not followed"),
         (answer_of("404 Not Found"), "nothing at this address"),
@@ -81,8 +81,8 @@ def answer_of(status="200 OK", kind="image/jpeg", more="", body=b"") -> bytes:
         (answer_of(body=b"\xff" * (MAX_BYTES + 1)), "more than"),
     ],
 )
-def test_an_invalid_camera_response_is_refused_with_a_reason(data, said):
-    with pytest.raises(ProtocolError, match=said):
+def test_an_invalid_camera_response_is_refused_with_a_reason(data, expected):
+    with pytest.raises(ProtocolError, match=expected):
         Answer().feed(data)
 
 
@@ -96,7 +96,7 @@ def test_a_camera_response_that_ends_too_early_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("body", "said"),
+    ("body", "expected"),
     [
         (b"no boundary " * 1000, "no boundary"),
         (b"--x\r\n" + b"Header: more\r\n" * 1000, "before a picture"),
@@ -106,8 +106,8 @@ def test_a_camera_response_that_ends_too_early_is_refused():
         (b"--x\r\n\r\n" + b"\xff" * (MAX_BYTES + 1), "more than"),
     ],
 )
-def test_an_invalid_stream_is_refused_before_filling_the_memory(body, said):
-    with pytest.raises(ProtocolError, match=said):
+def test_an_invalid_stream_is_refused_before_filling_the_memory(body, expected):
+    with pytest.raises(ProtocolError, match=expected):
         fed(Multipart("x"), body, 65536)
 
 

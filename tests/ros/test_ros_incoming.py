@@ -1,4 +1,4 @@
-"""Which messages are in the bytes of a WebSocket, however they are cut."""
+"""WebSocket messages are found in bytes that arrive in chunks of any size."""
 
 import itertools
 
@@ -27,7 +27,7 @@ def frame(data, first=0x81):
 
 
 class Reader:
-    """Keeps what is read of some bytes, in order."""
+    """Keeps the messages that are read, in order."""
 
     def __init__(self, shaken=True):
         self.messages, self.others = [], b""
@@ -102,7 +102,7 @@ def test_only_the_beginning_of_a_message_that_is_too_long_is_kept(data):
     left, size = length - len(begins), data.draw(st.integers(1 << 20, 1 << 23))
     for at in range(0, left, size):
         reader.read(bytes(min(size, left - at)))
-        assert len(reader.incoming) == 0, "nothing of the rest is kept"
+        assert len(reader.incoming) == 0, "the remaining bytes are not kept"
     reader.read(frame(b"after"))
     short = SHORTENED + length.to_bytes(8, "big") + begins[:KEPT]
     assert reader.messages == [b"before", short, b"after"]
@@ -125,7 +125,9 @@ def test_a_message_in_too_many_or_too_long_fragments_is_refused(sent, why):
     with pytest.raises(ProtocolError, match=why):
         reader.read(sent)
     reader.read(frame(b"after"))
-    assert reader.messages == [], "websockets gets the rest, to drop it"
+    assert reader.messages == [], (
+        "the remaining bytes go to websockets, which drops them"
+    )
     assert reader.others.endswith(frame(b"after"))
 
 

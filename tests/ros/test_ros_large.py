@@ -73,7 +73,9 @@ class TestDecision:
         assert not in_json.on
         assert in_json.silent(MAP, "cbor") is None
         in_json.begin()
-        assert in_json.silent(MAP, "cbor") == "ask", "on a new link it may be large"
+        assert in_json.silent(MAP, "cbor") == "ask", (
+            "a new link may send a large message"
+        )
 
     def test_json_is_given_up_after_several_lost_links(self):
         in_json = InJson()
@@ -87,7 +89,7 @@ class TestDecision:
 
 class TestSilence:
     def looks(self, answers, until=60):
-        """When a silent topic counts as not sent, looking ten times a second."""
+        """When a silent topic counts as not sent, at ten looks a second."""
         silence = Silence(0.0)
         for tenth in range(10 * until):
             now = tenth / 10
@@ -188,7 +190,7 @@ def test_a_map_published_late_returns_to_cbor_without_a_report(quick):
             await until(lambda: len(got) == 1)
             count = len(asked())
             await asyncio.sleep(0.6)
-            assert len(asked()) == count, "it is not asked for again and again"
+            assert len(asked()) == count, "the topic is requested again and again"
             assert seen == []
 
     asyncio.run(scenario())

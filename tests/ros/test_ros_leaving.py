@@ -1,4 +1,4 @@
-"""The display leaves a bridge that hangs when a client leaves a queue of messages."""
+"""The display leaves a bridge that hangs if a client's queue is not empty."""
 
 import asyncio
 
@@ -29,7 +29,7 @@ async def by_a_reset(server, bridge, listeners):
 async def by_unsubscribing(server, bridge, listeners):
     for listener in listeners:
         listener.remove()
-    # The bridge answers it after what came before, if it answers at all.
+    # The bridge answers this after the earlier requests, if it answers.
     await asyncio.sleep(0.1)
 
 
@@ -88,7 +88,7 @@ def test_the_bridge_accepts_clients_after_a_reset_of_the_calls_lane():
         ("geometry_msgs/msg/PoseArray", "cbor"),
         ("visualization_msgs/MarkerArray", "cbor"),
         ("sensor_msgs/PointCloud2", "cbor"),
-        ("nav_msgs/Odometry", None),  # has an array that no bridge sends in CBOR
+        ("nav_msgs/Odometry", None),  # no bridge sends its array in CBOR
         ("std_msgs/String", None),
     ],
 )

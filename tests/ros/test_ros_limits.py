@@ -1,4 +1,4 @@
-"""How large a message may be, and that nothing is built before that is looked at."""
+"""The size of a message is checked before the message is decoded."""
 
 import asyncio
 import json
@@ -63,17 +63,17 @@ def test_a_too_large_message_is_reported_to_its_subscriber_and_logged_once(caplo
     text = json.dumps({"data": "x" * (5 * MIB)})
 
     async def scenario():
-        got, said, mended = [], [], []
-        scope = Scope("page", lambda text, about: said.append(text), mended.append)
+        got, reported, mended = [], [], []
+        scope = Scope("page", lambda text, about: reported.append(text), mended.append)
         async with bridged() as (server, bridge):
             with scope.active():
                 bridge.subscribe("/t", got.append, "std_msgs/String")
             for _ in range(3):
                 await server.send(publish(text).decode())
             await until(lambda: bridge.stats.frames >= 3)
-            await until(lambda: said)
+            await until(lambda: reported)
             assert got == []
-            assert said == [
+            assert reported == [
                 "/t: got a message of 5.0 MiB; std_msgs/String may have 4 MiB: publish "
                 "less at a time, or on several topics"
             ]
@@ -89,7 +89,7 @@ def test_a_too_large_message_is_reported_to_its_subscriber_and_logged_once(caplo
 
 @pytest.mark.parametrize("binary", [False, True])
 def test_a_map_of_any_size_costs_neither_the_connection_nor_memory(binary, caplog):
-    """Such a map is latched: it would come again on each new connection."""
+    """Such a map is latched: the bridge would send it again on each new connection."""
     cells = b"0," * (40 * MIB)
     text = b'{"op":"publish","topic":"/map","msg":{"data":[' + cells + b"0]}}"
     if binary:
@@ -99,8 +99,8 @@ def test_a_map_of_any_size_costs_neither_the_connection_nor_memory(binary, caplo
     del text, cells
 
     async def scenario():
-        got, said, maps = [], [], []
-        scope = Scope("page", lambda text, about: said.append(text), lambda _: None)
+        got, reported, maps = [], [], []
+        scope = Scope("page", lambda text, about: reported.append(text), lambda _: None)
         async with bridged() as (server, bridge):
             with scope.active():
                 bridge.subscribe("/map", maps.append, "nav_msgs/OccupancyGrid")
@@ -109,8 +109,8 @@ def test_a_map_of_any_size_costs_neither_the_connection_nor_memory(binary, caplo
                 await server.send(large)
                 await server.send('{"op":"publish","topic":"/odom","msg":{"n":1}}')
                 await until(lambda number=number: len(got) > number)
-            await until(lambda: said)
-            assert said == [
+            await until(lambda: reported)
+            assert reported == [
                 "/map: got a message of 80.0 MiB; nav_msgs/OccupancyGrid may have "
                 "64 MiB: publish a coarser map, or a part of it"
             ]
@@ -148,7 +148,7 @@ def test_all_items_of_a_cbor_message_are_counted():
     check_count(cbor2.dumps({**op, "msg": {"data": b"\x80" * 5 * MIB, "n": [1.5, -7]}}))
     check_count(cbor2.dumps({**op, "msg": cbor2.CBORTag(72, b"\x80" * 5 * MIB)}))
     check_count(b"\xa1\x5f\x41a\xff\x01")  # a text in pieces
-    check_count(b"\xbf\xff\xa1")  # and what is cut off is somebody else's to refuse
+    check_count(b"\xbf\xff\xa1")  # the decoder refuses bytes that are cut off
     head = cbor2.dumps({**op, "msg": 0})[:-1]
     with pytest.raises(TooLarge, match="objects and lists"):
         check_count(head + b"\x9b" + struct.pack(">Q", 1 << 60) + b"\x80" * MAX_VALUES)
@@ -158,7 +158,7 @@ def test_all_items_of_a_cbor_message_are_counted():
 
 @pytest.mark.parametrize(
     "make",
-    [  # each takes long, so it is made when its test runs
+    [  # slow to make, so each is made when its test runs
         lambda: publish('{"transforms":[' + "[]," * 10 * MAX_VALUES + "1]}"),
         lambda: cbor2.dumps(
             {"op": "publish", "topic": "/t", "msg": [[]] * 10 * MAX_VALUES}
@@ -177,7 +177,7 @@ def test_the_worker_refuses_too_many_values_before_building_them(make):
         tracemalloc.stop()
     assert reply.kind == "TooLarge"
     assert "the limit is" in reply.error
-    assert most < 3 * len(frame)  # what it counts is a copy without texts
+    assert most < 3 * len(frame)  # the counted copy has no texts
 
 
 def transforms(count):

@@ -1,4 +1,4 @@
-"""What sets robots in motion, by name and by type."""
+"""Which topics and services move a robot, by name and by type."""
 
 import pytest
 

@@ -62,7 +62,7 @@ def test_the_worker_decodes_a_large_message_to_the_same_value(view):
     run(scenario)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="nice is what POSIX calls it")
+@pytest.mark.skipif(os.name != "posix", reason="only POSIX has nice")
 def test_the_decoding_worker_runs_at_low_priority():
     async def scenario():
         aside, done = Offload(), asyncio.Event()
@@ -230,7 +230,7 @@ def test_large_arrays_of_an_answer_are_not_copied_and_small_ones_do_not_keep_it(
     cells, parts = answered(2 << 20)
     assert cells.values.obj is parts[0]
     assert cells.array()[-1] == 7
-    assert not cells.array().flags.writeable, "other subscribers have it, too"
+    assert not cells.array().flags.writeable, "other subscribers share the array"
     cells, _ = answered(1000)
     assert isinstance(cells.values, array)
     assert bytes(cells) == b"\7" * 1000

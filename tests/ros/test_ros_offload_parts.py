@@ -1,4 +1,4 @@
-"""What becomes of large messages: in steps, in turns, and without stopping the rest."""
+"""Large messages are decoded in small steps and in turns, without blocking."""
 
 import asyncio
 import json
@@ -20,7 +20,7 @@ from webmap.ros.rosbridge.events import Publish
 pytestmark = pytest.mark.slow
 
 STEP = 0.1
-"""Seconds of processor that no step may take: five times what any takes here."""
+"""The limit of processor time for a step, in seconds: five times a usual step."""
 
 
 def run(scenario):
@@ -97,7 +97,7 @@ def test_a_long_message_is_decoded_completely_and_in_order(view):
         most = max(len(getattr(part, field)) for part in got)
         if getattr(view, "separable", False):
             assert most <= worker.PIECE
-            # Whoever comes later is given the whole of it, and not the last part.
+            # A later subscriber gets the whole message and not the last part.
             assert not message.is_decoded(view)
         else:
             assert len(got) == 1
@@ -108,10 +108,10 @@ def test_a_long_message_is_decoded_completely_and_in_order(view):
 
 @pytest.mark.parametrize("view", LONG, ids=lambda view: view.__name__)
 def test_no_decoding_step_of_a_long_message_blocks_the_event_loop(view):
-    """The steps of all tasks of this thread, by its own processor time.
+    """Measure the steps of all tasks of this thread in processor time.
 
-    A processor that others use too is slower, so the best of three rounds counts: a
-    step that is too long is too long in each.
+    A busy processor is slower, so the best of three rounds counts: a step that is
+    too long is too long in each round.
     """
     _, topic, frame = LONG[view]
 
@@ -194,7 +194,7 @@ def test_no_static_transform_is_dropped_when_newer_messages_arrive():
 
 
 def test_many_large_messages_of_one_bridge_do_not_delay_another_bridge():
-    """Many topics of one bridge wait, and then one message of another bridge comes."""
+    """Many topics of one bridge wait, and then a message of another bridge arrives."""
 
     async def scenario():
         greedy, other, order = Offload(), Offload(), []
@@ -226,7 +226,7 @@ def test_after_its_pause_a_bridge_decodes_only_the_newest_message(monkeypatch):
         began = time.monotonic()
         take(aside, Publish("/plan", poses(3001)), PathMsg, got)
         await asyncio.sleep(0.05)
-        take(aside, Publish("/plan", poses(3002)), PathMsg, got)  # the newest counts
+        take(aside, Publish("/plan", poses(3002)), PathMsg, got)  # newest
         await until(lambda: len(got) == 2)
         assert time.monotonic() - began > 0.35
         assert len(got[1].poses) == 3002
@@ -266,7 +266,7 @@ def test_decoding_a_large_map_does_not_block_the_event_loop():
     run(scenario)
 
 
-@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="Linux alone tells")
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="only Linux has prlimit")
 def test_the_memory_of_the_worker_is_limited():
     async def scenario():
         aside, got = Offload(), []

@@ -6,12 +6,12 @@ import pytest
 from webmap.ros.rosbridge import ops
 
 
-def said(frame):
+def decoded(frame):
     return json.loads(frame)
 
 
 def test_a_subscription_has_an_id_a_throttle_rate_and_a_queue_length():
-    assert said(
+    assert decoded(
         ops.subscribe("/scan", id="WebMap-1", type="sensor_msgs/LaserScan")
     ) == {
         "op": "subscribe",
@@ -29,7 +29,7 @@ def test_a_subscription_has_an_id_a_throttle_rate_and_a_queue_length():
 def test_no_subscription_can_hang_a_bridge_or_drop_a_burst(
     throttle, queue_length, compression
 ):
-    frame = said(
+    frame = decoded(
         ops.subscribe(
             "/a",
             id="x",
@@ -45,7 +45,7 @@ def test_no_subscription_can_hang_a_bridge_or_drop_a_burst(
 
 
 def test_an_unsubscribe_request_contains_the_subscription_id():
-    assert said(ops.unsubscribe("/scan", id="WebMap-1")) == {
+    assert decoded(ops.unsubscribe("/scan", id="WebMap-1")) == {
         "op": "unsubscribe",
         "id": "WebMap-1",
         "topic": "/scan",
@@ -53,13 +53,13 @@ def test_an_unsubscribe_request_contains_the_subscription_id():
 
 
 def test_advertised_topics_are_not_latched():
-    frame = said(ops.advertise("/cmd_vel", "geometry_msgs/Twist", id="WebMap-2"))
+    frame = decoded(ops.advertise("/cmd_vel", "geometry_msgs/Twist", id="WebMap-2"))
     assert frame["queue_size"] == 1
     assert frame["latch"] is False
 
 
 def test_a_call_without_arguments_sends_an_empty_mapping():
-    assert said(ops.call_service("/rosapi/topics", id="WebMap-3"))["args"] == {}
+    assert decoded(ops.call_service("/rosapi/topics", id="WebMap-3"))["args"] == {}
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
@@ -80,7 +80,7 @@ def test_values_without_a_json_form_are_refused():
 
 
 def test_text_of_any_language_is_kept():
-    assert said(ops.publish("/a", {"data": "löwe 獅"}))["msg"] == {"data": "löwe 獅"}
+    assert decoded(ops.publish("/a", {"data": "löwe 獅"}))["msg"] == {"data": "löwe 獅"}
 
 
 def test_a_lone_surrogate_is_refused():

@@ -1,4 +1,4 @@
-"""A bridge that floods the display's link holds up nothing else of its thread."""
+"""A bridge that floods the display's link does not delay other work of the thread."""
 
 import asyncio
 import base64
@@ -17,7 +17,7 @@ MAGIC = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
 @contextlib.asynccontextmanager
 async def bridge(talk):
-    """Serve WebSockets with ``talk(reader, writer)``; gives the address."""
+    """Serve WebSockets with ``talk(reader, writer)``; yield the address."""
 
     async def serve(reader, writer):
         with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):

@@ -1,4 +1,4 @@
-"""How the bytes of a WebSocket are cut, and how links take turns."""
+"""The bytes of a WebSocket are cut into pieces, and links take turns."""
 
 import asyncio
 import itertools
@@ -21,7 +21,7 @@ def frame(length):
 
 
 def cut(chunks):
-    """Return the pieces of what comes in chunks."""
+    """Return the pieces of bytes that arrive in chunks."""
     pieces, waiting, cutting = [], bytearray(), Pieces()
     for chunk in chunks:
         waiting += chunk
@@ -75,7 +75,7 @@ def test_during_the_handshake_each_line_is_a_piece():
 
 
 class Greedy:
-    """Wants a turn as often as it is asked."""
+    """A link that always has more to do."""
 
     def __init__(self, noted, name, times):
         self.noted, self.name, self.times = noted, name, times
@@ -103,7 +103,7 @@ def test_links_take_turns_and_the_event_loop_runs_between_them():
     noted, others = asyncio.run(story())
     assert "".join(noted) == "abc" * 20
     steps = [b - a for a, b in itertools.pairwise(others)]
-    assert max(steps) <= 5, "the loop goes on after a few turns"
+    assert max(steps) <= 5, "the loop continues after a few turns"
 
 
 def test_a_turn_asks_for_processor_time_only_when_it_may_be_over(monkeypatch):
@@ -119,7 +119,7 @@ def test_a_turn_asks_for_processor_time_only_when_it_may_be_over(monkeypatch):
     clock[0] = 100.4
     assert not turn.is_over
     assert asked == []
-    clock[0], used[0] = 100.6, 5.25  # the thread did not run all the time
+    clock[0], used[0] = 100.6, 5.25  # the thread was interrupted
     assert not turn.is_over
     assert asked == [100.6]
     clock[0] = 100.8

@@ -306,7 +306,7 @@ def test_truncated_captured_frames_raise_only_protocol_errors(path):
 
 
 def try_all(frame):
-    """Receive and decode in every way; only a ProtocolError may come out."""
+    """Receive and decode in every way; only a ProtocolError may be raised."""
     event = Protocol().receive(frame, 0.0)
     if isinstance(event, Publish):
         for view in (None, *VIEWS):

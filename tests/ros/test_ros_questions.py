@@ -1,4 +1,4 @@
-"""Questions to a bridge, how messages are encoded, and a bridge for a moment."""
+"""Service calls to a bridge, encodings of messages, and short connections."""
 
 import asyncio
 
@@ -13,7 +13,7 @@ NODES = {"publishers": ["/base", "/rosbridge_websocket"], "subscribers": ["/webm
 
 
 def asked(question, **answers):
-    """What a bridge answers to a question, where rosapi answers so."""
+    """Return the result of a service call to a bridge whose rosapi answers so."""
 
     async def scenario():
         async with bridged(opened=False, **answers) as (_, bridge):

@@ -1,4 +1,4 @@
-"""Topics that were subscribed before anybody published them."""
+"""Topics that are subscribed before a node publishes them."""
 
 import asyncio
 from itertools import pairwise
@@ -19,7 +19,7 @@ TYPE = "nav_msgs/OccupancyGrid"
 
 
 def looks(answers, until):
-    """At which times a silent topic is asked after, and when it is renewed."""
+    """The times at which a silent topic is checked, and when it is renewed."""
     silence = Silence(0.0)
     asked, renewed = [], []
     for tenth in range(int(until * 10)):
@@ -99,7 +99,7 @@ def test_a_bridge_without_rosapi_is_asked_for_publishers_only_a_few_times(
         async with bridged() as (server, bridge):
             bridge.on_error(errors.append)
             bridge.subscribe("/map", print, TYPE)
-            # It is asked for anew now and then, since nobody can tell.
+            # The topic is requested again sometimes, as its publishers are unknown.
             await server.wait_for("subscribe", count=3, topic="/map")
             asked = server.ops("call_service", service="/rosapi/publishers")
             assert len(asked) == UNANSWERED

@@ -1,4 +1,4 @@
-"""A bridge and what is subscribed on it end with whatever made them."""
+"""A bridge and its subscriptions end with the scope that made them."""
 
 import asyncio
 
@@ -19,14 +19,14 @@ def run(scenario):
 
 @pytest.fixture
 def lifecycle(monkeypatch):
-    """A process of its own for the bridges of a test."""
+    """A lifecycle for the bridges of one test."""
     lifecycle = Lifecycle()
     monkeypatch.setattr(bridge_module, "lifecycle", lifecycle)
     return lifecycle
 
 
 class Work:
-    """An async callback that goes on until it is cancelled."""
+    """An async callback that runs until it is cancelled."""
 
     def __init__(self):
         self.began = self.cancelled = 0
@@ -170,7 +170,7 @@ def test_no_error_is_reported_for_a_bridge_that_closes_with_its_users(
         await server.start()
         lifecycle.begin(asyncio.get_running_loop())
         with page.active():
-            page.add(_Closes(robot))  # older than the bridge, so removed after it
+            page.add(_Closes(robot))  # older, so it is removed later
             bridge = Bridge(server.url)
         with robot.active():
             bridge.subscribe("/odom", print)

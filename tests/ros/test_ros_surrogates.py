@@ -1,4 +1,4 @@
-"""Text with half a pair of surrogates, which a bridge writes for bytes of no UTF-8."""
+"""Text with a single surrogate, which a bridge sends for bytes that are not UTF-8."""
 
 import asyncio
 import json

@@ -73,7 +73,7 @@ class TestLag:
 
 
 def look(liveness, start, end, received=lambda _now: -math.inf):
-    """Look four times a second; return when the link was found dead."""
+    """Check four times a second; return when the link counts as dead."""
     now = start
     while now <= end:
         if liveness.is_dead(now, received(now)):
@@ -179,7 +179,7 @@ def test_the_mean_rate_never_exceeds_the_throttle_rate(gaps, period):
 
 
 def played(throttle, times):
-    """Offer messages at some times; return when each listener's message came."""
+    """Offer messages at given times; return when each listener received a message."""
     passed, waited = [], 0
     for now in times:
         due = throttle.due

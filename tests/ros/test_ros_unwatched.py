@@ -1,4 +1,4 @@
-"""Subscriptions to what is only shown, while nobody looks."""
+"""Subscriptions to topics that are only shown, while no page is open."""
 
 import asyncio
 
@@ -67,7 +67,7 @@ def test_a_listener_of_the_user_gets_all_messages_beside_one_that_only_shows():
                 await asyncio.sleep(0.03)
             assert asked(server, "/a") == [20]
             assert [message["data"] for message in shown] == ["0"]
-            looking._set(True)  # what waited comes at once
+            looking._set(True)  # the waiting message arrives at once
             await until(lambda: len(shown) == 2)
             assert shown[1]["data"] == "2"
             await server.publish("/a", {"data": "3"})

@@ -25,7 +25,7 @@ SCALARS = {
 
 
 def views():
-    """Every struct whose docstring names the message types that it is a view of."""
+    """Return every struct whose docstring names the message types of the view."""
     for module in pkgutil.walk_packages(webmap.__path__, "webmap."):
         if module.name.startswith(
             ("webmap.ros.", "webmap.modules.", "webmap.features.")
@@ -44,9 +44,9 @@ VIEWS = views()
 
 
 def misfits(struct, fields, others=()):
-    """What a view asks for and a definition has not, in words.
+    """Return the fields of a view that do not match a definition, as sentences.
 
-    A field that has a default may also be one of the other types' alone.
+    A field with a default may also exist only in another type.
     """
     if struct is Time:
         return []

@@ -1,4 +1,4 @@
-"""The work for each message from the socket to a callback, in calls and not in time."""
+"""The work per message from the socket to a callback, in calls instead of time."""
 
 import asyncio
 import json
@@ -47,7 +47,7 @@ SCAN = {
 
 
 class Calls:
-    """Counts the calls of a thread by the file and the name of what is called."""
+    """Counts the calls of a thread by file and function name."""
 
     def __init__(self):
         self.python, self.builtin = Counter(), Counter()
@@ -109,7 +109,7 @@ def test_a_message_takes_few_calls_and_no_turn_of_the_event_loop(
 ):
     # The bridge of this test answers no pings.
     monkeypatch.setattr("webmap.ros.rosbridge.connection.Liveness.LIMIT", 1000.0)
-    # Turns end by time, which would make the counts depend on the machine.
+    # Turns end by time, so the counts would depend on the machine.
     monkeypatch.setattr("webmap.ros.rosbridge.turns.STEP", 1000.0)
     monkeypatch.setattr("webmap.ros.rosbridge.turns.SHARE", 1000.0)
     calls = receive(topic, type, decode, message)

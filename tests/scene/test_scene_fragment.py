@@ -122,7 +122,7 @@ def test_adding_or_removing_an_event_handler_is_a_change():
 
 
 class Mirror:
-    """Does what a viewer does with changes, without any encoding."""
+    """Applies changes as a viewer does, without encoding."""
 
     def __init__(self, fragment):
         self.fragment = fragment

@@ -1,4 +1,4 @@
-"""What the tests of the server share."""
+"""Fixtures of the tests of the server."""
 
 import warnings
 from types import SimpleNamespace
@@ -8,7 +8,7 @@ from page_loop import Loop
 from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite, key_in
 
 with warnings.catch_warnings():
-    # Starlette wants another client library under its test client; httpx serves.
+    # Starlette wants another library for its test client; httpx works, too.
     warnings.simplefilter("ignore")
     from starlette.testclient import TestClient
 
@@ -20,7 +20,7 @@ HOST = "127.0.0.1:8000"
 
 @pytest.fixture
 def rooms() -> SimpleNamespace:
-    """The rooms below the server, all of them fakes."""
+    """The packages below the server, all of them fakes."""
     return SimpleNamespace(
         site=FakeSite(FakePage("/"), FakePage("/lab/", title="The <lab>")),
         model=FakeModel(),
@@ -35,7 +35,7 @@ def app(rooms):
 
 @pytest.fixture
 def make_client():
-    """Make a client of an ASGI application that follows no redirect by itself."""
+    """Make a client of an ASGI application; the client follows no redirect."""
 
     def make(app, **options):
         return TestClient(

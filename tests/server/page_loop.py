@@ -1,4 +1,4 @@
-"""The model's thread with pages in it, but for sockets: what the server would do."""
+"""The model's thread with pages, without sockets, in place of the server."""
 
 import asyncio
 import gc
@@ -48,7 +48,7 @@ class Loop:
         asyncio.run(live())
 
     def call(self, fn, *args):
-        """Call in the model's thread and return what it returned."""
+        """Call a function in the model's thread and return its result."""
         done, result = threading.Event(), []
 
         def run() -> None:
@@ -59,11 +59,11 @@ class Loop:
 
         self.runtime.call(run)
         assert done.wait(30)
-        assert result, "it raised; the log says what"
+        assert result, "the call raised an exception; see the log"
         return result[0]
 
     def wait(self, work):
-        """Run a coroutine in the model's thread and return what it returned."""
+        """Run a coroutine in the model's thread and return its result."""
         return asyncio.run_coroutine_threadsafe(work, self.runtime._loop).result(30)
 
     def end(self) -> None:
@@ -98,14 +98,14 @@ def open_page(model, page_id="page0001", viewer=ANN):
 def wait_for(condition):
     deadline = time.monotonic() + 20
     while not condition():
-        assert time.monotonic() < deadline, "it did not happen"
+        assert time.monotonic() < deadline, "the condition was not met in time"
         time.sleep(0.01)
 
 
 def objects_left(round_of, rounds: int, pages: int) -> list[int]:
-    """Return how many more objects there are after each round of so many pages.
+    """Return how many objects are added in each round of some pages.
 
-    What leaks does so in every round; what another thread imports, it does once.
+    A leak adds objects in every round; an import in another thread only in one.
     """
     left = []
     gc.collect()

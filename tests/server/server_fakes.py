@@ -1,4 +1,4 @@
-"""Stand-ins for the rooms below the server, and a way to run it for real."""
+"""Fakes of the packages below the server, and a way to run a real server."""
 
 import contextlib
 import re
@@ -113,22 +113,22 @@ class FakeGate:
 
 @dataclass
 class Browser:
-    """What a browser has that has signed in."""
+    """The cookie and the keys of a browser that has signed in."""
 
     cookie: str
-    """Its Cookie header."""
+    """The Cookie header of the browser."""
 
     key: str
-    """What its pages open their sockets with."""
+    """The key with which its pages open their sockets."""
 
     @property
     def protocols(self) -> list[str]:
-        """What its pages offer as subprotocols."""
+        """The subprotocols that its pages offer."""
         return ["webmap", self.key]
 
 
 def sign_in(url: str) -> Browser:
-    """Sign a new browser in by an address with a token or a code."""
+    """Sign in a new browser with an address that has a token or a code."""
     with httpx.Client(follow_redirects=True) as client:
         page = client.get(url)
         assert page.status_code == 200
@@ -137,7 +137,7 @@ def sign_in(url: str) -> Browser:
 
 
 def key_in(html: str) -> str:
-    """Return the key that a page hands out."""
+    """Return the key in a page."""
     return re.search(r'<meta name="webmap-key" content="([^"]+)">', html)[1]
 
 
@@ -152,7 +152,7 @@ class Running:
         self._app = app
 
     def sign_in(self) -> Browser:
-        """Return what a new viewer's browser has."""
+        """Sign in a new viewer and return the browser."""
         return sign_in(f"{self.origin}/?token={self._app.settings.token}")
 
     def socket_url(self, name: str) -> str:
@@ -161,7 +161,7 @@ class Running:
 
 @contextlib.contextmanager
 def running(app: WebApp) -> Iterator[Running]:
-    """Serve an application on a port that the kernel picks."""
+    """Serve an application on a port that the kernel chooses."""
     ready = threading.Event()
     listener = listen("127.0.0.1", 0)
     port = listener.getsockname()[1]

@@ -27,7 +27,7 @@ def socket_url(name, **query):
 
 
 def refused(client, url, headers, protocols=None):
-    """Return the status with which a socket is refused before the upgrade."""
+    """Return the HTTP status that refuses a socket before the upgrade."""
     with (
         pytest.raises(WebSocketDisconnect) as caught,
         client.websocket_connect(url, protocols, headers=dict(headers)),
@@ -46,7 +46,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def with_page(app, rooms, folder, client):
-    """A client of an application with a page of the user's own at /own/page."""
+    """A client of an application with a user's page at /own/page."""
     page = FakePage("/own/page", folder / "index.html", folder)
     rooms.site.pages["/own/page"] = page
     return client
@@ -387,7 +387,7 @@ def test_a_sign_in_code_works_once_and_for_one_browser(app, make_client):
     assert late.status_code == 401
     assert "works once" in late.text
     assert "set-cookie" not in late.headers
-    # In the browser that used it, the address that is in its history still leads on.
+    # In the browser that used the address, the address still redirects.
     assert first.get(address).headers["location"] == "/lab/?a=1"
 
 
@@ -407,7 +407,7 @@ def test_a_signed_in_browser_gets_the_same_key_with_the_token(client):
 
 @pytest.mark.parametrize("name", ["scene", "drive"])
 def test_the_cookie_cannot_open_a_socket(app, client, make_client, name, rooms):
-    """Another server on this host receives the cookie: cookies know no ports."""
+    """Another server on this host receives the cookie: cookies ignore the port."""
     key = client.headers.pop("webmap-key")
     url = socket_url(name, id="p")
     assert refused(client, url, ORIGIN) == 401
@@ -464,14 +464,14 @@ def test_the_application_works_under_a_prefix(app, rooms, make_client, with_page
 
 @pytest.mark.parametrize("is_async", [False, True])
 def test_a_host_application_can_authenticate_viewers(rooms, make_client, is_async):
-    def tell(scope):
+    def viewer_of(scope):
         known = any(name == b"x-user" for name, _ in scope["headers"])
         return Viewer("1", "Ada", "viewer") if known else None
 
-    async def tell_later(scope):
-        return tell(scope)
+    async def async_viewer_of(scope):
+        return viewer_of(scope)
 
-    settings = Settings(authenticate=tell_later if is_async else tell)
+    settings = Settings(authenticate=async_viewer_of if is_async else viewer_of)
     app = WebApp(rooms.site, rooms.model, rooms.gate, settings)
     client = make_client(app)
     assert client.get(f"/?token={settings.token}").status_code == 403

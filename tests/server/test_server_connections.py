@@ -1,4 +1,4 @@
-"""Connections that have not signed in are bounded, and keep nobody else out."""
+"""Connections without a sign-in are limited and do not block other viewers."""
 
 import asyncio
 import contextlib
@@ -54,30 +54,30 @@ def server(gate, large):
 
 @pytest.fixture
 def short(monkeypatch):
-    """Let no connection wait for long."""
+    """Shorten the time that a connection may wait."""
     monkeypatch.setattr(connections, "WAITING_S", SHORT_S)
 
 
 @pytest.fixture
 def open_raw(server):
-    """Open connections that say what the test lets them say."""
+    """Open connections that send the bytes of the test."""
     with contextlib.ExitStack() as stack:
 
-        def opened(said="", receive_buffer=None):
+        def opened(sent="", receive_buffer=None):
             link = socket.socket()
             stack.enter_context(link)
             if receive_buffer is not None:
                 link.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
             link.settimeout(20)
             link.connect(("127.0.0.1", server.port))
-            link.sendall(said.encode())
+            link.sendall(sent.encode())
             return link
 
         yield opened
 
 
 def is_open(link):
-    """Tell whether the server has not ended a connection on which it says nothing."""
+    """Return whether a connection on which the server sends nothing is still open."""
     link.setblocking(False)
     try:
         return link.recv(1) != b""
@@ -87,14 +87,14 @@ def is_open(link):
         return False
 
 
-def ends_though_bytes_come(link, said):
-    """Tell whether the server ends a connection on which a byte comes now and then."""
+def ends_though_bytes_come(link, sent):
+    """Return whether the server ends a connection that sends a byte now and then."""
     deadline = time.monotonic() + 20 * SHORT_S
     link.settimeout(SHORT_S / 4)
     try:
         while time.monotonic() < deadline:
-            link.sendall(said)
-            said = said and b"x"
+            link.sendall(sent)
+            sent = sent and b"x"
             with contextlib.suppress(TimeoutError):
                 if not link.recv(1 << 16):
                     return True
@@ -104,7 +104,7 @@ def ends_though_bytes_come(link, said):
 
 
 def rest_of(link):
-    """Return what comes until the server ends a connection."""
+    """Return the bytes that arrive until the server ends a connection."""
     got = bytearray()
     with contextlib.suppress(ConnectionError):
         while data := link.recv(1 << 20):
@@ -116,8 +116,8 @@ def test_600_idle_connections_without_sign_in_do_not_block_a_signed_in_viewer(
     server, gate, open_raw
 ):
     browser = server.sign_in()
-    said = ["", HEAD, HEAD + "Cookie: webmap_1=x\r\n"]
-    links = [open_raw(said[n % 3]) for n in range(600)]
+    sent = ["", HEAD, HEAD + "Cookie: webmap_1=x\r\n"]
+    links = [open_raw(sent[n % 3]) for n in range(600)]
     page = httpx.get(server.origin, headers={"cookie": browser.cookie})
     assert page.status_code == 200
 
@@ -133,7 +133,7 @@ def test_600_idle_connections_without_sign_in_do_not_block_a_signed_in_viewer(
     asyncio.run(drive())
     assert gate.connections[0].received == ['{"op":"stop","robot":"*"}']
     wait_for(lambda: sum(map(is_open, links)) <= STRANGERS)
-    # The newest stay: one of them is perhaps somebody who is about to sign in.
+    # The newest connections stay: one of them may be about to sign in.
     assert is_open(links[-1])
 
 
@@ -168,7 +168,7 @@ def test_too_many_connections_without_sign_in_are_logged_once(server, open_raw, 
 
 
 @pytest.mark.parametrize(
-    "said",
+    "sent",
     [
         "",
         "GET / HT",
@@ -178,9 +178,9 @@ def test_too_many_connections_without_sign_in_are_logged_once(server, open_raw, 
         "Upgrade: websocket\r\n",
     ],
 )
-def test_a_connection_that_sends_no_complete_request_is_closed(short, open_raw, said):
-    link = open_raw(said)
-    assert ends_though_bytes_come(link, b"x" if said else b"")
+def test_a_connection_that_sends_no_complete_request_is_closed(short, open_raw, sent):
+    link = open_raw(sent)
+    assert ends_though_bytes_come(link, b"x" if sent else b"")
 
 
 def test_an_endless_request_after_a_valid_one_closes_the_connection(
@@ -199,7 +199,7 @@ def test_a_large_answer_over_a_slow_link_is_sent_completely(short, server, open_
     link = open_raw(
         f"GET /large HTTP/1.1\r\n{host}Cookie: {cookie}\r\n\r\n", receive_buffer=4096
     )
-    time.sleep(4 * SHORT_S)  # the test's own slowness is what is tested
+    time.sleep(4 * SHORT_S)  # the test is slow on purpose
     assert len(rest_of(link)) > 20_000_000
 
 
@@ -224,7 +224,7 @@ def test_a_refused_socket_is_not_logged_as_an_error(
     link = open_raw(UPGRADE.replace("Host: 127.0.0.1", f"Host: {host}"))
     assert rest_of(link).startswith(f"HTTP/1.1 {status}".encode())
     open_raw("").close()
-    assert httpx.get(server.origin).status_code == 401  # by now it would be logged
+    assert httpx.get(server.origin).status_code == 401  # it would be logged by now
     assert "handshake" not in caplog.text
     assert not [one for one in caplog.records if one.levelname == "ERROR"]
 

@@ -1,4 +1,4 @@
-"""Consoles as they come and go: nothing of one is left when its page is closed."""
+"""Consoles open and close: nothing of a console is left after its page is closed."""
 
 import asyncio
 
@@ -48,10 +48,10 @@ def robots(loop, bridge):
 
 
 class Held:
-    """Everything that outlives pages, counted."""
+    """Counts of everything that outlives pages."""
 
     def __init__(self, bridge: Bridge, robots: list[Robot]) -> None:
-        # Tasks and the bridge are asked for in the model's thread, as they live there.
+        # Tasks and the bridge are read in the model's thread, which owns them.
         self.tasks = len(asyncio.all_tasks())
         self.topics = {
             name: len(topic.listeners) for name, topic in bridge._topics.items()
@@ -92,7 +92,7 @@ def test_a_hundred_consoles_opened_and_closed_leave_nothing_behind(
         build_console(page, [bridge], opened, None, "test", "test")
         opened.opened(page)
         (map,) = page.maps
-        # The card with its feed and its camera, and the log: all that listens.
+        # Everything that subscribes: the card with its feed and camera, and the log.
         map.set_selected(robots[len(names) % 3])
         panel = next(m for m in map.modules if isinstance(m, RosoutPanel))
         panel.on_message({"open": True})
@@ -108,7 +108,7 @@ def test_a_hundred_consoles_opened_and_closed_leave_nothing_behind(
             handle.closed()
         loop.call(lambda: True)
         wait_for(lambda: not model._hosts)
-        # What was cancelled ends in the turns that follow.
+        # Cancelled tasks end in the next turns of the loop.
         wait_for(lambda: loop.call(lambda: len(asyncio.all_tasks())) <= tasks)
 
     tasks = loop.call(lambda: len(asyncio.all_tasks()))
@@ -120,6 +120,6 @@ def test_a_hundred_consoles_opened_and_closed_leave_nothing_behind(
     assert after == before
     assert loop.runtime._watchers == {}
     assert min(more) < 2 * 25, "fewer than two objects for each page"
-    # What is compared is what an open console holds more of.
+    # These are the counts that an open console increases.
     differs = {name for name in before if held[name] != before[name]}
     assert differs >= {"tasks", "topics", "modules", "maps", "watched", "layers"}

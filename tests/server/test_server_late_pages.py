@@ -1,4 +1,4 @@
-"""Pages whose viewers left: how long they are kept, and what goes on meanwhile."""
+"""Pages whose viewers left: how long they are kept, and what runs meanwhile."""
 
 import asyncio
 import gc
@@ -40,7 +40,7 @@ def test_an_exception_in_a_cancelled_page_function_is_not_logged_as_a_failure(
     loop, monkeypatch, caplog
 ):
     monkeypatch.setattr(host_module, "KEPT_FOR", 0.0)
-    began, said = [], []
+    began, errors = [], []
 
     async def build(page):
         began.append(page)
@@ -50,15 +50,15 @@ def test_an_exception_in_a_cancelled_page_function_is_not_logged_as_a_failure(
             try:
                 webmap.Map(page.element("webmap_container"))
             except ConfigError as error:
-                said.append(str(error))
+                errors.append(str(error))
                 raise
 
     handle, _ = open_page(make_model(loop, build))
     wait_for(lambda: began)
     handle.closed()
-    wait_for(lambda: said)
+    wait_for(lambda: errors)
     loop.call(lambda: True)
-    assert "page '/' of Ann was closed" in said[0]
+    assert "page '/' of Ann was closed" in errors[0]
     assert "the page function failed" not in caplog.text
 
 
@@ -75,7 +75,7 @@ def test_at_the_page_limit_the_page_that_was_lost_first_is_removed(loop):
     assert opened() == ["page0001", "page0002", "page0003"]
     open_page(model, "page0004")
     assert opened() == ["page0001", "page0003", "page0004"]
-    open_page(model, "page0001")  # its viewer comes back
+    open_page(model, "page0001")  # the viewer returns
     open_page(model, "page0005")
     assert opened() == ["page0001", "page0003", "page0004", "page0005"]
     loop.call(lambda: model.close() or True)
@@ -98,5 +98,5 @@ def test_the_number_of_lost_pages_with_new_ids_is_limited(loop):
     assert len(hosts) <= 6 + host_module.CLOSED, "the others were collected"
     gc.unfreeze()
     gc.collect()
-    assert len(hosts) <= 6, "no timer holds the others; the last tick may hold one"
+    assert len(hosts) <= 6, "timers hold too many pages; the last tick may hold one"
     loop.call(lambda: model.close() or True)

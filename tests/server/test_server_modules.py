@@ -1,4 +1,4 @@
-"""What browsers get of WebMap's own modules and style sheets."""
+"""The modules and style sheets of WebMap that browsers receive."""
 
 import json
 import re
@@ -32,7 +32,7 @@ def own_files(suffix: str) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def read():
-    """Let a parser of JavaScript read all modules, as written and as served."""
+    """Parse all modules with a JavaScript parser, as written and as served."""
     sources = own_files(".js")
     served = served_modules(sources)
     given = {

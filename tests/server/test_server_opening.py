@@ -1,4 +1,4 @@
-"""What opens a browser shows other users of the machine nothing that signs in."""
+"""The command that opens a browser shows no secret to other users of the machine."""
 
 import contextlib
 import re
@@ -28,7 +28,7 @@ def home(tmp_path, monkeypatch):
 
 @pytest.fixture
 def browser(monkeypatch):
-    """What stands on a browser's command line, once it was opened."""
+    """Return the command line of the browser after it was opened."""
     there, arguments = threading.Event(), []
 
     def opens(*args, **options):

@@ -1,4 +1,4 @@
-"""WebMap's own files have another address when one of them changes."""
+"""All addresses of WebMap's own files change when one of the files changes."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Pages as they come and go: what a page function makes lasts as long as its page."""
+"""Pages open and close: objects of a page function live as long as their page."""
 
 import asyncio
 import gc
@@ -151,7 +151,7 @@ def test_the_page_of_a_viewer_who_does_not_reconnect_is_closed(loop, monkeypatch
 
 
 class Link:
-    """A bridge that counts who listens."""
+    """A bridge that counts its subscribers."""
 
     url = "ws://test:9090"
     lag = 0.0
@@ -246,12 +246,12 @@ def test_fifty_viewers_of_one_grid_share_one_decoding_and_one_encoding(loop):
             handle.receive(json.dumps({"op": "seen", "frame": frame}))
     loop.call(lambda: True)
     assert len(link.listeners) == 1
-    said = [len(socket.frames) for _, socket in pages]
+    counts = [len(socket.frames) for _, socket in pages]
     loop.call(lambda: link.listeners[0](7) or True)
 
     def news():
-        # A frame that only tells the time, as one does every second, is but a head.
-        new = (o.frames[count:] for (_, o), count in zip(pages, said, strict=True))
+        # A frame that only sends the time, once a second, is only a head.
+        new = (o.frames[count:] for (_, o), count in zip(pages, counts, strict=True))
         return [[frame[15:] for frame in frames if frame[15:]] for frames in new]
 
     wait_for(lambda: all(news()))
@@ -272,7 +272,7 @@ SCAN = {
 
 
 def counted(monkeypatch, owner, name):
-    """Note the arguments of each call of a method, which goes on as it is."""
+    """Record the arguments of each call of a method, and call the method."""
     calls, method = [], getattr(owner, name)
 
     def noting(self, *args):
@@ -296,8 +296,10 @@ def test_fifty_viewers_of_one_scan_share_one_decoding_and_one_drawing(
             webmap.Map(page.element("webmap_container")).add_robot(bob)
 
         def subscribed():
-            said = [received.message for received in there.log.messages]
-            return [m for m in said if (m["op"], m["topic"]) == ("subscribe", "/scan")]
+            messages = [received.message for received in there.log.messages]
+            return [
+                m for m in messages if (m["op"], m["topic"]) == ("subscribe", "/scan")
+            ]
 
         model = make_model(loop, build)
         pages = [open_page(model, f"page{number:04}") for number in range(50)]
@@ -307,13 +309,13 @@ def test_fifty_viewers_of_one_scan_share_one_decoding_and_one_drawing(
                 handle.receive(json.dumps({"op": "seen", "frame": frame}))
         loop.call(lambda: bridge.start(loop.runtime._loop) or True)
         wait_for(subscribed)
-        said = [len(socket.frames) for _, socket in pages]
+        counts = [len(socket.frames) for _, socket in pages]
         there.publish("/scan", SCAN)
         wait_for(lambda: drawn)
         wait_for(
             lambda: all(
                 len(socket.frames) > count
-                for (_, socket), count in zip(pages, said, strict=True)
+                for (_, socket), count in zip(pages, counts, strict=True)
             )
         )
         assert len(drawn) == 1

@@ -1,4 +1,4 @@
-"""The process around the application: one line, clear refusals, a clean end."""
+"""The server process: one line of output, clear refusals, a clean end."""
 
 import contextlib
 import os
@@ -38,7 +38,7 @@ print("ended", flush=True)
 
 @pytest.fixture
 def process():
-    """A process that serves, and whatever it has printed and logged at its end."""
+    """A process that serves; at its end, its output and log are shown."""
     child = subprocess.Popen(
         [sys.executable, "-c", PROGRAM, str(Path(__file__).parent), TOKEN],
         stdout=subprocess.PIPE,
@@ -98,8 +98,8 @@ def test_the_ready_line_is_printed_at_once(capsys):
 
 
 def test_a_port_in_use_is_refused_with_a_clear_message():
-    with listen("127.0.0.1", 0) as taken:
-        port = taken.getsockname()[1]
+    with listen("127.0.0.1", 0) as occupied:
+        port = occupied.getsockname()[1]
         with pytest.raises(ConfigError, match=f"port {port} on 127.0.0.1 is in use"):
             serve(app(), port=port)
 
@@ -139,7 +139,7 @@ def test_the_url_can_be_opened_by_a_browser_on_this_machine():
 
 
 def serve_in_thread(application, **options):
-    """Run :func:`serve` until it has failed; return the error."""
+    """Run :func:`serve` until it fails; return the error."""
     errors = []
 
     def run():

@@ -1,4 +1,4 @@
-"""The two sockets, over a real server and a client that is not ours."""
+"""The two sockets, with a real server and the client of websockets."""
 
 import asyncio
 import contextlib
@@ -44,7 +44,7 @@ def server(module_rooms):
 
 @pytest.fixture
 def rooms(module_rooms):
-    """The server's rooms, as if nobody had been there before."""
+    """The packages below the server, without earlier connections."""
     wait_for(lambda: all(s.times_closed for s in module_rooms.model.scenes))
     wait_for(lambda: all(c.times_closed for c in module_rooms.gate.connections))
     module_rooms.model.scenes.clear()
@@ -155,21 +155,22 @@ def test_a_page_has_a_speed_limit_of_zero_before_its_own_limit_is_known(
             await asyncio.to_thread(wait_for, lambda: len(rooms.gate.connections) == 2)
 
     asyncio.run(scenario())
-    # What is no page has no limit of a page; the model tells that of one that is.
+    # Without a page there is no speed limit; the model sends the limit of a page.
     speeds = [connection.speeds for connection in rooms.gate.connections]
     assert sorted(speeds, key=str) == [(0.0, 0.0), None]
     wait_for(lambda: len(rooms.model.drives) == 4)
 
 
 def test_a_drive_socket_without_an_id_counts_as_its_own_page(rooms, open_socket):
-    said = [["x"], ["x"]]
+    expected = [["x"], ["x"]]
 
     async def scenario():
         async with open_socket("drive") as first, open_socket("drive") as second:
             await first.send("x")
             await second.send("x")
             await asyncio.to_thread(
-                wait_for, lambda: [c.received for c in rooms.gate.connections] == said
+                wait_for,
+                lambda: [c.received for c in rooms.gate.connections] == expected,
             )
 
     asyncio.run(scenario())
@@ -224,9 +225,9 @@ def test_a_too_large_or_binary_message_closes_the_socket(
             await socket.send(message)
             return await reason_of(socket)
 
-    code, said = asyncio.run(scenario())
+    code, close_reason = asyncio.run(scenario())
     assert code == 1008
-    assert said.startswith(reason)
+    assert close_reason.startswith(reason)
     assert not any(s.received for s in (*rooms.model.scenes, *rooms.gate.connections))
 
 
@@ -277,8 +278,8 @@ def test_a_stop_in_invalid_utf_8_reaches_the_gate_before_the_socket_is_closed(
     whole = b'{"op":"stop","robot":"\xff"}'
     assert asyncio.run(scenario((True, whole)))[0] == 1008
     assert asyncio.run(scenario((False, whole[:8]), (True, whole[8:])))[0] == 1008
-    said = [each for one in rooms.gate.connections for each in one.received]
-    assert said == [whole, whole]
+    texts = [each for one in rooms.gate.connections for each in one.received]
+    assert texts == [whole, whole]
     assert "Traceback" not in caplog.text
 
 
@@ -345,9 +346,9 @@ def test_a_socket_with_an_unknown_page_or_an_invalid_id_is_closed_with_a_reason(
         async with open_socket(name) as socket:
             return await reason_of(socket)
 
-    code, said = asyncio.run(scenario())
+    code, close_reason = asyncio.run(scenario())
     assert code == 1008
-    assert said.startswith(reason)
+    assert close_reason.startswith(reason)
     assert rooms.model.scenes == []
 
 

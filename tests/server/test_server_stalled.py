@@ -1,4 +1,4 @@
-"""A page that stalls for good: closed in seconds, with a sentence, and nothing left."""
+"""A page that stops reading is closed in seconds, with a reason and without a leak."""
 
 import asyncio
 import contextlib
@@ -38,7 +38,7 @@ def gate():
 
 @pytest.fixture
 def server(model, gate, monkeypatch, request):
-    """A server with a tenth of the patience, or another one for pongs."""
+    """A server with a tenth of the timeout, or with another timeout for pongs."""
     patience = getattr(request, "param", None) or runner.PONG_WITHIN_S / 10
     monkeypatch.setattr(runner, "PING_EVERY_S", runner.PING_EVERY_S / 10)
     monkeypatch.setattr(runner, "PONG_WITHIN_S", patience)
@@ -56,8 +56,8 @@ def stall(server, name, meanwhile=lambda: None):
     """Let a page stop reading until the server has no connection of it.
 
     Returns:
-        The time that took, in seconds, and with which code and reason the page finds
-        its socket closed when it reads again.
+        The time until then, in seconds, and the code and reason of the closed socket
+        that the page gets when it reads again.
 
     """
     browser = server.sign_in()
@@ -110,7 +110,7 @@ def test_a_page_that_answers_nothing_is_closed_with_a_sentence(
 
 @pytest.mark.parametrize("server", [None, 60.0], indirect=True, ids=["pings", "none"])
 def test_a_page_that_reads_nothing_leaves_nothing_behind(server, model, caplog):
-    """Its connection is cut, although the system would keep what it did not read."""
+    """The connection is cut, although the system would keep the unread bytes."""
     caplog.set_level(logging.INFO)
 
     def flood():

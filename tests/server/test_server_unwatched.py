@@ -1,4 +1,4 @@
-"""Simulated robots over the real way, with and without an open page."""
+"""Simulated robots over real sockets, with and without an open page."""
 
 import time
 
@@ -13,7 +13,7 @@ from webmap_process import simulator
 
 @pytest.fixture
 def grace(monkeypatch):
-    """A short time until nobody looks."""
+    """A short time until robots count as unwatched."""
     monkeypatch.setattr(looking_module, "GRACE", 0.2)
     yield
     looking.end()
@@ -49,7 +49,7 @@ def test_few_messages_come_without_a_page_and_the_first_frames_are_fresh(loop, g
         loop.call(lambda: bridge.start(loop.runtime._loop) or True)
         loop.call(lambda: looking.expect_pages(loop.runtime._loop) or True)
         wait_for(lambda: not looking.somebody and bridge.state == "open")
-        time.sleep(1.0)  # for what was on its way
+        time.sleep(1.0)  # for messages that were already sent
         few = received(4.0)
         assert few <= 2 * (4 / 2 + 4 / 5) + 4  # poses and scans, and one more of each
         handle, socket = open_page(model)
@@ -63,7 +63,7 @@ def test_few_messages_come_without_a_page_and_the_first_frames_are_fresh(loop, g
         subscription = loop.call(
             lambda: bridge.subscribe("/robot_0/odom", mine.append, throttle=100)
         )
-        wait_for(lambda: len(mine) > 30)  # a user's own code gets all
+        wait_for(lambda: len(mine) > 30)  # a user's own code gets all messages
         assert not looking.somebody
         loop.call(lambda: subscription.remove() or True)
         loop.call(lambda: model.close() or True)

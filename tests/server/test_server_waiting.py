@@ -1,4 +1,4 @@
-"""Which connections without a sign-in must go, without any I/O."""
+"""Which connections without a sign-in are closed, without any I/O."""
 
 import pytest
 from hypothesis import given

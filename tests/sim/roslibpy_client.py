@@ -93,9 +93,9 @@ def main():
     received["nodes"] = ros.get_nodes()
     received["details"] = ros.get_node_details("/robots")
     if not ROS2:
-        # It reads ROS 1's spelling of a time alone.
+        # It reads only times in the form of ROS 1.
         received["time"] = dict(ros.get_time())
-        # The real ROS 2 rosapi dies of this one.
+        # This call ends the real rosapi of ROS 2.
         received["twist"] = ros.get_message_details("geometry_msgs/Twist")
         received["params"] = ros.get_params()
     start = position(first(ros, "/robot_0/odom", ODOM))

@@ -41,7 +41,7 @@ ORIGIN = Pose()
 
 
 def alone(pose=ORIGIN, **options):
-    """A robot with nothing around."""
+    """A robot without obstacles around it."""
     return Robot("robot_0", pose, BaseOptions(**options))
 
 
@@ -109,7 +109,7 @@ class Bench:
 
 
 class Client:
-    """One client; what it gets is read by ``texts`` and ``operations``."""
+    """One client; ``texts`` and ``operations`` return the frames that it received."""
 
     def __init__(self, bench):
         self.bench = bench
@@ -125,7 +125,7 @@ class Client:
         self.session.receive(json.dumps(operation))
 
     def frames(self):
-        """Every frame that waits."""
+        """Every waiting frame."""
         self.session.poll()
         found = []
         while frames := self.session.next_frames():
@@ -133,7 +133,7 @@ class Client:
         return found
 
     def operations(self, op=None, topic=None):
-        """Every operation that waits, decoded."""
+        """Every waiting operation, decoded."""
         decoded = [
             cbor2.loads(frame) if isinstance(frame, bytes) else json.loads(frame)
             for frame in self.frames()
@@ -157,7 +157,7 @@ class Client:
 
 @contextlib.contextmanager
 def running(*options, module="webmap.sim", cwd=None):
-    """Run a server as a process of its own, and give its URL."""
+    """Run a server as a separate process; yield its URL."""
     command = [sys.executable, "-m", module, *options]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=cwd)
     try:

@@ -32,7 +32,7 @@ def room():
 
 
 def wall_rows(view):
-    """How many pixels of the middle column are wall: neither ceiling nor floor."""
+    """Return how many pixels of the middle column show the wall."""
     middle = view[:, WIDTH // 2].astype(int)
     return int((np.abs(middle[:, 2] - middle[:, 0] - 12) < 8).sum())
 

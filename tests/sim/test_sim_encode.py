@@ -85,7 +85,7 @@ def test_raw_serialisation_has_the_length_and_numbers_of_the_real_server(dialect
     message = schema.conform(TYPES["odom"], json.loads(text)["msg"])
     made = serialize(schema.fields(TYPES["odom"]), message, ros2=dialect == "ros2")
     assert len(made) == len(real)
-    # Both end with the same covariance, and begin with the frames' names.
+    # Both begin with the names of the frames and end with the same covariance.
     assert made[-8 * 36 :] == real[-8 * 36 :]
     assert b"robot_0/odom" in made
 

@@ -1,4 +1,4 @@
-"""Errands: robots that drive on their own, and pause for every command of a client."""
+"""Errands: robots drive by themselves and pause for each command of a client."""
 
 import math
 
@@ -19,7 +19,7 @@ def bench(dialect="ros1"):
 
 
 def under_way(dialect="ros1"):
-    """A bench whose robot with errands moves."""
+    """A bench with a moving robot that has errands."""
     made = bench(dialect)
     made.run(1.5)
     until(made, 30, lambda: moves(made))
@@ -102,7 +102,9 @@ def test_a_command_ends_an_errand_and_the_next_begins_after_the_quiet_time(
 ):
     made = under_way(dialect)
     made.client().send(**command)
-    assert goal_of(made) is None, "it ends with the command, not with the next step"
+    assert goal_of(made) is None, (
+        "the goal ends with the command, not with the next step"
+    )
     made.run(1)
     at = where(made)
     made.run(QUIET - 2)

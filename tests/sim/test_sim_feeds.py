@@ -1,4 +1,4 @@
-"""What simulated robots say beside odometry and scans, against where they truly are."""
+"""Other messages of simulated robots, compared with their true poses."""
 
 import base64
 import math
@@ -23,7 +23,7 @@ LOCAL = {
 
 
 def messages_of(bench, topic, seconds=1.2, **asked):
-    """The messages of a topic from now on."""
+    """Return a list that receives the messages of a topic."""
     client = bench.client()
     client.send(op="subscribe", topic=topic, **asked)
     bench.run(seconds)
@@ -67,14 +67,14 @@ def test_every_topic_has_the_type_of_its_dialect_and_publishes_to_subscribers(di
 
 def names_of(fields, message):
     """The names of all fields, by the definition and as the message has them."""
-    known, said = [field.name for field in fields], list(message)
+    known, names = [field.name for field in fields], list(message)
     for field in fields:
         if field.fields is not None:
             value = message[field.name]
             for each in value if field.is_array else [value]:
                 more, received = names_of(field.fields, each)
-                known, said = known + more, said + received
-    return known, said
+                known, names = known + more, names + received
+    return known, names
 
 
 @DIALECTS
@@ -89,8 +89,8 @@ def test_every_message_has_the_fields_of_its_definition_in_their_order(dialect):
     assert len(published) > 30
     for each in published.values():
         fields = bench.graph.schema.fields(each.type)
-        known, said = names_of(fields, each.message)
-        assert said == known, each.topic
+        known, names = names_of(fields, each.message)
+        assert names == known, each.topic
         assert each.form("cbor-raw", bench.encoder)
 
 
@@ -100,16 +100,18 @@ def test_the_lookahead_point_is_published_in_the_base_frame_during_a_goal(dialec
     (robot,), (navigator,) = bench.world.robots, bench.world.navigators
     robot.pose = Pose(2.0, 1.5, 0.4)
     topic = "/robot_0/lookahead_point"
-    assert messages_of(bench, topic) == [], "it goes nowhere"
+    assert messages_of(bench, topic) == [], "the robot has no goal"
     bench.world.send_goal(0, Goal(Pose(8.0, 1.5)))
-    said = messages_of(bench, topic)[-1]
-    assert said["header"]["frame_id"] == "robot_0/base_link"
-    at = robot.pose @ Pose(said["point"]["x"], said["point"]["y"])
+    sent = messages_of(bench, topic)[-1]
+    assert sent["header"]["frame_id"] == "robot_0/base_link"
+    at = robot.pose @ Pose(sent["point"]["x"], sent["point"]["y"])
     here, corner = (robot.pose.x, robot.pose.y), navigator.path[1]
-    assert corner != (8.0, 1.5), "there is a box in between"
+    assert corner != (8.0, 1.5), "a box is in the way"
     assert math.dist(here, (at.x, at.y)) == pytest.approx(1.5)
     rest = math.dist(here, corner) - 1.5
-    assert math.dist((at.x, at.y), corner) == pytest.approx(rest), "on the way there"
+    assert math.dist((at.x, at.y), corner) == pytest.approx(rest), (
+        "the point is on the path"
+    )
     bench.world.stop(0)
     assert messages_of(bench, topic) == []
 
@@ -147,7 +149,7 @@ def test_a_local_costmap_is_centred_on_the_robot_and_inflates_walls(dialect):
         bench.world.command(0, Twist(vx=0.4, wz=0.3))
         bench.run(0.05)
     bench.run(1)
-    assert robot.odometry != robot.pose, "the frame of odometry is not the map's"
+    assert robot.odometry != robot.pose, "the odometry frame differs from the map frame"
     grid = messages_of(bench, LOCAL[dialect])[0]
     assert grid["header"]["frame_id"] == "robot_0/odom"
     cells, (x, y) = cells_of(grid), place_of(grid)
@@ -202,7 +204,7 @@ def test_the_costmap_of_a_standing_robot_is_sent_as_updates(dialect):
         rows = slice(change["y"], change["y"] + height)
         columns = slice(change["x"], change["x"] + width)
         cells[rows, columns] = patch.reshape(height, width)
-    # The last one came within a fifth of a second of the end, in which it stood.
+    # The last change came in the last 0.2 s, in which the robot did not move.
     now = bench.node._feeds._costmaps.costs.window(
         x, y, 100, Pose(), bench.world.others(0)
     )
@@ -325,15 +327,15 @@ def test_an_initial_pose_is_accepted_and_corrected_while_driving():
         },
     }
     client.send(op="publish", topic="/robot_0/initialpose", msg=message)
-    said = messages_of(bench, "/robot_0/amcl_pose")[-1]["pose"]
-    assert said["pose"]["position"]["x"] == pytest.approx(given.x)
-    assert said["covariance"][0] == pytest.approx(0.25)
+    estimate = messages_of(bench, "/robot_0/amcl_pose")[-1]["pose"]
+    assert estimate["pose"]["position"]["x"] == pytest.approx(given.x)
+    assert estimate["covariance"][0] == pytest.approx(0.25)
     bench.world.send_goal(0, Goal(Pose(8.5 if robot.pose.x < 5 else 1.5, 3.0)))
     bench.run(20)
-    said = messages_of(bench, "/robot_0/amcl_pose")[-1]["pose"]
-    at = said["pose"]["position"]
+    estimate = messages_of(bench, "/robot_0/amcl_pose")[-1]["pose"]
+    at = estimate["pose"]["position"]
     assert math.hypot(at["x"] - robot.pose.x, at["y"] - robot.pose.y) < 0.05
-    assert said["covariance"][35] == pytest.approx(SURE[2] ** 2, rel=0.2)
+    assert estimate["covariance"][35] == pytest.approx(SURE[2] ** 2, rel=0.2)
 
 
 @pytest.mark.parametrize(
@@ -364,8 +366,10 @@ def test_a_sonar_measures_the_wall_and_robots_in_its_cone():
     )
     other.pose = Pose(4.0, 1.0)
     binary = messages_of(bench, "/robot_0/sonar", compression="cbor")
-    assert binary[0]["range"] == math.inf, "nothing in reach"
-    assert messages_of(bench, "/robot_0/sonar")[0]["range"] is None, "as JSON has it"
+    assert binary[0]["range"] == math.inf, "nothing in range"
+    assert messages_of(bench, "/robot_0/sonar")[0]["range"] is None, (
+        "JSON has null for infinity"
+    )
     one.pose = Pose(0.29, 3.0, math.pi)
     assert (
         messages_of(bench, "/robot_0/sonar", compression="cbor")[0]["range"]
@@ -406,7 +410,7 @@ def test_diagnostics_and_logs_report_a_low_battery_and_a_goal(dialect):
     bench.world.robots[0].charge = 0.2
     parts = messages_of(bench, "/diagnostics")[-1]["status"]
     levels = {part["name"]: part["level"] for part in parts}
-    # Updaters of ROS 2 leave the namespace of their node out.
+    # In ROS 2 diagnostic updaters leave out the namespace of their node.
     space = "" if dialect == "ros2" else "robot_0/"
     assert levels == {
         f"{space}base: Motors": 0,
@@ -417,15 +421,15 @@ def test_diagnostics_and_logs_report_a_low_battery_and_a_goal(dialect):
     bench.run(1)
     bench.world.stop(0)
     bench.run(1)
-    said = [operation["msg"] for operation in log.operations("publish", "/rosout")]
+    messages = [operation["msg"] for operation in log.operations("publish", "/rosout")]
     warn, info = (30, 20) if dialect == "ros2" else (4, 2)
-    lines = [(line["level"], line["msg"]) for line in said]
+    lines = [(line["level"], line["msg"]) for line in messages]
     assert lines[0] == (info, "ready, the battery is at 20 %")
     assert lines[1] == (warn, "the battery is at 20 %")
     assert (info, "a goal at (2.00, 3.00)") in lines
     assert (info, "the goal canceled: stopped") in lines
     name = "robot_0.base" if dialect == "ros2" else "/robot_0/base"
-    assert said[0]["name"] == name
+    assert messages[0]["name"] == name
 
 
 @DIALECTS

@@ -36,7 +36,7 @@ async def serving(quirks):
 
 
 async def answers(url):
-    """Whether a new client gets in."""
+    """Return whether the server answers a new client."""
     try:
         async with connect(url, open_timeout=0.5, proxy=None):
             return True
@@ -84,7 +84,7 @@ def test_a_bridge_hangs_only_if_a_client_leaves_a_queue_without_throttle(
                 while leave is not leave_by_unsubscribing and len(server.sessions) > 1:
                     await asyncio.sleep(0.01)
             assert await answers(url) is not hangs
-            # Neither does anybody get an answer who was connected before.
+            # Clients that were connected before get no answer either.
             await other.send(json.dumps(request))
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(0.5 if hangs else 5):

@@ -130,7 +130,7 @@ def test_the_shipped_floor_is_a_closed_building():
     assert share[-1] > 0.05
     assert share[0] > 0.6
     assert share[100] > 0.05
-    # Closed: from inside nothing leads to the unknown around it.
+    # The walls are closed: no path leads from inside to the unknown area.
     free = plan.occupancy == 0
     assert not free[[0, -1]].any()
     assert not free[:, [0, -1]].any()

@@ -1,4 +1,4 @@
-"""Clients that this project did not write, against the simulator's server."""
+"""Clients of other projects, with the simulator's server."""
 
 import json
 import math
@@ -16,8 +16,8 @@ ROOT = HERE.parents[1]
 pytestmark = pytest.mark.peer
 
 
-def told_by(*command):
-    """Run a client to its end and return what it told."""
+def output_of(*command):
+    """Run a client to its end and return its output."""
     done = subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
     )
@@ -28,7 +28,7 @@ def told_by(*command):
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 def test_roslibpy_works_with_the_simulator(dialect):
     with running("--dialect", dialect) as url:
-        received = told_by(
+        received = output_of(
             sys.executable, str(HERE / "roslibpy_client.py"), url, dialect
         )
     ros2 = dialect == "ros2"
@@ -61,7 +61,9 @@ def test_roslib_works_with_the_simulator(dialect, package):
     if node is None or not (ROOT / "node_modules" / package).is_dir():
         pytest.skip(f"needs node, and {package} from npm")
     with running("--dialect", dialect) as url:
-        received = told_by(node, str(HERE / "roslib_client.mjs"), url, dialect, package)
+        received = output_of(
+            node, str(HERE / "roslib_client.mjs"), url, dialect, package
+        )
     ros2 = dialect == "ros2"
     odometry = "nav_msgs/msg/Odometry" if ros2 else "nav_msgs/Odometry"
     assert received["topics"]["/robot_0/odom"] == odometry

@@ -47,7 +47,7 @@ async def next_of(socket_, topic):
 
 @contextlib.asynccontextmanager
 async def simulated(**options):
-    """Run a simulator in this loop, and give its URL."""
+    """Run a simulator in this loop; yield its URL."""
     ready, stop = asyncio.get_running_loop().create_future(), asyncio.Event()
     task = asyncio.create_task(
         run_simulator(on_ready=ready.set_result, stop=stop, **options)
@@ -80,11 +80,11 @@ def test_a_client_drives_a_robot_over_a_socket():
 
 def test_a_port_in_use_is_an_error():
     async def scenario():
-        with socket.socket() as taken:
-            taken.bind(("127.0.0.1", 0))
-            taken.listen()
+        with socket.socket() as listener:
+            listener.bind(("127.0.0.1", 0))
+            listener.listen()
             with pytest.raises(ConfigError, match="in use: end the program"):
-                await run_simulator(port=taken.getsockname()[1])
+                await run_simulator(port=listener.getsockname()[1])
 
     asyncio.run(scenario())
 
@@ -174,7 +174,7 @@ def test_a_stalled_client_delays_no_other_client_and_uses_little_memory():
             connect(url, max_size=None, max_queue=1) as stalled,
             connect(url, max_size=None) as good,
         ):
-            # A stalled client that asks for much: the map, again and again.
+            # A stalled client that requests the map repeatedly.
             for number in range(200):
                 await subscribe(stalled, "/map", id=str(number), queue_length=1)
             await subscribe(stalled, "/robot_0/base_scan", queue_length=1)
@@ -236,7 +236,7 @@ def test_the_player_sends_captured_frames_byte_for_byte(dialect):
             assert (
                 await client.recv() == frame_file(dialect, "cbor_map.bin").read_bytes()
             )
-            # Latched: once, whatever else comes.
+            # A latched message is sent once, before other messages.
             await subscribe(client, "/robot_1/odom")
             second = json.loads(await client.recv())
             assert second["topic"] == "/robot_1/odom"

@@ -25,7 +25,7 @@ def test_a_robot_turns_by_the_commanded_angle():
 def test_driving_and_turning_makes_a_circle():
     robot = alone(acceleration=1e6, turn_acceleration=1e6)
     drive(robot, Twist(vx=1.0, wz=0.5), math.tau / 0.5 / 2, dt=0.01)
-    # Half a circle of radius 2 m, but for the first step's ramp.
+    # Half a circle of radius 2 m, except for the ramp of the first step.
     assert robot.pose.x == pytest.approx(0, abs=0.02)
     assert robot.pose.y == pytest.approx(4, abs=0.02)
 

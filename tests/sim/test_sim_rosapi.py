@@ -148,7 +148,7 @@ def test_in_ros2_a_request_for_parameter_names_hangs_rosapi():
     bench = Bench("ros2", "real")
     assert bench.client().call("/rosapi/get_param_names") is None
     assert bench.client().call("/rosapi/get_time") is None
-    # The rest of the graph is unharmed.
+    # The rest of the graph still works.
     assert bench.client().call("/robot_0/stop")["result"] is True
 
 

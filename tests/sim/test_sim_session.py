@@ -1,4 +1,4 @@
-"""Clients of the server, by the frames that they send and get."""
+"""Clients of the server: the frames that they send and receive."""
 
 import json
 import math

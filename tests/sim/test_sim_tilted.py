@@ -1,4 +1,4 @@
-"""Sensors that are not level, against where walls truly are."""
+"""Sensors that are not level, compared with the true places of walls."""
 
 import math
 
@@ -16,7 +16,7 @@ DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 
 
 def mounted(bench, name) -> Transform:
-    """Where a sensor is on its robot, as ``/tf_static`` tells it."""
+    """Return the pose of a sensor on its robot, from ``/tf_static``."""
     (message,) = messages_of(bench, "/tf_static", 0.1)
     for each in message["transforms"]:
         if each["child_frame_id"] == f"robot_0/{name}":
@@ -29,14 +29,14 @@ def mounted(bench, name) -> Transform:
 
 
 def on_map(bench, name, points) -> np.ndarray:
-    """Points of a sensor where they are on the map, of shape (N, 3)."""
+    """Return the points of a sensor on the map, of shape (N, 3)."""
     place = Transform.from_pose(bench.world.robots[0].pose) @ mounted(bench, name)
     found = (place.apply(Vector3(*map(float, point))) for point in points)
     return np.array([(p.x, p.y, p.z) for p in found])
 
 
 def to_wall(points) -> np.ndarray:
-    """How far points are from the faces of the room's walls, in metres."""
+    """Return the distances of points from the room's walls, in metres."""
     x, y = points[:, 0], points[:, 1]
     edge = np.minimum(np.minimum(x, 10 - x), np.minimum(y, 6 - y))
     return abs(edge - 0.05)
@@ -73,7 +73,7 @@ def test_the_cloud_of_a_depth_camera_is_in_its_optical_frame():
     cloud = messages_of(bench, "/robot_0/camera/points", compression="cbor")[-1]
     assert cloud["header"]["frame_id"] == "robot_0/camera_optical"
     points = np.frombuffer(cloud["data"], DEPTH)
-    assert points["z"].min() > 0.2, "z is forward"
+    assert points["z"].min() > 0.2, "the z axis points forward"
     there = on_map(
         bench, "camera_optical", zip(*(points[a] for a in "xyz"), strict=True)
     )
@@ -84,7 +84,7 @@ def test_the_cloud_of_a_depth_camera_is_in_its_optical_frame():
     at = bench.world.robots[0].pose
     aside = np.arctan2(there[:, 1] - at.y, there[:, 0] - at.x) - at.yaw
     aside = (aside + math.pi) % math.tau - math.pi
-    assert abs(aside).max() < math.radians(31), "only what is ahead is seen"
+    assert abs(aside).max() < math.radians(31), "only points ahead are seen"
 
 
 def test_robots_without_tilted_sensors_have_no_depth_camera():

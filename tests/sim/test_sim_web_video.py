@@ -60,7 +60,7 @@ def test_the_addresses_of_web_video_server_are_accepted(target, request_):
 
 
 @pytest.mark.parametrize(
-    ("target", "status", "said"),
+    ("target", "status", "expected"),
     [
         ("/stream", 400, "the topic of the camera is missing, as in /stream?topic="),
         ("/snapshot?topic=/", 400, "the topic of the camera is missing"),
@@ -80,11 +80,11 @@ def test_the_addresses_of_web_video_server_are_accepted(target, request_):
         ("/../etc/passwd", 404, "there is nothing at"),
     ],
 )
-def test_an_invalid_request_target_is_refused_with_a_reason(target, status, said):
+def test_an_invalid_request_target_is_refused_with_a_reason(target, status, expected):
     with pytest.raises(Refusal) as refused:
         asked(target)
     assert refused.value.status == status
-    assert said in str(refused.value)
+    assert expected in str(refused.value)
     assert len(str(refused.value)) < 250
 
 
@@ -138,7 +138,7 @@ def test_unreadable_or_too_large_image_data_is_refused(data):
 
 
 class Served:
-    """A server over a graph whose cameras send what the test has them send."""
+    """A server with a graph whose cameras send the pictures of the test."""
 
     def __init__(self):
         self.bench = Bench(robots=1)
@@ -188,7 +188,7 @@ def serving(scenario):
 async def until(condition, seconds=10.0):
     patience = time.monotonic() + seconds
     while not condition():
-        assert time.monotonic() < patience, "it never came true"
+        assert time.monotonic() < patience, "the condition was not met in time"
         await asyncio.sleep(0.005)
 
 
@@ -204,7 +204,7 @@ def test_the_display_parser_reads_a_stream_and_the_server_notices_the_end():
             seen += found
             assert seen[-1] == picture
         assert answer.streams
-        # No picture comes any more, and yet.
+        # The end is noticed without a further picture.
         writer.close()
         await until(lambda: served.watchers == 0)
 
@@ -248,7 +248,7 @@ def test_a_slow_reader_gets_the_newest_picture_and_few_old_pictures():
         slow = socket.socket()
         slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         slow.connect(("127.0.0.1", served.port))
-        # What a stream reader takes before it pauses is what its limit says.
+        # A stream reader pauses after its limit of bytes.
         reader, writer = await asyncio.open_connection(sock=slow, limit=4096)
         writer.write(f"GET {STREAM} HTTP/1.0\r\n\r\n".encode())
         await until(lambda: served.watchers == 1)
@@ -282,7 +282,7 @@ def test_a_reader_that_reads_nothing_is_disconnected(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("sent", "status", "said"),
+    ("sent", "status", "expected"),
     [
         (b"GET /stream HTTP/1.1\r\n\r\n", 400, "the topic of the camera is missing"),
         (b"PUT / HTTP/1.1\r\n\r\n", 405, "use GET for pictures, got 'PUT'"),
@@ -300,8 +300,8 @@ def test_a_reader_that_reads_nothing_is_disconnected(monkeypatch):
         ),
     ],
 )
-def test_a_refusal_is_sent_to_the_client(monkeypatch, sent, status, said):
-    if "0.1 s" in said:  # the others are to be in time on a busy machine too
+def test_a_refusal_is_sent_to_the_client(monkeypatch, sent, status, expected):
+    if "0.1 s" in expected:  # the others must be in time on a busy machine, too
         monkeypatch.setattr(server, "PATIENCE", 0.1)
 
     async def scenario(served):
@@ -310,7 +310,7 @@ def test_a_refusal_is_sent_to_the_client(monkeypatch, sent, status, said):
         async with asyncio.timeout(10):
             answer = (await reader.read()).decode()
         assert answer.startswith(f"HTTP/1.0 {status} ")
-        assert said in answer.partition("\r\n\r\n")[2]
+        assert expected in answer.partition("\r\n\r\n")[2]
         writer.close()
 
     serving(scenario)
@@ -358,7 +358,7 @@ def test_a_client_that_disconnects_at_once_leaves_no_connection():
 
 @contextlib.contextmanager
 def simulator():
-    """Run ``webmap sim`` and give the addresses of its rosbridge and its camera."""
+    """Run ``webmap sim``; yield the addresses of its rosbridge and its camera."""
     command = [sys.executable, "-m", "webmap", "sim", "--port", "0", "--robots", "1"]
     with subprocess.Popen(
         [*command, "--http-camera", "0"],
@@ -421,9 +421,9 @@ def test_the_display_shows_the_picture_of_a_simulated_camera(monkeypatch):
 
 
 def test_a_camera_port_in_use_is_an_error():
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        port = listener.getsockname()[1]
         with pytest.raises(ConfigError, match=f"{port}.*in use"):
             asyncio.run(run_simulator(http_camera=port))

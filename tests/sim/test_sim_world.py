@@ -16,7 +16,7 @@ def floor():
 
 
 def forward(world, seconds, until=lambda: False):
-    """Let time go by; return how much did."""
+    """Let time pass; return how much passed."""
     start = world.now
     while world.now - start < seconds and not until():
         world.step(0.025)

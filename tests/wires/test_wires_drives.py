@@ -1,4 +1,4 @@
-"""Scripted drives go over pipe, sockets and bridges as they did when recorded."""
+"""Scripted drives send the recorded messages over pipe, sockets and bridges."""
 
 import json
 import subprocess
@@ -16,9 +16,9 @@ PROGRAM = Path(__file__).with_name("wires_scripts.py")
 
 
 def played(folder, names):
-    """Return the recordings of scripts that processes of their own play.
+    """Play scripts in processes of their own and return the recordings.
 
-    Two at once, since each waits most of the time.
+    Two run at once, since each waits most of the time.
     """
     with ThreadPoolExecutor(2) as both:
         halves = [names[::2], names[1::2]]
@@ -27,7 +27,7 @@ def played(folder, names):
 
 
 def played_by_one(folder, names):
-    """Return what one process recorded."""
+    """Play scripts in one process and return the recordings."""
     if not names:
         return {}
     folder.mkdir()
@@ -46,9 +46,9 @@ def played_by_one(folder, names):
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory, request):
-    """What each script recorded; one that differs is played a second time.
+    """The recording of each script; a script with differences is played again.
 
-    A machine that stood still for a moment ends a drive, as it should.
+    A pause of the computer ends a drive, which is correct.
     """
     chosen = [
         name

@@ -1,4 +1,4 @@
-"""Robots of every source are declared, equipped and written down as when recorded."""
+"""Robots of every source are declared, equipped and written as recorded."""
 
 import json
 import subprocess
@@ -16,7 +16,7 @@ PROGRAM = Path(__file__).with_name("wires_sources.py")
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory, request):
-    """What became of each source."""
+    """The recording of each source."""
     folder = tmp_path_factory.mktemp("wires")
     chosen = [
         name
@@ -44,7 +44,7 @@ def test_the_robots_of_each_source_match_the_recording(recordings, name):
 
 @pytest.mark.parametrize("name", WRONG)
 def test_error_messages_match_the_recording(recordings, name):
-    """A text that is changed on purpose is recorded anew; nothing else is in here."""
+    """The recording has only error messages: record again after changing one."""
     text = recordings[name]
     assert "it failed" not in text, text
     compare(name, text)

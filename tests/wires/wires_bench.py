@@ -1,4 +1,4 @@
-"""All that a script needs: a display with its gate, pages, robots, and a recorder."""
+"""The parts of a script: a display with its gate, pages, robots and a recorder."""
 
 import asyncio
 import contextlib
@@ -19,13 +19,13 @@ from webmap.core.runtime import runtime
 sys.path.append(str(Path(__file__).parents[1] / "server"))
 
 PATIENCE = 10.0
-"""Seconds for which something is waited for."""
+"""Seconds until a wait times out."""
 
 CALM = 1.5
-"""Seconds in which nothing new comes, where it is not known what will."""
+"""Seconds without a change after which a text without a recording is complete."""
 
 STILL = 0.3
-"""Seconds in which nothing must follow what was recorded."""
+"""Seconds for which a text equal to the recording must stay the same."""
 
 
 NOWHERE = "ws://127.0.0.1:9"
@@ -33,10 +33,10 @@ NOWHERE = "ws://127.0.0.1:9"
 
 
 class Bench:
-    """A display that runs, for one script after the other.
+    """A running display, which plays one script after the other.
 
     Args:
-        recordings: What was recorded, by script; nothing of what is recorded now.
+        recordings: Returns the recording of a script, or an empty text.
 
     """
 
@@ -64,7 +64,7 @@ class Bench:
 
         self.tap.tap_the_pipe()
         self.early = wires_robots.of_twist(wires_robots.bridge_to(NOWHERE), "Early")
-        """A robot that was there before WebMap was started."""
+        """A robot that was declared before WebMap was started."""
         app = webmap.asgi_app(authenticate=authenticate)
         self.port = self._open.enter_context(running(app)).port
         self.until(lambda: "ready" in self.tap.channels()[FROM_GATE], "the gate")
@@ -75,7 +75,7 @@ class Bench:
 
     def play(self, name, script):
         """Run a script and return its recording."""
-        if not self._fresh:  # else what was noted since the start belongs to it
+        if not self._fresh:  # the first recording includes the start
             self.tap.begin()
         self._fresh = False
         self._expected = sections(self._recordings(name))
@@ -109,18 +109,18 @@ class Bench:
         return robot
 
     def end_with(self, robot):
-        """Have a robot end with the script."""
+        """Remove a robot at the end of the script."""
         self._robots.append(robot)
 
     def page(self, name, role="operator"):
-        """Return a page that somebody opens."""
+        """Open a page and return it."""
         page = Page(self, name, role)
         self._pages.append(page)
         self.until(lambda: page.greeted and page.tick, "the first tick")
         return page
 
     def model(self, fn, *args, **options):
-        """Call in the thread of the program, and return what it returns."""
+        """Call a function in the thread of the program and return its result."""
 
         async def called():
             return fn(*args, **options)
@@ -133,12 +133,14 @@ class Bench:
         return asyncio.run_coroutine_threadsafe(work, loop).result(30)
 
     def until(self, check, what, seconds=PATIENCE):
-        """Wait until something is so, and return that."""
+        """Wait until ``check`` returns a true value, and return the value."""
         deadline = time.monotonic() + seconds
         while not (found := check()):
             if time.monotonic() > deadline:
                 refused = [page.refusals for page in self._pages]
-                raise AssertionError(f"never came: {what}; refused: {refused}")
+                raise AssertionError(
+                    f"timed out waiting for {what}; refused: {refused}"
+                )
             time.sleep(0.01)
         return found
 
@@ -149,11 +151,11 @@ class Bench:
                 child.kill()
 
     def tasks_up(self, site, topic):
-        """Wait until the gate can send goals: it has announced a topic of theirs."""
+        """Wait until the gate can send goals: it has advertised a topic for them."""
         self.until(lambda: site.received("advertise", topic), f"the lane of {topic}")
 
     def shows(self, label, page, robot, check):
-        """Record the report of a robot on a page, once it is so and stays so."""
+        """Record a page's report of a robot when the check holds and it is stable."""
 
         def report():
             return page.report(robot)
@@ -161,7 +163,7 @@ class Bench:
         self._note(f"report to {page.name}: {label}", report, check)
 
     def reports(self, label, robot, check):
-        """Record the gate's newest report about a robot, likewise."""
+        """Record the gate's newest report of a robot in the same way."""
 
         def report():
             return self.tap.reports.get(robot.id, {})
@@ -169,21 +171,23 @@ class Bench:
         self._note(f"report: {label}", report, check)
 
     def note(self, title, text):
-        """Record something that the script itself found."""
+        """Record a text of the script itself."""
         self._reports[title] = text
 
     def _note(self, title, report, check):
-        def words():
+        def text():
             found = report()
             return self.tap.report(found) if found else ""
 
-        def so():
+        def holds():
             found = report()
             return bool(found and check(found))
 
-        self.until(so, title)
+        self.until(holds, title)
         expected = self._expected.get(title, "")
-        self._reports[title] = settled(words, expected, PATIENCE / 2, CALM / 2, good=so)
+        self._reports[title] = settled(
+            text, expected, PATIENCE / 2, CALM / 2, good=holds
+        )
 
     def _text(self):
         parts = dict(self.tap.channels())

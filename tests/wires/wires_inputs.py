@@ -1,4 +1,4 @@
-"""Robots from every source there is: command lines, plain data, lists of topics."""
+"""Robots from every source: command lines, plain data, lists of topics."""
 
 import json
 from pathlib import Path
@@ -85,11 +85,11 @@ GRAPHS = {
     },
     "nothing": {"/rosout": "rosgraph_msgs/Log"},
 }
-"""Topics with their types, as discovery is given them."""
+"""Topics with their types, as discovery receives them."""
 
 
 def listed(topics):
-    """Return topics as a person lists them."""
+    """Return a list of topics as a user writes one."""
     return "".join(f"{topic} {type}\n" for topic, type in topics.items())
 
 
@@ -109,7 +109,7 @@ LISTS = {
 }
 """Lists of topics in each form."""
 
-TOLD = "Bob:/robot_0/odom:/robot_0/cmd_vel:/robot_0/base_scan"
+GIVEN = "Bob:/robot_0/odom:/robot_0/cmd_vel:/robot_0/base_scan"
 
 VIEWS = {
     "plain": ("captured_ros1", ()),
@@ -117,12 +117,12 @@ VIEWS = {
     "rich": ("rich_bare", ()),
     "nav2": ("nav2_named", ()),
     "framed": ("nav2_bare", ()),
-    "told": ("captured_ros1", ("--robot", TOLD)),
+    "told": ("captured_ros1", ("--robot", GIVEN)),
     "told_alone": (
         "captured_ros1",
         (
             "--robot",
-            TOLD,
+            GIVEN,
             "--robot",
             "Al:::/scan",
             "--only-given",
@@ -130,11 +130,11 @@ VIEWS = {
             "1",
         ),
     ),
-    "told_and_found": ("captured_ros1", ("--robot", TOLD, "--discover")),
+    "told_and_found": ("captured_ros1", ("--robot", GIVEN, "--discover")),
     "told_better": (
         "captured_ros1",
         (
-            *("--robot", TOLD, "--set", "Bob.battery=/robot_0/battery"),
+            *("--robot", GIVEN, "--set", "Bob.battery=/robot_0/battery"),
             *("--set", "Bob.velocity_type=geometry_msgs/TwistStamped"),
             *("--set", "Bob.goal=/robot_0/goal", "--set", "Bob.cancel=/robot_0/cancel"),
             *("--set", "Bob.initialpose=/robot_0/initialpose"),
@@ -160,14 +160,14 @@ VIEWS = {
 """Command lines of ``webmap view`` for a bridge with a graph."""
 
 TREE = ("world", "bob/map", "bob/odom", "bob/base_link")
-"""Frames that hang from each other, which the bridge of ``framed`` tells."""
+"""A chain of frames, which the bridge of ``framed`` publishes."""
 
 SHOWN = {
     "plain": ("captured_ros1", ()),
     "found_better": VIEWS["found_better"],
-    "told": ("captured_ros1", ("--robot", TOLD)),
+    "told": ("captured_ros1", ("--robot", GIVEN)),
 }
-"""Command lines of ``webmap view --show``, likewise."""
+"""Command lines of ``webmap view --show`` for a bridge with a graph."""
 
 BRIDGE = "ws://robot:9090"
 HERE = {"bridge": BRIDGE}

@@ -1,6 +1,6 @@
-"""What people write wrongly: in fleet files, on command lines, in plain data, in calls.
+"""Mistakes in fleet files, on command lines, in plain data and in calls.
 
-Each has a name; what is said of it today is in the recordings.
+Each has a name; the recordings have the error messages.
 """
 
 import math
@@ -50,10 +50,10 @@ modules = [
   { name = "LaserScanner", args = [{ bridge = "north" }, "/s"], options = { x = 1 } },
 ]
 """
-"""A fleet file that is right."""
+"""A valid fleet file."""
 
 OF_BOB = "w_max = 1\n"
-"""Where keys of Bob's twist end."""
+"""The last key of Bob's twist."""
 
 
 def twist(line):
@@ -61,7 +61,7 @@ def twist(line):
 
 
 def bob(line):
-    """A line among Bob's own keys."""
+    """Return a change that puts a line among Bob's keys."""
     return ('battery = "/bob/battery_state"\n', f"{line}\n")
 
 
@@ -70,7 +70,7 @@ def ann(line):
 
 
 def third(line):
-    """A robot more behind Bob's bridge, with a line of its own."""
+    """Return a change that adds a robot at Bob's bridge, with a line."""
     robot = f'[[robots]]\nname = "Eve"\nbridge = "north"\n{line}\n'
     return ('[[robots]]\nname = "Ann"\n', f'{robot}\n[[robots]]\nname = "Ann"\n')
 
@@ -146,7 +146,7 @@ FLEET_FILES = {
     ),
     "empty file": (BASE, ""),
     "remark alone": (BASE, "# nothing\n"),
-    # Twice.
+    # Duplicates.
     "two of one name": ('"Ann"', '"Bob"'),
     "two names but for case": ('"Ann"', '"BOB"'),
     "two names but for form": ('"Ann"', '"\uff22ob"'),
@@ -279,7 +279,7 @@ FLEET_FILES = {
         "[map]",
         '[tiles]\nsource = "https://a.example/{z}"\nlatitude = 1\nlongitude = 0\n[map]',
     ),
-    # What is no TOML.
+    # Invalid TOML.
     "value without quotes": ('"Bob"', "Bob"),
     "value of nothing": ("w_max = 1", "w_max = "),
     "odd number": ("w_max = 1", "w_max = .inf"),
@@ -297,19 +297,19 @@ FLEET_FILES = {
     # Several at once.
     "several": ("v_max = 0.5\nw_max = 1", "vmax = 0.5\nw_max = false\nholonomic = 1"),
 }
-"""Changes of a file that is right: what is there, and what is written in its place."""
+"""Changes of the valid file: the old text and the new text."""
 
 
 def made_wrong(change):
     """Return a fleet file with a mistake.
 
     Raises:
-        ValueError: If the file has no such place.
+        ValueError: If the file does not contain the old text.
 
     """
     old, new = change
     if old not in BASE:
-        raise ValueError(f"the file that is right has no {old!r}")
+        raise ValueError(f"the valid file does not contain {old!r}")
     return BASE.replace(old, new, 1).encode()
 
 
@@ -439,7 +439,7 @@ DATA = {
 }
 
 
-def said(method, *args, **options):
+def with_bridge(method, *args, **options):
     """Return a call of a robot's method with a bridge."""
 
     def call():
@@ -471,15 +471,15 @@ def after(first, second):
 
 
 def velocity(*args, **options):
-    return said("set_twist_topic", *args, **options)
+    return with_bridge("set_twist_topic", *args, **options)
 
 
 def goals(*args, **options):
-    return said("set_move_topic", *args, **options)
+    return with_bridge("set_move_topic", *args, **options)
 
 
 def pose(*args, **options):
-    return said("set_initial_pose_topic", *args, **options)
+    return with_bridge("set_initial_pose_topic", *args, **options)
 
 
 def assist(*args, **options):
@@ -490,7 +490,7 @@ OTHER = "ws://other:9090"
 
 CALLS = {
     "velocity without bridge": bare("set_twist_topic", "ws://robot:9090", "/cmd_vel"),
-    "velocity without topic": said("set_twist_topic"),
+    "velocity without topic": with_bridge("set_twist_topic"),
     "velocity of no topic": velocity("cmd vel"),
     "velocity of a number": velocity(7),
     "velocity of another type": velocity("/cmd_vel", type="std_msgs/String"),
@@ -545,12 +545,12 @@ CALLS = {
     "assist of no number": assist("/scan", 0.3, x=math.nan),
     "assist of another word": assist("/scan", 0.3, blind="go"),
     "assist of no topic": assist("s can", 0.3),
-    "odometry of no topic": said("set_odometry_topic", "o dom"),
-    "odometry of another type": said("set_odometry_topic", "/odom", type="x/Y"),
-    "odometry of a text": said("set_odometry_topic", "/odom", "50"),
+    "odometry of no topic": with_bridge("set_odometry_topic", "o dom"),
+    "odometry of another type": with_bridge("set_odometry_topic", "/odom", type="x/Y"),
+    "odometry of a text": with_bridge("set_odometry_topic", "/odom", "50"),
     "odometry without bridge": bare("set_odometry_topic", "ws://robot:9090", "/odom"),
-    "frames of a number": said("set_tf", map_frame=1),
-    "frames of no topic": said("set_tf", namespace="/a b"),
+    "frames of a number": with_bridge("set_tf", map_frame=1),
+    "frames of no topic": with_bridge("set_tf", namespace="/a b"),
     "alignment of no number": bare("set_alignment", 1.0, 2.0, math.inf),
     "alignment of a text": bare("set_alignment", "1", 2.0, 3.0),
     "bridge of a web page": lambda: robots.bridge_to("http://robot:9090"),

@@ -1,4 +1,4 @@
-"""A page as a browser has it open: its two sockets, and inputs."""
+"""A page as a browser opens it: its two sockets and its inputs."""
 
 import contextlib
 import json
@@ -29,9 +29,9 @@ class Page:
     """Sends and receives on both sockets like a page.
 
     Args:
-        bench: What it belongs to.
-        name: Who looks at it.
-        role: What they may do.
+        bench: The bench of the script.
+        name: The name of the user.
+        role: The role of the user.
 
     """
 
@@ -42,14 +42,14 @@ class Page:
         self.inputs = None
         """The inputs for a robot that this page controls, as parts of full speed.
 
-        Nothing is sent without it. As long as the gate waits to see that it is off the
-        keys, it is."""
+        If None, nothing is sent. Zeros are sent until the gate has seen that the
+        inputs are released."""
         self.robot = ""
         """The id of the robot that the inputs drive."""
         self.greeted = False
         """Whether the gate has sent hello."""
         self.refusals = []
-        """What was refused, newest last."""
+        """The refusals, newest last."""
         self.ended = ""
         """Why the server closed the socket, once it has."""
         self._bench, self._tap = bench, bench.tap
@@ -72,7 +72,7 @@ class Page:
         id = f"page-{name}"
         self._scene = opened(f"scene?page=/&id={id}")
         self._scene.send(json.dumps({**HELLO, "page": id}))
-        self._scene.recv(10)  # so that what the page allows is known
+        self._scene.recv(10)  # then the server knows the limits of the page
         self._drive = opened(f"drive?id={id}")
         self._threads = [
             threading.Thread(target=work, daemon=True)
@@ -81,7 +81,7 @@ class Page:
         for thread in self._threads:
             thread.start()
 
-    # What a person does.
+    # Actions of the user.
 
     def send_op(self, op, **fields):
         """Send a command."""
@@ -90,10 +90,10 @@ class Page:
     def send(self, text):
         """Send a text as it is."""
         try:
-            said = json.loads(text)
+            message = json.loads(text)
         except ValueError:
-            said = {"op": "nonsense", "text": text}
-        self._tap.note(f"page {self.name} to server", said)
+            message = {"op": "nonsense", "text": text}
+        self._tap.note(f"page {self.name} to server", message)
         self._drive.send(text)
 
     def report(self, robot):
@@ -101,7 +101,7 @@ class Page:
         return self.reports.get(robot.id, Report())
 
     def take(self, robot):
-        """Take a robot, once it can be had."""
+        """Wait until a robot is free, and take it."""
         self._bench.until(lambda: self.report(robot)["armable"], "a robot")
         self.send_op("take", robot=robot.id)
         self._bench.until(lambda: self.report(robot)["mine"], "the lease")
@@ -112,7 +112,7 @@ class Page:
         self._bench.until(lambda: self.report(robot)["armed"], "an armed driver")
 
     def drive(self, robot, x=0.0, y=0.0, turn=0.0, *, until):
-        """Drive, until something is so and from then on."""
+        """Drive on; return when ``until`` returns a true value."""
         self.robot, self.inputs = robot.id, (x, y, turn)
         self._bench.until(until, "a robot that is driven")
 
@@ -128,7 +128,7 @@ class Page:
         self.send_op(op, **self._licence(robot.id), x=x, y=y, yaw=yaw)
 
     def reset(self, robot):
-        """End the STOP that is shown."""
+        """Reset the STOP that the page shows."""
         stop = self._bench.until(lambda: self.report(robot)["stop"], "a STOP")
         self.send_op("reset", robot=robot.id, stop=stop["id"])
 

@@ -1,7 +1,7 @@
-"""Recordings of what goes over the wires, and how a test is compared with one.
+"""Recordings of the messages on all connections, and comparison with them.
 
 A recording is a text of sections. ``WEBMAP_WIRES=write pytest tests/wires`` writes all
-of them anew; the difference that git shows is then what has changed.
+of them again; ``git diff`` then shows the changes.
 """
 
 import difflib
@@ -17,7 +17,7 @@ MOST_LINES = 60
 """Lines of a difference that are shown."""
 
 HEAD = "== "
-"""What a section begins with."""
+"""The beginning of a section."""
 
 
 def path_of(name: str) -> Path:
@@ -32,7 +32,7 @@ def recorded(name: str) -> str:
 
 
 def compare(name: str, text: str) -> None:
-    """Let a text pass that is the recording of that name, or make it the recording."""
+    """Fail if a text is not the recording of that name, or record the text."""
     if WRITES:
         FOLDER.mkdir(exist_ok=True)
         path_of(name).write_text(text, "utf-8")
@@ -56,8 +56,8 @@ def difference(name: str, text: str) -> str:
         shown[MOST_LINES:] = [f"... and {left} lines more"]
     return "\n".join(
         [
-            f"{name}: what went over the wires is not what was recorded.",
-            "If the change is meant: WEBMAP_WIRES=write pytest tests/wires",
+            f"{name}: the messages differ from the recording.",
+            "If the change is intended: WEBMAP_WIRES=write pytest tests/wires",
             *shown,
         ]
     )

@@ -27,10 +27,10 @@ class Link:
     """One WebSocket to the robot."""
 
     of_gate: bool
-    """Whether the gate's process had it when it opened."""
+    """Whether a gate process owned the socket when it opened."""
     socket: Any
     topics: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """What it subscribed to."""
+    """The subscriptions by topic."""
     received: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -40,13 +40,13 @@ class Link:
 
     @property
     def by_gate(self) -> bool:
-        """Whether the gate's process opened it; else the display did."""
-        # One that was closed at once was nobody's when it was looked at.
+        """Whether a gate process opened the socket, and not the display."""
+        # A socket that was closed at once had no owner when it was checked.
         return self.of_gate or any(id.startswith("webmap-gate") for id in self.ids)
 
     @property
     def lane(self) -> str:
-        """What the gate uses it for, by its messages."""
+        """The gate's use of the link, which follows from its messages."""
         ids, ops = self.ids, {message["op"] for message in list(self.received)}
         if not self.by_gate:
             return "display"
@@ -78,7 +78,7 @@ class Robot:
         self.velocity = velocity
         self.links: list[Link] = []
         self.repeated: dict[str, dict[str, Any]] = {}
-        """What it publishes again and again besides odometry, by topic."""
+        """Messages that it publishes periodically besides odometry, by topic."""
         self.follows = True
         """Whether it follows its commands."""
         self.now = REST
@@ -98,7 +98,7 @@ class Robot:
     def url(self):
         return f"ws://127.0.0.1:{self.port}"
 
-    # What a script asks for.
+    # For scripts.
 
     def received(self, op, topic=None, by_gate=True):
         """Return the received messages with an operation, oldest first."""
@@ -131,7 +131,7 @@ class Robot:
         asyncio.run_coroutine_threadsafe(work, self._loop).result(5)
 
     def publish(self, topic, message):
-        """Publish a message, as a node of the robot's own."""
+        """Publish a message, as a node of the robot."""
         work = self._publish(topic, message)
         asyncio.run_coroutine_threadsafe(work, self._loop).result(5)
 
@@ -235,7 +235,7 @@ def ports_of_gates():
 
 
 def scan_of(distance):
-    """Return a scan that sees a wall round about at a distance, in metres."""
+    """Return a scan with a wall on all sides at a distance, in metres."""
     return {
         "header": {"frame_id": "laser", "stamp": {"sec": 0, "nanosec": 0}},
         "angle_min": -3.0,
@@ -251,7 +251,7 @@ def scan_of(distance):
 
 
 def transforms(frames):
-    """Return a message of ``/tf`` with frames that hang from each other."""
+    """Return a message of ``/tf`` with a chain of frames."""
     nothing = {"x": 0.0, "y": 0.0, "z": 0.0}
     here = {"translation": nothing, "rotation": {**nothing, "w": 1.0}}
     return {

@@ -1,7 +1,7 @@
 """The robots of the scripts, as a program configures them.
 
-All that the scripts say to a robot is here. Where the way to say it changes, these
-functions change with it, and the recordings stay.
+All calls of the scripts to a robot are here. If WebMap's interface changes, only these
+functions change, and the recordings stay the same.
 """
 
 from webmap import Bridge, Robot
@@ -13,8 +13,8 @@ HOOKS = (
     {"service": "/e_stop", "type": "std_srvs/Trigger"},
 )
 FULL = 0.0625
-"""Metres per second: so slow that a busy machine, which counts as a slow link, takes
-nothing off it."""
+"""Metres per second: so slow that a busy computer, which counts as a slow link, does
+not reduce the speed."""
 
 LIMITS = {"stops_within": 0.25, "v_max": FULL, "w_max": 1.0}
 
@@ -30,13 +30,13 @@ def with_odometry(bridge, name, **options):
 def of_twist(bridge, name, **options):
     """A robot that is driven by Twist."""
     robot = with_odometry(bridge, name)
-    said = {"type": "geometry_msgs/Twist", **LIMITS, **options}
-    robot.set_twist_topic(bridge, "/cmd_vel", **said)
+    settings = {"type": "geometry_msgs/Twist", **LIMITS, **options}
+    robot.set_twist_topic(bridge, "/cmd_vel", **settings)
     return robot
 
 
 def of_stamped(bridge, name):
-    """A robot whose type of velocity rosapi reports, and which moves sideways too."""
+    """A robot whose velocity type rosapi reports; it also moves sideways."""
     robot = with_odometry(bridge, name, base_link="base_footprint")
     robot.set_twist_topic(bridge, "/cmd_vel", holonomic=True, a_max=1e6, **LIMITS)
     return robot
@@ -66,7 +66,7 @@ def by_move_base(bridge, name):
 
 
 def by_navigation(bridge, name):
-    """A robot of ROS 2 whose goals are called off when who sent one is lost."""
+    """A robot of ROS 2 whose goals are cancelled when the sender is lost."""
     robot = of_twist(bridge, name, type="geometry_msgs/msg/Twist")
     robot.set_move_topic(
         bridge,
@@ -104,7 +104,7 @@ def of_unknown_stop(bridge, name):
 
 
 def with_everything(bridge, other, name):
-    """A robot of which all is said that can be, each with a value of its own."""
+    """A robot with every setting; each setting has a different value."""
     robot = Robot(name, base_link="base_footprint")
     robot.set_odometry_topic(
         other, "odometry/filtered", 20, type="nav_msgs/msg/Odometry"
@@ -165,7 +165,7 @@ def of_poses(bridge, name):
 
 
 def at(name, url, velocity="", goal=""):
-    """A robot of which nothing is said but where it is told what."""
+    """A robot with a bridge, and topics for velocity and goals only if given."""
     robot, bridge = Robot(name), Bridge(url)
     if velocity:
         robot.set_twist_topic(bridge, velocity, type="geometry_msgs/Twist")
@@ -195,7 +195,7 @@ def bridge_to(url):
     return Bridge(url)
 
 
-# What changes of a robot that is declared.
+# Changes of a declared robot.
 
 
 def assist(robot, footprint=0.25, **options):
@@ -246,7 +246,7 @@ def gone(robot):
     robot.destroy()
 
 
-# What robots are, once they are configured.
+# Properties of configured robots.
 
 
 def all_robots():
@@ -257,9 +257,9 @@ def all_robots():
 
 
 def modules_of(robot):
-    """The modules of a robot: what they are called, and what they were given.
+    """The modules of a robot: their names and arguments.
 
-    Of one that was not added by name only its class is known.
+    Of a module that was not added by name, only the class is known.
     """
     named = iter(robot.module_arguments())
     found = []
@@ -280,7 +280,7 @@ def of_plain_data(data, bridges=None):
 
 
 def scenery_of(console):
-    """What a console shows besides robots, by kind."""
+    """The scenery that a console shows besides robots, by kind."""
     return {
         "maps": [
             (bridge.url, topic, options)

@@ -1,9 +1,9 @@
-"""Scripts that pages, programs and robots play, with everything real between them.
+"""Scripts of pages, programs and robots, with real processes and sockets between them.
 
     python tests/wires/wires_scripts.py RESULT MODE [SCRIPT...]
 
-plays scripts, all if none is named, and writes their recordings to the file RESULT as
-JSON. MODE is ``compare``, where what was recorded is waited for, or ``write``.
+plays the named scripts, or all, and writes their recordings to the file RESULT as JSON.
+MODE is ``compare``, which waits for the recorded messages, or ``write``.
 """
 
 import contextlib
@@ -39,7 +39,7 @@ def free(report):
 
 
 def driven(site, x, at_least=3):
-    """Return a check whether the robot received a speed, a few times."""
+    """Return a check that the robot received a speed a few times."""
     before = site.speeds.count(x)
     return lambda: site.speeds.count(x) >= before + at_least
 
@@ -106,7 +106,7 @@ def stop_and_reset(b):
     b.until(lambda: site.speeds[-1] == 0, "a zero")
     ann.inputs = None
     b.until(lambda: site.received("call_service"), "the hook that is a service")
-    b.shows("stopped by a viewer", vic, bob, stands)
+    b.shows("stopped by a viewer", vic, bob, stop_confirmed)
     vic.reset(bob)
     b.until(lambda: vic.refusals, "the refusal of a viewer's reset")
     ann.send_op("reset", robot=bob.id, stop="0000")
@@ -115,16 +115,16 @@ def stop_and_reset(b):
     b.shows("reset", ann, bob, free)
     ann.take(bob)
     b.model(bob.stop)
-    b.shows("stopped by the program", ann, bob, stands)
+    b.shows("stopped by the program", ann, bob, stop_confirmed)
     b.until(lambda: bob.report and bob.report.stop, "a report of the STOP")
     b.model(bob.reset_stop)
     b.shows("reset by the program", ann, bob, free)
-    with contextlib.suppress(Exception):  # the server ends the socket for that
+    with contextlib.suppress(Exception):  # the server closes the socket
         ann.send(' {"op":"stop" nonsense')
-    b.shows("stopped by a broken STOP", vic, bob, stands)
+    b.shows("stopped by a broken STOP", vic, bob, stop_confirmed)
 
 
-def stands(report):
+def stop_confirmed(report):
     return report["latched"] and report["stop"]["confirmed"]
 
 
@@ -156,7 +156,7 @@ def goals_by_move_base(b):
     ann.take(bob)
     ann.aim("goal", bob)
     (sent,) = b.until(lambda: site.received("publish", "/move_base/goal"), "the goal")
-    b.until(lambda: site.received("subscribe", "/move_base/result"), "its ear")
+    b.until(lambda: site.received("subscribe", "/move_base/result"), "its subscription")
     status = {"goal_id": sent["msg"]["goal_id"], "status": 1, "text": ""}
     site.publish("/move_base/status", {"status_list": [status]})
     b.shows("under way", ann, bob, goal_is("under way"))
@@ -178,8 +178,8 @@ def goals_by_navigation(b):
     link = site.link_that("send_action_goal")
     feedback = {"distance_remaining": 2.5, "number_of_recoveries": 1}
     feedback["navigation_time"] = {"sec": 3, "nanosec": 0}
-    said = {"op": "action_feedback", "id": sent["id"], "values": feedback}
-    site.send(link, {**said, "action": "/navigate_to_pose"})
+    message = {"op": "action_feedback", "id": sent["id"], "values": feedback}
+    site.send(link, {**message, "action": "/navigate_to_pose"})
     b.shows("under way", ann, bob, goal_is("under way"))
     result = {"op": "action_result", "id": sent["id"], "status": 4, "values": {}}
     site.send(link, {**result, "action": "/navigate_to_pose", "result": True})
@@ -187,10 +187,10 @@ def goals_by_navigation(b):
     ann.send_op("cancel", robot=bob.id)
     b.until(lambda: site.received("call_service"), "the cancel")
     b.until(lambda: len(site.received("advertise", "/goal_pose")) == 2, "another lane")
-    time.sleep(0.1)  # it is open, and the gate is told so
+    time.sleep(0.1)  # until the gate knows that the lane is open
     ann.aim("goal", bob, x=3.0)
     b.until(lambda: len(site.received("send_action_goal")) == 2, "another goal")
-    ann.close()  # who sent it is lost
+    ann.close()  # the sender of the goal is lost
     b.until(lambda: len(site.received("call_service")) == 2, "its cancel")
     b.reports("who sent it is lost", bob, goal_is("cancelling"))
 
@@ -210,11 +210,11 @@ def hand_over(b):
     b.shows("denied", ann, bob, lambda r: not r["asker"])
     b.until(lambda: len(ben.refusals) == 2, "the answer")
     ben.send_op("ask", robot=bob.id)
-    b.until(lambda: ann.report(bob)["asker"], "the question")
+    b.until(lambda: ann.report(bob)["asker"], "the request")
     ben.send_op("release", robot=bob.id)
-    b.until(lambda: not ann.report(bob)["asker"], "the end of the question")
+    b.until(lambda: not ann.report(bob)["asker"], "the end of the request")
     ben.send_op("ask", robot=bob.id)
-    b.until(lambda: ann.report(bob)["asker"], "the question")
+    b.until(lambda: ann.report(bob)["asker"], "the request")
     ann.send_op("grant", robot=bob.id)
     ann.inputs = None
     b.until(lambda: ben.report(bob)["mine"], "the lease")
@@ -223,7 +223,7 @@ def hand_over(b):
     ben.drive(bob, x=1.0, until=driven(site, FULL))
     ben.release_inputs(bob)
     ben.inputs = None
-    ben.close()  # without a word
+    ben.close()  # without a release
     b.shows("closed", ann, bob, free)
     b.run(bob.acquire_lease())
     b.shows("taken by the program", ann, bob, lambda r: r["holder"])
@@ -241,7 +241,7 @@ def a_program_drives(b):
 
     def drive(until, *velocity):
         def under_way():
-            with contextlib.suppress(NoLease):  # a busy machine lost it
+            with contextlib.suppress(NoLease):  # lost on a busy computer
                 b.model(bob.twist, *velocity)
                 return until()
             b.run(bob.acquire_lease())
@@ -293,7 +293,7 @@ def a_program_sends_goals(b):
 
 
 class Receiver:
-    """A module that records what the gate sent."""
+    """A module that records the velocities and goals that the gate sent."""
 
     def __init__(self, robot):
         self.twists, self.goals = [], []
@@ -325,7 +325,7 @@ def scan_assist(b):
     b.shows("near a wall", ann, bob, lambda r: "away" in str(r["why"]))
     ann.release_inputs(bob)
     b.model(robots.no_assist, bob)
-    b.until(lambda: not ann.report(bob)["mine"], "the robot, declared anew")
+    b.until(lambda: not ann.report(bob)["mine"], "the new declaration")
     ann.take(bob)
     ann.drive(bob, x=1.0, until=driven(site, FULL))
     ann.release_inputs(bob)
@@ -344,8 +344,8 @@ def another_program_drives(b):
         site.publish("/cmd_vel", velocity)
         return "/teleop" in (ann.report(bob)["other_writer"] or "")
 
-    time.sleep(2.1)  # for so long after a link opened nobody else's is told
-    b.until(written, "that another program drives")
+    time.sleep(2.1)  # just after a link opened, other writers are not reported
+    b.until(written, "a report of the other program")
 
 
 def a_stop_test(b):
@@ -357,14 +357,14 @@ def a_stop_test(b):
 
     def creeps():
         state = (ann.report(bob)["test"] or {"state": "failed"})["state"]
-        if state == "failed":  # at first, and where a busy machine came in between
+        if state == "failed":  # at first, and after a delay of a busy computer
             ann.rest(bob)
             ann.send_op("stop-test", robot=bob.id)
             time.sleep(0.2)
         return state == "waiting"
 
     b.until(creeps, "motion")
-    site.now = REST  # by itself
+    site.now = REST  # without a zero velocity
     b.shows("tested", ann, bob, lambda r: r["test"]["state"] == "done")
     ann.inputs = None
 
@@ -408,23 +408,25 @@ def a_declaration_that_changes(b):
     known("no goals", lambda r: r["method"] is None)
     b.model(robots.no_velocity, bob)
     known("no velocity", lambda r: r["armable"] is False)
-    b.until(lambda: site.received("unadvertise", "/other/cmd_vel"), "the last word")
+    b.until(
+        lambda: site.received("unadvertise", "/other/cmd_vel"), "the end of the topic"
+    )
 
 
 def a_state_that_is_stored(b):
-    """What an earlier version left of STOPs and of stop tests holds for robots."""
+    """STOPs and stop tests that an earlier version stored apply to the robots."""
     for name, url, *where in STORED:
         robot = b.robot(robots.at, name, url, *where)
         seen = b.until(lambda r=robot: b.tap.reports.get(r.id), f"a report of {name}")
         stop = seen["stop"] or {"by": None, "id": None}
         if not stop["id"] or stop["id"].startswith("file-"):
-            stop["id"] = None  # of a file that tells none it is that file's
+            stop["id"] = None  # the file has none: made from the file
         tested = [seen[f"stop_{key}"] for key in ("source", "time", "date")]
         b.note(name, f"STOP by {stop['by']}, {stop['id']}\nstop test {tested}")
 
 
 def every_option(b):
-    """Every field of what is declared has a value that is none of its defaults."""
+    """Every declared field has a value that is not the default."""
     _, bridge = b.site()
     _, other = b.site("other")
     full = b.robot(robots.with_everything, bridge, other, "Eve")
@@ -440,12 +442,12 @@ def a_gate_that_dies(b):
     ann.take(bob)
     ann.drive(bob, x=1.0, until=driven(site, FULL))
     vic.send_op("stop", robot=bob.id)
-    b.until(lambda: ann.report(bob)["latched"], "a STOP that stands")
+    b.until(lambda: ann.report(bob)["latched"], "an active STOP")
     ann.inputs = None
     ann.greeted = vic.greeted = False
     b.kill_the_gate()
     b.until(lambda: ann.greeted and vic.greeted, "another gate")
-    b.shows("another gate", ann, bob, stands)
+    b.shows("another gate", ann, bob, stop_confirmed)
     b.shows("another gate, the other robot", ann, two, free)
 
 
@@ -462,7 +464,7 @@ STORED = (
     ("Unreadable", "ws://robot-eight.example:9090", "cmd_vel"),
     ("Untouched", "ws://robot-nine.example:9090", "cmd_vel"),
 )
-"""Robots that tests/gate/stored_state has files of, in other spellings: their names,
+"""Robots with files in tests/gate/stored_state, in other spellings: their names,
 bridges, velocity topics and goal topics."""
 
 SCRIPTS = {
@@ -491,7 +493,7 @@ SCRIPTS = {
 
 
 def main() -> None:
-    """Play scripts and write what was recorded."""
+    """Play scripts and write their recordings."""
     result, mode, *names = sys.argv[1:]
     first, *others = SCRIPTS
     played = {}
@@ -509,7 +511,7 @@ def main() -> None:
             print(f"{name}: {time.monotonic() - began:.1f} s", flush=True)
             Path(result).write_text(json.dumps(played), "utf-8")
     shutil.rmtree(folder, ignore_errors=True)
-    # Not by the interpreter's own end: a page that hangs would hold it up.
+    # At once: a normal exit would wait for a page that hangs.
     sys.stdout.flush()
     os._exit(0)
 

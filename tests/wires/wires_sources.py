@@ -1,9 +1,9 @@
-"""What becomes of every source of robots: declarations, modules, plain data, texts.
+"""The results of every source of robots: declarations, modules, plain data, texts.
 
     python tests/wires/wires_sources.py RESULT MODE
 
-writes to the file RESULT, as JSON, what became of each source. Each has a process of
-its own, which nothing of another one has touched.
+writes the results of each source to the file RESULT as JSON. Each source has a process
+of its own, so that no source affects another.
 """
 
 import contextlib
@@ -45,7 +45,7 @@ from webmap.gate.display.client import GateClient
 from webmap.gate.specs import checked
 from webmap.server import application
 
-# So that no process of a source has to load them.
+# Loaded here once, and not again in the process of each source.
 import webmap.cli.check  # isort: skip
 import webmap.cli.discover  # isort: skip
 import webmap.fleet.found  # isort: skip
@@ -56,22 +56,22 @@ import webmap.cli.view  # isort: skip
 import webmap.modules.robot  # isort: skip
 
 AT_ONCE = 8
-"""Processes that run beside each other; most of them wait."""
+"""Processes that run at the same time; most of them wait."""
 
 PATIENCE = 30.0
-"""Seconds for which what was recorded is waited for."""
+"""Seconds to wait for the recorded text."""
 
 CALM = 2.5
-"""Seconds in which nothing new is found, where it is not known what will be."""
+"""Seconds without a change after which a text without a recording is complete."""
 
 _LOG = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d+ ")
 
 
 class Source:
-    """What one source has led to so far.
+    """The results of one source so far.
 
     Args:
-        expected: What was recorded of it.
+        expected: The recorded text.
 
     """
 
@@ -84,7 +84,7 @@ class Source:
         self._expected = expected
 
     def listen(self):
-        """Note what is declared to the gate, which is not started, and shown."""
+        """Record declarations to the gate, which is not started, and consoles."""
         declared, consoles = self.declared, self.consoles
         made = Console.__init__
 
@@ -102,7 +102,7 @@ class Source:
         Console.__init__ = noted
 
     def show(self, **ignored):
-        """Start WebMap, without its gate and its pages, and note what there is."""
+        """Start WebMap without its gate and its pages, and record the results."""
         webmap.start()
         try:
             text = settled(self._all, self._expected, PATIENCE, CALM)
@@ -123,41 +123,41 @@ class Source:
         return joined(parts)
 
     def _modules(self, robot):
-        said = [
+        texts = [
             lines(name, self._plain({"args": list(args), "options": options}))
             for name, args, options in robots.modules_of(robot)
         ]
-        return "\n".join(said)
+        return "\n".join(texts)
 
     def _plain_data(self, robot):
         try:
             data = robots.plain_data(robot)
         except Exception as error:
             return self.names.text(f"{type(error).__name__}: {error}")
-        # How it looks is not what this is about, and long.
+        # The model is long and is not tested here.
         model = json.dumps(data.pop("model", None))
         return tree({**self._plain(data), "model": f"{len(model)} characters"})
 
     def _scenery(self, console):
         kinds = robots.scenery_of(console)
-        said = [
+        texts = [
             lines(kind, self._plain({str(n): each}))
             for kind, found in kinds.items()
             for n, each in enumerate(found)
         ]
-        return re.sub(r"console-[0-9a-f]{16}", "console-*", "\n".join(said))
+        return re.sub(r"console-[0-9a-f]{16}", "console-*", "\n".join(texts))
 
     def _plain(self, value):
         """Return a value as JSON has it; a value unknown to JSON as text."""
 
-        def word(value):
+        def as_text(value):
             return (
                 f"<bridge {value.url}>"
                 if isinstance(value, webmap.Bridge)
                 else str(value)
             )
 
-        return self.names.plain(json.loads(json.dumps(value, default=word)))
+        return self.names.plain(json.loads(json.dumps(value, default=as_text)))
 
 
 # Kinds of sources.
@@ -175,7 +175,7 @@ def site(source, graph, label="hall", frames=()):
 
 
 def command(source, *arguments):
-    """Run a command line and record its output; one that serves shows its robots."""
+    """Run a command line and record its output, and its robots if it serves."""
 
     def serves(**options):
         note()
@@ -209,7 +209,7 @@ def fleet(source, name):
 
 
 def discovered(source, graph):
-    """Print what is found as a fleet file, and show what that file says."""
+    """Print the found robots as a fleet file, and show the robots of the file."""
     Path("topics.list").write_text(listed(GRAPHS[graph]), "utf-8")
     given = ("discover", NOWHERE, "--topics", "topics.list")
     text, report = Source(""), Source("")
@@ -264,7 +264,7 @@ def plain(source, name):
 
 
 def programmed(source, name):
-    """Show a robot of a program, and another one that is made of its plain data."""
+    """Show a robot of a program, and a second robot made from its plain data."""
     make = getattr(robots, name)
     bridge = robots.bridge_to("ws://robot:9090")
     if name == "with_everything":
@@ -301,10 +301,10 @@ def wrong_call(source, name):
 def refused(source, act):
     try:
         act()
-        said = "it was taken"
+        text = "it was taken"
     except Exception as error:
-        said = f"{type(error).__name__}: {error}"
-    source.parts["said"] = source.names.text(said)
+        text = f"{type(error).__name__}: {error}"
+    source.parts["said"] = source.names.text(text)
 
 
 def each(source, kind):
@@ -331,7 +331,7 @@ SOURCES = {
     **{f"plain_{name}": (plain, name) for name in PLAIN},
     **{f"programmed_{name}": (programmed, name) for name in robots.MAKERS},
 }
-"""What makes robots, by the name of its recording: how, and of what."""
+"""The sources by the names of their recordings: a function and its argument."""
 
 WRONG = {
     "wrong_fleet_files": (wrong_fleet, FLEET_FILES),
@@ -339,11 +339,11 @@ WRONG = {
     "wrong_plain_data": (wrong_data, DATA),
     "wrong_calls": (wrong_call, CALLS),
 }
-"""What is refused, by the name of its recording: how it is said, and what it is."""
+"""Wrong inputs by the names of their recordings: a function and its arguments."""
 
 
 def played(kind, name, expected, folder):
-    """Return what becomes of one source, in this process."""
+    """Play one source in this process and return its results."""
     os.chdir(folder)
     source = Source(expected)
     source.listen()
@@ -375,7 +375,7 @@ class Crowd:
         self._running[pid] = (key, result, time.monotonic())
 
     def end(self):
-        """Wait for all of them."""
+        """Wait for all processes."""
         while self._running:
             self._wait()
 
@@ -405,7 +405,7 @@ def make_files(folder):
 
 
 def main() -> None:
-    """Play all sources and write what became of them."""
+    """Play all sources and write their results."""
     result, mode, *chosen = sys.argv[1:]
     crowd = Crowd()
     for key, (kind, name) in SOURCES.items():

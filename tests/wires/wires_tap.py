@@ -21,7 +21,7 @@ SILENT: tuple[Any, ...] = (None, False, "", [], [0.0] * 6)
 """Values of a report that are not shown; its fields are recorded separately."""
 
 HASTY = ("drive", "stop-test")
-"""What may be refused where a robot, or a busy machine, was not ready yet."""
+"""Commands that may be refused while a robot or a busy computer is not ready yet."""
 
 TO_GATE = "display to gate"
 FROM_GATE = "gate to display"
@@ -34,8 +34,8 @@ Entry = tuple[str, dict[str, Any]]
 class Tap:
     """Notes messages by the channel that they pass; may be called from any thread.
 
-    The pipe is tapped in this process alone: what is noted was packed for the gate, or
-    came packed from it.
+    The pipe is tapped only in this process: at the packing of messages to the gate, and
+    at the unpacking of messages from the gate.
     """
 
     def __init__(self) -> None:
@@ -44,15 +44,14 @@ class Tap:
         self.reports: dict[str, dict[str, Any]] = {}
         """The gate's newest report about each robot, by the robot's id."""
         self.each_declaration = False
-        """Whether each declaration of a robot is shown, or of several in a row only
-        the last: how a program configures a robot, step by step or at once, is its
-        own matter."""
+        """Whether each declaration of a robot is shown, or only the last of several in
+        a row: a program may configure a robot in several steps or at once."""
         self._lock = threading.RLock()
         self._child_send = GateProcess.send
         self._unpacker_read = pipe.Unpacker._read
 
     def begin(self) -> None:
-        """Forget what was noted, names too."""
+        """Forget the noted messages and the names."""
         with self._lock:
             self.names = Names()
             self.entries = []
@@ -60,7 +59,7 @@ class Tap:
             self.each_declaration = False
 
     def tap_the_pipe(self) -> None:
-        """Note from now on what goes over the pipe."""
+        """Note the messages on the pipe from now on."""
         tap, send, read = self, self._child_send, self._unpacker_read
 
         def noted_send(child: GateProcess, *messages: msgspec.Struct) -> None:
@@ -107,7 +106,7 @@ class Tap:
     # As text.
 
     def channels(self) -> dict[str, str]:
-        """Return what went over each channel."""
+        """Return the messages of each channel as text."""
         with self._lock:
             entries = list(self.entries)
             names = [TO_GATE, FROM_GATE, *sorted({name for name, _ in entries})]
@@ -135,7 +134,7 @@ class Tap:
         return tree({key: shown[key] for key in shown if key not in ("op", "type")})
 
     def _lines_of(self, channel: str, messages: Iterable[dict[str, Any]]) -> list[str]:
-        said: list[tuple[str, str, str]] = []
+        texts: list[tuple[str, str, str]] = []
         before: dict[str, Any] = {}
         for message in messages:
             kind, text = self._line(message)
@@ -146,16 +145,16 @@ class Tap:
                 stays = "last"
             again = kind == "declare" and message.get("id") == before.get("id")
             if again and not self.each_declaration:
-                said.pop()
-            said.append((kind, text, stays))
+                texts.pop()
+            texts.append((kind, text, stays))
             before = message
         if channel == FROM_GATE or channel.startswith("server to page"):
             # The order of two kinds of messages may vary.
-            said.sort(key=lambda each: each[0])
-        return thinned((text, stays) for _, text, stays in said)
+            texts.sort(key=lambda each: each[0])
+        return thinned((text, stays) for _, text, stays in texts)
 
     def _line(self, message: dict[str, Any]) -> tuple[str, str | None]:
-        """Return of which kind a message is, and its line; None if it has none."""
+        """Return the kind of a message and its line; None if it is not shown."""
         fields = dict(message)
         kind = str(fields.pop("type", None) or fields.pop("op", "?"))
         match kind:
@@ -176,22 +175,22 @@ class Tap:
         return kind, lines(kind, self.names.plain(fields))
 
     def _declared(self, fields: dict[str, Any]) -> str:
-        # Its name on the wire is not only told apart, but kept as it is.
+        # The id is recorded as it is, without a token.
         id = fields.pop("id")
         return lines("declare", {"id": id, **self.names.plain(fields)})
 
     def _sent_by_page(self, fields: dict[str, Any]) -> tuple[str, str]:
         try:
-            said = json.loads(fields["text"])
-            op = said.pop("op")
+            command = json.loads(fields["text"])
+            op = command.pop("op")
         except (ValueError, AttributeError, KeyError):
             return "from_page", lines("from_page", self.names.plain(fields))
         who = self.names.text(fields["connection"])
-        return op, lines(f"browser {who}: {op}", self.names.plain(said))
+        return op, lines(f"browser {who}: {op}", self.names.plain(command))
 
 
 def unpacked(body: bytes) -> dict[str, Any]:
-    """Return a message of the pipe as it is there, field by field."""
+    """Return the fields of a packed message of the pipe."""
     found: dict[str, Any] = msgspec.msgpack.decode(body)
     return found
 
@@ -199,7 +198,7 @@ def unpacked(body: bytes) -> dict[str, Any]:
 def lanes_of(names: Names, label: str, robot: Any) -> dict[str, str]:
     """Return the messages that a robot received, by lane.
 
-    A lane may have been opened again, and a goal goes over a socket of its own.
+    A lane may have several sockets: after a reconnection, and one for each goal.
     """
     received: dict[str, list[tuple[str, str]]] = {}
     for link in list(robot.links):
@@ -224,13 +223,13 @@ def _operation(names: Names, message: dict[str, Any], lane: str) -> str | None:
     op = fields.pop("op")
     if lane == "display":
         if op in ("call_service", "unsubscribe"):
-            return None  # these are said when there is time
-        fields.pop("id", None)  # it counts what the process did before
+            return None  # sent at times that vary
+        fields.pop("id", None)  # it depends on earlier messages of the process
     return lines(op, names.plain(fields))
 
 
 def settled(
-    words: Callable[[], str],
+    current: Callable[[], str],
     expected: str,
     seconds: float,
     calm: float,
@@ -240,22 +239,22 @@ def settled(
     """Return the text when it no longer changes.
 
     Args:
-        words: Returns the text so far.
-        expected: What was recorded.
-        seconds: How long it is waited for.
-        calm: Seconds for which the words must stay the same if nothing is recorded.
-        still: Seconds for which what was recorded must stay the same.
+        current: Returns the text so far.
+        expected: The recorded text.
+        seconds: The longest time to wait for it.
+        calm: Seconds for which the text must stay the same if nothing is recorded.
+        still: Seconds for which the text must stay the same if it is the recorded text.
         good: Returns whether the text may be complete.
 
     """
     deadline = time.monotonic() + seconds
-    last, since = words(), time.monotonic()
+    last, since = current(), time.monotonic()
     while True:
         now = time.monotonic()
-        said = words()
-        if said != last or not good():
-            last, since = said, now
-        quiet = still if said == expected else seconds if expected else calm
+        text = current()
+        if text != last or not good():
+            last, since = text, now
+        quiet = still if text == expected else seconds if expected else calm
         if now > deadline or now - since >= quiet:
-            return said
+            return text
         time.sleep(0.02)

@@ -1,4 +1,4 @@
-"""Messages as lines of a recording, without what differs from run to run."""
+"""Messages as lines of a recording, without values that differ from run to run."""
 
 import json
 import re
@@ -26,10 +26,10 @@ _GENERATED = re.compile(r"\bWebMap-(\d+)\b")
 
 
 class Names:
-    """Tokens for what is drawn by lot or counted on: ids, epochs, ports.
+    """Tokens for random and counted values: ids, epochs, ports.
 
-    Numbers that only grow are counted in their order, others as they are first seen. So
-    it does not matter which thread notes its message first.
+    Values that only grow are numbered by size, others in the order in which they are
+    noted. So it does not matter which thread notes its message first.
     """
 
     def __init__(self) -> None:
@@ -46,7 +46,7 @@ class Names:
         self._growing.setdefault(kind, set()).add(number)
 
     def meet(self, kind: str, value: str) -> None:
-        """Note a value of a kind that is drawn by lot."""
+        """Note a random value of a kind."""
         seen = self._seen.setdefault(kind, {})
         self.call(value, seen.setdefault(value, f"<{kind} {len(seen) + 1}>"))
 
@@ -125,18 +125,18 @@ def _json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, sort_keys=True)
 
 
-def thinned(said: Iterable[tuple[str, str]]) -> list[str]:
-    """Return texts without those that are there again.
+def thinned(texts: Iterable[tuple[str, str]]) -> list[str]:
+    """Return texts without repetitions.
 
     Args:
-        said: Each text, and where it stays: ``"once"`` where it was said first,
-            ``"last"`` where it was said last, or ``""`` wherever it is not the same as
-            the one before.
+        texts: Each text, and which repetition stays: ``"once"`` for the first,
+            ``"last"`` for the last, or ``""`` for each that differs from the text
+            before it.
 
     """
     found: list[str] = []
     known: set[str] = set()
-    for text, stays in said:
+    for text, stays in texts:
         if (stays == "once" and text in known) or (found and found[-1] == text):
             continue
         if stays == "last" and text in known:

@@ -1,4 +1,4 @@
-"""The list of alerts: begin, end, acknowledge, flap, and the limit."""
+"""The list of alerts: begin, end, acknowledgement, flapping, and the limit."""
 
 import pytest
 
@@ -128,7 +128,9 @@ def test_an_active_alert_that_left_the_full_list_does_not_begin_again(alerts):
     assert alerts.dropped == 2 * MOST
     for robot in robots:
         lost(alerts, False, 4, robot)
-    assert len(alerts._newest) == MOST, "what is neither listed nor active is forgotten"
+    assert len(alerts._newest) == MOST, (
+        "alerts that are neither listed nor active are removed"
+    )
 
 
 def test_only_changed_alerts_are_sent_again(alerts):

@@ -22,7 +22,7 @@ def alerts():
 
 
 class Browser:
-    """A page of a viewer with the panel, and the messages that it got."""
+    """A page of a viewer with the panel, and the messages that the page received."""
 
     def __init__(self, alerts, folder, name="Ann", role="operator"):
         entry = PageEntry("/", lambda page: None, None, folder, "test")

@@ -1,4 +1,4 @@
-"""What makes an alert: from the gate's report, the connection, and the modules."""
+"""Alerts come from the gate's report, the connection, and the modules."""
 
 import asyncio
 from types import SimpleNamespace
@@ -27,7 +27,7 @@ def report(**changes):
     return SimpleNamespace(**known | changes)
 
 
-def robot(*, link=None, told=None, silent=0.1, throttle=100, modules=()):
+def robot(*, link=None, gate_report=None, silent=0.1, throttle=100, modules=()):
     return SimpleNamespace(
         id="r1",
         name="Bob",
@@ -35,7 +35,7 @@ def robot(*, link=None, told=None, silent=0.1, throttle=100, modules=()):
             bridge=bridge() if link is None else link, period=throttle / 1000
         ),
         silent_for=silent,
-        report=report() if told is None else told,
+        report=report() if gate_report is None else gate_report,
         modules=modules,
         charge=next((each.charge for each in modules if hasattr(each, "charge")), None),
         battery_low=0.2,
@@ -62,24 +62,30 @@ FAILED = SimpleNamespace(state="failed", why="no path")
     [
         (robot(), {}),
         (
-            robot(told=report(alarm="still moving", other_writer="/joy sends")),
+            robot(gate_report=report(alarm="still moving", other_writer="/joy sends")),
             {"disobeys": "Not obeying: still moving; /joy sends"},
         ),
         (
             robot(
-                told=report(
+                gate_report=report(
                     doing="unconfirmed", stop=SimpleNamespace(why="no odometry")
                 )
             ),
             {"unconfirmed": "STOP not confirmed: no odometry"},
         ),
-        (robot(told=report(doing="blocked")), {"blocked": "Driven, but not moving"}),
-        (robot(told=report(goal=FAILED)), {"goal": "Goal failed: no path"}),
         (
-            robot(told=report(goal=SimpleNamespace(state="failed", why=""))),
+            robot(gate_report=report(doing="blocked")),
+            {"blocked": "Driven, but not moving"},
+        ),
+        (robot(gate_report=report(goal=FAILED)), {"goal": "Goal failed: no path"}),
+        (
+            robot(gate_report=report(goal=SimpleNamespace(state="failed", why=""))),
             {"goal": "Goal failed"},
         ),
-        (robot(told=report(link="down")), {"commands": "No connection for commands"}),
+        (
+            robot(gate_report=report(link="down")),
+            {"commands": "No connection for commands"},
+        ),
         (robot(silent=LOST + 0.1), {"lost": "No pose received"}),
         (robot(silent=LOST + 0.1, throttle=2000), {}),
         (robot(silent=None), {}),
@@ -118,14 +124,14 @@ def test_the_charge_of_a_low_battery_is_settable():
 
 
 def test_a_new_connection_for_commands_makes_no_alert():
-    alerts, told = Alerts(), report(link="down")
-    watch = AlertWatch(alerts, lambda: [robot(told=told)])
+    alerts, gate_report = Alerts(), report(link="down")
+    watch = AlertWatch(alerts, lambda: [robot(gate_report=gate_report)])
     watch.look(1.0)
     watch.look(1.0 + LOST - 0.5)
     assert not alerts.listed
     watch.look(1.0 + LOST)
     assert [alert.kind for alert in alerts.listed.values()] == ["commands"]
-    told.link = "up"
+    gate_report.link = "up"
     watch.look(5.0)
     assert [alert.ended for alert in alerts.listed.values()] == [5.0]
 

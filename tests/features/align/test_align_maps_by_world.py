@@ -1,7 +1,7 @@
-"""Maps from disk, cell by cell: a place of the world is chosen, and what is there seen.
+"""Maps from disk, cell by cell: the cell at a place of the world is checked.
 
-What a cell must hold is worked out here for each pixel by itself, as map_server's
-documentation has it, and not by the code under test.
+The expected value of each cell is computed here from its pixel by the rules in
+map_server's documentation, and not by the code under test.
 """
 
 import asyncio
@@ -32,7 +32,7 @@ HERE = Path(__file__).parents[1]
 
 @dataclass(frozen=True)
 class Plan:
-    """A map as people write it down: a picture, its upper row first, and settings."""
+    """A map file: a picture, its upper row first, and settings."""
 
     picture: tuple[tuple[int, ...], ...]
     form: str = "P5"
@@ -86,7 +86,7 @@ class Plan:
         return range(max(math.floor(1 + 98 * part) - 1, 1), math.ceil(100 * part) + 2)
 
     def place(self, row: float, column: float) -> tuple[float, float]:
-        """A place of the world, in cells from the lower left corner."""
+        """Return a place of the world, given in cells from the lower left corner."""
         x, y, yaw = self.origin
         u, v = column * self.resolution, row * self.resolution
         return (
@@ -120,7 +120,7 @@ def plans(draw) -> Plan:
 
 
 def value_of(colour: tuple[int, int, int, int]) -> int:
-    """The cell's value behind a colour of the raw palette."""
+    """Return the cell value of a colour of the raw palette."""
     red, green, blue, alpha = colour
     assert red == green == blue
     assert alpha == 255
@@ -176,11 +176,11 @@ def test_every_cell_of_a_map_file_is_placed_at_its_world_position(
         (0.5, -0.3),
         (0.5, columns + 0.3),
     ]:
-        assert pixel(element, *plan.place(row, column)) is None, "beside the map"
+        assert pixel(element, *plan.place(row, column)) is None, "outside of the map"
     if plan.mode != "raw":
         # The same map from a topic, whose first row is the lowest.
         topic = map.add_module("OccupancyGrid", link, "/map", palette="raw")
-        link.say("/map", grid_message(plan, found))
+        link.publish("/map", grid_message(plan, found))
         (other,) = images(topic.layer)
         for row in range(rows):
             for column in range(columns):
@@ -206,7 +206,7 @@ def grid_message(plan: Plan, cells: np.ndarray) -> dict:
 
 
 def drawn(*rows: str) -> tuple[tuple[int, ...], ...]:
-    """A picture from characters: a wall, an unknown cell, a free one."""
+    """Return a picture made from characters for walls, unknown and free cells."""
     return tuple(tuple({"#": 0, "?": 205, ".": 254}[c] for c in row) for row in rows)
 
 
@@ -233,7 +233,7 @@ MAPS = {
     "raw": Plan(SHADES, "P2", 1.0, (0.0, 0.0, -math.pi / 2), mode="raw"),
     "thresholds": Plan(SHADES, occupied=0.9, free=0.05, origin=(-1.0, 0.0, 0.3)),
 }
-"""The settings of map_server's own test maps, and some that are odder."""
+"""The settings of map_server's test maps, and unusual settings."""
 
 
 @pytest.fixture(scope="module")

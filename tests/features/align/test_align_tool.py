@@ -1,4 +1,4 @@
-"""Who may align what, and what is kept of it."""
+"""Who may align which maps, and which alignments are saved."""
 
 import asyncio
 import json
@@ -19,8 +19,8 @@ from webmap.poses.alignment import align_bridge, alignments
 NAME = "ws://test:9090 Bob"
 
 
-class Saying(Channel):
-    """Keeps the messages to the browser parts."""
+class KeepingChannel(Channel):
+    """Records the messages to the browser parts."""
 
     def send(self, instance, message):
         self.__dict__.setdefault("received", []).append(message)
@@ -28,7 +28,7 @@ class Saying(Channel):
 
 @pytest.fixture
 def channel():
-    return Saying()
+    return KeepingChannel()
 
 
 @pytest.fixture
@@ -51,20 +51,20 @@ def tool(map, robot, store):
 
 
 def answer(channel, key):
-    (said,) = [message[key] for message in channel.received if key in message]
+    (found,) = [message[key] for message in channel.received if key in message]
     channel.received.clear()
-    return said
+    return found
 
 
 def save(tool, robot, x=1.0, y=2.0, angle=90.0, *, whole=False) -> None:
-    async def say():
+    async def save_and_wait():
         wanted = {"robot": robot.id, "whole": whole, "x": x, "y": y, "angle": angle}
         tool.on_message({"save": wanted})
         tasks = asyncio.all_tasks() - {asyncio.current_task()}
         if tasks:
             await asyncio.wait(tasks)
 
-    asyncio.run(say())
+    asyncio.run(save_and_wait())
 
 
 def test_begin_sends_the_robot_and_its_alignments_to_the_page(
@@ -196,9 +196,9 @@ def test_an_alignment_that_cannot_be_saved_is_applied_with_a_warning(
     store._folder.parent.mkdir(exist_ok=True)
     store._folder.write_text("a file where the folder should be")
     save(tool, robot)
-    said = answer(channel, "saved")
-    assert said["lost"].startswith("Cannot save the alignment: ")
-    assert said["lost"].endswith(". It is lost when WebMap ends.")
+    saved = answer(channel, "saved")
+    assert saved["lost"].startswith("Cannot save the alignment: ")
+    assert saved["lost"].endswith(". It is lost when WebMap ends.")
     assert robot.pose_source.own_alignment is not None
 
 
@@ -234,7 +234,7 @@ def test_a_robot_added_later_gets_its_saved_alignment(tool, robot, store, link):
     eve = Robot("Eve")
     eve.set_odometry_topic(link, "/eve/odom", type="geometry_msgs/PoseStamped")
     tool.map.add_robot(eve)
-    link.say("/eve/odom", {"header": {}, "pose": pose(1.0, 0.0)})
+    link.publish("/eve/odom", {"header": {}, "pose": pose(1.0, 0.0)})
     assert eve.position.x == pytest.approx(5.0)
     eve.destroy()
 

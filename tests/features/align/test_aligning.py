@@ -1,4 +1,4 @@
-"""Maps are laid onto each other by hand, in a real browser, and goals go along."""
+"""Maps are aligned by hand in a real browser, and goals use the alignment."""
 
 import json
 import math
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.browser
 
 PAGE = Path(__file__).parents[1] / "page_of_aligning.py"
 GOAL = "/robot_0/move_base_simple/goal"
-"""Why the gate takes no goal from a busy machine; a person sends it once more."""
+"""Why the gate refuses a goal from a busy machine; a person sends it again."""
 
 ROBOT = """(name) => {
   const world = document.querySelector('svg.webmap .world').getScreenCTM();
@@ -35,8 +35,8 @@ SCREEN = """([x, y]) => {
 
 
 @contextmanager
-def hearing_goals(url: str) -> Iterator[list[dict]]:
-    """Hear the goals that the robot is sent, as the robot does."""
+def receiving_goals(url: str) -> Iterator[list[dict]]:
+    """Receive the goals that are sent to the robot."""
     received: list[dict] = []
     over = threading.Event()
 
@@ -102,7 +102,7 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
         with (
             page_of(PAGE, **state) as url,
             watched_tab(chromium, 1000, 800) as tab,
-            hearing_goals(sim) as goals,
+            receiving_goals(sim) as goals,
         ):
             open_page(tab, url)
             before = {n: tab.evaluate(ROBOT, n) for n in ("robot_0", "robot_1")}
@@ -121,13 +121,13 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
             assert numbers(tab) == pytest.approx([3.0, 2.0, 0.0], abs=0.03)
             assert tab.evaluate(ROBOT, "robot_0") == pytest.approx(before["robot_0"])
 
-            # Arrow keys nudge what has the focus, and drive nothing.
+            # Arrow keys move the field with the focus and do not drive a robot.
             x, y, _ = numbers(tab)
             tab.keyboard.press("ArrowRight")
             tab.keyboard.press("Shift+ArrowUp")
             assert numbers(tab) == pytest.approx([x + 0.05, y + 0.5, 0.0], abs=2e-3)
 
-            # The handle turns about the robot, which stays where it would be.
+            # The handle turns the map about the robot; the robot keeps its place.
             handle = tab.locator(".webmap-align-knob").bounding_box()
             tip = (
                 handle["x"] + handle["width"] / 2,
@@ -145,7 +145,7 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
             expect(tab.locator(".webmap-align-body")).to_be_hidden()
             assert tab.evaluate(ROBOT, "robot_0") == pytest.approx(before["robot_0"])
 
-            # Numbers are typed exactly; saved, all behind the bridge go there.
+            # Typed numbers are exact; saved numbers apply to all robots of the bridge.
             begin(tab)
             for name, value in (("x", "10"), ("y", "-2.5"), ("angle", "90")):
                 tab.locator(f".webmap-align [name={name}]").fill(value)
@@ -158,7 +158,7 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
                 turned = tab.evaluate(ROBOT, name)[2] - angle - 90.0
                 assert math.remainder(turned, 360) == pytest.approx(0, abs=0.01)
 
-            # A goal that is clicked there reaches the robot in its own map.
+            # The robot receives a clicked goal in the coordinates of its own map.
             x, y, _ = tab.evaluate(ROBOT, "robot_0")
             place = tab.evaluate(SCREEN, [x + 1.0, y + 2.0])
             send(tab, place, (place[0] + 60, place[1]))
@@ -170,7 +170,7 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
             yaw = 2 * math.atan2(way["z"], way["w"])
             assert yaw == pytest.approx(-math.pi / 2, abs=0.02)
 
-        # What was saved holds in the next process.
+        # The saved alignment is used in the next process.
         with (
             page_of(PAGE, **state) as url,
             watched_tab(chromium, 1000, 800) as tab,
@@ -179,7 +179,7 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
             rx, ry, _ = before["robot_1"]
             there = pytest.approx([10.0 - ry, -2.5 + rx], abs=0.01)
             assert tab.evaluate(ROBOT, "robot_1")[:2] == there
-            # One robot may lie otherwise than the rest of its bridge.
+            # One robot may have another alignment than the rest of its bridge.
             select(tab, "robot_1")
             begin(tab)
             tab.locator(".webmap-align-what").select_option("own")
@@ -196,8 +196,8 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
 
 
 def send(tab, place, end) -> None:
-    """Send a goal, and again where it came to the gate too late."""
-    word = tab.locator(".webmap-goal-word")
+    """Send a goal; send it again if it reached the gate too late."""
+    status = tab.locator(".webmap-goal-word")
     for _ in range(10):
         tab.locator(".webmap-goal-go").click()
         drag(tab, place, end)
@@ -206,7 +206,7 @@ def send(tab, place, end) -> None:
               || /^Not sent/.test(
                 document.querySelector(".webmap-goal-word").textContent)"""
         )
-        if not TOO_LATE.search(word.inner_text()):
+        if not TOO_LATE.search(status.inner_text()):
             return
 
 
@@ -215,4 +215,4 @@ def until(tab, condition) -> None:
         if condition():
             return
         tab.evaluate("() => new Promise((done) => setTimeout(done, 50))")
-    raise AssertionError("it never came true")
+    raise AssertionError("the condition was not met in time")

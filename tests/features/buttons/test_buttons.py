@@ -1,4 +1,4 @@
-"""Buttons of robots: what they do over a real rosbridge, and what they never do."""
+"""Buttons of robots: what they do over a real rosbridge, and what they refuse."""
 
 import asyncio
 import contextlib
@@ -27,7 +27,7 @@ HORN = {
 }
 
 
-# What a configuration may say.
+# Valid and invalid configurations.
 
 
 @pytest.mark.parametrize(
@@ -138,12 +138,12 @@ def test_declared_motion_topics_of_robots_are_refused_for_buttons(robot):
         other.destroy()
 
 
-# What it does over a rosbridge.
+# Buttons over a rosbridge.
 
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
-    """Let a busy machine take its time to tell a type."""
+    """Allow a busy machine more time to find a type."""
     monkeypatch.setattr("webmap.ros.rosbridge.graph.BRIEF", 20.0)
 
 
@@ -183,7 +183,7 @@ def trigger(success=True, message="docked"):
 
 
 def pressed(robot, button, url, values=None, *, before=None, **world):
-    """Press one button over a simulator; return it and what the robot's node took."""
+    """Press a button over a simulator; return the button and the robot's node."""
 
     async def scenario():
         async with linked(url, **world) as (bridge, node):
@@ -265,9 +265,14 @@ def test_only_buttons_with_during_stop_work_while_stop_is_active(sim, robot):
         async with linked(sim["ros1"], services={"/dock": trigger()}) as (bridge, node):
             light = {**DOCK, "label": "Light", "during_stop": True}
             module = robot.add_module("Buttons", bridge, [DOCK, light])
-            said = {"doing": "stopped", "holder": None, "goal": None, "alarm": None}
-            said |= {"link": "up", "measured": None}
-            report = SimpleNamespace(latched=True, other_writer=None, **said)
+            report_fields = {
+                "doing": "stopped",
+                "holder": None,
+                "goal": None,
+                "alarm": None,
+            }
+            report_fields |= {"link": "up", "measured": None}
+            report = SimpleNamespace(latched=True, other_writer=None, **report_fields)
             robot.on_gate_report(report)
             assert await module["Dock"].press() is False
             assert module["Dock"].result == "Not done: STOP is active: reset it first"
@@ -319,7 +324,7 @@ def test_a_topic_with_another_type_gets_no_message(sim, robot):
 
 
 def params(store):
-    """rosapi's parameters of ROS 1; what begins with /fixed cannot be set."""
+    """The ROS 1 parameters in rosapi; those that begin with /fixed cannot be set."""
 
     def set_param(args):
         if not args["name"].startswith("/fixed"):
@@ -381,9 +386,9 @@ def test_a_parameter_of_ros_2_is_set_by_its_node(sim, robot, result, state, word
     (parameter,) = args["parameters"]
     assert parameter["name"] == "max_vel"
     value = parameter["value"]
-    assert len(value) == 10, "the graph knows the type, and fills the other fields in"
-    said = {name: each for name, each in value.items() if each}
-    assert said == {"type": 3, "double_value": 0.4}
+    assert len(value) == 10, "the graph fills in the other fields of the type"
+    filled = {name: each for name, each in value.items() if each}
+    assert filled == {"type": 3, "double_value": 0.4}
 
 
 def test_a_press_without_a_link_fails_with_the_reason(robot):
@@ -440,7 +445,7 @@ def typedef(type, **fields):
     }
 
 
-# How it looks on a page.
+# Buttons on a page.
 
 
 def test_a_viewer_sees_a_disabled_button_and_cannot_press_it(
@@ -460,5 +465,5 @@ def test_a_viewer_sees_a_disabled_button_and_cannot_press_it(
     asyncio.run(handler(Event(kind="click")))
     assert module["Dock"].state == "idle"
     page.close()
-    assert module["Dock"]._listeners != []  # the module's own
+    assert module["Dock"]._listeners != []  # of the module
     assert len(module["Dock"]._listeners) == 1

@@ -103,7 +103,7 @@ def test_a_button_with_confirm_asks_first_and_then_shows_the_result(tab, bench):
     dock.locator(".go").focus()
     tab.keyboard.press("Enter")
     expect(dock.locator(".yes")).to_be_visible()
-    tab.wait_for_timeout(400)  # a question that came this moment takes no answer
+    tab.wait_for_timeout(400)  # a new question accepts no answer at first
     dock.locator(".yes").press("Enter")
     expect(dock.locator(".result")).to_have_text("Done: in")
     assert bench.node.calls == [("/dock", {})]

@@ -1,4 +1,4 @@
-"""Cameras: one pull for all who watch."""
+"""Cameras: one subscription for all viewers."""
 
 import asyncio
 import base64
@@ -54,7 +54,7 @@ def test_a_compressed_picture_is_published_unchanged(link, robot, cbor):
     message = compressed(data)
     if cbor:
         message["data"] = data
-    link.say(TOPIC, message, cbor=cbor)
+    link.publish(TOPIC, message, cbor=cbor)
     assert received == [camera.url]
     picture = pictures.get(camera.url.rpartition("/")[2])
     assert picture == (data, "image/jpeg", True)
@@ -83,7 +83,7 @@ def test_the_type_is_derived_from_the_topic_name_or_left_to_the_bridge(
 def test_a_compressed_picture_is_shown_for_any_topic_name(link, robot, type):
     camera = robot.add_module(Camera, link, "/thermal/jpeg", type=type)
     camera.watch(lambda: None)
-    link.say("/thermal/jpeg", compressed(a_jpeg()))
+    link.publish("/thermal/jpeg", compressed(a_jpeg()))
     assert shown(camera).getpixel((4, 4))[0] > 180
     assert not robot.problems
 
@@ -102,17 +102,19 @@ def test_kept_pictures_are_limited_and_removed_after_the_last_watcher(
     camera = robot.add_module(Camera, link, TOPIC)
     watching = camera.watch(lambda: None)
     for red in range(0, 250, 2):
-        link.say(TOPIC, compressed(a_jpeg((red, 0, 0))))
+        link.publish(TOPIC, compressed(a_jpeg((red, 0, 0))))
     assert len(pictures) <= before + 64
     for number in range(8):
         large = a_jpeg((number, 0, 0)) + bytes(3 << 20)
-        link.say(TOPIC, compressed(large) | {"data": large}, cbor=True)
+        link.publish(TOPIC, compressed(large) | {"data": large}, cbor=True)
     assert len(pictures) <= before + 3
-    link.say(TOPIC, compressed(a_jpeg()))
+    link.publish(TOPIC, compressed(a_jpeg()))
     last = camera.url
     watching.remove()
     assert len(pictures) == before
-    assert pictures.get(last.rpartition("/")[2]), "a page is still loading the last"
+    assert pictures.get(last.rpartition("/")[2]), (
+        "a page may still load the last picture"
+    )
     later = time.monotonic() + 3.1
     with monkeypatch.context() as then:
         then.setattr(time, "monotonic", lambda: later)
@@ -123,12 +125,12 @@ def test_kept_pictures_are_limited_and_removed_after_the_last_watcher(
 def test_invalid_picture_data_is_a_problem_and_the_last_picture_stays(link, robot):
     camera = robot.add_module(Camera, link, TOPIC)
     camera.watch(lambda: None)
-    link.say(TOPIC, compressed(a_jpeg()))
+    link.publish(TOPIC, compressed(a_jpeg()))
     good = camera.url
-    link.say(TOPIC, compressed(b"<svg onload=alert(1)>", format="svg"))
+    link.publish(TOPIC, compressed(b"<svg onload=alert(1)>", format="svg"))
     assert camera.url == good
     assert any("not JPEG, PNG or WebP" in text for text in robot.problems.values())
-    link.say(TOPIC, compressed(a_jpeg((0, 0, 9))))
+    link.publish(TOPIC, compressed(a_jpeg((0, 0, 9))))
     assert not robot.problems
 
 
@@ -148,7 +150,7 @@ def test_raw_pixels_are_in_rgb_order_without_row_padding():
     assert (raw("rgba8", with_alpha).pixels() == red).all()
 
 
-# White, black, red and blue as BT.601 has them: Y, U and V.
+# White, black, red and blue in BT.601: Y, U and V.
 YUV = [(235, 128, 128), (16, 128, 128), (81, 90, 240), (41, 240, 110)]
 RGB = [(255, 255, 255), (0, 0, 0), (255, 0, 0), (0, 0, 255)]
 
@@ -177,7 +179,7 @@ def test_a_bayer_picture_becomes_a_colour_picture_of_half_its_size(filters, bits
     values = {"r": [200], "g": [90, 110], "b": [0]}
     square = [values[letter].pop() for letter in filters]
     mosaic = np.tile(np.array(square).reshape(2, 2), (2, 3))
-    mosaic = np.pad(mosaic, ((0, 1), (0, 1)))  # half a square is left out
+    mosaic = np.pad(mosaic, ((0, 1), (0, 1)))  # half a square is dropped
     kind = np.uint8 if bits == 8 else np.uint16
     seen = raw(f"bayer_{filters}{bits}", mosaic.astype(kind)).pixels()
     stretched = 1.0 if bits == 8 else 255 / 200
@@ -199,7 +201,7 @@ def test_big_endian_pixels_are_decoded():
 
 
 @pytest.mark.parametrize(
-    ("image", "said"),
+    ("image", "expected"),
     [
         (ImageMsg(10, 10, "rgb8", 30, b"\0" * 299), "too few"),
         (ImageMsg(10, 10, "rgb8", 29, b"\0" * 300), "too few"),
@@ -210,8 +212,8 @@ def test_big_endian_pixels_are_decoded():
         (ImageMsg(1, 9, "bayer_rggb8", 9, b"\0" * 9), "9 x 1, 2 x 2 at least"),
     ],
 )
-def test_an_invalid_raw_picture_is_refused_with_a_reason(image, said):
-    with pytest.raises(ProtocolError, match=said):
+def test_an_invalid_raw_picture_is_refused_with_a_reason(image, expected):
+    with pytest.raises(ProtocolError, match=expected):
         image.pixels()
 
 
@@ -237,7 +239,7 @@ def test_the_newest_raw_picture_is_shown(link, robot, topic):
                 "step": 24,
                 "data": data,
             }
-            link.say(topic, message)
+            link.publish(topic, message)
         patience = time.monotonic() + 10
         while camera.url is None or shown(camera).getpixel((4, 4))[0] < 190:
             assert time.monotonic() < patience

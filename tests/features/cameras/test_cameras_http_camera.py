@@ -1,4 +1,4 @@
-"""Cameras on the web: pulled once for all who watch, over real connections."""
+"""HTTP cameras: one connection for all viewers, over real sockets."""
 
 import asyncio
 import io
@@ -27,7 +27,7 @@ STREAM = "/stream?topic=/camera/image_raw&type=mjpeg"
 async def until(condition, seconds=10.0) -> None:
     patience = time.monotonic() + seconds
     while not condition():
-        assert time.monotonic() < patience, "it never came true"
+        assert time.monotonic() < patience, "the condition was not met in time"
         await asyncio.sleep(0.005)
 
 
@@ -51,13 +51,13 @@ def run(scenario) -> None:
 
 @pytest.fixture(autouse=True)
 def own_process(monkeypatch):
-    """Start nothing but what a test made."""
+    """Start only the objects that a test made."""
     monkeypatch.setattr(http_camera, "lifecycle", Lifecycle())
 
 
 @pytest.fixture(autouse=True)
 def quickly_again(monkeypatch):
-    """Wait a moment only until it is tried again."""
+    """Wait only a short time before the next attempt."""
     monkeypatch.setattr(Backoff, "next", lambda self, lasted=0.0: 0.02)
 
 
@@ -109,7 +109,7 @@ def test_a_watcher_added_before_the_start_gets_pictures_after_the_start(robot):
         async with CameraServer() as server:
             camera = HttpCamera(robot, server.at(STREAM), throttle=0)
             camera.watch(lambda: None)
-            for _ in range(2):  # a process may stop and start again
+            for _ in range(2):  # a process may end and start again
                 http_camera.lifecycle.begin(asyncio.get_running_loop())
                 await until(lambda last=camera.stamp: camera.stamp != last)
                 await http_camera.lifecycle.end()
@@ -166,7 +166,7 @@ def test_the_last_picture_of_a_burst_is_shown():
 
 
 @pytest.mark.parametrize(
-    ("path", "answer", "said"),
+    ("path", "answer", "expected"),
     [
         ("/a", b"HTTP/1.1 404 No\r\n\r\n", "answers 404"),
         ("/b", b"HTTP/1.1 302 No\r\nLocation: /stream\r\n\r\n", "not followed"),
@@ -180,7 +180,7 @@ def test_the_last_picture_of_a_burst_is_shown():
     ],
 )
 def test_an_invalid_camera_answer_is_a_problem_until_pictures_arrive(
-    path, answer, said
+    path, answer, expected
 ):
     async def scenario(server, robot):
         server.scripts[path] = (answer, True)
@@ -189,8 +189,8 @@ def test_an_invalid_camera_answer_is_a_problem_until_pictures_arrive(
         await until(lambda: robot.problems)
         (text,) = robot.problems.values()
         assert text.startswith(f"Front at {server.at(path)}: ")
-        assert said in text
-        # Where it would have led, nobody went.
+        assert expected in text
+        # The redirect was not followed.
         assert {line.split()[1] for line in server.asked} == {path}
         del server.scripts[path]
         await until(lambda: camera.url is not None)
@@ -216,19 +216,19 @@ def test_a_closed_stream_is_opened_again():
 def test_a_connection_without_pictures_times_out_and_is_retried():
     async def scenario(server, robot):
         server.scripts["/drip"] = (b"HTTP/1.1 200 OK\r\nContent-Type: ima", False)
-        said = []
+        problems = []
         pull = image_pull.Pull(
             image_pull.Address("127.0.0.1", server.port, False, "/drip", "x"),
             0.0,
             lambda picture: None,
-            said.append,
+            problems.append,
             patience=0.1,
             backoff=Backoff(),
         )
         pull.start(asyncio.get_running_loop())
         await until(lambda: len(server.asked) >= 2)
         await pull.stop()
-        assert said[0] == "no picture came for 0.1 s"
+        assert problems[0] == "no picture came for 0.1 s"
 
     run(scenario)
 
@@ -247,17 +247,17 @@ def test_a_refused_connection_is_a_problem():
 @pytest.mark.parametrize("name", ["cam..local", ".local", f"{'c' * 64}.local"])
 def test_an_invalid_host_name_is_a_problem_and_is_retried(robot, name):
     async def scenario():
-        said = []
+        problems = []
         pull = image_pull.Pull(
             parse_address(f"http://{name}/stream"),
             0.0,
             lambda picture: None,
-            said.append,
+            problems.append,
         )
         pull.start(asyncio.get_running_loop())
-        await until(lambda: len(said) >= 2)
+        await until(lambda: len(problems) >= 2)
         await pull.stop()
-        assert set(said) == {"there is no such host"}
+        assert set(problems) == {"there is no such host"}
 
     asyncio.run(scenario())
 
@@ -273,11 +273,11 @@ def test_the_ssl_context_is_created_once_in_a_thread(monkeypatch):
     monkeypatch.setattr(ssl, "create_default_context", reading)
 
     async def scenario(server, robot):
-        said = []
+        problems = []
         address = parse_address(server.at("/snapshot").replace("http:", "https:"))
-        pull = image_pull.Pull(address, 0.0, lambda picture: None, said.append)
+        pull = image_pull.Pull(address, 0.0, lambda picture: None, problems.append)
         pull.start(asyncio.get_running_loop())
-        await until(lambda: len(said) >= 3)
+        await until(lambda: len(problems) >= 3)
         await pull.stop()
 
     run(scenario)

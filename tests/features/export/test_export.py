@@ -1,4 +1,4 @@
-"""The view saved as SVG and PNG: opened alone, it looks as it did on the page."""
+"""The view saved as SVG and PNG: an opened file looks the same as the page."""
 
 import io
 import re
@@ -38,7 +38,7 @@ def tab(chromium: Browser, url: str) -> Iterator[Page]:
             " [...document.querySelectorAll('.world image')].every("
             "(i) => i.hasAttribute('href'))"
         )
-        # What is old stays so, and the picture is the same a second later.
+        # Stale elements stay stale, so the picture does not change any more.
         page.wait_for_selector(".robot.stale > .path.stale", state="attached")
         page.wait_for_selector(".webmap-export-go")
         page.wait_for_load_state("networkidle")
@@ -52,11 +52,11 @@ DECODED = """() => Promise.all(
     bitmap.src = image.getAttribute("href");
     return bitmap.decode();
   })).then(() => true)"""
-"""That the images have their pixels: addresses they have before."""
+"""Whether the images are decoded; they have addresses earlier."""
 
 
 def saved(tab: Page, kind: str, folder: Path) -> Path:
-    """Save the view with the keyboard alone; return the file."""
+    """Save the view with only the keyboard; return the file."""
     tab.locator(".webmap-export-go").focus()
     tab.keyboard.press("Enter")
     expect(tab.locator(".webmap-export-svg")).to_be_focused()
@@ -75,7 +75,7 @@ def pixels(png: bytes) -> np.ndarray:
 
 
 def drawn_alone(chromium: Browser, file: Path, width: int, height: int) -> np.ndarray:
-    """Return what a browser shows of a file that it opens by itself, offline."""
+    """Return a screenshot of a file that a browser opens offline."""
     context = chromium.new_context(
         viewport={"width": width, "height": height}, offline=True
     )
@@ -87,7 +87,7 @@ def drawn_alone(chromium: Browser, file: Path, width: int, height: int) -> np.nd
 
 
 def differing(one: np.ndarray, other: np.ndarray) -> float:
-    """Return which part of the pixels differs by more than a shade."""
+    """Return the share of pixels whose colours clearly differ."""
     assert one.shape == other.shape
     return float((np.abs(one - other).max(axis=2) > 24).mean())
 
@@ -136,7 +136,7 @@ def test_the_exported_svg_has_no_external_references_and_no_scripts(tab, tmp_pat
     assert len(images) == 3
     assert "<b>Küche</b>" in [t.text for t in root.iter(f"{SVG}text")]
     assert tab.url.split("/")[2] not in text
-    # Where the page's fonts are not there, one of the same kind takes the same room.
+    # Without the page's fonts, a font of the same kind has about the same size.
     families = [e.get("font-family") for e in root.iter() if e.get("font-family")]
     assert families
     for family in families:
@@ -244,7 +244,7 @@ def test_the_export_button_of_the_console_saves_its_map(
         box = tab.locator("svg.webmap").bounding_box()
         page = pixels(tab.screenshot(clip=box))
         alone = drawn_alone(chromium, file, int(box["width"]), int(box["height"]))
-    # The scale is hidden on the page and in the picture.
+    # The scale is hidden on the page and in the file.
     assert differing(page[:-60], alone[:-60]) < 0.003
 
 

@@ -14,9 +14,9 @@ function near(one, other) {
 }
 
 test("the text of a goal shows its state and the progress of the robot", () => {
-  const told = { left: 3.24, eta: 75, recoveries: 2 };
+  const progress = { left: 3.24, eta: 75, recoveries: 2 };
   assert.equal(
-    look(goal("under way", told)).text,
+    look(goal("under way", progress)).text,
     "Navigating to goal, 3.2 m to go, about 75 s left, 2 recoveries",
   );
   assert.equal(look(goal("under way", { left: 12.3, eta: 150 })).text, "Navigating to goal, 12 m to go, about 3 min left");
@@ -37,7 +37,7 @@ test("an ended goal is hidden after a while, a failed goal stays", () => {
     shown.dismiss("r1");
     assert.equal(shown.shown(6000).size, 0);
     shown.report("r1", goal("sent", { id: "g2" }), 7000);
-    assert.equal(shown.shown(7000).size, 1, "the next one is shown");
+    assert.equal(shown.shown(7000).size, 1, "the next goal is shown");
   }
 });
 
@@ -49,7 +49,7 @@ test("a goal that already ended when the page opened is not shown", () => {
   shown.gone("r1");
   shown.dismiss("r1");
   shown.report("r1", goal("failed"), 2);
-  assert.equal(shown.shown(2).size, 0, "nor after the robot was gone");
+  assert.equal(shown.shown(2).size, 0, "not shown after the robot was gone either");
 });
 
 test("a goal that starts and ends between two reports is shown", () => {

@@ -8,7 +8,7 @@ const LINKLESS = "no connection to the bridge that takes goals";
 
 const pass = holdTimeouts();
 
-/** A gate that answers with these refusals, the last one again and again. */
+/** A gate that answers with these refusals and repeats the last one. */
 function gate(...answers) {
   const asked = { times: 0 };
   asked.offer = async () => {
@@ -22,7 +22,7 @@ test("a goal without a link is sent again until the gate accepts it", async () =
   const asked = gate(LINKLESS, LINKLESS, null);
   const sent = sendGoal(asked.offer, () => true);
   await settle();
-  assert.equal(asked.times, 1, "not before the wait is over");
+  assert.equal(asked.times, 1, "the goal is not sent again before the wait is over");
   await pass(2);
   assert.equal(await sent, true);
   assert.equal(asked.times, 3);

@@ -1,6 +1,6 @@
-"""Goals, routes and initial poses, from a real page through the real gate to robots.
+"""Goals, routes and initial poses go from a real page through the real gate to robots.
 
-The robots are simulated, of ROS 1 and of ROS 2, each behind a rosbridge of its own.
+The robots are simulated, in ROS 1 and ROS 2, each behind a rosbridge of its own.
 """
 
 import json
@@ -19,12 +19,12 @@ from real_browser import end_stops, watched_tab
 from webmap.cli.demo_simulator import simulator
 from webmap_process import page_of
 
-# Alone, as the gate takes no goal that is older than 0.3 s when it comes.
+# Serial, as the gate refuses a goal that arrives more than 0.3 s late.
 pytestmark = [pytest.mark.browser, pytest.mark.serial]
 
 HERE = Path(__file__).parents[1]
 OUTSIDE = (1180, 400)
-"""A place on the screen that is outside of the house."""
+"""A place on the screen outside of the house."""
 
 WORDS = (
     ".webmap-goal-word, .webmap-locate-word, "
@@ -39,7 +39,7 @@ PLACE = """name => {
 
 
 def open_floor(folder: Path) -> Path:
-    """Write a hall of 16 m with nothing in it, in map_server's form."""
+    """Write an empty hall of 16 m as a map file of map_server."""
     side = 320
     wall, inside = bytes(side), b"\0" + b"\xfe" * (side - 2) + b"\0"
     pixels = wall + inside * (side - 2) + wall
@@ -106,17 +106,17 @@ def press(tab: Page, x: float, y: float, *, drag: float = 0.0) -> None:
 
 
 def beside(tab: Page, name: str, dx: float = 16.0) -> tuple[float, float]:
-    """A place on the screen near a robot, which it soon reaches."""
+    """Return a place on the screen near a robot."""
     x, y = tab.evaluate(PLACE, name)
     middle = tab.viewport_size["width"] / 2
     return x + math.copysign(dx, middle - x), y
 
 
-def taken(tab: Page, act, said: Locator) -> None:
-    """Do something that the gate takes, and again where its way was too long.
+def repeat_until_accepted(tab: Page, act, status: Locator) -> None:
+    """Send a command, and send it again while it reaches the gate too late.
 
-    On a machine that is too busy a command may be older than the gate allows, and then
-    it is refused. Like a person, this tries again.
+    On a busy machine a command may be older than the gate allows, and is then refused.
+    A person would try again, too.
     """
     for _ in range(10):
         act()
@@ -130,20 +130,20 @@ def taken(tab: Page, act, said: Locator) -> None:
             arg=WORDS,
             timeout=20_000,
         )
-        if not TOO_LATE.search(said.inner_text()):
+        if not TOO_LATE.search(status.inner_text()):
             return
-    raise AssertionError(f"too slow again and again: {said.inner_text()}")
+    raise AssertionError(f"too slow ten times: {status.inner_text()}")
 
 
 def send(tab: Page, name: str, to: str = "") -> None:
-    """Send a robot beside another, or to where it soon is."""
+    """Send a robot to a place beside another robot, or to a place nearby."""
     pick(tab, name)
 
     def act():
         tab.keyboard.press("g")
         press(tab, *beside(tab, to or name, 45.0 if to else 16.0), drag=30)
 
-    taken(tab, act, tab.locator(".webmap-goal-word"))
+    repeat_until_accepted(tab, act, tab.locator(".webmap-goal-word"))
 
 
 def label(tab: Page):
@@ -197,12 +197,12 @@ def reset(tab: Page) -> None:
     standing = tab.locator(".webmap-stop-standing")
     expect(standing).to_contain_text(f"STOP active: {robots} robots")
     button = tab.locator(".webmap-stop .webmap-reset")
-    button.click(trial=True)  # a person could
+    button.click(trial=True)  # waits until a person could click
     end_stops(button)
 
 
 def send_elsewhere(bridge: str) -> None:
-    """Send the plain robot by its topic, as RViz does, to where it cannot get."""
+    """Send the plain robot to an unreachable place by its topic, as RViz does."""
     pose = {"position": {"x": 40.0, "y": 40.0}, "orientation": {"w": 1.0}}
     message = {"header": {"frame_id": "map"}, "pose": pose}
     topic = "/robot_1/move_base_simple/goal"
@@ -220,7 +220,7 @@ def test_a_goal_on_a_plain_topic_has_no_progress_and_is_drawn_once(tab, bridges)
     expect(
         tab.locator(".webmap-goal-arrow.way, .webmap-goal-arrow.sent")
     ).to_have_count(0)
-    # It has ended and is shown no more, and the topic has not told of another.
+    # The goal has ended and is hidden; the topic has published no other goal.
     label(tab).get_by_role("button", name="Hide this goal").click()
     expect(tab.locator(".webmap-goal-arrow")).to_have_count(0)
     expect(published).to_be_hidden()
@@ -235,24 +235,24 @@ WORLD = """([x, y]) => {
 
 
 @contextmanager
-def hearing(bridge: str, topic: str) -> Iterator[ClientConnection]:
-    """Hear what a robot is told on a topic, as the robot does."""
+def subscribed(bridge: str, topic: str) -> Iterator[ClientConnection]:
+    """Subscribe to a topic of a robot, as the robot does."""
     with connect(bridge, compression=None) as link:
         link.send(json.dumps({"op": "subscribe", "topic": topic}))
         yield link
 
 
 def test_an_initial_pose_is_sent_unless_the_robot_is_navigating(tab, bridges):
-    with hearing(bridges["ROS1"], "/robot_0/initialpose") as robot:
-        told_and_refused(tab, robot)
+    with subscribed(bridges["ROS1"], "/robot_0/initialpose") as robot:
+        check_poses_sent_and_refused(tab, robot)
 
 
-def told_and_refused(tab: Page, robot: ClientConnection) -> None:
-    word = tab.locator(".webmap-locate-word")
+def check_poses_sent_and_refused(tab: Page, robot: ClientConnection) -> None:
+    status = tab.locator(".webmap-locate-word")
     pick(tab, "Old 0")
     tab.keyboard.press("i")
-    expect(word).to_contain_text("Press where the robot is")
-    expect(word).to_contain_text("(± 1.0 m, ± 30°)")
+    expect(status).to_contain_text("Press where the robot is")
+    expect(status).to_contain_text("(± 1.0 m, ± 30°)")
     x, y = beside(tab, "Old 0", 5)
     tab.mouse.move(x, y)
     tab.mouse.down()
@@ -269,13 +269,13 @@ def told_and_refused(tab: Page, robot: ClientConnection) -> None:
     pressed = [(x, y)]
 
     def again():
-        if TOO_LATE.search(word.inner_text()):
+        if TOO_LATE.search(status.inner_text()):
             pressed.append(beside(tab, "Old 0", 5))
             tab.keyboard.press("i")
             press(tab, *pressed[-1], drag=30)
 
-    taken(tab, again, word)
-    expect(word).to_have_text("Pose sent.")
+    repeat_until_accepted(tab, again, status)
+    expect(status).to_have_text("Pose sent.")
     received = json.loads(robot.recv(timeout=10))["msg"]
     at, turn = (received["pose"]["pose"][part] for part in ("position", "orientation"))
     assert received["header"]["frame_id"] == "map"
@@ -289,7 +289,7 @@ def told_and_refused(tab: Page, robot: ClientConnection) -> None:
     expect(label(tab)).to_contain_text("Navigating to goal")
     tab.keyboard.press("i")
     press(tab, *beside(tab, "Old 0", 5), drag=30)
-    expect(word).to_have_text(
+    expect(status).to_have_text(
         "Pose not sent: the robot is navigating: cancel the goal first"
     )
     label(tab).get_by_role("button", name="Cancel goal").click()
@@ -312,7 +312,7 @@ def test_several_robots_get_goals_beside_each_other(tab):
             0, timeout=20_000
         )
 
-    taken(tab, act, tab.locator(".webmap-goal-word"))
+    repeat_until_accepted(tab, act, tab.locator(".webmap-goal-word"))
     under_way = tab.locator(".webmap-goal-arrow:not(.aimed, .asked)")
     expect(under_way).to_have_count(2)
     spots = [
@@ -336,7 +336,7 @@ def test_a_route_can_be_drawn_saved_run_skipped_paused_and_interrupted(tab):
     tab.locator(".webmap-route-edit").click()
     x, y = beside(tab, "New 1", 0)
     side = x - beside(tab, "New 1", 1.0)[0]
-    # So far from each other that a slow machine presses before the next one is reached.
+    # Far apart, so that also a slow machine presses before the next point is reached.
     for dx in (10, 65, 120):
         press(tab, x - dx * side, y, drag=20)
     expect(tab.locator(".webmap-route-point")).to_have_count(3)
@@ -344,24 +344,24 @@ def test_a_route_can_be_drawn_saved_run_skipped_paused_and_interrupted(tab):
     tab.locator(".webmap-route-name").fill("Round")
     tab.locator(".webmap-route-save").click()
     expect(tab.locator(".webmap-route-saved")).to_contain_text("Saved as Round.")
-    word = tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
-    taken(tab, tab.locator(".webmap-route-run").click, word)
+    status = tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
+    repeat_until_accepted(tab, tab.locator(".webmap-route-run").click, status)
     for _ in range(10):
-        expect(word).to_have_text(re.compile("point 2 of 3|^Halted"), timeout=15_000)
-        if not TOO_LATE.search(word.inner_text()):
+        expect(status).to_have_text(re.compile("point 2 of 3|^Halted"), timeout=15_000)
+        if not TOO_LATE.search(status.inner_text()):
             break
-        tab.locator(".webmap-route-pause").click()  # it says "Resume"
-    expect(word).to_have_text("New 1 is navigating to point 2 of 3.")
+        tab.locator(".webmap-route-pause").click()  # the button shows "Resume"
+    expect(status).to_have_text("New 1 is navigating to point 2 of 3.")
     tab.locator(".webmap-route-skip").click()
-    expect(word).to_have_text("New 1 is navigating to point 3 of 3.")
+    expect(status).to_have_text("New 1 is navigating to point 3 of 3.")
     tab.locator(".webmap-route-pause").click()
-    expect(word).to_have_text("Paused before point 3 of 3.")
+    expect(status).to_have_text("Paused before point 3 of 3.")
     tab.locator(".webmap-route-pause").click()
-    expect(word).to_have_text("New 1 is navigating to point 3 of 3.")
+    expect(status).to_have_text("New 1 is navigating to point 3 of 3.")
     tab.get_by_role("button", name="STOP ALL").click()
-    expect(word).to_contain_text("Interrupted before point 3 of 3")
+    expect(status).to_contain_text("Interrupted before point 3 of 3")
     reset(tab)
-    expect(word).to_contain_text("Interrupted before point 3 of 3")
+    expect(status).to_contain_text("Interrupted before point 3 of 3")
 
     tab.reload()
     tab.locator(".webmap-route > summary").click()
@@ -376,15 +376,15 @@ def test_a_route_can_be_drawn_saved_run_skipped_paused_and_interrupted(tab):
     tab.mouse.up()
     pick(tab, "New 1")
     tab.locator(".webmap-route-run").click()
-    expect(word).to_have_text(
+    expect(status).to_have_text(
         "Interrupted before point 1 of 1: the goal failed: no path to the goal."
     )
     tab.locator(".webmap-route-skip").click()
-    expect(word).to_have_text("Route of New 1 ended.")
+    expect(status).to_have_text("Route of New 1 ended.")
 
 
 def drawn_route(tab: Page) -> list[tuple[str, float]]:
-    """Return the number of each point that is drawn, and where it is across."""
+    """Return the number and the x on the screen of each drawn point."""
     return [
         (number, float(across))
         for number, across in tab.locator(".webmap-route-point").evaluate_all(
@@ -395,27 +395,27 @@ def drawn_route(tab: Page) -> list[tuple[str, float]]:
 
 
 def next_goal(tab: Page, robot: ClientConnection) -> float:
-    """Return x of the next goal that move_base hears, in metres."""
-    word = tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
+    """Return x of the next goal that move_base receives, in metres."""
+    status = tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
     for _ in range(30):
         try:
             message = json.loads(robot.recv(timeout=1))["msg"]
         except TimeoutError:
-            if word.get_attribute("data-state") == "halted":
-                assert TOO_LATE.search(word.inner_text()), word.inner_text()
-                tab.locator(".webmap-route-pause").click()  # it says "Resume"
+            if status.get_attribute("data-state") == "halted":
+                assert TOO_LATE.search(status.inner_text()), status.inner_text()
+                tab.locator(".webmap-route-pause").click()  # the button shows "Resume"
         else:
             return message["goal"]["target_pose"]["pose"]["position"]["x"]
-    raise AssertionError(f"no further goal: {word.inner_text()}")
+    raise AssertionError(f"no further goal: {status.inner_text()}")
 
 
 def test_a_reordered_route_with_a_loop_sends_its_goals_in_order(tab, bridges):
     pick(tab, "Old 0")
     tab.locator(".webmap-route > summary").click()
-    word = tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
+    status = tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
     loop = tab.locator(".webmap-route-loop")
     loop.click()
-    expect(word).to_have_text("A loop needs at least 2 points.")
+    expect(status).to_have_text("A loop needs at least 2 points.")
     tab.locator(".webmap-route-edit").click()
     x, y = beside(tab, "Old 0", 0)
     side = beside(tab, "Old 0", 1.0)[0] - x
@@ -423,7 +423,7 @@ def test_a_reordered_route_with_a_loop_sends_its_goals_in_order(tab, bridges):
     for across in (a, b, c):
         press(tab, across, y, drag=20 * side)
     tab.locator(".webmap-route-edit").click()
-    expect(word).to_have_text("")
+    expect(status).to_have_text("")
     first, second, third = (across for _, across in drawn_route(tab))
 
     tab.get_by_role("button", name="Move point 3 up").click()
@@ -432,13 +432,13 @@ def test_a_reordered_route_with_a_loop_sends_its_goals_in_order(tab, bridges):
     expect(tab.locator(".webmap-route-up").first).to_be_disabled()
     expect(loop).to_have_attribute("aria-pressed", "true")
     line = tab.locator(".webmap-route-line").get_attribute("points").split()
-    assert line[0] == line[-1], "the way back to the first point is drawn"
+    assert line[0] == line[-1], "the line back to the first point is drawn"
 
-    with hearing(bridges["ROS1"], "/robot_0/move_base/goal") as robot:
-        taken(tab, tab.locator(".webmap-route-run").click, word)
+    with subscribed(bridges["ROS1"], "/robot_0/move_base/goal") as robot:
+        repeat_until_accepted(tab, tab.locator(".webmap-route-run").click, status)
         there = [tab.evaluate(WORLD, [across, y])[0] for across in (a, c, b, a)]
         seen = [next_goal(tab, robot) for _ in there]
     assert seen == pytest.approx(there, abs=0.02)
-    expect(word).to_have_text("Old 0 is navigating to point 1 of 3, round 2.")
+    expect(status).to_have_text("Old 0 is navigating to point 1 of 3, round 2.")
     tab.locator(".webmap-route-end").click()
-    expect(word).to_have_text("Route of Old 0 ended.")
+    expect(status).to_have_text("Route of Old 0 ended.")

@@ -1,4 +1,4 @@
-"""The display's halves of the tools that send robots somewhere."""
+"""The display's part of the tools for goals and initial poses."""
 
 import asyncio
 import math
@@ -43,11 +43,11 @@ class TestGoalMark:
         ann, bob, cid = robots
         listener = map.add_module(GoalListener)
         map.toggle_marked(ann)
-        assert map.selected is ann, "the first one is selected"
+        assert map.selected is ann, "the first robot is selected"
         map.toggle_marked(bob)
         map.set_marked(cid, True)
         assert map.marked == [bob, cid]
-        assert map.selected is ann, "who is driven stays"
+        assert map.selected is ann, "a driven robot stays selected"
         map.toggle_marked(bob)
         assert map.marked == [cid]
         assert listener.received == ["mark"] * 3
@@ -113,23 +113,23 @@ class TestInitialPose:
         self, map, robot, monkeypatch
     ):
         map.add_robot(robot)
-        tool, said = map.add_module("InitialPoseTool"), []
+        tool, sent_messages = map.add_module("InitialPoseTool"), []
         bridge = Bridge("ws://127.0.0.1:9")
-        monkeypatch.setattr(tool.browser_part, "send", said.append)
+        monkeypatch.setattr(tool.browser_part, "send", sent_messages.append)
         tool.on_message({"covariance": robot.id})
         robot.set_initial_pose_topic(bridge, "/initialpose", covariance=(1, 4, 0.25))
         robot.set_alignment(3, 0, 90)
         tool.on_message({"covariance": robot.id})
         tool.on_message({"covariance": "r999"})
         tool.on_message({"covariance": None})
-        assert said.pop(1)["covariance"] == {
+        assert sent_messages.pop(1)["covariance"] == {
             "robot": robot.id,
             "x": 1,
             "y": 4,
             "yaw": 0.25,
             "turn": pytest.approx(math.pi / 2),
         }
-        assert said == [{"covariance": None}] * 3
+        assert sent_messages == [{"covariance": None}] * 3
 
     def test_a_key_is_one_character(self, map):
         with pytest.raises(ValueError, match="one character"):

@@ -1,4 +1,4 @@
-"""Labels on maps: shared, added on pages, kept on the disk."""
+"""Labels on maps: shared, added on pages, saved on disk."""
 
 import asyncio
 import json
@@ -21,7 +21,7 @@ def state(tmp_path, monkeypatch):
 
 @pytest.fixture
 def said(monkeypatch):
-    """What modules send to their halves."""
+    """The messages of modules to their browser parts."""
     sent = []
     monkeypatch.setattr(
         "webmap.core.world_view.BrowserPart.send",

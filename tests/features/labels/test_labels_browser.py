@@ -1,4 +1,4 @@
-"""Labels in a real browser: upright, added, kept, and a place to send a robot to."""
+"""Labels in a real browser: upright, added, saved, and used as goals."""
 
 import math
 import re
@@ -16,7 +16,7 @@ from webmap_process import page_of, simulator, webmap
 
 pytestmark = pytest.mark.browser
 
-"""Why the gate takes no goal from a busy machine; a person presses once more."""
+"""Why the gate refuses a goal from a busy machine; a person presses again."""
 
 FLEET = """\
 [bridges]
@@ -58,7 +58,7 @@ def state(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def serve(bridge, state, tmp_path_factory):
-    """Start the console; another one has the same state."""
+    """Start the console; a second console uses the same state."""
     file = tmp_path_factory.mktemp("fleet") / "fleet.toml"
     file.write_text(FLEET.format(url=bridge))
     running = ExitStack()
@@ -87,7 +87,7 @@ def opened(tab: Page, url: str) -> None:
     expect(tab.locator(".occupancy-grid image")).to_have_attribute(
         "href", re.compile(".")
     )
-    # Hands move the view and press labels from now on.
+    # From here on the test moves the view and presses labels.
     tab.locator("svg.webmap-view-control").wait_for()
     expect(tab.locator(".webmap-labels-go")).to_be_visible()
     tab.locator("#show-all").click()
@@ -98,7 +98,7 @@ def label(tab: Page, name: str):
 
 
 def turn_and_size(tab: Page, name: str) -> tuple[float, float]:
-    """How far a label is turned on the screen, in radians, and how large it is."""
+    """Return the angle of a label on the screen, in radians, and its size."""
     a, b, c, d = (
         label(tab, name)
         .locator(".upright")
@@ -148,12 +148,12 @@ def test_an_overlapping_name_is_hidden_until_the_pointer_is_on_its_label(tab):
     expect(label(tab, "Äpfel <b>")).not_to_have_class(re.compile("crowded"))
     expect(beside.locator(".name")).to_be_hidden()
     x, y = place(tab, 3.1, 2.1)
-    tab.mouse.move(x + 9, y - 9)  # of the two spots only this one is there
+    tab.mouse.move(x + 9, y - 9)  # only this spot belongs to one label
     expect(beside.locator(".name")).to_be_visible()
 
 
 def place(tab: Page, x: float, y: float) -> tuple[float, float]:
-    """Where a place of the world is in the window."""
+    """Return where a place of the world is in the window."""
     return tab.locator("svg.webmap .world").evaluate(
         "(e, [x, y]) => { const m = e.getScreenCTM();"
         " return [m.a * x + m.c * y + m.e, m.b * x + m.d * y + m.f]; }",
@@ -219,7 +219,7 @@ def test_labels_added_in_the_demo_persist_after_a_restart(chromium, tmp_path):
 
 
 def moved(tab: Page, wall) -> None:
-    """Drag a label, then move it by keys, and see that only Save keeps that."""
+    """Drag a label, move it by keys, and check that only Save keeps the place."""
 
     def where() -> tuple[float, float]:
         return tuple(
@@ -248,7 +248,7 @@ def moved(tab: Page, wall) -> None:
         expect(keep).to_be_hidden()
         assert where() == pytest.approx(before if ending == "cancel" else there)
     assert tab.evaluate("document.querySelector('.world').getCTM().e") == seen
-    # What the disk has is what a page that opens now shows.
+    # A new page shows the saved labels.
     tab.reload()
     expect(tab.locator("#link")).to_have_attribute("data-link", "open")
     expect(tab.locator(".webmap-labels-go")).to_be_visible()
@@ -269,14 +269,14 @@ def test_a_label_can_send_the_selected_robot_to_its_position(chromium, serve, br
         expect(send).to_be_disabled()
         tab.locator("#robots .row").click()
         expect(send).to_have_text("Send goal here")
-        word = tab.locator(".webmap-labels-word")
+        status = tab.locator(".webmap-labels-word")
         for _ in range(10):
             send.click()
-            expect(word).to_have_text(re.compile("^Goal sent to|^Goal not sent"))
-            if not TOO_LATE.search(word.inner_text()):
+            expect(status).to_have_text(re.compile("^Goal sent to|^Goal not sent"))
+            if not TOO_LATE.search(status.inner_text()):
                 break
-            label(tab, "Äpfel <b>").press("Enter")  # which takes the words away
-        expect(word).to_have_text("Goal sent to Äpfel <b>.")
+            label(tab, "Äpfel <b>").press("Enter")  # this removes the text
+        expect(status).to_have_text("Goal sent to Äpfel <b>.")
         expect(tab.locator(".robot.selected")).to_have_count(1)
         deadline = time.monotonic() + 10
         while not node.received and time.monotonic() < deadline:

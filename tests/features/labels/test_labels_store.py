@@ -1,4 +1,4 @@
-"""Places with a name: what is taken, and how they are kept."""
+"""Places with a name: which are valid, and how they are saved."""
 
 import json
 import os

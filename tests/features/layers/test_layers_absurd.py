@@ -1,4 +1,4 @@
-"""Numbers that are finite and absurd: refused in words, before a browser sees them."""
+"""Finite but absurd numbers are refused with a reason and never sent to a browser."""
 
 import warnings
 
@@ -43,7 +43,7 @@ X, Y = ({"name": n, "offset": 0, "datatype": 7, "count": 1} for n in "xy")
 
 
 def high(z: float) -> dict:
-    """A pose at a height."""
+    """Return a pose with a height."""
     at = pose(0, 0)
     return {
         "header": header(),
@@ -52,7 +52,7 @@ def high(z: float) -> dict:
 
 
 @pytest.mark.parametrize(
-    ("module", "message", "said"),
+    ("module", "message", "expected"),
     [
         ("Path", path([(0, 0), (FAR, 1)]), "got (1e+300, 1) as point 1 of 2"),
         (
@@ -125,16 +125,16 @@ def high(z: float) -> dict:
     ],
 )
 def test_robot_messages_with_absurdly_large_values_are_refused(
-    link, robot, module, message, said
+    link, robot, module, message, expected
 ):
     robot.add_module(module, link, "/topic")
-    link.say("/topic", message)
+    link.publish("/topic", message)
     (problem,) = robot.problems.values()
-    assert said in problem
+    assert expected in problem
 
 
 @pytest.mark.parametrize(
-    ("message", "said"),
+    ("message", "expected"),
     [
         (marker(CUBE, at=(FAR, 0, 0)), "a pose must be within 1e+07 m"),
         (marker(SPHERES, [(0, 0)], at=(FAR, 0, 0)), "a pose must be within 1e+07 m"),
@@ -158,17 +158,17 @@ def test_robot_messages_with_absurdly_large_values_are_refused(
     ],
 )
 def test_markers_with_absurdly_large_values_are_refused(
-    map, link, channel, message, said
+    map, link, channel, message, expected
 ):
     layer = map.add_module("Markers", link, "/markers").layer
-    link.say("/markers", {"markers": [message]})
+    link.publish("/markers", {"markers": [message]})
     assert not layer.svg.children
     (error,) = channel.errors
-    assert said in error
+    assert expected in error
 
 
 @pytest.mark.parametrize(
-    ("message", "said"),
+    ("message", "expected"),
     [
         (grid(CORNERS, 1e308), "sides of at most 1e+07 m, got 3 x 2 cells of 1e+"),
         (grid(CORNERS, 3.4e6), "3 x 2 cells of 3.4e+06 m"),
@@ -176,12 +176,12 @@ def test_markers_with_absurdly_large_values_are_refused(
     ],
 )
 def test_a_grid_with_absurdly_large_values_is_refused(
-    map, link, channel, message, said
+    map, link, channel, message, expected
 ):
     map.add_module("OccupancyGrid", link, "/map")
-    link.say("/map", message)
+    link.publish("/map", message)
     (error,) = channel.errors
-    assert said in error
+    assert expected in error
 
 
 @pytest.mark.parametrize("low", [-1e39, 0.1])
@@ -197,11 +197,11 @@ def test_poses_with_zero_quaternions_are_left_out_of_a_pose_array(link, robot):
     module = robot.add_module("PoseArray", link, "/particles")
     nowhere = {**pose(1, 2), "orientation": ZEROS}
     poses = [pose(3, 4), nowhere, pose(5, 6), nowhere]
-    link.say("/particles", {"header": header(), "poses": poses})
+    link.publish("/particles", {"header": header(), "poses": poses})
     assert [(each.x, each.y) for each in module.poses] == [(3, 4), (5, 6)]
     (problem,) = robot.problems.values()
     assert "2 of 4 poses have a quaternion of zeros" in problem
-    link.say("/particles", {"header": header(), "poses": poses[:1]})
+    link.publish("/particles", {"header": header(), "poses": poses[:1]})
     assert not robot.problems
 
 
@@ -211,7 +211,7 @@ def test_a_tilted_marker_with_an_absurd_height_is_refused(map, link, channel):
     for number, type in enumerate((CUBE, SPHERE, CUBES, SPHERES)):
         turned = {**pose(0, 0), "orientation": on_its_side}
         tall = marker(type, [(0, 0)], pose=turned, scale=(1, 1, FAR), id=number)
-        link.say("/markers", {"markers": [tall]})
+        link.publish("/markers", {"markers": [tall]})
         (problem,) = layer.problems.values()
         assert f"marker {number} of 'test': scale.z must be at most 1e+07 m" in problem
     assert not layer.svg.children
@@ -219,9 +219,9 @@ def test_a_tilted_marker_with_an_absurd_height_is_refused(map, link, channel):
 
 def test_a_fix_with_an_absurd_deviation_is_drawn_without_its_circle(link, robot):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
-    link.say("/fix", fix(50.0, 14.0, spread=[4.0, 0, 0, 0, 4.0, 0, 0, 0, 9.0]))
+    link.publish("/fix", fix(50.0, 14.0, spread=[4.0, 0, 0, 0, 4.0, 0, 0, 0, 9.0]))
     assert float(module.covariance.get("r")) == 2.0
-    link.say("/fix", fix(50.001, 14.0, spread=[FAR, 0, 0, 0, 4.0, 0, 0, 0, 9.0]))
+    link.publish("/fix", fix(50.001, 14.0, spread=[FAR, 0, 0, 0, 4.0, 0, 0, 0, 9.0]))
     assert float(module.covariance.get("r")) == 0.0
     assert module.position == pytest.approx((0, 111.229), abs=0.01)
     (problem,) = robot.problems.values()
@@ -229,23 +229,23 @@ def test_a_fix_with_an_absurd_deviation_is_drawn_without_its_circle(link, robot)
         "the standard deviation of a fix must be at most 1e+07 m, got 1e+150 m; its"
         in problem
     )
-    link.say("/fix", fix(50.001, 14.0))
+    link.publish("/fix", fix(50.001, 14.0))
     assert not robot.problems
 
 
 def test_a_sonar_with_a_huge_max_range_is_accepted(link, robot):
     module = robot.add_module("Range", link, "/sonar")
-    link.say("/sonar", sonar(1.5, high=3.4e38))
+    link.publish("/sonar", sonar(1.5, high=3.4e38))
     assert module.distance == 1.5
     assert not robot.problems
 
 
 def test_a_refused_path_keeps_the_last_path(link, robot):
     module = robot.add_module("Path", link, "/plan")
-    link.say("/plan", path([(0, 0), (1, 0)]))
-    link.say("/plan", path([(0, 0), (5, 0)]) | {"header": ENDLESS})
+    link.publish("/plan", path([(0, 0), (1, 0)]))
+    link.publish("/plan", path([(0, 0), (5, 0)]) | {"header": ENDLESS})
     assert module.length == 1.0
-    link.say("/plan", path([]) | {"poses": [high(0), high(FAR)]})
+    link.publish("/plan", path([]) | {"poses": [high(0), high(FAR)]})
     assert module.length == 1.0
 
 
@@ -259,7 +259,7 @@ def test_points_with_absurd_intensities_are_drawn_in_the_outermost_colours(
     points = [[at, 0, 0, value] for at, value in enumerate((-1.7e308, 0.0, 1.7e308))]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        link.say("/points", cloud(points, dtype="<f8"))
+        link.publish("/points", cloud(points, dtype="<f8"))
     counts = [len(band._dots.points) // 4 for band in module.dots]
     assert counts == ([2, 0, 0, 0, 0, 0, 0, 1] if limits else [3, *[0] * 7])
     assert not robot.problems

@@ -1,4 +1,4 @@
-"""Robots whose maps are not the common one."""
+"""Robots whose maps differ from the common map."""
 
 import math
 
@@ -33,7 +33,7 @@ def bob(link):
 
 
 def go(link, x, y, yaw=0.0, seconds=100.0) -> None:
-    link.say("/odom", {"header": header(seconds), "pose": pose(x, y, yaw)})
+    link.publish("/odom", {"header": header(seconds), "pose": pose(x, y, yaw)})
 
 
 def where(robot):
@@ -55,7 +55,7 @@ def test_a_new_alignment_moves_the_robot_at_once(link, bob):
     bob.set_alignment(0.0, 1.0, 0.0)
     assert where(bob) == (2.0, 1.0, 0.0)
     assert len(moved) == 1
-    assert bob.problems == {}, "that is no jump of the robot's"
+    assert bob.problems == {}, "an alignment is no jump of the robot"
     bob.unset_alignment()
     assert where(bob) == (2.0, 0.0, 0.0)
 
@@ -74,7 +74,7 @@ def test_a_bridge_alignment_moves_all_robots_without_their_own_alignment(link, b
     ann.set_alignment(0.0, 0.0, 0.0)
     align_bridge(link, 3.0, 0.0, 0.0)
     go(link, 1.0, 0.0)
-    link.say("/ann/odom", {"header": header(), "pose": pose(1.0, 0.0)})
+    link.publish("/ann/odom", {"header": header(), "pose": pose(1.0, 0.0)})
     assert where(bob) == (4.0, 0.0, 0.0)
     assert where(ann) == (1.0, 0.0, 0.0)
     align_bridge(link, 5.0, 0.0, 0.0)
@@ -99,10 +99,10 @@ def test_the_path_and_the_sonar_cone_are_aligned_with_the_robot(link, bob):
     bob.set_alignment(10.0, 0.0, 90.0)
     go(link, 2.0, 0.0)
     points = [{"header": header(), "pose": pose(x, 0.0)} for x in (2.0, 4.0)]
-    link.say("/plan", {"header": header(), "poses": points})
+    link.publish("/plan", {"header": header(), "poses": points})
     sonar = {"radiation_type": 0, "field_of_view": 0.5, "range": 1.0}
     limits = {"min_range": 0.1, "max_range": 5.0}
-    link.say("/sonar", {"header": header(), **sonar, **limits})
+    link.publish("/sonar", {"header": header(), **sonar, **limits})
     assert to_root(way.line).apply(4.0, 0.0) == pytest.approx((10.0, 4.0))
     assert to_root(cone.cone).apply(1.0, 0.0) == pytest.approx((10.0, 3.0))
     bob.set_alignment(0.0, 0.0, 0.0)
@@ -151,7 +151,7 @@ def test_a_costmap_in_the_odometry_frame_is_aligned_with_its_robot(map, link, bo
     bob.add_module("OnMaps", "OccupancyGrid", link, "/bob/costmap", map_frame="map")
     bob.set_alignment(10.0, 0.0, 90.0)
     (layer,) = (m.layer for m in map.modules if hasattr(m, "layer"))
-    link.say("/bob/costmap", {**grid(CORNERS, 1.0), "header": header(frame="odom")})
+    link.publish("/bob/costmap", {**grid(CORNERS, 1.0), "header": header(frame="odom")})
     send_transforms(link, transform("map", "odom", 3.0, 0.0, 0.0))
     assert to_root(layer.svg).apply(1.0, 0.0) == pytest.approx((10.0, 4.0))
 

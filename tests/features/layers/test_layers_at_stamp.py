@@ -1,4 +1,4 @@
-"""What a robot's sensors saw stays where the robot was when they saw it."""
+"""Sensor data is drawn where the robot was when the sensor measured."""
 
 import math
 
@@ -11,10 +11,10 @@ from test_layers_poses import sonar
 
 from webmap.base.geometry import Affine
 
-# A robot that turns on the spot at (4, 3), by 1 rad/s from 100.0 s on.
+# A robot that turns on the spot at (4, 3) with 1 rad/s, from 100.0 s on.
 AT = (4.0, 3.0)
 WALL = [(2.0, 0.0), (2.0, 0.5), (1.0, -1.0)]
-"""What the sensor sees, in its own frame, when the robot looks along x."""
+"""The points of the sensor, in its own frame, when the robot looks along x."""
 
 
 def stamp(seconds: float) -> dict:
@@ -34,13 +34,13 @@ def transform(parent, child, x, y, yaw, seconds, *, roll=0.0) -> dict:
 
 
 def odometry(link, seconds, frame="odom") -> None:
-    """Say where the robot is at a time, by a pose."""
+    """Publish the pose of the robot at a time."""
     header = {"stamp": stamp(seconds), "frame_id": frame}
-    link.say("/odom", {"header": header, "pose": pose(*AT, seconds - 100.0)})
+    link.publish("/odom", {"header": header, "pose": pose(*AT, seconds - 100.0)})
 
 
 def scan(points, seconds, frame="laser", *, increment=0.0) -> dict:
-    """A scan with one ray for each point, at a degree of its own."""
+    """Return a scan with one ray for each point, at an angle in whole degrees."""
     rays: list[float | None] = [None] * 360
     for x, y in points:
         rays[round(math.degrees(math.atan2(y, x)) * 1) % 360] = math.hypot(x, y)
@@ -59,7 +59,7 @@ def scan(points, seconds, frame="laser", *, increment=0.0) -> dict:
 
 
 def seen_from(yaw, offset=(0.0, 0.0), *, points=WALL):
-    """Where on the map a sensor has the points, with the robot turned so."""
+    """Return the sensor's points on the map, with the robot turned by an angle."""
     matrix = Affine.translation(*AT) @ Affine.rotation(yaw)
     return sorted(matrix.apply(x + offset[0], y + offset[1]) for x, y in points)
 
@@ -92,7 +92,7 @@ def dot_of(scanner):
 def test_a_scan_stays_in_place_while_the_robot_turns(link, scanner, robot):
     for seconds in (100.0, 100.1):
         odometry(link, seconds)
-    link.say("/scan", scan(WALL, 100.05))
+    link.publish("/scan", scan(WALL, 100.05))
     for seconds in (100.2, 100.5, 101.0):
         odometry(link, seconds)
         assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.05)), seconds
@@ -103,18 +103,18 @@ def test_a_scan_stays_in_place_while_the_robot_turns(link, scanner, robot):
 def test_a_scan_newer_than_the_poses_is_corrected_when_poses_arrive(link, scanner):
     for seconds in (100.0, 100.1):
         odometry(link, seconds)
-    link.say("/scan", scan(WALL, 100.25))
-    # As if the robot turned on evenly.
+    link.publish("/scan", scan(WALL, 100.25))
+    # As if the robot kept turning at the same speed.
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.25))
     header = {"stamp": stamp(100.3), "frame_id": "odom"}
-    link.say("/odom", {"header": header, "pose": pose(*AT, 0.0)})
-    # It turned back in fact: between 0.1 at 100.1 and 0.0 at 100.3.
+    link.publish("/odom", {"header": header, "pose": pose(*AT, 0.0)})
+    # In fact the robot turned back: from 0.1 at 100.1 to 0.0 at 100.3.
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.025))
 
 
 def test_a_scan_without_a_stamp_moves_with_the_robot(link, scanner):
     odometry(link, 100.0)
-    link.say("/scan", scan(WALL, 0.0))
+    link.publish("/scan", scan(WALL, 0.0))
     odometry(link, 101.0)
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(1.0))
 
@@ -128,14 +128,14 @@ def test_a_scan_of_another_clock_moves_with_the_robot_and_is_a_problem(
     )
     odometry(link, 100.0)
     odometry(link, 100.1)
-    link.say("/scan", scan(WALL, 163.0))
+    link.publish("/scan", scan(WALL, 163.0))
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.1))
     odometry(link, 100.2)
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.2))
     (problem,) = robot.problems.values()
     assert "are the clocks of the sensor and of the odometry the same?" in problem
     assert "62.900 s before the requested" in problem
-    link.say("/scan", scan(WALL, 100.15))
+    link.publish("/scan", scan(WALL, 100.15))
     assert robot.problems == {}
 
 
@@ -143,7 +143,7 @@ def test_without_frames_stamps_less_than_a_minute_off_are_no_problem(
     link, scanner, robot
 ):
     odometry(link, 100.0)
-    link.say("/scan", scan(WALL, 159.0))
+    link.publish("/scan", scan(WALL, 159.0))
     odometry(link, 100.2)
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.2))
     assert robot.problems == {}
@@ -153,7 +153,7 @@ def test_without_frames_stamps_more_than_a_minute_off_are_a_problem(
     link, scanner, robot
 ):
     odometry(link, 100.0)
-    link.say("/scan", scan(WALL, 163.0))
+    link.publish("/scan", scan(WALL, 163.0))
     (problem,) = robot.problems.values()
     assert "63.000 s before the requested 163.000 s; are the clocks" in problem
 
@@ -161,7 +161,7 @@ def test_without_frames_stamps_more_than_a_minute_off_are_a_problem(
 def test_a_scan_of_a_robot_without_new_poses_is_no_problem(link, scanner, robot):
     odometry(link, 100.0)
     robot.pose_source.received_at -= 90.0
-    link.say("/scan", scan(WALL, 190.0))
+    link.publish("/scan", scan(WALL, 190.0))
     assert np.array(on_map(dot_of(scanner))) == near(seen_from(0.0))
     assert robot.problems == {}
 
@@ -175,8 +175,8 @@ def test_a_scan_is_corrected_for_the_rotation_during_its_sweep(link, scanner):
         x, y = 2 * math.cos(math.radians(degrees)), 2 * math.sin(math.radians(degrees))
         wall.append((x, y))
         assert turned < took
-    # Seen in the sensor's frame as it is when each ray is sent.
-    link.say("/scan", scan(wall, 100.05, increment=took / 360))
+    # The points are in the sensor's frame at the time of each ray.
+    link.publish("/scan", scan(wall, 100.05, increment=took / 360))
     turned = [
         Affine.rotation(took * degrees / 360).apply(*point)
         for degrees, point in zip((10, 120, 230, 350), wall, strict=True)
@@ -198,7 +198,7 @@ def test_static_frames_place_a_sensor_on_a_turning_robot(link, scanner, robot, n
         send_transforms(link, transform("map", "odom", 0, 0, 0, 100 + yaw))
         send_transforms(link, transform("odom", "base_link", *AT, yaw, 100 + yaw))
         odometry(link, 100 + yaw)
-    link.say("/scan", scan([(2.0, 0.0)], 100.15))
+    link.publish("/scan", scan([(2.0, 0.0)], 100.15))
     for seconds in (100.3, 101.0):
         odometry(link, seconds)
         assert np.array(on_map(dot_of(scanner))) == near(
@@ -216,7 +216,7 @@ def test_a_scan_of_an_upside_down_sensor_is_mirrored(link, scanner, robot):
             link, transform("odom", "base_link", *AT, seconds - 100, seconds)
         )
         odometry(link, seconds)
-    link.say("/scan", scan([(2.0, 0.5), (1.0, -1.0)], 100.1))
+    link.publish("/scan", scan([(2.0, 0.5), (1.0, -1.0)], 100.1))
     wanted = seen_from(0.1, (0.2, 0.0), points=[(2.0, -0.5), (1.0, 1.0)])
     odometry(link, 100.6)
     assert np.array(on_map(dot_of(scanner))) == near(wanted)
@@ -231,7 +231,7 @@ def test_a_configured_sensor_position_overrides_the_frames_for_a_scan(link, robo
     )
     for seconds in (100.0, 100.1):
         odometry(link, seconds, "map")
-    link.say("/scan", scan([(1.0, 0.0)], 100.05))
+    link.publish("/scan", scan([(1.0, 0.0)], 100.05))
     odometry(link, 101.0, "map")
     (found,) = on_map(dot_of(scanner))
     (wanted,) = seen_from(0.05, points=[(-0.7, 0.0)])
@@ -245,8 +245,8 @@ def test_clouds_and_sonar_cones_stay_where_they_were_measured(link, robot):
     for seconds in (100.0, 100.1):
         odometry(link, seconds)
     header = {"stamp": stamp(100.05), "frame_id": "sensor"}
-    link.say("/sonar", {**sonar(1.0), "header": header})
-    link.say("/points", {**cloud([[2.0, 0.0, 0.0]]), "header": header})
+    link.publish("/sonar", {**sonar(1.0), "header": header})
+    link.publish("/points", {**cloud([[2.0, 0.0, 0.0]]), "header": header})
     odometry(link, 101.0)
     tip, point = seen_from(0.05, points=[(1.0, 0.0)])[0], on_map(points.dots[0])[0]
     assert to_root(cone.cone).apply(1.0, 0.0) == pytest.approx(tip, abs=1e-6)
@@ -256,7 +256,7 @@ def test_clouds_and_sonar_cones_stay_where_they_were_measured(link, robot):
 
 def test_a_removed_module_has_no_listener_on_the_robot(link, scanner, robot):
     odometry(link, 100.0)
-    link.say("/scan", scan(WALL, 100.2))
+    link.publish("/scan", scan(WALL, 100.2))
     robot.remove_module(scanner)
     assert robot.pose_source._listeners == {}
     odometry(link, 100.3)

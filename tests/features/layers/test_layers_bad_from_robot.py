@@ -1,8 +1,8 @@
-"""What broken robots send, over a real socket: said once, and nothing else disturbed.
+"""Bad messages of robots, over a real socket: reported once, without other effects.
 
-Two robots are on one page, each behind a rosbridge of its own. One of them sends
-something bad on one of its topics; what was drawn stays, the other robot and the other
-topics go on, and so does the topic itself as soon as it makes sense again.
+Two robots are on one page, each behind a rosbridge of its own. One of them sends a bad
+message on one of its topics. The drawing stays, the other robot and the other topics
+still work, and the topic itself works again after its next valid message.
 """
 
 import asyncio
@@ -32,7 +32,7 @@ async def until(condition):
 
 
 class Server:
-    """A rosbridge that sends the frames that it is given, and nothing else."""
+    """A rosbridge that sends only the frames of the test."""
 
     def __init__(self) -> None:
         self.links, self.asked = set(), set()
@@ -145,7 +145,7 @@ WHOLE = publish("/map", grid(50))
 TEN_MILLION = scan(1.0, ranges=typed(85, np.full(10_000_000, 2, "<f4")))
 ONE_MILLION = scan(1.0, ranges=typed(85, np.full(1_000_000, 2, "<f4")))
 
-SAID = {
+REFUSED = {
     "a frame that was cut": (
         "/map",
         WHOLE[: len(WHOLE) - 30],
@@ -232,15 +232,15 @@ SAID = {
         "a time has -1 nanoseconds; expected 0 to 999999999",
     ),
 }
-"""What is refused: its topic, the frame or the message, and what is said."""
+"""What is refused: the topic, the frame or the message, and the notice."""
 
-TAKEN = {
+DRAWN = {
     "a bare NaN": ("/scan", publish("/scan", scan(math.nan)), 4),
     "a bare infinity": ("/scan", publish("/scan", scan(-math.inf)), 4),
     "one ray with no increment": ("/scan", scan(1, ranges=[2.0], angle_increment=0), 1),
     "a stamp of zero": ("/scan", scan(1, header=header() | {"stamp": {}}), 5),
 }
-"""What looks odd and is drawn: how many dots."""
+"""Unusual scans that are drawn: the number of dots."""
 
 DOUBTED = {
     "no ranges": (scan(1, ranges=[]), 0, "its scans have no ranges"),
@@ -250,11 +250,11 @@ DOUBTED = {
         "none of its 5 ranges is a nu",
     ),
 }
-"""What is drawn as far as it goes: how many dots, and what is said."""
+"""Scans that are drawn in part: the number of dots, and the notice."""
 
 
 def look(element) -> tuple:
-    """All of an element that people see, its age left out."""
+    """Return everything that users see of an element, without its age."""
     attributes = {k: v for k, v in element.attributes.items() if k != "data-age"}
     drawn = getattr(element, "_dots", None)
     parts = tuple(look(child) for child in element.children)
@@ -262,7 +262,7 @@ def look(element) -> tuple:
 
 
 class Scene:
-    """A page with two robots, of which the first will send something bad."""
+    """A page with two robots; the first robot will send bad messages."""
 
     def __init__(self, map, channel) -> None:
         self.map, self.errors = map, channel.errors
@@ -271,10 +271,10 @@ class Scene:
 
     async def start(self, stack: AsyncExitStack) -> None:
         self.bridges = [await server.start(stack) for server in self.servers]
-        self.said = []
+        self.bridge_errors = []
         self.grids = []
         for robot, bridge in zip(self.robots, self.bridges, strict=True):
-            bridge.on_error(lambda error: self.said.append(str(error)))
+            bridge.on_error(lambda error: self.bridge_errors.append(str(error)))
             robot.set_odometry_topic(bridge, "/odom", type="nav_msgs/Odometry")
             scanner = {"max_dots": None, "throttle": 0}
             robot.add_module("LaserScanner", bridge, "/scan", **scanner)
@@ -293,7 +293,7 @@ class Scene:
             robot.destroy()
 
     def state(self, number: int) -> dict[str, tuple]:
-        """What is drawn of each topic of a robot."""
+        """Return what is drawn of each topic of a robot."""
         robot = self.robots[number]
         by = {type(module).__name__: module for module in robot.modules}
         at = robot.position
@@ -305,7 +305,7 @@ class Scene:
             "/plan": by["Path"].points,
         }
 
-    async def say_good(self, number: int, x: float) -> dict[str, tuple]:
+    async def send_good(self, number: int, x: float) -> dict[str, tuple]:
         """Send good messages on every topic, and wait until all of them are drawn."""
         before = self.state(number)
         for topic, make in GOOD.items():
@@ -335,31 +335,33 @@ def with_scene(map, channel, scenario) -> None:
     asyncio.run(run())
 
 
-@pytest.mark.parametrize("name", SAID)
+@pytest.mark.parametrize("name", REFUSED)
 def test_invalid_data_gives_one_notice_and_affects_nothing_else(map, channel, name):
-    topic, what, said = SAID[name]
+    topic, what, expected = REFUSED[name]
 
     async def scenario(scene: Scene) -> None:
-        mine = await scene.say_good(0, 1.0)
-        theirs = await scene.say_good(1, 1.0)
+        mine = await scene.send_good(0, 1.0)
+        theirs = await scene.send_good(1, 1.0)
         assert scene.errors == []
         frame = frame_of(topic, what)
         for _ in range(3):
             await scene.servers[0].send(frame)
-        lines = lambda: [*scene.errors, *scene.said]  # noqa: E731
-        await until(lambda: any(said in line for line in lines()))
-        assert scene.state(0) == mine, "what was drawn stays"
+        lines = lambda: [*scene.errors, *scene.bridge_errors]  # noqa: E731
+        await until(lambda: any(expected in line for line in lines()))
+        assert scene.state(0) == mine, "the drawing stays"
         assert scene.state(1) == theirs
-        await scene.say_good(1, 2.0)
-        after = await scene.say_good(0, 2.0)
-        assert all(after[t] != mine[t] for t in GOOD), "all goes on, the link too"
-        for received in (scene.errors, scene.said):
-            found = [line for line in received if said in line]
-            assert len(found) == len(received) <= 1, "three times the same is said once"
+        await scene.send_good(1, 2.0)
+        after = await scene.send_good(0, 2.0)
+        assert all(after[t] != mine[t] for t in GOOD), (
+            "all topics still work, and the link"
+        )
+        for received in (scene.errors, scene.bridge_errors):
+            found = [line for line in received if expected in line]
+            assert len(found) == len(received) <= 1, "three equal notices are one"
         (line,) = scene.errors
-        assert (topic or "sent ") in line, "people read where it came from"
+        assert (topic or "sent ") in line, "the notice names its source"
         assert "Ann" not in line
-        assert channel.problems == {}, "and it is taken back"
+        assert channel.problems == {}, "the problem is cleared"
 
     with_scene(map, channel, scenario)
 
@@ -374,12 +376,12 @@ AILING = {
 def test_repeated_nan_messages_give_one_notice_until_the_data_is_valid(
     map, channel, caplog, monkeypatch
 ):
-    """The words have other numbers in them each time."""
-    # Else the log has a line more where three seconds pass between two poses.
+    """The text has other numbers each time."""
+    # Otherwise a pause of three seconds between two poses adds a log line.
     monkeypatch.setattr("webmap.poses.silence.LIMIT", 60.0)
 
     async def scenario(scene: Scene) -> None:
-        await scene.say_good(0, 1.0)
+        await scene.send_good(0, 1.0)
         robot, layer = scene.robots[0], scene.grids[0]
         standing = lambda: [*robot.problems.values(), *layer.problems.values()]  # noqa: E731
         caplog.clear()
@@ -388,17 +390,17 @@ def test_repeated_nan_messages_give_one_notice_until_the_data_is_valid(
                 await scene.servers[0].send(publish(topic, make(number)))
         newest = {"0.767", "21.83", "2.95"}
         await until(lambda: all(n in str(standing()) for n in newest))
-        assert len(standing()) == 3, "a card shows the newest"
+        assert len(standing()) == 3, "a card shows the newest problems"
         assert len(scene.errors) == 3
         assert sorted(channel.problems.values()) == sorted(scene.errors)
         assert len(warnings(caplog)) == 3
-        await scene.say_good(0, 2.0)
+        await scene.send_good(0, 2.0)
         assert standing() == []
-        assert channel.problems == {}, "no page shows any of them"
+        assert channel.problems == {}, "no page shows a problem"
         await scene.servers[0].send(publish("/plan", AILING["/plan"](7)))
         await until(standing)
         assert len(channel.problems) == 1
-        assert len(warnings(caplog)) == 3, "and the log has it already"
+        assert len(warnings(caplog)) == 3, "the log already has the line"
 
     with_scene(map, channel, scenario)
 
@@ -408,18 +410,18 @@ def warnings(caplog) -> list[str]:
     return [r.getMessage() for r in found if r.name.startswith("webmap")]
 
 
-@pytest.mark.parametrize("name", TAKEN)
+@pytest.mark.parametrize("name", DRAWN)
 def test_unusual_but_valid_scans_are_drawn_without_a_notice(map, channel, name):
-    topic, what, count = TAKEN[name]
+    topic, what, count = DRAWN[name]
 
     async def scenario(scene: Scene) -> None:
-        mine = await scene.say_good(0, 1.0)
+        mine = await scene.send_good(0, 1.0)
         await scene.servers[0].send(frame_of(topic, what))
         if scene.state(0)["/scan"] == mine["/scan"]:
             await until(lambda: len(dots_of(scene)) == count)
         assert len(dots_of(scene)) == count
-        await scene.say_good(0, 3.0)
-        assert [*scene.errors, *scene.said] == []
+        await scene.send_good(0, 3.0)
+        assert [*scene.errors, *scene.bridge_errors] == []
 
     with_scene(map, channel, scenario)
 
@@ -428,19 +430,19 @@ def test_unusual_but_valid_scans_are_drawn_without_a_notice(map, channel, name):
 def test_a_scan_without_any_range_is_drawn_without_dots_and_gives_one_notice(
     map, channel, name
 ):
-    what, count, said = DOUBTED[name]
+    what, count, expected = DOUBTED[name]
 
     async def scenario(scene: Scene) -> None:
-        await scene.say_good(0, 1.0)
-        theirs = await scene.say_good(1, 1.0)
+        await scene.send_good(0, 1.0)
+        theirs = await scene.send_good(1, 1.0)
         for _ in range(3):
             await scene.servers[0].send(publish("/scan", what))
         await until(lambda: scene.errors != [])
         await until(lambda: len(dots_of(scene)) == count)
-        await scene.say_good(0, 3.0)
+        await scene.send_good(0, 3.0)
         (line,) = scene.errors
         assert line.startswith("Bob: /scan: ")
-        assert said in line
+        assert expected in line
         assert scene.state(1) == theirs
 
     with_scene(map, channel, scenario)
@@ -456,7 +458,7 @@ def test_frames_of_nested_braces_take_little_processor_time(map, channel):
         began = time.process_time()
         for _ in range(20):
             await scene.servers[0].send("{" * 800 + "}" * 800)
-        await scene.say_good(0, 1.0)
+        await scene.send_good(0, 1.0)
         assert time.process_time() - began < 1.0
 
     with_scene(map, channel, scenario)
@@ -472,7 +474,7 @@ def test_a_map_of_50_megabytes_is_drawn_without_blocking_another_robot(map, chan
     huge = text.replace("[-7]", "[" + "-1," * (SIDE * SIDE - 1) + "100]")
 
     async def scenario(scene: Scene) -> None:
-        mine = await scene.say_good(0, 1.0)
+        mine = await scene.send_good(0, 1.0)
         assert len(huge) > 48_000_000
         seen: list[float] = []
         scene.bridges[1].subscribe(
@@ -483,12 +485,12 @@ def test_a_map_of_50_megabytes_is_drawn_without_blocking_another_robot(map, chan
             await scene.servers[1].send(publish("/odom", odometry(4.0)))
             await asyncio.sleep(0.01)
         await sending
-        assert len(seen) > 20, "the other robot went on meanwhile"
+        assert len(seen) > 20, "the other robot was still updated"
         assert max(np.diff(seen)) < 1.0
         layer = scene.grids[0]
         assert layer.cells.shape == (SIDE, SIDE)
         assert layer.cells[-1, -1] == 100
-        assert [*scene.errors, *scene.said] == []
+        assert [*scene.errors, *scene.bridge_errors] == []
 
     with_scene(map, channel, scenario)
 
@@ -504,7 +506,7 @@ def test_a_scan_of_two_million_rays_is_refused_without_blocking_another_robot(
     map, channel
 ):
     async def scenario(scene: Scene) -> None:
-        mine = await scene.say_good(0, 1.0)
+        mine = await scene.send_good(0, 1.0)
         seen: list[float] = []
         scene.bridges[1].subscribe(
             "/odom", lambda message: seen.append(time.monotonic())
@@ -515,10 +517,10 @@ def test_a_scan_of_two_million_rays_is_refused_without_blocking_another_robot(
                 await scene.servers[1].send(publish("/odom", odometry(4.0)))
                 await asyncio.sleep(0.01)
         await sending
-        assert max(np.diff(seen)) < 1.0, "the other robot went on meanwhile"
+        assert max(np.diff(seen)) < 1.0, "the other robot was still updated"
         (line,) = scene.errors
         assert "/scan: a scan of 1900000 rays" in line
-        assert scene.state(0) == mine, "what was drawn stays"
-        await scene.say_good(0, 2.0)
+        assert scene.state(0) == mine, "the drawing stays"
+        await scene.send_good(0, 2.0)
 
     with_scene(map, channel, scenario)

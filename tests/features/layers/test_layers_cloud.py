@@ -1,4 +1,4 @@
-"""Clouds of points, from above."""
+"""Clouds of points, drawn from above."""
 
 import base64
 import json
@@ -15,7 +15,7 @@ FLOAT32, FLOAT64, UINT8 = 7, 8, 2
 
 
 def cloud(points, *, dtype="<f4", pad=0, rows=1, row_pad=0, ros2=False, **extra):
-    """A cloud whose points are rows of x, y, z and perhaps an intensity."""
+    """Return a cloud from rows of x, y, z and optionally an intensity."""
     points = np.asarray(points, dtype)
     points = points.reshape(-1, points.shape[-1] if points.size else 3)
     names = ["x", "y", "z", "intensity"][: points.shape[1]]
@@ -65,7 +65,7 @@ FLAT = [(x, y) for x, y, _ in POINTS]
 )
 def test_every_point_is_a_dot_at_its_position(link, robot, layout, ros2):
     module = robot.add_module("PointCloud", link, "/points")
-    link.say("/points", cloud(POINTS, ros2=ros2, **layout))
+    link.publish("/points", cloud(POINTS, ros2=ros2, **layout))
     (path,) = module.dots
     assert on_map(path) == near(FLAT)
     assert "dot" in path.classes
@@ -74,10 +74,10 @@ def test_every_point_is_a_dot_at_its_position(link, robot, layout, ros2):
 
 def test_a_single_row_needs_no_row_step(link, robot):
     module = robot.add_module("PointCloud", link, "/points")
-    link.say("/points", cloud(POINTS, pad=5, row_step=0))
+    link.publish("/points", cloud(POINTS, pad=5, row_step=0))
     (path,) = module.dots
     assert on_map(path) == near(FLAT)
-    link.say("/points", cloud(POINTS, rows=2, row_step=0))
+    link.publish("/points", cloud(POINTS, rows=2, row_step=0))
     (problem,) = robot.problems.values()
     assert "does not fit into rows of 0 bytes" in problem
 
@@ -87,20 +87,20 @@ def test_point_data_may_be_bytes_in_cbor_or_a_list_of_numbers(link, robot):
     message = cloud(POINTS)
     raw = base64.b64decode(message["data"])
     message["data"] = raw
-    link.say("/points", message, cbor=True)
+    link.publish("/points", message, cbor=True)
     assert on_map(module.dots[0]) == near(FLAT)
     message = cloud(POINTS[:2])
     message["data"] = list(base64.b64decode(message["data"]))
-    link.say("/points", message)
+    link.publish("/points", message)
     assert on_map(module.dots[0]) == near(FLAT[:2])
 
 
 def test_a_cloud_is_placed_by_the_sensor_on_the_robot(link, robot):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
     module = robot.add_module("PointCloud", link, "/points", 0.5, 0.0, 90.0)
-    link.say("/odom", {"header": header(), "pose": pose(10, 20, math.pi / 2)})
-    link.say("/points", cloud([[1.0, 0.0, 0.0]]))
-    # Half a metre ahead of a robot that looks north, and then a metre to the west.
+    link.publish("/odom", {"header": header(), "pose": pose(10, 20, math.pi / 2)})
+    link.publish("/points", cloud([[1.0, 0.0, 0.0]]))
+    # Half a metre ahead of a robot that looks north, and a metre to the west.
     assert on_map(module.dots[0]) == near([(9, 20.5)])
 
 
@@ -108,25 +108,25 @@ def test_a_cloud_in_the_map_frame_stays_in_place_and_is_precise_far_away(link, r
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
     module = robot.add_module("PointCloud", link, "/points", frame="map")
     far = [[50_000.125, -70_000.25, 0], [50_001.5, -70_002.0, 0]]
-    link.say("/points", cloud(far, dtype="<f8"))
-    link.say("/odom", {"header": header(), "pose": pose(3, 4, 1.0)})
+    link.publish("/points", cloud(far, dtype="<f8"))
+    link.publish("/odom", {"header": header(), "pose": pose(3, 4, 1.0)})
     assert on_map(module.dots[0]) == near([tuple(point[:2]) for point in far])
 
 
 def test_only_points_between_z_min_and_z_max_are_drawn(link, robot):
     module = robot.add_module("PointCloud", link, "/points", z_min=0.15, z_max=1.0)
-    link.say("/points", cloud(POINTS))
+    link.publish("/points", cloud(POINTS))
     assert on_map(module.dots[0]) == near(FLAT[1:3])
 
 
 def test_non_finite_and_very_far_points_are_not_drawn(link, robot):
     module = robot.add_module("PointCloud", link, "/points")
     nowhere = [[math.nan, 0, 0], [0, math.inf, 0], [1, 1, math.nan], [1e30, 0, 0]]
-    link.say("/points", cloud([*POINTS, *nowhere]))
+    link.publish("/points", cloud([*POINTS, *nowhere]))
     assert on_map(module.dots[0]) == near(FLAT)
-    link.say("/points", cloud(nowhere))
+    link.publish("/points", cloud(nowhere))
     assert len(dots(module.dots[0])) == 0
-    link.say("/points", cloud([]))
+    link.publish("/points", cloud([]))
     assert robot.problems == {}
 
 
@@ -134,7 +134,7 @@ def test_a_cloud_without_a_z_field_is_drawn_completely(link, robot):
     module = robot.add_module("PointCloud", link, "/points", z_min=0.5)
     message = cloud(POINTS)
     del message["fields"][2]
-    link.say("/points", message)
+    link.publish("/points", message)
     assert on_map(module.dots[0]) == near(FLAT)
 
 
@@ -143,10 +143,10 @@ def test_points_above_each_other_in_a_cell_are_one_dot(link, robot):
     wall = [
         [2.0, 0.1 * i + 0.05, 0.01 * height] for i in range(20) for height in range(50)
     ]
-    link.say("/points", cloud(wall))
+    link.publish("/points", cloud(wall))
     assert len(dots(module.dots[0])) == 20
     every = robot.add_module("PointCloud", link, "/points", cell=0, max_points=600)
-    link.say("/points", cloud(wall))
+    link.publish("/points", cloud(wall))
     assert len(dots(every.dots[0])) == 600
 
 
@@ -156,13 +156,13 @@ def test_points_are_coloured_by_the_chosen_field(link, robot, by):
     values = [[float(i), 0.0, 0.0, 10.0 * i] for i in range(8)]
     if by == "z":
         values = [[x, y, x] for x, y, *_ in values]
-    link.say("/points", cloud(values))
+    link.publish("/points", cloud(values))
     assert [on_map(path) for path in module.dots] == [near([(i, 0)]) for i in range(8)]
     assert [f"band-{i}" in path.classes for i, path in enumerate(module.dots)]
     bounded = robot.add_module(
         "PointCloud", link, "/points", colour_by=by, low=1e3, high=2e3
     )
-    link.say("/points", cloud(values))
+    link.publish("/points", cloud(values))
     assert len(dots(bounded.dots[0])) == 8
 
 
@@ -188,8 +188,8 @@ BAD = {
 @pytest.mark.parametrize("why", BAD)
 def test_a_cloud_with_wrong_sizes_is_refused_and_the_last_cloud_stays(link, robot, why):
     module = robot.add_module("PointCloud", link, "/points")
-    link.say("/points", cloud(POINTS))
-    link.say("/points", BAD[why])
+    link.publish("/points", cloud(POINTS))
+    link.publish("/points", BAD[why])
     assert on_map(module.dots[0]) == near(FLAT)
     (problem,) = robot.problems.values()
     assert why in problem
@@ -197,7 +197,7 @@ def test_a_cloud_with_wrong_sizes_is_refused_and_the_last_cloud_stays(link, robo
 
 def test_a_missing_colour_field_is_a_problem_with_its_name(link, robot):
     robot.add_module("PointCloud", link, "/points", colour_by="rgb")
-    link.say("/points", cloud(POINTS))
+    link.publish("/points", cloud(POINTS))
     (problem,) = robot.problems.values()
     assert problem == "/points: points have no field 'rgb'; they have 'x', 'y', 'z'"
 

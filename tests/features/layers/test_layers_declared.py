@@ -1,4 +1,4 @@
-"""Mistakes in layers are named, and a refused message changes nothing."""
+"""Mistakes in layers are reported, and a refused message changes nothing."""
 
 import ast
 import inspect
@@ -146,17 +146,17 @@ def test_a_refused_message_does_not_move_the_last_drawing(map, robot, link):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
     for seconds in (1.0, 2.0, 3.0, 4.0):
         at = {"header": header("map", seconds), "pose": pose(seconds, 0, 0)}
-        link.say("/odom", at)
+        link.publish("/odom", at)
     on_map = map.add_module("OwnMap", link, "/zones").layer
     on_robot = robot.add_module("OwnFlat", link, "/flat")
     for topic, sensor in (("/zones", "odom"), ("/flat", "base_link")):
-        link.say(topic, {"header": header(sensor, 2.0), "x": 1.0})
+        link.publish(topic, {"header": header(sensor, 2.0), "x": 1.0})
     send_transforms(link, frame("map", "odom", (0.0, 0.0, 0.0), seconds=2.0))
     send_transforms(link, frame("map", "far", (50.0, 0.0, 0.0), seconds=2.0))
-    link.say("/zones", {"header": header("odom", 2.0), "x": 1.0})
+    link.publish("/zones", {"header": header("odom", 2.0), "x": 1.0})
     before = [to_root(each.svg).apply(0, 0) for each in (on_map, on_robot)]
-    link.say("/zones", {"header": header("far", 2.0), "x": math.nan})
-    link.say("/flat", {"header": header("base_link", 4.0), "x": math.nan})
+    link.publish("/zones", {"header": header("far", 2.0), "x": math.nan})
+    link.publish("/flat", {"header": header("base_link", 4.0), "x": math.nan})
     assert [to_root(each.svg).apply(0, 0) for each in (on_map, on_robot)] == before
     assert (on_map.place, on_robot.place) == (1.0, 1.0)
 
@@ -175,8 +175,8 @@ def test_nan_in_a_list_is_refused_in_every_encoding(robot, link, cbor):
         found = typed(85, np.array(ranges, "<f4")) if cbor else list(ranges)
         return {"header": header("base_link", 2.0), "ranges": found}
 
-    link.say("/scan", scan(1.0, 2.0), cbor=cbor)
-    link.say("/scan", scan(1.0, math.nan), cbor=cbor)
+    link.publish("/scan", scan(1.0, 2.0), cbor=cbor)
+    link.publish("/scan", scan(1.0, math.nan), cbor=cbor)
     assert seen == [[1.0, 2.0]]
     assert "ranges must be" in next(iter(robot.problems.values()))
 
@@ -189,7 +189,7 @@ def test_draw_gets_the_frame_and_the_stamp_of_the_message(robot, link):
 
     webmap.layer("my_msgs/X")(made(draw=draw))
     robot.add_module("Own", link, "/x")
-    link.say("/x", {"header": header("arm", 3.0)})
+    link.publish("/x", {"header": header("arm", 3.0)})
     assert seen == [("arm", 3.0, 3.0)]
 
     def draw_log(self, message, at):
@@ -197,7 +197,7 @@ def test_draw_gets_the_frame_and_the_stamp_of_the_message(robot, link):
 
     webmap.layer("rcl_interfaces/Log")(made("OwnLog", draw=draw_log))
     robot.add_module("OwnLog", link, "/log")
-    link.say("/log", {"stamp": {"sec": 5, "nanosec": 0}, "msg": "ready"})
+    link.publish("/log", {"stamp": {"sec": 5, "nanosec": 0}, "msg": "ready"})
     assert seen[1] == ("", 5.0)
 
 
@@ -206,7 +206,7 @@ PRIVATE = {
     "Diagnostics": {"refusing", "Removal", "keep", "robot_modules"},
     "Markers": {"LayerFrames", "TransformError", "not_known", "Removal", "keep"},
     "OccupancyGrid": {"refusing", "spawn"},
-    # What only these know.
+    # Names that only these layers use.
     "LaserScanner": {"Rays", "scan_name"},
     "NavSatFix": {"LocalPlane"},
     "Polygon": {"check_items"},
@@ -217,7 +217,7 @@ PUBLIC_MODULES = ("drawing", "geometry", "html", "messages", "options", "svg")
 @pytest.mark.parametrize("declared", declarations(), ids=lambda each: each.name)
 def test_built_in_layers_import_only_public_or_listed_names(declared):
     if not declared.built_in:
-        pytest.skip("it does not come with WebMap")
+        pytest.skip("the layer is not part of WebMap")
     homes = [getattr(webmap, name) for name in PUBLIC_MODULES]
     public = [value for home in homes for value in vars(home).values()]
     public += [getattr(webmap, name) for name in webmap.__all__]

@@ -1,7 +1,7 @@
-"""Every layer as a browser draws it, against where things truly are in the simulator.
+"""Every layer in a browser, compared with the true places in the simulator.
 
-A simulator of each dialect runs in this process, a page of another process shows it by
-the road of a real robot, and the page is asked where everything is on the map.
+A simulator of each dialect runs in this process, a page of another process shows it
+over a real bridge, and the test reads the places of everything on the map of the page.
 """
 
 import io
@@ -104,7 +104,7 @@ def worlds() -> Iterator[dict[str, Running]]:
 def _arrange(running: Running, spot: Pose) -> None:
     one, other = running.world.robots
     other.pose = other.odometry = spot
-    # What is measured from where it started is not what is measured on the map.
+    # Coordinates from the start of the robot differ from those on the map.
     one.odometry = Pose(1.5, -2.0, 0.7)
     running.node.advertise(INFLATED, "nav_msgs/GridCells")
 
@@ -138,7 +138,7 @@ def tab(chromium: Browser, url: str, running: Running, worlds) -> Iterator[Page]
 
 
 def until(look, wanted, what: str, seconds: float = 15) -> None:
-    """Wait until what is looked at is wanted."""
+    """Wait until the result of ``look`` satisfies ``wanted``."""
     deadline = time.monotonic() + seconds
     while not wanted(found := look()):
         assert time.monotonic() < deadline, f"{what}: {found}"
@@ -146,7 +146,7 @@ def until(look, wanted, what: str, seconds: float = 15) -> None:
 
 
 def near(tab: Page, script: str, wanted, within: float, what: str) -> None:
-    """Wait until points of the page are where they should be, in metres."""
+    """Wait until points of the page are at the expected places, in metres."""
 
     def off(found) -> float:
         truth = np.array(wanted() if callable(wanted) else wanted, float)
@@ -191,10 +191,10 @@ def test_a_cloud_shows_walls_and_other_robots_but_no_floor(tab, running):
             for ok in [np.isfinite(r)]
         ]
     )
-    near_floor = 0.1 / math.tan(math.radians(6))  # below it the lowest ring still looks
+    near_floor = 0.1 / math.tan(math.radians(6))  # the lowest ring sees lower
 
     def look() -> tuple[float, float]:
-        """How far dots are from what is there, and how much of that is drawn."""
+        """Return the distances of dots from obstacles, and the share that is drawn."""
         drawn = np.array(tab.evaluate('dots(".pointcloud > .dot")')).reshape(-1, 2)
         if not len(drawn):
             return math.inf, 0.0
@@ -297,10 +297,10 @@ def test_particles_and_the_ellipse_show_the_uncertainty_of_the_pose(tab, running
     pose = running.world.robots[0].pose
 
     def drawn_from() -> list[tuple[float, float]]:
-        poses = running.said["/robot_0/particlecloud"]["poses"]
+        poses = running.published["/robot_0/particlecloud"]["poses"]
         return [(p["position"]["x"], p["position"]["y"]) for p in poses]
 
-    # An arrow starts beside its pose, at one end of its base.
+    # The line of an arrow begins at one end of its base, beside the pose.
     near(tab, 'starts(".posearray > .arrow")', drawn_from, 0.03, "particles")
     ellipse = 'document.querySelector(".covariance > .ellipse")'
     script = f"""(() => {{ const e = {ellipse};
@@ -311,7 +311,7 @@ def test_particles_and_the_ellipse_show_the_uncertainty_of_the_pose(tab, running
     assert math.dist(middle, along) == pytest.approx(0.24, abs=0.002)
     assert math.dist(middle, aside) == pytest.approx(0.10, abs=0.002)
     turn = math.atan2(*(along - middle)[::-1]) - pose.yaw
-    assert math.sin(turn) == pytest.approx(0, abs=0.01), "the long axis lies ahead"
+    assert math.sin(turn) == pytest.approx(0, abs=0.01), "the long axis points ahead"
 
 
 def test_a_footprint_in_the_odom_frame_is_drawn_around_the_robot(tab, running):
@@ -329,12 +329,16 @@ def test_a_cone_begins_at_the_sonar_and_ends_at_its_measured_distance(tab, runni
     arc = 'document.querySelector(".range > .cone").getAttribute("d")'
 
     def apart(path: str) -> float:
-        said = running.said["/robot_0/sonar"]
-        reach = min(said["range"], said["max_range"])
+        sonar_message = running.published["/robot_0/sonar"]
+        reach = min(sonar_message["range"], sonar_message["max_range"])
         assert reach > 0.1
         return abs(float(re.search(r"A([\d.]+)", path).group(1)) - reach)
 
-    until(lambda: tab.evaluate(arc), lambda path: apart(path) < 0.002, "its length")
+    until(
+        lambda: tab.evaluate(arc),
+        lambda path: apart(path) < 0.002,
+        "the length of the cone",
+    )
 
 
 def test_points_in_base_link_and_cells_in_odom_are_in_place_on_the_map(tab, running):
@@ -352,14 +356,14 @@ def test_points_in_base_link_and_cells_in_odom_are_in_place_on_the_map(tab, runn
         ),
     }
 
-    def say() -> None:
+    def publish() -> None:
         stamp = node.graph.clock()
         for topic, (frame, message) in messages.items():
             name = f"{robot.frames}{frame}"
             header = node.messages.dialect.header(topic, stamp, name)
             node.publish(topic, {"header": header, **message})
 
-    running.do(say)
+    running.do(publish)
     ahead = robot.pose @ Pose(1.2, -0.4)
     find = 'inWorld(".pointstamped > .point", [[0, 0]])'
     near(tab, find, [(ahead.x, ahead.y)], 0.005, "point")
@@ -400,7 +404,7 @@ def test_battery_charge_health_and_log_are_shown(tab, running):
         f"{space}laser: Frequency",
     ]
     expect(tab.locator(".diagnostics")).to_have_class(re.compile(r"\bok\b"))
-    # The lowest that there is, and so what it stays at.
+    # This is the lowest charge, so the charge stays there.
     running.do(lambda: setattr(running.world.robots[0], "charge", 0.05))
     expect(tab.locator(".diagnostics.error title")).to_have_text(
         f"{space}base: Battery: 5 %, charge it"
@@ -422,7 +426,7 @@ def test_the_shown_picture_matches_the_simulated_camera(tab, running):
         shown = np.asarray(Image.open(io.BytesIO(found)), float)
         return float(abs(shown - true).mean())
 
-    # The newest picture may have been taken before the robots were where they are.
+    # The newest picture may be older than the last motion of the robots.
     until(apart, lambda mean: mean < 2, "another view would differ by tens")
 
 
@@ -435,7 +439,7 @@ def test_a_goal_has_a_path_a_marker_a_trail_and_lines_in_the_log(tab, running):
 
     def note(dt: float) -> None:
         if navigator.path and not seen.is_set():
-            return  # It waits until the page was looked at.
+            return  # The simulator waits until the test has read the page.
         step(dt)
         way.append((robot.pose.x, robot.pose.y))
         if navigator.steers_to is not None:
@@ -454,8 +458,8 @@ def test_a_goal_has_a_path_a_marker_a_trail_and_lines_in_the_log(tab, running):
         text = tab.locator('.marker.text[data-ns="goal"] text')
         expect(text).to_have_text(re.compile(r"^\d+\.\d m$"))
         seen.set()
-        stands = lambda: navigator.goal is None and robot.twist.is_zero  # noqa: E731
-        until(stands, bool, "the end of its way")
+        has_stopped = lambda: navigator.goal is None and robot.twist.is_zero  # noqa: E731
+        until(has_stopped, bool, "the end of the path")
     finally:
         world.step = step
     trail = 'polyline(".trail > polyline")'
@@ -468,22 +472,22 @@ def test_a_goal_has_a_path_a_marker_a_trail_and_lines_in_the_log(tab, running):
     off = np.hypot(*(drawn[:, np.newaxis] - true).transpose(2, 0, 1)).min(axis=1)
     assert off.max() < 0.03
     assert math.dist(drawn[0], way[0]) < 0.1
-    # It stays where it was told last, as none is told of a robot that stands.
+    # The point keeps its last place: no point is published while the robot stops.
     ahead = 'inWorld(".pointstamped > .point", [[0, 0]])[0]'
     until(
         lambda: tab.evaluate(ahead),
         lambda at: min(math.dist(at, each) for each in steered) < 0.05,
-        "what it steers to",
+        "the point that the robot steers to",
     )
     log = tab.locator("#log .message")
-    said = f"a goal at ({target.x:.2f}, {target.y:.2f})"
-    expect(log.get_by_text(said, exact=True)).to_have_count(1)
+    line = f"a goal at ({target.x:.2f}, {target.y:.2f})"
+    expect(log.get_by_text(line, exact=True)).to_have_count(1)
     expect(log.get_by_text("the goal canceled: stopped")).to_have_count(1)
     expect(tab.locator(".marker.arrow")).to_have_count(0)
 
 
 def _reachable(world, here: Pose, near: float, far: float) -> Pose:
-    """A place that a robot can go to straight on, near no other."""
+    """Return a place that a robot reaches on a straight line, far from other robots."""
     for turn in np.linspace(0, math.tau, 64, endpoint=False).tolist():
         for reach in np.arange(far, near, -0.1).tolist():
             way = [
@@ -497,7 +501,7 @@ def _reachable(world, here: Pose, near: float, far: float) -> Pose:
                 math.hypot(x - spot.x, y - spot.y) > 1 for x, y, _ in world.others(0)
             ):
                 return spot
-    raise AssertionError("there is no such place")
+    raise AssertionError("there is no reachable place")
 
 
 def test_each_layer_can_be_switched_by_keyboard_and_the_choice_persists(
@@ -533,7 +537,7 @@ def test_each_layer_can_be_switched_by_keyboard_and_the_choice_persists(
     with watched_tab(chromium, 800, 600) as someone:
         someone.goto(url.replace("/?", tab.url[tab.url.rindex("/") :] + "?"))
         someone.wait_for_selector(LAYERS["Scans"], state="attached")
-        assert someone.evaluate(shown, LAYERS["Scans"]), "another viewer's own choice"
+        assert someone.evaluate(shown, LAYERS["Scans"]), "each viewer has an own choice"
     tab.locator(".webmap-layers > summary").click()
     expect(boxes).to_have_count(len(LAYERS))
     for box in boxes.all():

@@ -1,4 +1,4 @@
-"""The tutorial of layers, as it stands in the documentation, in a real browser."""
+"""The tutorial of layers in the documentation, run in a real browser."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Fixes of satellites, on the plane of the map."""
+"""GPS fixes on the plane of the map."""
 
 import math
 
@@ -9,7 +9,7 @@ from test_layers_frames import send_transforms, transform
 from webmap.base.errors import ConfigError
 
 DATUM = (50.0, 14.0)
-# By the ellipsoid of WGS 84, at 50 degrees north.
+# From the WGS 84 ellipsoid, at 50 degrees north.
 METRES_A_DEGREE = {"lat": 111_229.0, "lon": 71_695.8}
 
 
@@ -32,7 +32,7 @@ def at(module) -> tuple[float, float]:
 @pytest.mark.parametrize("ros2", [False, True])
 def test_a_fix_is_drawn_at_its_true_distance_from_the_datum(link, robot, ros2):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
-    link.say("/fix", fix(50.001, 13.998, ros2=ros2))
+    link.publish("/fix", fix(50.001, 13.998, ros2=ros2))
     assert at(module) == pytest.approx(
         (-0.002 * METRES_A_DEGREE["lon"], 0.001 * METRES_A_DEGREE["lat"]), abs=0.01
     )
@@ -44,12 +44,14 @@ def test_a_gps_fix_message_is_drawn_like_a_nav_sat_fix_message(link, robot, type
     ros2 = type.startswith("gps_msgs")
     module = robot.add_module("NavSatFix", link, "/gps", datum=DATUM, type=type)
     assert link.types["/gps"] == type
-    said = fix(50.001, 14.0, status=18, spread=[4.0, 0, 0, 0, 4.0, 0, 0, 0, 9.0])
+    message = fix(50.001, 14.0, status=18, spread=[4.0, 0, 0, 0, 4.0, 0, 0, 0, 9.0])
     more = {"header": header("", ros2=ros2), "satellites_used": 7, "status": 18}
-    link.say("/gps", {**said, "status": more, "track": 90.0, "speed": 1.0, "dip": 0.0})
+    link.publish(
+        "/gps", {**message, "status": more, "track": 90.0, "speed": 1.0, "dip": 0.0}
+    )
     assert at(module) == pytest.approx((0, 111.229), abs=0.01)
     assert module.covariance.get("r") == "2"
-    link.say("/gps", {**said, "status": {**more, "status": -1}})
+    link.publish("/gps", {**message, "status": {**more, "status": -1}})
     assert "lost" in module.svg.classes
 
 
@@ -60,40 +62,40 @@ def test_a_message_type_without_fixes_is_refused(link, robot):
 
 def test_north_is_along_x_with_east_at_90_degrees(link, robot):
     module = robot.add_module("NavSatFix", link, datum=DATUM, east=90.0)
-    link.say("/fix", fix(50.001, 14.0))
+    link.publish("/fix", fix(50.001, 14.0))
     assert at(module) == pytest.approx((111.229, 0), abs=0.01)
 
 
 def test_without_a_datum_the_first_fix_is_placed_at_the_robot(link, robot):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
-    link.say("/odom", {"header": header(), "pose": pose(7, -3, 1.0)})
+    link.publish("/odom", {"header": header(), "pose": pose(7, -3, 1.0)})
     module = robot.add_module("NavSatFix", link)
-    link.say("/fix", fix(50.0, 14.0))
+    link.publish("/fix", fix(50.0, 14.0))
     assert at(module) == pytest.approx((7, -3))
-    link.say("/odom", {"header": header(), "pose": pose(9, 9, 2.0)})
-    link.say("/fix", fix(50.0001, 14.0))
+    link.publish("/odom", {"header": header(), "pose": pose(9, 9, 2.0)})
+    link.publish("/fix", fix(50.0001, 14.0))
     assert at(module) == pytest.approx((7, -3 + 11.1229), abs=0.01)
 
 
 def test_a_fix_before_the_first_pose_does_not_set_the_datum(link, robot):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
     module = robot.add_module("NavSatFix", link)
-    link.say("/fix", fix(50.0, 14.0))
+    link.publish("/fix", fix(50.0, 14.0))
     assert module.cross.get("visibility") == "hidden"
     assert module.datum is module.position is None
-    link.say("/odom", {"header": header(), "pose": pose(7, -3)})
-    link.say("/fix", fix(50.001, 14.0))
+    link.publish("/odom", {"header": header(), "pose": pose(7, -3)})
+    link.publish("/fix", fix(50.001, 14.0))
     assert at(module) == pytest.approx((7, -3))
 
 
 @pytest.fixture
 def in_odometry(link, robot):
-    """Let a robot be where its odometry has it, at (1, 0)."""
+    """Put a robot at (1, 0) by its odometry."""
 
     def at_one(*, quiet):
         robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
         robot.set_tf(link, quiet=quiet)
-        link.say("/odom", {"header": header("odom"), "pose": pose(1, 0)})
+        link.publish("/odom", {"header": header("odom"), "pose": pose(1, 0)})
         return robot.add_module("NavSatFix", link)
 
     return at_one
@@ -104,11 +106,11 @@ def test_the_first_fix_waits_until_frames_place_the_robot_on_the_map(
     link, in_odometry, quiet
 ):
     module = in_odometry(quiet=quiet)
-    link.say("/fix", fix(50.0, 14.0))
+    link.publish("/fix", fix(50.0, 14.0))
     assert module.position is None
     send_transforms(link, transform("map", "odom", 30, 20, 0))
-    link.say("/odom", {"header": header("odom"), "pose": pose(2, 0)})
-    link.say("/fix", fix(50.001, 14.0))
+    link.publish("/odom", {"header": header("odom"), "pose": pose(2, 0)})
+    link.publish("/fix", fix(50.001, 14.0))
     assert at(module) == pytest.approx((32, 20))
     assert module.datum == (50.001, 14.0)
 
@@ -118,41 +120,41 @@ def test_a_fix_is_placed_by_odometry_until_the_robot_has_a_map_frame(
 ):
     module = in_odometry(quiet=True)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
-    link.say("/fix", fix(50.0, 14.0))
+    link.publish("/fix", fix(50.0, 14.0))
     assert at(module) == pytest.approx((1, 0))
-    link.say("/fix", fix(50.001, 14.0))
+    link.publish("/fix", fix(50.001, 14.0))
     assert at(module) == pytest.approx((1, 111.229), abs=0.01)
     send_transforms(link, transform("map", "odom", 30, 20, 0))
-    link.say("/odom", {"header": header("odom"), "pose": pose(2, 0)})
-    link.say("/fix", fix(50.002, 14.0))
+    link.publish("/odom", {"header": header("odom"), "pose": pose(2, 0)})
+    link.publish("/fix", fix(50.002, 14.0))
     assert at(module) == pytest.approx((32, 20))
-    link.say("/fix", fix(50.003, 14.0))
+    link.publish("/fix", fix(50.003, 14.0))
     assert at(module) == pytest.approx((32, 131.229), abs=0.01)
 
 
 def test_the_radius_of_the_circle_is_the_standard_deviation(link, robot):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
-    link.say("/fix", fix(50, 14, spread=[4.0, 0, 0, 0, 2.25, 0, 0, 0, 9.0]))
+    link.publish("/fix", fix(50, 14, spread=[4.0, 0, 0, 0, 2.25, 0, 0, 0, 9.0]))
     assert module.covariance.get("r") == "2"
-    link.say("/fix", fix(50, 14, spread=[math.nan] * 9))
+    link.publish("/fix", fix(50, 14, spread=[math.nan] * 9))
     assert module.covariance.get("r") == "0"
 
 
 def test_a_fix_across_the_date_line_is_near_the_datum(link, robot):
     module = robot.add_module("NavSatFix", link, datum=(0.0, 179.9999))
-    link.say("/fix", fix(0.0, -179.9999))
+    link.publish("/fix", fix(0.0, -179.9999))
     assert at(module) == pytest.approx((22.26, 0), abs=0.01)
 
 
 def test_a_lost_fix_keeps_the_last_position(link, robot):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
     assert module.cross.get("visibility") == "hidden"
-    link.say("/fix", fix(50, 14))
-    link.say("/fix", fix(None, None, status=-1))
+    link.publish("/fix", fix(50, 14))
+    link.publish("/fix", fix(None, None, status=-1))
     assert "lost" in module.svg.classes
     assert at(module) == (0, 0)
     assert robot.problems == {}
-    link.say("/fix", fix(50, 14))
+    link.publish("/fix", fix(50, 14))
     assert "lost" not in module.svg.classes
     assert module.cross.get("visibility") is None
 
@@ -162,8 +164,8 @@ def test_a_lost_fix_keeps_the_last_position(link, robot):
 )
 def test_a_fix_with_invalid_coordinates_is_refused(link, robot, lat, lon):
     module = robot.add_module("NavSatFix", link, datum=DATUM)
-    link.say("/fix", fix(50, 14))
-    link.say("/fix", fix(lat, lon))
+    link.publish("/fix", fix(50, 14))
+    link.publish("/fix", fix(lat, lon))
     assert at(module) == (0, 0)
     (problem,) = robot.problems.values()
     assert "latitude of -90 to 90 degrees" in problem

@@ -1,4 +1,4 @@
-"""What modules draw, taken to its place by the frames that a robot knows."""
+"""Frames of a robot place the drawings of modules on the map."""
 
 import math
 
@@ -24,7 +24,7 @@ def transform(parent, child, x, y, yaw, secs=3) -> dict:
 
 def send_transforms(link, *transforms, static=False) -> None:
     topic = "/tf_static" if static else "/tf"
-    link.say(topic, {"transforms": list(transforms)})
+    link.publish(topic, {"transforms": list(transforms)})
 
 
 @pytest.fixture(autouse=True)
@@ -45,7 +45,7 @@ IN_ODOM = Affine.translation(10, -5) @ Affine.rotation(math.pi / 2)
 
 
 def odometry(link, x, y, yaw):
-    link.say("/odom", {"header": header("odom"), "pose": pose(x, y, yaw)})
+    link.publish("/odom", {"header": header("odom"), "pose": pose(x, y, yaw)})
 
 
 def test_a_path_in_the_odometry_frame_is_placed_by_that_frame(link, robot):
@@ -53,12 +53,12 @@ def test_a_path_in_the_odometry_frame_is_placed_by_that_frame(link, robot):
     send_transforms(link, transform("map", "odom", *ODOM))
     message = path([(1.0, 2.0), (3.0, 4.0)])
     message["header"] = header("odom")
-    link.say("/plan", message)
+    link.publish("/plan", message)
     wanted = [IN_ODOM.apply(1, 2), IN_ODOM.apply(3, 4)]
     assert in_world(module.line) == near(wanted)
     odometry(link, 7, 7, 1.0)
     assert in_world(module.line) == near(wanted)
-    link.say("/plan", path([(1.0, 2.0), (3.0, 4.0)]))
+    link.publish("/plan", path([(1.0, 2.0), (3.0, 4.0)]))
     assert in_world(module.line) == near([(1, 2), (3, 4)])
 
 
@@ -68,7 +68,7 @@ def test_a_frame_is_looked_up_at_the_stamp_of_the_message(link, robot):
     send_transforms(link, transform("map", "odom", 2, 0, 0, secs=4))
     message = path([(0.0, 0.0), (0.0, 4.0)])
     message["header"] = header("odom")
-    link.say("/plan", message)
+    link.publish("/plan", message)
     assert in_world(module.line) == near([(1, 0), (1, 4)])
 
 
@@ -81,8 +81,8 @@ def test_sensor_data_is_placed_by_the_frame_of_the_sensor(link, robot):
         transform("base_link", "laser", 0.0, 0.5, -math.pi / 2),
         static=True,
     )
-    link.say("/sonar", sonar(1.0))
-    link.say("/points", cloud([[2.0, 0.0, 0.0]]))
+    link.publish("/sonar", sonar(1.0))
+    link.publish("/points", cloud([[2.0, 0.0, 0.0]]))
     on_robot = to_root(robot.svg).inverse @ to_root(cone.cone)
     assert on_robot.apply(1, 0) == pytest.approx((-0.7, 0.1))
     (dot,) = dots(points.dots[0])
@@ -93,7 +93,7 @@ def test_sensor_data_is_placed_by_the_frame_of_the_sensor(link, robot):
 def test_a_configured_sensor_position_overrides_the_frames(link, robot):
     cone = robot.add_module("Range", link, "/sonar", 0.2, 0.0, 0.0)
     send_transforms(link, transform("base_link", "sonar", 5, 5, 1), static=True)
-    link.say("/sonar", sonar(1.0))
+    link.publish("/sonar", sonar(1.0))
     on_robot = to_root(robot.svg).inverse @ to_root(cone.cone)
     assert on_robot.apply(0, 0) == pytest.approx((0.2, 0))
 
@@ -102,22 +102,22 @@ def test_an_unknown_frame_is_a_problem_until_it_is_known(link, robot):
     module = robot.add_module("Path", link, "/plan")
     message = path([(1.0, 2.0), (3.0, 4.0)])
     message["header"] = header("odom")
-    link.say("/plan", message)
+    link.publish("/plan", message)
     assert in_world(module.line) == near([(1, 2), (3, 4)])
     (problem,) = robot.problems.values()
     assert "the pose of 'odom' is unknown" in problem
     send_transforms(link, transform("map", "odom", *ODOM))
-    link.say("/plan", message)
+    link.publish("/plan", message)
     assert robot.problems == {}
     assert len(numbers(module.line.get("points"))) == 4
-    link.say("/plan", {**message, "header": header("nowhere")})
+    link.publish("/plan", {**message, "header": header("nowhere")})
     assert len(robot.problems) == 1
     robot.remove_module(module)
     assert robot.problems == {}
 
 
 def colour(image, x: float, y: float) -> tuple[int, ...]:
-    """The colour of a place of the world, in a picture whose group may be placed."""
+    """Return the colour of a picture at a place; its group may be moved."""
     u, v = to_root(image).inverse.apply(x, y)
     picture = image_of(image)
     width, height = float(image.get("width")), float(image.get("height"))
@@ -133,9 +133,9 @@ def local(**info) -> dict:
 def test_a_costmap_in_the_odometry_frame_moves_with_that_frame(map, link, channel):
     before = dict(_shared_frames)
     module = map.add_module("OccupancyGrid", link, "/local", map_frame="map")
-    link.say("/local", {**local(), "header": header("map")})
-    assert "/tf" not in link.listeners, "nobody needs frames yet"
-    link.say("/local", local())
+    link.publish("/local", {**local(), "header": header("map")})
+    assert "/tf" not in link.listeners, "no module needs frames yet"
+    link.publish("/local", local())
     (error,) = channel.errors
     assert "the pose of 'odom' on the map is unknown" in error
     (image,) = images(module.layer)
@@ -155,8 +155,8 @@ def test_a_costmap_is_placed_by_the_frames_of_its_namespace(map, link):
     module = map.add_module(
         "OccupancyGrid", link, "/r1/local", map_frame="map", namespace="/r1"
     )
-    link.say("/r1/local", local())
-    link.say("/r1/tf", {"transforms": [transform("map", "odom", *ODOM)]})
+    link.publish("/r1/local", local())
+    link.publish("/r1/tf", {"transforms": [transform("map", "odom", *ODOM)]})
     (image,) = images(module.layer)
     assert colour(image, *IN_ODOM.apply(2.5, 3.5)) == BLACK
     assert "/tf" not in link.listeners
@@ -164,7 +164,7 @@ def test_a_costmap_is_placed_by_the_frames_of_its_namespace(map, link):
 
 def test_a_grid_without_a_map_frame_ignores_frames(map, link):
     module = map.add_module("OccupancyGrid", link, "/local")
-    link.say("/local", local())
+    link.publish("/local", local())
     (image,) = images(module.layer)
     assert colour(image, 2.5, 3.5) == BLACK
     assert set(link.listeners) == {"/local", "/local_updates"}

@@ -1,4 +1,4 @@
-"""Grids: which colour is where in the world."""
+"""Grids: the colours at places of the world."""
 
 import asyncio
 import math
@@ -18,7 +18,7 @@ WHITE, BLACK, CLEAR = (255, 255, 255, 255), (0, 0, 0, 255), (0, 0, 0, 0)
 
 
 def grid(cells, resolution=0.5, origin=None, *, ros2=False, **info) -> dict:
-    """A message; ``cells`` has its lowest row first."""
+    """Return a message; ``cells`` has its lowest row first."""
     cells = np.asarray(cells, np.int8)
     height, width = cells.shape
     received = {
@@ -50,7 +50,7 @@ def update(x, y, cells) -> dict:
 
 
 def shown(module):
-    """The only tile of a grid; None if there is none."""
+    """Return the only tile of a grid, or None without a tile."""
     found = images(module.layer)
     assert len(found) <= 1
     return found[0] if found else None
@@ -71,7 +71,7 @@ CORNERS = [[100, 0, 0], [0, -1, 50]]
     [(0, 0, 0), (-12.34, 7.89, 0), (3.3, -4.4, math.pi / 2), (-1, -2, -2.5)],
 )
 def test_every_cell_is_placed_by_the_origin_of_the_grid(link, module, x, y, yaw, ros2):
-    link.say("/map", grid(CORNERS, 0.35, pose(x, y, yaw), ros2=ros2))
+    link.publish("/map", grid(CORNERS, 0.35, pose(x, y, yaw), ros2=ros2))
     placed = Affine.translation(x, y) @ Affine.rotation(yaw)
     colours = {100: BLACK, 0: WHITE, -1: CLEAR, 50: (128, 128, 128, 255)}
     for row, values in enumerate(CORNERS):
@@ -83,21 +83,21 @@ def test_every_cell_is_placed_by_the_origin_of_the_grid(link, module, x, y, yaw,
 
 
 def test_the_image_has_the_highest_row_at_the_top(link, module):
-    link.say("/map", grid(CORNERS))
+    link.publish("/map", grid(CORNERS))
     assert image_of(shown(module)).getpixel((0, 1)) == BLACK
 
 
 def test_cells_in_cbor_give_the_same_picture(link, module):
     message = grid(CORNERS)
     message["data"] = typed(72, np.array(CORNERS, np.int8))
-    link.say("/map", message, cbor=True)
+    link.publish("/map", message, cbor=True)
     assert pixel(shown(module), 0.2, 0.2) == BLACK
     assert pixel(shown(module), 0.7, 0.7) == CLEAR
 
 
 def test_a_costmap_has_colours_for_lethal_inscribed_and_free_cells(map, link):
     module = map.add_module("OccupancyGrid", link, "/costmap", palette="costmap")
-    link.say("/costmap", grid([[0, 1, 98, 99, 100, -1]], 1.0))
+    link.publish("/costmap", grid([[0, 1, 98, 99, 100, -1]], 1.0))
     colours = [pixel(shown(module), x + 0.5, 0.5) for x in range(6)]
     assert colours[0] == colours[5] == CLEAR
     assert colours[1][2] > 250
@@ -124,8 +124,8 @@ def test_a_costmap_is_drawn_over_the_map_and_both_under_robots(
 
 
 def test_an_update_changes_only_its_rectangle(link, module):
-    link.say("/map", grid(np.zeros((4, 5)), 1.0, pose(10, 20)))
-    link.say("/map_updates", update(1, 2, [[100, 100], [-1, 100]]))
+    link.publish("/map", grid(np.zeros((4, 5)), 1.0, pose(10, 20)))
+    link.publish("/map_updates", update(1, 2, [[100, 100], [-1, 100]]))
     black = {
         (x, y)
         for x in range(5)
@@ -137,16 +137,16 @@ def test_an_update_changes_only_its_rectangle(link, module):
 
 
 def test_an_update_before_the_grid_changes_nothing(link, module, channel):
-    link.say("/map_updates", update(0, 0, [[100]]))
+    link.publish("/map_updates", update(0, 0, [[100]]))
     assert shown(module) is None
     assert channel.errors == []
 
 
 @pytest.mark.parametrize(("x", "y"), [(-1, 0), (0, -1), (2, 0), (0, 2), (2**31, 0)])
 def test_an_update_outside_the_grid_is_refused(link, module, channel, x, y):
-    link.say("/map", grid(np.zeros((3, 3))))
+    link.publish("/map", grid(np.zeros((3, 3))))
     before = shown(module).get("href")
-    link.say("/map_updates", update(x, y, [[100, 100], [100, 100]]))
+    link.publish("/map_updates", update(x, y, [[100, 100], [100, 100]]))
     assert shown(module).get("href") == before
     (error,) = channel.errors
     assert "reaches out of a grid of 3 x 3" in error
@@ -178,31 +178,31 @@ BAD = {
 
 @pytest.mark.parametrize("why", BAD)
 def test_an_invalid_grid_is_refused_and_the_last_grid_stays(link, module, channel, why):
-    link.say("/map", grid(CORNERS))
+    link.publish("/map", grid(CORNERS))
     before = shown(module).attributes, shown(module)._transform
-    link.say("/map", BAD[why])
-    link.say("/map", BAD[why])
+    link.publish("/map", BAD[why])
+    link.publish("/map", BAD[why])
     assert (shown(module).attributes, shown(module)._transform) == before
     (error,) = channel.errors
     assert why in error
-    link.say("/map", grid([[0]]))
+    link.publish("/map", grid([[0]]))
     assert pixel(shown(module), 0.1, 0.1) == WHITE
 
 
 def test_a_map_added_later_also_shows_the_problem_of_a_grid(map, page, link, channel):
     first = map.add_module("OccupancyGrid", link, "/map")
-    link.say("/map", grid(CORNERS, 0))
+    link.publish("/map", grid(CORNERS, 0))
     other = Map(page.element("other"), 10, 10)
     second = other.add_module("OccupancyGrid", link, "/map")
     assert first.layer is second.layer
     assert len(channel.errors) == 2
-    link.say("/map", grid(CORNERS))
+    link.publish("/map", grid(CORNERS))
     assert first.layer.problems == {}
 
 
 def test_raw_cells_may_have_any_value(map, link, channel):
     module = map.add_module("OccupancyGrid", link, "/raw", palette="raw")
-    link.say("/raw", grid([[0, 101, -2]], 1.0))
+    link.publish("/raw", grid([[0, 101, -2]], 1.0))
     greys = [pixel(shown(module), x + 0.5, 0.5)[0] for x in range(3)]
     assert greys == [255, 154, 1]
     assert channel.errors == []
@@ -222,7 +222,7 @@ def test_fifty_maps_share_one_picture_and_release_it(page, link, monkeypatch):
     maps = [Map(page.element(f"m{i}"), 10, 10) for i in range(50)]
     for map in maps:
         map.add_module("OccupancyGrid", link, "/map")
-    link.say("/map", grid(CORNERS))
+    link.publish("/map", grid(CORNERS))
     assert len(drawn) == 1
     page.close()
     assert link.listeners == {}
@@ -237,7 +237,7 @@ def test_the_newest_picture_is_served_and_old_pictures_are_dropped(
     published, before = Published(), len(pictures)
     tags = []
     for value in range(4):
-        link.say("/map", grid([[value * 10]]))
+        link.publish("/map", grid([[value * 10]]))
         tags.append(shown(module).get("href").rpartition("/")[2])
     tag = tags.pop()
     assert published.image(tag).media_type == "image/png"
@@ -254,8 +254,8 @@ def test_a_large_grid_is_drawn_in_the_background_and_the_newest_is_shown(map, li
             cells[:] = value
             message = grid(cells)
             message["data"] = typed(72, cells)
-            link.say("/map", message, cbor=True)
-        assert images(module.layer) == [], "it is not drawn in the callback"
+            link.publish("/map", message, cbor=True)
+        assert images(module.layer) == [], "the callback does not draw the grid"
         await drawn(module)
         assert all(image_of(each).getcolors() for each in images(module.layer))
         colours = {image_of(each).getcolors()[0][1] for each in images(module.layer)}
@@ -275,7 +275,7 @@ def test_a_grid_becomes_stale_only_with_an_age_limit(map, link):
     once = map.add_module("OccupancyGrid", link, "/map")
     often = map.add_module("OccupancyGrid", link, "/costmap", age_limit=2.0)
     for topic in ("/map", "/costmap"):
-        link.say(topic, grid(CORNERS))
+        link.publish(topic, grid(CORNERS))
     assert once.layer.svg._age.limit > 1e6
     assert often.layer.svg._age.limit == 2.0
 
@@ -284,7 +284,7 @@ def test_a_slow_page_still_gets_recent_pictures(link, module, monkeypatch):
     monkeypatch.setattr("webmap.core.pictures.KEPT_FOR", 60.0)
     urls, before = [], len(pictures)
     for value in range(100):
-        link.say("/map", grid([[value]]))
+        link.publish("/map", grid([[value]]))
         urls.append(shown(module).get("href"))
     assert all(Published().image(each.rpartition("/")[2]).data for each in urls)
     assert len(pictures) == before + 1

@@ -1,4 +1,4 @@
-"""Grids with more cells than are drawn: coarser, and no occupied cell is lost."""
+"""Grids with too many cells are drawn coarser, without losing an occupied cell."""
 
 import asyncio
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from module_fakes import images, pixel
 from test_layers_grid import drawn
-from test_layers_grid_tiles import CELL, change, count, module, say  # noqa: F401
+from test_layers_grid_tiles import CELL, change, count, module, publish  # noqa: F401
 
 from webmap.base.geometry import Pose
 from webmap.features.layers import grid_tiles as room
@@ -14,7 +14,7 @@ from webmap.features.layers.grid_tiles import MOST, OVERLAP, SIDE, GridTiles, co
 from webmap.scene import svg
 
 FREE = np.zeros((1100, 1200), np.int8)
-"""More cells than are drawn one by one in these tests."""
+"""More cells than these tests draw one by one."""
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def test_every_occupied_cell_of_a_coarse_grid_is_visible(link, module, count, ma
         spots = [(0, 0), (5, 700), (1099, 1199), (512, 511), (1098, 3)]
         for spot in spots:
             cells[spot] = 100
-        say(link, cells)
+        publish(link, cells)
         await drawn(grids)
         assert grids.layer.tiles.coarse == 3
         assert len(count) == len(images(grids.layer)) == 1
@@ -60,7 +60,7 @@ def test_every_occupied_cell_of_a_coarse_grid_is_visible(link, module, count, ma
         await drawn(grids)
         (image,) = images(grids.layer)
         assert pixel(image, 600.5 * CELL, 300.5 * CELL) == (0, 0, 0, 255)
-        say(link, FREE[:500, :500])
+        publish(link, FREE[:500, :500])
         await drawn(grids)
         assert grids.layer.tiles.coarse == 1
         assert not grids.layer.problems
@@ -69,7 +69,7 @@ def test_every_occupied_cell_of_a_coarse_grid_is_visible(link, module, count, ma
 
 
 def test_a_grid_of_400_million_cells_is_read_in_small_steps(monkeypatch):
-    """Nothing else of the display runs during a step."""
+    """Other work of the display must wait during a step."""
     steps = []
 
     async def draw(pieces, palette):
@@ -84,7 +84,7 @@ def test_a_grid_of_400_million_cells_is_read_in_small_steps(monkeypatch):
     monkeypatch.setattr(room, "coarser", read)
 
     async def scenario():
-        # The system has no memory for zeros that were never written.
+        # The system allocates no memory for zeros that are never written.
         cells = np.zeros((20_000, 20_000), np.int8)
         tiles = GridTiles(svg.g(), "map", print)
         tiles.show(cells, CELL, Pose(0.0, 0.0, 0.0))

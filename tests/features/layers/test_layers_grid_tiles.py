@@ -1,4 +1,4 @@
-"""Large grids: which tiles are drawn, where, and that others are left alone."""
+"""Large grids: which tiles are drawn, where, and which are not drawn again."""
 
 import asyncio
 
@@ -23,7 +23,7 @@ SPECKLED = np.random.default_rng(1).integers(-1, 101, (1100, 1200)).astype(np.in
 
 @pytest.fixture
 def count(monkeypatch):
-    """The shapes of the tiles that were drawn; this process draws them."""
+    """Record the shapes of the drawn tiles; this process draws them."""
     shapes = []
 
     async def draw(pieces, palette):
@@ -37,23 +37,23 @@ def count(monkeypatch):
 
 @pytest.fixture
 def module(map, link):
-    """A map; the tests add it within a running loop."""
+    """Return a map layer; the tests add it within a running loop."""
     return lambda **options: map.add_module("OccupancyGrid", link, "/map", **options)
 
 
-def say(link, cells, *at, resolution=CELL) -> None:
+def publish(link, cells, *at, resolution=CELL) -> None:
     message = grid(np.zeros((1, 1)), resolution, pose(*(at or (0, 0))))
     message["info"] |= {"height": len(cells), "width": len(cells[0])}
     message["data"] = typed(72, np.ascontiguousarray(cells))
-    link.say("/map", message, cbor=True)
+    link.publish("/map", message, cbor=True)
 
 
 def change(link, x, y, cells) -> None:
-    link.say("/map_updates", update(x, y, cells))
+    link.publish("/map_updates", update(x, y, cells))
 
 
 def seen(layer, shape, at=(0, 0, 0)) -> np.ndarray:
-    """The colours of all cells, of shape (height, width, 4); the tiles agree."""
+    """Return the colours of all cells, of shape (height, width, 4)."""
     found = np.full((*shape, 4), 255, np.uint8)
     found[...] = CLEAR
     known = np.zeros(shape, bool)
@@ -81,7 +81,7 @@ def expected(cells) -> np.ndarray:
 def test_the_tiles_of_a_large_grid_show_every_cell_in_place(link, module, count, yaw):
     async def scenario():
         grids = module()
-        say(link, SPECKLED, 3, -4, yaw)
+        publish(link, SPECKLED, 3, -4, yaw)
         await drawn(grids)
         assert len(count) == len(images(grids.layer)) == 9
         picture = seen(grids.layer, SPECKLED.shape, (3, -4, yaw))
@@ -95,7 +95,7 @@ def test_the_tiles_of_a_large_grid_show_every_cell_in_place(link, module, count,
 def test_neighbouring_tiles_overlap_so_that_no_seam_is_visible(link, module, count):
     async def scenario():
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await drawn(grids)
         for side in (SIDE * CELL, 2 * SIDE * CELL):
             for at in ((side + CELL / 2, 1.0), (1.0, side + CELL / 2)):
@@ -110,7 +110,7 @@ def test_neighbouring_tiles_overlap_so_that_no_seam_is_visible(link, module, cou
     ("x", "y", "size", "tiles"),
     [
         (600, 600, 100, 1),
-        (SIDE, 600, 5, 2),  # its neighbour draws these columns, too
+        (SIDE, 600, 5, 2),  # the neighbouring tile draws these columns, too
         (SIDE - 5, SIDE - 5, 10, 4),
         (1190, 1090, 10, 1),
         (0, 0, 1, 1),
@@ -121,7 +121,7 @@ def test_an_update_draws_and_sends_only_the_tiles_it_touches(
 ):
     async def scenario():
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await drawn(grids)
         before = {each: each.get("href") for each in images(grids.layer)}
         count.clear()
@@ -147,15 +147,15 @@ def test_an_update_draws_and_sends_only_the_tiles_it_touches(
 def test_a_grid_with_few_changed_cells_draws_only_their_tiles(link, module, count):
     async def scenario():
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await drawn(grids)
         count.clear()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await drawn(grids)
         assert count == []
         cells = SPECKLED.copy()
         cells[700, 700] ^= 1
-        say(link, cells)
+        publish(link, cells)
         await drawn(grids)
         assert len(count) == 1
 
@@ -166,7 +166,7 @@ def test_a_grid_with_few_changed_cells_draws_only_their_tiles(link, module, coun
 def test_a_map_that_grows_keeps_the_tiles_it_has(link, module, count, yaw):
     async def scenario():
         grids = module()
-        say(link, SPECKLED, 3, -4, yaw)
+        publish(link, SPECKLED, 3, -4, yaw)
         await drawn(grids)
         before = {
             each: (each.get("href"), matrix_of(each)) for each in images(grids.layer)
@@ -175,9 +175,9 @@ def test_a_map_that_grows_keeps_the_tiles_it_has(link, module, count, yaw):
         grown = np.full((1100, 1300), 40, np.int8)
         grown[:, 100:] = SPECKLED
         x, y = Affine.rotation(yaw).apply(-100 * CELL, 0)
-        say(link, grown, 3 + x, -4 + y, yaw)
+        publish(link, grown, 3 + x, -4 + y, yaw)
         await drawn(grids)
-        assert len(count) == 3, "those of the new columns"
+        assert len(count) == 3, "only tiles of the new columns are drawn"
         assert {width for _, width in count} == {100 + OVERLAP}
         after = {
             each: (each.get("href"), matrix_of(each)) for each in images(grids.layer)
@@ -195,10 +195,10 @@ def test_a_map_that_grows_keeps_the_tiles_it_has(link, module, count, yaw):
 def test_a_grid_with_other_cells_is_drawn_anew(link, module, count, at, resolution):
     async def scenario():
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await drawn(grids)
         count.clear()
-        say(link, SPECKLED, *at, resolution=resolution)
+        publish(link, SPECKLED, *at, resolution=resolution)
         await drawn(grids)
         assert len(count) == len(images(grids.layer)) == 9
         placed = Affine.translation(*at[:2]) @ Affine.rotation((*at, 0)[2])
@@ -217,13 +217,13 @@ def test_a_smaller_grid_removes_tiles_and_their_pictures(link, module, count, pa
     async def scenario():
         before = len(pictures)
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await drawn(grids)
         assert len(pictures) == before + 9
-        say(link, SPECKLED[:, :1000])
+        publish(link, SPECKLED[:, :1000])
         await drawn(grids)
         assert len(images(grids.layer)) == 6
-        say(link, SPECKLED[:600, :500])
+        publish(link, SPECKLED[:600, :500])
         await drawn(grids)
         assert len(images(grids.layer)) == 1
         page.close()
@@ -241,7 +241,7 @@ def test_a_tile_without_a_visible_cell_has_no_picture(
         grids = module(palette=palette)
         cells = np.full((1100, 1200), clear, np.int8)
         cells[10, 10] = 50
-        say(link, cells)
+        publish(link, cells)
         await drawn(grids)
         assert len(count) == 9
         assert len(images(grids.layer)) == 1
@@ -258,7 +258,7 @@ def test_a_tile_without_a_visible_cell_has_no_picture(
 def test_late_viewers_get_all_tiles(link, module, count):
     async def scenario():
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await drawn(grids)
         change(link, 600, 600, [[1]])
         await drawn(grids)
@@ -275,11 +275,11 @@ def test_updates_wait_while_a_large_grid_is_copied_and_leave_the_message(
 ):
     async def scenario():
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         message = grids.layer.cells
         for number in range(5):
             change(link, number, 3, [[number, 90]])
-        assert grids.layer.cells is message, "it is not copied in the callback"
+        assert grids.layer.cells is message, "the callback does not copy the cells"
         await drawn(grids)
         assert np.array_equal(message, SPECKLED)
         assert grids.layer.cells[3, :6].tolist() == [0, 1, 2, 3, 4, 90]
@@ -292,10 +292,10 @@ def test_updates_wait_while_a_large_grid_is_copied_and_leave_the_message(
 def test_a_whole_grid_replaces_updates_that_still_wait(link, module, count):
     async def scenario():
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         change(link, 0, 0, [[33]])
         later = np.full_like(SPECKLED, 20)
-        say(link, later)
+        publish(link, later)
         change(link, 5, 0, [[44]])
         await drawn(grids)
         later[0, 5] = 44
@@ -317,10 +317,10 @@ def test_an_older_drawing_never_replaces_a_newer_one(link, module, monkeypatch):
 
     async def scenario():
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await begun.wait()
         small = np.full((100, 100), 30, np.int8)
-        say(link, small)  # it is drawn at once, while the large one is being drawn
+        publish(link, small)  # drawn at once, during the large grid
         go_on.set()
         await drawn(grids)
         assert np.array_equal(seen(grids.layer, small.shape), expected(small))
@@ -343,13 +343,13 @@ def test_a_failing_worker_is_a_problem_until_it_draws_again(link, module, monkey
     async def scenario():
         nonlocal fails
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await drawn(grids)
         assert images(grids.layer) == []
         (problem,) = grids.layer.problems.values()
         assert problem.startswith("/map: its decoder ended")
         fails = False
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await drawn(grids)
         assert grids.layer.problems == {}
         assert len(images(grids.layer)) == 9
@@ -371,7 +371,7 @@ def test_the_drawing_ends_with_the_layer(link, module, page, monkeypatch):
     async def scenario():
         before = len(pictures)
         grids = module()
-        say(link, SPECKLED)
+        publish(link, SPECKLED)
         await begun.wait()
         page.close()
         await drawn(grids)
@@ -388,7 +388,7 @@ def test_a_grid_of_a_million_cells_is_one_tile_that_moves_with_the_grid(
         grids = module()
         cells = SPECKLED[:1000, :1048]
         for at in ((0, 0), (3, -4, 0.5), (600 * CELL, 0)):
-            say(link, cells, *at)
+            publish(link, cells, *at)
             await drawn(grids)
             (only,) = images(grids.layer)
             assert image_of(only).size == (1048, 1000)

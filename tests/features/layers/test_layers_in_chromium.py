@@ -1,4 +1,4 @@
-"""Layers as a real browser draws them: where on the screen, and in which colour."""
+"""Layers in a real browser: their places on the screen and their colours."""
 
 import io
 import math
@@ -38,7 +38,7 @@ TOGETHER = """(robot) => {
     left: on(robot, 0.3, 0.2),
   };
 }"""
-"""What goes along with a robot and where that is, at one time: it moves meanwhile."""
+"""The parts of a moving robot and their places, read at one time."""
 
 
 @pytest.fixture(scope="module")
@@ -59,26 +59,26 @@ def tab(chromium: Browser, url: str) -> Iterator[Page]:
 
 
 def on_screen(tab: Page, x: float, y: float, of: str = "svg.webmap .world"):
-    """Where a point of an element's own coordinates is on the screen."""
+    """Return where a point in an element's coordinates is on the screen."""
     return tab.evaluate(POINT, [of, x, y])
 
 
 def colours(tab: Page, *places: tuple[float, float]) -> list[tuple[int, ...]]:
-    """What is drawn now at places of the world, in metres."""
+    """Return the colours now drawn at places of the world, in metres."""
     picture = Image.open(io.BytesIO(tab.screenshot())).convert("RGB")
     pixels = [on_screen(tab, x, y) for x, y in places]
     return [picture.getpixel((round(u), round(v))) for u, v in pixels]
 
 
 def await_colours(tab: Page, wanted: list, *places: tuple[float, float]) -> None:
-    """Wait until images are drawn: they have addresses before they have pixels."""
+    """Wait until images are drawn; they have addresses before they have pixels."""
     deadline = time.monotonic() + 15
     while (found := colours(tab, *places)) != wanted:
-        assert time.monotonic() < deadline, f"never drawn so: {found}"
+        assert time.monotonic() < deadline, f"other colours are drawn: {found}"
 
 
 def floor(x: float, y: float) -> tuple[float, float]:
-    """A place of the floor, from its lower left corner, in the world."""
+    """Return a place of the floor in the world, from its lower left corner."""
     cos, sin = math.cos(0.2), math.sin(0.2)
     return -3 + cos * x - sin * y, -2 + sin * x + cos * y
 
@@ -86,7 +86,7 @@ def floor(x: float, y: float) -> tuple[float, float]:
 def test_the_map_is_drawn_in_place_while_it_is_updated(tab):
     corner = [(0.1, 0.1), (0.9, 0.1), (0.1, 0.9), (0.9, 0.9)]
     beside = [(1.1, 0.5), (0.5, 1.1), (0.1, 3.9), (5.0, 0.1)]
-    for _ in range(3):  # it is drawn anew twenty times a second meanwhile
+    for _ in range(3):  # the page is drawn again twenty times a second meanwhile
         assert colours(tab, *(floor(*at) for at in corner + beside)) == [
             *([WALL] * 4),
             *([FREE] * 4),
@@ -106,7 +106,7 @@ def test_cube_and_text_markers_are_drawn_at_their_positions(tab):
     x, y = on_screen(tab, 0, 0.4)
     assert abs(box["x"] + box["width"] / 2 - x) < 6
     assert abs(box["y"] + box["height"] / 2 - y) < 12
-    assert box["width"] > box["height"], "it stands upright"
+    assert box["width"] > box["height"], "the box is not upright"
 
 
 def test_a_path_stays_while_a_cloud_and_a_footprint_move_with_the_robot(tab):

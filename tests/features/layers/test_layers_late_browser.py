@@ -1,4 +1,4 @@
-"""What a slow link brings is drawn as old, though it has only just come."""
+"""Data from a slow link is drawn as old, although it arrived just now."""
 
 import re
 from urllib.parse import urlsplit
@@ -14,7 +14,7 @@ from webmap_process import webmap
 pytestmark = pytest.mark.browser
 
 LATE = 1.6
-"""Seconds by which everything is late that comes from the robots."""
+"""The delay of all messages from the robots, in seconds."""
 
 DRAWN = (".robot", ".laserscan", ".range")
 
@@ -31,13 +31,13 @@ def test_data_of_a_slow_link_is_drawn_as_stale_with_its_age(chromium: Browser):
         tab.set_default_timeout(20_000)
         tab.goto(url)
         for drawn in DRAWN:
-            # Of both robots: what is not heard of yet has no age.
+            # Of both robots: an element without data has no age.
             tab.locator(f"{drawn}:not(.stale)").nth(1).wait_for(state="attached")
         assert age_of(tab, ".robot") < 1.0
         link.shape(Shape(latency=LATE), "down")
         for drawn in DRAWN:
             tab.wait_for_selector(f"{drawn}.stale", state="attached")
-        tab.wait_for_timeout(2 * 1000 * LATE)  # what comes now comes late, and often
+        tab.wait_for_timeout(2 * 1000 * LATE)  # messages now arrive late and often
         assert tab.evaluate(LEAST_AGES, list(DRAWN)) >= 0.9 * LATE
         line = tab.locator("#robots .age").first
         expect(line).to_have_text(re.compile(r"^[1-3]\.\d s$"))
@@ -50,7 +50,7 @@ def age_of(tab: Page, selector: str) -> float:
     return tab.evaluate(LEAST_AGES, [selector])
 
 
-# Looked at for a second, so that what is drawn as new in between is seen.
+# Read for a second, so that elements drawn as new in between are found.
 LEAST_AGES = """async (selectors) => {
   let least = Infinity;
   const end = performance.now() + 1000;

@@ -1,4 +1,4 @@
-"""Maps from disk, in the form of map_server."""
+"""Maps from disk, in the format of map_server."""
 
 import asyncio
 import math
@@ -43,13 +43,15 @@ def described(folder, text="", *, image="map.pgm", **changed):
     known = dict(line.split(": ", 1) for line in lines)
     known.update(changed, image=image)
     file = folder / "map.yaml"
-    said = [f"{key}: {value}" for key, value in known.items() if value is not None]
-    file.write_text("\n".join(said) + "\n")
+    yaml_lines = [
+        f"{key}: {value}" for key, value in known.items() if value is not None
+    ]
+    file.write_text("\n".join(yaml_lines) + "\n")
     return file
 
 
 ROWS = [[0, 254, 254], [254, 205, 100]]
-"""A wall at the upper left, an unknown cell below, and something in between."""
+"""A wall at the upper left, an unknown cell below, and a value in between."""
 
 
 @pytest.mark.parametrize(
@@ -71,10 +73,10 @@ def test_png_and_bmp_images_give_the_same_map(tmp_path, suffix):
 
 
 SEE_THROUGH = [
-    # Red, green, blue, alpha; what map_server makes of it in each of its modes.
+    # Red, green, blue, alpha, and the result of map_server in each mode.
     ((0, 0, 0, 255), {"trinary": 100, "scale": 100, "raw": 0}),
     ((254, 254, 254, 255), {"trinary": 0, "scale": 0, "raw": -1}),
-    # 205 is unknown by itself; with 255 for its alpha the mean is 217, which is free.
+    # 205 alone is unknown; the mean with an alpha of 255 is 217, which is free.
     ((205, 205, 205, 255), {"trinary": 0, "raw": -1}),
     ((150, 150, 150, 255), {"trinary": -1, "raw": -1}),
     ((0, 0, 0, 0), {"trinary": 100, "scale": -1, "raw": 0}),

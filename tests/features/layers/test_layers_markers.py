@@ -1,4 +1,4 @@
-"""Markers: each type where and as large as it says."""
+"""Markers: each type has its place and size."""
 
 import asyncio
 import math
@@ -13,7 +13,7 @@ ARROW, CUBE, SPHERE, CYLINDER, STRIP, LINES = range(6)
 CUBES, SPHERES, POINTS, TEXT, MESH, TRIANGLES = range(6, 12)
 RED, BLUE = {"r": 1, "g": 0, "b": 0, "a": 1}, {"r": 0, "g": 0, "b": 1.0, "a": 0.5}
 AT = (3.0, -2.0, math.pi / 2)
-"""Here a metre ahead of a marker is a metre to the north."""
+"""A pose at which a metre ahead of a marker is a metre to the north."""
 
 
 def vector(x=0.0, y=0.0, z=0.0) -> dict:
@@ -42,8 +42,8 @@ def marker(type, points=(), *, scale=(1, 1, 1), at=AT, ros2=False, **more) -> di
     }
 
 
-def say(link, *markers) -> None:
-    link.say("/markers", {"markers": list(markers)})
+def publish(link, *markers) -> None:
+    link.publish("/markers", {"markers": list(markers)})
 
 
 @pytest.fixture
@@ -67,7 +67,7 @@ def near(points):
 
 @pytest.mark.parametrize("ros2", [False, True])
 def test_a_cube_is_a_box_centred_on_its_pose(link, layer, ros2):
-    say(link, marker(CUBE, scale=(2, 0.5, 9), ros2=ros2))
+    publish(link, marker(CUBE, scale=(2, 0.5, 9), ros2=ros2))
     (box,) = only(layer).children
     x, y, wide, high = (float(box.get(n)) for n in ("x", "y", "width", "height"))
     place = to_root(box)
@@ -81,7 +81,7 @@ def test_a_cube_is_a_box_centred_on_its_pose(link, layer, ros2):
 def test_spheres_and_cylinders_are_ellipses_with_their_two_diameters(
     link, layer, type, name
 ):
-    say(link, marker(type, scale=(2, 1, 1), color=BLUE))
+    publish(link, marker(type, scale=(2, 1, 1), color=BLUE))
     (ellipse,) = only(layer).children
     assert (ellipse.get("rx"), ellipse.get("ry")) == ("1", "0.5")
     assert (ellipse.get("fill"), ellipse.get("fill-opacity")) == ("#0000ff", "0.5")
@@ -90,7 +90,7 @@ def test_spheres_and_cylinders_are_ellipses_with_their_two_diameters(
 
 
 def test_an_arrow_has_the_length_of_its_scale(link, layer):
-    say(link, marker(ARROW, scale=(2.0, 0.1, 0.1)))
+    publish(link, marker(ARROW, scale=(2.0, 0.1, 0.1)))
     (arrow,) = only(layer).children
     outline = corners(arrow, arrow.get("points"))
     assert outline[3] == pytest.approx((3, 0))
@@ -99,7 +99,7 @@ def test_an_arrow_has_the_length_of_its_scale(link, layer):
 
 
 def test_an_arrow_goes_from_its_first_point_to_its_second(link, layer):
-    say(link, marker(ARROW, [(1, 1), (4, 5)], scale=(0.1, 0.3, 1.0)))
+    publish(link, marker(ARROW, [(1, 1), (4, 5)], scale=(0.1, 0.3, 1.0)))
     (arrow,) = only(layer).children
     outline = corners(arrow, arrow.get("points"))
     # Turned by a right angle about (3, -2).
@@ -111,12 +111,12 @@ def test_an_arrow_goes_from_its_first_point_to_its_second(link, layer):
 def test_a_line_strip_is_one_line_and_a_line_list_is_many_lines(link, layer):
     points = [(0, 0), (1, 0), (1, 1), (2, 1)]
     there = [(3, -2), (3, -1), (2, -1), (2, 0)]
-    say(link, marker(STRIP, points, scale=(0.05, 0, 0)))
+    publish(link, marker(STRIP, points, scale=(0.05, 0, 0)))
     (strip,) = only(layer).children
     assert corners(strip, strip.get("points")) == near(there)
     assert strip.get("stroke-width") == "0.05"
     assert strip.get("fill") == "none"
-    say(link, marker(LINES, points, scale=(0.05, 0, 0)))
+    publish(link, marker(LINES, points, scale=(0.05, 0, 0)))
     (lines,) = only(layer).children
     assert corners(lines, lines.get("d")) == near(there)
     assert lines.get("d").count("M") == 2
@@ -126,7 +126,7 @@ def test_a_line_strip_is_one_line_and_a_line_list_is_many_lines(link, layer):
 def test_cube_lists_and_points_are_rectangles_centred_on_their_points(
     link, layer, type
 ):
-    say(link, marker(type, [(0, 0), (5, 1)], scale=(0.4, 0.2, 1)))
+    publish(link, marker(type, [(0, 0), (5, 1)], scale=(0.4, 0.2, 1)))
     (path,) = only(layer).children
     first, second = path.get("d").split("z")[:2]
     x, y, wide, high, back = numbers(second)
@@ -137,7 +137,7 @@ def test_cube_lists_and_points_are_rectangles_centred_on_their_points(
 
 
 def test_sphere_lists_are_circles_centred_on_their_points(link, layer):
-    say(link, marker(SPHERES, [(1, 2)], scale=(0.4, 0.4, 0.4)))
+    publish(link, marker(SPHERES, [(1, 2)], scale=(0.4, 0.4, 0.4)))
     (path,) = only(layer).children
     x, y, rx, ry, *_ = numbers(path.get("d"))
     assert to_root(path).apply(x + rx, y) == pytest.approx((3 - 2, -2 + 1))
@@ -145,7 +145,7 @@ def test_sphere_lists_are_circles_centred_on_their_points(link, layer):
 
 
 def test_triangles_are_closed_paths_through_their_points(link, layer):
-    say(link, marker(TRIANGLES, [(0, 0), (1, 0), (0, 1)]))
+    publish(link, marker(TRIANGLES, [(0, 0), (1, 0), (0, 1)]))
     (path,) = only(layer).children
     assert corners(path, path.get("d")) == near([(3, -2), (3, -1), (2, -2)])
     assert path.get("d").endswith("z")
@@ -156,7 +156,7 @@ def test_points_with_their_own_colours_are_drawn_in_these_colours(link, layer, t
     count = 6
     points = [(i, i * i) for i in range(count)]
     colours = [RED] * 3 + [BLUE] * 3
-    say(link, marker(type, points, colors=colours, scale=(0.1, 0.1, 0.1)))
+    publish(link, marker(type, points, colors=colours, scale=(0.1, 0.1, 0.1)))
     fills = {path.get("fill") or path.get("stroke") for path in only(layer).children}
     if type in (STRIP, LINES):
         fills = {path.get("stroke") for path in only(layer).children}
@@ -167,17 +167,17 @@ def test_a_text_marker_is_upright_and_contains_only_text(link, layer):
     words = "<script>alert(1)</script> Küche"
     zeros = {"x": 0, "y": 0, "z": 0, "w": 0}
     at = {"position": vector(1, 2), "orientation": zeros}
-    say(link, marker(TEXT, text=words, scale=(0, 0, 0.3), pose=at))
+    publish(link, marker(TEXT, text=words, scale=(0, 0, 0.3), pose=at))
     (text,) = only(layer).children
     assert text.text == words
     size = float(text.get("font-size"))
     assert to_root(text).apply(0, 0) == (1, 2)
     letter = to_root(text).apply(0, -size)
-    assert letter == pytest.approx((1, 2.3)), "letters have y downward"
+    assert letter == pytest.approx((1, 2.3)), "letters have their y axis downward"
 
 
 def test_markers_are_replaced_and_deleted_by_namespace_and_id(link, layer):
-    say(
+    publish(
         link,
         marker(CUBE, id=1),
         marker(CUBE, id=2),
@@ -185,23 +185,23 @@ def test_markers_are_replaced_and_deleted_by_namespace_and_id(link, layer):
     )
     first, second, other = layer.svg.children
     assert (other.get("data-ns"), other.get("data-id")) == ("other", "1")
-    say(link, marker(SPHERE, id=1))
+    publish(link, marker(SPHERE, id=1))
     assert [list(shape.classes)[1] for shape in layer.svg.children] == [
         "sphere",
         "cube",
         "sphere",
     ]
-    say(link, marker(CUBE, id=1, action=2), marker(CUBE, id=77, action=2))
+    publish(link, marker(CUBE, id=1, action=2), marker(CUBE, id=77, action=2))
     assert layer.svg.children == (second, other)
-    say(link, marker(CUBE, action=3))
+    publish(link, marker(CUBE, action=3))
     assert layer.svg.children == ()
     assert first.parent is None
 
 
 def test_a_moved_marker_keeps_its_element(link, layer):
-    say(link, marker(CUBE))
+    publish(link, marker(CUBE))
     before = only(layer)
-    say(link, marker(CUBE, at=(7, 8, 0)))
+    publish(link, marker(CUBE, at=(7, 8, 0)))
     assert only(layer) is before
     assert to_root(before).apply(0, 0) == (7, 8)
 
@@ -210,9 +210,9 @@ def test_a_single_marker_message_is_drawn(map, link, channel):
     layer = map.add_module(
         "Markers", link, "/marker", type="visualization_msgs/msg/Marker"
     ).layer
-    link.say("/marker", marker(CUBE))
+    link.publish("/marker", marker(CUBE))
     assert "cube" in only(layer).classes
-    link.say("/marker", marker(CUBE, scale=(0, 1, 1)))
+    link.publish("/marker", marker(CUBE, scale=(0, 1, 1)))
     (error,) = channel.errors
     assert error.endswith("marker 1 of 'test': scale.x must be metres above 0, got 0.0")
 
@@ -240,16 +240,16 @@ BAD = {
 
 @pytest.mark.parametrize("why", BAD)
 def test_only_the_invalid_marker_of_an_array_is_left_out(link, layer, channel, why):
-    say(link, marker(SPHERE))
+    publish(link, marker(SPHERE))
     before = only(layer)
-    say(link, BAD[why], marker(CUBE, id=2))
+    publish(link, BAD[why], marker(CUBE, id=2))
     one, other = layer.svg.children
     assert one is before
     assert "cube" in other.classes
     (error,) = channel.errors
     assert why in error
     assert "1 of 2 are left out" in error
-    say(link, marker(CUBE, id=2))
+    publish(link, marker(CUBE, id=2))
     assert layer.problems == {}
 
 
@@ -277,13 +277,15 @@ def test_a_marker_with_a_zero_quaternion_is_drawn_unrotated_and_logged_once(
 ):
     nowhere = {**pose(3, -2), "orientation": ZEROS["orientation"]}
     unset = marker(type, points, pose=nowhere)
-    say(link, unset, {**unset, "id": 2})
-    say(link, unset)
+    publish(link, unset, {**unset, "id": 2})
+    publish(link, unset)
     assert len(layer.svg.children) == 2
     assert to_root(layer.svg.children[0]).apply(1, 0) == pytest.approx((4, -2))
     assert channel.errors == []
-    (said,) = (r.getMessage() for r in caplog.records if "zeros" in r.getMessage())
-    assert "marker 1 of 'test' has a quaternion of zeros and is drawn unturned" in said
+    (warning,) = (r.getMessage() for r in caplog.records if "zeros" in r.getMessage())
+    assert (
+        "marker 1 of 'test' has a quaternion of zeros and is drawn unturned" in warning
+    )
 
 
 def test_markers_beyond_the_limit_are_left_out_and_counted_in_a_notice(
@@ -299,17 +301,17 @@ def test_markers_beyond_the_limit_are_left_out_and_counted_in_a_notice(
 
     async def scenario():
         layer = map.add_module("Markers", link, "/markers").layer
-        say(link, *(marker(CUBE, id=i) for i in range(11)))
-        say(link, *(marker(CUBE, id=i) for i in range(12)))  # the same, and one more
+        publish(link, *(marker(CUBE, id=i) for i in range(11)))
+        publish(link, *(marker(CUBE, id=i) for i in range(12)))  # the same and one more
         assert len(layer.svg.children) == 10
         await until(lambda: channel.problems)
-        (said,) = channel.problems.values()
-        assert said == "/markers: 2 markers are left out: at most 10 are drawn"
-        say(link, marker(CUBE, id=0, action=3))  # delete all
+        (problem,) = channel.problems.values()
+        assert problem == "/markers: 2 markers are left out: at most 10 are drawn"
+        publish(link, marker(CUBE, id=0, action=3))  # delete all
         assert not channel.problems
-        say(link, *(marker(CUBE, id=i) for i in range(11)))
+        publish(link, *(marker(CUBE, id=i) for i in range(11)))
         await until(lambda: channel.problems)
-        say(link, marker(CUBE, id=1, action=2), marker(CUBE, id=10))
+        publish(link, marker(CUBE, id=1, action=2), marker(CUBE, id=10))
         await until(lambda: not channel.problems)
 
     asyncio.run(scenario())
@@ -318,11 +320,11 @@ def test_markers_beyond_the_limit_are_left_out_and_counted_in_a_notice(
 def test_a_marker_with_a_very_long_namespace_is_left_out_with_a_short_notice(
     link, layer, channel
 ):
-    say(link, marker(CUBE, ns="n" * 100_000), marker(CUBE, id=2))
+    publish(link, marker(CUBE, ns="n" * 100_000), marker(CUBE, id=2))
     assert len(layer.svg.children) == 1
-    (said,) = channel.problems.values()
-    assert "a namespace of 100000 characters; the limit is 256" in said
-    assert len(said) < 1100
+    (problem,) = channel.problems.values()
+    assert "a namespace of 100000 characters; the limit is 256" in problem
+    assert len(problem) < 1100
 
 
 @pytest.mark.parametrize("ros2", [False, True])
@@ -334,13 +336,13 @@ def test_a_marker_is_removed_after_its_lifetime_unless_it_is_sent_again(
 
     async def scenario():
         layer = map.add_module("Markers", link, "/markers").layer
-        say(
+        publish(
             link,
             marker(CUBE, id=1, lifetime=brief),
             marker(CUBE, id=2),
             marker(CUBE, id=3, lifetime=brief),
         )
-        say(link, marker(CUBE, id=3))
+        publish(link, marker(CUBE, id=3))
         assert len(layer.svg.children) == 3
         deadline = time.monotonic() + 10
         while len(layer.svg.children) == 3:

@@ -1,4 +1,4 @@
-"""What fails at every message, each time with other numbers, as a page shows it."""
+"""How a page shows an error that occurs in every message, with other numbers."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +17,7 @@ COUNT = """
 window.most = 0;
 window.words = new Set();
 new MutationObserver(() => {
-  // What is said of a link that is held up is another matter.
+  // Notices about a slow link do not count.
   const boxes = document.querySelectorAll(".webmap-notice:not(.status)");
   window.most = Math.max(window.most, boxes.length);
   for (const { textContent } of boxes) window.words.add(textContent);
@@ -31,7 +31,7 @@ CLEAR = """() => {
   const boxes = [...document.querySelectorAll(".webmap-notice")];
   return tool && !boxes.some((box) => covers(box.getBoundingClientRect()));
 }"""
-"""Whether the notices leave the tool at the top of the map alone."""
+"""Whether the notices do not cover the tool at the top of the map."""
 
 
 @pytest.fixture
@@ -48,8 +48,8 @@ def tab(chromium: Browser) -> Iterator[Page]:
 
 
 def test_repeated_nan_messages_show_one_notice_until_the_path_is_valid(tab):
-    said = tab.locator(".webmap-notice")
-    expect(said).to_contain_text("Ann: /plan: a path must be of finite numbers, got")
+    notices = tab.locator(".webmap-notice")
+    expect(notices).to_contain_text("Ann: /plan: a path must be of finite numbers, got")
     path = tab.locator(".path > polyline[points]")
     expect(path).to_have_count(1)
     drawn = path.get_attribute("points")
@@ -58,22 +58,22 @@ def test_repeated_nan_messages_show_one_notice_until_the_path_is_valid(tab):
         ".getAttribute('points') !== d",
         arg=drawn,
     )
-    expect(said).to_have_count(1)
+    expect(notices).to_have_count(1)
     assert tab.evaluate("[window.most, window.words.size]") == [1, 1]
     tab.keyboard.press("m")
-    expect(said).to_have_count(0)
+    expect(notices).to_have_count(0)
     expect(path).to_have_count(2)
 
     tab.keyboard.press("m")
-    expect(said).to_have_count(1)
-    said.get_by_role("button", name="Dismiss").click()
+    expect(notices).to_have_count(1)
+    notices.get_by_role("button", name="Dismiss").click()
     tab.locator("svg.webmap").focus()
     tab.keyboard.press("m")
     expect(path).to_have_count(2)
     tab.keyboard.press("m")
     tab.keyboard.press("b")
-    expect(said).to_contain_text("Ann: /plan_of_ann: ")
-    expect(said).to_have_count(1)
+    expect(notices).to_contain_text("Ann: /plan_of_ann: ")
+    expect(notices).to_have_count(1)
     tab.reload()
-    expect(said).to_have_count(2)
+    expect(notices).to_have_count(2)
     tab.wait_for_function(CLEAR)

@@ -1,4 +1,4 @@
-"""The views of the modules' messages, also by way of the worker for large frames."""
+"""The views of the modules' messages, also with the worker for large frames."""
 
 import json
 

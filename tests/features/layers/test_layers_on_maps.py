@@ -1,4 +1,4 @@
-"""Map modules that a robot brings along."""
+"""Modules of robots that draw on maps."""
 
 import pytest
 from module_fakes import header, images, pose
@@ -19,7 +19,7 @@ def test_only_maps_that_show_the_robot_have_its_map_module(map, page, robot, lin
     module = robot.add_module("OnMaps", "OccupancyGrid", link, "/c", palette="costmap")
     assert (len(grids(map)), len(grids(other))) == (1, 0)
     other.add_robot(robot)
-    assert grids(other)[0].layer is grids(map)[0].layer, "it is drawn once for both"
+    assert grids(other)[0].layer is grids(map)[0].layer, "both maps share one layer"
     map.remove_robot(robot)
     assert (len(grids(map)), len(grids(other))) == (0, 1)
     robot.remove_module(module)
@@ -49,7 +49,7 @@ def test_the_map_module_of_a_robot_draws_its_grid(map, robot, link, channel):
     robot.add_module("OnMaps", "OccupancyGrid", link, "/c")
     info = {"map_load_time": header()["stamp"], "resolution": 1, "width": 1}
     info |= {"height": 1, "origin": pose(0, 0)}
-    link.say("/c", {"header": header(), "info": info, "data": [100]})
+    link.publish("/c", {"header": header(), "info": info, "data": [100]})
     (image,) = images(grids(map)[0].layer)
     assert image.get("href")
 
@@ -60,7 +60,7 @@ def test_an_unknown_map_module_is_refused_with_its_name(robot):
 
 
 @pytest.mark.parametrize(
-    ("module", "options", "said"),
+    ("module", "options", "expected"),
     [
         ("OccupancyGrid", {"palette": "grey"}, 'palette: expected "map" or "costmap"'),
         ("OccupancyGrid", {"pallet": "map"}, 'did you mean "palette"'),
@@ -68,9 +68,9 @@ def test_an_unknown_map_module_is_refused_with_its_name(robot):
     ],
 )
 def test_invalid_arguments_are_refused_before_the_robot_is_on_a_map(
-    robot, link, module, options, said
+    robot, link, module, options, expected
 ):
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(ConfigError, match=expected):
         robot.add_module("OnMaps", module, link, "/c", **options)
 
 

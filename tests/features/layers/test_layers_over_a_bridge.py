@@ -1,4 +1,4 @@
-"""Layers over real sockets, from the simulator, in both dialects."""
+"""Layers with messages of the simulator over real sockets, in both dialects."""
 
 import asyncio
 import time
@@ -46,7 +46,7 @@ def test_drawn_cells_match_the_floor_plan_of_the_simulator(
 def test_missing_frames_are_a_problem_some_time_after_the_link_opens(
     monkeypatch, map: Map, page: Page, robot
 ):
-    """Nothing ever comes of them, so nothing but the time makes anybody look."""
+    """No frame arrives, so only the passing time triggers the check."""
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.6)
     monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.1)
 
@@ -58,7 +58,7 @@ def test_missing_frames_are_a_problem_some_time_after_the_link_opens(
         await until(lambda: urls)
         bridge = Bridge(urls[0])
         opened = []
-        # Before the frames, whose time begins when they hear of it.
+        # Added before the frames, whose time starts when they learn of the link.
         bridge.on_open(lambda: opened.append(time.monotonic()))
         robot.set_tf(bridge, namespace="/ghost")
         grid = map.add_module(

@@ -1,4 +1,4 @@
-"""A layer in one file outside of the package has all that a built-in one has."""
+"""A layer in one file outside of the package can do all that a built-in layer can."""
 
 import asyncio
 import importlib.util
@@ -45,7 +45,7 @@ TOPICS = {
 
 @pytest.fixture(autouse=True)
 def own_layers(monkeypatch, tmp_path):
-    """Import the file from a folder of its own, and forget its layers afterwards."""
+    """Import the file from another folder, and remove its layers afterwards."""
     for namespace in (robot_modules, map_modules):
         monkeypatch.setattr(namespace, "_registered", dict(namespace._registered))
     file = tmp_path / "my_own_layers.py"
@@ -71,7 +71,7 @@ def stamped(seconds: float, frame_id: str = "base_link") -> dict:
 
 
 def go(link, seconds: float, x: float, yaw: float) -> None:
-    link.say("/odom", {"header": stamped(seconds, "map"), "pose": pose(x, 0, yaw)})
+    link.publish("/odom", {"header": stamped(seconds, "map"), "pose": pose(x, 0, yaw)})
 
 
 def degrees(celsius: float | None, seconds: float = 3.0) -> dict:
@@ -140,8 +140,8 @@ def test_a_robot_layer_stays_at_its_stamp_pose_with_upright_text(link, robot):
     module = robot.add_module("Temperature", link, "/bob/temp")
     assert link.types["/bob/temp"] == "sensor_msgs/Temperature"
     assert list(module.svg.classes) == ["temperature"]
-    assert module.svg.get("data-layer") == "temp", "what the list of layers calls it"
-    link.say("/bob/temp", degrees(21.04))
+    assert module.svg.get("data-layer") == "temp", "the name in the list of layers"
+    link.publish("/bob/temp", degrees(21.04))
     assert module.text.text == "21.0 °C"
     assert to_root(module.text).apply(0, 0) == pytest.approx((5.5, 0), abs=1e-3)
     go(link, 3.3, 9.0, 2.0)
@@ -152,7 +152,7 @@ def test_a_robot_layer_stays_at_its_stamp_pose_with_upright_text(link, robot):
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "expected"),
     [
         (degrees(math.nan, 2.95), "temperature must be a finite number, got nan"),
         (degrees(None), "temperature must be a finite number, got null"),
@@ -162,41 +162,41 @@ def test_a_robot_layer_stays_at_its_stamp_pose_with_upright_text(link, robot):
     ],
 )
 def test_invalid_messages_are_logged_once_and_the_last_drawing_stays(
-    link, robot, caplog, wrong, said
+    link, robot, caplog, wrong, expected
 ):
     module = robot.add_module("Temperature", link, "/bob/temp")
-    link.say("/bob/temp", degrees(21))
+    link.publish("/bob/temp", degrees(21))
     before = to_root(module.text)
     for _ in range(3):
-        link.say("/bob/temp", wrong)
+        link.publish("/bob/temp", wrong)
     assert module.text.text == "21.0 °C"
     assert to_root(module.text) == before
     (problem,) = robot.problems.values()
-    assert said in problem
-    received = [each for each in caplog.records if said in each.getMessage()]
+    assert expected in problem
+    received = [each for each in caplog.records if expected in each.getMessage()]
     assert len(received) == 1
-    link.say("/bob/temp", degrees(22))
+    link.publish("/bob/temp", degrees(22))
     assert robot.problems == {}
 
 
 @pytest.mark.parametrize(
-    ("place", "said"),
+    ("place", "expected"),
     [
         ({"x": 1e300, "y": 0.0}, "x must be within 1e+07 m of the origin"),
         ({"x": 0.0, "y": math.inf}, "y must be a finite number, got inf"),
     ],
 )
 def test_an_absurd_position_is_refused_with_a_custom_message_view(
-    link, robot, place, said
+    link, robot, place, expected
 ):
     module = robot.add_module("OwnSpot", link, "/spot")
-    link.say("/spot", {"header": header(), "point": {"x": 1.0, "y": 2.0}})
+    link.publish("/spot", {"header": header(), "point": {"x": 1.0, "y": 2.0}})
     before = to_root(module.spot)
     assert before.apply(0, 0) == pytest.approx((1, 2), abs=1e-3)
-    link.say("/spot", {"header": header(), "point": place})
+    link.publish("/spot", {"header": header(), "point": place})
     assert to_root(module.spot) == before
     (problem,) = robot.problems.values()
-    assert said in problem
+    assert expected in problem
 
 
 def test_invalid_options_of_custom_layers_are_refused(link, robot, map):
@@ -213,7 +213,7 @@ def test_invalid_options_of_custom_layers_are_refused(link, robot, map):
 
 def test_removing_a_custom_layer_removes_its_drawing_and_its_problem(link, robot):
     module = robot.add_module("Temperature", link, "/bob/temp")
-    link.say("/bob/temp", degrees(math.nan))
+    link.publish("/bob/temp", degrees(math.nan))
     robot.remove_module(module)
     assert module.svg.parent is None
     assert robot.problems == {}
@@ -232,7 +232,7 @@ def test_a_map_layer_is_shared_by_maps_and_ends_with_the_last_map(link, map, pag
     layer = modules[0].layer
     assert modules[1].layer is layer
     assert len(link.listeners["/zones"]) == 1
-    link.say("/zones", zones((1, 2, 3), (4, 5, 6)))
+    link.publish("/zones", zones((1, 2, 3), (4, 5, 6)))
     assert [circle.get("cx") for circle in layer.svg.children] == ["1", "4"]
     assert layer.svg.get("data-layer") == "/zones"
     map.remove_module(modules[0])
@@ -244,10 +244,10 @@ def test_a_map_layer_is_shared_by_maps_and_ends_with_the_last_map(link, map, pag
 
 def test_a_map_layer_is_placed_by_its_frame_at_the_stamp(link, map):
     layer = map.add_module("Zones", link, "/zones", age_limit=2.0).layer
-    link.say("/zones", zones((1, 2, 3), frame_id="odom"))
+    link.publish("/zones", zones((1, 2, 3), frame_id="odom"))
     for seconds, x in ((2.9, 4.9), (3.1, 5.1)):
         send_transforms(link, frame("map", "odom", (x, 0.0, 0.0), seconds=seconds))
-    link.say("/zones", zones((1, 2, 3), frame_id="odom"))
+    link.publish("/zones", zones((1, 2, 3), frame_id="odom"))
     (circle,) = layer.svg.children
     assert to_root(circle).apply(0, 0) == pytest.approx((5.0, 0.0), abs=1e-3)
     assert layer.svg._age.limit == 2.0
@@ -257,13 +257,13 @@ def test_an_invalid_map_layer_message_is_a_problem_and_the_last_drawing_stays(
     link, map, channel
 ):
     layer = map.add_module("Zones", link, "/zones").layer
-    link.say("/zones", zones((1, 2, 3)))
-    link.say("/zones", zones((math.nan, 2, 3)))
-    link.say("/zones", zones((1e9, 2, 3)))
+    link.publish("/zones", zones((1, 2, 3)))
+    link.publish("/zones", zones((math.nan, 2, 3)))
+    link.publish("/zones", zones((1e9, 2, 3)))
     assert [circle.get("cx") for circle in layer.svg.children] == ["1"]
     (problem,) = channel.problems.values()
     assert "/zones: x must be" in problem
-    link.say("/zones", zones((5, 2, 3)))
+    link.publish("/zones", zones((5, 2, 3)))
     assert channel.problems == {}
 
 

@@ -1,4 +1,4 @@
-"""Points that somebody publishes, and the cells of grids, in their places."""
+"""Published points and the cells of grids are drawn at their places."""
 
 import math
 import random
@@ -8,7 +8,7 @@ import pytest
 from module_fakes import header, matrix_of, numbers, pose, to_root
 from test_layers_frames import send_transforms
 from test_layers_tilted import MAP, SLOPE, mount, sensed
-from tilted_frames import frame, taken
+from tilted_frames import frame, transformed
 
 from webmap.features.layers.grid_cells import rows_of
 
@@ -19,7 +19,7 @@ ENDLESS = {"stamp": {"secs": 10**400, "nsecs": 0}, "frame_id": "map"}
 @pytest.fixture
 def robot(robot, link):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
-    link.say("/odom", {"header": header(), "pose": pose(4, -2, 0.7)})
+    link.publish("/odom", {"header": header(), "pose": pose(4, -2, 0.7)})
     return robot
 
 
@@ -32,7 +32,7 @@ def point(x, y, z=0.0, *, frame="map", ros2=False) -> dict:
 
 
 def spot(module) -> tuple[float, float]:
-    """Where a point is drawn on the map."""
+    """Return where a point is drawn on the map."""
     return to_root(module.spot).apply(0, 0)
 
 
@@ -40,13 +40,13 @@ def spot(module) -> tuple[float, float]:
 def test_a_point_keeps_its_position_on_the_map_while_the_robot_moves(link, robot, ros2):
     module = robot.add_module("PointStamped", link, "/clicked_point", name="far")
     assert list(module.svg.classes) == ["pointstamped", "far"]
-    assert module.svg.get("visibility") == "hidden", "there is none yet"
-    link.say("/clicked_point", point(-3, 40, ros2=ros2))
+    assert module.svg.get("visibility") == "hidden", "there is no point yet"
+    link.publish("/clicked_point", point(-3, 40, ros2=ros2))
     assert module.svg.get("visibility") is None
     assert spot(module) == pytest.approx((-3, 40), abs=2e-3)
-    link.say("/odom", {"header": header(), "pose": pose(-3, 40, 3.0)})
+    link.publish("/odom", {"header": header(), "pose": pose(-3, 40, 3.0)})
     assert spot(module) == pytest.approx((-3, 40), abs=2e-3)
-    link.say("/clicked_point", point(1, 1, ros2=ros2))
+    link.publish("/clicked_point", point(1, 1, ros2=ros2))
     assert spot(module) == pytest.approx((1, 1), abs=2e-3)
 
 
@@ -56,14 +56,14 @@ def test_a_point_in_the_base_frame_is_placed_at_its_stamp(link, robot):
     turned = (0.0, 0.0, math.pi / 2)
     for seconds, x in ((2.9, 4.9), (3.1, 5.1)):
         send_transforms(link, frame("map", "base_link", (x, 0.0, 0.0), turned, seconds))
-    link.say("/lookahead_point", point(1.0, 0.5, frame="base_link"))
+    link.publish("/lookahead_point", point(1.0, 0.5, frame="base_link"))
     assert spot(module) == pytest.approx((4.5, 1.0), abs=2e-3)
     assert robot.problems == {}
 
 
 def test_without_frames_a_point_in_the_base_frame_is_placed_on_the_robot(link, robot):
     module = robot.add_module("PointStamped", link, "/lookahead_point", frame="robot")
-    link.say("/lookahead_point", point(1, 0, frame="base_link"))
+    link.publish("/lookahead_point", point(1, 0, frame="base_link"))
     wanted = (4 + math.cos(0.7), -2 + math.sin(0.7))
     assert spot(module) == pytest.approx(wanted, abs=2e-3)
 
@@ -73,20 +73,20 @@ def test_a_point_of_a_tilted_sensor_is_rotated_in_3d_and_projected(link, robot):
     send_transforms(link, MAP, SLOPE)
     mounted = mount(link, (0.3, 0.1, 0.8), (0.7, -0.9, 2.5))
     module = robot.add_module("PointStamped", link, "/seen")
-    link.say("/seen", sensed({"point": at(1.0, 0.2, 2.0)}))
-    ((x, y, _),) = taken([[1.0, 0.2, 2.0]], MAP, SLOPE, mounted)
+    link.publish("/seen", sensed({"point": at(1.0, 0.2, 2.0)}))
+    ((x, y, _),) = transformed([[1.0, 0.2, 2.0]], MAP, SLOPE, mounted)
     assert spot(module) == pytest.approx((x, y), abs=3e-3)
 
 
 def test_a_point_with_a_nan_height_is_drawn_in_the_plane(link, robot):
     module = robot.add_module("PointStamped", link, "/seen")
-    link.say("/seen", point(1, 2, math.nan))
+    link.publish("/seen", point(1, 2, math.nan))
     assert spot(module) == pytest.approx((1, 2), abs=2e-3)
     assert robot.problems == {}
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "expected"),
     [
         (point(math.nan, 2), "a point must be of finite numbers, got (nan, 2.0)"),
         (point(1, math.inf), "a point must be of finite numbers, got (1.0, "),
@@ -95,15 +95,17 @@ def test_a_point_with_a_nan_height_is_drawn_in_the_plane(link, robot):
         (point(5, 5) | {"header": ENDLESS}, "seconds of hundreds of digits"),
     ],
 )
-def test_an_invalid_point_is_refused_and_the_last_point_stays(link, robot, wrong, said):
+def test_an_invalid_point_is_refused_and_the_last_point_stays(
+    link, robot, wrong, expected
+):
     module = robot.add_module("PointStamped", link, "/seen")
-    link.say("/seen", point(1, 2))
+    link.publish("/seen", point(1, 2))
     before = matrix_of(module.spot)
-    link.say("/seen", wrong)
+    link.publish("/seen", wrong)
     assert matrix_of(module.spot) == before
     (problem,) = robot.problems.values()
-    assert said in problem
-    link.say("/seen", point(3, 4))
+    assert expected in problem
+    link.publish("/seen", point(3, 4))
     assert robot.problems == {}
 
 
@@ -123,7 +125,7 @@ def cells(middles, width=0.5, height=0.25, *, ros2=False) -> dict:
 
 
 def boxes(module) -> list[list[tuple[float, float]]]:
-    """The corners on the map of each rectangle that is drawn."""
+    """Return the corners on the map of each drawn rectangle."""
     place = to_root(module.drawn)
     found = []
     for text in (module.drawn.get("d") or "").split("z")[:-1]:
@@ -137,7 +139,7 @@ def boxes(module) -> list[list[tuple[float, float]]]:
 
 
 def box(x, y, width, height) -> list:
-    """The corners about a middle, as :func:`boxes` has them."""
+    """Return the corners around a centre, in the form of :func:`boxes`."""
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     return [
         pytest.approx((x + i * width / 2, y + j * height / 2), abs=2e-3)
@@ -149,12 +151,12 @@ def box(x, y, width, height) -> list:
 def test_a_cell_is_a_box_centred_on_its_point_that_stays_on_the_map(link, robot, ros2):
     module = robot.add_module("GridCells", link, "/cells", name="frontiers")
     assert list(module.svg.classes) == ["gridcells", "frontiers"]
-    link.say("/cells", cells([(1, 2), (4, -1)], ros2=ros2))
+    link.publish("/cells", cells([(1, 2), (4, -1)], ros2=ros2))
     wanted = [box(4, -1, 0.5, 0.25), box(1, 2, 0.5, 0.25)]
     assert boxes(module) == wanted
-    link.say("/odom", {"header": header(), "pose": pose(-40, 2, 3.0)})
+    link.publish("/odom", {"header": header(), "pose": pose(-40, 2, 3.0)})
     assert boxes(module) == wanted
-    link.say("/cells", cells([], 0, 0))
+    link.publish("/cells", cells([], 0, 0))
     assert boxes(module) == []
 
 
@@ -164,7 +166,7 @@ def test_cells_that_touch_along_x_are_one_box_in_any_order(link, robot):
     middles = [(7 + 0.05 * i, 3 + 0.05 * j) for i in range(40) for j in range(3)]
     middles.remove((7 + 0.05 * 20, 3 + 0.05 * 1))
     random.Random(1).shuffle(middles)
-    link.say("/cells", cells(middles, side, side))
+    link.publish("/cells", cells(middles, side, side))
     assert boxes(module) == [
         box(7.975, 3.0, 2.0, 0.05),
         box(7.475, 3.05, 1.0, 0.05),
@@ -174,7 +176,7 @@ def test_cells_that_touch_along_x_are_one_box_in_any_order(link, robot):
 
 
 def test_rows_of_slightly_shifted_cells_stay_near_the_cells():
-    step = 0.1 * 1.0005  # far within the tolerance, which many of them are not
+    step = 0.1 * 1.0005  # far within the tolerance; many are not
     middles = np.array([(number * step, 0.0, 0.0) for number in range(200)])
     rows = rows_of(middles, 0.1, 0.1)
     assert sum(rows.lengths) == 200
@@ -192,31 +194,31 @@ def test_cells_of_a_tilted_sensor_are_rotated_in_3d_and_projected(link, robot):
     send_transforms(link, MAP, SLOPE)
     mounted = mount(link, (0.3, 0.1, 0.8), (0.7, -0.9, 2.5))
     module = robot.add_module("GridCells", link, "/cells")
-    link.say("/cells", sensed(cells([(1.0, 0.2, 2.0), (1.5, 0.2, 2.0)])))
+    link.publish("/cells", sensed(cells([(1.0, 0.2, 2.0), (1.5, 0.2, 2.0)])))
     low, high = 0.075, 0.325
     corners = [[0.75, low], [1.75, low], [1.75, high], [0.75, high]]
-    there = taken([[*corner, 2.0] for corner in corners], MAP, SLOPE, mounted)
+    there = transformed([[*corner, 2.0] for corner in corners], MAP, SLOPE, mounted)
     (drawn,) = boxes(module)
     assert np.array(drawn) == pytest.approx(there[:, :2], abs=3e-3)
 
 
 def test_cells_beyond_max_cells_are_thinned_with_a_problem(link, robot):
     module = robot.add_module("GridCells", link, "/cells", max_cells=10)
-    link.say("/cells", cells([(i, 0) for i in range(25)]))
+    link.publish("/cells", cells([(i, 0) for i in range(25)]))
     drawn = sorted(corners[0][0] for corners in boxes(module))
     assert len(drawn) == 10
     assert drawn[0] == pytest.approx(-0.25, abs=2e-3)
     assert drawn[-1] == pytest.approx(23.75, abs=2e-3)
-    assert max(np.diff(drawn)) < 5, "evenly chosen"
+    assert max(np.diff(drawn)) < 5, "the drawn points are evenly spaced"
     (problem,) = robot.problems.values()
     assert "more than 10 cells: only that many are drawn" in problem
-    link.say("/cells", cells([(i, 0) for i in range(10)]))
+    link.publish("/cells", cells([(i, 0) for i in range(10)]))
     assert len(boxes(module)) == 10
     assert robot.problems == {}
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "expected"),
     [
         (cells([(1, 1), (math.nan, 1)]), "finite numbers, got (nan, 1.0) as point 1"),
         (cells([(1, math.inf)]), "cells must be of finite numbers"),
@@ -233,15 +235,17 @@ def test_cells_beyond_max_cells_are_thinned_with_a_problem(link, robot):
         (cells([(5, 5)]) | {"header": ENDLESS}, "seconds of hundreds of digits"),
     ],
 )
-def test_invalid_cells_are_refused_and_the_last_cells_stay(link, robot, wrong, said):
+def test_invalid_cells_are_refused_and_the_last_cells_stay(
+    link, robot, wrong, expected
+):
     module = robot.add_module("GridCells", link, "/cells")
-    link.say("/cells", cells([(1, 2)]))
+    link.publish("/cells", cells([(1, 2)]))
     before = module.drawn.get("d")
-    link.say("/cells", wrong)
+    link.publish("/cells", wrong)
     assert module.drawn.get("d") == before
     (problem,) = robot.problems.values()
-    assert said in problem
-    link.say("/cells", cells([]))
+    assert expected in problem
+    link.publish("/cells", cells([]))
     assert robot.problems == {}
 
 

@@ -1,4 +1,4 @@
-"""A pose that is published, such as a goal, is an arrow in its place."""
+"""A published pose, such as a goal, is drawn as an arrow at its place."""
 
 import math
 
@@ -11,12 +11,12 @@ from webmap.base.errors import ConfigError
 @pytest.fixture
 def robot(robot, link):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
-    link.say("/odom", {"header": header(), "pose": pose(4, -2, 0.7)})
+    link.publish("/odom", {"header": header(), "pose": pose(4, -2, 0.7)})
     return robot
 
 
 def at(module) -> tuple[float, float, float]:
-    """Where the arrow stands on the map, and where it points."""
+    """Return where the arrow is on the map, and where it points."""
     place = to_root(module.arrow)
     (x, y), (to_x, to_y) = place.apply(0, 0), place.apply(1, 0)
     return x, y, math.atan2(to_y - y, to_x - x)
@@ -24,21 +24,21 @@ def at(module) -> tuple[float, float, float]:
 
 def test_a_pose_is_an_arrow_that_keeps_its_position_and_heading_on_the_map(link, robot):
     module = robot.add_module("PoseStamped", link, "/target", name="far")
-    assert module.svg.get("visibility") == "hidden", "there is none yet"
+    assert module.svg.get("visibility") == "hidden", "there is no pose yet"
     assert {"posestamped", "far"} <= set(module.svg.classes)
-    link.say("/target", {"header": header(), "pose": pose(-3, 40, 2.0)})
+    link.publish("/target", {"header": header(), "pose": pose(-3, 40, 2.0)})
     assert module.svg.get("visibility") is None
     assert at(module) == pytest.approx((-3, 40, 2.0), abs=1e-3)
-    link.say("/odom", {"header": header(), "pose": pose(-3, 40, 3.0)})
+    link.publish("/odom", {"header": header(), "pose": pose(-3, 40, 3.0)})
     assert at(module) == pytest.approx((-3, 40, 2.0), abs=1e-3)
-    assert module.svg.get("visibility") is None, "no goal, so it stays"
-    link.say("/target", {"header": header(), "pose": pose(1, 1, 0.0)})
+    assert module.svg.get("visibility") is None, "only goals are hidden"
+    link.publish("/target", {"header": header(), "pose": pose(1, 1, 0.0)})
     assert at(module) == pytest.approx((1, 1, 0.0), abs=1e-3)
 
 
 def test_a_pose_is_placed_by_the_alignment_of_the_robot(link, robot):
     module = robot.add_module("PoseStamped", link, "/target")
-    link.say("/target", {"header": header(), "pose": pose(1, 0, 0.0)})
+    link.publish("/target", {"header": header(), "pose": pose(1, 0, 0.0)})
     robot.set_alignment(10.0, 0.0, 90.0)
     assert at(module) == pytest.approx((10, 1, math.pi / 2), abs=1e-3)
 
@@ -46,17 +46,19 @@ def test_a_pose_is_placed_by_the_alignment_of_the_robot(link, robot):
 def test_a_reached_goal_is_hidden(link, robot):
     module = robot.add_module("PoseStamped", link, "/goal_pose", name="goal")
     robot.set_alignment(10.0, 0.0, 90.0)
-    link.say("/goal_pose", {"header": header(), "pose": pose(8, 8, 0.0)})
+    link.publish("/goal_pose", {"header": header(), "pose": pose(8, 8, 0.0)})
     first = module.svg.get("data-pose")
-    link.say("/odom", {"header": header(), "pose": pose(7, 8, 0.0)})
-    assert module.svg.get("visibility") is None, "a metre is not there"
-    link.say("/odom", {"header": header(), "pose": pose(7.8, 8, 0.0)})
+    link.publish("/odom", {"header": header(), "pose": pose(7, 8, 0.0)})
+    assert module.svg.get("visibility") is None, "a metre away is not reached"
+    link.publish("/odom", {"header": header(), "pose": pose(7.8, 8, 0.0)})
     assert module.svg.get("visibility") == "hidden"
-    link.say("/odom", {"header": header(), "pose": pose(7, 8, 0.0)})
-    assert module.svg.get("visibility") == "hidden", "it was there"
-    link.say("/goal_pose", {"header": header(), "pose": pose(2, 2, 0.0)})
+    link.publish("/odom", {"header": header(), "pose": pose(7, 8, 0.0)})
+    assert module.svg.get("visibility") == "hidden", "the goal was reached before"
+    link.publish("/goal_pose", {"header": header(), "pose": pose(2, 2, 0.0)})
     assert module.svg.get("visibility") is None
-    assert module.svg.get("data-pose") != first, "the page can tell it from the last"
+    assert module.svg.get("data-pose") != first, (
+        "the page can distinguish the two goals"
+    )
 
 
 @pytest.mark.parametrize(("frame", "seen"), [("odom", "hidden"), ("map", None)])
@@ -65,19 +67,19 @@ def test_a_goal_is_reached_only_in_the_frame_used_to_draw_the_robot(
 ):
     robot.set_tf(link, map_frame="odom", namespace="/bob", quiet=True)
     module = robot.add_module("PoseStamped", link, "/goal_pose", name="goal")
-    link.say("/goal_pose", {"header": header(frame), "pose": pose(8, 8, 0.0)})
+    link.publish("/goal_pose", {"header": header(frame), "pose": pose(8, 8, 0.0)})
     assert module.svg.get("visibility") is None
-    link.say("/odom", {"header": header("odom"), "pose": pose(8, 8, 0.0)})
+    link.publish("/odom", {"header": header("odom"), "pose": pose(8, 8, 0.0)})
     assert module.svg.get("visibility") == seen
 
 
 def test_a_non_finite_pose_is_refused_and_the_last_pose_stays(link, robot):
     module = robot.add_module("PoseStamped", link, "/target")
-    link.say("/target", {"header": header(), "pose": pose(1, 2)})
+    link.publish("/target", {"header": header(), "pose": pose(1, 2)})
     before = matrix_of(module.arrow)
-    link.say("/target", {"header": header(), "pose": pose(math.nan, 2)})
+    link.publish("/target", {"header": header(), "pose": pose(math.nan, 2)})
     assert matrix_of(module.arrow) == before
-    assert any("finite" in said for said in robot.problems.values())
+    assert any("finite" in problem for problem in robot.problems.values())
 
 
 @pytest.mark.parametrize("wrong", [{"length": 0}, {"reached": math.inf}])

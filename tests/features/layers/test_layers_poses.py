@@ -1,4 +1,4 @@
-"""Poses, how sure they are, footprints and the cones of sonars."""
+"""Poses with their uncertainty, footprints and the cones of sonars."""
 
 import json
 import math
@@ -11,12 +11,12 @@ from module_fakes import header, numbers, pose, to_root, typed
 @pytest.fixture
 def robot(robot, link):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
-    link.say("/odom", {"header": header(), "pose": pose(4, -2, 0.7)})
+    link.publish("/odom", {"header": header(), "pose": pose(4, -2, 0.7)})
     return robot
 
 
 def arrows(module) -> list[tuple[tuple[float, float], float]]:
-    """Where each arrow begins on the map, and its yaw there."""
+    """Return where each arrow begins on the map, and its yaw."""
     place = to_root(module.arrows)
     found = []
     for triangle in (module.arrows.get("d") or "").split("z"):
@@ -45,7 +45,7 @@ def test_each_pose_is_an_arrow_at_its_position_on_the_map(link, robot, type, key
     poses = [pose(*at) for at in wanted]
     if key == "particles":
         poses = [{"pose": each, "weight": 0.5} for each in poses]
-    link.say("/particles", {"header": header(ros2=True), key: poses})
+    link.publish("/particles", {"header": header(ros2=True), key: poses})
     drawn = arrows(module)
     assert [at for at, _ in drawn] == [
         pytest.approx((x, y), abs=3e-3) for x, y, _ in wanted
@@ -53,13 +53,13 @@ def test_each_pose_is_an_arrow_at_its_position_on_the_map(link, robot, type, key
     assert [yaw for _, yaw in drawn] == pytest.approx(
         [yaw for _, _, yaw in wanted], abs=0.02
     )
-    link.say("/odom", {"header": header(), "pose": pose(-40, 2, 3.0)})
+    link.publish("/odom", {"header": header(), "pose": pose(-40, 2, 3.0)})
     assert arrows(module)[1][0] == pytest.approx((-3.25, 40.0), abs=3e-3)
 
 
 def test_poses_in_the_robot_frame_move_with_the_robot(link, robot):
     module = robot.add_module("PoseArray", link, "/seen", frame="robot")
-    link.say("/seen", {"header": header("base_link"), "poses": [pose(1, 0)]})
+    link.publish("/seen", {"header": header("base_link"), "poses": [pose(1, 0)]})
     ((at, yaw),) = arrows(module)
     assert at == pytest.approx((4 + math.cos(0.7), -2 + math.sin(0.7)), abs=3e-3)
     assert yaw == pytest.approx(0.7, abs=0.02)
@@ -68,10 +68,10 @@ def test_poses_in_the_robot_frame_move_with_the_robot(link, robot):
 def test_two_thousand_particles_are_thinned(link, robot):
     module = robot.add_module("PoseArray", link, "/particles", max_poses=300)
     poses = [pose(0.01 * i, 0) for i in range(2000)]
-    link.say("/particles", {"header": header(), "poses": poses})
+    link.publish("/particles", {"header": header(), "poses": poses})
     assert len(arrows(module)) == 300
     assert len(module.poses) == 2000
-    link.say("/particles", {"header": header(), "poses": []})
+    link.publish("/particles", {"header": header(), "poses": []})
     assert arrows(module) == []
 
 
@@ -89,12 +89,12 @@ def test_an_array_with_a_non_finite_pose_is_refused_and_the_last_array_stays(
     link, robot, wrong, why
 ):
     module = robot.add_module("PoseArray", link, "/particles")
-    link.say("/particles", {"header": header(), "poses": [pose(1, 2)]})
-    link.say("/particles", {"header": header(), "poses": [pose(8, 8), wrong]})
+    link.publish("/particles", {"header": header(), "poses": [pose(1, 2)]})
+    link.publish("/particles", {"header": header(), "poses": [pose(8, 8), wrong]})
     assert len(arrows(module)) == 1
     (problem,) = robot.problems.values()
     assert why in problem
-    link.say("/particles", {"header": header(), "poses": []})
+    link.publish("/particles", {"header": header(), "poses": []})
     assert robot.problems == {}
 
 
@@ -128,7 +128,7 @@ def test_the_ellipse_has_the_axes_of_the_covariance(link, robot, cbor):
     spread = covariance(plane[0, 0], plane[1, 1], plane[0, 1], 0.01)
     if cbor:
         spread = typed(86, np.array(spread))
-    link.say("/amcl", doubtful(pose(7, 8, 1.0), spread), cbor=cbor)
+    link.publish("/amcl", doubtful(pose(7, 8, 1.0), spread), cbor=cbor)
     rx, ry = float(module.ellipse.get("rx")), float(module.ellipse.get("ry"))
     assert (rx, ry) == pytest.approx((1.0, 0.4))
     place = to_root(module.ellipse)
@@ -148,14 +148,14 @@ def test_the_covariance_of_odometry_is_drawn(link, robot):
     still = {"linear": dict(x=0, y=0, z=0), "angular": dict(x=0, y=0, z=0)}
     message = doubtful(pose(1, 1), covariance(0.01, 0.01))
     message["twist"] = {"twist": still, "covariance": [0.0] * 36}
-    link.say("/o", message)
+    link.publish("/o", message)
     assert float(module.ellipse.get("rx")) == pytest.approx(0.2)
     assert module.heading.get("d") is None
 
 
 def test_an_unknown_heading_is_drawn_as_a_full_circle(link, robot):
     module = robot.add_module("PoseWithCovariance", link, "/amcl")
-    link.say("/amcl", doubtful(pose(0, 0), covariance(1, 1, 0, 1e6)))
+    link.publish("/amcl", doubtful(pose(0, 0), covariance(1, 1, 0, 1e6)))
     assert "A2.0000 2.0000 0 1 1" in module.heading.get("d")
 
 
@@ -171,9 +171,9 @@ def test_an_unknown_heading_is_drawn_as_a_full_circle(link, robot):
 )
 def test_an_invalid_covariance_is_refused(link, robot, spread, why):
     module = robot.add_module("PoseWithCovariance", link, "/amcl")
-    link.say("/amcl", doubtful(pose(1, 1), covariance(1, 1)))
+    link.publish("/amcl", doubtful(pose(1, 1), covariance(1, 1)))
     before = module.ellipse.attributes
-    link.say("/amcl", doubtful(pose(5, 5), spread))
+    link.publish("/amcl", doubtful(pose(5, 5), spread))
     assert module.ellipse.attributes == before
     assert to_root(module.ellipse).apply(0, 0) == pytest.approx((1, 1))
     (problem,) = robot.problems.values()
@@ -191,7 +191,7 @@ FOOT = [(0.3, 0.2), (0.3, -0.2), (-0.3, -0.2), (-0.3, 0.2)]
 @pytest.mark.parametrize(("frame", "goes"), [("map", False), ("robot", True)])
 def test_a_footprint_is_placed_by_its_frame(link, robot, frame, goes):
     module = robot.add_module("Polygon", link, "/footprint", frame=frame)
-    link.say("/footprint", polygon(FOOT, ros2=True))
+    link.publish("/footprint", polygon(FOOT, ros2=True))
     flat = numbers(module.outline.get("points"))
     place = to_root(module.outline)
     drawn = [place.apply(*p) for p in zip(flat[::2], flat[1::2], strict=True)]
@@ -203,14 +203,14 @@ def test_a_footprint_is_placed_by_its_frame(link, robot, frame, goes):
 
 def test_a_polygon_without_points_is_empty_and_an_invalid_one_is_refused(link, robot):
     module = robot.add_module("Polygon", link, "/footprint")
-    link.say("/footprint", polygon(FOOT))
+    link.publish("/footprint", polygon(FOOT))
     before = module.outline.get("points")
-    link.say("/footprint", polygon([(0, 0), (math.nan, 1)]))
-    link.say("/footprint", polygon([(0, 0)] * 10_001))
+    link.publish("/footprint", polygon([(0, 0), (math.nan, 1)]))
+    link.publish("/footprint", polygon([(0, 0)] * 10_001))
     assert module.outline.get("points") == before
     (problem,) = robot.problems.values()
     assert "10001 points" in problem
-    link.say("/footprint", polygon([]))
+    link.publish("/footprint", polygon([]))
     assert not module.outline.get("points")
     assert robot.problems == {}
 
@@ -234,7 +234,7 @@ def sonar(distance, *, view=0.5, low=0.1, high=4.0) -> dict:
 
 def test_the_cone_reaches_from_the_sensor_to_the_measured_distance(link, robot):
     module = robot.add_module("Range", link, "/sonar", 0.2, 0.1, 90.0)
-    link.say("/sonar", sonar(2.0))
+    link.publish("/sonar", sonar(2.0))
     x0, y0, x, y, radius, *_ = numbers(module.cone.get("d"))
     on_robot = to_root(robot.svg).inverse @ to_root(module.cone)
     assert on_robot.apply(x0, y0) == pytest.approx((0.2, 0.1))
@@ -249,7 +249,7 @@ def test_the_cone_reaches_from_the_sensor_to_the_measured_distance(link, robot):
 
 
 @pytest.mark.parametrize(
-    ("said", "distance", "radius"),
+    ("number", "distance", "radius"),
     [
         ("4.5", math.inf, 4.0),
         ("Infinity", math.inf, 4.0),
@@ -261,11 +261,11 @@ def test_the_cone_reaches_from_the_sensor_to_the_measured_distance(link, robot):
     ],
 )
 def test_a_sonar_distinguishes_no_echo_from_an_invalid_distance(
-    link, robot, said, distance, radius
+    link, robot, number, distance, radius
 ):
     module = robot.add_module("Range", link, "/sonar")
-    text = json.dumps(sonar(12345)).replace("12345", said)
-    link.say("/sonar", text)
+    text = json.dumps(sonar(12345)).replace("12345", number)
+    link.publish("/sonar", text)
     assert module.distance == distance
     drawn = module.cone.get("d")
     assert (drawn and numbers(drawn)[4]) == radius
@@ -281,8 +281,8 @@ def test_a_sonar_with_an_invalid_field_of_view_or_max_range_is_refused(
     link, robot, wrong
 ):
     module = robot.add_module("Range", link, "/sonar")
-    link.say("/sonar", sonar(1.0))
+    link.publish("/sonar", sonar(1.0))
     before = module.cone.get("d")
-    link.say("/sonar", sonar(2.0, **wrong))
+    link.publish("/sonar", sonar(2.0, **wrong))
     assert module.cone.get("d") == before
     assert len(robot.problems) == 1

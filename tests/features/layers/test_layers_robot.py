@@ -1,4 +1,4 @@
-"""The robot modules that come with WebMap."""
+"""The robot modules of WebMap."""
 
 import math
 
@@ -17,7 +17,7 @@ from webmap.ros.messages import BatteryStateMsg, LaserScanMsg
 
 
 class Link:
-    """A bridge that remembers who subscribed."""
+    """A bridge that records its subscribers."""
 
     url = "ws://test:9090"
     state = "open"
@@ -108,8 +108,8 @@ def test_max_dots_of_zero_is_refused():
         Robot("Bob").add_module("LaserScanner", Link(), "/scan", max_dots=0)
 
 
-def say_percentages(link, *percentages):
-    """Let battery states come in."""
+def publish_percentages(link, *percentages):
+    """Publish battery states."""
     callback, _, _ = link.listeners["/battery"]
     for percentage in percentages:
         callback(convert({"percentage": percentage, "voltage": 24.0}, BatteryStateMsg))
@@ -118,11 +118,11 @@ def say_percentages(link, *percentages):
 def test_a_battery_that_counts_to_100_is_read_correctly_at_low_charge():
     link, robot = Link(), Robot("Bob")
     battery = robot.add_module("Battery", link, "/battery")
-    say_percentages(link, 1.04)  # a gauge that is not calibrated
+    publish_percentages(link, 1.04)  # a gauge that is not calibrated
     assert battery.charge == 1.0
-    say_percentages(link, 80.0)
+    publish_percentages(link, 80.0)
     assert battery.charge == 0.8
-    say_percentages(link, 1.0)
+    publish_percentages(link, 1.0)
     assert battery.charge == 0.01
     assert not robot.problems
 
@@ -131,12 +131,14 @@ def test_a_battery_that_counts_to_100_is_read_correctly_at_low_charge():
 def test_an_invalid_battery_percentage_is_a_problem_until_a_valid_one_arrives(wrong):
     link, robot = Link(), Robot("Bob")
     battery = robot.add_module("Battery", link, "/battery")
-    say_percentages(link, 0.5, wrong)
+    publish_percentages(link, 0.5, wrong)
     assert battery.charge is None
-    (said,) = robot.problems.values()
-    assert said.startswith("/battery: a battery has a percentage of 0 to 1, or of 0 to")
-    assert f"got {wrong:g}" in said
-    say_percentages(link, 0.5)
+    (problem,) = robot.problems.values()
+    assert problem.startswith(
+        "/battery: a battery has a percentage of 0 to 1, or of 0 to"
+    )
+    assert f"got {wrong:g}" in problem
+    publish_percentages(link, 0.5)
     assert battery.charge == 0.5
     assert not robot.problems
 
@@ -157,7 +159,7 @@ def test_the_battery_passes_its_charge_or_none_to_other_modules(percentage, char
     link, robot = Link(), Robot("Bob")
     robot.add_module(Listener)
     robot.add_module("Battery", link, "/battery")
-    say_percentages(link, percentage)
+    publish_percentages(link, percentage)
     assert received == [charge]
 
 

@@ -39,15 +39,15 @@ SCALED = """([scale, middle]) => {
 }"""
 
 ZOOMS = [0.13, 0.21, 0.37, 1.0, 3.3]
-"""Pixels of the screen for each cell."""
+"""The screen pixels per cell."""
 
 SIDE = 900
-"""Of the screen, in pixels."""
+"""The size of the screen, in pixels."""
 
 
 @pytest.mark.parametrize(("path", "yaw"), [("", 0.0), ("turned", 0.3)])
 def test_no_line_is_visible_between_tiles(chromium: Browser, url, path, yaw):
-    """The background is black and all cells are white: a seam would be grey."""
+    """The background is black and all cells are white, so a seam would be grey."""
     darkest = {}
     with watched_tab(chromium, SIDE, SIDE) as tab:
         tab.goto(url)
@@ -55,7 +55,7 @@ def test_no_line_is_visible_between_tiles(chromium: Browser, url, path, yaw):
         expect(tab.locator(TILES)).to_have_count(9, timeout=30_000)
         for zoom in ZOOMS:
             tab.evaluate(SCALED, [zoom / 0.05, SIDE / 2 + 0.3])
-            deadline = time.monotonic() + 15  # for the pictures to be loaded
+            deadline = time.monotonic() + 15  # until the pictures are loaded
             while (found := darkest_of(tab, inside(zoom, yaw))) != 255:
                 if time.monotonic() > deadline:
                     break
@@ -71,7 +71,7 @@ def darkest_of(tab: Page, where: np.ndarray) -> int:
 
 
 def inside(zoom: float, yaw: float) -> np.ndarray:
-    """The pixels of the grid that neither its edge nor a part of the page covers."""
+    """Return the pixels of the grid without its edge and covered parts."""
     y, x = np.mgrid[:SIDE, :SIDE] - SIDE / 2
     along = abs(x * math.cos(yaw) - y * math.sin(yaw))
     across = abs(x * math.sin(yaw) + y * math.cos(yaw))

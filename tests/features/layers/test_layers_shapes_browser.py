@@ -1,4 +1,4 @@
-"""Each type of marker as a real browser draws it: which pixels it covers."""
+"""The pixels that each type of marker covers in a real browser."""
 
 import io
 import time
@@ -25,7 +25,7 @@ PIXELS = """(places) => {
 
 @pytest.fixture(scope="module")
 def colours(chromium: Browser) -> Iterator:
-    """What is drawn at places of the world, in metres."""
+    """Return the colours at places of the world, in metres."""
     file = HERE / "scene_of_shapes.py"
     with (
         page_of(file, PYTHONPATH=str(HERE)) as url,
@@ -44,7 +44,7 @@ def colours(chromium: Browser) -> Iterator:
 
         deadline = time.monotonic() + 10
         while found([SHAPES["cube"].at]) != [BLUE]:
-            assert time.monotonic() < deadline, "nothing is ever drawn"
+            assert time.monotonic() < deadline, "nothing is drawn in time"
         yield found
 
 

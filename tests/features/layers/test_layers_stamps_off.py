@@ -1,7 +1,7 @@
-"""Stamps an hour off, over a real socket: drawn all the same, and said once.
+"""Messages with stamps an hour off, over a real socket, are drawn with one notice.
 
-What is said names the difference. Stamps that are none at all are refused, which
-``test_layers_bad_from_robot`` has for most types.
+The notice contains the difference. Invalid stamps are refused;
+``test_layers_bad_from_robot`` tests this for most types.
 """
 
 import asyncio
@@ -21,7 +21,7 @@ from test_layers_bad_from_robot import (
 )
 
 NOW = 1_000_000.0
-"""By the robot's clock, in seconds; that of this machine does not matter."""
+"""A time of the robot's clock, in seconds; this machine's clock does not matter."""
 
 HOUR = 3600.0
 WAYS = {"ahead": HOUR, "behind": -HOUR}
@@ -29,7 +29,7 @@ WAYS = {"ahead": HOUR, "behind": -HOUR}
 
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
-    """Let nothing be said because this process was held up for a second."""
+    """Allow this process to be delayed for a second without a notice."""
     monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 60.0)
 
 
@@ -45,13 +45,13 @@ def transform(parent: str, child: str, x: float, about: dict) -> dict:
     return {"header": about, "child_frame_id": child, "transform": move}
 
 
-async def say(scene: Scene, topic: str, message: dict) -> None:
+async def send(scene: Scene, topic: str, message: dict) -> None:
     await scene.servers[0].send(publish(topic, message))
 
 
-async def stand(scene: Scene, x: float, seconds: float) -> None:
-    """Say where the robot is, and wait until it is drawn there."""
-    await say(scene, "/odom", odometry(x, header=at("odom", seconds)))
+async def move_to(scene: Scene, x: float, seconds: float) -> None:
+    """Publish the place of the robot, and wait until the robot is drawn there."""
+    await send(scene, "/odom", odometry(x, header=at("odom", seconds)))
     await until(lambda: drawn_at(scene, x))
 
 
@@ -65,17 +65,17 @@ def test_a_scan_an_hour_off_is_drawn_with_one_notice(map, channel, monkeypatch, 
     off = scan(1.5, header=at("laser", NOW + WAYS[way]))
 
     async def scenario(scene: Scene) -> None:
-        await stand(scene, 1.0, NOW)
+        await move_to(scene, 1.0, NOW)
         async with asyncio.timeout(DEADLINE):
-            while not scene.errors:  # A robot that fell silent is asked for nothing.
-                await say(scene, "/odom", odometry(1.0, header=at("odom", NOW)))
-                await say(scene, "/scan", off)
+            while not scene.errors:  # A silent robot is not requested again.
+                await send(scene, "/odom", odometry(1.0, header=at("odom", NOW)))
+                await send(scene, "/scan", off)
                 await asyncio.sleep(0.02)
         assert len(dots_of(scene)) == 5
         for _ in range(3):
-            await say(scene, "/scan", off)
-        await stand(scene, 1.1, NOW + 0.1)
-        await say(scene, "/scan", scan(1.0, header=at("laser", NOW + 0.1)))
+            await send(scene, "/scan", off)
+        await move_to(scene, 1.1, NOW + 0.1)
+        await send(scene, "/scan", scan(1.0, header=at("laser", NOW + 0.1)))
         await until(lambda: channel.problems == {})
         (line,) = scene.errors
         assert line.startswith("Bob: laserscan: ")
@@ -89,11 +89,11 @@ def test_a_scan_an_hour_off_is_drawn_with_one_notice(map, channel, monkeypatch, 
 @pytest.mark.parametrize("way", WAYS)
 def test_odometry_an_hour_off_is_drawn_with_one_notice(map, channel, way):
     async def scenario(scene: Scene) -> None:
-        await stand(scene, 1.0, NOW)
-        await stand(scene, 1.1, NOW + WAYS[way])
+        await move_to(scene, 1.0, NOW)
+        await move_to(scene, 1.1, NOW + WAYS[way])
         await until(lambda: scene.errors)
-        await stand(scene, 1.2, NOW + 0.2)
-        await stand(scene, 1.3, NOW + 0.3)
+        await move_to(scene, 1.2, NOW + 0.2)
+        await move_to(scene, 1.3, NOW + 0.3)
         (line,) = scene.errors
         assert line.startswith("Bob: the clock of its poses jumped by ")
         assert f"{WAYS[way]:+.1f} s" in line
@@ -102,18 +102,18 @@ def test_odometry_an_hour_off_is_drawn_with_one_notice(map, channel, way):
 
 
 async def placed(scene: Scene) -> None:
-    """Give the robot frames, and wait until it is drawn by them."""
+    """Publish frames of the robot, and wait until they place the robot."""
     scene.robots[0].set_tf(scene.bridges[0])
     await until(lambda: "/tf" in scene.servers[0].asked)
     await send_transforms(scene, at("", NOW))
-    await say(scene, "/odom", odometry(1.0, header=at("odom", NOW)))
+    await send(scene, "/odom", odometry(1.0, header=at("odom", NOW)))
     await until(lambda: drawn_at(scene, 11.0))
 
 
 async def send_transforms(scene: Scene, about: dict) -> None:
     chain = [("map", "odom", 10.0), ("odom", "base_link", 1.0)]
     transforms = [transform(*link, about) for link in chain]
-    await say(scene, "/tf", {"transforms": transforms})
+    await send(scene, "/tf", {"transforms": transforms})
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -125,7 +125,7 @@ def test_a_transform_an_hour_off_gives_one_notice_and_does_not_move_the_robot(
         await send_transforms(scene, at("", NOW + WAYS[way]))
         await send_transforms(scene, at("", NOW))
         await until(lambda: scene.errors)
-        await say(scene, "/odom", odometry(1.1, header=at("odom", NOW + 0.1)))
+        await send(scene, "/odom", odometry(1.1, header=at("odom", NOW + 0.1)))
         await until(lambda: drawn_at(scene, 11.1))
         (line,) = scene.errors
         assert line.startswith("Bob: 'map' -> 'odom': time jumped back by 3600.000 s")
@@ -139,7 +139,7 @@ def test_a_transform_with_invalid_nanoseconds_is_ignored_with_one_notice(map, ch
         for _ in range(3):
             await send_transforms(scene, header() | NANOSECONDS)
         await until(lambda: scene.errors)
-        await say(scene, "/odom", odometry(1.1, header=at("odom", NOW + 0.1)))
+        await send(scene, "/odom", odometry(1.1, header=at("odom", NOW + 0.1)))
         await until(lambda: drawn_at(scene, 11.1))
         (line,) = scene.errors
         assert line == (

@@ -1,4 +1,4 @@
-"""Markers of frames that are tilted, or that are tilted themselves, from above."""
+"""Tilted markers and markers of tilted frames, drawn from above."""
 
 import math
 
@@ -20,15 +20,15 @@ from test_layers_markers import (
     TEXT,
     TRIANGLES,
     marker,
-    say,
+    publish,
 )
 from test_layers_tilted import TURNS
-from tilted_frames import OPTICAL, OVER, frame, matrix, posed, taken
+from tilted_frames import OPTICAL, OVER, frame, matrix, posed, transformed
 
 BODY = frame("map", "base_link", (3.0, 1.0, 0.2), (0.05, 0.1, 2.0), 100.0)
 SIZE = (1.2, 0.5, 0.8)
 THERE, SELF = (0.4, -0.3, 2.0), (0.3, -0.2, 1.1)
-"""Where a marker is in its frame, and how it is turned there."""
+"""The pose of a marker in its frame."""
 
 CORNERS = [(1.0, 0.2, 2.0), (-0.5, 0.1, 1.0), (0.3, -1.5, 3.0)]
 
@@ -46,10 +46,10 @@ def layer(map, link):
 
 @pytest.fixture(params=TURNS.values(), ids=TURNS)
 def mounted(request, link, layer) -> dict:
-    """A sensor that is turned somehow, on a robot that leans."""
-    say(
+    """Mount a turned sensor on a tilted robot."""
+    publish(
         link, marker(CUBE, header={"frame_id": "sensor"})
-    )  # who needs frames hears them
+    )  # the layer needs frames now, so it receives them
     found = frame("base_link", "sensor", (0.3, 0.1, 0.8), request.param)
     send_transforms(link, found, static=True)
     send_transforms(link, BODY)
@@ -57,10 +57,10 @@ def mounted(request, link, layer) -> dict:
 
 
 def seen(link, layer, type, points=(), *, at=THERE, turns=SELF, **more):
-    """Say a marker of the sensor's frame, and return what is drawn of it."""
+    """Publish a marker in the sensor's frame, and return its drawing."""
     header = {"stamp": stamp(100.0), "frame_id": "sensor"}
     more = {"scale": SIZE, "header": header, "pose": posed(at, turns), **more}
-    say(link, marker(type, points, **more))
+    publish(link, marker(type, points, **more))
     (drawn,) = layer.shapes["test", 1].children
     return drawn
 
@@ -80,14 +80,14 @@ def outline(element) -> np.ndarray:
 
 
 def whole(mounted) -> tuple[np.ndarray, np.ndarray]:
-    """Where the marker truly is, and how it is turned there."""
+    """Return the true place and rotation of the marker."""
     own = frame("sensor", "marker", THERE, SELF)
-    middle, *axes = taken([(0, 0, 0), *np.eye(3)], BODY, mounted, own)
+    middle, *axes = transformed([(0, 0, 0), *np.eye(3)], BODY, mounted, own)
     return middle, np.array(axes) - middle
 
 
 def reach(type, axes, way) -> float:
-    """How far a solid about its middle reaches along a way of the plane."""
+    """Return how far a solid extends from its centre in a direction of the plane."""
     x, y, z = (axes[:, :2] @ way) * np.array(SIZE) / 2
     if type in (CUBE, CUBES):
         return abs(x) + abs(y) + abs(z)
@@ -116,7 +116,9 @@ def test_each_solid_of_a_tilted_list_has_its_outline_from_above(
     own = frame("sensor", "marker", THERE, SELF)
     _, axes = whole(mounted)
     shapes = path.get("d").strip("z").split("z")
-    for shape, middle in zip(shapes, taken(CORNERS, BODY, mounted, own), strict=True):
+    for shape, middle in zip(
+        shapes, transformed(CORNERS, BODY, mounted, own), strict=True
+    ):
         found = corners(path, shape)
         for way in WAYS:
             there = middle[:2] @ way + reach(type, axes, way)
@@ -130,7 +132,7 @@ def test_tilted_lines_and_triangles_are_projected_from_above(
     points = CORNERS if type != LINES else CORNERS[:2]
     drawn = seen(link, layer, type, points)
     own = frame("sensor", "marker", THERE, SELF)
-    there = taken(points, BODY, mounted, own)[:, :2]
+    there = transformed(points, BODY, mounted, own)[:, :2]
     text = drawn.get("points") or drawn.get("d")
     assert corners(drawn, text) == pytest.approx(there, abs=2e-3)
 
@@ -139,7 +141,7 @@ def test_a_tilted_arrow_is_projected_from_above(link, layer, mounted):
     ends = CORNERS[:2]
     drawn = seen(link, layer, ARROW, ends, scale=(0.05, 0.1, 0.2))
     own = frame("sensor", "marker", THERE, SELF)
-    start, end = taken(ends, BODY, mounted, own)[:, :2]
+    start, end = transformed(ends, BODY, mounted, own)[:, :2]
     found = corners(drawn, drawn.get("points"))
     assert found[3] == pytest.approx(end, abs=2e-3)
     assert (found[0] + found[6]) / 2 == pytest.approx(start, abs=2e-3)
@@ -150,7 +152,7 @@ def test_points_of_a_tilted_marker_keep_their_size(link, layer, mounted):
     own = frame("sensor", "marker", THERE, SELF)
     for square, there in zip(
         path.get("d").strip("z").split("z"),
-        taken(CORNERS, BODY, mounted, own),
+        transformed(CORNERS, BODY, mounted, own),
         strict=True,
     ):
         x, y, wide, high, _ = numbers(square)
@@ -162,7 +164,7 @@ def test_points_of_a_tilted_marker_keep_their_size(link, layer, mounted):
 def test_a_text_of_a_tilted_marker_is_in_place_and_upright(link, layer, mounted):
     text = seen(link, layer, TEXT, text="here")
     placed = to_root(text)
-    (there,) = taken([THERE], BODY, mounted)
+    (there,) = transformed([THERE], BODY, mounted)
     assert placed.apply(0, 0) == pytest.approx(there[:2])
     assert (placed.b, placed.c) == (0, 0)
     assert placed.a == -placed.d > 0
@@ -173,7 +175,7 @@ def test_a_frame_locked_marker_is_redrawn_when_its_frame_tilts(link, layer):
     tall = marker(
         CUBE, scale=(1.0, 1.0, 3.0), at=(0, 0, 0), header=header, frame_locked=True
     )
-    say(link, tall)
+    publish(link, tall)
     for seconds, turns, size in (
         (100.0, (0.0, 0.0, 0.0), (1.0, 1.0)),
         (100.1, (0.0, math.pi / 2, 0.0), (3.0, 1.0)),
@@ -195,15 +197,17 @@ def test_a_frame_locked_marker_with_an_absurd_height_is_refused_while_flat(
 ):
     header = {"stamp": stamp(0.0), "frame_id": "gripper"}
     tall = {"scale": (1.0, 1.0, 1e9), "header": header, "frame_locked": True}
-    say(link, marker(type, [(0, 0)], **tall))
+    publish(link, marker(type, [(0, 0)], **tall))
     assert layer.shapes == {}
-    assert any("scale.z must be at most" in said for said in layer.problems.values())
+    assert any(
+        "scale.z must be at most" in problem for problem in layer.problems.values()
+    )
 
 
 def test_a_frame_locked_marker_that_only_moves_is_not_redrawn(link, layer):
     header = {"stamp": stamp(0.0), "frame_id": "camera"}
     over = marker(CYLINDER, at=(0, 0, 0), header=header, frame_locked=True)
-    say(link, over)
+    publish(link, over)
     shapes = []
     for step in range(4):
         turns = (*OVER[:2], 0.7 * step)
@@ -216,10 +220,10 @@ def test_a_frame_locked_marker_that_only_moves_is_not_redrawn(link, layer):
 
 
 def test_a_marker_ahead_in_an_optical_frame_is_drawn_ahead_on_the_map(link, layer):
-    """With plain numbers: three metres ahead of the lens, and half a metre right."""
+    """In plain numbers: three metres ahead of the lens, and half a metre right."""
     header = {"stamp": stamp(0.0), "frame_id": "optical"}
-    say(link, marker(CUBE, header=header))
+    publish(link, marker(CUBE, header=header))
     send_transforms(link, frame("map", "optical", (1.0, 2.0, 0.5), OPTICAL))
-    say(link, marker(CUBE, header=header, pose=posed((0.5, 0.1, 3.0))))
+    publish(link, marker(CUBE, header=header, pose=posed((0.5, 0.1, 3.0))))
     assert to_root(layer.shapes["test", 1]).apply(0, 0) == pytest.approx((4.0, 1.5))
     assert matrix(*OPTICAL) @ (0.5, 0.1, 3.0) == pytest.approx([3.0, -0.5, -0.1])

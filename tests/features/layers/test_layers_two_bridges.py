@@ -1,4 +1,4 @@
-"""One robot behind two bridges: its poses come over one, a scan over the other."""
+"""A robot behind two bridges: its poses come over one, a scan over the other."""
 
 import asyncio
 import math
@@ -42,8 +42,8 @@ def test_a_scan_of_one_bridge_is_placed_by_the_poses_of_another_bridge(
         map.add_robot(robot)
 
         def subscribed(there: WitnessRobot) -> set[str]:
-            said = [received.message for received in there.log.messages]
-            return {m["topic"] for m in said if m["op"] == "subscribe"}
+            messages = [received.message for received in there.log.messages]
+            return {m["topic"] for m in messages if m["op"] == "subscribe"}
 
         for bridge in (by_odometry, by_scan):
             bridge.start(asyncio.get_running_loop())

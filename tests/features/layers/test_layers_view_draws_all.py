@@ -1,4 +1,4 @@
-"""``webmap view`` draws all that simulated robots say, and nobody told it anything."""
+"""``webmap view`` draws all topics of simulated robots without a configuration."""
 
 import math
 
@@ -14,7 +14,7 @@ from webmap_process import webmap
 
 pytestmark = pytest.mark.browser
 
-# What each robot has; costmaps and markers are on the map.
+# The layers of each robot; costmaps and markers are on the map.
 OF_A_ROBOT = (
     ".laserscan > .dot[d]",
     ".pointcloud > .dot.band-7[d]",
@@ -26,9 +26,9 @@ OF_A_ROBOT = (
     ".range > .cone[d]",
     ".navsatfix > .cross:not([visibility])",
 )
-# In ROS 2 no part says which of the two robots it is of.
+# In ROS 2 the names of parts do not contain the robot.
 HEALTH = {"ros1": ".diagnostics.ok", "ros2": ".diagnostics.unheard"}
-# What a real robot has besides, under names that nobody can know.
+# Further topics of a real robot, with names that cannot be known before.
 ODD = (
     '.laserscan.scan-2[data-layer="rear/ranges"] > .dot[d]',
     '.path[data-layer="transformed_global_plan"] > polyline[points]',
@@ -55,11 +55,11 @@ ON_THE_MAP = {
 def test_webmap_view_draws_all_layers_of_simulated_robots(
     chromium: Browser, dialect, tilted
 ):
-    """Also where lasers hang upside down and a cloud is in its optical frame."""
+    """This includes lasers upside down and a cloud in its optical frame."""
     with simulators(dialect, tilted=tilted) as found:
         world = found[dialect].world
         found[dialect].do(lambda: face_a_wall(world, 1))
-        found[dialect].do(lambda: say_more(found[dialect].node))
+        found[dialect].do(lambda: publish_more(found[dialect].node))
         view = webmap("view", found[dialect].url, "--port", "0", "--no-browser")
         with view as url, watched_tab(chromium, 1000, 700) as tab:
             tab.set_default_timeout(20_000)
@@ -85,13 +85,13 @@ def test_webmap_view_draws_all_layers_of_simulated_robots(
 
 
 def is_placed(tab: Page, selector: str, at: Pose) -> None:
-    """Look where something lies on the map."""
+    """Check the place of an element on the map."""
     off = lambda: math.dist(tab.evaluate(PLACE, selector), (at.x, at.y))  # noqa: E731
     until(off, lambda metres: metres < 0.05, selector)
 
 
 def face_a_wall(world, index: int) -> None:
-    """Turn a robot to a wall that its camera can see."""
+    """Turn a robot towards a wall that its camera can see."""
     robot, (ranges,) = world.robots[index], world.sweep([index])
     near = np.flatnonzero((ranges > 1.5) & (ranges < 4.0))
     turn = near[len(near) // 2] * math.tau / len(ranges) - math.pi
@@ -99,7 +99,7 @@ def face_a_wall(world, index: int) -> None:
 
 
 def dots_are_where_walls_are(tab: Page, world, clouds: int) -> None:
-    """Look where the dots of a robot's laser and of its clouds lie on the map."""
+    """Check the places of the dots of a robot's laser and clouds on the map."""
     robot = '.robot[data-name="robot_1"]'
     pose, ranges = world.robots[1].pose, world.sweep([1])[0]
     turns = pose.yaw - math.pi + np.arange(len(ranges)) * math.tau / len(ranges)
@@ -115,7 +115,7 @@ def dots_are_where_walls_are(tab: Page, world, clouds: int) -> None:
         return len(off) == len(walls) and off.min(axis=0).max() < 0.01
 
     scan = lambda: apart(".laserscan > .dot")  # noqa: E731
-    until(scan, is_scan, "each ray has a dot where it ends")
+    until(scan, is_scan, "each ray has a dot at its end")
     there = tab.locator(f"{robot} .pointcloud")
     drawn = there.filter(has=tab.locator('.dot[d^="M"]'))
     until(lambda: (there.count(), drawn.count()), (clouds, clouds).__eq__, "clouds")
@@ -136,7 +136,7 @@ def dots_are_where_walls_are(tab: Page, world, clouds: int) -> None:
     ahead = abs((turns[hit] - pose.yaw + math.pi) % math.tau - math.pi)
     seen = (ahead < math.radians(20)) & (ranges[hit] < 5.5)
     assert seen.sum() > 10
-    assert (mine[:, seen].min(axis=0) < 0.15).mean() > 0.9, "what is ahead is seen"
+    assert (mine[:, seen].min(axis=0) < 0.15).mean() > 0.9, "points ahead are seen"
 
 
 def _sees_only_ahead(tab: Page, robot: str, number: int, pose) -> bool:
@@ -149,8 +149,8 @@ def _sees_only_ahead(tab: Page, robot: str, number: int, pose) -> bool:
 DOCK = Pose(3.0, -2.0, 1.0)
 
 
-def say_more(node):
-    """Let the first robot have a second scan, a map of its own, and odd names."""
+def publish_more(node):
+    """Give the first robot a second scan, a map of its own, and unusual topic names."""
     robot, plan = node.world.robots[0], node.world.plan
     kinds = {
         "rear/ranges": "sensor_msgs/LaserScan",
@@ -168,7 +168,7 @@ def say_more(node):
         node.publish(topic, node.messages.grid(topic, node.graph.clock(), plan))
     corners = [{"x": float(x), "y": float(y), "z": 0.0} for x, y in SQUARE]
 
-    def say():
+    def publish_all():
         now, messages = node.graph.clock(), node.messages
         topic = f"{robot.topics}/rear/ranges"
         (ranges,) = node.world.sweep([0])
@@ -189,14 +189,14 @@ def say_more(node):
         fence = {"header": at["header"], "polygon": {"points": corners}}
         node.publish(f"{robot.topics}/keep_in", fence)
 
-    node.on_step.append(say)
+    node.on_step.append(publish_all)
 
 
 SQUARE = ((0, 0), (4, 0), (4, 4), (0, 4))
 
 
 def switch_one_map(tab):
-    """Switch one of three maps off by itself, and see the others stay."""
+    """Switch off one of three maps, and check that the others stay."""
     seen = """() => [...document.querySelectorAll(".occupancy-grid.map")]
       .filter((grid) => getComputedStyle(grid).display !== "none")
       .map((grid) => grid.dataset.layer).sort()"""

@@ -1,4 +1,4 @@
-"""Where a robot is to go and where it has been, in the frame of the map."""
+"""Paths to goals and trails, in the frame of the map."""
 
 import itertools
 import math
@@ -17,7 +17,7 @@ def path(points, *, ros2=False) -> dict:
 
 
 def go(link, x, y, yaw=0.0, frame="odom"):
-    link.say("/odom", {"header": header(frame), "pose": pose(x, y, yaw)})
+    link.publish("/odom", {"header": header(frame), "pose": pose(x, y, yaw)})
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def robot(robot, link):
 
 
 def in_world(line) -> list[tuple[float, float]]:
-    """The points of a line, where they lie on the map."""
+    """Return the points of a line on the map."""
     values = numbers(line.get("points") or "")
     place = to_root(line)
     pairs = zip(values[::2], values[1::2], strict=True)
@@ -42,7 +42,7 @@ def near(points):
 def test_a_path_keeps_its_position_on_the_map_while_the_robot_moves(link, robot, ros2):
     module = robot.add_module("Path", link, "/plan")
     points = [(1.0, 2.0), (3.5, -4.25), (-7.125, 0.0)]
-    link.say("/plan", path(points, ros2=ros2))
+    link.publish("/plan", path(points, ros2=ros2))
     for at in [(0, 0, 0), (5, -3, 1), (-200.5, 77, math.pi), (1, 1, -2)]:
         go(link, *at)
         assert in_world(module.line) == near(points)
@@ -51,7 +51,7 @@ def test_a_path_keeps_its_position_on_the_map_while_the_robot_moves(link, robot,
 def test_a_path_added_to_a_robot_away_from_the_origin_is_in_place(link, robot):
     go(link, 10, 20, 2.0)
     module = robot.add_module("Path", link, "/plan")
-    link.say("/plan", path([(1, 2), (3, 4)]))
+    link.publish("/plan", path([(1, 2), (3, 4)]))
     assert in_world(module.line) == near([(1, 2), (3, 4)])
 
 
@@ -68,16 +68,16 @@ def test_a_path_is_drawn_under_the_robot_and_ignores_clicks(link, robot):
 
 def test_a_path_without_poses_removes_the_line(link, robot):
     module = robot.add_module("Path", link, "/plan")
-    link.say("/plan", path([(1, 2), (4, 6)]))
+    link.publish("/plan", path([(1, 2), (4, 6)]))
     assert module.length == pytest.approx(5.0)
-    link.say("/plan", path([]))
+    link.publish("/plan", path([]))
     assert in_world(module.line) == []
     assert module.length == 0
 
 
 def test_a_long_path_is_thinned_evenly_and_keeps_both_ends(link, robot):
     module = robot.add_module("Path", link, "/plan", max_points=100)
-    link.say("/plan", path([(i * 0.01, 0) for i in range(5000)]))
+    link.publish("/plan", path([(i * 0.01, 0) for i in range(5000)]))
     drawn = in_world(module.line)
     assert len(drawn) == 100
     assert drawn[0] == pytest.approx((0, 0))
@@ -90,13 +90,13 @@ def test_a_long_path_is_thinned_evenly_and_keeps_both_ends(link, robot):
 @pytest.mark.parametrize("wrong", [None, math.nan, math.inf])
 def test_a_path_with_a_non_finite_point_is_refused(link, robot, wrong):
     module = robot.add_module("Path", link, "/plan")
-    link.say("/plan", path([(1, 2), (3, 4)]))
-    link.say("/plan", path([(1, 2), (3, wrong)]))
+    link.publish("/plan", path([(1, 2), (3, 4)]))
+    link.publish("/plan", path([(1, 2), (3, wrong)]))
     assert in_world(module.line) == near([(1, 2), (3, 4)])
     (problem,) = robot.problems.values()
     assert "as point 1 of 2" in problem
     assert "/plan" in problem
-    link.say("/plan", path([(5, 6), (7, 8)]))
+    link.publish("/plan", path([(5, 6), (7, 8)]))
     assert robot.problems == {}
     assert in_world(module.line) == near([(5, 6), (7, 8)])
 
@@ -106,13 +106,13 @@ def test_a_path_with_zero_quaternions_is_drawn(link, robot):
     for each in message["poses"]:
         each["pose"]["orientation"] = {"x": 0, "y": 0, "z": 0, "w": 0}
     module = robot.add_module("Path", link, "/plan")
-    link.say("/plan", message)
+    link.publish("/plan", message)
     assert in_world(module.line) == near([(1, 2), (3, 4)])
 
 
 def test_removing_a_path_removes_its_problem(link, robot):
     module = robot.add_module("Path", link, "/plan")
-    link.say("/plan", path([(math.nan, 0)]))
+    link.publish("/plan", path([(math.nan, 0)]))
     robot.remove_module(module)
     assert robot.problems == {}
 
@@ -129,7 +129,7 @@ def test_a_path_update_triggers_other_modules_of_the_robot(link, robot):
 
     robot.add_module(Listener)
     robot.add_module("Path", link, "/plan")
-    link.say("/plan", path([(0, 0), (0, 3)]))
+    link.publish("/plan", path([(0, 0), (0, 3)]))
     assert received == [3.0]
 
 
@@ -207,9 +207,9 @@ def test_invalid_trail_lengths_are_refused(robot, name, value):
 
 def test_the_path_of_a_robot_on_its_side_is_in_place(link, robot):
     module = robot.add_module("Path", link, "/plan")
-    link.say("/plan", path([(1, 2), (3, 4)]))
+    link.publish("/plan", path([(1, 2), (3, 4)]))
     q = Quaternion(0.5, 0.5, 0.5, 0.5)
     message = {"header": header(), "pose": pose(3, 4)}
     message["pose"]["orientation"] = {"x": q.x, "y": q.y, "z": q.z, "w": q.w}
-    link.say("/odom", message)
+    link.publish("/odom", message)
     assert in_world(module.line) == near([(1, 2), (3, 4)])

@@ -1,4 +1,4 @@
-"""Frames that are turned about any axis, by another way than WebMap's own."""
+"""Frames that are turned about any axis, computed without WebMap's code."""
 
 import math
 
@@ -6,14 +6,14 @@ import numpy as np
 from test_layers_at_stamp import stamp
 
 OPTICAL = (-math.pi / 2, 0.0, -math.pi / 2)
-"""Of a camera that looks ahead: x to the right, y down and z forward (REP 103)."""
+"""The turn of a camera that looks ahead: x right, y down and z forward (REP 103)."""
 
 OVER = (math.pi, 0.0, 0.0)
 """Upside down."""
 
 
 def matrix(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """The rotation matrix of turns about fixed x, then y, then z."""
+    """Return the rotation matrix of turns about fixed x, then y, then z."""
     (sr, sp, sy), (cr, cp, cy) = np.sin((roll, pitch, yaw)), np.cos((roll, pitch, yaw))
     about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
     about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
@@ -49,8 +49,8 @@ def frame(parent, child, place, turns=(0.0, 0.0, 0.0), seconds=0.0) -> dict:
     }
 
 
-def taken(points, *frames: dict) -> np.ndarray:
-    """Where points of the last frame are in the first one's parent: of shape (N, 3)."""
+def transformed(points, *frames: dict) -> np.ndarray:
+    """Return points of the last frame in the parent of the first, of shape (N, 3)."""
     found = np.asarray(points, float).reshape(-1, 3)
     for each in reversed(frames):
         turn, by = each["transform"]["rotation"], each["transform"]["translation"]

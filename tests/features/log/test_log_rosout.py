@@ -1,4 +1,4 @@
-"""What the nodes of a robot log."""
+"""The log lines of the nodes of a robot."""
 
 import pytest
 from module_fakes import header
@@ -27,11 +27,11 @@ def log(level, text, name="/planner", *, ros2=False) -> dict:
 def test_ros_1_and_ros_2_log_levels_map_to_the_same_names(link, robot, ros2):
     module = robot.add_module("Rosout", link, level="debug")
     for level in ROS1:
-        link.say("/rosout", log(level, f"it is {level}", ros2=ros2))
+        link.publish("/rosout", log(level, f"it is {level}", ros2=ros2))
     assert [line.level for line in module.lines] == list(ROS1)
     assert module.lines[0].text == "it is debug"
     assert module.lines[0].stamp == pytest.approx(3.5 if ros2 else 3, abs=1e-6)
-    assert link.types["/rosout"] is None, "the bridge knows which dialect's it is"
+    assert link.types["/rosout"] is None, "the bridge finds the type of its dialect"
 
 
 @pytest.mark.parametrize(
@@ -39,27 +39,27 @@ def test_ros_1_and_ros_2_log_levels_map_to_the_same_names(link, robot, ros2):
 )
 def test_an_unknown_log_level_is_replaced_by_a_known_one(link, robot, level, name):
     module = robot.add_module("Rosout", link, level="debug")
-    link.say("/rosout", log(level, "x", ros2=True))
+    link.publish("/rosout", log(level, "x", ros2=True))
     assert [line.level for line in module.lines] == [name]
 
 
 def test_log_lines_are_filtered_by_level_and_node_prefix(link, robot):
     module = robot.add_module("Rosout", link, level="error", prefix="/bob/")
-    link.say("/rosout", log("warn", "slow", "/bob/planner"))
-    link.say("/rosout", log("error", "stuck", "/eve/planner"))
-    link.say("/rosout", log("error", "stuck", "/bob/planner"))
-    link.say("/rosout", log("fatal", "gone", "bob/driver"))
+    link.publish("/rosout", log("warn", "slow", "/bob/planner"))
+    link.publish("/rosout", log("error", "stuck", "/eve/planner"))
+    link.publish("/rosout", log("error", "stuck", "/bob/planner"))
+    link.publish("/rosout", log("fatal", "gone", "bob/driver"))
     assert [line.text for line in module.lines] == ["stuck", "gone"]
 
 
 def test_a_page_shows_the_newest_lines_as_text_until_it_closes(link, robot):
     module = robot.add_module("Rosout", link, lines=3)
-    link.say("/rosout", log("warn", "before"))
+    link.publish("/rosout", log("warn", "before"))
     rows, page = html.ol(html.li("old")), Scope("page")
     with page.active():
         module.show_in(rows)
     for number in range(3):
-        link.say("/rosout", log("error", f"<b>{number}</b>", "/a"))
+        link.publish("/rosout", log("error", f"<b>{number}</b>", "/a"))
     assert [row.text for row in rows.children] == [
         "/a<b>0</b>",
         "/a<b>1</b>",
@@ -68,7 +68,7 @@ def test_a_page_shows_the_newest_lines_as_text_until_it_closes(link, robot):
     assert str(rows.children[0].classes) == "error"
     assert len(module.lines) == 3
     page.close()
-    link.say("/rosout", log("error", "after"))
+    link.publish("/rosout", log("error", "after"))
     assert len(rows.children) == 3
 
 
@@ -84,7 +84,7 @@ def test_a_long_line_is_truncated_and_passed_to_other_modules(link, robot):
 
     robot.add_module(Listener)
     robot.add_module("Rosout", link)
-    link.say("/rosout", log("error", "x" * 1_000_000))
+    link.publish("/rosout", log("error", "x" * 1_000_000))
     assert received == [2000]
 
 

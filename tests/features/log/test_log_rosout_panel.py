@@ -1,4 +1,4 @@
-"""The panel with what nodes log: shared, counted, and heard while it is open."""
+"""The panel of log lines: shared, counted, and subscribed only while it is open."""
 
 import asyncio
 
@@ -13,7 +13,7 @@ ROS1, ROS2 = {"info": 2, "error": 8}, {"info": 20, "error": 40}
 
 
 class LogLink:
-    """A bridge that somebody may listen to, and that can say something."""
+    """A bridge that has subscribers and publishes log lines."""
 
     def __init__(self, name):
         self.name, self.url, self.state = name, f"ws://{name}:9090", "open"
@@ -31,7 +31,7 @@ class LogLink:
 
         return Subscription()
 
-    def say(self, level, text, name="/planner", *, ros2=False):
+    def publish(self, level, text, name="/planner", *, ros2=False):
         where = {"stamp": {"sec": 3, "nanosec": 0}} if ros2 else {"header": header("")}
         number = (ROS2 if ros2 else ROS1)[level]
         plain = {**where, "level": number, "name": name, "msg": text}
@@ -54,10 +54,10 @@ def test_the_log_panel_receives_ros_1_and_ros_2_lines_only_while_open(map, page,
 
     async def scenario():
         panel = map.add_module("RosoutPanel", [old, new])
-        assert old.listeners == [], "nothing is asked of a robot while it is folded"
+        assert old.listeners == [], "a closed panel subscribes to nothing"
         panel.on_message({"open": True})
-        old.say("error", "stuck")
-        new.say("info", "on my way", "nav", ros2=True)
+        old.publish("error", "stuck")
+        new.publish("info", "on my way", "nav", ros2=True)
         panel.send_new_lines()
         first, second = said
         assert (first["bridge"], first["total"], first["state"]) == (0, 1, "open")
@@ -65,11 +65,11 @@ def test_the_log_panel_receives_ros_1_and_ros_2_lines_only_while_open(map, page,
         assert second["lines"][0][1:5] == ["info", "nav", "on my way", 1]
         said.clear()
         panel.send_new_lines()
-        assert said == [], "what was told is not told again"
-        old.say("error", "stuck")
+        assert said == [], "old lines are not sent again"
+        old.publish("error", "stuck")
         old.state = "closed"
         panel.send_new_lines()
-        assert said[0]["lines"][0][4] == 2, "what is said again is counted"
+        assert said[0]["lines"][0][4] == 2, "a repeated line is counted"
         assert said[0]["state"] == "closed"
         panel.on_message({"open": False})
         assert old.listeners == new.listeners == []
@@ -78,7 +78,7 @@ def test_the_log_panel_receives_ros_1_and_ros_2_lines_only_while_open(map, page,
         assert old.listeners == []
         panel.on_message({"open": True})
         page.close()
-        assert old.listeners == [], "a page that is gone listens to nothing"
+        assert old.listeners == [], "a closed page has no subscription"
 
     asyncio.run(scenario())
 
@@ -97,7 +97,7 @@ def test_a_bridge_that_comes_while_the_log_panel_is_open_is_followed(map, page, 
         while not new.listeners:
             await asyncio.sleep(0)
         await asyncio.sleep(0)
-        new.say("error", "stuck")
+        new.publish("error", "stuck")
         panel.send_new_lines()
         assert {(each["bridge"], each["name"]) for each in said} == {(1, "new")}
         assert said[-1]["lines"][0][1:5] == ["error", "/planner", "stuck", 1]
@@ -114,13 +114,13 @@ def test_pages_share_one_log_subscription_that_keeps_the_newest_lines():
     one, other = log.watch(), log.watch()
     assert len(link.listeners) == 1
     for number in range(MOST + 5):
-        link.say("info", f"{number}" + "x" * 2 * LONGEST)
+        link.publish("info", f"{number}" + "x" * 2 * LONGEST)
     assert (len(log.lines), log.total) == (MOST, MOST + 5)
     assert len(log.lines[-1].text) == LONGEST
     assert [line.number for line in log.since(log.version - 2)] == [MOST + 4, MOST + 5]
     one.remove()
     one.remove()
-    assert len(link.listeners) == 1, "the other still looks"
+    assert len(link.listeners) == 1, "the other page is still subscribed"
     other.remove()
     assert link.listeners == []
     log.watch()
@@ -130,9 +130,9 @@ def test_pages_share_one_log_subscription_that_keeps_the_newest_lines():
 def test_a_log_keeps_no_lines_from_a_time_without_viewers():
     link = LogLink("quiet")
     log = BridgeLog(link)
-    link.say("error", "before")
+    link.publish("error", "before")
     log.watch().remove()
-    link.say("error", "after")
+    link.publish("error", "after")
     assert list(log.lines) == []
 
 

@@ -1,4 +1,4 @@
-"""The player of a recording: what a page receives, and which commands it may give."""
+"""The player of a recording: what a page receives, and which commands are valid."""
 
 import json
 import math
@@ -15,8 +15,8 @@ def status(**changes):
     return {**usual, "playing": True, "ended": False, "problem": "", **changes}
 
 
-def say(link, topic, content):
-    link.say(topic, {"data": json.dumps(content)})
+def publish(link, topic, content):
+    link.publish(topic, {"data": json.dumps(content)})
 
 
 @pytest.fixture
@@ -34,8 +34,8 @@ def player(map, link, given, monkeypatch):
 
 def test_a_page_receives_the_status_and_the_marks(player, link):
     mark = {"at": 5.0, "kind": "stop", "text": "Stop on /e_stop"}
-    say(link, STATUS, status())
-    say(link, MARKS, {"marks": [mark], "left_out": 0, "read": 1.0})
+    publish(link, STATUS, status())
+    publish(link, MARKS, {"marks": [mark], "left_out": 0, "read": 1.0})
     assert player.sent == [
         {"status": status()},
         {"marks": {"marks": [mark], "left_out": 0, "read": 1.0}},
@@ -45,7 +45,7 @@ def test_a_page_receives_the_status_and_the_marks(player, link):
 def test_a_reloaded_page_receives_the_newest_status_again(player, link):
     player.on_ready()
     assert player.sent == []
-    say(link, STATUS, status())
+    publish(link, STATUS, status())
     player.on_ready()
     assert player.sent == [{"status": status()}] * 2
 
@@ -54,8 +54,8 @@ def test_a_later_page_receives_marks_that_were_found_in_several_parts(
     player, map, link, monkeypatch
 ):
     marks = {"marks": [], "left_out": 0, "read": 0.5}
-    say(link, MARKS, marks)
-    say(link, MARKS, marks | {"read": 1.0})
+    publish(link, MARKS, marks)
+    publish(link, MARKS, marks | {"read": 1.0})
     later = map.add_module(RecordingPlayer, link, print)
     sent = []
     monkeypatch.setattr(later.browser_part, "send", sent.append)
@@ -67,8 +67,8 @@ def test_a_later_page_receives_marks_that_were_found_in_several_parts(
     "text", ["", "Recording office: 1.0 of 4.0 s", "[]", '{"at": "x"}', "null", "{"]
 )
 def test_another_text_on_the_topics_is_ignored(player, link, text):
-    link.say(STATUS, {"data": text})
-    link.say(MARKS, {"data": text})
+    link.publish(STATUS, {"data": text})
+    link.publish(MARKS, {"data": text})
     assert player.sent == []
 
 
@@ -110,24 +110,24 @@ def test_a_command_that_is_not_valid_is_reported_and_not_given(
 def test_the_first_page_begins_the_recording_anew_and_later_ones_do_not(
     player, link, given
 ):
-    say(link, STATUS, status(jumps=0))
-    say(link, STATUS, status(jumps=1))
+    publish(link, STATUS, status(jumps=0))
+    publish(link, STATUS, status(jumps=1))
     assert given == [Command("again")]
 
 
 def test_a_later_page_does_not_begin_the_recording_anew(player, link, given):
-    say(link, STATUS, status(jumps=1))
+    publish(link, STATUS, status(jumps=1))
     assert given == []
 
 
 def test_a_jump_of_the_position_clears_the_trails(link, robot):
     trail = robot.add_module("Trail")
     expect_jumps(link, lambda: [robot])
-    say(link, STATUS, status(jumps=1))
+    publish(link, STATUS, status(jumps=1))
     trail._begin((1.0, 0.0))
-    say(link, STATUS, status(jumps=1))
+    publish(link, STATUS, status(jumps=1))
     assert trail.points
-    say(link, STATUS, status(jumps=2))
+    publish(link, STATUS, status(jumps=2))
     assert trail.points == []
 
 
@@ -136,6 +136,6 @@ def test_a_jump_of_the_position_is_no_jump_of_the_robot(link, robot, monkeypatch
     monkeypatch.setattr(type(robot), "expect_jump", lambda self: expected.append(self))
     expect_jumps(link, lambda: [robot])
     for jumps in (1, 1, 2):
-        say(link, STATUS, status(jumps=jumps))
-    link.say(STATUS, {"data": "no status"})
+        publish(link, STATUS, status(jumps=jumps))
+    link.publish(STATUS, {"data": "no status"})
     assert expected == [robot, robot]

@@ -1,6 +1,6 @@
-/** Areas to lay sweeps over, and what is known of them without the code under test. */
+/** Areas for sweeps, and their geometry computed without the code under test. */
 
-/** Areas with bays, whose parts can all be gone to without leaving them. */
+/** Areas with bays; a robot can reach all parts without leaving the area. */
 export const BAYS = {
   "two arms": [
     [0, 0],
@@ -61,7 +61,7 @@ export function numbersFrom(seed) {
   };
 }
 
-/** Corners given as [x, y], turned by so much, and moved to where a map may have them. */
+/** Return corners given as [x, y], turned by a yaw and moved to a place on the map. */
 export function placed(corners, yaw = 0, [x0, y0] = [0, 0]) {
   const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
   return corners.map(([x, y]) => ({ x: x0 + cos * x - sin * y, y: y0 + sin * x + cos * y }));
@@ -107,7 +107,7 @@ export function sizeOf(area) {
   return Math.abs(sum) / 2;
 }
 
-/** Metres from a point to the straight way between two others. */
+/** Metres from a point to the straight line between two other points. */
 export function awayFrom([p, q], { x, y }) {
   const [dx, dy] = [q.x - p.x, q.y - p.y];
   const length2 = dx * dx + dy * dy;
@@ -116,7 +116,7 @@ export function awayFrom([p, q], { x, y }) {
   return Math.hypot(x - p.x - t * dx, y - p.y - t * dy);
 }
 
-/** Whether a point is in an area or on its edge, by how often the area goes round it. */
+/** Whether a point is in an area or on its edge, by the winding number. */
 export function isIn(area, point) {
   let turned = 0;
   for (const [i, p] of area.entries()) {
@@ -129,7 +129,7 @@ export function isIn(area, point) {
   return Math.abs(turned) > Math.PI;
 }
 
-/** Points along a straight way, both ends too. */
+/** Points along a straight line, including both ends. */
 export function along(p, q, count = 20) {
   return Array.from({ length: count + 1 }, (_, i) => {
     const t = i / count;

@@ -10,12 +10,12 @@ const POINTS = [1, 2, 3].map((x) => ({ x, y: 0, yaw: 0 }));
 
 const pass = holdTimeouts();
 
-/** The page's line to a gate that refuses goals while `refusal` says why. */
+/** The page's link to a gate that refuses goals with the reason `refusal`, if any. */
 class FakeDrive {
   constructor() {
     this.refusal = null;
-    /** Where goals were offered, by x; and "cancel". */
-    this.said = [];
+    /** The x of each goal that was sent to the gate, and "cancel". */
+    this.offered = [];
     this.kept = 0;
     this.robots = new Map();
     this._listeners = {};
@@ -39,18 +39,18 @@ class FakeDrive {
   }
 
   cancel() {
-    this.said.push("cancel");
+    this.offered.push("cancel");
   }
 
   async goal(robot, { x }) {
     await this.taking;
-    this.said.push(x);
+    this.offered.push(x);
     this.emit("goal", robot);
     if (this.refusal !== null) throw new Error(this.refusal);
   }
 
-  report(word, more = {}) {
-    this.robots.set("r1", { robot: "r1", latched: false, goal: word, ...more });
+  report(reported, more = {}) {
+    this.robots.set("r1", { robot: "r1", latched: false, goal: reported, ...more });
     this.emit("robot", { robot: "r1" });
   }
 }
@@ -59,7 +59,7 @@ function goal(id, state = "under way") {
   return { id, state, why: "", method: "navigate_to_pose", left: null, eta: null };
 }
 
-/** A robot whose first goal waits for the link that another robot's goal used up. */
+/** A robot whose first goal waits for a link, as another goal used the link. */
 async function waiting() {
   const drive = new FakeDrive();
   drive.report(null);
@@ -67,7 +67,7 @@ async function waiting() {
   const robots = new RouteRobots(drive, () => null, () => {});
   robots.begin("r1", POINTS, { loop: false });
   await settle();
-  assert.deepEqual(drive.said, [1]);
+  assert.deepEqual(drive.offered, [1]);
   return { drive, robots, run: robots.of("r1").run };
 }
 
@@ -83,7 +83,7 @@ test("a route continues after its goals were refused for a missing link", async 
   drive.refusal = null;
   await pass();
   drive.report(goal("g2"));
-  assert.deepEqual(drive.said, [1, 1, 2, 2]);
+  assert.deepEqual(drive.offered, [1, 1, 2, 2]);
   assert.equal(run.state, "going");
 });
 
@@ -92,7 +92,7 @@ test("a route without a link halts with that reason after all tries", async () =
   await pass(20);
   assert.equal(run.state, "halted");
   assert.equal(run.why, LINKLESS);
-  assert.equal(drive.said.length, TRIES);
+  assert.equal(drive.offered.length, TRIES);
 });
 
 test("a waiting route is not busy", async () => {
@@ -116,7 +116,7 @@ for (const [what, act, state] of [
     await pass(20);
     assert.equal(bench.run.state, state);
     assert.deepEqual(
-      bench.drive.said.filter((each) => each !== "cancel"),
+      bench.drive.offered.filter((each) => each !== "cancel"),
       [1],
     );
   });
@@ -133,7 +133,7 @@ test("a skip while waiting drops the point and sends the next point once", async
   drive.refusal = null;
   robots.act("r1", "skip");
   await pass(20);
-  assert.deepEqual(drive.said, [1, 2]);
+  assert.deepEqual(drive.offered, [1, 2]);
   assert.equal(run.state, "going");
 });
 
@@ -143,7 +143,7 @@ test("a waiting route that is paused and resumed sends its point once", async ()
   drive.refusal = null;
   robots.act("r1", "go");
   await pass(20);
-  assert.deepEqual(drive.said, [1, "cancel", 1]);
+  assert.deepEqual(drive.offered, [1, "cancel", 1]);
   assert.equal(run.state, "going");
 });
 
@@ -151,7 +151,7 @@ test("no goals are sent after the tool is destroyed", async () => {
   const { drive, robots } = await waiting();
   robots.destroy();
   await pass(20);
-  assert.deepEqual(drive.said, [1]);
+  assert.deepEqual(drive.offered, [1]);
 });
 
 test("a route that ends while its lease is requested cancels the goal sent later", async () => {
@@ -164,7 +164,7 @@ test("a route that ends while its lease is requested cancels the goal sent later
   robots.act("r1", "end");
   take();
   await settle();
-  assert.deepEqual(drive.said, ["cancel", 1, "cancel"]);
+  assert.deepEqual(drive.offered, ["cancel", 1, "cancel"]);
   assert.equal(robots.of("r1").run.state, "ended");
 });
 
@@ -195,7 +195,7 @@ test("a run continues after the map is drawn again", async () => {
   const after = new RouteRobots(drive, () => null, () => {}, runs);
   drive.report(goal("g1", "reached"), { name: "Bob" });
   await settle();
-  assert.deepEqual(drive.said, [1, 2]);
+  assert.deepEqual(drive.offered, [1, 2]);
   assert.equal(after.of("r1").run.index, 1);
   assert.equal(before.of("r1"), undefined);
 });
@@ -210,7 +210,7 @@ test("a run halts if the map is drawn again while its goal waits for a link", as
   const after = new RouteRobots(drive, () => null, () => {}, before.destroy());
   drive.refusal = null;
   await pass(20);
-  assert.deepEqual(drive.said, [1]);
+  assert.deepEqual(drive.offered, [1]);
   assert.equal(after.of("r1").run.why, "the map was drawn again");
 });
 
@@ -237,6 +237,6 @@ test("a goal sent after the map was drawn again is cancelled", async () => {
   const after = new RouteRobots(drive, () => null, () => {}, before.destroy());
   take();
   await pass();
-  assert.deepEqual(drive.said, [1, "cancel"]);
+  assert.deepEqual(drive.offered, [1, "cancel"]);
   assert.equal(after.of("r1").run.state, "halted");
 });

@@ -14,24 +14,24 @@ function underWay(options) {
   const run = new RouteRun(POINTS, options);
   run.go(null);
   run.accepted(0);
-  say(run, goal("g1"));
+  report(run, goal("g1"));
   return run;
 }
 
-function say(run, word, { mine = true, latched = false, away = null, now = 0 } = {}) {
-  return run.report({ mine, latched, goal: word }, away, now);
+function report(run, reported, { mine = true, latched = false, away = null, now = 0 } = {}) {
+  return run.report({ mine, latched, goal: reported }, away, now);
 }
 
 test("a route sends its goals one after another and ends after the last", () => {
   const run = underWay();
   for (const n of [1, 2]) {
-    assert.deepEqual(say(run, goal(`g${n}`, "reached")), { send: POINTS[n] });
-    assert.equal(say(run, goal(`g${n}`, "reached")), null, "it is sent once");
+    assert.deepEqual(report(run, goal(`g${n}`, "reached")), { send: POINTS[n] });
+    assert.equal(report(run, goal(`g${n}`, "reached")), null, "the goal is sent once");
     run.accepted(0);
-    assert.equal(say(run, goal(`g${n}`, "reached")), null, "that is the one before");
-    assert.equal(say(run, goal(`g${n + 1}`)), null);
+    assert.equal(report(run, goal(`g${n}`, "reached")), null, "the previous goal is ignored");
+    assert.equal(report(run, goal(`g${n + 1}`)), null);
   }
-  assert.equal(say(run, goal("g3", "reached")), null);
+  assert.equal(report(run, goal("g3", "reached")), null);
   assert.equal(run.state, "ended");
   assert.equal(run.go("g3"), null);
 });
@@ -41,9 +41,9 @@ test("a loop starts again at its first point", () => {
   run.skip("g1");
   run.skip("g1");
   run.accepted(0);
-  say(run, goal("g3"));
+  report(run, goal("g3"));
   const later = { now: 1000 };
-  assert.deepEqual(say(run, goal("g3", "reached"), later), { send: POINTS[0] });
+  assert.deepEqual(report(run, goal("g3", "reached"), later), { send: POINTS[0] });
   assert.equal(run.rounds, 1);
 });
 
@@ -54,7 +54,7 @@ test("a loop whose points are already reached sends one goal per second", () => 
   const sent = [];
   for (let now = 0; now < 10_000; now += 50) {
     const there = goal(`g${sent.length}`, "sent", { method: "topic" });
-    if (say(run, there, { away: 0.1, now }) === null) continue;
+    if (report(run, there, { away: 0.1, now }) === null) continue;
     sent.push(now);
     run.accepted(now);
   }
@@ -62,13 +62,13 @@ test("a loop whose points are already reached sends one goal per second", () => 
 });
 
 test("a route without a loop does not wait at points that are reached at once", () => {
-  assert.deepEqual(say(underWay(), goal("g1", "reached")), { send: POINTS[1] });
+  assert.deepEqual(report(underWay(), goal("g1", "reached")), { send: POINTS[1] });
 });
 
 test("a STOP halts a loop that waits at a reached point", () => {
   const run = underWay({ loop: true });
-  assert.equal(say(run, goal("g1", "reached"), { now: 500 }), null);
-  say(run, goal("g1", "reached"), { now: 1500, latched: true });
+  assert.equal(report(run, goal("g1", "reached"), { now: 500 }), null);
+  report(run, goal("g1", "reached"), { now: 1500, latched: true });
   assert.equal(run.state, "halted");
 });
 
@@ -76,20 +76,20 @@ test("a loop with one point ends at that point", () => {
   const run = new RouteRun(POINTS.slice(0, 1), { loop: true });
   run.go(null);
   run.accepted(0);
-  say(run, goal("g1"));
-  assert.equal(say(run, goal("g1", "reached"), { now: 60_000 }), null);
+  report(run, goal("g1"));
+  assert.equal(report(run, goal("g1", "reached"), { now: 60_000 }), null);
   assert.equal(run.state, "ended");
 });
 
 test("a failed goal halts the route until the operator resumes or skips", () => {
   const run = underWay();
-  assert.equal(say(run, goal("g1", "failed", { why: "no path" })), null);
+  assert.equal(report(run, goal("g1", "failed", { why: "no path" })), null);
   assert.equal(run.state, "halted");
   assert.equal(run.why, "the goal failed: no path");
-  assert.equal(say(run, goal("g1", "failed")), null);
+  assert.equal(report(run, goal("g1", "failed")), null);
   assert.deepEqual(run.go("g1"), { send: POINTS[0] });
   run.accepted(0);
-  say(run, goal("g2", "failed"));
+  report(run, goal("g2", "failed"));
   assert.deepEqual(run.skip("g2"), { send: POINTS[1] });
 });
 
@@ -101,19 +101,19 @@ test("STOP, a lost lease, another goal and a cancel halt the route", () => {
     [goal("g1", "cancelled", { why: "STOP" }), {}, /cancelled: STOP/],
     [goal("g1", "cancelling"), {}, /cancelled/],
   ];
-  for (const [word, more, why] of cases) {
+  for (const [reported, more, why] of cases) {
     const run = underWay();
-    assert.equal(say(run, word, more), null);
+    assert.equal(report(run, reported, more), null);
     assert.equal(run.state, "halted");
     assert.match(run.why, why);
-    assert.equal(say(run, goal("g1", "reached")), null, "nothing goes on by itself");
+    assert.equal(report(run, goal("g1", "reached")), null, "the route does not continue by itself");
   }
 });
 
 test("a missing lease does not halt the route before the gate accepts the goal", () => {
   const run = new RouteRun(POINTS);
   run.go(null);
-  assert.equal(say(run, null, { mine: false }), null);
+  assert.equal(report(run, null, { mine: false }), null);
   assert.equal(run.state, "going");
   run.halt("Ann has control");
   assert.equal(run.why, "Ann has control");
@@ -123,9 +123,9 @@ test("a goal that never appears in a report halts the route", () => {
   const run = new RouteRun(POINTS);
   run.go("g0");
   run.accepted(0);
-  say(run, goal("g0", "reached"), { now: 4000 });
+  report(run, goal("g0", "reached"), { now: 4000 });
   assert.equal(run.state, "going");
-  say(run, goal("g0", "reached"), { now: 6000 });
+  report(run, goal("g0", "reached"), { now: 6000 });
   assert.equal(run.state, "halted");
 });
 
@@ -133,9 +133,9 @@ test("a pause cancels the goal and a resume sends the same point again", () => {
   const run = underWay();
   assert.deepEqual(run.pause(), { cancel: true });
   assert.equal(run.pause(), null);
-  assert.equal(say(run, goal("g1", "cancelled")), null);
+  assert.equal(report(run, goal("g1", "cancelled")), null);
   assert.equal(run.state, "paused");
-  assert.equal(run.skip("g1"), null, "while it is paused nothing is sent");
+  assert.equal(run.skip("g1"), null, "a paused route sends nothing");
   assert.equal(run.index, 1);
   assert.deepEqual(run.go("g1"), { send: POINTS[1] });
 });
@@ -161,13 +161,13 @@ test("a goal without progress counts as reached when the robot is near", () => {
   run.go(null);
   run.accepted(0);
   const sent = goal("g1", "sent", { method: "topic" });
-  assert.equal(say(run, sent, { away: 0.5 }), null);
-  assert.deepEqual(say(run, sent, { away: 0.2 }), { send: POINTS[1] });
+  assert.equal(report(run, sent, { away: 0.5 }), null);
+  assert.deepEqual(report(run, sent, { away: 0.2 }), { send: POINTS[1] });
 });
 
 test("a goal with progress is not reached by distance alone", () => {
   const run = underWay();
-  assert.equal(say(run, goal("g1"), { away: 0.1 }), null);
-  assert.equal(say(run, goal("g1", "unknown"), { away: 0.1 }), null);
+  assert.equal(report(run, goal("g1"), { away: 0.1 }), null);
+  assert.equal(report(run, goal("g1", "unknown"), { away: 0.1 }), null);
   assert.equal(run.state, "going");
 });

@@ -17,18 +17,18 @@ function plan(area, how = {}) {
   return planSweeps(area, { spacing: 1, room: ROOM, ...how });
 }
 
-/** Many areas with a spacing each, of which sweeps could be laid. */
+/** Many areas for which sweeps exist, each with a spacing. */
 function* plans(areaOf, seed, count = 80) {
   const number = numbersFrom(seed);
   for (let i = 0; i < count; i++) {
     const area = areaOf(number);
     const spacing = 0.3 + 1.5 * number();
     const across = number() < 0.5;
-    // What nobody could press, and what is one corner and not two.
+    // Areas too small to press, and sides so short that two corners are one.
     if (sizeOf(area) < 0.2 || shortestSide(area) < 0.05) continue;
     const made = plan(area, { spacing, across, room: Infinity });
     assert.equal(made.problem, "", JSON.stringify(area));
-    yield { area, spacing, across, ...made, told: JSON.stringify({ area, spacing, across }) };
+    yield { area, spacing, across, ...made, inputs: JSON.stringify({ area, spacing, across }) };
   }
 }
 
@@ -125,24 +125,24 @@ test("points at both ends of a sweep have its heading", () => {
 
 test("every point is in the area or on its edge", () => {
   for (const areaOf of [roundArea, starArea]) {
-    for (const { area, points, told } of plans(areaOf, 1)) {
-      assert.ok(points.every((point) => isIn(area, point)), told);
+    for (const { area, points, inputs } of plans(areaOf, 1)) {
+      assert.ok(points.every((point) => isIn(area, point)), inputs);
     }
   }
 });
 
 test("every sweep is completely inside the area", () => {
   for (const areaOf of [roundArea, starArea]) {
-    for (const { area, sweeps, told } of plans(areaOf, 2, 60)) {
+    for (const { area, sweeps, inputs } of plans(areaOf, 2, 60)) {
       const places = sweeps.flatMap(([p, q]) => along(p, q));
-      assert.ok(places.every((point) => isIn(area, point)), told);
+      assert.ok(places.every((point) => isIn(area, point)), inputs);
     }
   }
 });
 
 test("sweeps are at most the spacing apart and half the spacing from the bounds", () => {
   for (const areaOf of [roundArea, starArea]) {
-    for (const { area, sweeps, spacing, across, told } of plans(areaOf, 3)) {
+    for (const { area, sweeps, spacing, across, inputs } of plans(areaOf, 3)) {
       const over = acrossOf(area, across);
       const bounds = area.map(over);
       const lines = sweeps
@@ -152,16 +152,16 @@ test("sweeps are at most the spacing apart and half the spacing from the bounds"
       const ends = [Math.min(...bounds) - spacing / 2, Math.max(...bounds) + spacing / 2];
       const all = [ends[0], ...lines, ends[1]];
       const gaps = all.slice(1).map((line, i) => line - all[i]);
-      assert.ok(Math.max(...gaps) <= spacing + 1e-6, `${Math.max(...gaps)} ${told}`);
+      assert.ok(Math.max(...gaps) <= spacing + 1e-6, `${Math.max(...gaps)} ${inputs}`);
     }
   }
 });
 
 test("every place in an area without bays is within one spacing of a sweep", () => {
-  for (const { area, sweeps, spacing, told } of plans(roundArea, 4, 80)) {
+  for (const { area, sweeps, spacing, inputs } of plans(roundArea, 4, 80)) {
     for (const point of spread(area)) {
       const away = Math.min(...sweeps.map((sweep) => awayFrom(sweep, point)));
-      assert.ok(away <= spacing + 1e-6, `${away} ${JSON.stringify(point)} ${told}`);
+      assert.ok(away <= spacing + 1e-6, `${away} ${JSON.stringify(point)} ${inputs}`);
     }
   }
 });

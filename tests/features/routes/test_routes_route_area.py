@@ -1,4 +1,4 @@
-"""An area is pressed on the map in a real browser, and becomes points of a route."""
+"""An area is drawn on the map in a real browser and becomes points of a route."""
 
 import json
 import math
@@ -15,10 +15,10 @@ from webmap_process import page_of
 pytestmark = pytest.mark.browser
 
 FIELD = [(14.0, 4.0), (20.0, 4.0), (20.0, 6.9), (14.0, 6.9)]
-"""Its corners in metres, to the right of the panel."""
+"""The corners of the area in metres, to the right of the panel."""
 
 NEAR = 0.08
-"""Metres that pixels may round a corner away, and the direction with it."""
+"""The rounding of corners to pixels, in metres; directions are rounded, too."""
 
 SCREEN = """([x, y]) => {
   const m = document.querySelector('svg.webmap .world').getScreenCTM();
@@ -52,7 +52,7 @@ def press(tab: Page, *corners: tuple[float, float]) -> None:
         tab.mouse.click(*tab.evaluate(SCREEN, corner))
 
 
-def word(tab: Page):
+def status(tab: Page):
     return tab.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
 
 
@@ -67,20 +67,20 @@ def test_an_area_pressed_on_the_map_becomes_points_of_the_route(tab, state):
     three = [14.5, 4.5, 19.5, 4.5, 19.5, 5.45, 14.5, 5.45, 14.5, 6.4, 19.5, 6.4]
     assert swept(tab) == pytest.approx(three, abs=NEAR)
     press(tab, FIELD[0])
-    expect(word(tab)).to_have_text("6 points, 3 sweeps.")
+    expect(status(tab)).to_have_text("6 points, 3 sweeps.")
     assert swept(tab) == pytest.approx(three, abs=NEAR)
     box = tab.locator(".webmap-area-sweeps").bounding_box()
     middle = [box["x"] + box["width"] / 2, box["y"] + box["height"] / 2]
     assert middle == pytest.approx(tab.evaluate(SCREEN, (17, 5.45)), abs=3)
 
     tab.get_by_role("button", name="Across").click()
-    expect(word(tab)).to_have_text("12 points, 6 sweeps.")
+    expect(status(tab)).to_have_text("12 points, 6 sweeps.")
     tab.get_by_role("button", name="Across").click()
     tab.get_by_label("Spacing in m").fill("0")
-    expect(word(tab)).to_have_text("Got 0 m, expected a spacing of 0.2 to 20 m.")
+    expect(status(tab)).to_have_text("Got 0 m, expected a spacing of 0.2 to 20 m.")
     expect(tab.get_by_role("button", name="Add to route")).to_be_disabled()
     tab.get_by_label("Spacing in m").fill("1.5")
-    expect(word(tab)).to_have_text("4 points, 2 sweeps.")
+    expect(status(tab)).to_have_text("4 points, 2 sweeps.")
     tab.get_by_role("button", name="Add to route").click()
     expect(tab.locator(".webmap-route-point")).to_have_count(4)
     expect(tab.locator(".webmap-area")).to_be_hidden()
@@ -101,14 +101,14 @@ def test_an_area_pressed_on_the_map_becomes_points_of_the_route(tab, state):
 def test_an_invalid_area_is_refused_with_a_reason_and_escape_discards_an_area(tab):
     first, second, third, fourth = FIELD
     press(tab, first, second)
-    # It has the focus, so that the keys go on where the button was pressed.
+    # The element has the focus, so that the keyboard continues there.
     expect(tab.get_by_role("button", name="Done")).to_be_focused()
     tab.keyboard.press("Enter")
-    expect(word(tab)).to_have_text("Got 2 corners, expected at least 3. Add corners.")
+    expect(status(tab)).to_have_text("Got 2 corners, expected at least 3. Add corners.")
     press(tab, fourth, third)
     tab.evaluate("document.activeElement.blur()")
     tab.keyboard.press("Enter")
-    expect(word(tab)).to_contain_text("Sides 2 and 4 cross or touch")
+    expect(status(tab)).to_contain_text("Sides 2 and 4 cross or touch")
     for _ in range(2):
         tab.get_by_role("button", name="Undo").click()
     press(tab, third)
@@ -125,7 +125,7 @@ def test_route_points_persist_after_a_reconnect(tab):
     press(tab, *FIELD, FIELD[0])
     tab.get_by_role("button", name="Add to route").click()
     expect(tab.locator(".webmap-route-point")).to_have_count(6)
-    # What is there now goes with the map that is drawn anew.
+    # The old elements are removed when the map is drawn again.
     tab.evaluate("document.querySelector('.webmap-route').dataset.old = 'yes'")
     tab.evaluate("import('/_webmap/web/page.js').then(({page}) => page._link.renew())")
     expect(tab.locator(".webmap-route[open]:not([data-old])")).to_be_visible()

@@ -1,4 +1,4 @@
-"""Routes on disk: what is kept, what is refused, and what becomes of a broken file."""
+"""Routes on disk: valid routes, refused routes, and broken files."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""A layer of tiles on a map: what it loads, says and lets go."""
+"""A layer of tiles on a map: what it loads, reports and releases."""
 
 import asyncio
 import threading
@@ -34,7 +34,7 @@ def test_removing_the_tile_layer_releases_its_tiles(map, tiles, channel):
         map.remove_module(layer)
         await asyncio.sleep(0)
         assert len(pictures) == before
-        for url in urls:  # a page that shows them may be about to load them
+        for url in urls:  # a page may still load them
             assert pictures.get(url.removeprefix(PREFIX)) is not None
         assert layer._fragment not in channel.mounted.values()
 
@@ -60,13 +60,13 @@ def test_invalid_tiles_give_one_notice_and_the_others_are_drawn(map, channel, tm
 
     drawn = asyncio.run(scenario())
     assert len(drawn) > 3
-    (said,) = channel.errors
-    assert "a tile is not shown" in said
-    assert "is not a PNG, JPEG or WebP" in said
+    (error,) = channel.errors
+    assert "a tile is not shown" in error
+    assert "is not a PNG, JPEG or WebP" in error
 
 
 class Slow:
-    """Tiles from a disk that takes its time."""
+    """Tiles from a slow disk."""
 
     zooms = range(20)
     attribution = ""

@@ -1,4 +1,4 @@
-"""Tiles in a real browser: where they are, beside the fixes of satellites."""
+"""Tiles in a real browser: their places, compared with GPS fixes."""
 
 import io
 from collections.abc import Iterator
@@ -43,13 +43,13 @@ def url(tiles: Path) -> Iterator[str]:
 def tab(chromium: Browser, url: str) -> Iterator[Page]:
     with watched_tab(chromium, 900, 700) as page:
         page.goto(url)
-        page.locator("svg.webmap-view-control").wait_for()  # hands move it from now on
+        page.locator("svg.webmap-view-control").wait_for()  # later the test moves it
         settled(page, 17)
         yield page
 
 
 def settled(tab: Page, level: int) -> None:
-    """Wait until all tiles are of one level, drawn, and wherever there is one."""
+    """Wait until all available tiles of one level are drawn, and no others."""
     tab.wait_for_function(
         """([level, missing]) => {
           const tiles = [...document.querySelectorAll('.tile')];
@@ -84,7 +84,7 @@ def settled(tab: Page, level: int) -> None:
 
 
 def seen(tab: Page) -> np.ndarray:
-    """What is on the screen but the robots, of shape (h, w, 3)."""
+    """Return the screen without the robots, of shape (h, w, 3)."""
     tab.evaluate(
         "for (const e of document.querySelectorAll('.robot'))"
         " e.style.visibility = 'hidden'"
@@ -119,7 +119,7 @@ def test_tiles_and_satellite_fixes_are_drawn_at_their_true_positions(tab, level)
             tile = (level, int(x), int(y))
             if near_an_edge or tile == missing() or (picture[v, u] < 30).all():
                 continue
-            if v < 120 or (u > 700 and v > 600):  # what lies over the map
+            if v < 120 or (u > 700 and v > 600):  # the elements over the map
                 continue
             assert np.abs(picture[v, u].astype(int) - colour(*tile)).max() <= 3, tile
             checked += 1

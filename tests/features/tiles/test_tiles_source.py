@@ -1,4 +1,4 @@
-"""Tiles: where each lies on the map, which are wanted, and what is refused."""
+"""Tiles: their places on the map, which are wanted, and which are refused."""
 
 import errno
 import io
@@ -32,7 +32,7 @@ TILE = png()
 
 
 def ground(latitude: float, metres: float, steps: int = 2000) -> float:
-    """The latitude that lies so far north on the ellipsoid, along the meridian."""
+    """Return the latitude at a distance north on the ellipsoid, along the meridian."""
     lat, step = math.radians(latitude), metres / steps
     for _ in range(steps):
         flat = 1 - 6.69437999014e-3 * math.sin(lat) ** 2
@@ -74,7 +74,7 @@ def globe_of(z: int, x: float, y: float) -> tuple[float, float]:
     ("z", "away", "within"), [(19, 0, 0.002), (16, 3, 0.02), (13, 2, 0.1), (10, 0, 1)]
 )
 def test_a_point_of_a_tile_is_within_a_pixel_of_its_true_position(z, away, within):
-    """`within` is in pixels of the tile, for tiles so many away from the datum."""
+    """`within` is in pixels of the tile, for tiles at some distance from the datum."""
     plane = LocalPlane(50, 14, 25)
     grid = TileGrid(plane, [z], size=256, most=64)
     n = 2**z
@@ -90,7 +90,7 @@ def test_a_point_of_a_tile_is_within_a_pixel_of_its_true_position(z, away, withi
 
 
 def view(scale: float, x: float = 0, y: float = 0, turn: float = 0) -> Affine:
-    """From the map to 800 x 600 pixels, with a place of the map in the middle."""
+    """Return the view of 800 x 600 pixels with a place of the map in the centre."""
     middle = Affine.translation(400, 300) @ Affine.rotation(turn)
     return middle @ Affine(scale, 0, 0, -scale, 0, 0) @ Affine.translation(-x, -y)
 
@@ -139,7 +139,7 @@ def test_a_small_tile_limit_selects_a_coarser_zoom_level():
     assert {tile.z for tile in few.wanted(view(0.5), 800, 600)} <= {z - 1, z - 2}
 
 
-# Where they come from.
+# Sources of tiles.
 
 
 @pytest.fixture
@@ -248,8 +248,8 @@ def mbtiles(tmp_path):
 
 
 def test_mbtiles_rows_are_counted_from_the_south(mbtiles):
-    said = "<a href='https://x' onclick='y'>&copy; Somebody</a>\n and more"
-    source = mbtiles(metadata=[("attribution", said), ("format", "png")])
+    attribution = "<a href='https://x' onclick='y'>&copy; Somebody</a>\n and more"
+    source = mbtiles(metadata=[("attribution", attribution), ("format", "png")])
     assert list(source.zooms) == [3]
     assert source.read(Tile(3, 4, 5)) == (png(), "image/png")
     assert source.read(Tile(3, 4, 2)) is None
@@ -282,7 +282,7 @@ def test_zoom_levels_of_a_large_mbtiles_file_are_found_without_a_full_scan(
             "map.tile_row, images.tile_data FROM map "
             "JOIN images ON images.tile_id = map.tile_id",
         ]
-    # The first look at the clock, after so many steps of the database, is too late.
+    # The first check of the clock, after some database steps, is already too late.
     monkeypatch.setattr("webmap.features.tiles.tile_source.PATIENCE", -1.0)
     source = mbtiles(*statements, tiles=())
     assert list(source.zooms) == list(range(4, 13))

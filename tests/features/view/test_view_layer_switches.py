@@ -1,4 +1,4 @@
-"""What may be switched."""
+"""Which layers can be switched."""
 
 import pytest
 from playwright.sync_api import expect
@@ -51,7 +51,7 @@ def test_switches_are_in_natural_order_and_a_note_counts_the_omitted_ones(
     file = tmp_path / "many.py"
     file.write_text(MANY)
     with page_of(file) as url, watched_tab(chromium, 1280, 800) as page:
-        page.allowed = ["WebSocket", "ERR_CONNECTION"]  # when all of it ends
+        page.allowed = ["WebSocket", "ERR_CONNECTION"]  # when the whole layer ends
         page.goto(url)
         page.locator(".webmap-layers summary").click()
         rows = page.locator(".webmap-layers-row")

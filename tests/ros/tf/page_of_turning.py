@@ -1,4 +1,4 @@
-"""A page for a test: a robot of a simulator whose scans are rarer than its poses."""
+"""A test page: a simulated robot with fewer scans than poses."""
 
 import os
 

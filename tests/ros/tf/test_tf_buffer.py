@@ -245,7 +245,7 @@ def test_a_flood_of_frames_removes_the_least_recently_updated_frames(robot):
     robot.add("map", "late/odom", at(5.0), 13.0)
     robot.add("late/odom", "late/base_link", at(1.0), 13.0)
     assert place(robot.lookup("map", "late/base_link")) == (6.0, 0.0)
-    # What others hang from stays, however long ago, and what is told but once.
+    # Old parent frames and static frames are kept.
     assert place(robot.lookup("map", "laser", 11.8)) == (102.1, 0.0)
 
 
@@ -284,7 +284,7 @@ def test_a_missing_name_is_compared_once_and_never_with_too_many_frames(
         return str(error.value)
 
     assert miss() == miss()
-    assert compared == [4], "of what has not changed the words are the same"
+    assert compared == [4], "the same text is not computed again"
     robot.add("odom", "base_link", at(2.0), 12.0)
     robot.add("base_link", "camera", at(1.0), 0.0)
     assert "there are: base_link, camera, laser, map, odom" in miss()
@@ -339,7 +339,7 @@ def test_the_reverse_lookup_gives_the_inverse_transform(tree, target, source, ti
     same(there @ back, Transform())
 
 
-# Beyond what was told.
+# Times outside of the known transforms.
 
 
 def test_a_moving_frame_is_extrapolated_for_a_limited_time(robot):
@@ -360,10 +360,10 @@ def test_a_turning_frame_is_extrapolated():
     "received",
     [
         [(10.0, 0.0, 0.0)],  # once only
-        [(10.0, 0.0, 0.0), (10.1, 3.0, 0.0)],  # it leapt
-        [(10.0, 0.0, 0.0), (10.1, 3.0, 3.0)],  # it was turned round
+        [(10.0, 0.0, 0.0), (10.1, 3.0, 0.0)],  # the robot jumped
+        [(10.0, 0.0, 0.0), (10.1, 3.0, 3.0)],  # the robot turned round
         [(9.0, 2.0, 0.0), (10.1, 3.0, 0.0)],  # too long ago
-        [(10.09, 2.99, 0.0), (10.1, 3.0, 0.0)],  # too close together to tell
+        [(10.09, 2.99, 0.0), (10.1, 3.0, 0.0)],  # too close together to measure a speed
     ],
 )
 def test_a_frame_without_a_plausible_velocity_is_not_extrapolated(received):

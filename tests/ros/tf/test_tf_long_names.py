@@ -1,4 +1,4 @@
-"""Frames whose names are far too long: messages may have any text."""
+"""Frames with names that are far too long; messages may contain any text."""
 
 import time
 
@@ -12,9 +12,9 @@ LONG = "f" * 1_000_000
 @pytest.mark.parametrize("names", [(LONG, "a"), ("a", LONG)])
 def test_a_frame_with_a_too_long_name_is_refused(names):
     buffer = Buffer()
-    with pytest.raises(TransformError, match="characters; the limit is 256") as said:
+    with pytest.raises(TransformError, match="characters; the limit is 256") as refused:
         buffer.add(*names, Transform(), 1.0)
-    assert len(str(said.value)) < 200
+    assert len(str(refused.value)) < 200
     assert buffer.frames == []
 
 
@@ -24,7 +24,7 @@ def test_looking_up_a_too_long_name_is_fast_and_raises_a_short_error():
         buffer.add("map", f"f{number}", Transform(), 1.0)
     before = time.process_time()
     for number in range(20):
-        with pytest.raises(FrameMissing, match="name of") as said:
+        with pytest.raises(FrameMissing, match="name of") as refused:
             buffer.lookup("map", f"{LONG}{number}")
-        assert len(str(said.value)) < 200
+        assert len(str(refused.value)) < 200
     assert time.process_time() - before < 1.0

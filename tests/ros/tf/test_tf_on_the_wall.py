@@ -1,4 +1,4 @@
-"""The dots of a scan stay on the wall while the robot turns, as a page shows it."""
+"""On a page, the dots of a scan stay on the wall while the robot turns."""
 
 import json
 import re
@@ -15,13 +15,13 @@ from real_browser import watched_tab
 from webmap.sim.maps import FLOOR, OCCUPIED, load_map
 from webmap_process import page_of, simulator
 
-# How late the simulator stamps its scans is measured.
+# The test measures how late the simulator stamps its scans.
 pytestmark = [pytest.mark.browser, pytest.mark.serial]
 
 TURN = 1.2
 """Radians a second."""
 
-# Reads where the dots are on the map, every time that the page was drawn anew.
+# Reads the places of the dots on the map after each new drawing of the page.
 SAMPLE = """async (seconds) => {
   const path = document.querySelector('.laserscan > .dot');
   const world = document.querySelector('svg.webmap .world');
@@ -48,7 +48,7 @@ PAGE = Path(__file__).with_name("page_of_turning.py")
 
 @contextmanager
 def turning(url: str, dialect: str) -> Iterator[None]:
-    """Have the simulated robot turn on the spot, as another client commands it."""
+    """Let another client turn the simulated robot on the spot."""
     twist = "geometry_msgs/Twist" if dialect == "ros1" else "geometry_msgs/msg/Twist"
     message = {
         "linear": {"x": 0.0, "y": 0.0, "z": 0.0},
@@ -91,7 +91,7 @@ AROUND = [(row, column) for row in range(-4, 5) for column in range(-4, 5)]
 def to_wall(points: np.ndarray) -> np.ndarray:
     """How far points are from the nearest cell that is occupied, in metres.
 
-    Beyond four cells it is taken for a metre.
+    A point that is more than four cells away counts as one metre away.
     """
     side = PLAN.resolution
     own = np.floor((points - (PLAN.x, PLAN.y)) / side).astype(int)
@@ -100,8 +100,8 @@ def to_wall(points: np.ndarray) -> np.ndarray:
         cells = own + np.array((column, row))
         low = cells * side + (PLAN.x, PLAN.y)
         gap = np.maximum(0, np.maximum(low - points, points - low - side))
-        taken = PLAN.occupancy[cells[:, 1], cells[:, 0]] == OCCUPIED
-        far = np.minimum(far, np.where(taken, np.hypot(*gap.T), 1.0))
+        occupied = PLAN.occupancy[cells[:, 1], cells[:, 0]] == OCCUPIED
+        far = np.minimum(far, np.where(occupied, np.hypot(*gap.T), 1.0))
     return far
 
 
@@ -119,11 +119,11 @@ def test_scan_dots_stay_on_the_wall_while_the_robot_turns(chromium, dialect):
             page.wait_for_function(TURNED, arg=first)
             samples = page.evaluate(f"({SAMPLE})(2)")
     drawn = {json.dumps([s["matrix"], s["d"]]): s for s in samples}
-    assert len(drawn) > 10, "the scan is hardly ever drawn anew"
+    assert len(drawn) > 10, "the scan is drawn too rarely"
     yaws = np.unwrap([sample["yaw"] for sample in samples])
     assert yaws[-1] - yaws[0] > 1.0, "the robot does not turn"
     worst = [np.percentile(to_wall(places(s)), 90) for s in drawn.values()]
-    # A simulator that the machine holds up stamps a scan later than it took it.
+    # On a busy machine the simulator stamps a scan later than it measured it.
     assert np.percentile(worst, 90) < 0.02, np.round(worst, 3)
     assert max(worst) < 0.2, np.round(worst, 3)
 

@@ -22,7 +22,7 @@ class Listening(Removal):
 
 
 class Link:
-    """A bridge that says what it is told to say."""
+    """A bridge whose messages the test sends."""
 
     url, name = "ws://test:9090", "test"
     lag = 0.0
@@ -39,9 +39,9 @@ class Link:
         self.subscribed.append(entry)
         return Listening(lambda: self.subscribed.remove(entry))
 
-    def say(self, topic, message):
+    def publish(self, topic, message):
         received = [entry for entry in self.subscribed if entry[0] == topic]
-        assert received, f"nobody listens to {topic}"
+        assert received, f"{topic} has no subscriber"
         for _, callback, decode in received:
             callback(msgspec.convert(message, decode, strict=False))
 
@@ -98,44 +98,46 @@ def where(robot):
 
 
 def test_odometry_is_transformed_into_the_map_frame(link, bob):
-    link.say("/tf", {"transforms": [transform("map", "odom", 10.0, 5.0, math.pi / 2)]})
-    link.say("/odom", odometry(1.0))
+    link.publish(
+        "/tf", {"transforms": [transform("map", "odom", 10.0, 5.0, math.pi / 2)]}
+    )
+    link.publish("/odom", odometry(1.0))
     assert (10.0, 6.0, math.pi / 2) == where(bob)
     assert not bob.problems
 
 
 def test_odometry_uses_the_frames_at_its_stamp_not_the_newest_frames(link, bob):
     for stamp, x in ((10.0, 0.0), (10.5, 50.0)):
-        link.say("/tf", {"transforms": [transform("map", "odom", x, stamp=stamp)]})
-    link.say("/odom", odometry(1.0, stamp=10.25))
+        link.publish("/tf", {"transforms": [transform("map", "odom", x, stamp=stamp)]})
+    link.publish("/odom", odometry(1.0, stamp=10.25))
     assert where(bob) == (26.0, 0.0, 0.0)
 
 
 def test_a_pose_newer_than_the_frames_uses_the_newest_frames(link, bob):
-    link.say("/tf", {"transforms": [transform("map", "odom", 10.0)]})
-    link.say("/odom", odometry(1.0, stamp=10.3))
+    link.publish("/tf", {"transforms": [transform("map", "odom", 10.0)]})
+    link.publish("/odom", odometry(1.0, stamp=10.3))
     assert where(bob) == (11.0, 0.0, 0.0)
     assert not bob.problems
 
 
 def test_without_the_map_frame_a_robot_keeps_its_odometry_pose_and_a_problem(link, bob):
-    link.say("/odom", odometry(1.0))
+    link.publish("/odom", odometry(1.0))
     assert where(bob) == (1.0, 0.0, 0.0)
     assert "there is no frame 'map'" in bob.problems["tf"]
-    link.say("/tf", {"transforms": [transform("map", "odom", 10.0)]})
-    link.say("/odom", odometry(1.0, stamp=10.1))
+    link.publish("/tf", {"transforms": [transform("map", "odom", 10.0)]})
+    link.publish("/odom", odometry(1.0, stamp=10.1))
     assert where(bob) == (11.0, 0.0, 0.0)
     assert not bob.problems
 
 
 def test_a_quiet_robot_does_not_report_a_missing_map_frame(link, bob):
     bob.set_tf(link, quiet=True)
-    link.say("/odom", odometry(1.0))
+    link.publish("/odom", odometry(1.0))
     assert not bob.problems
 
 
 def test_a_pose_in_the_map_frame_is_unchanged(link, bob):
-    link.say("/odom", odometry(3.0, frame="map"))
+    link.publish("/odom", odometry(3.0, frame="map"))
     assert where(bob) == (3.0, 0.0, 0.0)
     assert not bob.problems
 
@@ -144,12 +146,14 @@ def test_a_robot_without_odometry_has_the_pose_of_its_base_frame(link):
     bob = Robot("Bob", base_link="base_footprint")
     bob.set_tf(link)
     chain = [transform("map", "odom", 10.0), transform("odom", "base_footprint", 2.0)]
-    link.say("/tf", {"transforms": chain})
+    link.publish("/tf", {"transforms": chain})
     assert where(bob) == (12.0, 0.0, 0.0)
     stamp = bob.pose_stamp
     bob.pose_stamp -= 1.0
-    link.say("/tf", {"transforms": [transform("map", "other", 1.0, stamp=20.0)]})
-    assert bob.pose_stamp == stamp - 1.0, "news of others is no news of this one"
+    link.publish("/tf", {"transforms": [transform("map", "other", 1.0, stamp=20.0)]})
+    assert bob.pose_stamp == stamp - 1.0, (
+        "frames of other robots do not update this robot"
+    )
     bob.destroy()
 
 
@@ -159,8 +163,8 @@ def test_frames_of_different_namespaces_are_kept_apart(link):
         space = f"/{robot.name}"
         robot.set_odometry_topic(link, f"{space}/odom", type="nav_msgs/Odometry")
         robot.set_tf(link, namespace=space)
-        link.say(f"{space}/tf", {"transforms": [transform("map", "odom", number)]})
-        link.say(f"{space}/odom", odometry(0.5))
+        link.publish(f"{space}/tf", {"transforms": [transform("map", "odom", number)]})
+        link.publish(f"{space}/odom", odometry(0.5))
     assert where(robots[0]) == (0.5, 0.0, 0.0)
     assert where(robots[1]) == (1.5, 0.0, 0.0)
     for robot in robots:
@@ -182,13 +186,13 @@ def test_robots_of_one_bridge_share_tf_until_the_last_robot_is_destroyed(link):
 def test_an_invalid_transform_is_logged_once_and_the_others_are_used(link, bob, caplog):
     bad = transform("odom", "base_link", math.nan)
     for _ in range(3):
-        link.say("/tf", {"transforms": [bad, transform("map", "odom", 10.0)]})
-    link.say("/odom", odometry(1.0))
+        link.publish("/tf", {"transforms": [bad, transform("map", "odom", 10.0)]})
+    link.publish("/odom", odometry(1.0))
     assert where(bob) == (11.0, 0.0, 0.0)
-    said = [line for line in caplog.messages if line.startswith("test: a transform")]
-    assert len(said) == 1
-    assert "not finite" in said[0]
-    assert bob.problems["frames"] == said[0].removeprefix("test: ")
+    lines = [line for line in caplog.messages if line.startswith("test: a transform")]
+    assert len(lines) == 1
+    assert "not finite" in lines[0]
+    assert bob.problems["frames"] == lines[0].removeprefix("test: ")
 
 
 def test_the_tf_settings_survive_the_conversion_to_plain_data():

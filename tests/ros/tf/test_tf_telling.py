@@ -1,4 +1,4 @@
-"""Who goes by frames is told of them, together and each by itself."""
+"""Listeners to frames are called together, and each separately."""
 
 import asyncio
 import time
@@ -40,11 +40,11 @@ def test_a_raising_frame_listener_is_logged_once_and_others_are_still_called(cap
     robot = Robot("Bob")
     robot.set_tf(link)
     for step in range(5):
-        link.say("/tf", moved(step, 10.0 + step))
+        link.publish("/tf", moved(step, 10.0 + step))
         assert robot.position.x == step
-    (said,) = caplog.records
-    assert said.getMessage() == "test: a listener to frames raised"
-    assert "this one cannot" in str(said.exc_info[1])
+    (record,) = caplog.records
+    assert record.getMessage() == "test: a listener to frames raised"
+    assert "this one cannot" in str(record.exc_info[1])
     held.remove()
     robot.destroy()
 
@@ -59,20 +59,22 @@ def test_frame_listeners_are_called_at_once_and_then_once_per_period(monkeypatch
         robot = Robot("Bob")
         robot.set_tf(link)
         await asyncio.sleep(0.0)
-        link.say("/tf", moved(0.0, 10.0))
+        link.publish("/tf", moved(0.0, 10.0))
         assert (len(received), robot.position.x) == (1, 0.0)
         for step in range(1, 11):
-            link.say("/tf", moved(step, 10.0 + step / 100))
+            link.publish("/tf", moved(step, 10.0 + step / 100))
         seen = time.monotonic()
         assert len(received) == 1
         await until(lambda: len(received) == 2)
-        assert robot.position.x == 10.0, "the newest"
+        assert robot.position.x == 10.0, "the newest transform is used"
         assert received[1] - received[0] >= 0.29
-        assert robot.pose_stamp <= seen, "it is as old as it is"
+        assert robot.pose_stamp <= seen, "the age counts from the arrival of the frames"
         await asyncio.sleep(0.35)
-        assert len(received) == 2, "there was nothing more"
-        link.say("/tf", moved(11.0, 11.0))
-        assert (len(received), robot.position.x) == (3, 11.0), "not held back"
+        assert len(received) == 2, "the listener is not called without new frames"
+        link.publish("/tf", moved(11.0, 11.0))
+        assert (len(received), robot.position.x) == (3, 11.0), (
+            "the first frames after a pause are used at once"
+        )
         robot.destroy()
         held.remove()
 
@@ -81,24 +83,24 @@ def test_frame_listeners_are_called_at_once_and_then_once_per_period(monkeypatch
 
 @pytest.mark.parametrize("robots", [1, 20])
 def test_robots_without_odometry_are_updated_in_almost_every_frame_period(robots):
-    """What is told at each period is taken, and not every other time."""
+    """Transforms of each period are used, not those of every second period."""
 
     async def scenario() -> None:
         link = OpenLink()
         fleet = [Robot(f"r{number}", base_link="base_link") for number in range(robots)]
         for robot in fleet:
             robot.set_tf(link)
-        received, taken = [], []
+        received, accepted = [], []
         held = frames_of(link).join(lambda: received.append(1))
         last, began = None, time.monotonic()
         for step in range(100):
-            link.say("/tf", moved(step, 10.0 + step / 100))
+            link.publish("/tf", moved(step, 10.0 + step / 100))
             if fleet[-1].position.x != last:
                 last = fleet[-1].position.x
-                taken.append(last)
+                accepted.append(last)
             await asyncio.sleep(0.01)
         assert len(received) <= 3 + (time.monotonic() - began) / PERIOD
-        assert len(taken) >= 0.8 * len(received)
+        assert len(accepted) >= 0.8 * len(received)
         for robot in fleet:
             robot.destroy()
         held.remove()

@@ -1,4 +1,4 @@
-"""Transforms: composed, undone and mixed."""
+"""Transforms: composition, inverse and interpolation."""
 
 import math
 
@@ -135,7 +135,9 @@ def test_a_rotation_in_the_plane_is_unchanged_when_seen_from_above(yaw, x, y):
 def test_heading_and_tilt_combine_to_the_whole_transform(transform, point):
     pose, tilt = transform.heading_and_tilt
     both = Transform.from_pose(pose).apply(tilt.apply(point))
-    assert near(both, transform.apply(point), 1e-3), "a tilt of a microradian is none"
+    assert near(both, transform.apply(point), 1e-3), (
+        "a tilt of a microradian is ignored"
+    )
     assert (tilt.translation.x, tilt.translation.y) == (0.0, 0.0)
     assert pose == transform.planar
 

@@ -1,4 +1,4 @@
-"""What is wrong with frames and poses is said, and taken back when it is mended."""
+"""Problems with frames and poses are reported, and cleared when they end."""
 
 import math
 import time
@@ -15,7 +15,7 @@ from webmap.ros.tf import Buffer
 
 
 class Clock:
-    """A clock that a test turns."""
+    """A clock that a test sets."""
 
     def __init__(self):
         self.now = 1000.0
@@ -47,7 +47,7 @@ def bob(link, clock):
 
 @pytest.fixture
 def ready(link, bob, clock):
-    """A robot that is where its frames have it."""
+    """A robot whose pose comes from its frames."""
 
     def go(seconds, *transforms, x=0.0):
         clock.now = 990.0 + seconds
@@ -55,8 +55,8 @@ def ready(link, bob, clock):
             transform("map", "odom", 1.0, stamp=seconds),
             transform("odom", "base_link", x, stamp=seconds),
         ]
-        link.say("/tf", {"transforms": [*chain, *transforms]})
-        link.say("/odom", odometry(x, stamp=seconds))
+        link.publish("/tf", {"transforms": [*chain, *transforms]})
+        link.publish("/odom", odometry(x, stamp=seconds))
 
     go(10.0)
     assert bob.problems == {}
@@ -64,33 +64,33 @@ def ready(link, bob, clock):
 
 
 def test_a_lasting_missing_map_frame_is_reported_and_then_cleared(link, bob, clock):
-    link.say("/odom", odometry(1.0))
-    assert bob.problems == {}, "frames come one after another"
+    link.publish("/odom", odometry(1.0))
+    assert bob.problems == {}, "frames arrive one after another"
     clock.now += 2.5
-    link.say("/odom", odometry(1.0, stamp=12.5))
-    assert bob.problems == {}, "and some only a while after the link is up"
+    link.publish("/odom", odometry(1.0, stamp=12.5))
+    assert bob.problems == {}, "some frames arrive some time after the link opens"
     clock.now += 1.0
-    link.say("/odom", odometry(1.0, stamp=13.5))
+    link.publish("/odom", odometry(1.0, stamp=13.5))
     assert "there is no frame 'map'; there are: none" in bob.problems["tf"]
-    link.say("/tf", {"transforms": [transform("map", "odom", 1.0, stamp=13.5)]})
-    link.say("/odom", odometry(1.0, stamp=13.6))
+    link.publish("/tf", {"transforms": [transform("map", "odom", 1.0, stamp=13.5)]})
+    link.publish("/odom", odometry(1.0, stamp=13.6))
     assert bob.problems == {}
 
 
 def test_unconnected_frame_trees_are_reported_with_their_roots(link, bob, clock):
     chain = [transform("map", "other", 1.0), transform("odom", "base_link", 1.0)]
     for _ in range(3):
-        link.say("/tf", {"transforms": chain})
-        link.say("/odom", odometry(1.0))
+        link.publish("/tf", {"transforms": chain})
+        link.publish("/odom", odometry(1.0))
         clock.now += 1.5
     assert "'odom' is in the tree of 'odom', 'map' in the" in bob.problems["tf"]
 
 
 def test_a_frame_loop_is_reported_completely_and_other_frames_stay_valid(ready, bob):
     ready(10.1, transform("base_link", "map", 0.0, stamp=10.1))
-    said = bob.problems["frames"]
-    assert "would close a loop" in said
-    assert "'map' -> 'odom' -> 'base_link' -> 'map'" in said
+    problem = bob.problems["frames"]
+    assert "would close a loop" in problem
+    assert "'map' -> 'odom' -> 'base_link' -> 'map'" in problem
     assert bob.position.x == pytest.approx(1.0)
     ready(15.0)
     assert "frames" in bob.problems
@@ -121,13 +121,13 @@ def test_a_frame_fault_of_another_robot_is_not_reported_for_this_robot(
 def test_silent_localisation_is_reported_and_then_cleared(link, ready, bob, clock):
     for seconds in (11.0, 12.5):
         clock.now = 990.0 + seconds
-        link.say("/odom", odometry(0.0, stamp=seconds))
-    assert bob.problems == {}, "within its time"
+        link.publish("/odom", odometry(0.0, stamp=seconds))
+    assert bob.problems == {}, "the transform is not late yet"
     for seconds in (13.0, 14.5):
         clock.now = 990.0 + seconds
-        link.say("/odom", odometry(0.0, stamp=seconds))
-    said = bob.problems["tf"]
-    assert "no new transform 'map' -> 'odom' for more than 2 s" in said
+        link.publish("/odom", odometry(0.0, stamp=seconds))
+    problem = bob.problems["tf"]
+    assert "no new transform 'map' -> 'odom' for more than 2 s" in problem
     ready(15.0)
     assert bob.problems == {}
 
@@ -136,15 +136,15 @@ def test_stopped_frames_of_a_robot_without_odometry_are_reported(link, clock):
     robot = Robot("Bob")
     robot.set_tf(link)
     chain = [transform("map", "odom", 1.0), transform("odom", "base_link", 1.0)]
-    link.say("/tf", {"transforms": chain})
+    link.publish("/tf", {"transforms": chain})
     assert robot.valid
     for _ in range(4):
         clock.now += 1.1
-        link.say("/tf", {"transforms": [transform("map", "other", 1.0)]})
+        link.publish("/tf", {"transforms": [transform("map", "other", 1.0)]})
     assert "'map' -> 'base_link'" in robot.problems["tf"]
     later = [transform("map", "odom", 1.0, stamp=15.0)]
     later.append(transform("odom", "base_link", 1.0, stamp=15.0))
-    link.say("/tf", {"transforms": later})
+    link.publish("/tf", {"transforms": later})
     assert robot.problems == {}
     robot.destroy()
 
@@ -159,7 +159,7 @@ def test_a_pose_jump_is_reported_for_some_seconds(ready, bob):
     assert bob.problems == {}
 
 
-# The rules by themselves.
+# The rules without a robot.
 
 
 def reading(x, stamp, frame="map"):
@@ -177,10 +177,10 @@ def test_repeated_pose_jumps_are_reported_as_two_publishers():
     "poses",
     [
         [(0.0, 10.0), (0.4, 10.01)],  # a correction
-        [(0.0, 10.0), (20.0, 14.5)],  # driven
-        [(0.0, 10.0), (50.0, 30.0)],  # not heard of for long
-        [(0.0, 0.0), (50.0, 0.0)],  # nobody says when
-        [(0.0, 10.0), (50.0, 9.0)],  # time goes back
+        [(0.0, 10.0), (20.0, 14.5)],  # the robot drove
+        [(0.0, 10.0), (50.0, 30.0)],  # no pose for a long time
+        [(0.0, 0.0), (50.0, 0.0)],  # no stamps
+        [(0.0, 10.0), (50.0, 9.0)],  # the stamp goes back
     ],
 )
 def test_a_plausible_or_untimed_movement_is_no_pose_jump(poses):
@@ -195,9 +195,9 @@ def test_a_plausible_or_untimed_movement_is_no_pose_jump(poses):
     [
         (13600.0, 0.1, "+3600.0"),
         (6400.0, 0.1, "-3600.0"),
-        (10020.0, 30.0, None),  # not heard of for a while
-        (10009.0, 0.1, None),  # a link that stalled leaves things out
-        (9999.5, 0.1, None),  # one that another has overtaken
+        (10020.0, 30.0, None),  # no pose for a while
+        (10009.0, 0.1, None),  # a stalled link loses messages
+        (9999.5, 0.1, None),  # messages arrived out of order
     ],
 )
 def test_a_jump_of_the_pose_clock_is_reported_with_its_size(stamp, passed, leapt):
@@ -216,30 +216,30 @@ def test_a_time_jump_of_a_robot_without_odometry_is_reported_once(link, clock):
     for stamp in (5000.0, 1400.0):
         clock.now += 1.0
         chain = [transform("map", "base_link", 1.0, stamp=stamp)]
-        link.say("/tf", {"transforms": chain})
+        link.publish("/tf", {"transforms": chain})
     (problem,) = robot.problems.values()
     assert "time jumped back by 3600.000 s" in problem
     robot.destroy()
 
 
 @pytest.mark.parametrize(
-    ("ahead", "said"), [(3600, "3600.0 s later"), (-3600, "3600.0 s earlier")]
+    ("ahead", "difference"), [(3600, "3600.0 s later"), (-3600, "3600.0 s earlier")]
 )
 @pytest.mark.parametrize("quiet", [False, True])
 def test_a_clock_difference_of_odometry_and_frames_is_reported_with_its_size(
-    link, bob, clock, ahead, said, quiet
+    link, bob, clock, ahead, difference, quiet
 ):
     bob.set_tf(link, quiet=quiet)
     for seconds in (0.0, 1.5, 3.0, 4.5):
         clock.now = 1000.0 + seconds
         stamp = 9000.0 + seconds
         chain = [transform("map", "odom", 1.0, stamp=stamp)]
-        link.say("/tf", {"transforms": chain})
-        link.say("/odom", odometry(0.4, stamp=stamp + ahead))
+        link.publish("/tf", {"transforms": chain})
+        link.publish("/odom", odometry(0.4, stamp=stamp + ahead))
     (problem,) = bob.problems.values()
-    assert f"its odometry is stamped {said} than the newest of 'map'" in problem
+    assert f"its odometry is stamped {difference} than the newest of 'map'" in problem
     assert bob.position.x == pytest.approx(1.4)
-    link.say("/odom", odometry(0.4, stamp=9004.6))
+    link.publish("/odom", odometry(0.4, stamp=9004.6))
     assert "tf" not in bob.problems
 
 
@@ -252,8 +252,8 @@ def test_a_change_of_the_frame_is_no_pose_jump():
 
 def test_the_number_of_frames_with_stored_faults_is_limited():
     faults = FrameFaults(Buffer())
-    said = [faults.note("map", f"f{n}", "wrong", 0.0) for n in range(60)]
-    assert sum(said) == 50
+    noted = [faults.note("map", f"f{n}", "wrong", 0.0) for n in range(60)]
+    assert sum(noted) == 50
     assert not faults.note("map", "f0", "wrong again", 1.0)
 
 

@@ -1,4 +1,4 @@
-"""Ages of data that did not change travel twice a second, and no page is deceived."""
+"""Ages of unchanged data are sent twice a second, and pages show correct ages."""
 
 import random
 import struct
@@ -33,7 +33,7 @@ def clock(monkeypatch):
 
 
 class Page:
-    """A page that knows the newest measured time of each element, in seconds."""
+    """A page that keeps the newest measurement time of each element, in seconds."""
 
     def __init__(self, *fragments):
         self.session = SceneSession()
@@ -44,7 +44,7 @@ class Page:
         self.sent = []
 
     def tick(self, now):
-        """Receive the next frame, if there is one, and all ages that are in it."""
+        """Receive the next frame, if there is one, and all its ages."""
         before = {f: self.session._fragments[f] for f in self.fragments}
         frame = self.session.frame(now)
         if frame is None:
@@ -64,7 +64,7 @@ def robots(count):
 
 
 def run(clock, page, feeds, seconds):
-    """Let data come, and the page tick, at their own times."""
+    """Let data arrive and the page tick at their own times."""
     due = sorted((START + first, each) for each, (first, _, _) in enumerate(feeds))
     end = START + seconds
     tick = START
@@ -85,11 +85,11 @@ def test_a_page_of_robots_that_stand_still_gets_two_frames_a_second(clock):
     fragments = robots(20)
     page = Page(*fragments)
     feeds = [
-        (chance.uniform(0, 0.1), 0.1, lambda f=fragment: stand(f))
+        (chance.uniform(0, 0.1), 0.1, lambda f=fragment: set_same_pose(f))
         for fragment in fragments
     ]
 
-    def stand(fragment):
+    def set_same_pose(fragment):
         fragment.root.set_pose(1.0, 2.0, 3.0)
         fragment.root.set_age(0.02)
 
@@ -121,7 +121,7 @@ def test_ages_that_wait_are_encoded_once_for_all_pages(clock, monkeypatch):
         fragment.root.set_age(0.0)
         for page in pages:
             page.tick(clock.now)
-    assert len(calls) == 3  # the first frame has it too
+    assert len(calls) == 3  # the first frame has the age too
     assert {len(page.sent) for page in pages} == {4}
 
 
@@ -141,7 +141,7 @@ def test_an_age_travels_at_once_with_the_pose_that_it_dates(clock):
 def test_data_is_never_shown_fresher_than_it_is_nor_stale_while_it_is_fresh(
     clock, period
 ):
-    """Whatever its rate; data that comes too rarely looks stale between messages."""
+    """This holds at any rate; data that arrives too rarely looks stale in between."""
     fragments = robots(3)
     page = Page(*fragments)
     feeds = [
@@ -212,7 +212,7 @@ def test_a_pose_changes_only_by_what_can_be_seen(clock):
     for step in range(100):
         root.set_pose(1.0 + step % 2 * 9e-5, 2.0 - step % 3 * 4e-5, 0.5 + 9e-6)
     assert fragment.revision == revision
-    for step in range(100):  # a slow motion adds up
+    for step in range(100):  # slow motion adds up
         root.set_pose(1.0 + step * 1e-5, 2.0, 0.5)
     assert 5 <= fragment.revision - revision <= 10
     assert abs(root._transform[0] - (1.0 + 99e-5)) < 1e-4
@@ -221,7 +221,7 @@ def test_a_pose_changes_only_by_what_can_be_seen(clock):
 
 
 def test_a_page_whose_answer_was_late_gets_each_age_at_once(clock):
-    """With the delay of the network, ages that wait would look stale."""
+    """With the network delay added, ages that wait would look stale."""
     (fragment,) = robots(1)
     page = Page(fragment)
     answers, frames = [], []

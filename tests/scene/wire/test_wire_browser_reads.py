@@ -1,4 +1,4 @@
-"""What Python encodes, the browser's own decoder reads as the same tree."""
+"""The browser's decoder reads the tree that Python encoded."""
 
 import base64
 import itertools
@@ -26,7 +26,7 @@ DECODER = HERE.parents[1] / "web" / "decode.mjs"
 
 
 class Decoder:
-    """One node process that answers frames with what they build."""
+    """A node process that answers frames with the tree that they build."""
 
     def __init__(self):
         executable = shutil.which("node")
@@ -76,7 +76,7 @@ def test_the_browser_decoder_reads_any_bytes_or_raises_a_known_error(
     session.error("x")
     frame = session.frame(0.0)[:15] + data if with_header else data
     answer = decoder.read([frame])
-    # The plain tree of the tests trips over ids that nobody made; a page does not.
+    # The plain tree of the tests fails on unknown ids; a page does not.
     assert answer.get("kind", "WireError") in (
         "WireError",
         "VersionError",

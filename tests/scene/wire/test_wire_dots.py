@@ -1,4 +1,4 @@
-"""A page gets the dots near its view that are not switched off, and no others."""
+"""A page receives only the dots near its view that are not switched off."""
 
 import json
 import math
@@ -53,9 +53,9 @@ class Shown:
         matrix = {"a": pixels, "b": 0, "c": 0, "d": -pixels}
         shift = {"e": 350 - pixels * x, "f": 250 + pixels * y}
         size = {"width": 700, "height": 500, "left": 0, "top": 0}
-        self.say(op="view", map_element=self.root.id, **matrix, **shift, **size)
+        self.send(op="view", map_element=self.root.id, **matrix, **shift, **size)
 
-    def say(self, **message):
+    def send(self, **message):
         self.session.receive(json.dumps(message))
 
     def tick(self):
@@ -125,13 +125,13 @@ def test_dots_of_a_layer_that_is_off_are_not_sent(decoder):
     shown = Shown()
     shown.view()
     shown.tick()
-    shown.say(op="unseen", elements=[shown.path.id])
+    shown.send(op="unseen", elements=[shown.path.id])
     assert 0 < shown.tick() < 40
     assert shown.dots(decoder) == 0
     for number in range(5):
         shown.path.set_rays(rays(room(seed=number + 5)))
         assert shown.tick() == 0
-    shown.say(op="unseen", elements=[])
+    shown.send(op="unseen", elements=[])
     assert shown.tick() > 200
     assert shown.dots(decoder) == 360
 
@@ -142,7 +142,7 @@ def test_another_page_gets_the_dots_that_one_page_does_not_show(decoder):
     for each in (shown, other):
         each.view()
         each.tick()
-    shown.say(op="unseen", elements=[shown.path.id])
+    shown.send(op="unseen", elements=[shown.path.id])
     shown.tick()
     shown.path.set_rays(OTHER)
     assert shown.tick() == 0
@@ -158,7 +158,7 @@ def test_a_scan_on_two_maps_is_sent_if_one_of_them_shows_its_place(decoder):
     mount = shown.session.mount(Fragment(root), under=0)
     shown.session.mount(shown.fragment, under=world.id, within=mount)
     shown.session.view(root.id, "scale", 50.0)
-    shown.say(
+    shown.send(
         **{"op": "view", "map_element": root.id, "a": 50, "b": 0, "c": 0, "d": -50},
         **{"e": 350 - 5000, "f": 250, "width": 700, "height": 500},
         **{"left": 0, "top": 0},
@@ -172,7 +172,7 @@ def test_a_page_that_starts_again_gets_its_dots_again(decoder):
     shown = Shown()
     shown.view()
     shown.tick()
-    shown.say(op="unseen", elements=[shown.path.id])
+    shown.send(op="unseen", elements=[shown.path.id])
     shown.tick()
     shown.session.restart()
     shown.frames.clear()

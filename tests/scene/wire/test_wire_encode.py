@@ -40,7 +40,7 @@ def test_a_string_is_encoded_after_its_length(text):
 
 
 def records_since(fragment, revision):
-    """Return the records of what changed, without the head of their section."""
+    """Return the records of the changes, without the head of their section."""
     head = bytes([Op.DELTA]) + varint(fragment.id)
     data = encode_changes(fragment, revision)
     assert data.startswith(head)
@@ -137,7 +137,7 @@ def test_an_unset_attribute_is_encoded_as_unset():
 
 
 def test_an_unset_attribute_of_the_page_html_is_unset_for_later_viewers():
-    """The page's own HTML may have it, as a card that is hidden at first."""
+    """The page's HTML may have the attribute, as a card that is hidden at first."""
     document = Document()
     fragment = Fragment(document)
     card, since = document.bind("card"), fragment.revision

@@ -1,4 +1,4 @@
-"""A scan is sent in few bytes, and drawn where its rays hit."""
+"""A scan is sent in few bytes and drawn where its rays end."""
 
 import math
 
@@ -127,7 +127,7 @@ def test_the_page_reads_any_distances(decoder, reach, detail):
     found, expected = drawn(decoder, look(session)), points_of(scan)
     farthest = max([0.0, *np.nan_to_num(reach)])
     near = max(detail, farthest / 30000) / 2 + 0.002
-    if farthest * scan.turn > NEAR * near:  # else neighbouring rays are one
+    if farthest * scan.turn > NEAR * near:  # otherwise neighbouring rays are one dot
         assert len(found) == len(expected)
         assert np.allclose(found, expected, atol=near, rtol=0)
     assert (len(found) > 0) == (len(expected) > 0)
@@ -156,7 +156,7 @@ def test_distances_are_rounded_to_an_eighth_of_a_pixel_of_the_screen(
     _, _, path, frames = shown(scan, pixels=pixels, dpr=dpr)
     assert list(path._coded) == [detail]
     assert detail == 0.001 or detail <= 1 / (pixels * dpr) / 8
-    if detail < 1:  # then all of it is within half a pixel
+    if detail < 1:  # then all dots are within half a pixel
         found, expected = drawn(decoder, frames), points_of(scan)
         assert np.allclose(found, expected, atol=detail / 2 + 0.001, rtol=0)
 
@@ -183,7 +183,7 @@ def test_rays_within_half_a_pixel_are_one_and_the_nearest_of_them_stays(decoder)
     assert len(whole) == 3600
     assert 1000 < len(found) < 2000
     gaps = np.hypot(*(found - np.roll(found, 1, axis=0)).T)
-    assert np.sort(gaps)[-3] <= 0.05 + 0.008  # half a pixel, but for the pole
+    assert np.sort(gaps)[-3] <= 0.05 + 0.008  # half a pixel, except for the pole
     pole = found[np.hypot(*found.T) < 3]
     assert len(pole) == 1
     bearing = 1234 * math.tau / 3600 - math.pi

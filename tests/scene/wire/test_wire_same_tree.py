@@ -1,4 +1,4 @@
-"""What Python holds and what a real document holds are the same tree."""
+"""Python and a real document hold the same tree."""
 
 import base64
 import math
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 
-# The server of a scene is a helper of the tests of the browser.
+# The scene server is in the folder of the browser's tests.
 sys.path.insert(0, str(Path(__file__).parents[2] / "web"))
 
 from scene_host import SceneHost
@@ -24,12 +24,12 @@ pytestmark = pytest.mark.browser
 SHOW = """
 async (frames) => {
   const { Scene } = await import("/_webmap/web/scene.js");
-  const said = [];
+  const notices = [];
   const scene = new Scene({
     send() {},
-    notice: (text) => said.push(text),
-    error: (text) => said.push(text),
-    problem: (number, text) => said.push(text),
+    notice: (text) => notices.push(text),
+    error: (text) => notices.push(text),
+    problem: (number, text) => notices.push(text),
     recheckProblems() {},
     hear() {},
     drive() {},
@@ -61,7 +61,7 @@ async (frames) => {
   };
   const roots = [...scene._mounts.values()].map(({ root }) => plain(root.element));
   scene._ages.stop();
-  return { roots, said };
+  return { roots, notices };
 }
 """
 
@@ -124,6 +124,6 @@ def assert_same(blank, history):
     session = SceneSession()
     frames = [base64.b64encode(f).decode() for f in play(history, session)]
     shown = blank.evaluate(SHOW, frames)
-    assert shown["said"] == []
+    assert shown["notices"] == []
     mounts = list(session._mounts.values())
     assert shown["roots"] == [expected(m.fragment.root, m) for m in mounts]

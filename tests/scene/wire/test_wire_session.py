@@ -301,13 +301,13 @@ def test_module_messages_pass_only_while_the_module_is_attached():
     root, _ = a_map()
     session.mount(Fragment(root), under=0)
     session.attach(root.id, 5, "x.js", {})
-    said = '{"op":"module","instance":5,"data":{"x":1}}'
-    assert session.receive(said) == [ModuleMessage(instance=5, data={"x": 1})]
+    text = '{"op":"module","instance":5,"data":{"x":1}}'
+    assert session.receive(text) == [ModuleMessage(instance=5, data={"x": 1})]
     session.send(5, {"hello": "there"})
     assert b'{"hello":"there"}' in session.frame(0.0)
     session.detach(5)
     session.send(5, {"hello": "again"})
-    assert session.receive(said) == []
+    assert session.receive(text) == []
     assert b"again" not in session.frame(0.0)
 
 
@@ -342,7 +342,7 @@ def test_the_bytes_that_wait_for_a_sleeping_page_are_limited():
         session.view(root.id, "translate", 1.0, 1.0)
     for _ in range(100_000):
         inner = session.mount(Fragment(svg.g()), under=world.id, within=outer)
-        pending.new.clear()  # as if the page had it
+        pending.new.clear()  # as if the page had received the frame
         session.unmount(inner)
         assert len(pending.gone) <= PendingRecords.BYTES_KEPT
     assert pending.send_all

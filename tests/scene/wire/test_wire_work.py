@@ -1,7 +1,7 @@
-"""What moving robots cost a display and its viewers, counted by a clock of the test.
+"""The work for moving robots in a display and its viewers, with a clock of the test.
 
-A slower machine counts the same. A bound that is exceeded means more work for each
-frame of each viewer: find out for what before raising it.
+The counts do not depend on the machine. An exceeded bound means more work for each
+frame of each viewer: find the cause before you raise the bound.
 """
 
 import gc
@@ -50,7 +50,7 @@ class Fleet:
         self.sent.clear()
 
     def run(self, seconds: float, rate: int = 20) -> None:
-        """Let poses come at a rate, and the pages tick 20 times a second."""
+        """Let poses arrive at a rate, and the pages tick 20 times a second."""
         for _ in range(round(seconds / TICK)):
             self.clock.now += TICK
             for _ in range(max(1, rate // 20)):
@@ -166,4 +166,4 @@ def test_a_viewer_that_reads_nothing_keeps_the_memory_of_one_frame(clock):
         session.receive(f'{{"op":"seen","frame":{number}}}')
     frame = session.frame(clock.now)
     assert len(frame) <= 15 + 32 * ROBOTS
-    assert session.frame(clock.now) is None, "one frame, and no burst"
+    assert session.frame(clock.now) is None, "one frame and no further frames"

@@ -1,4 +1,4 @@
-"""What a page shows of a session, and random things to do to a scene."""
+"""The picture that a page shows of a session, and random changes of a scene."""
 
 import math
 import struct
@@ -17,7 +17,7 @@ def f32(value):
 
 
 def picture_of(session):
-    """Return what a page shows, as ``tests/web/tree.mjs`` says it."""
+    """Return what a page shows, in the form of ``tests/web/tree.mjs``."""
     return [
         {
             "id": mount.number,
@@ -170,7 +170,7 @@ steps = st.lists(
         st.integers(0, 40),
         st.integers(0, 40),
         st.floats(-9000, 9000, width=32),
-        # Without a bracket there is no url(), which a scene refuses.
+        # Without a bracket there is no url(); a scene refuses url().
         st.text(st.characters(codec="utf-8", exclude_characters="\0("), max_size=8),
     ),
     max_size=20,
@@ -181,7 +181,7 @@ histories = st.lists(
     min_size=1,
     max_size=6,
 )
-"""Steps, and what the page does after them."""
+"""Steps, and the actions of the page after them."""
 
 
 def play(history, session):
