@@ -19,10 +19,10 @@ class Row:
 
     name: str
     seconds: float
-    """The time of each of its comparisons, so that all take less than 15 minutes."""
+    """The time of each comparison; all benchmarks take less than 15 minutes."""
 
     quick: bool = False
-    """Whether it is one of those that all together give a rough look in 2 minutes."""
+    """Whether ``--quick`` runs it; these benchmarks take 2 minutes together."""
 
 
 ROWS = [
@@ -35,7 +35,7 @@ ROWS = [
     Row("peers", 25),
     Row("limits", 45),
     Row("console", 60),
-    Row("opening", 25),
+    Row("opening", 18),
     Row("agents", 50),
     Row("uplink", 40),
     Row("narrow", 40),
@@ -48,13 +48,13 @@ ROWS = [
 BENCHES = {row.name: row for row in ROWS}
 
 MOST_ROUNDS = 9
-"""Rounds of a comparison that is done sooner than its time is over."""
+"""The greatest number of rounds of a comparison, even if time is left."""
 
 
 @click.command()
 @click.argument("names", nargs=-1, type=click.Choice(list(BENCHES)))
 @click.option("--rounds", type=click.IntRange(1), help="Runs of each contender.")
-@click.option("--quick", is_flag=True, help="A tenth of the work: a rough look.")
+@click.option("--quick", is_flag=True, help="A tenth of the work: rough results.")
 def main(names: tuple[str, ...], rounds: int | None, quick: bool) -> None:
     """Run the benchmarks called NAMES, or all of them; with --quick, the cheap ones."""
     rows = [BENCHES[name] for name in names] or [
@@ -66,7 +66,7 @@ def main(names: tuple[str, ...], rounds: int | None, quick: bool) -> None:
         begun = time.monotonic()
         try:
             comparisons = run(row, rounds, quick=quick)
-        except Exception:  # the other benchmarks are worth as much without it
+        except Exception:  # the other benchmarks do not depend on it
             traceback.print_exc()
             failed.append(row.name)
         took[row.name] = time.monotonic() - begun

@@ -1,7 +1,7 @@
-"""The way of a velocity through an agent and a router, compared with the direct way.
+"""The time of a velocity through an agent and a router, compared with a direct link.
 
 The operator, the display, the router, the agent and the robot are on one computer, so
-the figures have the cost of the processes and none of a network.
+the figures contain the cost of the processes and no cost of a network.
 """
 
 import json
@@ -27,8 +27,8 @@ FULL = 1.0
 """The robot's highest speed, in m/s."""
 
 
-class Hand:
-    """An operator that holds a slowly changing speed, and notes when it was sent."""
+class Operator:
+    """An operator that sends drive commands and measures their acknowledgements."""
 
     def __init__(self, gates: Gates, robot: str) -> None:
         self._robot = robot
@@ -45,20 +45,20 @@ class Hand:
         """Why requests were refused."""
         self.armable = threading.Event()
         self.armed = threading.Event()
-        self._connection = gates.connect("Ann", "operator", self._hear, print)
+        self._connection = gates.connect("Ann", "operator", self._receive, print)
         self._connection.set_speeds(FULL, FULL)
 
     @property
     def holds(self) -> bool:
-        """Whether the gate has said that it has the robot."""
+        """Whether the gate has reported that the operator has control."""
         return self._mine
 
     def take(self) -> None:
-        """Take the robot."""
+        """Take control of the robot."""
         self._send(op="take")
 
     def drive(self, x: float) -> None:
-        """Send one command; ``x`` is a part of the full speed."""
+        """Send one command; ``x`` is a fraction of the full speed."""
         if self._epoch is None or self._gate not in self._ticks:
             return
         self._seq += 1
@@ -85,7 +85,7 @@ class Hand:
     def _send(self, **fields: object) -> None:
         self._connection.receive(json.dumps({**fields, "robot": self._robot}))
 
-    def _hear(self, text: str) -> None:
+    def _receive(self, text: str) -> None:
         message = json.loads(text)
         if message["op"] == "tick":
             gate = message.get("gate", "")
@@ -103,17 +103,17 @@ class Hand:
                 self.armed.set()
 
 
-def take_control(hand: Hand) -> None:
-    """Ask for control, again if nothing comes of it, until commands may move."""
+def take_control(operator: Operator) -> None:
+    """Take control, with retries, until the commands can move the robot."""
     deadline, asked = time.monotonic() + 20, -math.inf
-    while not hand.armed.is_set():
+    while not operator.armed.is_set():
         now = time.monotonic()
         if now > deadline:
-            raise RuntimeError(f"no control of the robot; refused: {hand.refused}")
+            raise RuntimeError(f"no control of the robot; refused: {operator.refused}")
         if now > asked + 2:
-            hand.take()
+            operator.take()
             asked = now
-        hand.drive(0.0)
+        operator.drive(0.0)
         time.sleep(PERIOD)
 
 
@@ -133,17 +133,17 @@ def delays(url: str, id: str, robot: WitnessRobot) -> list[float]:
                 odometry_type="nav_msgs/Odometry",
             )
         )
-        hand = Hand(gates, id)
-        if not hand.armable.wait(20):
+        operator = Operator(gates, id)
+        if not operator.armable.wait(20):
             raise RuntimeError("the robot cannot be driven")
-        take_control(hand)
+        take_control(operator)
         sent: dict[int, float] = {}
         for number in range(VELOCITIES):
             part = 0.2 + 0.001 * number
             sent[number] = time.monotonic()
-            hand.drive(part)
+            operator.drive(part)
             time.sleep(PERIOD)
-        hand.drive(0.0)
+        operator.drive(0.0)
     finally:
         gates.stop()
         close_peers()
@@ -162,7 +162,7 @@ def delays(url: str, id: str, robot: WitnessRobot) -> list[float]:
 
 
 def way(*, agent: bool) -> Callable[[], Figures]:
-    """Return a run over the direct way, or through an agent and a router."""
+    """Return a run over a direct link, or through an agent and a router."""
 
     def run() -> Figures:
         with ExitStack() as running, tempfile.TemporaryDirectory() as _state:
@@ -188,7 +188,7 @@ def way(*, agent: bool) -> Callable[[], Figures]:
 
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
-    """Compare the way through an agent with the direct one."""
+    """Compare the time through an agent with the time over a direct link."""
     contenders = [
         Contender("direct", way(agent=False)),
         Contender("agent and router", way(agent=True)),

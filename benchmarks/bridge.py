@@ -1,10 +1,11 @@
 """The cost of a frame from a robot: ``webmap.Bridge``, roslibpy and roslib in Node.js.
 
-Each listens in its own process to the same player in another process. roslibpy returns
-dicts and lists, roslib objects; WebMap returns typed messages and compact arrays, so it
-does more work. The reference is the floor: websockets and msgspec alone, with JSON.
+Each runs in a separate process, and receives frames from the same player in another
+process. roslibpy returns dicts and lists, roslib objects; WebMap returns typed messages
+and compact arrays, so it does more work. The reference is the least possible work:
+websockets and msgspec alone, with JSON.
 WebMap requests scans in CBOR, which roslibpy cannot read and roslib reads if asked;
-``webmap-json`` is WebMap with a bridge that only has JSON.
+``webmap-json`` is WebMap with a bridge that supports only JSON.
 """
 
 import json

@@ -2,8 +2,8 @@
 
 ``BRIDGED_URL`` is the address of the rosbridge, ``BRIDGED_ROBOTS`` the number of its
 robots. They have scans if ``BRIDGED_SCANS`` is set. ``BRIDGED_VIEWERS`` is the greatest
-number of pages. If ``BRIDGED_FRAME_RATE`` is set, pages get so many frames a second,
-and everybody may look and stop, and not drive.
+number of pages. If ``BRIDGED_FRAME_RATE`` is set, it is the number of frames a second
+for each page, and all users are viewers: they can stop robots, but not drive.
 """
 
 import os
@@ -44,5 +44,5 @@ if rate:
         authenticate=lambda scope: looks, max_pages=pages, frame_rate=float(rate)
     )
     serve(app, port=0)
-    raise SystemExit  # otherwise ``webmap run`` would serve the pages once more
+    raise SystemExit  # otherwise ``webmap run`` would also serve the pages
 webmap.run(max_pages=pages)

@@ -1,8 +1,8 @@
 """A program for ``webmap run``: the console with the robots of ``busy_robots``.
 
 ``FLEET_URL`` is the address of their rosbridge, ``FLEET_ROBOTS`` their number, and
-``FLEET_BEAMS`` the beams of a scan; 0 for robots without scans. It answers each line of
-its input with the number of messages that it has received.
+``FLEET_BEAMS`` the beams of a scan; 0 for robots without scans. For each line of
+its input, it prints the number of messages that it has received.
 """
 
 import os
@@ -18,7 +18,7 @@ SCANS = int(os.environ["FLEET_BEAMS"]) > 0
 
 
 def config(number: int) -> webmap.RobotConfig:
-    """Return a robot as ``webmap view`` configures one that it has found."""
+    """Return a robot with the configuration of a robot that ``webmap view`` finds."""
     topics = f"/robot_{number}"
     modules: list[dict[str, Any]] = [{"name": "Trail", "options": {"length": 10.0}}]
     if SCANS:
@@ -36,7 +36,7 @@ def config(number: int) -> webmap.RobotConfig:
 
 
 def answer() -> None:
-    """Answer the benchmark."""
+    """Print the number of messages for each line of the input."""
     for _ in sys.stdin:
         print(bridge.stats.frames, flush=True)
 

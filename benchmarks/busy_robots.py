@@ -27,7 +27,7 @@ SLOTS = 10
 """Parts of a period over which the robots are spread."""
 
 SECONDS, NANOSECONDS, X, Y = 1_234_567_890, 987_654_321, 4321.125, 8642.125
-"""Numbers in the template of a message, in place of which the present ones go."""
+"""Numbers in the template of a message that the current values replace."""
 
 
 def _websocket(opcode: int, payload: bytes) -> bytes:
@@ -105,7 +105,7 @@ class Subscriber:
                 self._due.pop(topic, None)
 
     def frames(self, slot: int, now: float) -> Iterator[bytes]:
-        """Yield what is due of the robots of a slot."""
+        """Yield the frames that are due for the robots of a slot."""
         for topic, asked in self._slots[slot].items():
             if now >= self._due[topic] - 0.5 / RATE:
                 self._due[topic] = now + min(asked.values())

@@ -1,5 +1,5 @@
-// A circle for each dot, moved by attributes, as the library of 2012 drew scans. There
-// is no network: the numbers are made here, before the measurement starts.
+// One circle for each dot, moved by attributes, as the library of 2012 drew scans. There
+// is no network: this script creates the numbers before the measurement starts.
 "use strict";
 
 const SVG = "http://www.w3.org/2000/svg";

@@ -1,8 +1,8 @@
-"""How soon the console answers an operator: select, filter and pan, until it is drawn.
+"""The time until the console shows the effect of an input: select, filter and pan.
 
-A hundred robots with scans of 360 points at 10 Hz and poses at 20 Hz, compared with two
-of them. Each figure is the time from the input to the end of the frame that shows its
-effect, which includes what the page was busy with before.
+A hundred robots with scans of 360 points at 10 Hz and poses at 20 Hz are compared with
+two such robots. Each figure is the time from the input to the end of the frame that
+shows its effect. It includes earlier work of the page that delays the input.
 """
 
 import statistics
@@ -19,7 +19,7 @@ FEW = 2
 BEAMS = 360
 TIMES = 20
 
-# The end of the first frame that begins with the effect on the page.
+# Waits for the end of the first frame that begins with the effect on the page.
 DRAWN = """
 const drawn = (shown = () => true) => new Promise((done) => {
   const begin = () => {

@@ -31,7 +31,7 @@ class Display:
         return next(p for p in self.process.children() if "webmap.gate" in p.cmdline())
 
     def cpu(self) -> float:
-        """Return the seconds of processor time that it has used."""
+        """Return the processor time of the display in seconds."""
         times = self.process.cpu_times()
         return float(times.user + times.system)
 
@@ -67,11 +67,11 @@ def bridged(
     """Start a rosbridge with robots of ``stamped``, and a display that shows them.
 
     Args:
-        robots: How many.
+        robots: The number of robots.
         beams: Beams of each scan; 0 for robots without scans.
-        viewers: How many pages may be open.
-        frame_rate: Frames a second for each page, of people who may not drive; without
-            it the usual number, and everybody may drive.
+        viewers: The greatest number of open pages.
+        frame_rate: Frames a second for each page, whose user can then not drive. None
+            for the default rate, and users who can drive.
 
     """
     with (

@@ -1,12 +1,12 @@
-"""A display of an agent's robots that draws nothing, with pages that only look.
+"""A display of an agent's robots that draws nothing, with pages that do not drive.
 
-It exchanges with the agent what a display exchanges: it subscribes to topics, connects
-its pages to the agent's gate, and answers that gate. It decodes no message, so several
-of them fit beside an agent on one machine.
+It exchanges the same messages with the agent as a real display: it subscribes to
+topics, connects pages to the agent's gate, and answers this gate. It decodes no
+messages, so several such displays can run beside an agent on one machine.
 
 Run as ``python -m benchmarks.far_display AGENT PAGES``, with the subscriptions as a
-list in JSON on standard input. Prints ``ready`` when messages come, and ends at the end
-of its standard input.
+list in JSON on standard input. Prints ``ready`` when messages arrive, and ends when
+standard input ends.
 """
 
 import asyncio
@@ -22,9 +22,9 @@ from webmap.gate.protocol import RobotSpec
 
 
 def main(agent: str, pages: int) -> None:
-    """Look at an agent until the standard input ends."""
+    """Connect to an agent until standard input ends."""
     subscriptions = json.loads(sys.stdin.readline())
-    heard, thread, gates = threading.Event(), LoopThread("data"), Gates()
+    arrived, thread, gates = threading.Event(), LoopThread("data"), Gates()
 
     def subscribe() -> None:
         for op in subscriptions:
@@ -33,7 +33,7 @@ def main(agent: str, pages: int) -> None:
     lane = AgentLane(
         agent,
         opened=subscribe,
-        received=lambda _: heard.set(),
+        received=lambda _: arrived.set(),
         closed=lambda why: print(f"the connection ended: {why}", file=sys.stderr),
         failed=lambda error: print(error, file=sys.stderr),
     )
@@ -46,7 +46,7 @@ def main(agent: str, pages: int) -> None:
         for number in range(pages):
             gates.connect(f"viewer {number}", "operator", lambda _: None, print)
         thread.call(begin())
-        if not heard.wait(30):
+        if not arrived.wait(30):
             raise TimeoutError(f"no message came from {agent}")
         print("ready", flush=True)
         sys.stdin.read()

@@ -27,7 +27,7 @@ TICK = float(os.environ.get("FLEET_TICK", "0.05"))
 """Seconds between two poses of a robot; scans come half as often."""
 
 STEPS = 40
-"""Ticks after which everything repeats."""
+"""Ticks after which poses and scans repeat."""
 
 
 class Mover:
@@ -54,7 +54,7 @@ class Mover:
         """Show the state of one tick."""
         turn = self.phase + number % STEPS * math.tau / STEPS
         x, y = self.x + math.cos(turn), self.y + math.sin(turn)
-        if CONSOLE or not BEAMS:  # with the age of the pose
+        if CONSOLE or not BEAMS:  # sends the age of the pose, too
             turned = Quaternion.from_yaw(turn + math.pi / 2)
             pose = PoseReading(Vector3(x, y, 0.0), turned)
             self.robot.show_pose(pose, time.monotonic())

@@ -1,4 +1,4 @@
-"""Frames as rosbridge sends them: all digits, escaped slashes, null for no reading."""
+"""Frames in the form of rosbridge: all digits, escaped slashes, null for no range."""
 
 import json
 import math

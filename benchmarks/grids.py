@@ -1,4 +1,4 @@
-"""The costs of a changed square of a map: they do not depend on the map's size.
+"""The costs of a changed square of a map; they do not depend on the map's size.
 
 The map has 1,000 x 1,000 or 4,000 x 4,000 cells, and the square 100 x 100. The last
 contender publishes the whole large map again, with one changed cell.
@@ -13,7 +13,7 @@ from benchmarks.harness import Comparison, Contender, Figures, compare
 
 
 def reading(side: int, order: str, count: int) -> Callable[[], Figures]:
-    """Return a run with ``count`` changes of a map of ``side`` cells a side."""
+    """Return a run with ``count`` changes of a map with ``side`` cells on each side."""
 
     def run() -> Figures:
         command = [sys.executable, "-m", "benchmarks.map_reader", str(side), order]

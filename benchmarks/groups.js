@@ -1,5 +1,5 @@
-// A group for each robot, moved by its transform attribute, and nothing else. There is
-// no network: the numbers are made here.
+// One group for each robot, moved only by its transform attribute. There is no network:
+// this script creates the numbers.
 "use strict";
 
 const SVG_GROUPS = "http://www.w3.org/2000/svg";

@@ -1,8 +1,8 @@
-"""Paired runs: A B A B, medians, ratios, a table for people and JSON for programs.
+"""Paired runs: A B A B, with medians and ratios, as a Markdown table and as JSON.
 
 A single figure depends more on the machine than on the code. Therefore the contenders
-of a comparison run in turn, round after round, and only the ratio within a round
-counts: a slow machine slows both.
+of a comparison run one after the other, in several rounds, and only the ratio within a
+round counts: a slow machine slows both.
 """
 
 import json
@@ -40,7 +40,7 @@ PACKAGES = (
     "viser",
     "playwright",
 )
-"""The packages whose versions are noted."""
+"""The packages whose versions are in the results."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +134,7 @@ def compare(title: str, contenders: Sequence[Contender], rounds: int) -> Compari
 
 
 def percentile(values: Sequence[float], percent: int) -> float:
-    """Return a percentile, NaN of nothing."""
+    """Return a percentile; NaN if there are no values."""
     if not values:
         return math.nan
     return sorted(values)[min(len(values) - 1, len(values) * percent // 100)]
@@ -170,11 +170,11 @@ def report(
     """Print the tables, and write everything as JSON.
 
     Args:
-        name: The benchmark.
-        comparisons: What it found.
-        seconds: How long it took.
-        rough: Whether it did a part of the work only; such results have a folder of
-            their own.
+        name: The name of the benchmark.
+        comparisons: The results.
+        seconds: The duration of the benchmark.
+        rough: Whether it did only a part of the work; such results are in a separate
+            folder.
 
     Returns:
         The file that was written.

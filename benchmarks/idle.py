@@ -1,9 +1,9 @@
-"""What robots that nobody drives cost the gate.
+"""The processor time of the gate for robots that nobody drives.
 
-First one rosbridge with many robots: the gate has three connections, whatever their
-number, so this shows the work for each robot. Then one rosbridge for each robot: the
-gate pings each connection, and bare connections of the ``websockets`` package that are
-pinged as often are the reference.
+First, many robots have one rosbridge: the gate has three connections for any number of
+robots, so this shows the work for each robot. Then each robot has a separate rosbridge:
+the gate pings each connection. The reference is bare connections of the ``websockets``
+package with as many pings.
 """
 
 import asyncio
@@ -28,17 +28,17 @@ MANY = 1000
 """Robots of one rosbridge."""
 
 BRIDGES = 100
-"""Robots with a rosbridge each."""
+"""Robots, each with a separate rosbridge."""
 
 PINGS = (0.5, 1.0, 1.0)
 """Seconds between pings on the gate's lanes: control, odometry and tasks."""
 
 PATIENCE = 60.0
-"""Seconds until all connections must be open."""
+"""Seconds after which all connections must be open."""
 
 
 async def _serve() -> None:
-    """Accept everything and send nothing; prints the port."""
+    """Print the port, accept all messages and send none."""
 
     async def handle(link: ServerConnection) -> None:
         async for _ in link:
@@ -57,7 +57,7 @@ async def _ping(link: ClientConnection, period: float) -> None:
 
 
 async def _connect(port: str, robots: int) -> None:
-    """Open three connections for each robot and ping them; prints a line when open."""
+    """Open three connections for each robot, print a line, and ping them."""
     address = f"ws://127.0.0.1:{port}"
     pinging = []
     for _ in range(robots):
@@ -103,9 +103,9 @@ def gate_with(robots: int, seconds: float, *, apart: bool) -> Callable[[], Figur
     """Return a run of the gate with idle robots.
 
     Args:
-        robots: How many.
-        seconds: The time that is measured.
-        apart: Whether each robot has its own rosbridge.
+        robots: The number of robots.
+        seconds: The duration of the measurement.
+        apart: Whether each robot has a separate rosbridge.
 
     """
 
@@ -153,7 +153,7 @@ def bare(robots: int, seconds: float) -> Callable[[], Figures]:
 
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
-    """Compare many idle robots with one, and their connections with bare ones."""
+    """Compare many idle robots with one, and the gate with bare connections."""
     seconds = 2.0 if quick else 5.0
     many = [
         Contender(f"{robots} robots", gate_with(robots, seconds, apart=False))

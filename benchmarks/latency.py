@@ -1,10 +1,10 @@
-"""From a robot's socket to the attribute in the browser, and from a key to the robot.
+"""Latency from a robot's socket to the attribute in Chromium, and from a key back.
 
-Robot, rosbridge and clock are in this process. The page reports over a socket of its
-own that it set a transform, or got a key. The report counts when it arrives here, so it
-adds the time of one hop to a pose, and leaves out one hop of a key. The reference is a
-bare relay with the same hops: browser, WebSocket, server in Python, WebSocket and
-rosbridge.
+Robot, rosbridge and clock are in this process. The page reports over a separate socket
+that it has set a transform or received a key. The time of a report is its arrival here,
+so the time of a pose includes one hop too many, and the time of a key lacks one hop.
+The reference is a bare relay with the same hops: browser, WebSocket, server in Python,
+WebSocket and rosbridge.
 """
 
 import random
@@ -33,10 +33,10 @@ TICK = 0.05
 """Seconds between two frames of the display."""
 
 FIRST = 20.0
-"""x of the first pose, in metres; each is a centimetre farther."""
+"""x of the first pose, in metres; each next pose is one centimetre farther."""
 
 PATIENCE = 30.0
-"""Seconds until the page must be ready."""
+"""Seconds after which the key must drive the robot."""
 
 REPORT = """(() => {
   const marks = new WebSocket("ws://127.0.0.1:PORT");
@@ -51,13 +51,13 @@ REPORT = """(() => {
 
 
 class Robot(WitnessRobot):
-    """The robot, with the topics that the pages know."""
+    """The robot, with the topics that the pages use."""
 
     ODOMETRY_TOPIC, TWIST_TOPIC, _ = topics(0)
 
 
 class Marks:
-    """What the page reports, with the time of arrival."""
+    """The reports of the page, with their times of arrival."""
 
     def __init__(self) -> None:
         self.found: list[tuple[float, str]] = []
@@ -79,7 +79,7 @@ class Marks:
 
 
 def pose(x: float) -> dict[str, object]:
-    """Return odometry at a place."""
+    """Return an odometry message with a position."""
     message = odometry(0)
     message["pose"]["pose"]["position"] = {"x": x, "y": Y, "z": 0.0}
     return message
@@ -108,7 +108,7 @@ def keys(page: Page, robot: WitnessRobot, marks: Marks) -> list[float]:
     """Return the times from a key to the velocity at the robot's socket, in ms."""
     found = []
     deadline = time.monotonic() + PATIENCE
-    while not _pressed(page, robot, marks, 2.0):  # the first ones take the robot
+    while not _pressed(page, robot, marks, 2.0):  # the first press takes control
         if time.monotonic() > deadline:
             raise RuntimeError("the key does not drive the robot")
     for _ in range(KEYS):
@@ -193,7 +193,7 @@ def measured(url: str, robot: WitnessRobot, measure: Measure) -> Figures:
 
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
-    """Compare both ways with a bare relay."""
+    """Compare both directions with a bare relay."""
     name = f"bare relay, a pose every {1000 * TICK:.0f} ms"
     shown = [
         Contender("bare relay", bare(poses)),
@@ -204,7 +204,7 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
         Contender("bare relay", bare(keys)),
         Contender("WebMap", webmap(keys)),
     ]
-    del quick  # fewer would have no percentiles
+    del quick  # fewer values would give no percentiles
     return [
         compare("from a robot's socket to the attribute in Chromium", shown, rounds),
         compare("from a key in Chromium to the robot's socket", driven, rounds),

@@ -1,10 +1,10 @@
-"""How many robots, and how many viewers, until what is shown is too old.
+"""The numbers of robots and of viewers at which poses and frames become too old.
 
-Robots send odometry at 10 Hz; more and more of them, until the oldest percent of the
-poses is older than 150 ms: at a viewer of the display, and at the gate, where each but
-one was stopped and is watched, and where one is driven. Then more and more viewers of
-100 robots, with the setting for it, until frames are that old; five more that read
-nothing; and 500 with 5 frames a second.
+Robots send odometry at 10 Hz. Their number grows until one percent of the poses is
+older than 150 ms: first at a viewer of the display, then at the gate, which has stopped
+and watches all robots but one, and drives that one. Then the number of viewers of 100
+robots grows until frames are older than 150 ms. Two more runs have five viewers that
+read nothing, and 500 viewers with 5 frames a second.
 """
 
 import json
@@ -20,7 +20,7 @@ from contextlib import ExitStack
 
 import psutil
 
-from benchmarks.agents import Hand
+from benchmarks.agents import Operator
 from benchmarks.display import Display, bridged, stamped
 from benchmarks.harness import Comparison, Figures, percentile
 from benchmarks.plot import Curve, Plot, save
@@ -30,17 +30,17 @@ from webmap.agents.gates import Gates
 from webmap.gate.protocol import Report, RobotReport, RobotSpec
 
 FEW = 50
-"""The fewest robots that a gate watches: each was stopped."""
+"""The smallest number of robots that a gate watches; it has stopped them."""
 
 ROBOTS = (100, 200, 500, 1000, 2000, 4000)
 VIEWERS = (50, 100, 200)
 SHOWN = 100
-"""Robots that the viewers see."""
+"""The number of robots that the display shows to many viewers."""
 
 STALLED = 5
 
 MOST_VIEWERS, FRAME_RATE = 500, 5.0
-"""The most viewers, and the frames a second that the settings then give to each."""
+"""The greatest number of viewers, and their frames a second in this run."""
 
 TOO_OLD = 150.0
 """Milliseconds."""
@@ -62,7 +62,7 @@ def busy(process: psutil.Process, seconds: float) -> float:
 def seen(
     shown: Display, viewers: int, seconds: float, stalled: int = 0
 ) -> dict[str, float]:
-    """Return what viewers of a display receive, and its processor time."""
+    """Return the figures of the viewers of a display, and its processor time."""
     command = [sys.executable, "-m", "benchmarks.watchers", shown.url, str(viewers)]
     with subprocess.Popen(
         [*command, str(seconds), "1", str(stalled)], stdout=subprocess.PIPE, text=True
@@ -76,7 +76,7 @@ def seen(
 
 
 def display_with(robots: int, seconds: float) -> Figures:
-    """Return what one viewer sees of a number of robots."""
+    """Return the figures of one viewer of a number of robots."""
     with bridged(robots) as shown:
         found = seen(shown, 1, seconds)
     return {
@@ -90,7 +90,7 @@ def display_with(robots: int, seconds: float) -> Figures:
 def viewed_by(
     viewers: int, seconds: float, stalled: int = 0, frame_rate: float | None = None
 ) -> Figures:
-    """Return what many viewers see of some robots."""
+    """Return the figures of many viewers of some robots."""
     pages = viewers + stalled
     with bridged(SHOWN, viewers=pages, frame_rate=frame_rate) as shown:
         found = seen(shown, viewers, seconds, stalled)
@@ -106,8 +106,8 @@ def viewed_by(
 class Watch:
     """The ages of the odometry that the gate reports.
 
-    A report has the newest odometry, so that between two messages it becomes up to a
-    period older; only the first report of each message counts.
+    A report contains the newest odometry, whose age grows until the next message.
+    Therefore only the first report of each message counts.
     """
 
     def __init__(self) -> None:
@@ -117,7 +117,7 @@ class Watch:
         self._last: dict[str, float] = {}
 
     def note(self, report: Report) -> None:
-        """Note a report."""
+        """Record a report."""
         if not isinstance(report, RobotReport):
             return
         now = time.monotonic()
@@ -137,15 +137,15 @@ def _until(check: Callable[[], bool], what: str) -> None:
     deadline = time.monotonic() + 60
     while not check():
         if time.monotonic() > deadline:
-            raise RuntimeError(f"never came: {what}")
+            raise RuntimeError(f"timeout: {what}")
         time.sleep(0.05)
 
 
 def gate_with(robots: int, seconds: float) -> Figures:
-    """Return what the gate knows of robots that were stopped, and how it answers.
+    """Return the ages of odometry at a gate, and the times until it acknowledges.
 
-    Each robot but the first was stopped, so the gate watches its odometry and keeps
-    sending zero to it. An operator holds the first one.
+    An operator has control of the first robot. All others have been stopped, so the
+    gate watches their odometry and sends zeros to them.
     """
     with ExitStack() as running:
         os.environ["WEBMAP_STATE_DIR"] = running.enter_context(
@@ -169,27 +169,27 @@ def gate_with(robots: int, seconds: float) -> Figures:
                 )
             )
         _until(lambda: len(watch.up) == robots, "the connections")
-        hand = Hand(gates, "r0")
+        operator = Operator(gates, "r0")
         stopping = gates.connect("Bob", "viewer", lambda _text: None, print)
         for number in range(1, robots):
             stopping.receive(json.dumps({"op": "stop", "robot": f"r{number}"}))
         _until(lambda: len(watch.stopped) == robots - 1, "the stops")
-        hand.take()
+        operator.take()
         gate = next(
             process
             for process in psutil.Process().children()
             if "webmap.gate" in process.cmdline()
         )
         ended = threading.Event()
-        driving = threading.Thread(target=_drive, args=(hand, ended))
+        driving = threading.Thread(target=_drive, args=(operator, ended))
         driving.start()
         time.sleep(2.0)
         watch.ages.clear()
-        hand.forget()
+        operator.forget()
         before, begun = used(gate), time.monotonic()
         time.sleep(seconds)
         cpu = 100 * (used(gate) - before) / (time.monotonic() - begun)
-        ages, trips = list(watch.ages), list(hand.trips)
+        ages, trips = list(watch.ages), list(operator.trips)
         ended.set()
         driving.join()
     return {
@@ -200,12 +200,12 @@ def gate_with(robots: int, seconds: float) -> Figures:
     }
 
 
-def _drive(hand: Hand, ended: threading.Event) -> None:
+def _drive(operator: Operator, ended: threading.Event) -> None:
     while not ended.wait(0.05):
-        if hand.holds:
-            hand.drive(0.0)
+        if operator.holds:
+            operator.drive(0.0)
         else:
-            hand.take()
+            operator.take()
 
 
 def ramp(
@@ -216,7 +216,7 @@ def ramp(
     what: str = "robots",
     age: str = AGE_99,
 ) -> Comparison:
-    """Measure more and more of something until an age is too high, or nothing comes."""
+    """Measure growing numbers until an age is too high, or no data arrives."""
     found: dict[str, list[Figures]] = {}
     for count in counts:
         print(f"{title}: {count} {what}", file=sys.stderr)
@@ -235,7 +235,7 @@ def ramp(
 
 
 def end_of(comparison: Comparison, age: str = AGE_99) -> str:
-    """Return in words where an age becomes higher than allowed."""
+    """Return a sentence with the number at which an age becomes too high."""
     ages = [
         (int(name.split()[0]), comparison.median(name, age)) for name in comparison.runs
     ]

@@ -12,13 +12,13 @@ from webmap.base.loop_thread import LoopThread
 Queue = Literal["fair", "one"]
 
 PACKET = 1448
-"""Bytes that cross the line at a time: what an Ethernet packet of TCP carries."""
+"""Bytes that cross the line at a time, as many as a TCP packet on Ethernet has."""
 
 KEPT = 4096
-"""Bytes of a connection to a narrow line that the system keeps; Linux doubles it."""
+"""The receive buffer of a connection to a narrow line; Linux doubles it."""
 
 READ = 1 << 16
-"""Bytes that are read at a time where the line is as wide as the machine can."""
+"""Bytes that are read at a time if the line has no limit."""
 
 
 class Direction:
@@ -26,15 +26,16 @@ class Direction:
 
     Args:
         rate: Bytes a second; None for no limit.
-        queue: ``one``: what was sent first crosses first, of whatever connection, as in
-            a plain modem. ``fair``: the connections take turns, as with fq_codel.
-        depth: Bytes that wait in one queue; the connections wait outside beyond that.
+        queue: ``one``: bytes of all connections cross in the order in which they were
+            sent, as in a simple modem. ``fair``: the connections take turns, as with
+            fq_codel.
+        depth: The size of one queue in bytes; if it is full, the connections wait.
 
     """
 
     def __init__(self, rate: float | None, queue: Queue, depth: int) -> None:
         self.bytes = 0
-        """What has crossed the line."""
+        """The number of bytes that have crossed the line."""
         self._rate = rate
         self._depth = depth if queue == "one" else 0
         self._waiting: deque[tuple[asyncio.StreamWriter, bytes]] = deque()
@@ -53,7 +54,7 @@ class Direction:
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
     ) -> None:
-        """Carry what one connection sends until it ends."""
+        """Carry the bytes of one connection until it ends."""
         while data := await reader.read(PACKET if self._rate else READ):
             if self._rate is None:
                 await self._cross(writer, data)
@@ -64,12 +65,12 @@ class Direction:
                     self._size += len(data)
                     self._room.notify_all()
             else:
-                async with self._turn:  # in the order in which they ask for it
+                async with self._turn:  # in the order of the requests
                     await self._pace(len(data))
                     await self._cross(writer, data)
 
     async def empty_queue(self) -> None:
-        """Let the one queue cross, for ever."""
+        """Send the bytes of the one queue over the line, for ever."""
         while True:
             async with self._room:
                 await self._room.wait_for(lambda: bool(self._waiting))
@@ -85,7 +86,7 @@ class Direction:
         """Wait as long as the bytes take to cross."""
         assert self._rate is not None
         loop = asyncio.get_running_loop()
-        # What sleep() was late is made good by the next one, up to a moment.
+        # The next wait is shorter if sleep() was late, by at most 5 ms.
         begun = max(self._free_at, loop.time() - 0.005)
         self._free_at = begun + size / self._rate
         await asyncio.sleep(self._free_at - loop.time())
@@ -98,13 +99,13 @@ class Direction:
 
 
 class Line:
-    """Passes connections on to a port of this computer; a context manager.
+    """Forwards connections to a port of this computer; a context manager.
 
     Args:
         port: The port.
         rate: Bytes a second, each way, of all connections; None for no limit.
-        queue: Who waits where the line is too narrow; see :class:`Direction`.
-        depth: Bytes that may wait in front of the line where there is one queue.
+        queue: The order of the bytes on a narrow line; see :class:`Direction`.
+        depth: The size of the queue in bytes, if there is one queue.
 
     """
 
@@ -134,7 +135,7 @@ class Line:
             self._begin(direction.empty_queue())
         server = socket.create_server(("127.0.0.1", 0))
         if self.up.narrow:
-            # What the kernel of this computer kept would be a queue of its own.
+            # A large buffer in the kernel would be another queue.
             server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, KEPT)
         self._server = await asyncio.start_server(
             self._accept, sock=server, limit=PACKET

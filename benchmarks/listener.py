@@ -1,4 +1,4 @@
-"""One client that listens to the player and reports the cost of each frame.
+"""One client that receives frames from the player and reports the cost of a frame.
 
 Run as ``python -m benchmarks.listener CLIENT PORT TOPIC COUNT``; prints JSON. The cost
 is the processor time of this whole process, all threads, from the first frame of the
@@ -31,7 +31,7 @@ class Meter:
         self._cpu = self._wall = 0.0
 
     def frame(self) -> None:
-        """Note that one message reached the user's code."""
+        """Count a message that reached the code of the user."""
         self.seen += 1
         if self.seen == WARM:
             self._cpu, self._wall = time.process_time(), time.perf_counter()
@@ -50,7 +50,7 @@ class Meter:
 
 
 def listen_with_roslibpy(port: int, topic: str, meter: Meter) -> None:
-    """Receive messages as roslibpy gives them: dicts, without conversion to arrays."""
+    """Receive messages with roslibpy: dicts, without conversion to arrays."""
     import roslibpy
 
     def on_message(message: dict[str, Any]) -> None:
@@ -108,7 +108,7 @@ async def _listen_with_webmap(
 
 
 def listen_with_libraries(port: int, topic: str, meter: Meter) -> None:
-    """Receive typed messages with websockets and msgspec alone, and nothing around."""
+    """Receive typed messages with websockets and msgspec alone."""
     asyncio.run(_listen_with_libraries(port, topic, meter))
 
 
@@ -133,7 +133,7 @@ async def _listen_with_libraries(port: int, topic: str, meter: Meter) -> None:
 
 
 def main(client: str, port: int, topic: str, count: int) -> None:
-    """Listen with one client and print the figures."""
+    """Receive frames with one client and print the figures."""
     meter = Meter(count)
     if client == "roslibpy":
         listen_with_roslibpy(port, topic, meter)

@@ -1,7 +1,7 @@
-"""A display of one map, without pages; it reports what the map and its changes cost.
+"""A display of one map, without pages; it reports the cost of the map and its changes.
 
-Run as ``python -m benchmarks.map_reader SIDE ORDER COUNT``; prints JSON. Each order is
-sent to the map server when the change before it was drawn.
+Run as ``python -m benchmarks.map_reader SIDE ORDER COUNT``; prints JSON. It sends
+each order to the map server when it has drawn the change before.
 """
 
 import asyncio
@@ -42,7 +42,7 @@ def used() -> float:
 
 
 async def measure(url: str, give: Any, order: str, count: int) -> dict[str, float]:
-    """Show the map, give the orders one after the other, and return the figures."""
+    """Show the map, send the orders one after the other, and return the figures."""
     published: list[tuple[float, int]] = []
     publish = pictures.publish
 
@@ -59,7 +59,7 @@ async def measure(url: str, give: Any, order: str, count: int) -> dict[str, floa
     bridge.start(asyncio.get_running_loop())
 
     async def drawn() -> float:
-        """Wait until pictures came and no more follow; return when the last came."""
+        """Wait until all pictures are published; return the time of the last one."""
         while not published or layer.tiles.is_drawing:  # noqa: ASYNC110
             await asyncio.sleep(0.005)
         return published[-1][0]

@@ -36,7 +36,7 @@ def rooms(side: int) -> "np.ndarray":
 
 
 async def serve(side: int) -> None:
-    """Publish what standard input orders, until it ends."""
+    """Follow the orders on standard input until it ends."""
     schema, quirks = Schema(Dialect("ros1")), parse_quirks("real", "ros1")
     graph, node = Graph(schema), object()
     server = RosbridgeServer(graph, Encoder(schema, quirks))

@@ -1,11 +1,12 @@
-"""A narrow uplink: does the lane of ticks and commands stay free while data suffers?
+"""A narrow uplink: data is delayed, but ticks and commands should not be delayed.
 
 Between an agent and its router is a line of 1 Mbit/s, each way, for all sessions of
-the agent. A display subscribes to more and more of the robots' data. An operator at the
-same display holds a robot and sends commands, all of speed zero, 20 times a second.
+the agent. A display subscribes to the data of more and more robots. An operator at the
+same display has control of a robot and sends a command of speed zero 20 times a second.
 
-Measured are the time from a command to the tick that acknowledges it, which includes up
-to 50 ms until the gate's next tick, and the rate and the age of the data that arrives.
+The benchmark measures the time from a command to the tick that acknowledges it, which
+includes up to 50 ms until the next tick of the gate. It also measures the rate and the
+age of the data that arrives.
 """
 
 import asyncio
@@ -15,7 +16,7 @@ import zlib
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
-from benchmarks.agents import Hand
+from benchmarks.agents import Operator
 from benchmarks.harness import Comparison, Contender, Figures, compare, percentile
 from benchmarks.line import Line, Queue
 from benchmarks.plot import Curve, Plot, save
@@ -36,7 +37,7 @@ LOADS = (8, 16)
 
 PERIOD = 0.05
 WARM = 2.0
-"""Seconds for which queues may fill before anything is measured."""
+"""Seconds before the measurement, in which queues may fill."""
 
 TRIP, TRIP_95, TRIP_99 = (f"command to its tick, {n} (ms)" for n in (50, 95, 99))
 ANSWERED = "commands with an answer within 300 ms (%)"
@@ -45,18 +46,18 @@ BYTES = "bytes on the line (kB a second)"
 
 
 class Arrivals:
-    """The messages that arrive, with the age of each."""
+    """The ages of the messages that arrive."""
 
     def __init__(self) -> None:
         self.ages: list[float] = []
 
     def take(self, message: OdometryMsg | LaserScanMsg) -> None:
-        """Note a message; its stamp is of this computer's clock."""
+        """Record a message; its stamp is from the clock of this computer."""
         self.ages.append(1000 * (time.time() - message.header.stamp.seconds))
 
 
 def subscribe(url: str, robots: int, arrivals: Arrivals) -> Callable[[], None]:
-    """Subscribe to the data of robots; return a function that ends it."""
+    """Subscribe to the data of robots; return a function that unsubscribes."""
     thread = LoopThread("data")
     bridge = Bridge(url)
 
@@ -118,17 +119,17 @@ def measured(agent: str, line: Line, robots: int, seconds: float) -> Figures:
     gates.start()
     try:
         gates.declare(RobotSpec(id=robot, name="robot_0", bridge_url=agent))
-        hand = Hand(gates, robot)
-        if not hand.armable.wait(30):
+        operator = Operator(gates, robot)
+        if not operator.armable.wait(30):
             raise RuntimeError("the robot cannot be driven")
-        hand.take()
+        operator.take()
         end_data = subscribe(agent, robots, arrivals)
         try:
-            hold(hand, WARM)
-            hand.forget()
+            hold(operator, WARM)
+            operator.forget()
             arrivals.ages.clear()
             sent, begun = line.up.bytes, time.monotonic()
-            hold(hand, seconds)
+            hold(operator, seconds)
             took = time.monotonic() - begun
             carried, ages = (line.up.bytes - sent) / took, list(arrivals.ages)
             time.sleep(1.0)  # for the last answers
@@ -137,12 +138,12 @@ def measured(agent: str, line: Line, robots: int, seconds: float) -> Figures:
     finally:
         gates.stop()
         close_peers()
-    trips = hand.trips
+    trips = operator.trips
     return {
         TRIP: percentile(trips, 50),
         TRIP_95: percentile(trips, 95),
         TRIP_99: percentile(trips, 99),
-        ANSWERED: 100 * sum(trip <= 300 for trip in trips) / max(1, hand.sent),
+        ANSWERED: 100 * sum(trip <= 300 for trip in trips) / max(1, operator.sent),
         RATE: len(ages) / took,
         AGE: percentile(ages, 50),
         AGE_95: percentile(ages, 95),
@@ -150,16 +151,16 @@ def measured(agent: str, line: Line, robots: int, seconds: float) -> Figures:
     }
 
 
-def hold(hand: Hand, seconds: float) -> None:
-    """Send commands for a time, and take the robot again whenever it was lost."""
+def hold(operator: Operator, seconds: float) -> None:
+    """Send commands for a time; take control again whenever it is lost."""
     end = time.monotonic() + seconds
     taken = float("-inf")
     while (now := time.monotonic()) < end:
-        if hand.holds:
-            hand.drive(0.0)
+        if operator.holds:
+            operator.drive(0.0)
         elif now - taken > 0.5:
             taken = now
-            hand.take()
+            operator.take()
         time.sleep(PERIOD)
 
 
@@ -180,7 +181,7 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
 
 
 def plot(comparisons: Sequence[Comparison]) -> Plot:
-    """Return what ticks and data suffer against the load that is offered."""
+    """Return a plot of the delay of ticks against the offered load."""
     loads = [100 * 1000 * each.median("wide", BYTES) / WIDTH for each in comparisons]
     curves = []
     for name in list(comparisons[0].runs)[1:]:

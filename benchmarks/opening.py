@@ -1,9 +1,9 @@
-"""How soon an opened page shows a robot: the console, compared with a bare page.
+"""The time until an opened page shows a robot: the console and a bare page.
 
-The bare page is an HTML file with one module, which opens a socket and shows what comes
-on it: no page that gets its robots by a socket can be faster. Both are opened in a new
-browser, on this machine, and over a link with a round trip of 100 ms and 1.6 Mbit/s as
-Chromium imitates it.
+The bare page is an HTML file with one module, which opens a socket and shows the data
+from it: no page that receives its robots over a socket can be faster. Both are opened
+in a new browser, on this machine, and over a link that Chromium simulates, with a round
+trip of 100 ms and 1.6 Mbit/s.
 """
 
 import socket
@@ -96,7 +96,7 @@ def bare_page() -> Iterator[str]:
 
 
 def measure(page: Page, url: str, *, slow: bool) -> Figures:
-    """Open a page and return the time until its first robot, and what was loaded."""
+    """Open a page; return the time until its first robot, and the amount of data."""
     session = page.context.new_cdp_session(page)
     sizes: list[float] = []
     session.on(
@@ -121,7 +121,7 @@ def measure(page: Page, url: str, *, slow: bool) -> Figures:
     while not page.evaluate("globalThis.firstRobot ?? 0"):
         page.wait_for_timeout(10)
     first: float = page.evaluate("firstRobot")
-    page.wait_for_timeout(2000)
+    page.wait_for_timeout(2000 if slow else 1000)  # for the features
     return {
         "first robot (ms)": first,
         "requests in all": len(sizes),
@@ -129,25 +129,12 @@ def measure(page: Page, url: str, *, slow: bool) -> Figures:
     }
 
 
-def bare(*, slow: bool) -> Callable[[], Figures]:
-    """Return a run of the bare page."""
+def opened(url: str, *, slow: bool) -> Callable[[], Figures]:
+    """Return a run that opens a page in a new browser."""
 
     def run() -> Figures:
-        with bare_page() as url, browser_page() as page:
+        with browser_page() as page:
             return measure(page, url, slow=slow)
-
-    return run
-
-
-def console(robots: int, *, slow: bool) -> Callable[[], Figures]:
-    """Return a run of the console, whose robots were there before."""
-
-    def run() -> Figures:
-        with display(robots, BEAMS, console=True) as shown:
-            with browser_page() as page:  # the robots, and the files, are ready
-                measure(page, shown.url, slow=False)
-            with browser_page() as page:
-                return measure(page, shown.url, slow=slow)
 
     return run
 
@@ -155,17 +142,17 @@ def console(robots: int, *, slow: bool) -> Callable[[], Figures]:
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare the console with the bare page, without and with a slow link."""
     robots = 2 if quick else ROBOTS
-    return [
-        compare(
-            f"opening a page, {where}",
-            [
-                Contender("bare page", bare(slow=slow)),
-                Contender("console", console(robots, slow=slow)),
-            ],
-            rounds,
-        )
-        for where, slow in (
-            ("on this machine", False),
-            (f"{ROUND_TRIP_MS} ms and {BYTES_A_SECOND * 8 / 1e6} Mbit/s", True),
-        )
-    ]
+    link = f"{ROUND_TRIP_MS} ms and {BYTES_A_SECOND * 8 / 1e6} Mbit/s"
+    with bare_page() as bare, display(robots, BEAMS, console=True) as shown:
+        opened(shown.url, slow=False)()  # until the robots and the files are ready
+        return [
+            compare(
+                f"opening a page, {where}",
+                [
+                    Contender("bare page", opened(bare, slow=slow)),
+                    Contender("console", opened(shown.url, slow=slow)),
+                ],
+                rounds,
+            )
+            for where, slow in (("on this machine", False), (link, True))
+        ]

@@ -1,7 +1,7 @@
-"""Moving robots in NiceGUI or viser, each in the way of it that costs its server least.
+"""Moving robots in NiceGUI or viser, with the least work for the server.
 
-Run as ``python peer_server.py nicegui|viser ROBOTS PORT`` with a Python that has them;
-nothing of WebMap is needed.
+Run as ``python peer_server.py nicegui|viser ROBOTS PORT`` with a Python that has these
+packages. It does not use WebMap.
 """
 
 import math
@@ -13,14 +13,14 @@ RATE = 10
 
 
 def place(number: int, side: int) -> tuple[float, float, float]:
-    """Return x, y and yaw of a robot now: as in ``fleet``, on a circle."""
+    """Return the current x, y and yaw of a robot on a circle, as in ``fleet``."""
     turn = 0.7 * number + math.pi * time.monotonic()
     x, y = number % side * 4.0 + math.cos(turn), number // side * 4.0 + math.sin(turn)
     return x, y, turn + math.pi / 2
 
 
 def show_in_nicegui(robots: int, port: int) -> None:
-    """Send the whole picture as SVG at each step; an element for each costs more."""
+    """Send all robots as one SVG at each step; an element for each costs more."""
     from nicegui import ui
 
     side = math.ceil(math.sqrt(robots))
@@ -37,7 +37,7 @@ def show_in_nicegui(robots: int, port: int) -> None:
         box = f"-3 -3 {4 * side + 2} {4 * side + 2}"
         return f'<svg width="800" height="800" viewBox="{box}">{"".join(shapes)}</svg>'
 
-    @ui.page("/")  # type: ignore[untyped-decorator]  # the package is not here
+    @ui.page("/")  # type: ignore[untyped-decorator]  # the package is not installed
     def main() -> None:
         shown = ui.html(picture(), sanitize=False)
         ui.timer(1 / RATE, lambda: shown.set_content(picture()))

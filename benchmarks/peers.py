@@ -1,8 +1,8 @@
 """Other ways to show moving robots in a browser: NiceGUI, viser, and ros2d.
 
-NiceGUI and viser draw from a Python server, as WebMap does; the positions are computed
-in it. ros2d draws in the browser what a rosbridge sends to it; WebMap gets the same
-from the same rosbridge. One viewer each, and robots at 10 Hz. A line before each server
+NiceGUI and viser, like WebMap, have a Python server, which computes the positions.
+ros2d draws the data of a rosbridge in the browser; WebMap gets the same data from the
+same rosbridge. Each has one viewer, and robots at 10 Hz. A line before each server
 counts the bytes. The peers are no dependencies: ``make bench-peers`` installs them.
 """
 
@@ -29,10 +29,10 @@ PEERS = ROOT / ".venv-peers"
 PYTHON = PEERS / "bin" / "python"
 
 ROBOTS = 100
-"""Robots."""
+"""The number of robots."""
 
 SETTLED = 3.0
-"""Seconds until a page is measured."""
+"""Seconds from opening a page to the measurement."""
 
 HOW = "run `make bench-peers`"
 
@@ -43,7 +43,7 @@ SCRIPTS = (
     PEERS / "node_modules/ros2d/build/ros2d.min.js",
     Path(__file__).parent / "ros2d.js",
 )
-"""What the page of ros2d loads."""
+"""The scripts that the page of ros2d loads."""
 
 SERVER = "server, a robot's update (us)"
 BYTES = "bytes to the viewer (kB a second)"
@@ -51,7 +51,7 @@ THREAD = "main thread of the browser (ms a second)"
 
 
 def has(package: str) -> bool:
-    """Return whether a peer of Python is installed."""
+    """Return whether the Python package of a peer is installed."""
     if not PYTHON.exists():
         return False
     asked = subprocess.run([PYTHON, "-c", f"import {package}"], capture_output=True)

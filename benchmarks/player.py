@@ -1,8 +1,8 @@
 """Imitates a rosbridge that sends frames to one subscriber as fast as it reads.
 
 Run as ``python -m benchmarks.player COUNT``; prints its port. It implements only the
-part of the protocol that a subscription needs. The WebSocket frames are made before,
-and written many at a time, so that the subscriber never waits for this process.
+part of the protocol that a subscription needs. It creates the WebSocket frames before,
+and writes many at a time, so that the subscriber never waits for this process.
 """
 
 import asyncio

@@ -11,7 +11,7 @@ from benchmarks.harness import RESULTS
 WIDTH, HEIGHT = 640, 360
 LEFT, RIGHT, TOP, BOTTOM = 56, 16, 36, 44
 LINE = 16
-"""Height of a line of the legend, which is under the picture."""
+"""Height of a line of the legend, which is below the plot."""
 COLOURS = ("#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf")
 DASHES = ("", "6 3", "2 3")
 
@@ -22,7 +22,7 @@ class Curve:
 
     name: str
     points: Sequence[tuple[float, float]]
-    """Points, by rising x; those with NaN are left out."""
+    """Points, sorted by x; the plot omits points with NaN."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,9 +31,9 @@ class Plot:
 
     title: str
     x: str
-    """What the horizontal axis has, with its unit."""
+    """The label of the horizontal axis, with its unit."""
     y: str
-    """What the vertical axis has, with its unit."""
+    """The label of the vertical axis, with its unit."""
     curves: Sequence[Curve]
 
     def svg(self) -> str:

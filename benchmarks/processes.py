@@ -1,4 +1,4 @@
-"""Commands of WebMap that run beside a benchmark, and what they cost."""
+"""Commands of WebMap that run beside a benchmark, and their processor time."""
 
 import os
 import subprocess
@@ -14,8 +14,8 @@ def started(*command: object, state: str = "") -> Iterator[tuple[str, psutil.Pro
     """Run a command of WebMap; yield the address in its first line, and its process.
 
     Args:
-        command: What follows ``webmap`` on the command line.
-        state: The folder of its state; "" for that of this process.
+        command: The arguments after ``webmap`` on the command line.
+        state: The folder of its state; "" for the folder of this process.
 
     Raises:
         RuntimeError: If its first line has no address.

@@ -1,8 +1,8 @@
-"""A bare server between a rosbridge and a browser, which passes on what comes.
+"""A bare server between a rosbridge and a browser, which forwards the messages.
 
 Run as ``python -m benchmarks.relay ROSBRIDGE PERIOD``; prints the address of a page.
 The page draws a robot at the poses of its odometry, and sends a velocity for each key.
-Poses go on at once, or only the newest one in each period of that many seconds.
+It forwards each pose at once, or only the newest pose in each period of PERIOD seconds.
 """
 
 import asyncio
@@ -52,7 +52,7 @@ def page(connection: ServerConnection, request: Request) -> Response | None:
 async def pass_on(
     source: ClientConnection, target: ServerConnection, period: float
 ) -> None:
-    """Pass on the poses."""
+    """Forward the poses."""
     newest: list[str | bytes] = []
 
     async def tick() -> None:

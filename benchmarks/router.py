@@ -1,7 +1,7 @@
-"""What a router costs for each message, and how far that carries a fleet, on paper.
+"""The cost of a message in a router, and the computed cost of large fleets.
 
-The first part measures: sessions send and receive through ``webmap router``. The second
-part computes messages, bytes and processors of large fleets from these costs.
+The first part measures sessions that send and receive through ``webmap router``. The
+second part computes messages, bytes and processors of large fleets from these costs.
 """
 
 import threading
@@ -16,7 +16,7 @@ from webmap.agents.address import locator
 from webmap.agents.peer import COPIES, zenoh_config
 
 RATE = 1000
-"""Messages that the sender sends a second."""
+"""Messages a second of the sender."""
 
 READERS = (0, 1, 4, 8)
 """Sessions that receive each message."""
@@ -87,13 +87,13 @@ class Costs:
     """Seconds of processor time for each message."""
 
     into: float
-    """In the router, for a message that comes."""
+    """In the router, for each message that it receives."""
     out: float
-    """In the router, for each session that it goes to."""
+    """In the router, for each session that it sends the message to."""
     put: float
-    """In the process that sends it."""
+    """In the process that sends the message."""
     take: float
-    """In a process that receives it, up to Python's function."""
+    """In a process that receives the message, until Python calls the function."""
 
 
 def costs(comparison: Comparison) -> Costs:
@@ -116,7 +116,7 @@ def costs(comparison: Comparison) -> Costs:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A fleet, and who shows what."""
+    """A fleet, and the agents that each display shows."""
 
     name: str
     agents: int
@@ -124,9 +124,9 @@ class Layout:
     shown: int
     """Agents that each display subscribes to."""
     routers: int = 1
-    """Regions with a router each; agents and displays are spread evenly."""
+    """Regions, each with a router; agents and displays are spread evenly."""
     crossing: float = 0.0
-    """The share of what a display shows that is in another region."""
+    """The share of the agents of a display that are in another region."""
 
 
 UP: dict[str, tuple[float, int]] = {
@@ -137,17 +137,17 @@ UP: dict[str, tuple[float, int]] = {
     "scans": (10.0, 1370),
     "frames": (20.0, 250),
 }
-"""What an agent of one robot sends: messages a second and bytes of each on the link."""
+"""Messages that an agent of one robot sends: rate, and bytes of each on the link."""
 
 DOWN: dict[str, tuple[float, int]] = {
     "answers": (1.0, 180),
     "pings": (1.4, 110),
 }
-"""What a display that controls nothing sends to each agent that it shows."""
+"""Messages that a display without control sends to each agent that it shows."""
 
 
 def flows(layout: Layout, cost: Costs) -> Figures:
-    """Return what one agent, one display and one router carry."""
+    """Return the load of one agent, one display and one router."""
     up = sum(rate for rate, _ in UP.values())
     up_bytes = sum(rate * size for rate, size in UP.values())
     down = sum(rate for rate, _ in DOWN.values())
@@ -157,8 +157,8 @@ def flows(layout: Layout, cost: Costs) -> Figures:
         count / layout.routers for count in (layout.agents, layout.displays)
     )
     pairs = displays * layout.shown
-    # What crosses between two regions is handled by both routers: one copy each way for
-    # each region that shows it.
+    # Both routers handle a message between two regions: one copy for each region that
+    # shows it.
     shown_there = min(pairs, layout.agents - agents) if layout.routers > 1 else 0.0
     between = layout.crossing * shown_there
     into = agents * up + pairs * down + between * (up + down)
@@ -192,7 +192,7 @@ LAYOUTS = (
 
 
 def on_paper(cost: Costs) -> Comparison:
-    """Return the flows of the layouts."""
+    """Return the load of each layout."""
     return Comparison(
         "1,000 agents and 100 displays, computed",
         {layout.name: [flows(layout, cost)] for layout in LAYOUTS},
@@ -202,8 +202,8 @@ def on_paper(cost: Costs) -> Comparison:
 def crowd(layout: Layout, cost: Costs, seconds: float) -> Figures:
     """Return the router's cost of a small fleet, computed and measured.
 
-    Each agent and each display is a session of its own, with the rates of ``UP`` and
-    ``DOWN``; nothing but Zenoh runs in them.
+    Each agent and each display is a separate session that sends at the rates of ``UP``
+    and ``DOWN``. The sessions run only Zenoh.
     """
     with started("router", "--listen", "tcp/127.0.0.1:0") as (url, router):
         place, ended = locator(url), threading.Event()
@@ -240,7 +240,7 @@ def _ignore(_sample: object) -> None:
 def _send(
     layout: Layout, agents: list[Any], displays: list[Any], ended: threading.Event
 ) -> None:
-    """Send at the rates of a fleet, in steps of 50 ms, until it is over."""
+    """Send at the rates of a fleet, in steps of 50 ms, until the end."""
     due: dict[tuple[str, int], float] = {}
     begun = time.monotonic()
     while not ended.wait(0.05):

@@ -1,9 +1,9 @@
-"""A long run: does memory grow, or the age of what viewers see?
+"""A long run that checks whether memory or the age of frames and poses grows.
 
 Run as ``python -m benchmarks.soak [--seconds N]``. Robots send odometry and scans to a
-display with viewers; the display and its gate must need no more memory at the end than
-after the warm-up, and frames and poses must be as new. Ends with a table, with a plot
-in ``results/soak.svg``, and with status 1 if something grew.
+display with viewers. The display and its gate must not need more memory at the end
+than after the warm-up, and frames and poses must not be older. The run prints a table,
+writes a plot to ``results/soak.svg``, and exits with status 1 if something grew.
 """
 
 import json
@@ -26,17 +26,17 @@ BEAMS = 360
 VIEWERS = 20
 
 SAMPLES = 120
-"""Samples of a run of an hour; a shorter one has fewer, of 2 s each at least."""
+"""Samples of an hour; a shorter run has fewer samples, each of at least 2 s."""
 
 WARM = 0.25
-"""The part of the time in which memory may grow."""
+"""The fraction of the time in which memory may grow: the warm-up."""
 
 GROWTH = 2.0
 """Percent by which memory may grow after the warm-up."""
 
 OLDER = 50.0
 """Milliseconds by which the age of frames and poses may grow: one tick of the display.
-Noise of the machine is below that, and what waits in a queue is not."""
+The noise of the machine is smaller, and the delay of a queue is larger."""
 
 FEWER = 5.0
 """Percent by which the frames of the viewer that gets the fewest may decrease."""
@@ -49,7 +49,7 @@ MEMORY, AGES = (DISPLAY, GATE), (FRAME, POSE)
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """What one figure did after the warm-up."""
+    """The change of one figure after the warm-up."""
 
     name: str
     begin: float
@@ -58,7 +58,7 @@ class Verdict:
 
     @property
     def text(self) -> str:
-        """Return it as a line of a table."""
+        """Return the verdict as a line of a table."""
         change = 100 * (self.end / self.begin - 1) if self.begin else 0.0
         passed = "pass" if self.passed else "FAIL"
         values = f"{self.begin:.1f} | {self.end:.1f} | {change:+.1f} %"
@@ -68,7 +68,8 @@ class Verdict:
 def judged(samples: Sequence[Figures]) -> list[Verdict]:
     """Return the verdicts about memory, ages and frames.
 
-    The begin and the end are medians of a fifth of the samples after the warm-up.
+    The values of the begin and the end are medians of a fifth of the samples after the
+    warm-up.
     """
     after = samples[int(len(samples) * WARM) :]
     fifth = max(1, len(after) // 5)
@@ -135,7 +136,7 @@ def plots(samples: Sequence[Figures], period: float, title: str) -> tuple[Plot, 
 
 
 @click.command()
-@click.option("--seconds", default=3600.0, show_default=True, help="How long.")
+@click.option("--seconds", default=3600.0, show_default=True, help="The duration.")
 @click.option("--robots", default=ROBOTS, show_default=True, help="How many.")
 @click.option("--viewers", default=VIEWERS, show_default=True, help="How many.")
 def main(seconds: float, robots: int, viewers: int) -> None:

@@ -1,8 +1,8 @@
-"""A rosbridge of many robots whose odometry has the time at which it was sent.
+"""A rosbridge of many robots whose odometry contains its sending time.
 
 Run as ``python -m benchmarks.stamped ROBOTS [BEAMS]``; prints its address. All robots
-have the same y and the same yaw, so that a pose can be found in a frame of the display
-by these bytes alone.
+have the same y and the same yaw, so that a viewer can find a pose in a frame of the
+display by these bytes alone.
 """
 
 import asyncio
@@ -24,19 +24,19 @@ RATE = 10
 """Messages a second of each topic."""
 
 PARTS = 5
-"""Parts of the fleet that send one after the other, in one period."""
+"""Parts of the fleet, which send one after the other in each period."""
 
 TURN = 100.0
-"""Seconds after which the times that poses have begin again."""
+"""Seconds after which the times in poses start again at zero."""
 
 Y = 7.25
 """The y of all robots, in metres."""
 
 MOST_WAITING = 8_000_000
-"""Bytes that may wait for one client; beyond that it misses messages."""
+"""Bytes that may wait for one client; if more wait, it misses messages."""
 
 SPEEDS = 10.0
-"""Seconds after which the times that velocities have begin again."""
+"""Seconds after which the times in velocities start again at zero."""
 
 
 def topics(robot: int) -> tuple[str, str, str]:
@@ -80,7 +80,7 @@ class Stamped:
         self._text = text
 
     def frame(self, now: float) -> bytes:
-        """Return the frame that is sent now."""
+        """Return the current frame."""
         wall = time.time()
         values = {
             "STAMP": f'{{"secs":{int(wall)},"nsecs":{int(wall % 1 * 1e9)}}}',
@@ -103,7 +103,7 @@ class Scans:
             message["intensities"] = cbor2.CBORTag(85, b"")
 
     def frame(self) -> bytes:
-        """Return the frame that is sent now."""
+        """Return the current frame."""
         self._count += 1
         message, wall = self._messages[self._count % 4], time.time()
         stamp = {"secs": int(wall), "nsecs": int(wall % 1 * 1e9)}
@@ -132,7 +132,7 @@ class StampedBridge(WitnessBridge):
                 self.types[ranges] = "sensor_msgs/LaserScan"
 
     async def play(self) -> None:
-        """Send messages to all who subscribed, for ever."""
+        """Send messages to all subscribers, for ever."""
         due, count = time.monotonic(), 0
         while True:
             due += 1 / RATE / PARTS

@@ -1,18 +1,18 @@
-"""How long a robot can be driven over a link that loses packets, by its transport.
+"""The share of time in which a robot is driven over a lossy link, by transport.
 
-A simulation, because a proxy cannot lose what is below TCP. The gate's own classes
-decide what a tick and a command are worth; the page is a model of ``web/motion``. The
-link delays and loses packets:
+This is a simulation, because a proxy cannot lose packets below TCP. The real classes of
+the gate check ticks and commands; the page is a model of ``web/motion``. The link
+delays and loses packets:
 
-- TCP delivers in order. A lost packet is sent again when a later one was answered and a
-  quarter of a round trip has passed (RACK, RFC 8985), or when the timer of Linux ends.
-- Over two connections of TCP everything is sent twice, and the first copy counts.
-- QUIC on one stream delivers in order too. A lost packet is sent again when a later one
-  was answered and an eighth of a round trip has passed, or after three later ones
+- TCP delivers in order. It sends a lost packet again when a later one was answered and
+  a quarter of a round trip has passed (RACK, RFC 8985), or when Linux's timer ends.
+- Two TCP connections: each message is sent over both, and the first copy counts.
+- QUIC on one stream delivers in order too. It sends a lost packet again when a later
+  one was answered and an eighth of a round trip has passed, or after three later ones
   (RFC 9002).
-- A datagram, of UDP or of QUIC, is lost or comes; the next one does not wait for it.
+- A datagram, of UDP or of QUIC, is lost or arrives; the next one does not wait for it.
 
-Not in the model: congestion windows, queues, and what a radio link itself repeats.
+The model has no congestion windows, no queues, and no repetitions of a radio link.
 """
 
 import heapq
@@ -50,35 +50,35 @@ BURST = 0.1
 NEVER = float("inf")
 
 MIN_RTO = 0.2
-"""Seconds that Linux adds to the round trip before TCP's timer ends, at least."""
+"""The least seconds that Linux adds to the round trip for the timer of TCP."""
 
 SHOWN: tuple[Transport, ...] = ("tcp", "two", "datagrams")
-"""What the plot has: on one stream, QUIC is as TCP."""
+"""The transports in the plot; QUIC on one stream is like TCP."""
 
 LATE = 0.3
-"""Seconds after which the page gives a tick or an answer up; ``LATE`` in loop.js."""
+"""Seconds after which a tick or an answer is late; ``LATE`` in loop.js."""
 
 PRESS_AGAIN = 1.0
 """Seconds in which an operator notices a stop, releases the key and presses it."""
 
-COMMAND, TICK, HEARD, PAGE = range(4)
+COMMAND, TICK, RECEIVED, PAGE = range(4)
 
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A link that delays and loses packets, each direction by itself."""
+    """A link that delays and loses packets, independently in each direction."""
 
     round_trip: float
-    """Seconds, without what losses add."""
+    """The round trip in seconds, without losses."""
 
     loss: float = 0.0
     """The share of the packets that are lost."""
 
     burst: float = 0.0
-    """Mean seconds of a time in which all packets are lost; 0: each by itself."""
+    """The mean length of a burst of losses in seconds; 0: independent losses."""
 
     jitter: float = 0.01
-    """Most seconds that are added to a way at random."""
+    """The greatest random delay of a packet, in seconds."""
 
 
 def losses(link: Link, rng: random.Random) -> Callable[[float], bool]:
@@ -86,7 +86,7 @@ def losses(link: Link, rng: random.Random) -> Callable[[float], bool]:
     if not link.burst or not link.loss:
         return lambda _at: rng.random() < link.loss
     gap = link.burst * (1 - link.loss) / link.loss
-    ends = [0.0]  # of a good time, then of a bad time, and so on
+    ends = [0.0]  # of a time without losses, then of a burst, and so on
 
     def lost(at: float) -> bool:
         while ends[-1] <= at:
@@ -100,12 +100,12 @@ def losses(link: Link, rng: random.Random) -> Callable[[float], bool]:
 def arrivals(
     sent: Sequence[float], link: Link, transport: Transport, rng: random.Random
 ) -> list[float]:
-    """Return when each packet can be read at the other end; ``NEVER`` if it is lost.
+    """Return when each packet is delivered at the other end; ``NEVER`` if it is lost.
 
     Args:
         sent: When each packet is sent first, in order.
         link: The link.
-        transport: What carries the packets.
+        transport: The transport of the packets.
         rng: The source of losses and jitter.
 
     """
@@ -158,11 +158,11 @@ def sent_again(
     """Return when a packet that was sent at ``at`` and lost is sent again.
 
     Args:
-        at: When it was sent last.
+        at: The time at which it was sent last.
         tries: How often it was sent again before.
-        answered: When each packet was sent whose answer comes.
+        answered: The sending times of all packets that are answered.
         round_trip: Seconds.
-        transport: What carries the packets.
+        transport: The transport of the packets.
 
     """
     place = bisect_right(answered, at)
@@ -178,7 +178,7 @@ def sent_again(
 
 @dataclass(slots=True)
 class Page:
-    """The page of an operator who holds a key, and presses it again after each stop."""
+    """The page of an operator, who holds a key and presses it again after a stop."""
 
     hold_from: float = PRESS_AGAIN
     tick: int = -1
@@ -187,7 +187,7 @@ class Page:
     armed: bool = False
     late_at: float = 0.0
 
-    def hear(self, tick: int, acked: int, armed: bool, now: float) -> None:
+    def receive(self, tick: int, acked: int, armed: bool, now: float) -> None:
         """Process a tick of the gate."""
         if tick <= self.tick:
             return
@@ -218,7 +218,7 @@ class Page:
 
 @dataclass(slots=True)
 class Driven:
-    """What the gate let through."""
+    """The motion that the gate allowed."""
 
     seconds: float = 0.0
     """How long the robot was driven."""
@@ -250,7 +250,7 @@ class Gate:
         return tick
 
     def end(self, now: float) -> Driven:
-        """Return what was let through until now."""
+        """Return the motion that was allowed until now."""
         self._look(now)
         self._end(now)
         return self.driven
@@ -292,9 +292,9 @@ def drive(link: Link, transport: Transport, seconds: float, seed: int) -> Driven
 
     Args:
         link: The link between gate and page.
-        transport: What carries ticks and commands.
-        seconds: How long the operator wants to.
-        seed: Seed of losses, jitter and the phase of the page.
+        transport: The transport of ticks and commands.
+        seconds: How long the operator wants to drive.
+        seed: The seed of losses, jitter and the phase of the page.
 
     """
     rng = random.Random(seed)
@@ -303,20 +303,20 @@ def drive(link: Link, transport: Transport, seconds: float, seed: int) -> Driven
     issued = [number * (PERIOD + 1e-9) for number in range(count)]
     phase = rng.random() * PERIOD
     steps = [phase + number * PERIOD * 1.0001 for number in range(count)]
-    # Between two commands the display answers a sample: a packet more of the same link.
+    # Between two commands, the link carries one more packet: the answer to a sample.
     up = sorted(steps + [at + PERIOD / 2 for at in steps])
     down_at = arrivals(issued, link, transport, rng)
     up_at = arrivals(up, link, transport, rng)[::2]
     gate, page = Gate(), Page()
-    heard: list[tuple[int, int, bool]] = [(-1, -1, False)] * count
+    sent: list[tuple[int, int, bool]] = [(-1, -1, False)] * count
     commands: list[tuple[int, bool]] = [(-1, False)] * count
     for now, kind, number in merged(up_at, issued, down_at, steps):
         if now > seconds:
             break
         if kind == TICK:
-            heard[number] = (gate.issue(now), gate.acked, gate.armed)
-        elif kind == HEARD:
-            page.hear(*heard[number], now)
+            sent[number] = (gate.issue(now), gate.acked, gate.armed)
+        elif kind == RECEIVED:
+            page.receive(*sent[number], now)
         elif kind == PAGE:
             oldest = steps[page.acked + 1] if page.acked + 1 < number else now
             commands[number] = (page.tick, page.step(oldest, now))
@@ -348,7 +348,7 @@ def scenes() -> dict[str, Link]:
 
 
 def over(transport: Transport, seconds: float) -> Callable[[], Figures]:
-    """Return a run over one transport; each run has the next seed."""
+    """Return a run with one transport; each run uses the next seed."""
     seeds = itertools.count(1)
 
     def run() -> Figures:
@@ -364,7 +364,7 @@ def over(transport: Transport, seconds: float) -> Callable[[], Figures]:
 
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
-    """Compare the transports for links of every kind."""
+    """Compare the transports on all links."""
     seconds = 60.0 if quick else 600.0
     contenders = [
         Contender(name, over(transport, seconds)) for transport, name in NAMES.items()
@@ -374,7 +374,7 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
 
 
 def plot(seconds: float) -> Plot:
-    """Return the share of the time that is driven against the round trip."""
+    """Return a plot of the share of driven time against the round trip."""
     curves = []
     trips = [0.05 + 0.025 * number for number in range(11)]
     cases: list[tuple[float, Transport]] = [

@@ -1,7 +1,8 @@
-"""What robots cost the display while no page is open, compared with one viewer.
+"""The processor time of a display without open pages, compared with one viewer.
 
-A thousand robots with odometry at 10 Hz behind one rosbridge, and a hundred that have
-scans of 360 points at 10 Hz too. The console is the program, as with ``webmap view``.
+One rosbridge has a thousand robots with odometry at 10 Hz, or a hundred robots with
+odometry and scans of 360 points at 10 Hz. The display serves the console, like ``webmap
+view``.
 """
 
 import os
@@ -18,13 +19,13 @@ import psutil
 from benchmarks.harness import Comparison, Contender, Figures, compare
 
 FLEETS = {"1,000 robots": (1000, 0), "100 robots with scans": (100, 360)}
-"""The robots, and the beams of their scans."""
+"""The number of robots, and of the beams of their scans."""
 
 PROGRAM = Path(__file__).parent / "busy_fleet.py"
 
 BEGIN = 16.0
-"""Seconds until all robots have connected and nobody counts as looking; half of them
-for the robots alone."""
+"""Seconds until all robots are connected and no page counts as open; half of this
+time is for the robots."""
 
 
 @contextmanager
@@ -49,7 +50,7 @@ def _line(process: "subprocess.Popen[str]") -> str:
 
 
 def _spent(display: "subprocess.Popen[str]") -> tuple[float, int]:
-    """Return the processor time of the display in seconds, and its messages."""
+    """Return the processor time of the display in seconds, and its message count."""
     assert display.stdin is not None
     times = psutil.Process(display.pid).cpu_times()
     display.stdin.write("\n")

@@ -1,12 +1,12 @@
-"""What displays and viewers cost an agent, and the bytes on its uplink.
+"""The cost of displays and viewers for an agent, and the bytes on its uplink.
 
-The agent of simulated robots with scans, with one display and with several, each a
-process that draws nothing (``far_display.py``). A line between agent and router counts
-the bytes: of data, ticks and everything else. They are compared with those of rosbridge
-in JSON: a client that subscribes to the same topics, as often. Figures are for each
-message of a topic, because a busy machine makes fewer of them.
+The agent has simulated robots with scans, and one or several displays: processes that
+draw nothing (``far_display.py``). A line between agent and router counts all bytes: of
+data, ticks and everything else. They are compared with the bytes of rosbridge in JSON,
+for a client that subscribes to the same topics at the same rates. Figures are for each
+message of a topic, because a busy machine produces fewer messages.
 
-What a display subscribes to is found out with one that shows its robots to a viewer.
+A real display that shows the robots to a viewer first gives the list of subscriptions.
 """
 
 import asyncio
@@ -32,10 +32,10 @@ from webmap.base.loop_thread import LoopThread
 
 ROBOTS = 20
 SHAPES = ((1, 1), (4, 1), (4, 50))
-"""Displays, and viewers of each."""
+"""Numbers of displays, and of viewers of each display."""
 
 SLOW = 2.0
-"""Scans a second of each robot where ``--rate`` thins them."""
+"""Scans a second of each robot if ``--rate`` limits them."""
 
 MESSAGES = "messages of topics (a second)"
 BYTES = "bytes on the uplink (bytes a message)"
@@ -44,7 +44,7 @@ CPU = "cpu of the agent (us a message)"
 
 @dataclass
 class Scene:
-    """What an agent asked of its rosbridge to show its robots."""
+    """The subscriptions of an agent at its rosbridge to show its robots."""
 
     subscriptions: list[dict[str, object]] = field(default_factory=list)
 
@@ -55,7 +55,7 @@ class Scene:
         return [str(op["topic"]) for op in self.subscriptions if op["type"] in types]
 
     def note(self, frame: str | bytes) -> None:
-        """Note an operation that a client sent."""
+        """Record an operation of a client."""
         op = json.loads(frame)
         if str(op.get("id", "")).startswith("agent-") and op["op"] == "subscribe":
             kept = [each for each in self.subscriptions if each["topic"] != op["topic"]]
@@ -63,7 +63,7 @@ class Scene:
 
 
 def watched_scene() -> Scene:
-    """Return what an agent subscribes to for a display with a viewer."""
+    """Return the subscriptions of an agent for a display with a viewer."""
     scene = Scene()
     thread = LoopThread("listening")
     with ExitStack() as running:
@@ -145,7 +145,7 @@ def watched_by(
     seconds: float,
     options: Sequence[object] = (),
 ) -> Callable[[], Figures]:
-    """Return a run with displays, pages of each, and options of the agent."""
+    """Return a run with a number of displays, of pages of each, and agent options."""
 
     def run() -> Figures:
         with ExitStack() as running:

@@ -1,12 +1,12 @@
 """Viewers that draw nothing: they receive and acknowledge frames, like a page.
 
-Each has a socket to the gates too, as a page has, and sends no command. Their sockets
-are plain, so that hundreds of them fit into one process.
+Each also has a socket to the gates, like a page, and sends no commands. The sockets use
+little code, so that hundreds of viewers can run in one process.
 
 Run as ``python -m benchmarks.watchers URL COUNT SECONDS [PERIODS [STALLED]]``. Prints
-``ready`` when all have received a frame, then JSON with the data received in the
-seconds after that, ``PERIODS`` times. ``STALLED`` more viewers read nothing after their
-first frame.
+``ready`` when all have received a frame, then ``PERIODS`` lines of JSON, each with the
+figures of ``SECONDS`` seconds. ``STALLED`` more viewers read nothing after their first
+frame.
 """
 
 import asyncio
@@ -29,7 +29,7 @@ HEAD = struct.Struct("<HBI")
 """Version, flags and number of a frame."""
 
 NOW = struct.Struct("<d")
-"""The display's clock, after the head."""
+"""The clock of the display, after the head of a frame."""
 
 PLACE = re.compile(rb"(....)" + re.escape(struct.pack("<ff", Y, 0.0)), re.DOTALL)
 """x, y and yaw of a robot of ``stamped``."""
@@ -62,12 +62,12 @@ class Socket(asyncio.Protocol):
         transport.write(self._request)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Note that it did not open."""
+        """Set the error of the opening if the socket is not open yet."""
         if not self.opened.done():
             self.opened.set_exception(exc or ConnectionError("it was closed"))
 
     def data_received(self, data: bytes) -> None:
-        """Take whole messages."""
+        """Process all complete messages."""
         self._data += data
         if not self.opened.done():
             head, found, rest = self._data.partition(b"\r\n\r\n")
@@ -84,7 +84,7 @@ class Socket(asyncio.Protocol):
         del self._data[:at]
 
     def _message(self, at: int) -> int | None:
-        """Take the message at a place; return its end, or None if it is incomplete."""
+        """Process the message at a place; return its end, None if it is incomplete."""
         data = self._data
         if len(data) < at + 2:
             return None
@@ -114,9 +114,9 @@ class Watcher:
     """One viewer.
 
     Args:
-        name: Its name, which is that of its page too.
-        looks: Whether it searches its frames for poses of ``stamped``.
-        stalls: Whether it reads nothing after its first frame.
+        name: The name of the viewer and of its page.
+        looks: Whether the viewer searches frames for poses of ``stamped``.
+        stalls: Whether the viewer reads nothing after its first frame.
 
     """
 
@@ -132,13 +132,13 @@ class Watcher:
         """Count from now on."""
         self.bytes = self.frames = 0
         self.ages: list[float] = []
-        """Milliseconds from the making of each frame to its arrival."""
+        """Milliseconds from the creation of each frame to its arrival."""
         self.poses: list[float] = []
         """Milliseconds from the sending of each pose by its robot to its arrival."""
 
     async def open(self, url: str) -> None:
         """Open both sockets like a separate browser, with a key if there is a token."""
-        # No address has TLS, and to load its certificates for each viewer takes long.
+        # No address uses TLS, and loading certificates for each viewer takes long.
         async with httpx.AsyncClient(
             follow_redirects=True, verify=False, timeout=30.0
         ) as client:
@@ -186,11 +186,11 @@ def _same(socket: Socket) -> Socket:
 
 
 def _leave(_message: bytes) -> None:
-    """Use nothing of a message."""
+    """Ignore a message."""
 
 
 def figures(watchers: list[Watcher], seconds: float) -> dict[str, float]:
-    """Return what a viewer received a second, and how old it was."""
+    """Return the data that a viewer received a second, and its age."""
     ages = [each for watcher in watchers for each in watcher.ages]
     poses = [each for watcher in watchers for each in watcher.poses]
     total = len(watchers) * seconds
@@ -209,7 +209,7 @@ def figures(watchers: list[Watcher], seconds: float) -> dict[str, float]:
 async def main(
     url: str, count: int, seconds: float, periods: int = 1, stalled: int = 0
 ) -> None:
-    """Watch with ``count`` viewers and print what they received."""
+    """Run ``count`` viewers and print the figures of their data."""
     watchers = [Watcher(f"watcher{n:04d}", looks=n == 0) for n in range(count)]
     others = [Watcher(f"stalled{n:04d}", stalls=True) for n in range(stalled)]
     async with asyncio.timeout(max(90, 0.5 * count)):

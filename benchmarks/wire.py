@@ -1,7 +1,8 @@
-"""What the display sends to one viewer, compared with what rosbridge sent to it.
+"""The data that the display sends to one viewer, compared with rosbridge.
 
-The robots, their layers and the session of a page are real; only the clock is made, so
-that the figures are the same on each machine. The page acknowledges each frame.
+The robots, their layers and the session of a page are real. Only the clock is
+simulated, so that the figures are the same on each machine. The page acknowledges each
+frame.
 """
 
 import json
@@ -33,11 +34,11 @@ TICKS = 20
 
 BEAMS = 360
 NOISE = 0.01
-"""Metres; the standard deviation of the distances of a usual scanner."""
+"""The standard deviation of the ranges of a usual scanner, in metres."""
 
 VIEW = {"op": "view", "b": 0, "c": 0, "e": 0, "f": 500, "height": 1000}
 WIDE = 10_000
-"""Pixels of a map that shows all robots, which are in a row."""
+"""The width in pixels of a map that shows all robots, which are in a row."""
 
 
 class Site:
@@ -73,7 +74,7 @@ class Site:
         self._chance = np.random.default_rng(1)
 
     def run(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance the simulated clock."""
         for tick in range(int(seconds * TICKS)):
             self.now += 1 / TICKS
             for number, robot in enumerate(self.robots):
@@ -139,7 +140,7 @@ def shown(
 
 
 def rosbridge(*topics: str) -> Callable[[], Figures]:
-    """Return what a rosbridge sends to one browser: every message, in JSON."""
+    """Return the data of a rosbridge for one browser: each message, in JSON."""
 
     def run() -> Figures:
         frames = {ODOM: json_frames(ODOM), SCAN: json_frames(SCAN, BEAMS)}
@@ -154,7 +155,7 @@ def rosbridge(*topics: str) -> Callable[[], Figures]:
 
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
-    """Compare what a viewer gets with what rosbridge sends."""
+    """Compare the data of a viewer with the data of rosbridge."""
     seconds = 2.0 if quick else 20.0
     poses = [
         Contender("rosbridge's JSON", rosbridge(ODOM)),

@@ -1,4 +1,4 @@
-"""Bags for tests: written by the recorder's own parts, from messages as they go."""
+"""Bags for tests, written with the modules of the recorder."""
 
 from functools import cache
 
@@ -8,7 +8,7 @@ from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.schema import Schema
 
 BEGIN = 1_700_000_000 * 10**9
-"""When what is in them was recorded, in nanoseconds since 1970."""
+"""The time of the begin of each bag, in nanoseconds since 1970."""
 
 ODOMETRY = "nav_msgs/Odometry"
 TWIST = "geometry_msgs/Twist"
@@ -18,14 +18,14 @@ GRID = "nav_msgs/OccupancyGrid"
 
 @cache
 def types_of(dialect):
-    """What is known of the types of a ROS; it takes a while to be made."""
+    """Return the known types of a ROS version; creating them takes a while."""
     return Types(dialect)
 
 
 class Made:
-    """Messages of one dialect, and bags of them.
+    """Creates messages of one dialect, and bags with them.
 
-    A moment is seconds since the begin of the bag.
+    A moment is a time in seconds since the begin of the bag.
     """
 
     def __init__(self, dialect):
@@ -58,7 +58,7 @@ class Made:
         return self.message(GRID, info=info, data=cells)
 
     def bag(self, path, *messages):
-        """Write topics, types, moments and messages; return where the bag is."""
+        """Write topics, types, moments and messages; return the path of the bag."""
         bag, types = new_bag(path, self.dialect), types_of(self.dialect)
         channels = {}
         for topic, type_name, moment, message in messages:

@@ -15,14 +15,15 @@ def a_jpeg(colour=(200, 30, 30), size=(16, 12)) -> bytes:
 
 
 class CameraServer:
-    """Serves ``/stream``, ``/snapshot`` and whatever else a test writes.
+    """Serves ``/stream``, ``/snapshot`` and the paths that a test adds.
 
     Attributes:
-        scripts: Bytes to answer a path with, and whether to hang up after them.
-        frozen: While it is set the stream goes on and has no new picture.
-        pictures: How many were sent.
-        asked: The first lines of all requests, and then their headers.
-        open: How many connections there are now.
+        scripts: For each path, the bytes of the answer, and whether the server closes
+            the connection after them.
+        frozen: While it is set, the stream stays open and has no new pictures.
+        pictures: The number of pictures that were sent.
+        asked: All requests, each with its first line and its headers.
+        open: The number of open connections.
 
     """
 
@@ -54,7 +55,7 @@ class CameraServer:
         self.open += 1
         try:
             first = await reader.readexactly(1)
-            if first == b"\x16":  # TLS, which this server does not speak
+            if first == b"\x16":  # TLS, which this server does not support
                 writer.write(b"HTTP/1.0 400 Bad Request\r\n\r\n")
                 await writer.drain()
                 return
@@ -75,10 +76,10 @@ class CameraServer:
 
     async def _answer(self, path: str, writer) -> None:
         if path in self.scripts:
-            data, hangs_up = self.scripts[path]
+            data, closes = self.scripts[path]
             writer.write(data)
             await writer.drain()
-            if hangs_up:
+            if closes:
                 writer.close()
                 await writer.wait_closed()
             else:
@@ -107,7 +108,7 @@ class CameraServer:
                 await asyncio.sleep(self._period)
 
     def picture(self) -> bytes:
-        """Return the newest picture: its red tells its number."""
+        """Return the newest picture: its red component shows its number."""
         return a_jpeg((self.pictures * 5 % 256, 60, 60))
 
 

@@ -1,7 +1,7 @@
-"""Frames that were captured from real rosbridge servers: where they are.
+"""The files of frames that were captured from real rosbridge servers.
 
-The folder ``captured`` holds them once, as its README says. A frame has a plain name
-here, such as ``publish_odom.json``; its file also names what wrote it.
+They are in the folder ``captured``; see its README. A frame has a plain name here, such
+as ``publish_odom.json``; the name of its file also contains the program that wrote it.
 """
 
 from pathlib import Path
@@ -9,7 +9,7 @@ from pathlib import Path
 CAPTURED = Path(__file__).parent / "captured"
 
 PLAYER = {"module": "frame_player", "cwd": Path(__file__).parent}
-"""How the player of frames is started as a process: with ``-m``, in that folder."""
+"""The module and the folder with which ``python -m`` starts the player of frames."""
 
 _WRITER = {"ros1": "ujson", "ros2": "ros2"}
 
@@ -39,8 +39,8 @@ def frame_file(dialect: str, name: str) -> Path:
     """Return the file of a frame.
 
     Args:
-        dialect: The server's, ``"ros1"`` or ``"ros2"``.
-        name: The frame's plain name.
+        dialect: The dialect of the server, ``"ros1"`` or ``"ros2"``.
+        name: The plain name of the frame.
 
     """
     stem, _, suffix = name.rpartition(".")
@@ -52,5 +52,5 @@ def frame_file(dialect: str, name: str) -> Path:
 
 
 def played(dialect: str) -> list[Path]:
-    """Return what ``frame_player`` plays to be the server of a dialect."""
+    """Return the files with which ``frame_player`` acts as a server of a dialect."""
     return [frame_file(dialect, name) for name in _PLAYED]

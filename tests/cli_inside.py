@@ -1,6 +1,6 @@
-"""The command line in this process, for commands that end by themselves.
+"""Run the command line in this process, for commands that end by themselves.
 
-A process of its own takes half a second to start. Each command is also tested as one.
+A separate process takes half a second to start. Another test of each command uses one.
 """
 
 import io
@@ -20,7 +20,7 @@ LOGGERS = ("websockets", "uvicorn", "asyncio", "PIL")
 
 @dataclass(frozen=True)
 class Done:
-    """How a command ended, as ``subprocess.run`` returns it."""
+    """The result of a command, like the result of ``subprocess.run``."""
 
     returncode: int
     stdout: str
@@ -31,8 +31,8 @@ def run_inside(*arguments: object, stdin: str = "") -> Done:
     """Run a command.
 
     Args:
-        *arguments: What follows ``webmap``.
-        stdin: Its standard input.
+        *arguments: The arguments after ``webmap``.
+        stdin: The text of standard input.
 
     """
     out, err = io.StringIO(), io.StringIO()
@@ -44,8 +44,8 @@ def run_inside(*arguments: object, stdin: str = "") -> Done:
             after.callback(logger.setLevel, logger.level)
         # `webmap agent` sets the agent of its process.
         after.enter_context(patch.object(RobotMotion, "agent", ""))
-        words = ["webmap", *map(str, arguments)]
-        after.enter_context(patch.object(sys, "argv", words))
+        command = ["webmap", *map(str, arguments)]
+        after.enter_context(patch.object(sys, "argv", command))
         stdin = io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8")
         after.enter_context(patch.object(sys, "stdin", stdin))
         after.enter_context(redirect_stdout(out))

@@ -1,4 +1,4 @@
-"""Simulators that the commands may use, and a port for one that comes later."""
+"""Simulators for tests of commands, and a port for a server that starts later."""
 
 import socket
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ from webmap_process import simulator
 def later_port() -> Iterator[int]:
     """A port on which nothing listens yet, reserved for this test."""
     with socket.socket() as kept:
-        # With this a server may listen there all the same.
+        # With this option another socket may listen on the port.
         kept.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         kept.bind(("127.0.0.1", 0))
         yield kept.getsockname()[1]
@@ -27,7 +27,7 @@ def ros1() -> Iterator[str]:
 
 @pytest.fixture(scope="session")
 def ros2() -> Iterator[str]:
-    """The address of one of ROS 2, with a bare robot that takes TwistStamped."""
+    """The address of a simulated rosbridge of ROS 2 with a robot for TwistStamped."""
     with simulator(
         "--port",
         "0",

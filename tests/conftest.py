@@ -1,4 +1,4 @@
-"""What every test shares."""
+"""Settings and fixtures of all tests."""
 
 import gc
 import os
@@ -15,15 +15,15 @@ from real_browser import launched
 from webmap.base.logs import budgets
 
 __all__ = ["later_port", "ros1", "ros2"]
-"""Fixtures of another file."""
+"""Fixtures from another file."""
 
-# Two noisy cores: how long an example takes says nothing about the code.
+# On two busy cores, the time of an example does not depend on the code alone.
 settings.register_profile(
     "webmap", deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("webmap")
 
-# Once for all, since it is the whole process that has it.
+# This setting is for the whole process.
 expect.set_options(timeout=15_000)
 
 
@@ -34,10 +34,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Keep the garbage collector from what all tests together are made of.
+    """Exclude the objects of all test modules from the garbage collection.
 
-    A full collection looks at a million objects otherwise, and takes half a second.
-    Many tests ask for one.
+    Otherwise a full collection checks a million objects, and takes half a second. Many
+    tests run a full collection.
     """
     gc.collect()
     gc.freeze()
@@ -45,7 +45,7 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def state_folder() -> Iterator[None]:
-    """Separate stored state, such as a STOP, from the user's and from other tests."""
+    """Store state, such as a STOP, in a new folder, not in the folder of the user."""
     with tempfile.TemporaryDirectory(prefix="webmap-state-") as folder:
         before = os.environ.get("WEBMAP_STATE_DIR")
         os.environ["WEBMAP_STATE_DIR"] = folder
@@ -63,10 +63,10 @@ def log_budgets() -> None:
 
 
 def of_browsers(fixture_name: str, config: pytest.Config) -> str:
-    """Return for how long a browser runs.
+    """Return the scope of the browser.
 
     Other tests of the same worker need the thread for asyncio, so a browser ends with
-    its module. Where only tests with a browser run, one serves all of a worker's.
+    its module. If only tests with a browser run, all tests of a worker use one browser.
     """
     alone = re.match(r"browser\b(?!.* or )", config.getoption("markexpr"))
     return "session" if alone else "module"

@@ -2,9 +2,9 @@
 
 ``python -m frame_player FILE...``, in the folder of the tests, serves files with one
 frame each: ``*.json`` with a publication or the response of a service, ``*.bin`` with a
-publication as CBOR. Clients get the frames of the topics that they subscribe, at a
-fixed rate, and answers to what rosapi was asked when the frames were taken; whatever
-else they send is met with silence, as by the servers that the frames come from.
+publication as CBOR. Clients get the frames of the topics that they subscribe to, at a
+fixed rate, and the answers of rosapi that were captured with the frames. The player
+ignores all other operations, as the captured servers do.
 """
 
 import argparse
@@ -39,10 +39,10 @@ class Recording:
     """The frames that are played."""
 
     texts: dict[str, str] = field(default_factory=dict)
-    """A publication of each topic, as it came."""
+    """A publication of each topic, as it was captured."""
 
     binaries: dict[tuple[str, str], bytes] = field(default_factory=dict)
-    """The same by topic and compression, where it was taken."""
+    """Binary publications by topic and compression, if they were captured."""
 
     answers: dict[str, Any] = field(default_factory=dict)
     """The values of rosapi's responses, by service."""
@@ -55,7 +55,7 @@ class Recording:
 
 
 def load_recording(files: Iterable[Path]) -> Recording:
-    """Return the frames of files; of two for one topic the first.
+    """Return the frames of files; if two are of the same topic, only the first.
 
     Raises:
         ConfigError: If there is no publication among them.
@@ -83,9 +83,9 @@ def _add_text(recording: Recording, text: str) -> None:
 
 
 def _operation(text: str) -> dict[str, Any]:
-    """Return what a file holds; nothing if it is no frame but notes beside them."""
+    """Return the operation in a file; an empty dict if the file has no frame."""
     try:
-        # Not msgspec: a real server writes the bare token NaN.
+        # Not msgspec: a real server writes the token NaN, which is not JSON.
         operation = json.loads(text)
     except ValueError:
         return {}
@@ -94,7 +94,7 @@ def _operation(text: str) -> dict[str, Any]:
 
 def _add_binary(recording: Recording, frame: bytes) -> None:
     if not frame:
-        return  # nothing came, and that was what had to be recorded
+        return  # the server sent no frame, and the empty file shows this
     operation = cbor2.loads(frame)
     is_raw = set(operation["msg"]) == {"secs", "nsecs", "bytes"}
     key = (operation["topic"], "cbor-raw" if is_raw else "cbor")
@@ -102,7 +102,7 @@ def _add_binary(recording: Recording, frame: bytes) -> None:
 
 
 def _recorded_poses(recording: Recording) -> dict[str, dict[str, Any]]:
-    """Return where ``/tf`` has each robot in its odometry's frame."""
+    """Return the pose of each robot in its odometry frame, from ``/tf``."""
     frame = recording.texts.get("/tf")
     transforms = json.loads(frame)["msg"]["transforms"] if frame else []
     poses = {}
@@ -118,7 +118,7 @@ def _recorded_poses(recording: Recording) -> dict[str, dict[str, Any]]:
 def _copy_messages(recording: Recording, robot: str, pose: dict[str, Any]) -> None:
     """Copy the messages of the recorded robot to a robot with frames in ``/tf`` only.
 
-    Its name takes the other's place in the bytes, and its own pose in odometry.
+    The copies have the name of this robot, and the odometry has the pose of this robot.
     """
     recorded = "robot_0"
     if len(robot) != len(recorded) or f"/{robot}/odom" in recording.texts:
@@ -139,12 +139,12 @@ def _with_pose(text: str, pose: dict[str, Any]) -> str:
     if "covariance" not in (operation["msg"].get("pose") or ()):
         return text
     operation["msg"]["pose"]["pose"] = pose
-    # As the recorded servers write it.
+    # The recorded servers write JSON in this form.
     return json.dumps(operation, separators=(",", ":")).replace("/", "\\/")
 
 
 class Player:
-    """Answers one client from a recording, without its socket."""
+    """Answers the frames of one client from a recording; it has no socket."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
@@ -170,7 +170,7 @@ class Player:
         return []
 
     def due(self) -> list[str | bytes]:
-        """Return the frames of this moment: latched ones only once a subscription."""
+        """Return the frames to send now; latched ones once for each subscription."""
         frames = []
         for topic, compression in self._subscribed.items():
             if topic in _LATCHED and topic not in self._fresh:

@@ -17,13 +17,13 @@ from webmap.ros.rosbridge.server.server import RosbridgeServer
 
 
 class HangingBridge:
-    """Each topic brings a message every 10 ms, so one is always in transit."""
+    """Publishes on each topic every 10 ms, so a message is always in transit."""
 
     def __init__(self, dialect, types):
         quirks = parse_quirks("real,spinning_queue", dialect)
         schema = Schema(Dialect(dialect))
-        # The types of move_base exist in ROS 1 only. A bridge of either version has
-        # them here, so that the same goals end at both.
+        # The types of move_base exist in ROS 1 only. Here also a bridge of ROS 2 has
+        # them, so that the tests can send the same goals to both.
         move_base = files("webmap.ros").joinpath("msg/move_base_msgs.msg")
         schema.define(split_texts(move_base.read_text("utf-8"), ros2=False))
         self.graph = Graph(schema)
@@ -47,7 +47,7 @@ class HangingBridge:
         return len(self.server.sessions)
 
     def reset_all(self):
-        """End every socket as a network does: without a close frame."""
+        """Abort every socket without a close frame, as a network failure does."""
         for connection in list(self.server._server.connections):
             connection.transport.abort()
 

@@ -1,4 +1,4 @@
-"""Where a page draws the dots of a scan, computed apart from the browser."""
+"""Compute the places of the dots of a scan without the browser."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from webmap.scene.live import Rays
 
 
 def points_of(rays: Rays) -> np.ndarray:
-    """Where rays hit, of shape (N, 2), in metres of the element."""
+    """Return the points that rays hit, of shape (N, 2), in metres of the element."""
     reach = np.frombuffer(rays.ranges, "<f4").astype(float)
     chosen = (np.arange(len(reach)) * (rays.total / max(1, len(reach)))).astype(int)
     bearings = rays.first + rays.turn * chosen

@@ -1,4 +1,4 @@
-"""Debian's Chromium, and what it complains about."""
+"""Debian's Chromium, and the errors and warnings that it reports."""
 
 import re
 import shutil
@@ -17,9 +17,9 @@ from playwright.sync_api import (
     sync_playwright,
 )
 
-# Each new window loads two pages of Chromium's own for a list below its address bar,
-# which takes as long as a page of ours. Chromium takes the last such option only, so
-# this one repeats the features that Playwright disables.
+# Each new window loads two internal pages of Chromium for the list below the address
+# bar, which takes as long as a page of WebMap. Chromium uses only the last option of
+# this name, so this list also has the features that Playwright disables.
 DISABLED_FEATURES = [
     "WebUIOmniboxPopup",
     "WebUIOmniboxAimPopup",
@@ -56,8 +56,8 @@ CHROMIUM_ARGS = [
 def launched() -> Iterator[Browser]:
     """Run a browser.
 
-    Playwright keeps an event loop running in the thread, in which no other test may
-    use asyncio until this ends.
+    Playwright runs an event loop in this thread. Other tests cannot use asyncio in the
+    thread until the browser ends.
     """
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
@@ -68,14 +68,13 @@ def launched() -> Iterator[Browser]:
 
 
 def end_stops(button: Locator) -> None:
-    """End every STOP with the button that does, wherever on the page it lies.
+    """End every STOP with two presses of a reset button, wherever it is on the page.
 
-    All of them have to be known to the page: a robot that comes to be stopped between
-    the two presses takes the first one back. The presses are apart by the clock of the
-    page, as a busy machine may take seconds between two of Playwright's, and the first
-    is forgotten by then.
+    The page must already show every STOP: another STOP between the two presses cancels
+    the first press. A script in the page makes both presses, because a busy machine may
+    need seconds between two presses by Playwright, and the first press then expires.
     """
-    # There is none to press before the gate has said that it stopped a robot.
+    # The button is hidden until the gate has reported a STOP.
     expect(button).not_to_have_attribute("hidden", "")
     asked = button.evaluate(
         """async (e) => {
@@ -91,17 +90,17 @@ def end_stops(button: Locator) -> None:
 
 
 def hold(keyboard: Keyboard, key: str, has_effect: Callable[[], bool]) -> None:
-    """Hold a key until it has its effect, and keep holding it.
+    """Hold a key until it has an effect, and keep it pressed.
 
-    On a machine that is too busy to run the page at its pace a press does nothing,
-    since nothing may move by a late command. Like a person, this presses again.
+    If a busy machine delays the page, a press may have no effect, because the gate
+    refuses late commands. Then this function presses again, as an operator does.
     """
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline:
-        time.sleep(0.5)  # hands must be off before a press counts
+        time.sleep(0.5)  # all keys must be released before a press counts
         keyboard.down(key)
-        patience = time.monotonic() + 3
-        while time.monotonic() < patience:
+        end_of_try = time.monotonic() + 3
+        while time.monotonic() < end_of_try:
             if has_effect():
                 return
             time.sleep(0.02)
@@ -132,7 +131,7 @@ class Complaints:
 
     @property
     def unexpected(self) -> list[str]:
-        """What no pattern in ``allowed`` is found in."""
+        """The reports that match no pattern in ``allowed``."""
         return [
             f"{line} {url}".rstrip()
             for line, url in self._reports
@@ -153,7 +152,7 @@ def watched_tab(browser: Browser, width: int, height: int) -> Iterator[Page]:
     page.allowed = []
     try:
         yield page
-    finally:  # a page that goes on would slow down all later tests
+    finally:  # a page that runs on would slow down all later tests
         context.close()
     complaints.allowed = page.allowed
     assert not complaints.unexpected, complaints.unexpected

@@ -1,4 +1,4 @@
-"""WebMap and its simulator as processes of their own, as a person starts them."""
+"""Start WebMap and its simulator as separate processes, as a user does."""
 
 import os
 import re
@@ -15,8 +15,8 @@ HERE = str(Path(__file__).parent)
 def webmap(*arguments: str | Path, **environment: str) -> Iterator[str]:
     """Run the command ``webmap``; yield the address that it prints when ready.
 
-    A ``PYTHONPATH`` is searched before the folder of the tests and the paths that this
-    process has.
+    Python searches a given ``PYTHONPATH`` before the folder of the tests and before the
+    paths of this process.
     """
     if "PYTHONPATH" in environment:
         paths = [environment["PYTHONPATH"], HERE, os.getenv("PYTHONPATH")]
@@ -38,10 +38,10 @@ def webmap(*arguments: str | Path, **environment: str) -> Iterator[str]:
 
 
 def page_of(file: str | Path, **environment: str) -> AbstractContextManager[str]:
-    """Show what a page function or a fleet file says; give the address."""
+    """Serve a page function or a fleet file; yield the address."""
     return webmap("run", file, "--port", "0", "--no-browser", **environment)
 
 
 def simulator(*options: str) -> AbstractContextManager[str]:
-    """Run simulated robots; give the address of their rosbridge."""
+    """Run simulated robots; yield the address of their rosbridge."""
     return webmap("sim", "--port", "0", *options)

@@ -27,13 +27,13 @@ WIDTH = 1040
 """Width of the picture, in pixels."""
 
 EVERY = 6
-"""Frames of the page for one that Chromium sends."""
+"""Chromium sends one of this number of frames of the page."""
 
 FRAME = 0.14
 """Least seconds between two frames of the picture."""
 
 QUALITIES = (75, 60, 45, 30)
-"""Qualities of the picture, of which the first is used that makes it small enough."""
+"""Qualities of the picture; the first one with a small enough file is used."""
 
 LARGEST = 2_000_000
 """Most bytes of the file."""
@@ -48,9 +48,9 @@ TURN_FOR = 500
 
 
 class Recording:
-    """Frames of a page, each with the time that it is shown and a caption.
+    """Frames of a page, each with its time and a caption.
 
-    Chromium sends a frame when the page has changed, which costs the page less time
+    Chromium sends a frame when the page has changed. This needs less time of the page
     than screenshots: a page that is too busy does not drive.
 
     Args:
@@ -71,7 +71,7 @@ class Recording:
         )
 
     def end(self) -> None:
-        """Take no more frames."""
+        """Stop recording."""
         self._session.send("Page.stopScreencast")
 
     def _take(self, sent: dict[str, Any]) -> None:

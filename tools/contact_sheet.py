@@ -31,11 +31,11 @@ SIZES = {
 TOUCH = {"phone", "phone-landscape", "tablet"}
 
 THUMBNAIL = 480
-"""Width of a thumbnail in pixels; the sheet has as many in a row as fit in 2400."""
+"""Width of a thumbnail in pixels; a row of the sheet is 2400 pixels wide."""
 
 
 def click(selector: str) -> Callable[[Page], None]:
-    """Return a step that presses something, also where the page is narrow."""
+    """Return a step that clicks an element, even if the element is not visible."""
     return lambda page: page.locator(selector).first.dispatch_event("click")
 
 
@@ -83,7 +83,7 @@ def reset(page: Page) -> None:
 
 
 def turn_sheet(page: Page) -> None:
-    """Open or close the sheet with the list and the card, where there is one."""
+    """Open or close the sheet with the list and the card, if it is visible."""
     sheet = page.locator("#sheet")
     if sheet.is_visible():
         sheet.dispatch_event("click")
@@ -113,7 +113,7 @@ STATES: tuple[tuple[str, tuple[Callable[[Page], None], ...]], ...] = (
 
 
 def pictures(browser: Browser, url: str, size: str, scheme: str) -> list[Image.Image]:
-    """Walk through the states and return a thumbnail of each."""
+    """Open the page in each state and return the thumbnails."""
     width, height = SIZES[size]
     context = browser.new_context(
         color_scheme="dark" if scheme == "dark" else "light",

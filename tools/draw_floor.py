@@ -1,7 +1,8 @@
 """Draw the floor plan that comes with the simulator: ``python tools/draw_floor.py``.
 
-A map_server image, which is also the picture under the robots: dark walls and slate
-furniture count as occupied, white and pale tints as free, the grey outside as unknown.
+It is an image for map_server, and also the picture under the robots. Dark walls and
+furniture are occupied, white and pale colours are free, and the grey outside is
+unknown.
 Lengths are metres, x to the right and y up, from the middle of the building.
 """
 
@@ -15,8 +16,8 @@ DATA = Path(__file__).parents[1] / "src" / "webmap" / "sim" / "data"
 RESOLUTION = 0.05
 LEFT, BOTTOM, WIDTH, HEIGHT = -21.0, -13.5, 42.0, 27.0
 
-# map_server uses the mean of the three: below 89 is occupied, above 205 is free, and
-# 205 itself is unknown.
+# map_server uses the mean of the three components: below 89 is occupied, above
+# 205 is free, and 205 is unknown.
 OUTSIDE = (203, 205, 207)
 WALL = (38, 43, 52)
 FURNITURE = (70, 84, 104)

@@ -1,4 +1,4 @@
-"""Install ROS 2 and a rosbridge that this project did not write, for the peer tests.
+"""Install ROS 2 and the rosbridge of another project, for the peer tests.
 
 usage: python tools/make_ros.py FOLDER
 
@@ -50,10 +50,10 @@ def main() -> int:
 
 
 def make(folder: Path) -> None:
-    """Install into a folder unless that was done before.
+    """Install into a folder, unless it is up to date.
 
     Raises:
-        CannotInstallError: If it cannot be done here.
+        CannotInstallError: If ROS cannot be installed here.
 
     """
     stamp = folder / "installed"
@@ -63,7 +63,7 @@ def make(folder: Path) -> None:
     python, library = find_python()
     shutil.rmtree(folder, ignore_errors=True)
     run(python, "-m", "venv", "--without-pip", str(folder))
-    # The pip of this environment knows groups; that of Python 3.12.1 does not.
+    # The pip of this environment supports groups; the pip of Python 3.12.1 does not.
     run(sys.executable, "-m", "pip", "--python", str(folder / "bin" / "python"),
         "install", "--quiet", "--no-compile", "--disable-pip-version-check",
         "--group", f"{ROOT / 'pyproject.toml'}:ros")  # fmt: skip
@@ -71,7 +71,7 @@ def make(folder: Path) -> None:
     (packages,) = lib.glob("python3.*/site-packages")
     (bridge,) = packages.glob("rosbridge_server_rs/rosbridge_server_rs_jazzy")
     bridge.chmod(0o755)
-    # On a robot this library chooses between several; these wheels have only one.
+    # On a robot this library selects one of several others; the wheels have only one.
     (lib / "librmw_implementation.so").symlink_to("librmw_fastrtps_cpp.so")
     environment = {
         "AMENT_PREFIX_PATH": str(folder),
@@ -88,14 +88,14 @@ def make(folder: Path) -> None:
 
 
 def fingerprint() -> str:
-    """Return a text that changes if other packages are needed."""
+    """Return a text that changes if the needed packages change."""
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]
     text = json.dumps(groups["ros"]) + Path(__file__).read_text()
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def find_python() -> tuple[str, Path]:
-    """Return a Python that the wheels are for, and its shared library.
+    """Return a Python for which the wheels are, and its shared library.
 
     Raises:
         CannotInstallError: If there is none.

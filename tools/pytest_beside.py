@@ -1,9 +1,10 @@
 """Run pytest, and run the failed tests a second time, alone.
 
-A browser that shares two cores with another one may be delayed by seconds, longer than
-a test allows, and a shared machine may stop for a moment. So if only a few tests fail,
-they run again. A test that fails again has failed; a test that passes is listed: its
-waiting time is too short and must be corrected. A safety test does not run again.
+A browser that shares two cores with another browser may be delayed by seconds, longer
+than a test allows, and a shared machine may not run for a moment. So if only a few
+tests fail, they run again. A test that fails again has failed. A test that passes is
+listed: its waiting time is too short and must be corrected. A safety test does not run
+again.
 
 Usage: pytest_beside.py JOBS [PYTEST ARGUMENT...]
 """

@@ -166,7 +166,7 @@ def take_layers(browser: Browser, picture: Picture, url: str) -> None:
 
 
 def take(browser: Browser, picture: Picture, url: str) -> None:
-    """Drive a robot like an operator, and take the picture meanwhile."""
+    """Drive a robot like an operator, and take the picture while it moves."""
     page = open_page(browser, picture, url)
     page.locator('.robot[data-name="Robot 1"] .hit').click()
     page.locator("#card h2", has_text="Robot 1").wait_for(state="attached")
@@ -282,8 +282,8 @@ def drive(page: Page) -> None:
             return
         page.keyboard.up("w")
         page.wait_for_timeout(500)
-    said = page.locator(".webmap-teleop-state").inner_text()
-    raise SystemExit(f"the robot could not be driven: {said}")
+    status = page.locator(".webmap-teleop-state").inner_text()
+    raise SystemExit(f"the robot could not be driven: {status}")
 
 
 def main(names: list[str]) -> None:

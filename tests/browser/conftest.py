@@ -1,4 +1,4 @@
-"""Real Chromium, as large as an operator's window."""
+"""A real Chromium in the window size of an operator."""
 
 from collections.abc import Iterator
 
@@ -16,6 +16,6 @@ def tab(chromium: Browser) -> Iterator[Page]:
 
 @pytest.fixture
 def other(chromium: Browser) -> Iterator[Page]:
-    """Somebody else's page, in a browser of their own."""
+    """The page of another person, in a separate browser context."""
     with watched_tab(chromium, 1200, 800) as page:
         yield page

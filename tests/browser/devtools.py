@@ -1,7 +1,7 @@
-"""A Chromium that is controlled by its DevTools protocol alone.
+"""A Chromium that is controlled only by its DevTools protocol.
 
-Playwright keeps every page focused and visible, which is what most tests want, and
-what a test of a hidden page cannot have.
+Playwright keeps every page focused and visible. Most tests need that, but a test of a
+hidden page cannot use it.
 """
 
 import itertools
@@ -35,7 +35,7 @@ class Tab:
             self.call(f"{domain}.enable")
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """Call a method of the protocol and return what it returned."""
+        """Call a method of the protocol and return its result."""
         number = next(self._numbers)
         message = {"id": number, "method": method, "params": parameters}
         self._socket.send(json.dumps(message))
@@ -115,7 +115,7 @@ class Tab:
 
 
 class Chromium:
-    """A browser with tabs, ended with a context."""
+    """A browser with tabs, as a context manager."""
 
     def __enter__(self) -> "Chromium":
         self._folder = tempfile.mkdtemp(prefix="webmap-chromium-")

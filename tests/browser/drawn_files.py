@@ -1,4 +1,4 @@
-"""Files that lie under the robots of a fixed site: a floor, a picture and tiles."""
+"""Files that are drawn below the robots of a fixed site: a floor, a picture, tiles."""
 
 import math
 from pathlib import Path

@@ -1,8 +1,9 @@
-"""What pages draw, held against recordings of it.
+"""Compare what pages draw with recordings.
 
 A recording has a line for each element: see ``drawn_reader.js``. ``WEBMAP_DRAWN=write``
-in the environment writes them anew, once the pages stand still; look at the difference
-before it is committed. Boxes are those of one machine's Chromium and its fonts.
+in the environment writes new recordings as soon as the pages no longer change. Look at
+the difference before you commit it. Boxes depend on the Chromium and the fonts of one
+machine.
 """
 
 import difflib
@@ -24,28 +25,28 @@ RECORDINGS = HERE / "drawn"
 WRITES = os.environ.get("WEBMAP_DRAWN") == "write"
 
 WIDTH, HEIGHT = 1280, 800
-"""Of the window, in pixels."""
+"""The size of the window in pixels."""
 
 PIXELS = 2.0
-"""By how much boxes, and parts of colours from 0 to 255, may differ."""
+"""The tolerance of boxes, and of colour components from 0 to 255."""
 
 SMALL = 0.002
-"""By how much any other number may differ."""
+"""The tolerance of all other numbers."""
 
 LONGEST, LOOKS = 25.0, 40
-"""Seconds, and number of looks, within which a page has to be as it was recorded.
+"""The time in seconds, and the number of looks, until a page must match its recording.
 
-A look takes longer on a busy machine, whose pages say now and then that data is old.
+A look takes longer on a busy machine, where pages sometimes show that data is old.
 """
 
 STILL = 1.0
-"""Seconds after which it has to look so again."""
+"""The time in seconds after which the page must match again."""
 
 SHOWN = 12
-"""Differences that a failure names."""
+"""The number of differences that a failure lists."""
 
 CLOSED = ("svg.sprite", "#help")
-"""Of these only the number of elements inside counts: they are a file's own HTML."""
+"""Only the number of elements inside is compared: they come from an HTML file."""
 
 CONSOLE = (
     "svg.webmap-view-control",
@@ -56,15 +57,15 @@ CONSOLE = (
     *(f".webmap-{name}" for name in ("measure", "rosout", "route", "scale-bar")),
     *(f".webmap-{name}" for name in ("stop", "teleop", "teleop-stop")),
 )
-"""What the modules of the browser put on the console; hands come when all are there."""
+"""The elements of the browser modules on the console."""
 
 UNORDERED = (".webmap-overlay", ".webmap-corner", "#stop-place", ".drive-bar")
-"""Here modules of the browser lie in the order in which they happened to be loaded."""
+"""Here the elements of browser modules are in the order of their loading."""
 
 _READER = (HERE / "drawn_reader.js").read_text().strip().removesuffix(";")
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _PARTS = re.compile(
-    r"(?P<word>~\d+|#[\da-f]+\b)"
+    r"(?P<token>~\d+|#[\da-f]+\b)"
     r"|(?P<box>@-?\d+,-?\d+ \d+x\d+|\{[-\d |]+\})"
     r"|(?P<points><[^>]+>)"
     rf"|{_NUMBER.pattern}"
@@ -73,27 +74,27 @@ _PARTS = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of a recording, apart from its numbers."""
+    """A line of a recording, with its numbers separated from the text."""
 
     text: str
     shape: str
-    """The text with a sign in the place of each number."""
+    """The text with a placeholder for each number."""
 
     numbers: tuple[float, ...]
     tolerances: tuple[float, ...]
 
     @classmethod
     def of(cls, text: str) -> "Line":
-        """Take a line apart."""
+        """Separate the numbers of a line from its text."""
         numbers: list[float] = []
         tolerances: list[float] = []
 
         def take(match: re.Match[str]) -> str:
-            if match["word"]:
+            if match["token"]:
                 return match[0]
             found = [float(number) for number in _NUMBER.findall(match[0])]
             numbers.extend(found)
-            # Points are rounded, and which way one goes is nobody's business.
+            # Points are rounded; the direction of the rounding does not matter.
             largest = max(map(abs, found), default=0.0)
             near = max(SMALL, largest / 2000) if match["points"] else SMALL
             tolerances.extend(PIXELS if match["box"] else near for _ in found)
@@ -103,7 +104,7 @@ class Line:
         return cls(text, shape, tuple(numbers), tuple(tolerances))
 
     def matches(self, other: "Line") -> bool:
-        """Return whether another line differs by no more than numbers may."""
+        """Return whether another line differs only within the tolerances."""
         return self.shape == other.shape and all(
             abs(mine - its) <= tolerance + 1e-9
             for mine, its, tolerance in zip(
@@ -114,7 +115,7 @@ class Line:
 
 @contextmanager
 def opened(chromium: Browser, url: str, *shown: str) -> Iterator[Page]:
-    """Open a page in a window of always the same size, and wait for what is shown."""
+    """Open a page in a window of a fixed size, and wait for some elements."""
     with watched_tab(chromium, WIDTH, HEIGHT) as page:
         page.goto(url)
         for selector in shown:
@@ -123,7 +124,7 @@ def opened(chromium: Browser, url: str, *shown: str) -> Iterator[Page]:
 
 
 def robots(count: int) -> str:
-    """Return a selector of so many robots that have their places."""
+    """Return a selector that matches when ``count`` robots are placed."""
     placed = ".robot:not(.unplaced)"
     return f"{placed}:nth-child({count} of {placed})"
 
@@ -140,12 +141,13 @@ def expect_drawn(
     """Check that a page draws what was recorded, or record it.
 
     Args:
-        page: The page; it has what the recording is of, or gets it soon.
-        name: Of the recording.
-        hidden: A selector of elements in which what hidden ones have inside counts too.
-        absent: Selectors of elements that are no part of the picture.
-        level: Selectors of elements in which neighbours of one kind come in any order.
-        unstable: Selectors and an attribute of each that is no part of the picture.
+        page: The page; it shows the recorded elements now or soon.
+        name: The name of the recording.
+        hidden: A selector of elements; inside these, the content of hidden elements
+            is compared, too.
+        absent: Selectors of elements that are not compared.
+        level: Selectors of elements in which neighbours of one kind may have any order.
+        unstable: Selectors, each with an attribute that is not compared.
 
     """
     __tracebackhide__ = True
@@ -182,27 +184,27 @@ def expect_drawn(
     more = [f"... and {len(found) - SHOWN} more"] if len(found) > SHOWN else []
     listed = "\n".join([*found[:SHOWN], *more])
     raise AssertionError(
-        f"{name}: the page draws something else than was recorded "
-        f"(- recorded, + drawn; WEBMAP_DRAWN=write records it anew):\n{listed}"
+        f"{name}: the drawing differs from the recording "
+        f"(- recorded, + drawn; WEBMAP_DRAWN=write records it again):\n{listed}"
     )
 
 
 def _still(page: Page, read: Callable[[], list[str]]) -> list[str]:
-    """Return what a page draws now and drew some seconds ago."""
+    """Return what a page draws as soon as it has not changed for some seconds."""
     deadline = time.monotonic() + 4 * LONGEST
     seen: dict[tuple[str, ...], float] = {}
     while True:
         lines, now = read(), time.monotonic()
         if now - seen.setdefault(tuple(lines), now) >= 4 * STILL:
             return lines
-        assert now < deadline, "the page does not stand still:\n" + "\n".join(
+        assert now < deadline, "the page does not stop changing:\n" + "\n".join(
             differences(list(seen)[-2], lines)
         )
         page.wait_for_timeout(500)
 
 
 def differences(recorded: Sequence[str], drawn: Sequence[str]) -> list[str]:
-    """Return the differences, each with the elements that the line lies in."""
+    """Return the differences, each with the elements around the line."""
     if recorded == drawn:
         return []
     before, after = ([Line.of(text) for text in lines] for lines in (recorded, drawn))

@@ -1,21 +1,21 @@
 /**
- * Read what a page draws: one line for each element of its body, indented as it lies.
+ * Read what a page draws: one line for each element of its body, indented by its depth.
  *
  * A line has the element's tag, id and classes, its attributes, the paint of a shape of
  * SVG, the box in the window, "unseen" if nothing of it is drawn, and a quotation mark if
- * there is text in it. Words are left out: while the boxes are read, every text is the
- * same letter, so that another word does not move anything.
+ * there is text in it. The texts are left out: while the boxes are read, every text is
+ * the same letter, so that a different text does not change the layout.
  *
  * @param {object} options
- * @param {string} options.hidden A selector of elements in which what is inside of hidden
- *     ones is read too.
- * @param {string[]} options.closed Selectors of elements that are only counted inside.
+ * @param {string} options.hidden A selector of elements; inside these, the content of
+ *     hidden elements is read, too.
+ * @param {string[]} options.closed Selectors of elements whose content is only counted.
  * @param {string[]} options.absent Selectors of elements that are left out.
  * @param {string[]} options.unordered Selectors of elements whose children come in any
  *     order; they are sorted here.
  * @param {string[]} options.level Selectors of elements in which neighbours with the same
  *     tag and classes come in any order.
- * @param {[string, string][]} options.unstable Selectors and an attribute of each that is
+ * @param {[string, string][]} options.unstable Selectors, each with an attribute that is
  *     left out.
  */
 async ({ hidden, closed, absent, unordered, level, unstable }) => {
@@ -32,7 +32,7 @@ async ({ hidden, closed, absent, unordered, level, unstable }) => {
   // Attributes with more numbers are summed up.
   const LONG = 40;
 
-  // Numbers of a process are given anew at the end, in the order of the lines.
+  // Numbers of a process are replaced at the end, in the order of the lines.
   const numbered = (id) => (/\d/.test(id) ? `~{${id}}` : id);
   const short = (number, digits = 3) => {
     const text = number.toFixed(digits);
@@ -40,7 +40,7 @@ async ({ hidden, closed, absent, unordered, level, unstable }) => {
     return plain === "-0" ? "0" : plain;
   };
 
-  /** Of many points what can be compared: least, most, mean, and the mean weighted by order. */
+  /** Summarize points: minimum, maximum, mean, and the mean weighted by order. */
   const points = (pairs) =>
     [0, 1]
       .map((axis) => {
@@ -53,7 +53,7 @@ async ({ hidden, closed, absent, unordered, level, unstable }) => {
       })
       .join(" | ");
 
-  /** Numbers rounded; of many of them only how many there are, and where the points lie. */
+  /** Round numbers; of many numbers, return the count and a summary of the points. */
   const digest = (text) => {
     const all = text.match(NUMBER) ?? [];
     if (all.length <= LONG) return text.replace(NUMBER, (n) => short(Number(n)));
@@ -90,7 +90,7 @@ async ({ hidden, closed, absent, unordered, level, unstable }) => {
     return `${width}x${height} {${means.join(" | ")}}`;
   };
 
-  // What an <image> shows cannot be read from it, and is loaded once more.
+  // The pixels of an <image> cannot be read, so its file is loaded once more.
   const pictures = (window.picturesRead ??= new Map());
   for (const { href } of document.querySelectorAll("image")) {
     const address = href.baseVal;
@@ -119,9 +119,9 @@ async ({ hidden, closed, absent, unordered, level, unstable }) => {
       else if (name === "style") {
         const { style } = element;
         for (const key of [...style].sort()) {
-          const told = style.getPropertyValue(key).trim();
+          const css = style.getPropertyValue(key).trim();
           // Pixels are in the box.
-          found.push(`style.${key}=${/^-?[\d.]+px$/.test(told) ? "px" : digest(told)}`);
+          found.push(`style.${key}=${/^-?[\d.]+px$/.test(css) ? "px" : digest(css)}`);
         }
       } else if (name === "href" || name === "src") {
         const own = value.startsWith("#") ? `#${numbered(value.slice(1))}` : "";
@@ -202,7 +202,7 @@ async ({ hidden, closed, absent, unordered, level, unstable }) => {
       texts.push([node, node.data]);
     }
   }
-  // Nothing is drawn and nothing of the page runs before all of them are put back.
+  // All texts are restored before the browser draws or runs a script of the page.
   for (const [node] of texts) node.data = "x";
   let lines;
   try {

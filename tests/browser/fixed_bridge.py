@@ -23,13 +23,13 @@ QUICK, SLOW = 0.2, 1.0
 """Seconds between two messages of a topic."""
 
 SOON_OLD = re.compile(r"/(tf|odom|pose|pose2d|scan|ranges|sonar\w*|points)\Z")
-"""Topics of which what is drawn is old after a second or two."""
+"""Topics whose drawing becomes old after one or two seconds."""
 
 SUBSCRIBED = {
     "/anna/cmd_vel": "geometry_msgs/Twist",
     "/bert/cmd_vel": "geometry_msgs/Twist",
 }
-"""Topics that the robots listen to, and do nothing for."""
+"""Topics to which the robots subscribe without an effect."""
 
 
 class FixedBridge:
@@ -56,7 +56,7 @@ class FixedBridge:
         }
 
     async def run(self, stop: threading.Event) -> None:
-        """Publish everything until it is stopped."""
+        """Publish all messages until the bridge is stopped."""
         for topic, (type, message) in self._sites[0].items():
             latch = topic in LATCHED
             self.graph.advertise(self, topic, type, node="/site", latch=latch)
@@ -79,7 +79,7 @@ class FixedBridge:
                 self.graph.publish(self, topic, self._now(message, stamp))
 
     def _now(self, message: Any, stamp: float) -> Any:
-        """Return a message with every header of this moment."""
+        """Return a message with the current time in every header."""
         if isinstance(message, list) and message and isinstance(message[0], dict):
             return [self._now(each, stamp) for each in message]
         if not isinstance(message, dict):
@@ -93,7 +93,7 @@ class FixedBridge:
 
 @contextlib.contextmanager
 def fixed_bridge(dialect: str) -> Iterator[FixedBridge]:
-    """Run such a bridge in a thread of its own."""
+    """Run a :class:`FixedBridge` in a separate thread."""
     bridge = FixedBridge(dialect)
     ready, stop = threading.Event(), threading.Event()
 

@@ -1,4 +1,4 @@
-"""Messages of ROS, of the fields that layers draw; all others are zero."""
+"""ROS messages with the fields that layers draw; all other fields are zero."""
 
 import io
 import math
@@ -24,7 +24,7 @@ def quaternion(roll: float, pitch: float, yaw: float) -> Fields:
 
 
 def xyz(*values: float) -> Fields:
-    """Return ``geometry_msgs/Point``, or what is like it."""
+    """Return ``geometry_msgs/Point``, or a message with the same fields."""
     return dict(zip("xyz", [*map(float, values), 0.0, 0.0], strict=False))
 
 
@@ -34,7 +34,7 @@ def pose(x: float, y: float, yaw: float = 0.0, *, z: float = 0.0, tilt=()) -> Fi
 
 
 def header(frame: str) -> Fields:
-    """Return a header; who publishes it says when."""
+    """Return a header without a time, which the publisher sets."""
     return {"stamp": "now", "frame_id": frame}
 
 
@@ -45,7 +45,7 @@ def transform(parent: str, child: str, place, turns=(0.0, 0.0, 0.0)) -> Fields:
 
 
 def covariance(xx: float, xy: float, yy: float, turn: float) -> list[float]:
-    """Return the 36 numbers of a pose in the plane."""
+    """Return the 36 covariances of a pose in the plane."""
     found = [0.0] * 36
     found[0], found[1], found[6], found[7], found[35] = xx, xy, xy, yy, turn
     return found
@@ -115,7 +115,7 @@ def poses(frame: str, count: int, x: float, y: float) -> Fields:
 def marker(
     number: int, type: int, at: Fields, scale: tuple[float, ...], **more: Any
 ) -> Fields:
-    """Return ``visualization_msgs/Marker``, in the map's frame unless it is said."""
+    """Return ``visualization_msgs/Marker``; its default frame is the map's."""
     colour = dict(zip("rgba", more.pop("colour", (0.1, 0.3, 0.9, 0.8)), strict=True))
     return {
         "header": header(more.pop("frame", "map")),
@@ -156,5 +156,5 @@ def sonar(frame: str, distance: float) -> Fields:
 
 def battery(charge: float) -> Fields:
     """Return ``sensor_msgs/BatteryState``."""
-    said = {"percentage": charge, "voltage": 24.5, "present": True}
-    return {"header": header("base_link"), **said}
+    fields = {"percentage": charge, "voltage": 24.5, "present": True}
+    return {"header": header("base_link"), **fields}

@@ -1,8 +1,9 @@
 """One fixed message of each kind that a layer draws, of robots at a made-up site.
 
-Anna knows frames: her sensors sit on her at odd angles, one head down, one on its side.
-Bert knows none: all that is said of him is his odometry and what goes along with him.
-Of Carl and Dora there is nothing but a pose.
+Anna has frames: her sensors are mounted at odd angles, one upside down and one on its
+side.
+Bert has no frames: he has only odometry and layers that move with him.
+Carl and Dora have only a pose.
 """
 
 import math
@@ -29,9 +30,9 @@ from fixed_messages import (
 )
 
 STEPS = ((0.0, 0.0), (0.4, 0.1), (0.7, 0.35), (0.9, 0.7))
-"""Where Anna's base is in her odometry, one after another, in metres.
+"""The successive places of Anna's base in her odometry, in metres.
 
-They are so near to each other that none is taken for a jump.
+The places are close, so that no step is treated as a jump.
 """
 
 LATCHED = (
@@ -41,10 +42,10 @@ LATCHED = (
     "/anna/move_base/local_costmap/costmap",
     "/tf_static",
 )
-"""Topics that say what they say once; parts of a costmap are told again and again."""
+"""Topics with latched messages; updates of a costmap are published repeatedly."""
 
 DATUM = (48.4, 9.95)
-"""Latitude and longitude of the map's origin, where that is said."""
+"""Latitude and longitude of the map's origin, for layers that need them."""
 
 TYPES = {
     "gps_msgs/GPSFix": (
@@ -54,7 +55,7 @@ TYPES = {
     ),
     "gps_msgs/GPSStatus": "int16 status",
 }
-"""Types that the simulator does not know, with what is in them."""
+"""Types that the simulator does not know, with their fields."""
 
 OPTICAL = (-math.pi / 2, 0.0, -math.pi / 2)
 """Of a camera that looks ahead: x to the right, y down and z forward (REP 103)."""
@@ -65,7 +66,7 @@ MOUNTS = {
     "sonar": ((0.25, -0.1, 0.15), (0.0, -0.3, -0.4)),
     "camera_optical": ((0.2, 0.0, 0.4), (OPTICAL[0] - 0.25, *OPTICAL[1:])),
 }
-"""Where Anna's sensors are on her base: metres, and turns about fixed x, y and z."""
+"""The poses of Anna's sensors on her base: metres, and turns about fixed x, y, z."""
 
 
 def floor() -> np.ndarray:
@@ -133,7 +134,7 @@ def markers() -> list[Fields]:
 
 
 def frames(step: int) -> Fields:
-    """Return Anna's own moving frames, of one of :data:`STEPS`."""
+    """Return Anna's moving frames at one of :data:`STEPS`."""
     return {
         "transforms": [
             transform("map", "anna/odom", (-2.0, -1.0, 0.0), (0.0, 0.0, 0.35)),
@@ -143,7 +144,7 @@ def frames(step: int) -> Fields:
 
 
 def mounts() -> Fields:
-    """Return where Anna's sensors are."""
+    """Return the frames of Anna's sensors."""
     return {
         "transforms": [
             transform("anna/base_link", f"anna/{name}", *at)
@@ -153,7 +154,7 @@ def mounts() -> Fields:
 
 
 def particles(*, ros2: bool) -> dict[str, tuple[str, Fields]]:
-    """Return the possible poses of Anna, as published in either ROS."""
+    """Return the particles of Anna, as ROS 1 or ROS 2 publishes them."""
     array = poses("map", 12, -1.5, -0.4)
     if not ros2:
         return {"/anna/particlecloud": ("geometry_msgs/PoseArray", array)}
@@ -164,14 +165,14 @@ def particles(*, ros2: bool) -> dict[str, tuple[str, Fields]]:
 
 def parts() -> list[Fields]:
     """Return the diagnostics of the parts of both robots."""
-    said = (
+    levels = (
         ("anna/base: Motors", 0),
         ("anna/base: Battery", 1),
         ("bert/base: Motors", 2),
     )
     return [
         {"level": level, "name": name, "message": "so", "hardware_id": name[:4]}
-        for name, level in said
+        for name, level in levels
     ]
 
 
@@ -192,8 +193,8 @@ def site(step: int, *, ros2: bool) -> dict[str, tuple[str, Fields]]:
     """Return the type and the message of each topic.
 
     Args:
-        step: Where Anna is: one of :data:`STEPS`.
-        ros2: Whether topics are called as in ROS 2.
+        step: The place of Anna: an index of :data:`STEPS`.
+        ros2: Whether topics have the names of ROS 2.
 
     """
     x, y = STEPS[step]

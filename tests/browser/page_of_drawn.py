@@ -1,4 +1,4 @@
-"""A page of layers with every option that places or shapes them, and of ways to a pose.
+"""A page with every option that places or shapes layers, and every source of poses.
 
 Run by ``webmap run``; ``DRAWN_BRIDGE`` is the address of a :mod:`fixed_bridge`, and
 ``DRAWN_FILES`` a folder with ``tiles``, ``floor.yaml`` and ``picture.png``.
@@ -22,7 +22,7 @@ def arrow(colour):
     return svg.path(d="M.3 0L-.2.2V-.2Z", fill=colour, stroke="#fff")
 
 
-# By its odometry and by the frames: whatever names a frame lies there.
+# The pose comes from odometry and frames; layers with a frame are drawn in the frame.
 anna = webmap.Robot("Anna", arrow("#1f6feb"))
 anna.set_odometry_topic(bridge, "/anna/odom")
 anna.set_tf(bridge, base_frame="anna/base_link")
@@ -51,13 +51,13 @@ local = "/anna/move_base/local_costmap/costmap"
 own = {"palette": "costmap", "map_frame": "map"}
 anna.add_module("OnMaps", "OccupancyGrid", bridge, local, **own)
 
-# By the frames alone.
+# The pose comes only from the frames.
 frames = webmap.Robot("Frames", arrow("#8250df"), base_link="anna/laser")
 frames.set_tf(bridge)
 frames.add_module("LaserScanner", bridge, "/anna/scan", max_dots=10)
 frames.add_module("Polygon", bridge, foot, name="other")
 
-# By its odometry alone, with what it carries mounted by hand.
+# The pose comes only from odometry, and the mounts of sensors are set in code.
 bert = webmap.Robot("Bert", arrow("#bf3989"))
 bert.set_odometry_topic(bridge, "/bert/odom")
 mounted = {"x": 0.3, "y": -0.1, "angle": -60.0}
@@ -67,7 +67,7 @@ bert.add_module("Polygon", bridge, "/bert/footprint")
 bert.add_module("PoseWithCovariance", bridge, "/bert/odom", type="nav_msgs/Odometry")
 bert.add_module("PointCloud", bridge, "/anna/points", frame="map", cell=0.3)
 
-# By other types of poses, one of them on a map of its own.
+# The poses have other types, and one robot has an alignment.
 carl = webmap.Robot("Carl", arrow("#116329"))
 carl.set_odometry_topic(bridge, "/carl/pose")
 carl.set_alignment(1.0, -0.5, 30.0)
@@ -77,7 +77,7 @@ dora = webmap.Robot("Dora", arrow("#9a6700"))
 dora.set_odometry_topic(bridge, "/dora/pose2d", type="geometry_msgs/Pose2D")
 dora.add_module("LaserScanner", bridge, "/bert/scan", 0.1, 0.2, 10.0)
 
-# All that is behind a bridge lies turned.
+# The world of the bridge is rotated.
 emil = webmap.Robot("Emil", arrow("#cf222e"))
 emil.set_odometry_topic(turned, "/bert/odom")
 emil.add_module("LaserScanner", turned, "/bert/scan", max_dots=12)
@@ -88,7 +88,7 @@ robots = [anna, frames, bert, carl, dora, emil]
 
 @webmap.page("/")
 def show(page: webmap.Page) -> None:
-    """Show all of them on all that can lie under them."""
+    """Show all robots on all kinds of backgrounds."""
     map = webmap.Map(page.element("webmap_container"), 1200, 760)
     map.add_module("TileLayer", f"{files}/tiles", DATUM, east=30.0, attribution="us")
     map.add_module("MetreGrid", least=50)

@@ -1,4 +1,4 @@
-"""Processes of ours, and what a page shows of them."""
+"""Commands of WebMap as processes, and helpers for their pages."""
 
 import os
 import re
@@ -21,12 +21,12 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 class Process:
-    """A command of ours that runs until the test has seen enough."""
+    """A command of WebMap that runs until the test ends it."""
 
     def __init__(
         self, *command: object, cwd: Path | None = None, module: str = "webmap"
     ) -> None:
-        # No pipe: one that nobody reads for long fills up, and then nothing writes.
+        # No pipe: a pipe that is not read fills up and blocks the process.
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - closed at its end
         self.popen = subprocess.Popen(
             [sys.executable, "-m", module, *map(str, command)],
@@ -39,33 +39,33 @@ class Process:
         self._log = b""
 
     def ready(self, pattern: str, within: float = 30.0) -> str:
-        """Wait for the line that reports it ready; return the URL in it."""
+        """Wait for the line that reports readiness; return the URL in the line."""
         stdout = self.popen.stdout
         deadline = time.monotonic() + within
-        said = b""
+        output = b""
         while time.monotonic() < deadline:
             if not select.select([stdout], [], [], 0.1)[0]:
                 continue
             chunk = os.read(stdout.fileno(), 4096)
-            said += chunk
-            match = re.search(pattern, said.decode())
+            output += chunk
+            match = re.search(pattern, output.decode())
             if match:
                 return match[1]
             if not chunk:
                 break
-        raise AssertionError(f"not ready: {said!r}\n{self.log}")
+        raise AssertionError(f"not ready: {output!r}\n{self.log}")
 
     @property
     def log(self) -> str:
-        """What it wrote to standard error so far."""
+        """The standard error of the process so far."""
         if not self._stderr.closed:
-            # Not by seeking: the process writes where this file stands.
+            # No seek: the process shares the position of this file.
             size = os.fstat(self._stderr.fileno()).st_size
             self._log = os.pread(self._stderr.fileno(), size, 0)
         return self._log.decode(errors="replace")
 
     def end(self, sig: int = signal.SIGINT) -> int:
-        """End it as a person would; return its exit code."""
+        """End the process as a person would; return its exit code."""
         if self.popen.poll() is None:
             self.popen.send_signal(sig)
         try:
@@ -104,12 +104,12 @@ BRIDGE = r"rosbridge is ready at (\S+)\n"
 
 @contextmanager
 def serving(script: str, bridge: str, folder: Path) -> Iterator:
-    """Run an example as it stands, but for the address of the rosbridge.
+    """Run an example unchanged, except for the URL of the rosbridge.
 
     Args:
-        script: Its path below the examples.
+        script: The path of the example below the examples.
         bridge: The rosbridge's URL.
-        folder: Where its copy goes.
+        folder: The folder for the copy.
 
     """
     shutil.copytree((EXAMPLES / script).parent, folder, dirs_exist_ok=True)
@@ -122,7 +122,7 @@ def serving(script: str, bridge: str, folder: Path) -> Iterator:
 
 
 def matrix(tab: Page, selector: str) -> list[float]:
-    """Return the matrix of an element's own place, as the browser draws it."""
+    """Return the matrix of an element's own transform, as the browser draws it."""
     return tab.locator(selector).first.evaluate(
         # Not consolidate(), which would replace the objects that the client keeps.
         "e => { let m = new DOMMatrix();"
@@ -132,7 +132,7 @@ def matrix(tab: Page, selector: str) -> list[float]:
 
 
 def place_on_screen(tab: Page, selector: str) -> tuple[float, float]:
-    """Return where an SVG element's origin is in the window, in pixels."""
+    """Return the place of an SVG element's origin in the window, in pixels."""
     x, y = tab.locator(selector).evaluate(
         "e => { const m = e.getScreenCTM(); return [m.e, m.f]; }"
     )
@@ -140,7 +140,7 @@ def place_on_screen(tab: Page, selector: str) -> tuple[float, float]:
 
 
 def wait_until(condition, within: float = 10.0, what: str = "it") -> None:
-    """Poll a condition until it holds."""
+    """Poll a condition until it is true."""
     deadline = time.monotonic() + within
     while time.monotonic() < deadline:
         value = condition()
@@ -151,7 +151,7 @@ def wait_until(condition, within: float = 10.0, what: str = "it") -> None:
 
 
 def reset(tab: Page) -> None:
-    """End the STOP of the selected robot, by two presses as a person does."""
+    """End the STOP of the selected robot with two presses, as a person does."""
     button = tab.locator(".webmap-teleop .webmap-reset")
-    button.click(trial=True)  # a person could
+    button.click(trial=True)  # waits until a person could click
     end_stops(button)

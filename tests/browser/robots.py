@@ -8,7 +8,7 @@ import roslibpy
 
 
 class Witness:
-    """Listens to the topics of a robot through roslibpy."""
+    """Subscribes to the topics of a robot through roslibpy."""
 
     def __init__(self, url: str) -> None:
         parts = urlsplit(url)
@@ -29,7 +29,7 @@ class Witness:
         roslibpy.Topic(self.ros, topic, type_name).subscribe(on_message)
 
     def count(self, topic: str) -> int:
-        """How many messages of a topic came."""
+        """The number of messages received on a topic."""
         with self._lock:
             return self._count.get(topic, 0)
 
@@ -41,7 +41,7 @@ class Witness:
                 if topic in self._newest:
                     return self._newest[topic]
             time.sleep(0.02)
-        raise AssertionError(f"nothing came on {topic}")
+        raise AssertionError(f"no message received on {topic}")
 
     def place(self, topic: str) -> tuple[float, float]:
         """The pose of the robot in odometry."""
@@ -54,5 +54,5 @@ class Witness:
         return twist["linear"]["x"], twist["angular"]["z"]
 
     def close(self) -> None:
-        """Leave."""
+        """Disconnect."""
         self.ros.close()

@@ -48,7 +48,7 @@ def viewing(*urls: str, robots: list[str]) -> Iterator:
 
 
 def recorded_pose(dialect: str) -> tuple[float, float, float]:
-    """Where the captured odometry has the robot: x, y, yaw."""
+    """The pose of the robot in the captured odometry: x, y, yaw."""
     frame = json.loads(frame_file(dialect, "publish_odom.json").read_text())
     pose = frame["msg"]["pose"]["pose"]
     q = pose["orientation"]
@@ -57,7 +57,7 @@ def recorded_pose(dialect: str) -> tuple[float, float, float]:
 
 
 def recorded_dots(dialect: str) -> list[tuple[float, float]]:
-    """Where the rays of the captured scan end, in the robot's frame, in metres."""
+    """The ends of the rays of the captured scan, in the robot's frame, in metres."""
     frame = frame_file(dialect, "cbor_scan_inf_nan.bin").read_bytes()
     scan = cbor2.loads(frame)["msg"]
     little_endian_floats = 85
@@ -100,7 +100,7 @@ def row(tab, name: str):
 
 
 def expect_recorded(tab, name: str, dialect: str) -> None:
-    """Check that a robot is drawn where it was recorded, with what it scanned."""
+    """Check that a robot and its scan are drawn at the recorded place."""
     x, y, yaw = recorded_pose(dialect)
     cos, sin = math.cos(yaw), math.sin(yaw)
     drawn = matrix(tab, robot(name))
@@ -136,7 +136,7 @@ def test_one_map_shows_ros_1_and_ros_2_robots_at_their_recorded_poses(tab, ros1,
 
 
 DRIVEN = "Moving, not by WebMap"
-"""What was recorded was driven by somebody else."""
+"""The recorded robot was driven by another program."""
 
 
 def closed_port() -> int:
@@ -145,7 +145,7 @@ def closed_port() -> int:
 
 
 def expect_going_on(tab, name: str, dialect: str) -> None:
-    """Check that new data of a robot comes and is shown."""
+    """Check that the page still receives and shows new data of a robot."""
     expect(tab.locator(f"{robot(name)}:not(.unplaced):not(.stale)")).to_be_attached()
     tab.wait_for_timeout(1500)
     expect(tab.locator(f"{robot(name)}.stale")).to_have_count(0)
@@ -186,7 +186,7 @@ def test_a_topic_with_a_wrong_type_is_reported_and_the_other_robot_is_still_upda
 ):
     url = request.getfixturevalue(dialect)
     with viewing(url, robots=[f"Good:{ROBOT}", f"Odd:{topics}"]) as server:
-        for _ in range(2):  # a page that is loaded again says it again
+        for _ in range(2):  # a page that is loaded again shows the notice again
             tab.goto(server.url)
             notice = tab.locator(".webmap-notice.alert")
             expect(notice.filter(has_text=re.compile(sentence))).to_be_visible()
@@ -197,7 +197,7 @@ def test_a_topic_with_a_wrong_type_is_reported_and_the_other_robot_is_still_upda
 
 @pytest.mark.parametrize("url", ["http://robot:9090", "robot:9090", "ws://robot:x"])
 def test_an_invalid_url_is_refused_with_one_line(url):
-    # Nothing is served, so that there is no page to say it on.
+    # There is no server, and so no page that could show the error.
     process = Process("view", url, "--port", 0, "--no-browser")
     assert process.popen.wait(30) == 2
     assert process.log.count("\n") == 1

@@ -1,4 +1,4 @@
-"""A map is crisp when it is near, and whole when it is far away."""
+"""A map has sharp pixels when zoomed in, and keeps its walls when zoomed out."""
 
 import io
 
@@ -119,7 +119,7 @@ def row(page, map):
 def test_a_zoomed_in_map_has_sharp_edges(page, map, image):
     look(page, "Near")
     assert rendering(page, image) == "pixelated"
-    assert len(set(row(page, map)[40:-40])) == 2, "nothing between wall and floor"
+    assert len(set(row(page, map)[40:-40])) == 2, "no grey between wall and floor"
 
 
 @both

@@ -1,4 +1,4 @@
-"""The console, the examples and recordings are drawn as they were recorded."""
+"""The drawings of the console, the examples and played recordings do not change."""
 
 import pytest
 from drawn_pictures import CONSOLE, expect_drawn, opened, robots
@@ -9,7 +9,7 @@ from bag_making import Made
 from captured_frames import PLAYER, played
 from webmap_process import simulator, webmap
 
-# A busy machine may say for long that links are slow.
+# On a busy machine the pages may show for a long time that links are slow.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
 
 ROBOT = "/robot_0/odom:/robot_0/cmd_vel:/robot_0/base_scan"
@@ -18,12 +18,12 @@ DRAINING = ("rect.charge", "width")
 """Batteries of simulated robots lose charge all the time."""
 
 PARTICLES = ".posearray"
-"""They lie elsewhere each second; layers of fixed messages have them too."""
+"""Particles move every second; the layers of fixed messages include them, too."""
 
 
 @pytest.fixture(autouse=True)
 def own_state(tmp_path, monkeypatch):
-    """Leave out what other tests put on the map to stay."""
+    """Use a separate state folder, without the marks of other tests."""
     monkeypatch.setenv("WEBMAP_STATE_DIR", str(tmp_path / "state"))
 
 
@@ -72,7 +72,7 @@ PLAYED = {
     "/anna/markers": 1,
     "/anna/move_base/local_costmap/footprint": 1,
 }
-"""How often a second a topic is in the bag; what is latched is there once."""
+"""The rate of each topic in the bag in Hz; a latched topic is stored once."""
 
 
 def test_a_played_bag_matches_the_recorded_drawing(chromium, tmp_path):

@@ -1,4 +1,4 @@
-"""Every layer, drawn from messages that never change, is drawn as it was recorded."""
+"""The drawing of every layer from fixed messages matches its recording."""
 
 import pytest
 from drawn_files import make_files
@@ -9,18 +9,18 @@ from playwright.sync_api import Page, expect
 
 from webmap_process import page_of, webmap
 
-# A busy machine may say for long that links are slow.
+# On a busy machine the pages may show for a long time that links are slow.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]
 
 
 @pytest.fixture(autouse=True)
 def own_state(tmp_path, monkeypatch):
-    """Leave out what other tests put on the map to stay."""
+    """Use a separate state folder, without the marks of other tests."""
     monkeypatch.setenv("WEBMAP_STATE_DIR", str(tmp_path / "state"))
 
 
 def go_along(page: Page, bridge: FixedBridge, *behind: str) -> None:
-    """Let Anna go her way, step by step, once all that follows her is there."""
+    """Move Anna step by step, once all layers that follow her are drawn."""
     for selector in behind:
         page.locator(selector).first.wait_for(state="attached")
     anna = page.locator('.robot[data-name="anna" i]')
@@ -57,7 +57,7 @@ def test_discovered_robots_and_layers_match_the_recorded_drawing(chromium, diale
         page.get_by_role("checkbox", name="Costmaps", exact=True).check()
         page.locator("#show-all").click()
         send_scans_again(page)
-        # What is found at once lies on the map in the order in which it was asked for.
+        # Layers that are found together are on the map in the order of the requests.
         expect_drawn(page, f"view_{dialect}", level=[".world"])
 
 

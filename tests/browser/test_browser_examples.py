@@ -72,7 +72,7 @@ def style(tab, selector, name):
 
 
 def shape(tab, name):
-    """How a robot's own model is filled and outlined."""
+    """The fill and the outline of a robot's own model."""
     circle = f"{robot(name)} > g:not(.laserscan) > circle"
     return tuple(style(tab, circle, what) for what in ("fill", "stroke"))
 
@@ -158,7 +158,7 @@ def test_the_log_reports_when_the_simulator_dies_and_restarts(tab, tmp_path):
                 expect(tab.locator(".robot:not(.stale)")).to_have_count(2)
             tab.goto(
                 "about:blank"
-            )  # before the server ends, which it would complain of
+            )  # before the server ends, as the page would report an error
 
 
 # The module tutorial.
@@ -237,6 +237,8 @@ def test_a_followed_robot_stays_at_its_screen_position_while_moving(
     )
     assert place_on_screen(tab, group) == pytest.approx(place, abs=0.5)
     end, after = matrix(tab, group)[4:], matrix(tab, world)
-    assert after[:4] == pytest.approx(view[:4]), "following neither zooms nor turns"
+    assert after[:4] == pytest.approx(view[:4]), (
+        "following neither zooms nor rotates the view"
+    )
     moved = math.dist(view[4:], after[4:])
     assert moved == pytest.approx(40 * math.dist(start, end), abs=1)

@@ -1,4 +1,4 @@
-"""Several people, one robot, and what happens when the display dies."""
+"""Several operators with one robot, and a display that is killed."""
 
 import os
 import re
@@ -18,7 +18,7 @@ ODOM = "/robot_0/odom"
 
 @pytest.fixture
 def simulator():
-    """One robot in a long corridor, whose base does not stop by itself."""
+    """One robot in a long corridor, with a base without a command timeout."""
     command = ("sim", "--robots", 1, "--seed", 7, "--port", 0, "--robot-timeout", 0)
     with running(*command, pattern=BRIDGE) as process:
         yield process.url
@@ -62,14 +62,14 @@ def test_another_page_stops_a_driven_robot_with_stop_all(server, witness, tab, o
     wait_until(lambda: standing(witness), what="standing still")
     expect(row).to_contain_text("STOP active")
     tab.wait_for_timeout(700)
-    assert standing(witness), "the key that is still held drives on"
+    assert standing(witness), "the key that is still held does not drive"
     tab.keyboard.up("s")
 
 
 def test_keys_of_a_page_without_control_do_not_drive_the_robot(
     server, witness, tab, other
 ):
-    # First, as a page that loads may hold up the page that drives.
+    # Load this page first: a page that loads may delay the page that drives.
     other.goto(server.url)
     other.locator("#robots .row button").click()
     expect(other.locator(".webmap-teleop")).to_have_attribute("data-state", "free")
@@ -78,7 +78,7 @@ def test_keys_of_a_page_without_control_do_not_drive_the_robot(
     other.locator("svg.webmap").focus()
     other.keyboard.down("w")
     other.wait_for_timeout(600)
-    assert witness.speed(ODOM)[0] <= 0, "the other's key had an effect"
+    assert witness.speed(ODOM)[0] <= 0, "the key on the other page has no effect"
     other.keyboard.up("w")
     tab.keyboard.up("s")
     wait_until(lambda: standing(witness), what="standing still")

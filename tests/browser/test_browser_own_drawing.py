@@ -1,4 +1,4 @@
-"""What a program draws by itself, on a page without an HTML file: seen as drawn."""
+"""Own drawings of a program, on a page without an HTML file, are shown."""
 
 import io
 
@@ -72,14 +72,14 @@ def server(tmp_path_factory):
 @pytest.fixture(scope="module")
 def page(server, chromium):
     with watched_tab(chromium, 900, 600) as tab:
-        tab.allowed.append("404")  # the image that is nowhere
+        tab.allowed.append("404")  # the image that does not exist
         tab.goto(server.url)
         tab.locator(".robot").nth(1).wait_for(state="attached")
         yield tab
 
 
 def colour(page, x, y):
-    """Return what is drawn so many pixels from the map's left and top."""
+    """Return the colour at a distance in pixels from the map's left and top."""
     shot = page.locator("svg.webmap").screenshot()
     return Image.open(io.BytesIO(shot)).convert("RGB").getpixel((x, y))
 

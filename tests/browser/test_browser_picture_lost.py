@@ -1,4 +1,4 @@
-"""Somebody drives, and the page's picture is cut off while its other line holds."""
+"""The scene connection of a driving page is lost while its drive connection holds."""
 
 import json
 import threading
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.browser
 
 
 def test_the_page_releases_its_inputs_when_the_scene_connection_is_lost(tab):
-    pictures, said = [], []
+    pictures, sent = [], []
     cut = threading.Event()
 
     def through(route):
@@ -23,7 +23,7 @@ def test_the_page_releases_its_inputs_when_the_scene_connection_is_lost(tab):
 
     def listen(link):
         if "/drive" in link.url:
-            link.on("framesent", lambda frame: said.append(json.loads(frame)))
+            link.on("framesent", lambda frame: sent.append(json.loads(frame)))
 
     tab.route_web_socket("**/scene*", through)
     tab.on("websocket", listen)
@@ -35,17 +35,17 @@ def test_the_page_releases_its_inputs_when_the_scene_connection_is_lost(tab):
 
         def asked():
             tab.wait_for_timeout(20)
-            last = [word["x"] for word in said if word["op"] == "drive"][-1:]
+            last = [command["x"] for command in sent if command["op"] == "drive"][-1:]
             return last[0] if last else None
 
         hold(tab.keyboard, "w", lambda: asked() == 1)
         cut.set()
         pictures[-1].close()
-        wait_until(lambda: asked() == 0, what="letting go")
+        wait_until(lambda: asked() == 0, what="a neutral command")
         cut.clear()
         pictures[-1].close()
         expect(tab.locator("html.disconnected")).not_to_be_attached()
-        assert asked() == 0, "a key that is held on moves nothing"
+        assert asked() == 0, "a key that is still held moves nothing"
         tab.keyboard.up("w")
         hold(tab.keyboard, "w", lambda: asked() == 1)
         tab.close()

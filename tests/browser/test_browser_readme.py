@@ -1,4 +1,4 @@
-"""The twelve lines of the first page, as a stranger types them."""
+"""The twelve-line program of the README runs as printed there."""
 
 import re
 from pathlib import Path
@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def program(page: str) -> str:
-    """Return the program with a bridge that stands on a page of the docs."""
+    """Return the program of a page of the docs, with another bridge."""
     text = (ROOT / page).read_text()
     blocks = re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S)
     [found] = [block for block in blocks if "webmap.Bridge(" in block]

@@ -1,4 +1,4 @@
-"""A page that is open while WebMap is started anew says what has become of it."""
+"""A page that is open while WebMap restarts shows the restart."""
 
 from urllib.parse import urlsplit
 

@@ -1,4 +1,4 @@
-"""Robots lie in a group of their own: CSS counts them, and layers keep their order."""
+"""Robots are in a separate group: CSS can count them, and layers keep their order."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""Signing in with a real browser: what opens, what stays, what another server gets."""
+"""Sign-in with a real browser: URLs, cookies, and requests to another server."""
 
 import http.server
 import threading
@@ -57,9 +57,9 @@ def shows_its_map(page):
 def test_the_file_opened_in_the_browser_signs_in_and_leaves_a_clean_url(
     tab, script, tmp_path, monkeypatch
 ):
-    said = tmp_path / "command line"
+    file = tmp_path / "command line"
     browser = tmp_path / "browser"
-    browser.write_text(f'#!/bin/sh\necho "$@" > "{said}.new"\nmv "{said}.new" "{said}"')
+    browser.write_text(f'#!/bin/sh\necho "$@" > "{file}.new"\nmv "{file}.new" "{file}"')
     browser.chmod(0o755)
     home = tmp_path / "home"
     home.mkdir()
@@ -67,10 +67,10 @@ def test_the_file_opened_in_the_browser_signs_in_and_leaves_a_clean_url(
     monkeypatch.setenv("BROWSER", f"{browser} %s")
     with running("run", script, "--port", 0, pattern=WEB) as process:
         deadline = time.monotonic() + 20
-        while not said.exists():
+        while not file.exists():
             assert time.monotonic() < deadline
             time.sleep(0.02)
-        line = said.read_text().strip()
+        line = file.read_text().strip()
         assert line.startswith(f"file://{home}/")
         root = process.url.partition("?")[0]
         tab.goto(line)
@@ -104,7 +104,7 @@ class Neighbour(http.server.BaseHTTPRequestHandler):
     def do_GET(self):
         self.cookies.append(self.headers.get("cookie", ""))
         self.send_response(200)
-        # And it takes the cookie away.
+        # The page also removes the cookie.
         for pair in self.headers.get("cookie", "").split("; "):
             name = pair.partition("=")[0]
             self.send_header("set-cookie", f"{name}=; Path=/; Max-Age=0")
@@ -131,10 +131,10 @@ def test_the_cookie_alone_gives_a_server_on_another_port_no_access(tab, script):
             assert Neighbour.cookies[0].startswith("webmap_")
             assert near_page.evaluate("Object.values(localStorage)") == []
             near_page.close()
-            # The page that is open needs no cookie; its key is enough.
+            # An open page needs no cookie; its key is enough.
             assert tab.context.cookies() == []
             assert tab.evaluate(SOCKETS, ["webmap", *key]) == ["open", "open"]
-            # The cookie alone opens nothing, from whatever page.
+            # The cookie alone gives no access, from any page.
             name, _, value = Neighbour.cookies[0].partition("=")
             root = process.url.partition("?")[0]
             tab.context.add_cookies([{"name": name, "value": value, "url": root}])

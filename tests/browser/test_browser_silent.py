@@ -1,4 +1,4 @@
-"""A robot that vanishes while its bridge stays: what the page and the log say."""
+"""The page and the log report a robot that vanishes while its bridge is open."""
 
 import re
 from contextlib import ExitStack
@@ -16,7 +16,7 @@ STALE = re.compile(r"\bstale\b")
 
 @pytest.fixture
 def robots():
-    """Bob and Ann, each behind a rosbridge of its own."""
+    """Bob and Ann, each behind a separate rosbridge."""
     with ExitStack() as stack:
         yield [stack.enter_context(WitnessRobot()) for _ in range(2)]
 
@@ -42,13 +42,13 @@ def test_a_robot_without_odometry_becomes_stale_on_the_page_and_in_the_log(
     old = [rows["Bob"].get_by_text("Stale data"), tab.locator("#card .state .old")]
 
     def bob_looks(*, is_old: bool) -> None:
-        for word in old:
-            expect(word).to_be_visible(visible=is_old)
+        for element in old:
+            expect(element).to_be_visible(visible=is_old)
         if is_old:
             expect(drawn["Bob"]).to_have_class(STALE)
         else:
             expect(drawn["Bob"]).not_to_have_class(STALE)
-        # The other goes on.
+        # The other robot is still updated.
         expect(drawn["Ann"]).not_to_have_class(STALE)
         expect(rows["Ann"].get_by_text("Stale data")).to_be_hidden()
         expect(rows["Ann"].locator(".age")).to_have_text(re.compile(r"^0\.\d s$"))

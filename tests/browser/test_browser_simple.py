@@ -1,4 +1,4 @@
-"""The simple tutorial in a real browser: see it, move it, drive it."""
+"""The simple tutorial in a real browser: the view, the selection, driving."""
 
 import math
 
@@ -23,7 +23,7 @@ def simulator():
 
 @pytest.fixture(scope="module")
 def server(simulator, tmp_path_factory):
-    """The example as it stands, but for the simulator's port."""
+    """The example unchanged, except for the port of the simulator."""
     folder = tmp_path_factory.mktemp("simple")
     script = (EXAMPLES / "simple" / "simple.py").read_text()
     assert script.count("ws://localhost:9090") == 1
@@ -50,7 +50,7 @@ def opened(server, tab):
     tab.locator(".robot:not(.unplaced)").wait_for(state="attached")
     tab.locator(".dot[d]").wait_for(state="attached")
     tab.get_by_role("button", name="STOP").wait_for()
-    tab.locator("svg.webmap-view-control").wait_for()  # what hears drags and the wheel
+    tab.locator("svg.webmap-view-control").wait_for()  # receives drags and the wheel
     return tab
 
 
@@ -110,7 +110,9 @@ def test_dragging_moves_the_view_by_the_same_distance_and_is_not_a_click(opened)
         what="following the drag",
     )
     opened.wait_for_timeout(300)
-    assert opened.locator(".robot.selected").count() == 1, "the drag deselected"
+    assert opened.locator(".robot.selected").count() == 1, (
+        "the drag changed the selection"
+    )
 
 
 def test_the_wheel_zooms_the_view_about_the_pointer(opened):
@@ -174,8 +176,8 @@ def test_a_held_key_drives_the_selected_robot_until_release(
     before = robot_place(opened)
 
     def moving():
-        # The speeds that the tutorial says, which a base that nobody vouches for
-        # is never driven at.
+        # The speeds of the tutorial. A base without a known command timeout is never
+        # driven at these speeds.
         v, w = witness.speed(ODOM)
         if forward:
             return v * forward > 0.9 and math.dist(before, robot_place(opened)) > 0.1
@@ -217,16 +219,16 @@ def test_a_hidden_tab_stops_the_robot_and_showing_the_tab_again_sends_nothing(
         hold(tab, "w", lambda: witness.speed(ODOM)[0] > 0.2)
         other = browser.new_tab()
         wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
-        # On a busy machine it may have stopped before, since the page was held up.
+        # On a busy machine the robot may have stopped earlier, as the page was delayed.
         tab.wait("document.visibilityState === 'hidden'")
         browser.activate(tab)
         tab.wait("document.visibilityState === 'visible'")
-        # The zeros of the stop end by themselves; after them there is silence.
+        # The zero velocities of the stop end after a while; then nothing is sent.
         tab.evaluate("new Promise(done => setTimeout(done, 1000))")
         before = witness.count("/cmd_vel")
         tab.evaluate("new Promise(done => setTimeout(done, 1000))")
         assert witness.speed(ODOM) == (0.0, 0.0)
-        assert witness.count("/cmd_vel") == before, "something was sent to the robot"
+        assert witness.count("/cmd_vel") == before, "no message is sent to the robot"
         assert tab.errors == []
         other.close()
         tab.close()
@@ -247,12 +249,14 @@ def test_a_stop_blocks_motion_until_reset_and_a_new_key_press(opened, witness):
     opened.keyboard.press("Space")
     wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
     opened.wait_for_timeout(700)
-    assert witness.speed(ODOM) == (0.0, 0.0), "the held key drives on"
+    assert witness.speed(ODOM) == (0.0, 0.0), "the held key does not drive"
     opened.keyboard.up("s")
     opened.wait_for_timeout(300)
     opened.keyboard.down("s")
     opened.wait_for_timeout(700)
-    assert witness.speed(ODOM) == (0.0, 0.0), "a STOP that stands lets a press through"
+    assert witness.speed(ODOM) == (0.0, 0.0), (
+        "a press does not drive while a STOP is active"
+    )
     opened.keyboard.up("s")
     reset(opened)
     hold(opened.keyboard, "s", lambda: witness.speed(ODOM)[0] < -0.2)

@@ -1,4 +1,4 @@
-"""What a page complains of fails the test, whichever page of the test it is."""
+"""An error or a warning on any page of a test fails the test."""
 
 import pytest
 from playwright.sync_api import Page
@@ -23,7 +23,7 @@ def one_that_it_opens(page: Page) -> Page:
 
 
 def failure(chromium, do) -> str:
-    """Return why a test fails that does something with its tab."""
+    """Return the reason why a test with an action on its tab fails."""
     try:
         with watched_tab(chromium, 400, 300) as tab:
             do(tab)

@@ -1,8 +1,8 @@
-"""A display without pages: watches the cameras of all robots, and prints what it has.
+"""A display without pages: watches the cameras of all robots and prints changes.
 
-Run with the address of a router. Each line is what changed, as JSON: a robot's cameras,
-problems and picture. A line on standard input ends the watching, a second one the
-process.
+Run with the URL of a router. Each line is a JSON list of all robots with their cameras,
+problems and pictures. A line on standard input ends the watching; a second line ends
+the process.
 """
 
 import io
@@ -21,7 +21,7 @@ from webmap.fleet.of_agents import find_agents
 
 
 def seen(robot):
-    """Return what pages show of a robot."""
+    """Return what pages show about a robot."""
     images = [each for each in robot.svg.walk() if getattr(each, "tag", "") == "image"]
     return {
         "name": robot.name,
@@ -35,7 +35,7 @@ def seen(robot):
 
 
 def picture(camera):
-    """Return the newest picture of a camera: its red, and its age in seconds."""
+    """Return the red value and the age in seconds of a camera's newest picture."""
     if camera.url is None:
         return None
     image = Image.open(io.BytesIO(pictures.get(camera.url.rpartition("/")[2]).data))

@@ -1,6 +1,6 @@
-"""A program on a display: drives the robot of an agent, and prints what came of it.
+"""A program on a display: drives the robot of an agent and prints the results.
 
-Run with the address of a router that has one agent with one robot.
+Run with the URL of a router that has one agent with one robot.
 """
 
 import asyncio
@@ -20,16 +20,16 @@ console = Console()
 
 
 async def until(check, act=lambda: None):
-    """Do something at 20 Hz until a check holds."""
+    """Call ``act`` at 20 Hz until ``check`` returns true."""
     deadline = time.monotonic() + 30.0
     while not check():
-        assert time.monotonic() < deadline, "it did not happen"
+        assert time.monotonic() < deadline, "the condition did not become true"
         act()
         await asyncio.sleep(0.05)
 
 
 async def driven():
-    """Drive the robot, then send it to a goal; return what came of it."""
+    """Drive the robot, then send it to a goal; return the results."""
     await until(lambda: console.robots)
     (robot,) = console.robots
     await until(lambda: robot.report is not None)
@@ -42,7 +42,9 @@ async def driven():
     await until(turned, lambda: robot.twist(0.0, rz=0.5))
     result = {"epoch": epoch == robot.report.epoch}
     result["holder"] = robot.report.holder.name
-    await until(lambda: robot.report.state == "held")  # it sends no more
+    await until(
+        lambda: robot.report.state == "held"
+    )  # the program no longer sends velocities
     place = Vector3(robot.position.x, robot.position.y)
     robot.move(place, Quaternion.from_yaw(begun))
     await until(lambda: robot.report.goal is not None)

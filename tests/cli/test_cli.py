@@ -1,4 +1,4 @@
-"""The commands: one line when ready, clean ends, one sentence for what is wrong."""
+"""Commands print one line when ready, end cleanly, and report errors in one line."""
 
 import re
 import signal
@@ -15,7 +15,7 @@ from cli_inside import run_inside
 pytestmark = pytest.mark.slow
 
 WEB = r"WebMap is ready at http://127\.0\.0\.1:\d+/\?token=[\w-]{43,}\n"
-TOLD = ("--robot", "Bob:/odom::")
+ROBOT = ("--robot", "Bob:/odom::")
 
 
 def run(*arguments, within=30):
@@ -39,24 +39,24 @@ def start(*arguments):
 
 
 def is_logged(line):
-    """Return whether a line on standard error is one of the log, with its time."""
+    """Return whether a line on standard error is a log line with a time."""
     return re.match(r"\d{4}-\d\d-\d\d ", line) is not None
 
 
 @pytest.fixture
 def page(tmp_path):
-    """The file of a page of one's own."""
+    """The file of a program with a page."""
     file = tmp_path / "page.py"
     file.write_text("import webmap\n\n@webmap.page('/')\ndef main(page): pass\n")
     return file
 
 
 def test_help_names_every_command():
-    said = run("--help")
-    assert said.returncode == 0
+    help_text = run("--help")
+    assert help_text.returncode == 0
     commands = ("demo", "view", "discover", "doctor", "play", "record", "run", "check")
     for command in (*commands, "sim"):
-        assert re.search(rf"^  {command} ", said.stdout, re.M)
+        assert re.search(rf"^  {command} ", help_text.stdout, re.M)
         assert run_inside(command, "--help").returncode == 0
 
 
@@ -65,7 +65,7 @@ def test_version_prints_the_version_of_the_package():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         (("dmeo",), "No such command"),
         (("demo", "--robots", "none"), "not a valid integer"),
@@ -86,13 +86,13 @@ def test_version_prints_the_version_of_the_package():
     ],
 )
 def test_an_invalid_argument_prints_one_error_line_and_exits_with_code_2(
-    arguments, said
+    arguments, message
 ):
     result = run_inside(*arguments)
     assert result.returncode == 2, result.stderr
     [error] = [line for line in result.stderr.splitlines() if not is_logged(line)]
     assert error.startswith("Error: ")
-    assert said in error
+    assert message in error
     assert result.stdout == ""
 
 
@@ -103,20 +103,20 @@ def test_an_invalid_argument_prints_one_error_line_and_exits_with_code_2(
         ("sim", "--port", "0", "--http-camera"),
         ("demo", "--no-browser", "--port"),
         ("demo", "--no-browser", "--port", "0", "--bridge-port"),
-        ("view", "ws://127.0.0.1:1", *TOLD, "--no-browser", "--port"),
+        ("view", "ws://127.0.0.1:1", *ROBOT, "--no-browser", "--port"),
         ("run", "--no-browser", "PAGE", "--port"),
     ],
 )
 def test_a_port_in_use_prints_one_error_line_and_exits_with_code_2(arguments, page):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        command = [page if word == "PAGE" else word for word in arguments]
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        port = listener.getsockname()[1]
+        command = [page if argument == "PAGE" else argument for argument in arguments]
         result = run(*command, port)
     assert result.returncode == 2
-    said = result.stderr.splitlines()[-1]
-    assert said.startswith(f"Error: port {port} on 127.0.0.1 is in use: ")
+    error = result.stderr.splitlines()[-1]
+    assert error.startswith(f"Error: port {port} on 127.0.0.1 is in use: ")
     assert result.stderr.count("Error") == 1
     assert "Traceback" not in result.stderr
     assert result.stdout == ""
@@ -129,13 +129,13 @@ def test_a_port_in_use_prints_one_error_line_and_exits_with_code_2(arguments, pa
         (("sim", "--port", 0), r"rosbridge is ready at ws://127\.0\.0\.1:\d+\n"),
         (("demo", "--port", 0, "--no-browser"), WEB),
         (("run", "PAGE", "--port", 0, "--no-browser"), WEB),
-        (("view", "ws://127.0.0.1:1", *TOLD, "--port", 0, "--no-browser"), WEB),
+        (("view", "ws://127.0.0.1:1", *ROBOT, "--port", 0, "--no-browser"), WEB),
     ],
 )
 def test_a_command_prints_one_ready_line_and_a_signal_ends_it_with_exit_code_0(
     command, line, sig, page
 ):
-    process = start(*[page if word == "PAGE" else word for word in command])
+    process = start(*[page if argument == "PAGE" else argument for argument in command])
     try:
         assert re.fullmatch(line, process.stdout.readline())
         process.send_signal(sig)
@@ -144,7 +144,7 @@ def test_a_command_prints_one_ready_line_and_a_signal_ends_it_with_exit_code_0(
         if process.poll() is None:
             process.kill()
     assert process.returncode == 0, err
-    assert out == "", "nothing but the one line"
+    assert out == "", "only the one line is printed"
     assert "Traceback" not in err
 
 
@@ -159,10 +159,10 @@ def test_killing_the_demo_also_ends_its_gate_and_simulator():
             check=True,
         )
         children = [int(pid) for pid in listed.stdout.split()]
-        if len(children) == 2:  # the gate comes a moment after the page
+        if len(children) == 2:  # the gate starts a moment after the page
             break
         time.sleep(0.1)
-    assert len(children) == 2, "the gate and the simulator"
+    assert len(children) == 2, "the children are the gate and the simulator"
     process.kill()
     process.communicate(timeout=10)
     for _ in range(100):
@@ -175,7 +175,7 @@ def test_killing_the_demo_also_ends_its_gate_and_simulator():
         if not [line for line in alive if line.strip() and "Z" not in line]:
             return
         time.sleep(0.1)
-    raise AssertionError(f"still there: {alive}")
+    raise AssertionError(f"still running: {alive}")
 
 
 def test_a_failing_script_is_named_with_its_error():

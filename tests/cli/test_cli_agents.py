@@ -1,4 +1,4 @@
-"""``webmap agent`` and ``webmap router``: options, and what can be wrong with them."""
+"""``webmap agent`` and ``webmap router``: options and their errors."""
 
 import asyncio
 import os
@@ -51,7 +51,7 @@ service = "/dock"
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         (("agent", "ws://h", *NAME), "Missing option '--router'"),
         (("agent", "ws://h", *ROUTER), "Missing option '--name'"),
@@ -73,22 +73,24 @@ service = "/dock"
         (("demo", "--agents", "2", "--robots", "3"), "one robot for each agent"),
     ],
 )
-def test_a_wrong_argument_ends_the_command_with_one_sentence(arguments, words):
-    said = run_inside(*arguments, *(("--wait", "0") if arguments[0] == "agent" else ()))
-    assert said.returncode == 2
-    assert words in said.stderr.splitlines()[-1]
+def test_a_wrong_argument_ends_the_command_with_one_sentence(arguments, message):
+    result = run_inside(
+        *arguments, *(("--wait", "0") if arguments[0] == "agent" else ())
+    )
+    assert result.returncode == 2
+    assert message in result.stderr.splitlines()[-1]
 
 
 def test_the_unit_for_systemd_runs_the_same_command():
-    said = run_inside("agent", "ws://localhost:9090", *ROUTER, *NAME, "--systemd")
-    assert said.returncode == 0
+    result = run_inside("agent", "ws://localhost:9090", *ROUTER, *NAME, "--systemd")
+    assert result.returncode == 0
     (command,) = [
-        line for line in said.stdout.splitlines() if line.startswith("ExecStart=")
+        line for line in result.stdout.splitlines() if line.startswith("ExecStart=")
     ]
     assert command.endswith(
         "-m webmap agent ws://localhost:9090 --router zenoh://127.0.0.1:1 --name bay3"
     )
-    assert "EnvironmentFile=-/etc/webmap/bay3.env" in said.stdout
+    assert "EnvironmentFile=-/etc/webmap/bay3.env" in result.stdout
 
 
 def test_rates_and_operators_are_read():
@@ -107,12 +109,12 @@ def wait_for(check, within=20.0):
         found = check()
         if found:
             return found
-        assert time.monotonic() < deadline, "it did not happen"
+        assert time.monotonic() < deadline, "the condition did not become true"
         time.sleep(0.05)
 
 
 def listening(command):
-    """Return the sockets on which a command that runs now listens, and its gate."""
+    """Return the sockets on which a running command and its gate listen."""
     started = [
         process
         for process in psutil.Process().children()

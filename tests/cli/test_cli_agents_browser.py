@@ -1,4 +1,4 @@
-"""A router, agents and displays, each a process of its own, seen in a real browser."""
+"""A router, agents and displays as separate processes, in a real browser."""
 
 import re
 from contextlib import contextmanager
@@ -45,7 +45,7 @@ def agent(folder, url, router, name, *more, **environment):
 
 @contextmanager
 def display(chromium, router, *more):
-    """Open the page of a display of its own."""
+    """Open the page of a separate display."""
     options = ("--port", "0", "--no-browser")
     with (
         webmap("view", router, *more, *options) as url,
@@ -79,7 +79,7 @@ def placed(page):
 
 
 def choose(page, name):
-    """Select a robot once it is placed."""
+    """Select a robot as soon as it is placed."""
     row = page.locator("#robots .row").filter(has_text=name)
     expect(row).to_have_count(1, timeout=SOON)
     expect(placed(page)).to_have_count(2, timeout=SOON)
@@ -98,7 +98,7 @@ def test_the_robots_of_all_agents_are_drawn_with_map_and_scan(chromium, yard):
         expect(dots).to_have_count(2, timeout=SOON)
         drawn = [dot.get_attribute("d").upper().count("M") for dot in dots.all()]
         fewest, most = sorted(drawn)
-        assert 5 < fewest <= 30 < most, "one agent allows 30 beams"
+        assert 5 < fewest <= 30 < most, "only one agent limits scans to 30 beams"
 
 
 def test_two_displays_drive_one_robot_in_turn_and_either_stops_it(chromium, yard):
@@ -155,7 +155,10 @@ def test_agents_that_come_and_end_while_a_page_is_open(chromium, tmp_path):
         expect(page.locator("#robots .row")).to_contain_text("Lost", timeout=SOON)
         expect(bridges).to_have_text("No connection to the bridge", timeout=SOON)
         names = page.locator("#robots .row .name")
-        for url, number in ((three, 3), (one, 1)):  # it restarts with other robots
+        for url, number in (
+            (three, 3),
+            (one, 1),
+        ):  # the simulator restarts with other robots
             with agent(tmp_path, url, router, "bay1"):
                 expected = [f"robot_{index} (bay1)" for index in range(number)]
                 expect(names).to_have_text(expected, timeout=2 * SOON)
@@ -226,7 +229,7 @@ SVG = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 3 2" width="3" hei
 
 @pytest.fixture
 def camera():
-    """A camera on the web, in a thread of its own."""
+    """A camera server in a separate thread."""
     thread = LoopThread("camera")
     server = CameraServer()
     thread.call(server.__aenter__())

@@ -1,4 +1,4 @@
-"""``webmap doctor``, ``discover`` and ``record`` with the address of an agent."""
+"""``webmap doctor``, ``discover`` and ``record`` with the URL of an agent."""
 
 import re
 import subprocess
@@ -42,15 +42,17 @@ def agent(router, name, folder):
 
 
 def wait_for_sign(router, name):
-    """Wait until an agent shows that it is there, once it knows that no other has its
-    name."""
+    """Wait until an agent publishes its sign of life.
+
+    An agent publishes the sign once it knows that no other agent has its name.
+    """
     signs, peer = [], Peer(router, User())
     peer.listen(keys.here(name), lambda *sign: signs.append(sign))
     peer.start()
     try:
         deadline = time.monotonic() + 30
         while not signs:
-            assert time.monotonic() < deadline, "the agent gives no sign"
+            assert time.monotonic() < deadline, "the agent publishes no sign of life"
             time.sleep(0.05)
     finally:
         peer.close()
@@ -74,35 +76,35 @@ def bay1(router, folder):
 
 
 def test_doctor_checks_the_only_agent_of_a_router(router, bay1):
-    said = webmap("doctor", router, "--seconds", "1", "--try-call")
-    assert said.returncode == 0, said.stdout + said.stderr
-    assert said.stdout.startswith(f"{bay1}\n")
-    assert "The agent's rosbridge listens on its own computer alone." in said.stdout
-    assert re.search(r"/robot_0/odom: \d+\.\d messages a second", said.stdout)
-    assert "A service call takes" in said.stdout
-    assert "an agent lets a display offer no service" in said.stdout
-    assert "Frames lead from map to robot_0/odom" in said.stdout
+    result = webmap("doctor", router, "--seconds", "1", "--try-call")
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert result.stdout.startswith(f"{bay1}\n")
+    assert "The agent's rosbridge listens on its own computer alone." in result.stdout
+    assert re.search(r"/robot_0/odom: \d+\.\d messages a second", result.stdout)
+    assert "A service call takes" in result.stdout
+    assert "an agent lets a display offer no service" in result.stdout
+    assert "Frames lead from map to robot_0/odom" in result.stdout
 
 
 def test_doctor_checks_a_robot_of_an_agent_as_options_configure_it(bay1):
     given = ("--robot", "Bob:/robot_0/odom:/robot_0/cmd_vel:")
-    said = webmap("doctor", bay1, "--seconds", "1", *given)
-    assert said.returncode == 0, said.stdout + said.stderr
-    assert "robots checked: Bob." in said.stdout
+    result = webmap("doctor", bay1, "--seconds", "1", *given)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "robots checked: Bob." in result.stdout
 
 
 def test_discover_names_the_robots_of_an_agent(bay1):
-    said = webmap("discover", bay1)
-    assert said.returncode == 0, said.stderr
-    assert "robot_0 (in /robot_0)" in said.stdout
+    result = webmap("discover", bay1)
+    assert result.returncode == 0, result.stderr
+    assert "robot_0 (in /robot_0)" in result.stdout
 
 
 def test_a_robot_of_an_agent_is_recorded(router, bay1, tmp_path):
     bag = tmp_path / "robot.bag"
     options = ("--topic", "/robot_0/odom", "--topic", "/map", "--duration", "4")
-    said = webmap("record", router, *options, "--out", bag)
-    assert said.returncode == 0, said.stderr
-    assert f"Recording {bay1} to {bag}" in said.stdout
+    result = webmap("record", router, *options, "--out", bag)
+    assert result.returncode == 0, result.stderr
+    assert f"Recording {bay1} to {bag}" in result.stdout
     with AnyReader([bag]) as reader:
         counts = {each.topic: each.msgcount for each in reader.connections}
     assert counts["/robot_0/odom"] > 5
@@ -126,24 +128,24 @@ def test_commands_for_several_agents_check_all_or_list_them(router, bay1, folder
 
 def test_a_router_without_agents_or_that_is_away_is_named(router, tmp_path):
     away = "cannot reach the router at tcp/127.0.0.1:1: the connection was refused"
-    said = webmap("doctor", "zenoh://127.0.0.1:1", "--wait", "1")
-    assert said.returncode == 1
-    assert f"WRONG    The agent cannot be reached: {away}" in said.stdout
+    result = webmap("doctor", "zenoh://127.0.0.1:1", "--wait", "1")
+    assert result.returncode == 1
+    assert f"WRONG    The agent cannot be reached: {away}" in result.stdout
     bag = tmp_path / "robot.bag"
-    said = webmap("record", "zenoh://127.0.0.1:1/bay1", "--wait", "0", "--out", bag)
-    assert said.returncode == 2
-    assert away in said.stderr.splitlines()[-1]
-    said = webmap("discover", f"{router}/bay9", "--wait", "0")
-    assert said.returncode == 1
-    assert "no answer from the agent bay9" in said.stderr
+    result = webmap("record", "zenoh://127.0.0.1:1/bay1", "--wait", "0", "--out", bag)
+    assert result.returncode == 2
+    assert away in result.stderr.splitlines()[-1]
+    result = webmap("discover", f"{router}/bay9", "--wait", "0")
+    assert result.returncode == 1
+    assert "no answer from the agent bay9" in result.stderr
 
 
 def test_a_router_without_agents_is_wrong_and_the_advice_starts_one():
     with running("router", "--listen", "tcp/127.0.0.1:0") as empty:
-        said = webmap("doctor", empty, "--wait", "0")
-        assert said.returncode == 1
+        result = webmap("doctor", empty, "--wait", "0")
+        assert result.returncode == 1
         assert f"WRONG    The agent cannot be reached: no agent is at {empty}." in (
-            said.stdout
+            result.stdout
         )
         found = webmap("discover", empty, "--wait", "0")
         assert found.returncode == 1
@@ -151,15 +153,15 @@ def test_a_router_without_agents_is_wrong_and_the_advice_starts_one():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         (("doctor", "zenoh://h/a", "--stop-test", "bob"), "press Stop test"),
         (("discover", "zenoh://h/a", "--toml"), "run webmap discover --toml on the"),
     ],
 )
 def test_what_only_the_robots_computer_can_do_is_refused_with_a_sentence(
-    arguments, words
+    arguments, message
 ):
-    said = webmap(*arguments)
-    assert said.returncode == 2
-    assert words in said.stderr
+    result = webmap(*arguments)
+    assert result.returncode == 2
+    assert message in result.stderr

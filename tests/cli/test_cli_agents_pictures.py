@@ -52,7 +52,7 @@ drives = ["bay3"]
 
 @pytest.fixture
 def camera():
-    """A camera on the web, in a thread of its own."""
+    """A camera server in a separate thread."""
     thread = LoopThread("camera")
     server = CameraServer()
     thread.call(server.__aenter__())
@@ -66,7 +66,7 @@ def as_user(name, password):
 
 
 class Display:
-    """A display without pages, as a process of its own."""
+    """A display without pages, as a separate process."""
 
     def __init__(self, process):
         self._process = process
@@ -111,7 +111,7 @@ def display(router, **environment):
 def wait_for(check, within=30.0):
     deadline = time.monotonic() + within
     while not check():
-        assert time.monotonic() < deadline, "it did not happen"
+        assert time.monotonic() < deadline, "the condition did not become true"
         time.sleep(0.02)
 
 
@@ -147,7 +147,7 @@ def test_displays_show_cameras_and_the_picture_that_only_the_agent_reaches(
                     f"Rear at {gone} through the agent bay3: it answers 404: there is "
                     "nothing at this address"
                 )
-            # Once for both, by the agent, which alone has the password.
+            # The agent, which has the password, opens one stream for both displays.
             streams = [head for head in camera.asked if "/stream" in head]
             assert (len(streams), "Authorization: Basic " in streams[0]) == (1, True)
             reds = {ann: set(), ben: set()}
@@ -158,7 +158,7 @@ def test_displays_show_cameras_and_the_picture_that_only_the_agent_reaches(
                 return min(map(len, reds.values())) > 5
 
             wait_for(both_get_pictures)
-            # A camera without new pictures shows: their age grows.
+            # A frozen camera is detected by the growing age of its picture.
             camera.frozen = True
             wait_for(lambda: ann.front[1] > 1.0 and ben.front[1] > 1.0)
             camera.frozen = False

@@ -1,4 +1,4 @@
-"""A program on a display drives the robot of an agent: with everything real."""
+"""A program on a display drives the robot of an agent, without fakes."""
 
 import json
 import os
@@ -18,7 +18,7 @@ PROGRAM = Path(__file__).with_name("program_of_agents.py")
 
 @pytest.fixture
 def run(tmp_path):
-    """Run the program at an agent that is started with some options."""
+    """Run the program with an agent that has some options."""
 
     def run(*options):
         with (

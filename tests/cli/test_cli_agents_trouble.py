@@ -1,4 +1,4 @@
-"""What an agent or a display prints when the other side is not as expected."""
+"""The errors that an agent or a display prints when the other side is wrong."""
 
 import socket
 import subprocess
@@ -40,7 +40,7 @@ def lines_of(*arguments):
 
 @contextmanager
 def beacons(router, name, beacon):
-    """Let an agent show that it is there, again and again."""
+    """Publish the beacon of an agent repeatedly."""
     ended = threading.Event()
     peer = Peer(router, User())
     peer.start()
@@ -93,8 +93,10 @@ def test_a_router_that_accepts_and_never_answers_is_no_zenoh_router(command):
     with socket.create_server(("127.0.0.1", 0)) as server:
         host, port = server.getsockname()
         router = f"zenoh://{host}:{port}"
-        with lines_of(*(word.format(router=router) for word in command)) as lines:
-            words = f"cannot reach the router at tcp/{host}:{port}"
+        with lines_of(
+            *(argument.format(router=router) for argument in command)
+        ) as lines:
+            message = f"cannot reach the router at tcp/{host}:{port}"
             assert any(
-                words in line and "it is not a Zenoh router" in line for line in lines
+                message in line and "it is not a Zenoh router" in line for line in lines
             )

@@ -14,7 +14,7 @@ from webmap.cli import bad_link
 
 @contextmanager
 def echo():
-    """A server that sends back what it receives, for one client; its address."""
+    """A server that echoes the data of one client; yield its address."""
     with socket.create_server(("127.0.0.1", 0)) as listener:
 
         def serve():
@@ -61,7 +61,9 @@ def test_jitter_is_added_at_random():
         connected(url) as client,
     ):
         took = [seconds_for_an_answer(client) for _ in range(10)]
-    assert sum(took) / 10 > 0.02, "40 ms on average, both ways together"
+    assert sum(took) / 10 > 0.02, (
+        "the delay is 40 ms on average, for both ways together"
+    )
 
 
 def test_a_stall_holds_the_link_again_and_again(monkeypatch):
@@ -74,7 +76,7 @@ def test_a_stall_holds_the_link_again_and_again(monkeypatch):
         stalls, deadline = 0, time.monotonic() + 20
         while stalls < 3:
             assert time.monotonic() < deadline
-            # A message that waits for the end of a stall began after its beginning.
+            # A message that waits for the end of a stall was sent during the stall.
             stalls += seconds_for_an_answer(client) > 0.15
 
 

@@ -26,9 +26,9 @@ def webmap(*arguments):
 def test_the_fleet_file_of_discover_passes_the_check_and_runs(ros1, ros2, tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text(webmap("discover", "--toml", ros1, ros2).stdout)
-    said = webmap("check", file)
-    assert said.returncode == 0, said.stderr
-    assert said.stdout == f"{file}: 3 robots behind 2 bridges, no mistakes\n"
+    result = webmap("check", file)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == f"{file}: 3 robots behind 2 bridges, no mistakes\n"
     with subprocess.Popen(
         [sys.executable, "-m", "webmap", "run", file, "--port", "0", "--no-browser"],
         stdout=subprocess.PIPE,
@@ -49,15 +49,15 @@ def test_check_and_run_refuse_an_invalid_fleet_file_with_exit_code_2(tmp_path):
     file = tmp_path / "fleet.toml"
     file.write_text('[bridges]\na = "ws://a"\n[[robots]]\nnmae = "Bob"\n')
     for command in ("check", "run"):
-        said = run_inside(command, file)
-        assert said.returncode == 2
-        assert f'{file}:4: robots[0].nmae: there is no key "nmae" here' in said.stderr
-        assert said.stdout == ""
-        assert "Traceback" not in said.stderr
+        result = run_inside(command, file)
+        assert result.returncode == 2
+        assert f'{file}:4: robots[0].nmae: there is no key "nmae" here' in result.stderr
+        assert result.stdout == ""
+        assert "Traceback" not in result.stderr
 
 
 def test_check_refuses_a_pipe_instead_of_a_file(tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    said = run_inside("check", tmp_path / "pipe")
-    assert said.returncode == 2
-    assert f"{tmp_path / 'pipe'}: expected a file, got a pipe" in said.stderr
+    result = run_inside("check", tmp_path / "pipe")
+    assert result.returncode == 2
+    assert f"{tmp_path / 'pipe'}: expected a file, got a pipe" in result.stderr

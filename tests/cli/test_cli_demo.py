@@ -1,4 +1,4 @@
-"""``webmap demo``: its robots are those that the simulator plays."""
+"""``webmap demo``: its robots match the robots of the simulator."""
 
 import asyncio
 from types import SimpleNamespace
@@ -105,7 +105,7 @@ def test_errands_are_paused_again_and_again_while_webmap_has_the_robot(
         await asyncio.sleep(0)
         assert bridge.sent == 0
         report(**change)
-        report(**change)  # a second report begins no second repetition
+        report(**change)  # a second report does not start a second repetition
         async with asyncio.timeout(10):
             while bridge.sent < 4:
                 await asyncio.sleep(0.01)

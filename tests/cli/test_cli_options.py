@@ -1,4 +1,4 @@
-"""``--topics``, for bridges that cannot say which topics there are."""
+"""``--topics``, for bridges that cannot list their topics."""
 
 import subprocess
 import sys
@@ -26,26 +26,26 @@ def webmap(*arguments, stdin=""):
 
 def test_discover_finds_robots_of_a_topic_list_without_the_bridge():
     command = ("discover", "ws://127.0.0.1:1", "--topics", "-", "--toml")
-    said = run_inside(*command, stdin=TOPICS)
-    assert said.returncode == 0, said.stderr
-    (robot,) = tomllib.loads(said.stdout)["robots"]
+    result = run_inside(*command, stdin=TOPICS)
+    assert result.returncode == 0, result.stderr
+    (robot,) = tomllib.loads(result.stdout)["robots"]
     assert robot["name"] == "bob"
-    assert "/bob/odom" in said.stdout
+    assert "/bob/odom" in result.stdout
 
 
 def test_an_invalid_line_of_a_topic_list_is_reported_with_its_number():
-    said = webmap("discover", "ws://127.0.0.1:1", "--topics", "-", stdin="/odom\n")
-    assert said.returncode == 2
-    assert said.stderr.startswith("Error: <stdin>, line 1: got '/odom'; expected a")
+    result = webmap("discover", "ws://127.0.0.1:1", "--topics", "-", stdin="/odom\n")
+    assert result.returncode == 2
+    assert result.stderr.startswith("Error: <stdin>, line 1: got '/odom'; expected a")
 
 
 def test_a_topic_list_with_two_bridges_is_refused(tmp_path):
     topics = tmp_path / "topics.txt"
     topics.write_text(TOPICS)
     for command in ("discover", "doctor"):
-        said = run_inside(command, "ws://a:1", "ws://b:1", "--topics", str(topics))
-        assert said.returncode == 2
-        assert "one bridge, got 2 bridges" in said.stderr
+        result = run_inside(command, "ws://a:1", "ws://b:1", "--topics", str(topics))
+        assert result.returncode == 2
+        assert "one bridge, got 2 bridges" in result.stderr
 
 
 def test_help_shows_each_example_on_its_own_line():
@@ -54,25 +54,27 @@ def test_help_shows_each_example_on_its_own_line():
 
 
 def test_an_endless_topic_list_is_refused():
-    said = webmap("discover", "ws://127.0.0.1:1", "--topics", "/dev/zero")
-    assert said.returncode == 2
-    assert "has more than 4194304 characters, expected a list of topics" in said.stderr
+    result = webmap("discover", "ws://127.0.0.1:1", "--topics", "/dev/zero")
+    assert result.returncode == 2
+    assert (
+        "has more than 4194304 characters, expected a list of topics" in result.stderr
+    )
 
 
 def test_a_topic_list_that_is_not_utf_8_is_refused(tmp_path):
     (tmp_path / "list").write_bytes(b"/odom \xff")
-    said = webmap("discover", "ws://127.0.0.1:1", "--topics", str(tmp_path / "list"))
-    assert said.returncode == 2
-    assert "list is not UTF-8" in said.stderr
+    result = webmap("discover", "ws://127.0.0.1:1", "--topics", str(tmp_path / "list"))
+    assert result.returncode == 2
+    assert "list is not UTF-8" in result.stderr
 
 
 def test_a_device_instead_of_a_program_is_refused():
-    said = run_inside("run", "/dev/zero", "--no-browser")
-    assert said.returncode == 2
-    assert "/dev/zero: expected a file or a folder, got a device" in said.stderr
+    result = run_inside("run", "/dev/zero", "--no-browser")
+    assert result.returncode == 2
+    assert "/dev/zero: expected a file or a folder, got a device" in result.stderr
 
 
-# What a list says.
+# The content of a list.
 
 ROS2 = """\
 /cmd_vel [geometry_msgs/msg/TwistStamped, geometry_msgs/msg/Twist]
@@ -109,7 +111,7 @@ def test_topic_lists_printed_by_ros_or_written_by_hand_are_read(text, types):
 
 
 @pytest.mark.parametrize(
-    ("text", "words"),
+    ("text", "message"),
     [
         ("/odom nav_msgs/Odometry\n/odom\n", "list.txt, line 2: got '/odom'; expected"),
         ("odom nav_msgs/Odometry", "line 1: got 'odom nav_msgs/Odometry'"),
@@ -121,10 +123,10 @@ def test_topic_lists_printed_by_ros_or_written_by_hand_are_read(text, types):
         ("\x00\xff" * 100, "line 1"),
     ],
 )
-def test_the_error_for_an_invalid_topic_list_explains_the_mistake(text, words):
+def test_the_error_for_an_invalid_topic_list_explains_the_mistake(text, message):
     with pytest.raises(ConfigError) as caught:
         parse_topics(text, "list.txt")
-    assert words in str(caught.value)
+    assert message in str(caught.value)
     assert len(str(caught.value)) < 400
 
 

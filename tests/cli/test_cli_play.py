@@ -1,4 +1,4 @@
-"""``webmap play``: what is said of files that cannot be played, and without rosbags."""
+"""``webmap play``: errors for files that cannot be played, and without rosbags."""
 
 import signal
 import socket
@@ -41,9 +41,9 @@ def run(*arguments):
     )
 
 
-def assert_refused(done, words):
+def assert_refused(done, message):
     assert done.returncode == 2, done.stderr
-    assert words in done.stderr
+    assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert done.stdout == ""
 
@@ -63,7 +63,7 @@ def test_a_truncated_file_prints_one_error_line_and_exits_with_code_2(bag):
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("options", "message"),
     [
         (("--start", "5"), "is 2.0 s long, so it cannot be played from 5 s on"),
         (("--rate", "0"), "--rate"),
@@ -71,8 +71,8 @@ def test_a_truncated_file_prints_one_error_line_and_exits_with_code_2(bag):
         (("--rate", "1e9"), "0.001<=x<=1000"),
     ],
 )
-def test_an_invalid_start_or_rate_exits_with_code_2(bag, options, words):
-    assert_refused(run_inside("play", bag, *options), words)
+def test_an_invalid_start_or_rate_exits_with_code_2(bag, options, message):
+    assert_refused(run_inside("play", bag, *options), message)
 
 
 def test_a_command_to_an_ended_replay_prints_a_notice_and_raises_no_error(bag, capfd):
@@ -104,19 +104,19 @@ def test_play_does_not_use_the_velocity_topic_of_a_recorded_robot(bag):
         try:
             assert "WebMap is ready at " in process.stdout.readline()
             process.send_signal(signal.SIGINT)
-            said = process.stderr.read()
-            assert process.wait(15) == 0, said
+            printed = process.stderr.read()
+            assert process.wait(15) == 0, printed
         finally:
             process.kill()
-    (found,) = [line for line in said.splitlines() if line.startswith("Found ")]
+    (found,) = [line for line in printed.splitlines() if line.startswith("Found ")]
     assert found.startswith("Found office: odometry /odom")
     assert "cmd_vel" not in found
 
 
 def test_a_bridge_port_in_use_prints_an_error_and_exits_with_code_2(bag):
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        port = listener.getsockname()[1]
         done = run(bag, "--bridge-port", port)
     assert_refused(done, f"port {port} on 127.0.0.1 is in use")

@@ -1,4 +1,4 @@
-"""A recording in a real browser: it is seen, it says what it is, and nobody drives."""
+"""A recording in a real browser is shown and labelled, and cannot be driven."""
 
 import re
 
@@ -64,13 +64,13 @@ def test_a_looping_recording_causes_no_problems_or_notices(chromium, tmp_path):
         page.locator("#robots .row").click()
         page.evaluate(
             """() => {
-              window.said = new Set();
+              window.seen = new Set();
               setInterval(() => {
                 const problems = document.querySelector("#card .problems").textContent;
                 const notices = document.querySelector(".webmap-notices")?.textContent;
-                for (const text of [problems, notices]) if (text) window.said.add(text);
+                for (const text of [problems, notices]) if (text) window.seen.add(text);
               }, 50);
             }"""
         )
         page.wait_for_timeout(5000)
-        assert page.evaluate("[...window.said]") == []
+        assert page.evaluate("[...window.seen]") == []

@@ -1,4 +1,4 @@
-"""The player bar in a real browser: by mouse, by keyboard, by touch, and its limits."""
+"""The player bar in a real browser, with mouse, keyboard and touch, and its limits."""
 
 import re
 from contextlib import contextmanager
@@ -22,7 +22,7 @@ FRAME = """() => {
 
 @pytest.fixture
 def bag(tmp_path):
-    """A minute in which the robot is at (position in seconds, 0), with three events."""
+    """A minute with three events; at time t the robot is at x = t."""
     made = Made("ros2")
     goal = made.message(POSE, pose={"position": {"x": 3.0}, "orientation": {"w": 1.0}})
     moments = [step / 5 for step in range(301)]

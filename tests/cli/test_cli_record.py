@@ -1,4 +1,4 @@
-"""``webmap record`` and ``webmap play``: what was said once is said again."""
+"""``webmap record`` and ``webmap play``: recorded messages are published again."""
 
 import contextlib
 import json
@@ -23,17 +23,17 @@ pytestmark = pytest.mark.slow
 COMMAND = [sys.executable, "-m", "webmap", "record"]
 
 
-class Ear:
-    """Hears topics behind a bridge as any client does, in a thread of its own."""
+class Subscriber:
+    """Subscribes to topics of a bridge like any client, in a separate thread."""
 
     def __init__(self, socket, *topics):
         self.received = {topic: [] for topic in topics}
         self._socket = socket
         for topic in topics:
             socket.send(json.dumps({"op": "subscribe", "topic": topic}))
-        threading.Thread(target=self._hear, daemon=True).start()
+        threading.Thread(target=self._receive, daemon=True).start()
 
-    def _hear(self):
+    def _receive(self):
         with contextlib.suppress(ConnectionClosed):
             for frame in self._socket:
                 operation = json.loads(frame)
@@ -49,19 +49,19 @@ class Ear:
 
 
 @contextlib.contextmanager
-def hearing(url, *topics):
+def subscribed(url, *topics):
     with connect(url, proxy=None, max_size=None) as socket:
-        yield Ear(socket, *topics)
+        yield Subscriber(socket, *topics)
 
 
 def without_times(message):
-    """A message but for its stamp, and what ROS 1 counts its messages by."""
+    """Return a message without its time stamp and without the sequence of ROS 1."""
     header = {"frame_id": message["header"]["frame_id"]}
     return json.dumps(message | {"header": header})
 
 
 def age(message):
-    """How many seconds ago a message says that it was."""
+    """Return the age of a message by its time stamp, in seconds."""
     whole, rest = (
         message["header"]["stamp"].get(ros1, message["header"]["stamp"].get(ros2))
         for ros1, ros2 in (("secs", "sec"), ("nsecs", "nanosec"))
@@ -75,13 +75,14 @@ def test_a_played_recording_repeats_the_messages_of_the_robot(tmp_path, dialect)
     odom, scan = "/robot_0/odom", "/robot_0/base_scan"
     received = ("--robots", "1", "--wander", "--dialect", dialect)
     bag = tmp_path / ("drive.bag" if dialect == "ros1" else "drive")
-    with simulator(*received) as url, hearing(url, odom, scan) as ear:
-        ear.wait_for(scan, 1)
+    with simulator(*received) as url, subscribed(url, odom, scan) as subscriber:
+        subscriber.wait_for(scan, 1)
         done = run(url, "--out", bag, "--duration", "2")
         assert done.returncode == 0, done.stderr
-        ear.wait_for(scan, len(ear.received[scan]) + 2)
-        said = {
-            topic: {*map(without_times, ear.received[topic])} for topic in ear.received
+        subscriber.wait_for(scan, len(subscriber.received[scan]) + 2)
+        published = {
+            topic: {*map(without_times, subscriber.received[topic])}
+            for topic in subscriber.received
         }
     lasted = r"Recorded \d+ messages of \d+ topics in [2-9]\.\d s to "
     assert re.search(lasted, done.stderr)
@@ -89,12 +90,12 @@ def test_a_played_recording_repeats_the_messages_of_the_robot(tmp_path, dialect)
     kept = ("/map", "/tf_static")
     with (
         replay("--loop", bag) as (played, _),
-        hearing(played, odom, scan, "/tf", *kept) as again,
+        subscribed(played, odom, scan, "/tf", *kept) as again,
     ):
         for message in again.wait_for(odom, 5):
-            assert without_times(message) in said[odom]
+            assert without_times(message) in published[odom]
         for message in again.wait_for(scan, 3):
-            assert without_times(message) in said[scan]
+            assert without_times(message) in published[scan]
         assert 0 <= age(again.wait_for(odom, 6)[-1]) < 2
         assert len(again.wait_for("/map", 1)[0]["data"]) > 1000
         assert again.wait_for("/tf_static", 1)
@@ -122,15 +123,15 @@ def test_record_stores_only_the_named_topics_until_a_signal(ros2, tmp_path):
     ):
         assert process.stdout.readline() == f"Recording {ros2} to {bag}\n"
         assert "Waiting for: /later" in process.stderr.readline()
-        with hearing(ros2, "/odom") as ear:
-            ear.wait_for("/odom", 40)  # the recorder's own link may come later
+        with subscribed(ros2, "/odom") as subscriber:
+            subscriber.wait_for("/odom", 40)  # the recorder may subscribe later
         process.send_signal(signal.SIGINT)
-        said = process.stderr.read()
-        assert process.wait(15) == 0, said
+        printed = process.stderr.read()
+        assert process.wait(15) == 0, printed
     with AnyReader([bag]) as reader:
         assert {c.topic for c in reader.connections} == {"/odom"}
         assert reader.message_count > 3
-    assert re.search(r"Recorded \d+ messages of 1 topic in \d+\.\d s to ", said)
+    assert re.search(r"Recorded \d+ messages of 1 topic in \d+\.\d s to ", printed)
 
 
 def run(*arguments):
@@ -151,9 +152,9 @@ def test_a_named_topic_without_a_known_type_is_refused(tmp_path):
     assert_refused(done, "the type of /x is unknown: give it with --type")
 
 
-def assert_refused(done, words):
+def assert_refused(done, message):
     assert done.returncode == 2, done.stderr
-    assert words in done.stderr
+    assert message in done.stderr
     assert "Traceback" not in done.stderr
     assert done.stdout == ""
 
@@ -166,7 +167,7 @@ def test_record_does_not_overwrite_an_existing_bag(ros1, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
         (("ws://127.0.0.1:1", "--wait", "0"), "cannot reach the rosbridge"),
         (("http://robot:9090",), "ws://"),
@@ -180,10 +181,10 @@ def test_record_does_not_overwrite_an_existing_bag(ros1, tmp_path):
     ],
 )
 def test_an_invalid_argument_of_record_is_refused_and_no_bag_is_created(
-    arguments, words, tmp_path
+    arguments, message, tmp_path
 ):
     done = run_inside("record", *arguments, "--out", tmp_path / "bag")
-    assert_refused(done, words)
+    assert_refused(done, message)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -200,4 +201,4 @@ def test_compressed_images_received_in_cbor_are_recorded_completely(tmp_path, di
             for connection, _, raw in reader.messages()
         ]
     assert pictures
-    assert bytes(pictures[0].data).startswith(b"\xff\xd8\xff"), "a JPEG"
+    assert bytes(pictures[0].data).startswith(b"\xff\xd8\xff"), "the data is a JPEG"

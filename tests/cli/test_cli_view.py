@@ -1,4 +1,4 @@
-"""``webmap view``: robots are found, given, and come later."""
+"""``webmap view``: robots that are found, given, or appear later."""
 
 import asyncio
 import re
@@ -34,28 +34,28 @@ TOPICS = {"/odom": "nav_msgs/Odometry", "/cmd_vel": "geometry_msgs/Twist"}
 
 
 class View:
-    """A view that runs, and all that it said on standard error."""
+    """A running view, and all that it printed on standard error."""
 
     def __init__(self, process):
-        self.process, self.said = process, ""
+        self.process, self.printed = process, ""
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
     def _read(self):
         for line in self.process.stderr:
-            self.said += line
+            self.printed += line
 
     def read_all(self):
-        """Wait until all is read that it said, before its pipe is closed."""
+        """Wait until all output is read, before the pipe is closed."""
         self._reader.join(10)
 
     def wait_for(self, pattern, within=20.0):
         deadline = time.monotonic() + within
         while time.monotonic() < deadline:
-            if re.search(pattern, self.said):
+            if re.search(pattern, self.printed):
                 return
             time.sleep(0.05)
-        raise AssertionError(f"never said {pattern!r}, but:\n{self.said}")
+        raise AssertionError(f"never printed {pattern!r}, but:\n{self.printed}")
 
 
 @contextmanager
@@ -72,7 +72,7 @@ def viewing(*arguments):
             process.send_signal(signal.SIGINT)
             assert process.wait(15) == 0
             view.read_all()
-            assert process.stdout.read() == "", "nothing but the one line"
+            assert process.stdout.read() == "", "only the one line is printed"
         finally:
             process.kill()
 
@@ -88,7 +88,7 @@ def test_view_finds_robots_of_ros_1_and_ros_2(ros1, ros2):
 def test_view_with_a_robot_option_discovers_no_other_robots(ros1):
     with viewing(ros1, "--robot", "Bob:/odom:/cmd_vel:/scan") as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
-    assert "Found" not in view.said
+    assert "Found" not in view.printed
 
 
 def test_a_robot_option_replaces_the_discovered_robot_with_the_same_topics(ros1):
@@ -96,7 +96,7 @@ def test_a_robot_option_replaces_the_discovered_robot_with_the_same_topics(ros1)
     with viewing(ros1, "--discover", "--robot", given) as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
         view.wait_for("Found robot_1")
-    assert "Found robot_0" not in view.said
+    assert "Found robot_0" not in view.printed
 
 
 def test_view_opens_the_page_without_a_bridge_and_robots_appear_later(later_port):
@@ -115,16 +115,16 @@ def test_a_robot_option_replaces_a_robot_of_a_bridge_that_starts_later(
     with viewing(f"ws://127.0.0.1:{later_port}", "--wait", "0.5", *given) as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
         with simulator("--port", str(later_port), "--robots", "2"):
-            # Both settle at one look, and are reported in the order of their names.
+            # Both robots are found at the same look, and reported in order of name.
             view.wait_for(r"A robot appeared behind ws://.*: robot_1: odometry", 40)
-    assert "robot_0: odometry" not in view.said
+    assert "robot_0: odometry" not in view.printed
 
 
 def test_view_without_rosapi_opens_the_page_and_advises_robot_options():
     from websockets.sync.client import connect
 
     with simulator("--port", "0", "--dialect", "ros2") as url:
-        with connect(url, proxy=None) as other:  # as ROS 2 has it, this ends rosapi
+        with connect(url, proxy=None) as other:  # in ROS 2, this call ends rosapi
             other.send('{"op":"call_service","service":"/rosapi/message_details",'
                        '"args":{"type":"nav_msgs/Odometry"}}')  # fmt: skip
         with viewing(url) as view:
@@ -147,7 +147,7 @@ def test_a_signal_ends_the_wait_for_a_bridge_with_exit_code_0(sig):
         assert process.wait(15) == 0
         view.read_all()
         assert process.stdout.read() == ""
-    assert "Traceback" not in view.said
+    assert "Traceback" not in view.printed
 
 
 @pytest.fixture
@@ -188,7 +188,7 @@ def test_a_new_robot_appears_on_open_pages_and_on_later_pages(bridge):
     early = FakePage()
     console.opened(early)
     late.add(Candidate(bridge, found()))
-    for topic in ("/map", "/other/map", "/map"):  # the first one comes again
+    for topic in ("/map", "/other/map", "/map"):  # the first map appears again
         late.came(News(found(**{topic: GRID}), ("map",)), bridge)
     after = FakePage()
     console.opened(after)
@@ -209,10 +209,10 @@ def test_a_new_robot_gets_a_unique_name(bridge, capsys):
     came(News(robot), bridge)
     assert late.robots[0].name == "bob (bob:9090)"
     assert late.robots[0].motion.spec().stops_within == 0.25
-    said = capsys.readouterr()
-    assert said.out == ""
-    words = "A robot appeared behind ws://bob:9090: bob (bob:9090): odometry /odom"
-    assert words in said.err
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    message = "A robot appeared behind ws://bob:9090: bob (bob:9090): odometry /odom"
+    assert message in printed.err
     late.robots[0].destroy()
 
 
@@ -290,8 +290,8 @@ def test_cameras_that_appear_later_are_used_up_to_four(bridge, capsys):
     look(3)
     look(6)
     assert names() == ["Camera", "Camera 2", "Camera 3", "Camera 4"]
-    said = capsys.readouterr().err.splitlines()[1:]
-    assert said == [
+    lines = capsys.readouterr().err.splitlines()[1:]
+    assert lines == [
         "bob has new topics: camera /cam0/image_raw/compressed",
         "bob has new topics: camera /cam1/image_raw/compressed, "
         "camera /cam2/image_raw/compressed",
@@ -329,9 +329,9 @@ STAMPED = "geometry_msgs/msg/TwistStamped"
 
 
 def fleet_of(bridge, *given, topics, settings=()):
-    """What is shown of a list of topics, where there is no rosapi to ask."""
-    said = Overrides([parse_setting(text) for text in settings])
-    return find_fleet([bridge], given, wait=0.0, topics=topics, overrides=said)
+    """Return the fleet of a list of topics, without rosapi."""
+    overrides = Overrides([parse_setting(text) for text in settings])
+    return find_fleet([bridge], given, wait=0.0, topics=topics, overrides=overrides)
 
 
 def test_a_robot_from_a_topic_list_is_driven_with_the_listed_velocity_type(bridge):
@@ -403,11 +403,11 @@ RICH = {
 
 
 def drawing_of(bridge, topics, *settings):
-    """Draw what is found of one robot; return it, the console and what is drawn."""
+    """Draw the layers found for one robot; return the robot, the console and layers."""
     console = Console()
-    said = Overrides([parse_setting(text) for text in settings])
-    late = ShownRobots(console, said)
-    (found_,) = said.findings(bridge.url, discover(topics, "bob")).robots
+    overrides = Overrides([parse_setting(text) for text in settings])
+    late = ShownRobots(console, overrides)
+    (found_,) = overrides.findings(bridge.url, discover(topics, "bob")).robots
     late.add(Candidate(bridge, found_))
     layers = LookingForLayers(bridge, late)
     asyncio.run(layers.take(topics))
@@ -432,7 +432,9 @@ def test_all_scans_maps_and_paths_are_drawn_once(bridge):
     ]
     assert list(console.grids) == [(bridge, "/map")]
     asyncio.run(layers.take(RICH | {"/a/third": SCAN}))
-    assert topics_of(robot, "LaserScanner")[2:] == ["/a/third"], "one that came later"
+    assert topics_of(robot, "LaserScanner")[2:] == ["/a/third"], (
+        "the topic appeared later"
+    )
     robot.destroy()
 
 
@@ -448,21 +450,21 @@ def test_each_camera_above_the_limit_is_reported_once(bridge, capsys):
     def cameras(count):
         return {f"/a/cam{n}/image_raw/compressed": IMAGE for n in range(count)}
 
-    def said():
+    def reports():
         return [line for line in capsys.readouterr().err.splitlines() if "cam" in line]
 
     robot, _, layers = drawing_of(bridge, RICH | cameras(6))
-    (line,) = said()
+    (line,) = reports()
     assert line == (
         "a: not drawn, beyond the limit for their kind: "
         "/a/cam4/image_raw/compressed, /a/cam5/image_raw/compressed"
     )
     asyncio.run(layers.take(RICH | cameras(6)))
-    assert said() == []
+    assert reports() == []
     asyncio.run(layers.take(RICH | cameras(7)))
-    assert said() == [
+    assert reports() == [
         "a: not drawn, beyond the limit for their kind: /a/cam6/image_raw/compressed"
-    ], "one that came later"
+    ], "the topic appeared later"
     robot.destroy()
 
 
@@ -478,7 +480,7 @@ def test_paths_above_the_limit_are_reported_once(bridge, capsys):
     robot, _, layers = drawing_of(bridge, many)
     asyncio.run(layers.take(many))
     assert len(topics_of(robot, "Path")) == 6
-    said = [line for line in capsys.readouterr().err.splitlines() if "limit" in line]
-    assert len(said) == 1
-    assert "a: not drawn, beyond the limit for their kind: /a/path_5" in said[0]
+    lines = [line for line in capsys.readouterr().err.splitlines() if "limit" in line]
+    assert len(lines) == 1
+    assert "a: not drawn, beyond the limit for their kind: /a/path_5" in lines[0]
     robot.destroy()

@@ -1,4 +1,4 @@
-"""What was found, and what comes later, in a real browser."""
+"""Robots that are found at once or later, in a real browser."""
 
 import subprocess
 import sys
@@ -39,7 +39,9 @@ def test_the_page_shows_a_robot_option_with_the_layers_of_its_namespace(chromium
         ):
             expect(page.locator(drawn).first).to_be_attached(timeout=15_000)
         assert page.locator("#robots .row .name").all_inner_texts() == ["Bob"]
-        assert page.locator(".laserscan").count() == 0, "it was told to have none"
+        assert page.locator(".laserscan").count() == 0, (
+            "the option gives the robot no scan"
+        )
 
 
 def test_the_page_draws_the_layers_of_a_topic_list_without_rosapi(chromium, tmp_path):
@@ -49,7 +51,7 @@ def test_the_page_draws_the_layers_of_a_topic_list_without_rosapi(chromium, tmp_
         "/local_costmap/costmap nav_msgs/msg/OccupancyGrid\n"
     )
     with simulator("--port", "0", "--dialect", "ros2", "--flat") as url:
-        with connect(url, proxy=None) as other:  # as ROS 2 has it, this ends rosapi
+        with connect(url, proxy=None) as other:  # in ROS 2, this call ends rosapi
             other.send('{"op":"call_service","service":"/rosapi/message_details",'
                        '"args":{"type":"nav_msgs/Odometry"}}')  # fmt: skip
         with shown(chromium, "view", url, "--topics", str(listed)) as page:

@@ -26,7 +26,7 @@ SIZES = {
 
 @dataclass
 class Demo:
-    """A demo that runs, and the address of its page."""
+    """A running demo and the URL of its page."""
 
     url: str
     process: subprocess.Popen
@@ -75,9 +75,9 @@ def halt(demo: Demo) -> Iterator[psutil.Process]:
 
 @pytest.fixture
 def open_console(chromium: Browser, demo: Demo):
-    """Open the console, and fail on what the browser complains about.
+    """Open the console, and fail on errors and warnings of the browser.
 
-    Patterns in ``open_console.allowed`` are no failure.
+    Messages that match ``open_console.allowed`` are not a failure.
     """
     contexts, complaints = [], Complaints()
 
@@ -87,7 +87,7 @@ def open_console(chromium: Browser, demo: Demo):
         complaints.listen(context)
         page = context.new_page()
         page.goto(demo.url)
-        # A phone has the list in the sheet, which is closed at first.
+        # On a phone, the list is in the sheet, which is closed at first.
         expect(page.locator("#robots .row")).to_have_count(demo.robots)
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(demo.robots)
         expect(page.locator("#link")).to_have_attribute("data-link", "open")

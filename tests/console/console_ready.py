@@ -1,4 +1,4 @@
-"""When a page of the console can be used, and what several tests do with one."""
+"""Wait until a page of the console is ready, and steps that several tests share."""
 
 import re
 import time
@@ -11,14 +11,14 @@ READY = """async () => {
   const styles = [...document.querySelectorAll("link[rel=stylesheet]")];
   return parts.every(({ part }) => part) && styles.every(({ sheet }) => sheet);
 }"""
-"""Whether every module of the page is there and listens, and every style sheet."""
+"""Whether every module of the page is attached and every style sheet is loaded."""
 
 
 def wait_until_ready(page: Page) -> None:
-    """Wait for what the page loads once it knows its modules, each on its own."""
+    """Wait until the page has loaded all its modules and style sheets."""
     deadline = time.monotonic() + 30
     while not page.evaluate(READY):
-        assert time.monotonic() < deadline, "a module of the page does not come"
+        assert time.monotonic() < deadline, "a module of the page was not loaded"
         page.wait_for_timeout(50)
 
 
@@ -36,21 +36,21 @@ PLACES = f"""() => {{
     .filter((at) => document.elementFromPoint(...at)?.closest("svg.webmap"))
     .sort(([a, b], [c, d]) => Math.hypot(c - x, d - y) - Math.hypot(a - x, b - y));
 }}"""
-"""Places of the window beside other robots, where the map is to be seen; the farthest
-from the selected robot first."""
+"""Places of the window beside other robots where the map is visible. The place farthest
+from the selected robot is first."""
 
 NAVIGATING = re.compile("Navigating to goal.*to go")
 
 
 def send_away(page: Page) -> None:
-    """Send the selected robot to beside another one, far enough to be seen."""
+    """Send the selected robot to a place beside a robot that is far away."""
     goal = page.locator("#card .goal")
     without_path: set[tuple[float, ...]] = set()
-    # A page that is too busy sends nothing, and some places have no path to them.
+    # A busy page may send nothing, and some places cannot be reached.
     for _ in range(12):
         page.get_by_role("button", name="Send goal…").click()
         expect(page.locator(".webmap-goal-word")).to_contain_text("Press on the map")
-        # Now, as the words have moved the panel, and robots may move too.
+        # Read the places now: the text moved the panel, and robots may move, too.
         places = page.evaluate(PLACES)
         x, y = next(place for place in places if tuple(place) not in without_path)
         page.mouse.click(x, y)
@@ -83,11 +83,11 @@ def shown_state(page: Page):
     return page.locator("#card .state span:not(.old):visible").first
 
 
-def same_word(page: Page, word: str | re.Pattern, patience: float = 15.0) -> None:
-    """The bar, the card and the list have the same words for the selected robot."""
+def expect_state(page: Page, text: str | re.Pattern, patience: float = 15.0) -> None:
+    """Check that the bar, the card and the list show a state of the selected robot."""
     line = page.locator("#robots .row:has([aria-pressed=true]) .state span:visible")
     for where in (title(page), shown_state(page), line.first):
-        expect(where).to_have_text(word, timeout=patience * 1000)
+        expect(where).to_have_text(text, timeout=patience * 1000)
 
 
 COVERED = """(e, reach) => {
@@ -99,13 +99,13 @@ COVERED = """(e, reach) => {
     .filter((hit) => hit === null || !e.contains(hit))
     .map((hit) => hit?.outerHTML.slice(0, 80) ?? "nothing");
 }"""
-"""What is hit in place of an element, at its middle and near its four edges."""
+"""The elements that cover an element at its middle or near its four edges."""
 
 
 def assert_free(what: Locator, reach: float = 0.9) -> None:
-    """See that nothing lies over a thing."""
+    """Check that no other element covers an element."""
     expect(what).to_be_in_viewport(ratio=0.99)
-    for _ in range(20):  # what was opened just now may still be laid out
+    for _ in range(20):  # the layout may still change after an opening
         covered = what.evaluate(COVERED, reach)
         if not covered:
             return

@@ -25,7 +25,7 @@ NAMES = [
 STATES = ["stopped", "stopped", "lost", "battery_low", "driven", "navigating"]
 
 GIVEN: dict[str, str] = {}
-"""The state of each robot that is not free, by its id."""
+"""The state of each robot that is not free, by the id of the robot."""
 
 
 def state(robot: webmap.Robot) -> RobotState:
@@ -44,14 +44,14 @@ GIVEN |= {robot.id: s for robot, s in zip(console.given, STATES, strict=False)}
 
 
 def place(index: int) -> tuple[float, float]:
-    """Return a place: of the first 20 robots apart, of the others close together."""
+    """Return the place of a robot: the first 20 are far apart, the others are close."""
     if index < 20:
         return 3.0 * (index % 5), 3.0 * (index // 5)
     return 18.0 + 0.2 * (index % 5), 4.0 + 0.2 * (index // 5)
 
 
 async def give_poses() -> None:
-    """Give every robot its pose, again and again, so that none is stale."""
+    """Give every robot its pose repeatedly, so that no pose is stale."""
     while True:
         for index, robot in enumerate(console.given):
             position = Vector3(*place(index), 0.0)
@@ -61,7 +61,7 @@ async def give_poses() -> None:
 
 
 class Poses:
-    """Begins to give poses when the first page opens; a module of maps."""
+    """A module of maps that starts to give poses when the first page opens."""
 
     task: asyncio.Task[None] | None = None
 

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { StopTestButton } from "../../src/webmap/console/card_actions.js";
 
-/** A drive that has one robot, and what was asked of it. */
+/** A drive with one robot, and the requests that it received. */
 function driveWith(report) {
   const asked = [];
   const robots = new Map([["r1", { robot: "r1", mine: true, ...report }]]);

@@ -35,7 +35,7 @@ console = open_console(bridges, configs, title="Strained")
 
 
 async def give_poses() -> None:
-    """Give every robot its pose, again and again."""
+    """Give every robot its pose repeatedly."""
     while True:
         now = time.monotonic()
         for index, robot in enumerate(console.given):
@@ -45,14 +45,14 @@ async def give_poses() -> None:
 
 
 async def remove() -> None:
-    """Remove the last robot from all pages, again and again."""
+    """Remove the last robot from all pages repeatedly."""
     while True:
         await asyncio.sleep(2.0)
         console.remove(console.given[-1])
 
 
 class Strain:
-    """Begins when the first page opens; a module of maps."""
+    """A module of maps that starts when the first page opens."""
 
     task: asyncio.Task[None] | None = None
 

@@ -1,4 +1,4 @@
-"""axe-core finds nothing to complain about, whatever is open."""
+"""axe-core finds no violation in any state of the console."""
 
 import re
 from pathlib import Path
@@ -20,11 +20,11 @@ RUN = """async () => {
 }"""
 
 OF_AXE = "Applying inline style"
-"""What the browser says of a style that axe-core tries to set for a moment."""
+"""The warning of the browser about a style that axe-core tries to set."""
 
 
 class Looker:
-    """Asks axe-core in one state after the other."""
+    """Runs axe-core in each state of the page."""
 
     def __init__(self, page: Page) -> None:
         self.page = page

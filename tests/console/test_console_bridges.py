@@ -1,4 +1,4 @@
-"""How it stands with the bridges, in words."""
+"""The text that shows the state of the bridges."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What an operator sees of the console and does with it."""
+"""The console as an operator sees and uses it."""
 
 import re
 from contextlib import contextmanager, suppress
@@ -47,7 +47,7 @@ def test_the_operator_sees_you_have_control_and_another_page_sees_has_control(
     mine, theirs = open_console(), open_console()
     row(mine, "Robot 2").click()
     you = mine.locator("#card .state .you:visible")
-    for _ in range(5):  # a page that is too busy is refused
+    for _ in range(5):  # commands of a busy page are refused
         mine.get_by_role("button", name="Take control of Robot 2").click()
         with suppress(AssertionError):
             expect(you).to_have_text("You have control", timeout=3000)
@@ -89,7 +89,7 @@ def test_every_button_input_and_summary_is_at_least_44_pixels_large(open_console
         page.locator("#sheet").click()
     row(page, "Robot 0").click()
     expect(page.locator("#card")).to_be_visible()
-    # A press on a label around a box is a press on the box.
+    # A press on the label of a checkbox is a press on the checkbox.
     small = page.evaluate(
         """() => [...document.querySelectorAll('button, input, summary')]
             .map(e => e.closest('label') ?? e)
@@ -207,13 +207,15 @@ WENT = """([x, y]) => {
 
 @contextmanager
 def driven(page: Page):
-    """Drive the selected robot by half a metre, whichever way is free, and further."""
+    """Drive the selected robot half a metre forward or back, and keep driving."""
     start = page.locator(".robot.selected").evaluate(
         "r => (({ e, f }) => [e, f])(r.transform.baseVal[0].matrix)"
     )
     page.locator("svg.webmap").focus()
-    for key in 4 * "ws":  # a page that is too busy drives nothing
-        page.wait_for_timeout(300)  # hands must be off before a press counts
+    for key in 4 * "ws":  # a busy page drives nothing
+        page.wait_for_timeout(
+            300
+        )  # the keys must be released for a while before a press
         page.keyboard.down(key)
         try:
             page.wait_for_function(WENT, arg=start, timeout=3000)
@@ -355,7 +357,7 @@ def test_route_points_can_be_added_by_touch_after_set_pose_in_between(
     floor = page.locator("image.floor.day").bounding_box()
 
     def tap_floor(count: int) -> None:
-        # In the lower left, which neither a panel nor the stick covers.
+        # In the lower left, where there is neither a panel nor the stick.
         page.touchscreen.tap(
             floor["x"] + 0.1 * count * floor["width"],
             floor["y"] + 0.8 * floor["height"],

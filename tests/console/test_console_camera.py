@@ -33,8 +33,8 @@ cameras = [
 
 
 @contextmanager
-def running(*command: str, says: str):
-    """Run a command of webmap until it has said where it is."""
+def running(*command: str, pattern: str):
+    """Run a command of webmap; yield the URL that it prints."""
     with subprocess.Popen(
         [sys.executable, "-m", "webmap", *command],
         stdout=subprocess.PIPE,
@@ -44,7 +44,7 @@ def running(*command: str, says: str):
     ) as process:
         try:
             line = process.stdout.readline()
-            found = re.search(says, line)
+            found = re.search(pattern, line)
             assert found, line
             yield found[1]
         finally:
@@ -54,7 +54,7 @@ def running(*command: str, says: str):
 
 @pytest.fixture(scope="module")
 def camera():
-    """A camera on the web, in a thread of its own."""
+    """A camera server in a separate thread."""
     thread = LoopThread("camera")
     server = CameraServer()
     thread.call(server.__aenter__())
@@ -65,14 +65,16 @@ def camera():
 
 @pytest.fixture(scope="module")
 def url(camera, tmp_path_factory):
-    with running("sim", "--robots", "1", "--port", "0", says=r"at (ws\S+)") as bridge:
+    with running(
+        "sim", "--robots", "1", "--port", "0", pattern=r"at (ws\S+)"
+    ) as bridge:
         fleet = tmp_path_factory.mktemp("fleet") / "fleet.toml"
         text = FLEET.format(
             bridge=bridge, front=camera.at("/stream"), rear=camera.at("/snapshot")
         )
         fleet.write_text(text)
         run = ("run", str(fleet), "--port", "0", "--no-browser")
-        with running(*run, says=r"ready at (\S+)") as url:
+        with running(*run, pattern=r"ready at (\S+)") as url:
             yield url
 
 
@@ -116,7 +118,7 @@ def large(page: Page, name: str = "Front"):
 
 
 def red(page: Page) -> int:
-    """Return how red the picture is, which tells which one it is."""
+    """Return how red the picture is, which identifies the picture."""
     return page.evaluate(
         """() => {
             const canvas = document.createElement('canvas');
@@ -128,7 +130,7 @@ def red(page: Page) -> int:
 
 
 def moves_within(page: Page, ms: int) -> bool:
-    """Return whether the robot is sent a velocity within a time."""
+    """Return whether a velocity is sent to the robot within a time."""
     return page.evaluate(
         """ms => new Promise(done => {
             const sent = document.querySelector('#card .speeds tbody td');
@@ -144,12 +146,12 @@ def moves_within(page: Page, ms: int) -> bool:
 
 
 def sent(page: Page):
-    """Return where the card says which speed was sent."""
+    """Return the cell of the card that shows the speed that was sent."""
     return page.locator("#card .speeds tbody td").first
 
 
 def hold_w(page: Page) -> None:
-    """Press W, and see the robot driven by it."""
+    """Hold W until the robot is driven."""
     hold(page.keyboard, "w", lambda: sent(page).text_content() != "0.00")
 
 
@@ -202,7 +204,7 @@ def test_a_floating_camera_panel_stays_on_the_map_and_is_restored_by_a_reload(
 
 
 def can_be_pressed(what) -> None:
-    """See that what is hit in the middle of a thing is the thing itself."""
+    """Check that no other element covers the middle of an element."""
     expect(what).to_be_in_viewport(ratio=0.95)
     assert what.evaluate(
         """e => {
@@ -250,14 +252,14 @@ def test_a_driven_robot_stops_when_its_camera_freezes(open_page, camera):
     expect(sent(page)).to_have_text("0.00")
     received = page.locator(".webmap-teleop")
     expect(received).to_contain_text("o picture from the camera for 1 s")
-    # It comes again, and the key is still held: nothing moves by that.
+    # The picture moves again, but the key that is still held drives nothing.
     camera.frozen = False
     expect(panel).not_to_have_class(re.compile("stale"))
     assert not moves_within(page, 700)
     page.keyboard.up("w")
     hold_w(page)
     page.keyboard.up("w")
-    # Whoever closes it does not go by it.
+    # A closed camera does not stop the robot.
     camera.frozen = True
     expect(panel).to_have_class(re.compile("stale"))
     panel.get_by_role("button", name="Close the camera").click()
@@ -272,5 +274,5 @@ def test_two_viewers_of_a_camera_share_one_stream(open_page, camera):
     before = pulls()
     for _ in range(2):
         large(open_page())
-    assert pulls() - before <= 1  # none, where the page of a test before is kept
-    assert 1 <= camera.open <= 2  # the stream, and a snapshot that is on its way
+    assert pulls() - before <= 1  # no new one if the page of an earlier test is kept
+    assert 1 <= camera.open <= 2  # the stream, and perhaps a snapshot

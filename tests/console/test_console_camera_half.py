@@ -1,4 +1,4 @@
-"""The half of the camera's panel that has the pictures, without a browser."""
+"""The Python half of the camera panel, without a browser."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from webmap.scene.wire.session import SceneSession
 
 
 class Feed(CameraFeed):
-    """A camera whose pictures a test gives."""
+    """A camera with pictures that a test provides."""
 
     def begin(self) -> None:
         pass

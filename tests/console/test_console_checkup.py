@@ -38,12 +38,12 @@ def test_only_one_check_of_a_bridge_runs_at_a_time():
         go_on.set()
         await until(lambda: not checkup.is_running)
         assert asked == ["ws://bob:9090"]
-        assert checkup.version > before, "pages see that there is something new"
+        assert checkup.version > before, "pages see that there is a new result"
         assert checkup.summary == "1 wrong"
         assert "WRONG    The rosbridge cannot be reached" in checkup.text
         checkup.start()
         await until(lambda: not checkup.is_running)
-        assert len(asked) == 2, "it is asked again when somebody wants that"
+        assert len(asked) == 2, "a second check observes the bridge again"
 
     asyncio.run(run())
 
@@ -66,16 +66,16 @@ def test_a_check_that_raises_is_shown_as_a_finding_and_can_be_repeated(caplog):
 
 
 @pytest.mark.parametrize(
-    ("levels", "words"),
+    ("levels", "summary"),
     [
         (["good", "note", "good"], "No problems: 1 note, 2 good"),
         (["good", "wrong", "warning", "warning"], "1 wrong, 2 warnings, 1 good"),
     ],
 )
-def test_the_summary_counts_the_findings_of_each_level(levels, words):
+def test_the_summary_counts_the_findings_of_each_level(levels, summary):
     checkup = Checkup("ws://bob:9090")
     checkup.findings = [Finding(level, "bridge", "x") for level in levels]
-    assert checkup.summary == words
+    assert checkup.summary == summary
 
 
 def test_a_bridge_has_one_check_for_all_viewers():
@@ -117,12 +117,12 @@ def test_a_slow_call_test_runs_only_on_request_and_its_result_is_reported():
     async def run():
         checkup.start()
         await until(lambda: not checkup.is_running)
-        assert not received, "it is not tried of itself"
+        assert not received, "the slow call is not tried without a request"
         ended = checkup.ended
         checkup.try_call()
-        assert not checkup.can_try, "one at a time"
+        assert not checkup.can_try, "only one check runs at a time"
         await until(lambda: not checkup.is_running)
-        assert checkup.ended == ended, "nothing was listened to again"
+        assert checkup.ended == ended, "the bridge was not observed again"
 
     asyncio.run(run())
     assert received == ["Testing what a slow service call delays."]

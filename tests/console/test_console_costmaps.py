@@ -31,9 +31,9 @@ def test_a_costmap_is_named_after_the_end_of_its_topic(topic, name):
 
 
 def test_a_named_costmap_is_not_renamed_and_a_map_gets_no_name():
-    said = grid("/costmap")
-    said.layer.svg.set("data-layer", "/costmap (north)")
-    assert named(said, grid("/map", "map")) == ["/costmap (north)", None]
+    costmap = grid("/costmap")
+    costmap.layer.svg.set("data-layer", "/costmap (north)")
+    assert named(costmap, grid("/map", "map")) == ["/costmap (north)", None]
 
 
 def test_modules_without_a_layer_are_ignored():

@@ -19,7 +19,7 @@ ROWS = "#robots > .row:not(.filtered) .name"
 
 @pytest.fixture(scope="module")
 def site() -> Iterator[str]:
-    """Run the console with 30 robots; give its address."""
+    """Run the console with 30 robots; yield its URL."""
     with page_of(SITE) as url:
         yield url
 
@@ -54,11 +54,11 @@ HIDDEN_AGAIN = """() => new Promise((done) => {
   observer.observe(document, { subtree: true, ...options });
   setTimeout(() => done([...found]), 1500);
 })"""
-"""The elements of a page that are hidden while they are hidden already."""
+"""The elements that the page hides although they are hidden already."""
 
 
 def test_the_page_hides_nothing_that_is_hidden_already(page):
-    """The browser computes styles after each time, for ticks 20 times a second."""
+    """Each hiding makes the browser compute styles, and ticks arrive at 20 Hz."""
     page.locator("#robots > .row > button").first.click()
     assert page.evaluate(HIDDEN_AGAIN) == []
 
@@ -133,7 +133,7 @@ def test_the_arrow_keys_move_in_the_list_and_enter_selects(page):
 
 def test_the_order_is_kept_while_the_pointer_is_over_the_list(page):
     expect(page.locator(ROWS).first).to_have_text("Robot 3")
-    # As if the state of the robot became the worst one.
+    # As if this robot got the worst state of all robots.
     change = """() => {
       const row = [...document.querySelectorAll("#robots > .row")][9];
       row.dataset.rank = "-1";
@@ -155,8 +155,8 @@ def test_each_robot_on_the_map_has_the_shape_of_its_state_in_the_list(page):
       (row) => [row.dataset.robot,
         row.querySelector(".shape.now use").getAttribute("href")]))"""
     assert page.evaluate(shape) == page.evaluate(listed)
-    words = page.locator(".robot .words").all_text_contents()
-    assert sorted(filter(None, words)) == [
+    states = page.locator(".robot .words").all_text_contents()
+    assert sorted(filter(None, states)) == [
         "Battery low",
         "Lost: no new pose",
         "STOP active",

@@ -1,6 +1,6 @@
 """What a browser loads until the console shows a robot, and afterwards.
 
-Work is counted, not time: requests, bytes, and what a browser need not ask for again.
+The tests count requests, bytes and files that the browser keeps; they measure no time.
 """
 
 import re
@@ -21,8 +21,8 @@ ROBOTS = 1
 
 MOST_REQUESTS = 20
 MOST_BYTES = 110_000
-"""Until the first robot is shown; the page needs about 14 requests and 97 kB, with the
-images of the map."""
+"""The limits until the first robot is shown. The page needs about 14 requests and 97 kB
+with the images of the map."""
 
 MOST_REQUESTS_IN_ALL = 75
 
@@ -41,11 +41,11 @@ look();
 
 @dataclass
 class Answer:
-    """One request, and what came of it."""
+    """One request and its response."""
 
     url: str
     begun: float
-    """When it was sent, as a Unix time in seconds; so are the other times."""
+    """When the request was sent, as a Unix time in seconds, as the other times."""
     offset: float
     """The difference between Unix time and the browser's own."""
     ended: float = float("inf")
@@ -53,7 +53,7 @@ class Answer:
     status: int = 0
     headers: dict[str, str] = field(default_factory=dict)
     stored: bool = False
-    """Whether the browser had it already."""
+    """Whether the response came from the cache of the browser."""
 
     @property
     def path(self) -> str:
@@ -67,9 +67,9 @@ class Loading:
         self.answers: dict[str, Answer] = {}
         self.redirects = 0
         self.first_picture = float("inf")
-        """When the first frame of the scene came, by the browser's own time."""
+        """When the first frame of the scene arrived, by the time of the browser."""
         self.asked: list[str] = []
-        """The messages that the page sent before the first frame of the scene came."""
+        """The messages that the page sent before the first frame of the scene."""
         session = self._session = page.context.new_cdp_session(page)
         session.on("Network.requestWillBeSent", self._sent)
         session.on("Network.requestServedFromCache", self._from_cache)
@@ -80,12 +80,12 @@ class Loading:
         session.send("Network.enable")
 
     def end(self) -> None:
-        """Record nothing more."""
+        """Stop recording."""
         self._session.detach()
 
     def _sent(self, event: dict) -> None:
         if not event["request"]["url"].startswith("http"):
-            return  # the page made it itself
+            return  # a data or blob URL of the page itself
         self.redirects += "redirectResponse" in event
         at = event["wallTime"]
         answer = Answer(event["request"]["url"], at, at - event["timestamp"])

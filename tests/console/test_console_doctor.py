@@ -1,4 +1,4 @@
-"""The report of the readiness check, as an operator asks for it and reads it."""
+"""The report of the readiness check, as an operator requests and reads it."""
 
 import re
 
@@ -23,11 +23,11 @@ def test_a_bridge_is_checked_on_request_and_each_finding_shows_its_level(
     open_console,
 ):
     page = open_console()
-    assert page.locator(".finding").count() == 0, "nothing is asked of itself"
+    assert page.locator(".finding").count() == 0, "no check runs without a request"
     report = open_report(page)
     expect(report.locator(".status")).to_contain_text("Listening for 3 s")
     expect(report.get_by_role("button", name="Check again")).to_be_disabled()
-    # How many warnings there are depends on how busy the machine is.
+    # The number of warnings depends on the load of the machine.
     checked = re.compile(r"^Checked \d.* ago\. .*\d+ notes, \d+ good$")
     expect(report.locator(".status")).to_have_text(checked, timeout=20_000)
     velocity = report.locator(".finding").filter(
@@ -42,7 +42,7 @@ def test_a_bridge_is_checked_on_request_and_each_finding_shows_its_level(
         line.locator(shape).evaluate_all("all => all.map(e => e.getAttribute('d'))")
         for line in (velocity, notes.first)
     )
-    assert good != note, "not by colour alone"
+    assert good != note, "the levels differ in shape, not only in colour"
     expect(report.get_by_role("heading", name="Robot 2")).to_be_attached()
     expect(page.get_by_role("button", name="STOP ALL")).to_be_in_viewport(ratio=1)
 

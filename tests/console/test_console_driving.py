@@ -4,12 +4,12 @@ import re
 from contextlib import suppress
 
 import pytest
-from console_ready import assert_free, same_word, select, title, unfold
+from console_ready import assert_free, expect_state, select, title, unfold
 from playwright.sync_api import expect
 
 from real_browser import hold
 
-# A page or a robot that waits for a processor stops.
+# On a busy machine, a delayed page or robot stops.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
 
 BLOCKED = "Not moving: blocked?"
@@ -19,16 +19,16 @@ MINUS = re.compile("\N{MINUS SIGN}")
 def test_the_bar_the_card_and_the_list_show_the_same_state(open_console):
     page = open_console()
     select(page, "Robot 1")
-    same_word(page, "Free")
+    expect_state(page, "Free")
     page.get_by_role("button", name="Take control of Robot 1").click()
-    same_word(page, "You have control")
+    expect_state(page, "You have control")
     hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
-    same_word(page, "You are driving")
+    expect_state(page, "You are driving")
     page.keyboard.up("a")
-    same_word(page, "You have control")
+    expect_state(page, "You have control")
     back = page.get_by_role("button", name="Release control of Robot 1")
-    back.evaluate("e => e.click()")  # it moves while the words beside it change
-    same_word(page, "Free")
+    back.evaluate("e => e.click()")  # the button moves while the text beside it changes
+    expect_state(page, "Free")
 
 
 def test_the_card_runs_a_stop_test_of_a_robot_with_a_stated_command_timeout(
@@ -48,21 +48,21 @@ def test_the_card_runs_a_stop_test_of_a_robot_with_a_stated_command_timeout(
     page.wait_for_function(
         "document.querySelector('.cameras img').naturalWidth === 320"
     )
-    # The figures are below the camera, where the card has to be scrolled.
+    # The figures are below the camera; the card must be scrolled to see them.
     figures = page.locator("#card .speeds")
     assert page.locator("#card").evaluate("e => e.scrollHeight > e.clientHeight + 40")
     figures.scroll_into_view_if_needed()
     assert_free(figures)
     tested = re.compile(r"\(tested \d{4}-\d\d-\d\d\)")
     for _ in range(8):
-        for words in ("Run stop test", "Robot will move slowly: press again"):
-            button = page.get_by_role("button", name=words, exact=True)
+        for label in ("Run stop test", "Robot will move slowly: press again"):
+            button = page.get_by_role("button", name=label, exact=True)
             page.wait_for_timeout(450)
             button.click()
         expect(test).not_to_have_attribute("data-test", "asking")
         page.wait_for_timeout(300)
         expect(test).to_have_attribute("data-test", "ready")
-        # On a busy machine a late command ends it, which the card says.
+        # On a busy machine a late command ends the test, as the card shows.
         ended = page.locator("#card .test", has_text="Stop test: ")
         expect(ended.or_(bound.filter(has_text=tested)).first).to_be_attached()
         if tested.search(bound.inner_text()):
@@ -75,21 +75,21 @@ def test_the_card_runs_a_stop_test_of_a_robot_with_a_stated_command_timeout(
 def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):
     page = open_console()
     select(page, "Robot 2")
-    words = title(page)
-    for _ in range(8):  # a page that is too busy lets go
+    state = title(page)
+    for _ in range(8):  # a busy page stops driving
         hold(
             page.keyboard,
             "w",
-            lambda: words.text_content() in ("You are driving", BLOCKED),
+            lambda: state.text_content() in ("You are driving", BLOCKED),
         )
-        while words.text_content() == "You are driving":
+        while state.text_content() == "You are driving":
             page.wait_for_timeout(100)
         with suppress(AssertionError):
-            same_word(page, BLOCKED, patience=2.0)
+            expect_state(page, BLOCKED, patience=2.0)
             break
         page.keyboard.up("w")
     else:
-        raise AssertionError(f"never shown as blocked: {words.text_content()}")
+        raise AssertionError(f"never shown as blocked: {state.text_content()}")
     detail = page.locator(".webmap-teleop-detail")
     expect(detail).to_have_text(re.compile(r"^Sent: \d\.\d\d m/s.*Measured: 0\.00 m/s"))
     page.keyboard.up("w")

@@ -1,7 +1,7 @@
 """The robots of the lively demo that drive on their own, under an operator."""
 
 import pytest
-from console_ready import same_word, select, wait_until_ready
+from console_ready import expect_state, select, wait_until_ready
 from playwright.sync_api import expect
 
 from real_browser import watched_tab
@@ -14,7 +14,7 @@ PLACE = """() => {
   return [Math.round(e), Math.round(f)];
 }"""
 PAUSE = 8000
-"""Milliseconds in which a robot begins its next errand, unless its errands pause."""
+"""Milliseconds in which a robot begins its next errand, unless errands are paused."""
 
 
 @pytest.fixture
@@ -24,17 +24,17 @@ def tab(chromium, tmp_path):
         watched_tab(chromium, 1280, 800) as page,
         webmap(*demo, WEBMAP_STATE_DIR=str(tmp_path)) as url,
     ):
-        page.allowed = ["WebSocket", "ERR_CONNECTION"]  # when all of it ends
+        page.allowed = ["WebSocket", "ERR_CONNECTION"]  # when the processes end
         page.goto(url)
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(4)
         wait_until_ready(page)
         select(page, "Robot 2")
-        same_word(page, "Moving, not by WebMap", 30)
+        expect_state(page, "Moving, not by WebMap", 30)
         yield page
 
 
 def expect_standing(page):
-    """Expect that the selected robot does not move for longer than it rests."""
+    """Expect that the selected robot does not move for longer than :data:`PAUSE`."""
     before = page.evaluate(PLACE)
     page.wait_for_timeout(PAUSE)
     assert page.evaluate(PLACE) == before
@@ -42,7 +42,7 @@ def expect_standing(page):
 
 def test_taking_control_of_a_robot_with_errands_stops_it_until_the_release(tab):
     tab.locator(".webmap-teleop-lease").click()
-    same_word(tab, "You have control")
+    expect_state(tab, "You have control")
     expect_standing(tab)
 
 

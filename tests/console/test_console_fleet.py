@@ -1,4 +1,4 @@
-"""Robots as the console shows them."""
+"""Robots in the console."""
 
 import pytest
 

@@ -100,8 +100,8 @@ def test_the_thresholds_and_the_mode_of_the_yaml_file_are_applied(tmp_path):
     image.putdata([0, 128, 254])
     image.save(tmp_path / "floor.png")
 
-    def drawn(**said):
-        floor = load_floor(write(tmp_path, **said), tmp_path)
+    def drawn(**changes):
+        floor = load_floor(write(tmp_path, **changes), tmp_path)
         painted = Image.open(floor.day).convert("RGB")
         return [colour(painted, (x, 0)) for x in range(3)]
 
@@ -113,7 +113,9 @@ def test_the_thresholds_and_the_mode_of_the_yaml_file_are_applied(tmp_path):
     assert graded[0] == wall
     assert graded[2] == free
     assert graded[1] not in COLOURS["day"]
-    assert drawn(mode="raw") == [free, unknown, unknown], "0 is free there, 128 none"
+    assert drawn(mode="raw") == [free, unknown, unknown], (
+        "in raw mode 0 is free and 128 is unknown"
+    )
 
 
 def test_a_negated_image_is_drawn_inverted(tmp_path):
@@ -144,7 +146,7 @@ def test_transparent_pixels_are_read_as_map_server_reads_them(
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "reason"),
     [
         ({"resolution": 0}, "resolution"),
         ({"resolution": ".nan"}, "resolution"),
@@ -161,10 +163,10 @@ def test_transparent_pixels_are_read_as_map_server_reads_them(
     ],
 )
 def test_a_map_with_an_invalid_value_is_refused_with_the_reason(
-    tmp_path, changes, said
+    tmp_path, changes, reason
 ):
     draw(tmp_path)
-    with pytest.raises(ConfigError, match=said):
+    with pytest.raises(ConfigError, match=reason):
         load_floor(write(tmp_path, **changes), tmp_path)
 
 

@@ -1,5 +1,5 @@
-"""The frame of the console: how much of the map is uncovered, the docked panels, the
-palette, and north up."""
+"""The frame of the console: the visible part of the map, the docked panels, the palette
+and north up."""
 
 import re
 
@@ -37,7 +37,7 @@ ROBOT = """() => {
   const { e, f } = document.querySelector(".robot.selected").getScreenCTM();
   return document.elementFromPoint(e, f)?.closest("svg.webmap") ? "free" : "covered";
 }"""
-"""Whether something covers the selected robot."""
+"""Whether an element covers the selected robot."""
 
 
 @pytest.mark.serial  # a late command stops the robot

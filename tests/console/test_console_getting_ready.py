@@ -1,4 +1,4 @@
-"""A page that was just opened says that it is getting ready until a press drives."""
+"""A page that was just opened shows "Preparing input" until a press drives."""
 
 import threading
 import time
@@ -15,10 +15,10 @@ READY = """() => {
   if (shown || title !== "Free") window.notReadyAt = now;
   return now - (window.notReadyAt ??= now) > 300;
 }"""
-"""Whether the page has said for 300 ms that a press drives.
+"""Whether the page has shown for 300 ms that a press drives.
 
-A page that was held up while it loads says so for some 30 ms before it knows that the
-gate's last ticks came late. Nobody reads a word and presses a key in that time.
+A page that was blocked while it loaded shows this for about 30 ms before it detects
+that the last ticks of the gate were late. No person can react in that time.
 """
 
 
@@ -32,27 +32,27 @@ def test_the_page_shows_preparing_input_until_teleop_is_loaded(chromium, demo):
         lambda r: r.continue_() if come.is_set() else held.append(r),
     )
     page.goto(demo.url, wait_until="commit")
-    words = page.locator(".getting-ready")
+    status = page.locator(".getting-ready")
     row = page.locator("#robots .row", has_text="Robot 1").locator("button").first
     row.click()
     expect(row).to_have_attribute("aria-pressed", "true")
-    expect(words).to_be_visible()
-    expect(words).to_contain_text("Preparing input")
+    expect(status).to_be_visible()
+    expect(status).to_contain_text("Preparing input")
     page.keyboard.down("w")
     come.set()
     for route in held:
         route.continue_()
-    expect(words).to_be_hidden()
+    expect(status).to_be_hidden()
     title = page.locator(".webmap-teleop-title")
     expect(title).to_have_text("Free")
-    page.keyboard.down("w")  # as the keyboard repeats it
+    page.keyboard.down("w")  # the keyboard repeats the key
     expect(title).to_have_text("Input blocked: release all keys, then press again")
     page.keyboard.up("w")
     expect(title).to_have_text("Free")
     context.close()
 
 
-@pytest.mark.serial  # a page that is kept waiting for a processor lets go
+@pytest.mark.serial  # a delayed page stops driving
 def test_the_first_press_drives_when_preparing_input_is_no_longer_shown(chromium, demo):
     context = chromium.new_context(viewport={"width": 1280, "height": 800})
     page = context.new_page()

@@ -1,4 +1,4 @@
-"""Robots that are gone, or that move by themselves."""
+"""Robots that are gone, or that another program moves."""
 
 import json
 import re
@@ -31,7 +31,7 @@ console.open_console([bridge], robots)
 
 @contextmanager
 def odometry(url: str, speed: float = 0.0) -> Iterator[None]:
-    """Publish the odometry of a robot until this ends; its speed is in m/s."""
+    """Publish the odometry of a robot until the context ends; ``speed`` is in m/s."""
     pose = {"position": {"x": 1, "y": 2, "z": 0}, "orientation": {"w": 1}}
     message = {
         "header": {"frame_id": "odom", "stamp": {"secs": 0, "nsecs": 0}},
@@ -102,9 +102,9 @@ def test_a_robot_that_moves_by_itself_is_not_shown_as_free(chromium, tmp_path):
             page.goto(address)
             row = page.locator("#robots .row", has_text="Ghost")
             row.locator("button").first.click()
-            words = "Moving, not by WebMap"
-            expect(row).to_contain_text(words)
-            expect(page.locator("#card .state")).to_contain_text(words)
-            expect(page.locator(".webmap-teleop-title")).to_have_text(words)
+            state = "Moving, not by WebMap"
+            expect(row).to_contain_text(state)
+            expect(page.locator("#card .state")).to_contain_text(state)
+            expect(page.locator(".webmap-teleop-title")).to_have_text(state)
             speed = page.locator("#card tr", has_text="Speed").locator("td").last
             expect(speed).to_have_text("0.30")

@@ -28,7 +28,7 @@ def chosen(map, *modules):
     map.selected = SimpleNamespace(modules=[*modules, object()])
 
 
-def said(health):
+def shown_parts(health):
     items = health.element.children[1].children
     return [(item.get("data-level"), item.text) for item in items]
 
@@ -46,17 +46,19 @@ def test_parts_that_are_not_ok_are_listed_with_their_level_and_message(map):
     chosen(map, diagnosing)
     health.on_select()
     assert health.element.get("hidden") is None
-    assert said(health) == [
+    assert shown_parts(health) == [
         ("wrong", "Error: motors: <b>hot</b>"),
         ("note", "Stale: laser"),
         ("warning", "Warning: battery: low"),
     ]
     first = health.element.children[1].children[0]
     health.poll()
-    assert health.element.children[1].children[0] is first, "nothing is new"
+    assert health.element.children[1].children[0] is first, (
+        "the list is not replaced without a change"
+    )
     diagnosing.parts = diagnosing.parts[3:]
     health.poll()
-    assert said(health) == [("good", "All OK: 1 part")]
+    assert shown_parts(health) == [("good", "All OK: 1 part")]
     map.selected = None
     health.on_select()
     assert health.element.get("hidden") is not None
@@ -70,7 +72,7 @@ def test_a_robot_without_diagnostics_shows_no_health(map):
     assert health.element.get("hidden") is not None
 
 
-UNHEARD = ("note", "No data: no diagnostics of this robot received yet")
+NO_DATA = ("note", "No data: no diagnostics of this robot received yet")
 
 
 @pytest.mark.parametrize("parts", [[], [("base: Motors", "ok", "fine", "nobody's")]])
@@ -78,7 +80,7 @@ def test_a_robot_without_received_diagnostics_is_shown_as_no_data(map, parts):
     chosen(map, Diagnosing(*parts))
     health = RobotHealth(map, html.section())
     assert health.element.get("hidden") is None
-    assert said(health) == [UNHEARD]
+    assert shown_parts(health) == [NO_DATA]
 
 
 def test_a_bad_part_of_an_unknown_robot_is_listed_with_robot_unknown(map):
@@ -88,7 +90,7 @@ def test_a_bad_part_of_an_unknown_robot_is_listed_with_robot_unknown(map):
     ]
     chosen(map, Diagnosing(*nobodys, ("robot_0/base: Battery", "ok", "full")))
     health = RobotHealth(map, html.section())
-    assert said(health) == [
+    assert shown_parts(health) == [
         ("wrong", "Error: base: Motors (robot unknown): hot"),
         ("note", "Stale: base: Laser (robot unknown)"),
     ]
@@ -98,5 +100,5 @@ def test_parts_above_the_limit_are_only_counted(map):
     parts = [(f"part {number}", "error", "bad") for number in range(MOST + 3)]
     chosen(map, Diagnosing(*parts))
     health = RobotHealth(map, html.section())
-    assert len(said(health)) == MOST + 1
-    assert said(health)[-1] == ("note", "and 3 more parts")
+    assert len(shown_parts(health)) == MOST + 1
+    assert shown_parts(health)[-1] == ("note", "and 3 more parts")

@@ -1,4 +1,4 @@
-"""Which topics the robots of a page use, as the check of their bridge is told."""
+"""The topics that the robots of a page use, as given to the check of the bridge."""
 
 import asyncio
 from pathlib import Path
@@ -55,7 +55,7 @@ def test_a_configured_robot_uses_the_topics_of_its_configuration(bridge):
     assert [topic for topic, _ in bob.topics["camera"]] == cameras
     assert bob.topics["action"] == (("/navigate_to_pose/_action/feedback", ""),)
     assert bob.topics["cloud"] == bob.topics["plan"] == ()
-    assert "tf" not in bob.topics, "frames are told of as they are found"
+    assert "tf" not in bob.topics, "frames are used as they are found"
 
 
 def test_topics_of_modules_are_in_use_with_positional_and_keyword_arguments(bridge):
@@ -128,7 +128,7 @@ def test_a_robot_without_a_source_of_poses_uses_no_tf_topic(bridge):
 
 
 class Publisher:
-    """Takes the files of the page; nobody loads them here."""
+    """Accepts the files of the page; no browser loads them."""
 
     def publish_file(self, file):
         assert Path(file).is_file(), file
@@ -143,12 +143,12 @@ def map_of(viewer):
         return Map(page.element("map"))
 
 
-def press(report, words):
-    """Press the button of a report that says this, as a page can say at any time."""
+def press(report, label):
+    """Press the button of a report with this label, as a page can do at any time."""
     (button,) = [
         each
         for each in report.walk()
-        if getattr(each, "tag", "") == "button" and each.text == words
+        if getattr(each, "tag", "") == "button" and each.text == label
     ]
     (handler,) = button.handlers("click")
     handler(Event(kind="click"))
@@ -163,7 +163,7 @@ async def until(condition):
 
 @pytest.fixture
 def checkup(bridge):
-    """The check of the bridge, which looks at nothing and notes what it is asked."""
+    """The check of the bridge; it observes nothing and records its arguments."""
     checkup = checkup_of(bridge)
     checkup.asked = []
 

@@ -1,14 +1,14 @@
-"""Each task of the operator's manual, done with the keyboard alone."""
+"""Each task of the operator's manual, done with only the keyboard."""
 
 import re
 
 import pytest
-from console_ready import same_word, shown_state, title
+from console_ready import expect_state, shown_state, title
 from playwright.sync_api import Page, expect
 
 from real_browser import hold
 
-# A page or a robot that waits for a processor stops.
+# On a busy machine, a delayed page or robot stops.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
 
 ROBOTS = 3
@@ -17,7 +17,7 @@ GOAL_MARK = ".webmap-goal-mark"
 
 
 def find(page: Page, text: str) -> None:
-    """Press what the palette finds first."""
+    """Search in the palette and press the first result."""
     page.keyboard.press("Control+k")
     expect(page.get_by_role("dialog", name="Find")).to_be_visible()
     page.keyboard.type(text)
@@ -33,13 +33,13 @@ def reset(page: Page) -> None:
 
 
 def select(page: Page, robot: str) -> None:
-    """Select a robot, and free it from what an earlier test left: a page, a STOP."""
+    """Select a robot, and end the control or the STOP that an earlier test left."""
     find(page, robot)
     expect(page.locator("#card h2")).to_have_text(robot.capitalize())
     expect(shown_state(page)).to_have_text(re.compile("Free|STOP active"))
     if shown_state(page).text_content() == "STOP active":
         reset(page)
-        same_word(page, "Free")
+        expect_state(page, "Free")
 
 
 def test_a_robot_is_selected_driven_stopped_and_released(open_console):
@@ -47,27 +47,27 @@ def test_a_robot_is_selected_driven_stopped_and_released(open_console):
     select(page, "robot 1")
     expect(page.locator("#card h2")).to_have_text("Robot 1")
     find(page, "take control")
-    same_word(page, "You have control")
+    expect_state(page, "You have control")
     hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
     page.keyboard.up("a")
-    same_word(page, "You have control")
+    expect_state(page, "You have control")
     page.keyboard.press("Space")
-    same_word(page, "STOP active")
+    expect_state(page, "STOP active")
     reset(page)
-    same_word(page, "Free")
+    expect_state(page, "Free")
     page.keyboard.press("Shift+Escape")
-    same_word(page, "STOP active")
+    expect_state(page, "STOP active")
     expect(page.locator(".webmap-stop-standing")).to_contain_text("3 robots")
     all_ = page.get_by_role("button", name="Reset all")
     all_.focus()
     page.keyboard.press("Enter")
     page.wait_for_timeout(500)
     page.keyboard.press("Enter")
-    same_word(page, "Free")
+    expect_state(page, "Free")
     find(page, "take control")
-    same_word(page, "You have control")
+    expect_state(page, "You have control")
     find(page, "release control")
-    same_word(page, "Free")
+    expect_state(page, "Free")
 
 
 def test_a_goal_is_placed_with_arrow_keys_turned_sent_and_cancelled(open_console):
@@ -98,7 +98,7 @@ def test_arrow_keys_move_the_mark_of_a_goal_and_not_the_robot_in_control(open_co
     page = open_console()
     select(page, "robot 1")
     find(page, "take control")
-    same_word(page, "You have control")
+    expect_state(page, "You have control")
     expect(page.locator(".webmap-teleop-detail")).not_to_contain_text("Preparing")
     page.keyboard.press("g")
     expect(page.locator(".webmap-goal-word")).to_contain_text("arrows move")
@@ -117,7 +117,7 @@ def test_a_place_is_found_by_name_and_a_robot_is_sent_there(open_console):
     select(page, "robot 2")
     page.keyboard.press("l")
     where = page.locator("svg.webmap").bounding_box()
-    # The position of a new label needs the pointer once; the task is to send there.
+    # The pointer sets the position of the new label; the task is to send a robot there.
     page.mouse.click(
         where["x"] + where["width"] * 0.5, where["y"] + where["height"] * 0.5
     )
@@ -137,9 +137,9 @@ def test_a_place_is_found_by_name_and_a_robot_is_sent_there(open_console):
         except AssertionError:
             find(page, "charging dock")
     page.keyboard.press("Escape")
-    same_word(page, "STOP active")
+    expect_state(page, "STOP active")
     reset(page)
-    same_word(page, "Free")
+    expect_state(page, "Free")
 
 
 def test_the_view_the_layers_and_the_help_need_no_mouse(open_console):
@@ -178,7 +178,7 @@ def test_a_pose_is_set_with_arrow_keys(open_console):
 
 
 def tab_to(page: Page, name: str) -> None:
-    """Move the focus to the button whose name begins so with the Tab key."""
+    """Press Tab until the focus is on the button whose name begins with ``name``."""
     focused = "() => document.activeElement?.innerText ?? ''"
     for _ in range(60):
         page.keyboard.press("Tab")
@@ -203,8 +203,8 @@ def test_a_route_is_made_with_arrow_keys_and_started_and_ended(open_console):
     expect(page.get_by_role("button", name="Add points")).to_be_visible()
     tab_to(page, "Start route")
     page.keyboard.press("Enter")
-    word = page.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
-    expect(word).to_contain_text("Robot 1")
+    status = page.locator(".webmap-route > .webmap-tool-body > .webmap-route-word")
+    expect(status).to_contain_text("Robot 1")
     tab_to(page, "End route")
     page.keyboard.press("Enter")
     expect(page.get_by_role("button", name="End route")).to_be_hidden()
@@ -226,7 +226,7 @@ def test_control_is_requested_and_handed_over(open_console):
         select(page, "robot 2")
     mine.bring_to_front()
     find(mine, "take control")
-    same_word(mine, "You have control")
+    expect_state(mine, "You have control")
     theirs.bring_to_front()
     find(theirs, "request control")
     mine.bring_to_front()
@@ -234,4 +234,4 @@ def test_control_is_requested_and_handed_over(open_console):
     tab_to(mine, "Hand over")
     mine.keyboard.press("Enter")
     theirs.bring_to_front()
-    same_word(theirs, "You have control")
+    expect_state(theirs, "You have control")

@@ -1,4 +1,4 @@
-"""The layout of the console: saved, loaded, as it was found, and there again."""
+"""The layout of the console: saved, loaded, reset and restored."""
 
 import json
 from pathlib import Path
@@ -11,18 +11,18 @@ pytestmark = pytest.mark.browser
 FILE = "webmap-layout.json"
 
 LISTEN = """() => {
-  window.said = [];
+  window.sent = [];
   const { send } = WebSocket.prototype;
   WebSocket.prototype.send = function (data) {
-    window.said.push([new URL(this.url).pathname.split("/").at(-1), String(data)]);
+    window.sent.push([new URL(this.url).pathname.split("/").at(-1), String(data)]);
     return send.call(this, data);
   };
 }"""
-"""Writes down what the page tells the display and the gate from now on."""
+"""Records the messages of the page to the display and the gate from now on."""
 
 
 def view_of(page: Page) -> list[float]:
-    """Return what carries metres to pixels of the map."""
+    """Return the matrix from metres to pixels of the map."""
     return page.locator("g.world").evaluate(
         "g => (({a, b, c, d, e, f}) => [a, b, c, d, e, f])(g.getCTM())"
     )
@@ -40,7 +40,7 @@ def expect_view(page: Page, view: list[float]) -> None:
 
 
 def menu(page: Page) -> None:
-    """Open the menu by the keyboard."""
+    """Open the menu with the keyboard."""
     page.wait_for_selector(".webmap-layout-save", state="attached")
     page.locator(".webmap-export-go").focus()
     page.keyboard.press("Enter")
@@ -53,11 +53,11 @@ def load(page: Page, file: Path) -> None:
     chooser.value.set_files(file)
 
 
-def assert_no_robot_was_told_anything(page: Page) -> None:
-    """See that the page spoke of its view alone, and held nothing to drive with."""
-    said = [(lane, json.loads(text)) for lane, text in page.evaluate("window.said")]
-    drive = [command for lane, command in said if lane == "drive"]
-    scene = [message for lane, message in said if lane == "scene"]
+def assert_no_command_was_sent(page: Page) -> None:
+    """Check that the page sent only messages about its view and neutral commands."""
+    sent = [(lane, json.loads(text)) for lane, text in page.evaluate("window.sent")]
+    drive = [command for lane, command in sent if lane == "drive"]
+    scene = [message for lane, message in sent if lane == "scene"]
     for command in drive:
         assert command.get("op", "drive") == "drive", command
         assert not any(command.get(axis) for axis in ("x", "y", "turn")), command
@@ -97,11 +97,11 @@ def test_a_layout_is_saved_reset_and_loaded_and_the_last_view_is_restored(
     assert set(saved) == parts
     assert saved["layers"]["shown"]["Scans"] is False
 
-    # What follows is the layout's doing alone.
+    # From here on, only the layout may change the page.
     page.evaluate(LISTEN)
-    word = page.locator(".webmap-layout-word")
+    message = page.locator(".webmap-layout-word")
     page.get_by_role("button", name="Reset layout").press("Enter")
-    expect(word).to_have_text("The layout is reset.")
+    expect(message).to_have_text("The layout is reset.")
     expect_view(page, found)
     expect(page.locator(".webmap-layers")).not_to_have_attribute("open", "")
     expect(log).not_to_have_attribute("open", "")
@@ -110,25 +110,25 @@ def test_a_layout_is_saved_reset_and_loaded_and_the_last_view_is_restored(
     wrong = tmp_path / "wrong.json"
     wrong.write_text(json.dumps({**saved, "log": {"open": True, "least": "loud"}}))
     load(page, wrong)
-    expect(word).to_contain_text('log.least: expected "debug", ')
-    expect(word).to_contain_text('got "loud". Nothing was changed.')
+    expect(message).to_contain_text('log.least: expected "debug", ')
+    expect(message).to_contain_text('got "loud". Nothing was changed.')
     wrong.write_text(" " * 66_000)
     load(page, wrong)
-    expect(word).to_contain_text("expected at most 64 kB, got 65 kB")
+    expect(message).to_contain_text("expected at most 64 kB, got 65 kB")
     expect_view(page, found)
     expect(page.locator(".laserscan").first).to_be_visible()
 
     load(page, tmp_path / FILE)
-    expect(word).to_have_text(f"Loaded {FILE}. No command was sent to a robot.")
+    expect(message).to_have_text(f"Loaded {FILE}. No command was sent to a robot.")
     expect_view(page, left)
     expect(page.locator(".laserscan").first).to_be_hidden()
     expect(log).to_have_attribute("open", "")
     page.locator(".webmap-layers").evaluate("e => { e.open = true; }")
     expect(page.get_by_label("Scans", exact=True)).not_to_be_checked()
     expect(page.locator(".robot.selected")).to_have_attribute("data-name", "Robot 2")
-    assert_no_robot_was_told_anything(page)
+    assert_no_command_was_sent(page)
 
-    # A new page opens without a list in the dock, so its map is wider.
+    # A new page opens without a list in the dock, so that its map is wider.
     page.locator(".webmap-layers").evaluate("e => { e.open = false; }")
     page.wait_for_timeout(300)
     wide = [*left[:4], left[4] + 160, left[5]]

@@ -1,4 +1,4 @@
-"""Who says which view a page of the console begins with."""
+"""The view with which a page of the console begins."""
 
 import struct
 from pathlib import Path
@@ -12,7 +12,7 @@ from webmap.scene.wire.session import SceneSession
 
 
 class Publisher:
-    """Takes the files of the page; nobody loads them here."""
+    """Accepts the files of the page; no browser loads them."""
 
     def publish_file(self, file: Path) -> str:
         assert Path(file).is_file(), file
@@ -58,8 +58,8 @@ def test_the_answer_to_the_page_is_sent_after_the_view_operations(map, frame, la
     map.page.channel.frame(0.0)
     frame.place()
     layout.on_message({"own": True})
-    said = map.page.channel.frame(1.0)
-    assert said.index(struct.pack("<d", -MARGIN)) < said.index(b'{"own":true}')
+    data = map.page.channel.frame(1.0)
+    assert data.index(struct.pack("<d", -MARGIN)) < data.index(b'{"own":true}')
 
 
 def test_a_reset_layout_shows_the_robots_again(map, frame, layout):

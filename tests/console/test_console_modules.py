@@ -1,4 +1,4 @@
-"""The modules of maps that the console brings, without their browser parts."""
+"""The modules that the console adds to maps, without their browser parts."""
 
 from pathlib import Path
 
@@ -16,8 +16,8 @@ from webmap.scene.wire.session import SceneSession
 PACKAGE = Path(__file__).parents[2] / "src" / "webmap"
 
 
-class Hearing:
-    """Writes down what the goal tool's triggers tell."""
+class TriggerRecorder:
+    """Records the arguments of the goal tool's triggers."""
 
     def __init__(self, map: Map) -> None:
         self.received: list[tuple] = []
@@ -70,10 +70,10 @@ def test_an_invalid_option_of_a_module_is_refused(map, factory, options):
 def test_a_goal_and_a_cancel_of_the_page_fire_triggers(map):
     robot = Robot("Bob")
     map.add_robot(robot)
-    tool, hearing = map.add_module(GoalTool), map.add_module(Hearing)
+    tool, recorder = map.add_module(GoalTool), map.add_module(TriggerRecorder)
     tool.on_message({"goal": {"robot": robot.id, "x": 1, "y": 2.0, "yaw": 0.5}})
     tool.on_message({"cancel": robot.id})
-    assert hearing.received == [("sent", robot, 1, 2.0, 0.5), ("canceled", robot)]
+    assert recorder.received == [("sent", robot, 1, 2.0, 0.5), ("canceled", robot)]
     robot.destroy()
 
 
@@ -89,9 +89,9 @@ def test_a_goal_and_a_cancel_of_the_page_fire_triggers(map):
     ],
 )
 def test_an_invalid_message_of_a_page_fires_no_trigger(map, message):
-    tool, hearing = map.add_module(GoalTool), map.add_module(Hearing)
+    tool, recorder = map.add_module(GoalTool), map.add_module(TriggerRecorder)
     tool.on_message(message)
-    assert hearing.received == []
+    assert recorder.received == []
 
 
 def test_a_view_follows_only_a_robot_of_its_map(map):

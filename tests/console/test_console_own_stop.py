@@ -1,4 +1,4 @@
-"""What the card says of a robot that nothing tells to stop any more."""
+"""The card shows how a robot stops when commands no longer arrive."""
 
 from types import SimpleNamespace
 
@@ -19,7 +19,7 @@ def report(**changes):
     return SimpleNamespace(report=SimpleNamespace(**(known | changes)))
 
 
-def words(robot) -> str:
+def text_of(robot) -> str:
     shown = OwnStop(1.0)
     shown.show(robot)
     return f"{shown._bound.text}|{shown._how.text}|{shown._test.text}"
@@ -33,12 +33,14 @@ def test_the_bound_is_the_command_timeout_plus_the_braking_time():
 
 
 def test_the_bound_uses_a_lower_speed_limit_of_the_page():
-    assert words(report()).startswith("stops within 2.25 s|")
+    assert text_of(report()).startswith("stops within 2.25 s|")
 
 
 def test_the_result_of_a_stop_test_is_shown_with_its_date():
-    said = words(report(stop_time=0.31, stop_source="tested", stop_date="2026-11-21"))
-    assert "0.31 s command timeout (tested 2026-11-21)" in said
+    shown = text_of(
+        report(stop_time=0.31, stop_source="tested", stop_date="2026-11-21")
+    )
+    assert "0.31 s command timeout (tested 2026-11-21)" in shown
 
 
 @pytest.mark.parametrize(
@@ -46,13 +48,13 @@ def test_the_result_of_a_stop_test_is_shown_with_its_date():
     [(None, NOBODY_KNOWS), ("tested", "does not stop")],
 )
 def test_a_robot_without_a_command_timeout_is_shown_without_a_bound(source, text):
-    said = words(report(stop_time=None, stop_source=source, stop_date="2026-11-21"))
-    assert said.startswith(f"{text}|")
+    shown = text_of(report(stop_time=None, stop_source=source, stop_date="2026-11-21"))
+    assert shown.startswith(f"{text}|")
 
 
 def test_a_failed_stop_test_is_shown_with_its_reason():
     failed = SimpleNamespace(state="failed", text="the robot did not move within 1.5 s")
-    assert words(report(test=failed)).endswith(
+    assert text_of(report(test=failed)).endswith(
         "|Stop test: The robot did not move within 1.5 s."
     )
 

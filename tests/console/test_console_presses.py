@@ -1,14 +1,14 @@
-"""How many presses each frequent task takes."""
+"""The number of presses for each frequent task."""
 
 import re
 
 import pytest
-from console_ready import PLACES, same_word, title
+from console_ready import PLACES, expect_state, title
 from playwright.sync_api import Page, expect
 
 from real_browser import hold
 
-# A page or a robot that waits for a processor stops.
+# On a busy machine, a delayed page or robot stops.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
 
 ROBOTS = 3
@@ -32,13 +32,13 @@ def test_driving_stopping_and_resetting_take_one_one_and_two_presses(open_consol
     assert presses(page) == 1
     page.locator(".webmap-teleop-stop").first.click()
     page.keyboard.up("a")
-    same_word(page, "STOP active")
+    expect_state(page, "STOP active")
     assert presses(page) == 1
     reset = page.locator(".drive-bar .webmap-reset")
     reset.click()
     page.wait_for_timeout(450)
     reset.click()
-    same_word(page, "Free")
+    expect_state(page, "Free")
     assert presses(page) == 2
 
 
@@ -72,9 +72,9 @@ def test_control_of_a_robot_of_another_operator_takes_one_press(open_console):
         page.locator("#robots .row", has_text="Robot 2").locator("button").first.click()
     mine.bring_to_front()
     mine.get_by_role("button", name="Take control of Robot 2").click()
-    same_word(mine, "You have control")
+    expect_state(mine, "You have control")
     theirs.bring_to_front()
     theirs.evaluate(COUNT)
     theirs.get_by_role("button", name="Request control").click()
-    same_word(theirs, "You have control", 30)  # after 10 s without an answer
+    expect_state(theirs, "You have control", 30)  # after 10 s without an answer
     assert presses(theirs) == 1

@@ -1,4 +1,4 @@
-"""STOP, the stick and what is said of motion are in reach, whatever is open."""
+"""STOP, the stick and the state of motion are visible, whatever else is open."""
 
 import pytest
 from console_ready import assert_free
@@ -9,7 +9,7 @@ from real_browser import end_stops
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 ROBOTS = 10
-"""So many that the list of stopped robots is long."""
+"""Enough robots for a long list of stopped robots."""
 
 PANELS = """() => [...document.querySelectorAll("details")]
   .filter((e) => e.querySelector("summary").checkVisibility()).length"""
@@ -55,7 +55,7 @@ def test_stop_can_be_pressed_and_works_with_any_panel_open(open_console, size):
     expect(page.locator(".webmap-stop-standing")).to_contain_text(f"{ROBOTS} robots")
     expect(help_).to_be_hidden()
     reset()
-    # Esc closes the help first, and is STOP then.
+    # The first Esc closes the help; the next Esc is STOP.
     page.keyboard.press("?")
     expect(help_).to_be_visible()
     page.keyboard.press("Escape")

@@ -1,4 +1,4 @@
-"""What was refused is there to be seen."""
+"""The console shows a refused command."""
 
 import pytest
 from playwright.sync_api import expect

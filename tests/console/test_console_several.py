@@ -79,14 +79,14 @@ def test_all_robots_of_a_search_are_sent_and_their_goals_cancelled(demo, open_co
     expect(bar.locator(".webmap-several-count")).to_have_text(f"{demo.robots} robots")
     page.locator("#show-all").click()
     navigating = page.locator("#robots .row[data-state^=navigating]")
-    # A goal of a page that is too busy is too old, and is not sent.
+    # On a busy machine a goal may be too old, and is then not sent.
     for _ in range(5):
         bar.get_by_role("button", name="Send goal…").click()
         expect(page.locator(".webmap-goal-word")).to_contain_text("Press on the map")
         box = page.locator("svg.webmap").bounding_box()
         page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         page.mouse.down()
-        # The places of all robots are visible before the release.
+        # The goals of all robots are visible before the release.
         expect(page.locator(".webmap-goal-arrow")).to_have_count(demo.robots)
         page.mouse.up()
         with suppress(AssertionError):

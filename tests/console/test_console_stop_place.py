@@ -1,4 +1,4 @@
-"""STOP and STOP ALL can be hit and do not move, in every state and at every size."""
+"""STOP and STOP ALL can be pressed and do not move, in every state and size."""
 
 from collections.abc import Callable
 
@@ -10,7 +10,7 @@ from real_browser import hold
 pytestmark = pytest.mark.browser
 
 ROBOTS = 10
-"""So many that the list of stopped robots is long."""
+"""Enough robots for a long list of stopped robots."""
 
 SIZES = [
     (320, 480),
@@ -26,8 +26,8 @@ SIZES = [
     (1440, 900),
     (3840, 2160),
 ]
-"""Width and height in pixels: both sides of the steps of the layout, and 1024x600 and
-1440x900 at a zoom of 200 %."""
+"""Width and height in pixels: both sides of each breakpoint of the layout, and 1024x600
+and 1440x900 at a zoom of 200 %."""
 
 LOOK = """async () => {
   await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
@@ -45,19 +45,20 @@ LOOK = """async () => {
     one: look(".webmap-teleop-stop", /^stop$/i),
   };
 }"""
-"""Where both buttons are, and what is hit at the centre in place of a STOP button."""
+"""The places of both buttons, and the element that covers the centre, if any."""
 
 DRIVE = """async (change) => {
   const { page } = await import(document.querySelector('[src$="page.js"]').src);
   const { drive } = page;
-  drive._told ??= drive._receive;
+  drive._receiveUnchanged ??= drive._receive;
   drive._receive = (message) =>
-    drive._told(message.op === "robot" ? { ...message, ...change } : message);
+    drive._receiveUnchanged(
+      message.op === "robot" ? { ...message, ...change } : message);
   for (const report of drive.robots.values()) {
     drive._receive({ op: "robot", ...report });
   }
 }"""
-"""Have the gate's reports say something else to this page."""
+"""Change fields in all reports that this page receives from the gate."""
 
 LOSE_SIGN_IN = """async () => {
   const { page } = await import(document.querySelector('[src$="page.js"]').src);
@@ -71,7 +72,7 @@ LOSE_SIGN_IN = """async () => {
 
 
 class Walk:
-    """Goes through all sizes in one state after the other."""
+    """Checks a state of the page at all sizes."""
 
     def __init__(self, page: Page) -> None:
         self.page = page
@@ -79,7 +80,7 @@ class Walk:
         self.wrong: list[str] = []
 
     def look(self, state: str) -> None:
-        """See at every size that both buttons can be hit, and are where they were."""
+        """Check at every size that both buttons can be pressed and have not moved."""
         for size in SIZES:
             self.page.set_viewport_size({"width": size[0], "height": size[1]})
             seen = self.page.evaluate(LOOK)
@@ -120,7 +121,7 @@ def camera(page: Page) -> None:
 
 
 def in_one_state_each(page: Page, look: Callable[[str], None]) -> None:
-    """Open one thing of the console after the other beside the card."""
+    """Open each part of the console, one after the other, beside the card."""
     page.locator("#card .button", has_text="Send goal…").click()
     expect(page.locator(".webmap-goal-word")).not_to_be_empty()
     look("choosing a goal")
@@ -207,7 +208,7 @@ def test_the_stop_buttons_of_the_alarm_are_at_the_same_places_and_send_stop(
     expect(alarm).to_be_visible()
     twins = alarm.locator(".webmap-stop-twin")
     expect(twins).to_have_count(2)
-    # There is one STOP ALL, and not another one elsewhere.
+    # There is only one STOP ALL.
     expect(alarm.get_by_role("button", name="STOP ALL")).to_have_count(1)
     seen = alarm.get_by_role("button", name="Acknowledge")
     expect(seen).to_be_in_viewport(ratio=1)
@@ -219,13 +220,13 @@ def test_the_stop_buttons_of_the_alarm_are_at_the_same_places_and_send_stop(
     page.evaluate(sent)
     for box in places.values():
         page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    said = page.evaluate(
+    stops = page.evaluate(
         """async () => (await import(
           document.querySelector('[src$="page.js"]').src)).page.sentStops"""
     )
-    assert said[0] == "*"
-    assert len(said) == 2
-    assert said[1] not in {"*", ""}
+    assert stops[0] == "*"
+    assert len(stops) == 2
+    assert stops[1] not in {"*", ""}
     seen.click()
     expect(alarm).to_have_count(0)
     end = page.locator(".webmap-stop-list .webmap-reset")

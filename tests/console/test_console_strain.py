@@ -1,4 +1,4 @@
-"""The console when there is far too much, or nothing, or no storage."""
+"""The console with far too many robots, without robots, and without storage."""
 
 import signal
 from pathlib import Path
@@ -24,14 +24,14 @@ NO_STORAGE = """() => {
     Object.defineProperty(window, name, { get: refuse });
   }
 }"""
-"""Storage as in a page that may store nothing."""
+"""Storage of a page that is not allowed to store data."""
 
 FULL_STORAGE = """() => {
   Storage.prototype.setItem = () => {
     throw new DOMException("Full.", "QuotaExceededError");
   };
 }"""
-"""Storage that has no space left."""
+"""Storage without free space."""
 
 CORNER = """(e) => {
   const { right, top } = e.getBoundingClientRect();

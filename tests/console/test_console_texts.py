@@ -1,4 +1,4 @@
-"""What the console says of a robot."""
+"""The texts of the console about a robot."""
 
 import math
 

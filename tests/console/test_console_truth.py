@@ -1,11 +1,11 @@
-"""The words of the console are true, and the same everywhere."""
+"""The texts of the console are true, and the same everywhere."""
 
 import re
 from pathlib import Path
 
 import pytest
 from console_ready import (
-    same_word,
+    expect_state,
     select,
     send_away,
     shown_state,
@@ -21,13 +21,13 @@ from webmap_process import simulator, webmap
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 ROBOTS = 10
-"""So many that the list has a search."""
+"""Enough robots for a list with a search."""
 
 PLACE = """() => {
   const { e, f } = document.querySelector(".robot.selected").getScreenCTM();
   return [e, f];
 }"""
-"""Where the selected robot is in the window."""
+"""The place of the selected robot in the window."""
 
 HAS_GONE = f"""([x, y, far]) => {{
   const [e, f] = ({PLACE})();
@@ -41,12 +41,12 @@ def test_a_robot_with_a_goal_is_navigating_and_its_cancel_names_the_operator(
     page = open_console()
     select(page, "Robot 2")
     send_away(page)
-    same_word(page, re.compile("^Navigating"))
+    expect_state(page, re.compile("^Navigating"))
     page.locator("#card").get_by_role("button", name="Cancel goal").click()
     goal = page.locator("#card .goal")
     expect(goal).to_contain_text("Goal cancelled: by ")
     expect(goal).not_to_contain_text("another program")
-    same_word(page, "You have control")
+    expect_state(page, "You have control")
 
 
 def test_the_card_of_the_selected_robot_is_shown_after_a_reload(open_console):
@@ -68,7 +68,7 @@ def test_the_view_uncovers_a_robot_that_is_selected_in_the_list(
     select(page, "Robot 4")
     card = page.locator("#card").bounding_box()
     x, y = page.evaluate(PLACE)
-    # Its own card covers it now.
+    # The card of the robot covers the robot now.
     page.mouse.move(300, 400)
     page.mouse.down()
     page.mouse.move(
@@ -105,14 +105,14 @@ def test_set_pose_on_the_page_does_not_report_a_jump_of_the_pose(chromium):
         wait_until_ready(page)
         select(page, "robot_0")
         unfold(page)
-        word = page.locator(".webmap-locate-word")
+        status = page.locator(".webmap-locate-word")
         before = page.evaluate(PLACE)
         for _ in range(5):  # a page that is too busy sends nothing
             page.get_by_role("button", name="Set pose").click()
-            expect(word).to_contain_text("Press where the robot is")
+            expect(status).to_contain_text("Press where the robot is")
             page.mouse.click(before[0] + 70, before[1] - 70)
-            expect(word).to_have_text(re.compile("^Pose sent|^Pose not sent"))
-            if word.inner_text() == "Pose sent.":
+            expect(status).to_have_text(re.compile("^Pose sent|^Pose not sent"))
+            if status.inner_text() == "Pose sent.":
                 break
         page.wait_for_function(HAS_GONE, arg=[*before, 60])
         page.wait_for_timeout(2000)
@@ -145,7 +145,7 @@ def test_escape_sends_stop_while_this_page_drives_even_with_an_open_menu(open_co
     page.locator(".webmap-layers summary").click()
     hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
     page.keyboard.press("Escape")
-    same_word(page, "STOP active")
+    expect_state(page, "STOP active")
     page.keyboard.up("a")
     end_stops(page.locator(".webmap-teleop .webmap-reset"))
     expect(shown_state(page)).to_have_text("Free")
@@ -159,7 +159,7 @@ def test_escape_sends_stop_while_a_robot_of_this_page_navigates(
     send_away(page)
     page.locator(".webmap-layers summary").click()
     page.keyboard.press("Escape")
-    same_word(page, "STOP active")
+    expect_state(page, "STOP active")
     end_stops(page.locator(".webmap-teleop .webmap-reset"))
 
 
@@ -170,7 +170,7 @@ def test_the_space_bar_sends_stop_after_escape_closed_a_menu(open_console):
     page.keyboard.press("Escape")
     expect(page.locator(".webmap-layers[open]")).to_have_count(0)
     page.keyboard.press("Space")
-    same_word(page, "STOP active")
+    expect_state(page, "STOP active")
     end_stops(page.locator(".webmap-teleop .webmap-reset"))
 
 
@@ -229,7 +229,7 @@ def test_an_exported_picture_contains_no_handles_of_tools(open_console, tmp_path
     text = file.read_text(encoding="utf-8")
     assert "Robot 1" in text
     assert "webmap-align" not in text
-    # Opened alone, nothing is drawn in the corner where hidden parts would lie.
+    # Opened alone, the image is empty in the corner where hidden parts would be.
     page.goto(file.as_uri())
     there = page.evaluate(
         """() => [...document.querySelectorAll("circle, path, rect, line")]

@@ -57,7 +57,7 @@ def found(name: str) -> Any:
 
 
 def member(owner: Any, name: str) -> Any:
-    """Return an attribute, or the annotation of one that each instance has."""
+    """Return an attribute, or the annotation of an attribute of each instance."""
     if hasattr(owner, name):
         return getattr(owner, name)
     for each in getattr(owner, "__mro__", ()):
@@ -94,7 +94,7 @@ def is_identifier(name: str) -> bool:
 
 
 def is_shown(word: str) -> bool:
-    """Return whether a string or the text of an element has this word."""
+    """Return whether a string or the text of an element has this text."""
     begins = r"""["'`>](?:[^"'`<>\n]*[^"'`<>\n\w])?"""
     source = sources(".js", ".py", ".html")
     return re.search(rf"{begins}{re.escape(word)}\b", source) is not None

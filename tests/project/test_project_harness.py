@@ -1,4 +1,4 @@
-"""The benchmarks' harness: who runs when, and what is compared with what."""
+"""The harness of the benchmarks: the order of the runs, and the comparisons."""
 
 import pytest
 

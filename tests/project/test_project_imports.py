@@ -1,4 +1,4 @@
-"""What is loaded when, because it decides how soon things start and what can fail."""
+"""The modules that an import loads: they affect the start time and what can fail."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ HEAVY = {"PIL", "cbor2", "click", "numpy", "starlette", "uvicorn", "yaml"}
 
 
 def loaded_by(statement: str) -> set[str]:
-    """Return the top-level modules that a fresh interpreter has after it."""
+    """Return the top-level modules of a new interpreter after a statement."""
     return {name.partition(".")[0] for name in modules_after(statement)}
 
 
@@ -70,6 +70,6 @@ def test_parsing_a_scan_in_the_gate_loads_cbor2_as_the_only_heavy_package() -> N
 
 def test_the_gate_process_imports_no_module_of_the_display() -> None:
     loaded = modules_after("import webmap.gate.__main__")
-    rooms = {".".join(name.split(".")[:2]) for name in loaded}
+    folders = {".".join(name.split(".")[:2]) for name in loaded}
     display = {"cli", "console", "core", "modules", "scene", "server", "sim", "wire"}
-    assert not rooms & {f"webmap.{room}" for room in display}
+    assert not folders & {f"webmap.{folder}" for folder in display}

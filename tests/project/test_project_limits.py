@@ -1,4 +1,4 @@
-"""Where the ramps of robots end, and what is left out where a peer is not installed."""
+"""The ends of the ramps of robots, and peers that are not installed."""
 
 from benchmarks import peers
 from benchmarks.limits import AGE_99, Watch, end_of, plot, ramp
@@ -65,6 +65,6 @@ def test_a_peer_that_is_not_installed_is_left_out_with_what_installs_it(
     monkeypatch.setattr(peers, "compare", lambda _title, found, _rounds: found)
     (contenders,) = peers.bench(rounds=1, quick=True)
     assert [contender.name for contender in contenders] == ["WebMap"]
-    said = capsys.readouterr().out
-    assert all(name in said for name in ("nicegui", "viser", "ros2d"))
-    assert said.count("make bench-peers") == 3
+    output = capsys.readouterr().out
+    assert all(name in output for name in ("nicegui", "viser", "ros2d"))
+    assert output.count("make bench-peers") == 3

@@ -1,4 +1,4 @@
-"""The line between an agent and a router, and the scene that crosses it."""
+"""The line between an agent and a router, and the subscriptions of an agent."""
 
 import json
 import socket
@@ -15,7 +15,7 @@ SENT = bytes(range(256)) * 100
 
 @pytest.fixture
 def echo():
-    """Return the port of a server that sends back what it gets."""
+    """Return the port of a server that sends back all bytes that it receives."""
     server = socket.create_server(("127.0.0.1", 0))
 
     def serve(link):

@@ -1,4 +1,4 @@
-"""The public names, and the version that is said in several places."""
+"""The public names, and the version, which is in several files."""
 
 import inspect
 import re

@@ -1,4 +1,4 @@
-"""The second look that tests get when they fail."""
+"""The second run of failed tests."""
 
 import os
 import subprocess
@@ -16,9 +16,9 @@ from pathlib import Path
 
 def test_once():
     before = Path(__file__).with_name("before")
-    looked = before.exists()
+    existed = before.exists()
     before.touch()
-    assert looked
+    assert existed
 """
 
 
@@ -42,34 +42,34 @@ def run(tmp_path):
 
 
 def test_a_test_that_passes_the_second_time_is_named(run):
-    status, said = run(ONCE)
+    status, shown = run(ONCE)
     assert status == 0
     assert (
-        "Passed the second time; correct these tests:\n  test_it.py::test_once" in said
+        "Passed the second time; correct these tests:\n  test_it.py::test_once" in shown
     )
 
 
 def test_a_test_that_also_fails_the_second_time_fails_the_run(run):
-    status, said = run(ONCE + "\ndef test_never():\n    assert not 1\n")
+    status, shown = run(ONCE + "\ndef test_never():\n    assert not 1\n")
     assert status == 1
-    assert "2 failed at first" in said
-    assert "correct these tests" not in said
+    assert "2 failed at first" in shown
+    assert "correct these tests" not in shown
 
 
 def test_a_failed_safety_test_is_not_repeated(run):
-    status, said = run("import pytest\npytestmark = pytest.mark.safety\n" + ONCE)
+    status, shown = run("import pytest\npytestmark = pytest.mark.safety\n" + ONCE)
     assert status == 1
-    assert "Now a second time" not in said
+    assert "Now a second time" not in shown
 
 
 def test_many_failed_tests_are_not_repeated(run):
     source = "import pytest\n@pytest.mark.parametrize('n', range(11))\n"
-    status, said = run(source + "def test_never(n):\n    assert False\n")
+    status, shown = run(source + "def test_never(n):\n    assert False\n")
     assert status == 1
-    assert "Now a second time" not in said
+    assert "Now a second time" not in shown
 
 
 def test_a_collection_error_fails_the_run(run):
-    status, said = run("import nothing_of_that_name\n")
+    status, shown = run("import nothing_of_that_name\n")
     assert status != 0
-    assert "correct these tests" not in said
+    assert "correct these tests" not in shown

@@ -1,4 +1,4 @@
-"""The sums of messages of a large fleet."""
+"""The computed message rates of a large fleet."""
 
 import pytest
 

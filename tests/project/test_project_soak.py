@@ -1,4 +1,4 @@
-"""What the long run and the robots of other benchmarks measure, on made figures."""
+"""The verdicts of the long run, and the age of a pose, with invented figures."""
 
 import importlib.util
 import json
@@ -15,7 +15,7 @@ from webmap.scene.wire.encode import encode_changes
 
 
 def samples(**last):
-    """Return samples that are equal, except for the ends of some figures."""
+    """Return equal samples, except for the last values of some figures."""
     names = (*MEMORY, *AGES, FRAMES)
     begin = dict.fromkeys(names, 100.0)
     return [begin] * 30 + [begin | last] * 10

@@ -1,4 +1,4 @@
-"""What holds for every file of the project."""
+"""Rules for every file of the project."""
 
 import ast
 import re
@@ -12,14 +12,14 @@ from webmap.server.own_files import FOLDERS
 
 ROOT = Path(__file__).parents[2]
 SOURCES = sorted((ROOT / "src").rglob("*.py"))
-# A path of somebody's machine: a home, a checkout, the root's own folder.
+# A path of a developer's machine: a home folder, a checkout, the folder of root.
 MACHINE_PATH = re.compile(
     r"(?<![\w./*])(?:/(?:home|Users)/\w+/|/(?:root|work)/\w|[A-Z]:\\Users\\\w)"
 )
 
 
 def project_files() -> list[Path]:
-    """Return what git knows of, or everything where there is no git (an sdist)."""
+    """Return the files that git tracks, or all files of src without git (an sdist)."""
     names: list[str] = []
     if (ROOT / ".git").exists() and (git := shutil.which("git")):
         done = subprocess.run(
@@ -57,13 +57,13 @@ def test_no_file_contains_a_path_of_a_developer_machine() -> None:
     assert not found
 
 
-# In pieces, so that this file names none itself.
+# In parts, so that this file contains no such path.
 @pytest.mark.parametrize("parts", [("/home", "ann", "x"), ("cd /root", "a")])
 def test_the_machine_path_pattern_finds_such_paths(parts: tuple[str, ...]) -> None:
     assert MACHINE_PATH.search("/".join(parts))
 
 
-# What only a rosbridge has: operations, encodings, fields, nodes and parameters.
+# Terms of rosbridge only: operations, encodings, fields, nodes and parameters.
 ROSBRIDGE_WORDS = re.compile(
     r"rosapi|rosbridge_(?:suite|websocket|server|library)|max_message_size|cbor|"
     r"fragment_size|throttle_rate|advertise_service|service_response|"
@@ -72,11 +72,11 @@ ROSBRIDGE_WORDS = re.compile(
 )
 PROTOCOL_ROOMS = (
     "ros/rosbridge/",
-    "gate/",  # it has sockets of its own
-    "agents/",  # an agent passes on what displays ask of its rosbridge
-    "testing/",  # its peers are rosbridges
+    "gate/",  # the gate has separate sockets to the rosbridge
+    "agents/",  # an agent forwards the requests of displays to its rosbridge
+    "testing/",  # the test robots have rosbridges
 )
-# People have to read of rosapi, since they have to start it; a replay starts it, too.
+# These messages name rosapi, as users must start it; a replay starts it, too.
 ROSBRIDGE_TEXTS = {
     "bags/replay.py": {"rosapi"},
     "cli/doctor.py": {"rosapi"},
@@ -95,8 +95,8 @@ def test_only_the_allowed_folders_use_rosbridge_terms() -> None:
         name = path.relative_to(ROOT / "src/webmap").as_posix()
         if name.startswith(PROTOCOL_ROOMS):
             continue
-        words = {word.lower() for word in ROSBRIDGE_WORDS.findall(path.read_text())}
-        found += [f"{name}: {w}" for w in words - ROSBRIDGE_TEXTS.get(name, set())]
+        terms = {term.lower() for term in ROSBRIDGE_WORDS.findall(path.read_text())}
+        found += [f"{name}: {w}" for w in terms - ROSBRIDGE_TEXTS.get(name, set())]
     assert not found, (
         "write topics, messages and services, as webmap.ros.bridge does; the folder of "
         "another protocol belongs in PROTOCOL_ROOMS"

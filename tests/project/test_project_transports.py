@@ -1,4 +1,4 @@
-"""The simulation of a link that loses packets: what waits, and who is stopped."""
+"""The simulation of a link that loses packets: delays, and stops of the robot."""
 
 import itertools
 import random
@@ -11,7 +11,7 @@ SENT = [number * 0.05 for number in range(10)]
 
 
 class Losing(random.Random):
-    """Loses the third packet at its first attempt, and nothing else."""
+    """Loses only the third packet, at the first attempt."""
 
     def __init__(self):
         super().__init__()
@@ -37,7 +37,7 @@ def test_without_losses_each_packet_takes_half_of_a_round_trip():
 def test_a_lost_packet_holds_up_those_behind_it_until_a_later_one_was_answered():
     for transport in ("tcp", "quic"):
         came = received(transport)
-        # Sent at 100 ms; the next one, of 150 ms, is answered at 250 ms.
+        # Sent at 100 ms; the next packet is sent at 150 ms and answered at 250 ms.
         assert came[2] == pytest.approx(0.25 + 0.05)
         assert came[3:5] == [came[2]] * 2
         assert came[:2] + came[6:] == pytest.approx(
@@ -100,7 +100,7 @@ def test_the_gate_counts_a_stop_only_while_the_robot_is_driven():
         now = number * 0.05001
         gate.take(number, gate.issue(now), number > 10, now + 0.001)
     assert gate.driven.stops == 0
-    for number in range(40, 60):  # no command comes any more
+    for number in range(40, 60):  # no more commands arrive
         gate.issue(number * 0.05001)
     assert gate.driven.stops == 1
     assert gate.driven.seconds == pytest.approx(29 * 0.05 + 0.2, abs=0.05)

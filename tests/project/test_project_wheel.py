@@ -1,4 +1,4 @@
-"""The wheel holds all that WebMap needs, and starts where nothing else is."""
+"""The wheel has all files of WebMap, and runs in an empty environment."""
 
 import os
 import re
@@ -39,7 +39,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of commands of a fresh environment with the wheel in it."""
+    """Return the folder of the commands of a new environment with the wheel."""
     folder = tmp_path_factory.mktemp("a path with spaces") / "environment"
     run([sys.executable, "-m", "venv", "--without-pip", folder])
     commands = folder / ("Scripts" if os.name == "nt" else "bin")
@@ -49,7 +49,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(command: list[str | Path], cwd: Path | None = None) -> str:
-    # Nothing of this checkout may leak in: that is the point of the test.
+    # The environment must not use any file of this checkout.
     clean = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
     done = subprocess.run(command, cwd=cwd, env=clean, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -67,27 +67,27 @@ def test_the_wheel_contains_every_file_of_the_package(wheel: Path) -> None:
 
 
 def test_an_installed_wheel_prints_its_version(installed: Path, tmp_path: Path) -> None:
-    said = run([installed / "webmap", "--version"], cwd=tmp_path)
-    assert webmap.__version__ in said
+    output = run([installed / "webmap", "--version"], cwd=tmp_path)
+    assert webmap.__version__ in output
 
 
 LOADED = re.compile(
     r'''(?:\b(?:src|href)=|\bfrom |\bimport |\bimport\(|\burl\()"([^"#?][^"]*)"'''
 )
-"""What a page, a module or a style sheet names that a browser loads."""
+"""The files that a browser loads for a page, a module or a style sheet."""
 
 
 def load(url: str) -> set[str]:
-    """Load a page with all that it needs, as a browser would, and return the paths."""
+    """Load a page and all files that it needs, as a browser does; return the paths."""
     wanted = [
         f"/_webmap/{path.relative_to(SOURCE / 'webmap').as_posix()}"
-        for room in ("web", "features", "console")
-        for path in (SOURCE / "webmap" / room).rglob("*")
+        for folder in ("web", "features", "console")
+        for path in (SOURCE / "webmap" / folder).rglob("*")
         if path.suffix in {".js", ".css"}
     ]
     with httpx.Client(follow_redirects=True) as client:
         page = client.get(url).url
-        # Browser halves are named by the page's socket alone.
+        # Only the socket of the page names the scripts of features.
         todo, seen = [page, *map(page.join, wanted)], set()
         while todo:
             answer = client.get(todo.pop())

@@ -1,17 +1,17 @@
-"""The bench is the same for all that needs a real browser."""
+"""Provide the bench of all tests that need a real browser."""
 
 import sys
 from pathlib import Path
 
 import pytest
 
-# What drives Chromium and starts our processes is with the tests of the browser.
+# The modules that control Chromium and start processes are in tests/browser.
 sys.path.insert(0, str(Path(__file__).parents[1] / "browser"))
 
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):
-    """A robot, a display and a browser, with a proxy on each hop."""
+    """A robot, a display and a browser, with a proxy on each connection."""
     from safety_proof import ProvingBench
 
     with ProvingBench(tmp_path_factory.mktemp("safety")) as bench:
@@ -20,7 +20,7 @@ def bench(tmp_path_factory):
 
 @pytest.fixture(scope="session", autouse=True)
 def progress(pytestconfig):
-    """Show how far a long run has come, past the capturing of output."""
+    """Print the progress of a long run, although pytest captures output."""
     from safety_run import SHOW
 
     capture = pytestconfig.pluginmanager.getplugin("capturemanager")

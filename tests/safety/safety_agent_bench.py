@@ -27,7 +27,7 @@ from webmap.testing import FaultProxy, WitnessRobot
 DRIVER = Path(__file__).with_name("safety_driver.py")
 
 ROBOT = f"r{zlib.crc32(b'bay3/Bob'):08x}"
-"""The identifier of the robot that the agent gives."""
+"""The identifier that the agent gives to the robot."""
 
 READY = r"is ready at zenoh://127\.0\.0\.1:(\d+)"
 
@@ -51,11 +51,11 @@ class FarDriver:
 
     @property
     def now(self):
-        """What the gate said last of the robot."""
+        """The last report of the gate about the robot."""
         return self.reports[-1] if self.reports else {}
 
     def acquire(self):
-        """Have the program take the robot; return the answer."""
+        """Let the program take control of the robot; return the answer."""
         before = len(self.acquired)
         self.order("acquire")
         wait_for(lambda: len(self.acquired) > before, "an answer", 20)
@@ -88,7 +88,7 @@ class FarDriver:
 
 
 class AgentBench:
-    """All processes between the operator's hand and the robot."""
+    """All processes between the operator and the robot."""
 
     def __init__(self, folder):
         self._folder = folder
@@ -148,9 +148,9 @@ class AgentBench:
         return driver
 
     def drive_off(self, within=20.0):
-        """Take the robot and drive, until it moves steadily.
+        """Take control and drive until the robot moves steadily.
 
-        On a machine that holds the way to the robot up, the page loses control.
+        If the machine delays the commands too long, the page loses control.
         """
         driver, deadline = self.driver, time.monotonic() + within
         while time.monotonic() < deadline:
@@ -162,7 +162,7 @@ class AgentBench:
             try:
                 wait_for(lambda: driver.now.get("mine"), "control of the robot", 3.0)
             except AssertionError:
-                continue  # the agent refused it: the display had slept
+                continue  # the agent refused: the display did not run for a while
             pass_time(0.5)
             driver.order("x 1")
             at = time.monotonic()
@@ -174,9 +174,9 @@ class AgentBench:
         raise AssertionError(f"no steady motion: {driver.now}, refused: {refused}")
 
     def program_off(self, within=20.0):
-        """Have the program take the robot and drive it, until it moves steadily.
+        """Let the program take control and drive until the robot moves steadily.
 
-        On a machine that holds the way to the robot up, the program loses control.
+        If the machine delays the commands too long, the program loses control.
         """
         driver, deadline = self.driver, time.monotonic() + within
         while time.monotonic() < deadline:

@@ -1,4 +1,4 @@
-"""A person who holds W, a robot that records its commands, and faults in between.
+"""A bench: an operator holds W, a robot records its commands, and proxies fail.
 
 ::
 
@@ -23,10 +23,10 @@ SITE = Path(__file__).with_name("safety_site.py")
 V_MAX, W_MAX = 1.0, 1.5
 
 NEUTRAL = 0.3
-"""Seconds for which the key is off before it is pressed: 200 ms must have been seen."""
+"""Seconds for which W is released before a press; the gate requires 200 ms."""
 
 ROBOT_TIMEOUT = 0.5
-"""Seconds until the witness stops by itself."""
+"""Seconds without a command after which the witness robot stops by itself."""
 
 
 def wait_for(check, what, within=15.0):
@@ -39,7 +39,7 @@ def wait_for(check, what, within=15.0):
 
 
 def pass_time(seconds):
-    """Let the machine go on: what must not happen has this long to happen."""
+    """Wait, for example to check afterwards that nothing has happened."""
     time.sleep(seconds)
 
 
@@ -64,11 +64,12 @@ RESET = """import("/_webmap/web/key.js").then(({ protocols }) => new Promise((do
 
 
 class Bench:
-    """Everything from the finger to the wheel, with real processes.
+    """All parts from the key to the robot, as real processes.
 
     Args:
-        folder: For what stays on the disk.
-        timeout: Seconds until the robot stops by itself; None for one that never does.
+        folder: The folder of the stored state.
+        timeout: Seconds without a command after which the robot stops by itself;
+            None if it never does.
 
     """
 
@@ -78,9 +79,9 @@ class Bench:
         self._open = ExitStack()
         self.browser = self.tab = self.display = None
         self.others_publish = False
-        """Whether the test has another program publish velocities."""
+        """Whether another program of the test publishes velocities."""
         self.causes = []
-        """When zeros may begin, as at each release of the key."""
+        """Times at which zeros may begin, for example at each release of the key."""
 
     def __enter__(self):
         enter = self._open.enter_context
@@ -120,16 +121,16 @@ class Bench:
             self.browser = self.tab = None
 
     def renew_browser(self):
-        """Open the page in another browser: the one of before is dead or maimed."""
+        """Open the page in a new browser, as the old one has ended or is damaged."""
         self.tab.close()
         self.end_browser()
         self.open_page()
 
     def open_page(self, before=""):
-        """Open the page in a new tab of a browser that runs.
+        """Open the page in a new tab; start a browser if none runs.
 
         Args:
-            before: A script that runs in the page before its own.
+            before: A script that runs before the scripts of the page.
 
         """
         if self.browser is None:
@@ -167,7 +168,7 @@ class Bench:
 
     @property
     def gate(self):
-        """The process of the gate that runs now."""
+        """The process of the gate that runs now, or None."""
         for child in psutil.Process(self.display.popen.pid).children(recursive=True):
             with suppress(psutil.Error):
                 if "webmap.gate" in child.cmdline():
@@ -179,7 +180,7 @@ class Bench:
         everybody = psutil.Process(self.browser.process.pid).children(recursive=True)
         return [process for process in everybody if is_renderer(process)]
 
-    # The person.
+    # The operator.
 
     def press(self):
         self.tab.down("w")
@@ -189,7 +190,7 @@ class Bench:
         self.tab.up("w")
 
     def repeat_press(self):
-        """What a keyboard sends on while a key is held."""
+        """Send the repeated key event that a keyboard sends while W is held."""
         self.tab.call(
             "Input.dispatchKeyEvent",
             type="keyDown",
@@ -211,12 +212,12 @@ class Bench:
         )
 
     def reset_stop(self):
-        """End the STOP, through a socket of the page's own, as its button does."""
+        """End the STOP, like the reset button, but over a second socket of the page."""
         self.tab.wait("document.body.innerText.includes('STOP active')")
         assert self.tab.evaluate(RESET) in {"free", "held", "stopping"}
 
-    def heal(self):
-        """Have a display and a page, whatever the test before left behind."""
+    def restore(self):
+        """Start the display and open the page again if the previous test ended them."""
         self.robot_hop.release()
         self.web_hop.release()
         if self.display.popen.poll() is not None:
@@ -228,27 +229,27 @@ class Bench:
         if self.tab is None:
             self.open_page()
         elif not self.others_publish:
-            said = self.tab.evaluate("document.body.innerText")
-            assert "nother program" not in said, said
+            text = self.tab.evaluate("document.body.innerText")
+            assert "nother program" not in text, text
 
     def drive_off(self, within=30.0):
-        """Press W until the robot moves, and keep pressing; like a person, again."""
-        self.heal()
+        """Hold W until the robot moves, and keep W pressed; if necessary, try again."""
+        self.restore()
         deadline = time.monotonic() + within
         while time.monotonic() < deadline:
             pass_time(NEUTRAL)
             self.press()
-            patience = time.monotonic() + 2.5
-            while time.monotonic() < patience:
+            end_of_try = time.monotonic() + 2.5
+            while time.monotonic() < end_of_try:
                 if self.steady():
                     return
                 pass_time(0.01)
             self.let_go()
-        said = self.tab.evaluate("document.body.innerText")
-        raise AssertionError(f"W does not drive it\n{said}\n{self.display.log}")
+        text = self.tab.evaluate("document.body.innerText")
+        raise AssertionError(f"W does not drive the robot\n{text}\n{self.display.log}")
 
     def steady(self):
-        """Whether the robot has been moved without a break for a moment."""
+        """Return whether the robot received velocities without a gap for 0.4 s."""
         now = time.monotonic()
         recent = [
             velocity
@@ -266,13 +267,13 @@ SLOW = Shape(latency=0.4)
 
 
 def send_only(tab: Tab, method, **parameters):
-    """Call a method whose answer will never come."""
+    """Call a method of DevTools and do not wait for an answer."""
     message = {"id": next(tab._numbers), "method": method, "params": parameters}
     tab._socket.send(json.dumps(message))
 
 
 def is_renderer(process: psutil.Process) -> bool:
-    """Return whether a process draws pages, and has not ended meanwhile."""
+    """Return whether a process is a renderer of pages and still runs."""
     try:
         return "--type=renderer" in process.cmdline()
     except (psutil.ZombieProcess, psutil.NoSuchProcess):

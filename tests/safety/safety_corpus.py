@@ -1,7 +1,7 @@
-"""What a page may send that no page should: refused whole, and never motion.
+"""Invalid messages of a page: the gate refuses each, and none moves the robot.
 
-``EPOCH``, ``TICK`` and ``SEQ`` stand for those that are right at that moment, so that
-nothing but what is wrong with a message can be why it does not move the robot.
+A test replaces ``EPOCH``, ``TICK`` and ``SEQ`` by the values that are valid when it
+sends the message, so that the gate refuses the message only because of its error.
 """
 
 ROBOT = '"op":"drive","robot":"ROBOT"'
@@ -33,7 +33,7 @@ NO_NUMBERS = [
 CORPUS = [
     *(f'{{{ROBOT},{STAMP},"x":{x},{REST}}}' for x in NO_NUMBERS),
     *(f'{{{ROBOT},{STAMP},"x":0.5,"y":0.0,"turn":{x}}}' for x in NO_NUMBERS[:8]),
-    # A field too few, too many, or twice.
+    # A field is missing, is unknown, or occurs twice.
     f'{{{ROBOT},{STAMP},"x":1.0,"y":0.0}}',
     f"{{{ROBOT},{STAMP},{REST}}}",
     f'{{{ROBOT},"epoch":EPOCH,"seq":SEQ,"x":1.0,{REST}}}',
@@ -44,7 +44,7 @@ CORPUS = [
     f'{{{ROBOT},{STAMP},"x":0.0,"x":1.0,{REST}}}',
     f'{{{ROBOT},{STAMP},"x":1.0,{REST},"x":1.0}}',
     f'{{"op":"drive","op":"drive","robot":"ROBOT",{STAMP},"x":1.0,{REST}}}',
-    # The wrong one, or the wrong time.
+    # A field has a wrong value.
     f'{{"op":"drive","robot":"nobody",{STAMP},"x":1.0,{REST}}}',
     f'{{"op":"drive","robot":"",{STAMP},"x":1.0,{REST}}}',
     f'{{"op":"drive","robot":7,{STAMP},"x":1.0,{REST}}}',
@@ -58,7 +58,7 @@ CORPUS = [
     f'{{{ROBOT},"epoch":EPOCH,"seq":SEQ,"tick":0,"x":1.0,{REST}}}',
     f'{{{ROBOT},"epoch":EPOCH,"seq":SEQ,"tick":TICK00,"x":1.0,{REST}}}',
     f'{{{ROBOT},"epoch":EPOCH,"seq":SEQ,"tick":null,"x":1.0,{REST}}}',
-    # No message at all.
+    # The text is not one whole message.
     "",
     " ",
     "drive",

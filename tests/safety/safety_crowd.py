@@ -1,6 +1,7 @@
-"""Many viewers of one page, some of whom read nothing, until standard input ends.
+"""Many viewers of one page, some of which read nothing, until standard input ends.
 
-Started as ``safety_crowd.py URL VIEWERS SILENT``; prints ``ready`` after all connected.
+Started as ``safety_crowd.py URL VIEWERS SILENT``; prints ``ready`` when all
+viewers have connected.
 """
 
 import asyncio
@@ -29,7 +30,7 @@ def sign_in(url: str) -> str:
 
 
 async def view(url: str, key: str, number: int, silent: bool, there) -> None:
-    """Be one page: send hello, and acknowledge each frame or none."""
+    """Connect as one page: send hello, and acknowledge each frame or read nothing."""
     address = urlsplit(url).netloc
     name = f"viewer{number:04d}"
     socket = await connect(
@@ -61,7 +62,7 @@ async def view(url: str, key: str, number: int, silent: bool, there) -> None:
 
 
 async def main(url: str, viewers: int, silent: int) -> None:
-    """Have all come, then wait for the end."""
+    """Connect all viewers, then wait for the end of standard input."""
     key = sign_in(url)
     there = 0
 

@@ -2,9 +2,9 @@
 
 Its arguments are the address of the robot's bridge or agent, and the robot's id.
 
-A process of its own, so that it can be killed. It reads orders, one a line (``take``,
-``x 1.0``, ``stop``, and for its program ``acquire``, ``v 0.5`` and ``silent``), and
-writes a line of JSON for each new report of the robot from the gate.
+It is a separate process, so that a test can kill it. It reads one order from each line:
+``take``, ``x 1.0``, ``stop``, ``reset``, and for its program ``acquire``, ``v 0.5`` and
+``silent``. It prints a line of JSON for each report of the gate about the robot.
 """
 
 import json
@@ -21,7 +21,7 @@ ROBOT = sys.argv[2] if len(sys.argv) > 2 else "r1"
 
 
 def write_line(text: str) -> None:
-    """Write a line, whole: several threads write."""
+    """Print a whole line at a time, as several threads print."""
     sys.stdout.write(f"{text}\n")
     sys.stdout.flush()
 
@@ -39,7 +39,7 @@ class Operator:
         self._connection = client.connect("Ann", "operator", self._on_message, print)
 
     def send(self, text: str) -> None:
-        """Send a text as it is."""
+        """Send a text unchanged."""
         self._connection.receive(text)
 
     def reset(self) -> None:
@@ -48,7 +48,7 @@ class Operator:
         self.send(json.dumps(command))
 
     def step(self) -> None:
-        """Send the command, if there is one."""
+        """Send a drive command, if a speed is set."""
         if self.x is None or self._gate not in self._ticks:
             return
         self._seq += 1
@@ -79,14 +79,14 @@ class Operator:
 
 
 class Program:
-    """Gives a velocity at 20 Hz while it has control, as Python code does."""
+    """Sends a velocity at 20 Hz while it has control, as a program in Python does."""
 
     def __init__(self, client: Gates) -> None:
         self.v: float | None = None
         self._client = client
 
     def acquire(self) -> None:
-        """Take the robot, and print what came of it."""
+        """Take control of the robot, and print the result."""
         try:
             answer = {"op": "acquired", "epoch": self._client.take(ROBOT).result(10)}
         except NoLease as error:
@@ -94,7 +94,7 @@ class Program:
         write_line(json.dumps(answer))
 
     def step(self) -> None:
-        """Give the velocity, if there is one."""
+        """Send the velocity, if one is set."""
         if self.v is None:
             return
         try:
@@ -106,7 +106,7 @@ class Program:
 
 
 def main() -> None:
-    """Follow the orders on standard input, until it ends."""
+    """Follow the orders on standard input until it ends."""
     client = Gates()
     client.start()
     spec = RobotSpec(

@@ -1,7 +1,7 @@
-"""Ten robots that scan, and a map of 16 million cells that comes again and again.
+"""Ten robots with scans, and a map of 16 million cells that is published repeatedly.
 
-A process of its own, with two rosbridge servers; says on standard output where they
-are, and ends when standard input does.
+It is a separate process with two rosbridge servers. It prints their addresses, and ends
+when standard input ends.
 """
 
 import asyncio
@@ -21,14 +21,14 @@ from webmap.sim.process import end_with_stdin
 
 ROBOTS = 10
 SIDE = 4000
-"""Cells along a side of the map."""
+"""Number of cells along a side of the map."""
 
 EVERY = 2.0
-"""Seconds between two of the maps."""
+"""Seconds between two maps."""
 
 
 async def send_maps(stop: asyncio.Event) -> None:
-    """Publish maps, no two of which are the same, to every subscriber."""
+    """Publish the map again and again, each time with other cells."""
     schema, quirks = Schema(Dialect("ros1")), parse_quirks("real", "ros1")
     graph, node = Graph(schema), object()
     server = RosbridgeServer(graph, Encoder(schema, quirks))
@@ -38,7 +38,7 @@ async def send_maps(stop: asyncio.Event) -> None:
     cells[::97], cells[:, ::113], cells[: SIDE // 8] = 100, 100, -1
     print(f"maps at {await server.start('127.0.0.1', 0)}", flush=True)
     while not stop.is_set():
-        cells = np.roll(cells, 1, axis=0)  # every tile has to be drawn again
+        cells = np.roll(cells, 1, axis=0)  # the display must draw every tile again
         now = time.time()
         message = messages.cells("/huge", now, "map", cells, 0.05, (0.0, 0.0))
         graph.publish(node, "/huge", message)

@@ -1,6 +1,6 @@
-"""A page that sends one robot to places; the address of its bridge is in SAFETY_BRIDGE.
+"""A page that sends goals to one robot, whose bridge has the address SAFETY_BRIDGE.
 
-The robot's stop hook may never be answered.
+The service of the robot's stop hook may never answer.
 """
 
 import os
@@ -17,7 +17,7 @@ bob.set_move_topic(bridge, action="/robot_0/navigate_to_pose")
 
 @webmap.page("/")
 def main(page):
-    """Show the robot, chosen, with the origin of the world in the middle."""
+    """Show the selected robot, with the origin of the world in the middle."""
     map = webmap.Map(page.element("webmap_container"))
     map.add_module("Teleop", 1.0, 1.5)
     map.add_module("StopButton")

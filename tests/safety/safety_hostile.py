@@ -1,14 +1,15 @@
-"""A good robot that a person drives in Chromium, beside robots of hostile bridges.
+"""An operator drives a good robot in Chromium, beside robots of hostile bridges.
 
 ::
 
     Chromium ── display ── gate ── witness robot
                    │         │
-                   └─────────┴──── hostile bridges, each a process of its own
+                   └─────────┴──── hostile bridges, each in a separate process
 
-``with beside(bench, "safety_hostile_peers:pings"): ...`` shows one more robot on the
-page for each name. Its bridge is the peer of that name, an async function that is given
-each link and does what it likes. ``drive(bench)`` drives the good robot and measures.
+``with beside(bench, "safety_hostile_peers:pings"): ...`` adds one robot to the
+page for each name. Its bridge is the peer of that name: an async function that gets
+each connection and sends arbitrary data. ``drive(bench)`` drives the good robot and
+measures.
 """
 
 import contextlib
@@ -22,7 +23,7 @@ from safety_load import helper
 from safety_waiting import Contention
 
 SETTLE = 2.0
-"""Seconds for which a peer may do its worst before the good robot is driven."""
+"""Seconds for which the peers send before the good robot is driven."""
 
 DRIVE = 3.0
 """Seconds for which the good robot is driven."""
@@ -42,21 +43,21 @@ RECORD_TICKS = """{
         }
     };
 }"""
-"""Notes when each tick of the gate comes to the page, on the page's own socket."""
+"""Records the time at which each tick of the gate arrives at the page."""
 
 
 READY = "document.querySelector('.webmap-teleop-title')?.textContent === 'Free'"
-"""Whether the page says that a press drives."""
+"""Whether the page shows that a key press drives the robot."""
 
 
 class Driven(NamedTuple):
-    """What was measured of the good robot; all times in seconds."""
+    """The measurements of the good robot; all times are in seconds."""
 
     refused: int
-    """How often W was pressed without the robot driving."""
+    """How often W was pressed and the robot did not move."""
 
     zeros: int
-    """Zeros at the robot while W was held."""
+    """Zeros that the robot received while W was held."""
 
     velocity_gap: float
     """The longest time between two velocities at the robot while W was held."""
@@ -65,32 +66,32 @@ class Driven(NamedTuple):
     """The longest time between two ticks of the gate at the page."""
 
     driving_jitter: float
-    """The longest time that the machine kept a thread waiting while W was held."""
+    """The longest delay of a thread by the machine while W was held."""
 
     stop: float
-    """From the space bar to the first zero at the robot."""
+    """The time from the press of the space bar to the first zero at the robot."""
 
     moved_after: int
-    """Velocities that move, of the half second after that zero, with W held on."""
+    """Nonzero velocities in the half second after that zero, with W still held."""
 
     stop_jitter: float
-    """How long the machine kept a thread waiting from the space bar to that zero."""
+    """How long the machine delayed a thread from the space bar to that zero."""
 
     stolen: float
     """The most steal time of all processors in a quarter of a second."""
 
     waited: float
-    """The longest wait of one thread on the way in a quarter of a second."""
+    """The longest wait of one thread for a processor in a quarter of a second."""
 
 
 @contextlib.contextmanager
 def beside(bench, *peers, shown=False):
-    """Show one more robot for each peer, on a bridge that the peer plays.
+    """Show one more robot for each peer; the peer is the bridge of that robot.
 
     Args:
         bench: The bench of the good robot.
-        peers: Each ``module:function``, a module of this folder.
-        shown: Whether the page shows all that the peers send.
+        peers: ``module:function`` of each peer; the module is in this folder.
+        shown: Whether the page shows all data of the peers.
 
     """
     with contextlib.ExitStack() as open:
@@ -107,7 +108,7 @@ def beside(bench, *peers, shown=False):
             bench.start_display()
             bench.open_page(before=RECORD_TICKS)
             pass_time(SETTLE)
-            bench.tab.wait(READY)  # until then the page says that it is getting ready
+            bench.tab.wait(READY)  # first the page shows that it prepares input
             yield urls
         finally:
             del os.environ["SAFETY_HOSTILE"], os.environ["SAFETY_SHOWN"]
@@ -116,7 +117,7 @@ def beside(bench, *peers, shown=False):
 
 
 def drive(bench, seconds=DRIVE):
-    """Hold W, then press STOP with W held on; return what was measured."""
+    """Hold W, then press STOP with W still held; return the measurements."""
     with Contention(bench.waiting()) as contention:
         driven = _drive(bench, seconds)
     return driven._replace(stolen=contention.stolen, waited=contention.waited)
@@ -130,7 +131,7 @@ def _drive(bench, seconds):
             break
         except AssertionError:
             refused += 1
-            assert refused < 5, "W never drives the good robot"
+            assert refused < 5, "W does not drive the good robot"
     begun = time.monotonic()
     pass_time(seconds)
     ended = time.monotonic()
@@ -167,7 +168,7 @@ def _drive(bench, seconds):
 
 
 def gap(times):
-    """Return the longest time between two of several times; infinity of fewer."""
+    """Return the longest gap between successive times; infinity if there is none."""
     return max(
         (after - before for before, after in itertools.pairwise(times)),
         default=float("inf"),

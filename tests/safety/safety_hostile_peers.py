@@ -1,7 +1,8 @@
-"""Hostile rosbridges, each an async function that talks on one link as it likes.
+"""Hostile rosbridges, each an async function that sends arbitrary data to a client.
 
-``safety_hostile.beside`` starts ``safety_hostile_peers.py MODULE:FUNCTION``, a process
-for each peer. It prints the bridge's address and ends with its standard input.
+``safety_hostile.beside`` starts ``safety_hostile_peers.py MODULE:FUNCTION`` as a
+process for each peer. The process prints the address of the bridge, and ends when
+standard input ends.
 """
 
 import asyncio
@@ -19,7 +20,7 @@ MORE, TEXT, BINARY, CLOSE, PING, PONG = 0, 1, 2, 8, 9, 10
 """Kinds of WebSocket frames."""
 
 CHUNK = 1 << 18
-"""Bytes that a flood writes at a time: asyncio reads up to 256 KiB in one piece."""
+"""Bytes of one write of a flood; asyncio reads up to 256 KiB at a time."""
 
 
 def frame(opcode, body=b"", *, final=True):
@@ -52,7 +53,7 @@ class Link:
         headers = dict(
             line.lower().split(b": ", 1) for line in request.split(b"\r\n")[1:-2]
         )
-        # The key keeps its case: its hash is the answer.
+        # Not in lower case: the answer contains a hash of the key.
         at = request.lower().index(b"sec-websocket-key: ") + 19
         key = request[at : at + len(headers[b"sec-websocket-key"])]
         magic = key + b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
@@ -70,7 +71,8 @@ class Link:
         """Write bytes and wait until the client has taken most of them."""
         self.writer.write(data)
         await self.writer.drain()
-        await asyncio.sleep(0)  # drain() gives nobody a turn while there is room
+        # drain() does not switch tasks while the buffer has room.
+        await asyncio.sleep(0)
 
     async def send(self, message):
         """Send one message, of any length, as JSON."""
@@ -98,13 +100,13 @@ class Link:
                 return json.loads(body)
 
     async def read_on(self):
-        """Read to the end, so that the client never waits to write."""
+        """Read and ignore everything, so that the client can always write."""
         while await self.reader.read(1 << 16):
             pass
 
 
 def flood(piece):
-    """Return a peer that opens a WebSocket and then repeats a piece for ever."""
+    """Return a peer that opens a WebSocket and sends ``piece`` for ever."""
     chunk = many(piece)
 
     async def talk(link):
@@ -133,14 +135,14 @@ status_words = flood(
 
 
 async def endless_message(link):
-    """Send one message in frames of one byte that never end."""
+    """Send one endless message in frames of one byte."""
     await link.accept()
     await link.write(frame(TEXT, b"{", final=False))
     await link.repeat(many(frame(MORE, b" ", final=False)))
 
 
 async def endless_headers(link):
-    """Answer the handshake with headers that never end."""
+    """Answer the handshake with endless headers."""
     await link.request()
     await link.write(b"HTTP/1.1 101 Switching Protocols\r\n")
     await link.repeat(many(b"X: y\r\n"))
@@ -153,7 +155,7 @@ async def frames_with_handshake(link):
 
 
 async def nested(link):
-    """Send messages that nest deeper than Python's own limit, ten a second."""
+    """Send messages with more nested lists than Python allows, ten a second."""
     await link.accept()
     while True:
         await link.write(frame(TEXT, b'{"op":"x","a":' + b"[" * 100_000))
@@ -166,7 +168,7 @@ async def serve(talk, stop):
 
     async def take(reader, writer):
         links.add(asyncio.current_task())
-        # asyncio would log that a link was cancelled, as they are at the end.
+        # Otherwise asyncio logs the tasks that are cancelled at the end.
         with contextlib.suppress(
             ConnectionError, asyncio.IncompleteReadError, asyncio.CancelledError
         ):
@@ -184,8 +186,8 @@ async def serve(talk, stop):
 
 
 async def main(name):
-    """Serve the peer that a name tells, until standard input ends."""
-    # A hostile bridge runs on another computer: it takes no processor from WebMap.
+    """Serve the peer of this name until standard input ends."""
+    # A real bridge runs on another computer and needs no processor time of this one.
     os.nice(19)
     module, function = name.split(":")
     stop = asyncio.Event()

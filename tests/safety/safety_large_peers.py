@@ -1,4 +1,4 @@
-"""Rosbridges that send messages far larger than anybody can use, once a second."""
+"""Rosbridges that send a much too large message once a second."""
 
 import asyncio
 import base64
@@ -114,7 +114,7 @@ def picture(width, height):
 
 
 def empty_lists(count):
-    """An answer without a request, and a message, of nothing but empty lists."""
+    """Return an answer without a request, and a message, with only empty lists."""
     lists = "[]," * count + "[]"
     answer = f'{{"op":"service_response","service":"/x","values":[{lists}]}}'
     head = cbor2.dumps({"op": "publish", "topic": "/map", "msg": 0})[:-1]
@@ -140,7 +140,7 @@ def in_fragments(count):
 
 
 def png_bombs(side):
-    """A text in pixels, and a compressed picture, that are small until unpacked."""
+    """Return two compressed pictures that are small until they are unpacked."""
     from PIL import Image
 
     file = io.BytesIO()
@@ -152,7 +152,7 @@ def png_bombs(side):
 
 
 def peer(make, *arguments):
-    """Return a peer that sends to every subscriber of a topic that is shown."""
+    """Return a peer that sends messages after the client subscribes to /diagnostics."""
 
     async def talk(link):
         await link.accept()
@@ -173,7 +173,7 @@ def peer(make, *arguments):
 
     async def read_on(link):
         while True:
-            await link.receive()  # which answers pings
+            await link.receive()  # reading also answers pings
 
     return talk
 

@@ -1,7 +1,7 @@
-"""Much to show, many who watch and a busy processor.
+"""The full load: much data to show, many viewers, and a busy processor.
 
-Ten robots scan ten times a second, a map of 16 million cells comes every two seconds
-through a rosbridge, and fifty viewers look on, of whom five read nothing.
+Ten robots send ten scans a second, a rosbridge sends a map of 16 million cells every
+two seconds, and there are fifty viewers, of which five read nothing.
 """
 
 import contextlib
@@ -28,20 +28,20 @@ DOTS = """[...document.querySelectorAll('.laserscan .dot')]
 
 
 def run_separately():
-    """Be another computer as far as one can: robots and viewers are not on this one.
+    """Give this process a low priority, because robots and viewers are other computers.
 
-    What they send and take is the load; the processor that they need for it is not.
+    The data that they send and receive is the load, not their processor time.
     """
     os.setsid()
     os.nice(19)
     with contextlib.suppress(OSError):
-        # Where each session gets the same share, it is the session that must be nice.
+        # With autogroups, Linux compares the priorities of sessions, not of processes.
         Path("/proc/self/autogroup").write_text("19")
 
 
 @contextlib.contextmanager
 def helper(script, *arguments):
-    """Run a script of this folder until its standard input ends."""
+    """Run a script of this folder for as long as the ``with`` block lasts."""
     command = [sys.executable, str(Path(__file__).with_name(script)), *arguments]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen(
@@ -55,7 +55,7 @@ def helper(script, *arguments):
             try:
                 process.wait(20)
             except subprocess.TimeoutExpired:
-                process.kill()  # the machine gives it no time to end in order
+                process.kill()  # the machine is too busy for an orderly end
 
 
 @contextlib.contextmanager
@@ -84,7 +84,7 @@ def busy_processor():
 
 @contextlib.contextmanager
 def under_load(bench):
-    """Have all there is to show on the page of a bench."""
+    """Run the display of a bench under the full load."""
     with flood() as addresses:
         os.environ["SAFETY_FLOOD"] = addresses
         try:
@@ -94,19 +94,19 @@ def under_load(bench):
             with crowd(bench.url), busy_processor():
                 wait_for(lambda: bench.tab.evaluate(DOTS) == SCANNERS, "scans", 30)
                 wait_for(lambda: bench.tab.evaluate(PICTURE), "a map", 30)
-                bench.crowded = True
+                bench.loaded = True
                 yield
         finally:
-            bench.crowded = False
+            bench.loaded = False
             del os.environ["SAFETY_FLOOD"]
             bench.end_display()
 
 
 @contextlib.contextmanager
 def maps_coming(bench):
-    """See that a map came, and was drawn, in the meantime."""
+    """Assert that the page draws a new map during the ``with`` block."""
     before = bench.tab.evaluate(PICTURE)
     yield
-    bench.heal()
+    bench.restore()
     wait_for(lambda: bench.tab.evaluate(PICTURE) not in (None, before), "maps", 30)
     assert bench.tab.evaluate(DOTS) == SCANNERS

@@ -15,18 +15,18 @@ from safety_figures import DOCS, Figure
 PAGE = DOCS / "safety.md"
 README = DOCS.parent / "README.md"
 BEGIN, END = "<!-- promises -->\n", "<!-- /promises -->\n"
-"""What encloses the generated lines in both files."""
+"""The lines before and after the generated lines in both files."""
 
 
 class Promise(NamedTuple):
     """A row of the table."""
 
     number: int
-    words: str
+    text: str
     figures: str
-    """A pattern for the names of the figures that measure it; "" if none does."""
+    """A pattern for the names of the figures that measure the promise; "" for none."""
     shown_by: str
-    """The test of the promise, which may be another than the tests that measure."""
+    """The test of the promise; the figures may come from other tests."""
 
 
 BUSY = "; a map of 16 million cells.*"
@@ -174,7 +174,7 @@ IN_SHORT = (1, 8, 7, 14, 16)
 
 
 def nearest(promise: Promise, figures: Sequence[Figure]) -> Figure | None:
-    """Return the figure that is nearest to its limit, or None if none measures it."""
+    """Return the figure that is nearest to its limit, or None if there is none."""
     own = [f for f in figures if re.fullmatch(promise.figures, f.name)]
     return max(own, key=lambda f: (f.worst / f.promised, f.worst), default=None)
 
@@ -182,14 +182,14 @@ def nearest(promise: Promise, figures: Sequence[Figure]) -> Figure | None:
 def worst(promise: Promise, figures: Sequence[Figure]) -> str:
     """Return the worst time, the promised time and the fault.
 
-    The fault is named because it may be another than that of the test in the same row:
-    the tests of S3 and S12 do not time a robot.
+    The fault may differ from the fault of the test in the same row: the tests of S3 and
+    S12 do not measure the time of a robot.
     """
     figure = nearest(promise, figures)
     if figure is None:
         return "shown by the test"
     missed = ", **missed**" if figure.worst > figure.promised else ""
-    what = figure.name.split(";")[0]  # the promise names the load
+    what = figure.name.split(";")[0]  # the promise already names the load
     return (
         f"{figure.worst * 1000:.0f} of {figure.promised * 1000:.0f} ms{missed}: {what}"
     )
@@ -199,7 +199,7 @@ def promise_table(figures: Sequence[Figure]) -> str:
     """Return the table in Markdown."""
     lines = ["| | promise | worst measured | shown by |", "|---|---|---|---|"]
     lines += [
-        f"| S{p.number} | {p.words} | {worst(p, figures)} | `{p.shown_by}` |"
+        f"| S{p.number} | {p.text} | {worst(p, figures)} | `{p.shown_by}` |"
         for p in PROMISES
     ]
     return "\n".join(lines) + "\n"
@@ -209,7 +209,7 @@ def in_short(figures: Sequence[Figure]) -> str:
     """Return the lines of the README in Markdown."""
     promises = [next(p for p in PROMISES if p.number == n) for n in IN_SHORT]
     return "".join(
-        f"- S{p.number}: {p.words}. Worst measured: {worst(p, figures)}.\n"
+        f"- S{p.number}: {p.text}. Worst measured: {worst(p, figures)}.\n"
         for p in promises
     )
 

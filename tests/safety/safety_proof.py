@@ -1,4 +1,4 @@
-"""The proof: a fault is inflicted on a robot that is driven, and its log is judged."""
+"""Cause a fault while a robot is driven, and check the log of its velocities."""
 
 import math
 import time
@@ -14,41 +14,41 @@ from webmap.gate.rules.motion import LENGTH, NEW_LINK_LENGTH
 from webmap.testing import Bounds, Quiet, check_invariants
 
 EVERY = 5
-"""Of how many trials of a full run one takes its time.
+"""In a full run, one of this number of trials is long; in a quick run, each one is.
 
-How soon the robot is stopped does not depend on how long a fault lasts after that; what
-happens when it is mended might. So all trials measure the one, and a fifth of a full
-run, as every trial of a quick one, waits for the other at length.
+The time until the robot stops does not depend on how long the fault lasts afterwards.
+The behaviour after the end of the fault may depend on it, so the long trials let the
+fault last, and watch the robot for a longer time.
 """
 
-HURRIED_WATCH = 0.3
-"""Seconds for which nothing may move in the other trials."""
+SHORT_WATCH = 0.3
+"""Seconds for which the robot may not move after the fault in a short trial."""
 
 
 class ProvingBench(Bench):
-    """A bench on which faults are inflicted and measured."""
+    """A bench that causes faults and measures the time until the robot stops."""
 
-    hurried = False
-    """Whether this trial does not wait at length."""
+    short_trial = False
+    """Whether this trial is short; see :data:`EVERY`."""
 
-    crowded = False
-    """Whether a program beside takes all the processor that it can get.
+    loaded = False
+    """Whether another program uses all free processor time.
 
-    Then a quick run grants what a thread on the way waited for it.
+    Then a quick run adds the waiting time of the threads to the promised time.
     """
 
     def stretch(self, long, short=0.3):
-        """Return how many seconds something lasts in this trial."""
-        return short if self.hurried else long
+        """Return ``long`` seconds in a long trial, and ``short`` in a short trial."""
+        return short if self.short_trial else long
 
     def linger(self, long, short=0.3):
-        """Let the fault go on for a while, which is shorter in most trials."""
+        """Let the fault last: ``long`` seconds, or ``short`` in a short trial."""
         pass_time(self.stretch(long, short))
 
     def prove(
         self,
         name,
-        inflict,
+        fault,
         *,
         within,
         back=lambda: None,
@@ -59,39 +59,39 @@ class ProvingBench(Bench):
         before=lambda: None,
         new_link=False,
     ):
-        """Inflict a fault on a robot that is driven, as often as is asked for.
+        """Cause a fault while the robot is driven, once in each trial.
 
         Args:
-            name: What fails, for the table.
-            inflict: Makes it fail.
-            within: Seconds in which the robot is promised to be stopped.
+            name: The fault, as the table of figures names it.
+            fault: Causes the fault.
+            within: The promised time until the robot is stopped, in seconds.
             back: Ends the fault.
             stops_by: ``zero``: a zero must come; ``itself``: no process can send one,
-                and the robot's own timeout must stop it.
+                and the robot's own command timeout must stop it.
             held_after: Whether the key is still down when the fault ends.
-            watch: Seconds for which nothing may move after the fault ends.
-            few_late: How many moving velocities may still come when the fault ends, if
-                the robot is driven through a link that keeps what it cannot pass on.
-            before: Happens while the robot moves, before the fault.
-            new_link: Whether the zeros may be owed on a new link, where they go on for
-                longer; so they are if nobody can send one.
+            watch: Seconds for which the robot may not move after the fault ends.
+            few_late: How many nonzero velocities may still arrive when the fault ends:
+                a stalled link delivers the velocities that it has stored.
+            before: Called while the robot moves, before the fault.
+            new_link: Whether the gate may send the zeros on a new link, where it sends
+                them for a longer time. This is so if no process can send a zero.
 
         """
         zeros = NEW_LINK_LENGTH if new_link or stops_by == "itself" else LENGTH
         if is_measured(name):
-            pytest.skip("the run that is resumed has it")
+            pytest.skip("the resumed run already has this figure")
         begin, figures, progress = time.monotonic(), [], Progress(name, TRIALS)
         self.quiet, self.unreachable, self.causes = [], [], []
         for trial in range(TRIALS):
-            self.hurried = FULL and trial % EVERY != 0
+            self.short_trial = FULL and trial % EVERY != 0
             self._drive_before_fault(before)
             waiting = self.waiting()
             self.fault_at = time.monotonic()
-            inflict()
+            fault()
             figure = self._measure(within, stops_by)
-            if self.crowded and not FULL:
+            if self.loaded and not FULL:
                 figure["jitter"] = max(figure["jitter"], waiting.seconds())
-            watched = self.stretch(watch, HURRIED_WATCH)
+            watched = self.stretch(watch, SHORT_WATCH)
             self._recover(figure, back, held_after, watched, few_late)
             figures.append(figure)
             progress.add(figure["late"], figure["jitter"])
@@ -127,13 +127,13 @@ class ProvingBench(Bench):
             assert figure["late"] <= most, (name, worst, figures)
 
     def _drive_before_fault(self, before):
-        """Drive, so that it is the fault that stops the robot and nothing else."""
+        """Drive until the robot moves steadily, so that only the fault can stop it."""
         why = None
         for _ in range(5):
             try:
                 self.drive_off()
             except (AssertionError, OSError, EOFError):
-                # The test before may have left a page that is beyond repair.
+                # The page of the previous test may no longer work: use a new browser.
                 self.end_browser()
                 self.drive_off()
             try:
@@ -143,10 +143,12 @@ class ProvingBench(Bench):
             except AssertionError as error:
                 why = error
             self.let_go()
-        raise AssertionError("the robot stops again and again") from why
+        raise AssertionError(
+            "the robot stopped before the fault in five attempts"
+        ) from why
 
     def waiting(self):
-        """Measure from now on how long the processes between key and robot wait."""
+        """Measure from now on how long the processes from key to robot wait to run."""
         processes = [psutil.Process(), psutil.Process(self.display.popen.pid)]
         if self.gate:
             processes.append(self.gate)
@@ -156,12 +158,12 @@ class ProvingBench(Bench):
         return Waiting(each.pid for each in processes)
 
     def _measure(self, within, stops_by):
-        """Wait until the robot is stopped, and return how long that took."""
+        """Wait until the robot is stopped, and return how long this took."""
         stopped = self._stopped_after(self.fault_at, stops_by)
-        # The dead-man's time began with a command that may have been in transit.
+        # The dead-man timeout began with a command that may have been in transit.
         jitter = self.sentinel.stolen(self.fault_at - 0.1, stopped)
         if stops_by == "itself":
-            # From the last message before the fault until the first one after it.
+            # From the last message before the fault to the first message after it.
             self.unreachable.append((self.fault_at - 0.5, math.inf))
         return {"late": stopped - self.fault_at, "jitter": jitter, "within": within}
 
@@ -170,7 +172,7 @@ class ProvingBench(Bench):
         still = self.fault_at + figure["within"] + figure["jitter"] + 0.001
         recovering = time.monotonic()
         back()
-        # While a part comes back, zeros may begin anew at any time.
+        # While a part starts again, zeros may begin at any time.
         while recovering < time.monotonic():
             self.causes.append(recovering)
             recovering += 0.1
@@ -181,10 +183,10 @@ class ProvingBench(Bench):
             self.unreachable[-1] = (self.unreachable[-1][0], time.monotonic())
         late = self.robot.log.moving_since(still)
         if few_late and late:
-            # TCP delivers what it had taken; then a zero must come, and nothing else.
+            # TCP delivers the stored velocities; after them, only zeros may arrive.
             assert len(late) <= few_late, f"{len(late)} late velocities"
             still = late[-1].at
-        self.quiet.append(Quiet(still, time.monotonic(), "after a fault, W held on"))
+        self.quiet.append(Quiet(still, time.monotonic(), "after a fault, W still held"))
         if self.tab is not None:
             self.let_go()
 
@@ -192,6 +194,6 @@ class ProvingBench(Bench):
         log = self.robot.log
         if stops_by == "zero":
             wait_for(lambda: log.first_zero(begun), "a zero")
-            # A moving command that was on its way may come first, never after.
+            # A nonzero velocity in transit may arrive before the zero, not after it.
             return log.first_zero(begun)
-        return wait_for(lambda: log.standstill(begun + 0.02), "standing still")
+        return wait_for(lambda: log.standstill(begun + 0.02), "a standstill")

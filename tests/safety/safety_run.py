@@ -1,7 +1,7 @@
-"""How long the run is, how far it has come, and what it need not measure again.
+"""The number of trials of a run, its progress, and the figures that it has already.
 
-A full run is of fifty trials or more; the environment states the number. It asserts the
-promises as they stand, while a quick one grants what the machine itself was late by.
+A full run has fifty trials or more; an environment variable sets the number. A full run
+asserts the promised times. A quick run adds the delay of the machine to them.
 """
 
 import functools
@@ -18,15 +18,18 @@ TRIALS = int(os.environ.get("WEBMAP_SAFETY_TRIALS", "3"))
 FULL = TRIALS >= 50
 
 SHOW: list[Callable[[str], None]] = [print]
-"""What shows progress, the newest last; pytest's own, past its capturing, in a run."""
+"""Functions that print progress; the last one is used.
+
+During a run, this is a function that prints although pytest captures output.
+"""
 
 
 class Progress:
-    """Says how far a scenario is, where a run is long enough to ask.
+    """Prints the progress of a scenario, if a run has more than one trial.
 
     Args:
-        name: The scenario.
-        trials: How many it has.
+        name: The name of the scenario.
+        trials: The number of its trials.
 
     """
 
@@ -39,7 +42,7 @@ class Progress:
         self._of_machine = 0.0
 
     def add(self, late: float, jitter: float) -> None:
-        """Print how a trial ended; seconds."""
+        """Add the result of a trial, in seconds, and print the progress at times."""
         self._number += 1
         self._worst = max(self._worst, late)
         self._of_machine = max(self._of_machine, jitter)
@@ -54,17 +57,17 @@ class Progress:
 
 
 def grace(jitter: float) -> float:
-    """Return what is granted on top of a promise, of what the machine was late by."""
+    """Return the part of the machine's delay that is added to a promised time."""
     return 0.0 if FULL else jitter
 
 
 @functools.cache
 def version() -> str:
-    """Return what is measured: the version, and the commit if there is one."""
+    """Return the version of WebMap, with its commit if there is one."""
     commit = _git("describe", "--always")
     if not commit:
         return webmap.__version__
-    # The table itself, which a run writes, makes it no other version.
+    # A run writes the table in docs, so changes there do not count.
     changed = "+" if _git("status", "--porcelain", "--", "src", "tests") else ""
     return f"{webmap.__version__} ({commit}{changed})"
 
@@ -81,7 +84,7 @@ def _git(*arguments: str) -> str:
 
 
 def is_measured(name: str) -> bool:
-    """Return whether a run that is resumed has this scenario already, and kept it."""
+    """Return whether a resumed run already has a figure that keeps this promise."""
     path = os.environ.get("WEBMAP_SAFETY_FIGURES")
     if not path or os.environ.get("WEBMAP_SAFETY_RESUME") != "1":
         return False

@@ -1,9 +1,9 @@
-"""A page with one robot, and code of its user that blocks when the robot says so.
+"""A page with one robot, and user code that blocks when the robot sends a message.
 
-The addresses come from the environment: SAFETY_BRIDGE, where the robot is, and
-SAFETY_FLOOD, if there is more to show: where robots that scan are, and where maps are;
-SAFETY_HOSTILE, where robots are whose bridges do what they like. With SAFETY_SHOWN all
-that those send is shown, too.
+Environment variables have the addresses of the bridges: SAFETY_BRIDGE of the robot;
+SAFETY_FLOOD, if set, of ten robots with scans and of a large map; SAFETY_HOSTILE of
+robots whose bridges are hostile. With SAFETY_SHOWN the page also shows all data of the
+hostile bridges.
 """
 
 import asyncio
@@ -22,15 +22,15 @@ bob.set_twist_topic(bridge, "/cmd_vel", stops_within=0.5)
 
 
 def block(message):
-    """Block the model thread, as a callback does that waits for something."""
+    """Block the model thread, as a callback that waits does."""
     time.sleep(message["data"])
 
 
 def hold_the_interpreter(message):
-    """Let no thread of this process run, as a long call of an extension does."""
+    """Block all threads of this process, as a long call of an extension does."""
     until = time.monotonic() + message["data"]
     while time.monotonic() < until:
-        # One call that never gives the lock away; a loop of Python would.
+        # A single call keeps the interpreter lock; a Python loop would release it.
         sum(itertools.repeat(1, 200_000_000))
 
 
@@ -79,7 +79,7 @@ for url in os.environ.get("SAFETY_HOSTILE", "").split():
 
 @webmap.page("/")
 def main(page):
-    """Show the robot, chosen, with keys to drive it."""
+    """Show the selected robot, with teleoperation by keys."""
     map = webmap.Map(page.element("webmap_container"), 400, 300)
     map.add_module("Teleop", 1.0, 1.5)
     map.add_module("StopButton")

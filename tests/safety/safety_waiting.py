@@ -1,4 +1,4 @@
-"""How long the threads between a key and a robot waited for a processor."""
+"""Measure how long the threads from key to robot wait for a processor."""
 
 import threading
 import time
@@ -6,20 +6,21 @@ from collections.abc import Iterable
 from pathlib import Path
 
 BESIDE = ("ThreadPool", "CompositorTile")
-"""Threads of a browser that draw or load: no key passes them."""
+"""Names of browser threads that draw or load; they do not handle keys."""
 
 NANO = 1e-9
 
 
 class Waiting:
-    """How long processes that were ready wait for the scheduler, from now on.
+    """Measures from now on how long ready processes wait for a processor.
 
-    A thread that sleeps most of the time, as the sentinel's, gets a processor before
-    those that have just used one. So where all processors are taken, it says little of
-    what a browser has to wait, and Linux, which counts that for each thread, says more.
+    The sentinel's thread sleeps most of the time, so Linux runs it before threads that
+    have just used a processor. When all processors are busy, the sentinel waits less
+    than a browser does. Therefore this class reads the waiting time of each thread,
+    which Linux counts.
 
     Args:
-        pids: The processes between key and robot.
+        pids: The processes from key to robot.
 
     """
 
@@ -28,11 +29,11 @@ class Waiting:
         self._before = self._delays()
 
     def seconds(self) -> float:
-        """Return how long since then the thread waited that waited longest."""
+        """Return the waiting time of the thread that has waited longest since then."""
         return max(self.of_threads().values(), default=0.0)
 
     def of_threads(self) -> dict[tuple[int, str], float]:
-        """Return how long since then each thread waited."""
+        """Return the waiting time of each thread since then."""
         return {
             thread: delay - self._before.get(thread, 0.0)
             for thread, delay in self._delays().items()
@@ -45,7 +46,7 @@ class Waiting:
                 try:
                     name = (task / "comm").read_text()
                     _, delay, _ = (task / "schedstat").read_text().split()
-                except (OSError, ValueError):  # it has ended, or nobody counts
+                except (OSError, ValueError):  # it has ended, or is not counted
                     continue
                 if not name.startswith(BESIDE):
                     delays[pid, task.name] = int(delay) * NANO
@@ -60,7 +61,7 @@ class Contention:
     that processor, and Linux counts the time as steal time, see proc_stat(5).
 
     Args:
-        waiting: Reads how long the threads between key and robot have waited.
+        waiting: Reads how long the threads from key to robot have waited.
 
     """
 
@@ -68,7 +69,7 @@ class Contention:
     """Seconds between two readings."""
 
     WINDOW = 0.25
-    """Seconds over which time that was taken is added up."""
+    """The length of the window in seconds."""
 
     def __init__(self, waiting: Waiting) -> None:
         self._waiting = waiting

@@ -1,9 +1,9 @@
-"""No command older than 300 ms reaches the wheels, by when it truly was said (S2).
+"""No command that was sent more than 300 ms ago moves the robot (S2).
 
-A page says another direction every 0.7 seconds and notes when, so each velocity that
-the robot is told betrays the time from which it is. The gate's ticks have no part in
-the verdict: both times are of this machine's clock. A direction lasts 0.4 s and comes
-again after 5.6, which no stall here is as long as.
+A page sends another direction every 0.7 s and records the time of each command. The
+direction of a velocity at the robot therefore shows when its command was sent. The
+test does not use the ticks of the gate: both times are from the clock of this machine.
+Each direction is sent for 0.4 s, and again 5.6 s later; all stalls are shorter.
 """
 
 import time
@@ -19,10 +19,10 @@ pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
 
 MAX_AGE = 0.3
-"""Seconds from which on a command is refused."""
+"""The age in seconds above which the gate refuses a command."""
 
 ON_THE_WAY = 0.1
-"""Seconds for the ways to and from the gate, and for both clocks to be compared."""
+"""Seconds for the transport to and from the gate, and for comparing the clocks."""
 
 DRIVE = """(async () => {
     const { protocols } = await import("/_webmap/web/key.js");
@@ -30,7 +30,7 @@ DRIVE = """(async () => {
     const PHASES = [
         [1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, 1], [-1, -1], [1, -1],
     ];
-    const said = [];
+    const sent = [];
     let socket, tick, robot, epoch, seq = 0;
     const connect = () => {
         const url = new URL("/_webmap/drive", location.href);
@@ -56,12 +56,12 @@ DRIVE = """(async () => {
         const phase = Math.floor(now / 700);
         const off = now % 700 > 400 || epoch === null;
         const [x, turn] = off ? OFF : PHASES[phase % PHASES.length];
-        said.push([now / 1000, x, turn]);
+        sent.push([now / 1000, x, turn]);
         seq += 1;
         const stamp = { op: "drive", robot, epoch: epoch ?? 0, seq, tick };
         socket.send(JSON.stringify({ ...stamp, x, y: 0, turn }));
     }, 50);
-    window.said = () => said;
+    window.sent = () => sent;
     return true;
 })()"""
 
@@ -70,16 +70,16 @@ def sign(number):
     return (number > 0) - (number < 0)
 
 
-def ages(received, said):
-    """Return how old each velocity is that is not zero, by the newest that says so."""
+def ages(received, sent):
+    """Return the age of each nonzero velocity: since its direction was sent last."""
     found = []
     for each in received:
         way = sign(each.twist.vx), sign(each.twist.wz)
         if way == (0, 0):
             continue
-        earlier = [one for one in said if one[0] <= each.at + 0.02]
+        earlier = [one for one in sent if one[0] <= each.at + 0.02]
         times = [at for at, x, turn in earlier if (x, turn) == way]
-        assert times, f"nobody ever said {each.twist}"
+        assert times, f"the page did not send {each.twist}"
         found.append(each.at - times[-1])
     return found
 
@@ -92,7 +92,7 @@ def stall(bench, way, seconds):
 
 @pytest.fixture
 def driven(bench):
-    """A robot that a page's own code drives in all directions, in turn."""
+    """A bench whose page drives the robot in all directions, one after the other."""
     bench.open_page()
     assert bench.tab.evaluate(DRIVE)
     wait_for(lambda: len(moves(bench)) > 20, "motion")
@@ -105,9 +105,9 @@ def moves(bench):
     return [received for received in bench.robot.log.twists if not received.is_zero]
 
 
-def said_by(bench):
+def commands_of(bench):
     offset = time.time() - time.monotonic()
-    return [(at - offset, x, turn) for at, x, turn in bench.tab.evaluate("said()")]
+    return [(at - offset, x, turn) for at, x, turn in bench.tab.evaluate("sent()")]
 
 
 @LONG
@@ -120,7 +120,7 @@ def test_stalls_between_page_and_gate_deliver_no_command_above_the_age_limit(
         stall(driven, way, seconds)
         before = len(moves(driven))
         wait_for(lambda b=before: len(moves(driven)) > b + 10, "motion after the stall")
-    found = ages(driven.robot.log.twists[begin:], said_by(driven))
+    found = ages(driven.robot.log.twists[begin:], commands_of(driven))
     assert len(found) > 40
     assert max(found) <= MAX_AGE + ON_THE_WAY + driven.sentinel.worst(since)
 
@@ -129,6 +129,6 @@ def test_a_slow_link_with_jitter_delivers_no_command_above_the_age_limit(driven)
     begin, since = len(driven.robot.log.twists), time.monotonic()
     driven.web_hop.shape(Shape(latency=0.03, jitter=0.12))
     pass_time(6.0)
-    found = ages(driven.robot.log.twists[begin:], said_by(driven))
-    assert found, "a link that is fit to drive by at times"
+    found = ages(driven.robot.log.twists[begin:], commands_of(driven))
+    assert found, "the link was too slow to drive at all"
     assert max(found) <= MAX_AGE + ON_THE_WAY + driven.sentinel.worst(since)

@@ -1,4 +1,4 @@
-"""Everything that can fail between an operator and a robot that has an agent."""
+"""Faults between an operator and a robot that has an agent."""
 
 import json
 import random
@@ -27,7 +27,7 @@ def bench(tmp_path_factory):
 
 
 def prove(bench, what, fail, within=PROMISED, *, program=False):
-    """Drive, let something fail, and measure the time to the first zero."""
+    """Drive, cause a fault, and measure the time to the first zero."""
     if program:
         bench.program_off()
     else:
@@ -46,7 +46,7 @@ def prove(bench, what, fail, within=PROMISED, *, program=False):
 
 
 def back(bench):
-    """Wait until the robot can be driven again; nothing moves by itself."""
+    """Wait until the robot can be driven again; check that it does not move."""
     since = time.monotonic()
     wait_for(lambda: bench.driver.now.get("link") == "up", "the agent", 30)
     pass_time(1.0)
@@ -197,7 +197,7 @@ def test_a_stop_for_an_agent_that_is_away_is_the_first_it_gets_on_return(bench):
     wait_for(lambda: bench.driver.now.get("link") == "down", "a lost agent")
     bench.driver.order("stop")
     pass_time(1.0)
-    assert not bench.driver.now.get("latched"), "not confirmed while it is away"
+    assert not bench.driver.now.get("latched"), "STOP is active without the agent"
     bench.agent_hop.refuse(False)
     wait_for(lambda: bench.driver.now.get("latched"), "the STOP", 20)
     bench.driver.order("reset")
@@ -225,15 +225,15 @@ def test_two_displays_cannot_both_drive_and_the_loss_of_one_ends_only_its_own(be
 
 @pytest.fixture
 def program(bench):
-    """No page of the display drives; the program has no control afterwards."""
+    """A driver whose program can take control; it has no control afterwards."""
     bench.driver.order("x 0")
-    renew_driver(bench)  # whatever its operator had is gone
+    renew_driver(bench)  # its operator loses control
     yield bench.driver
     renew_driver(bench)
 
 
 def has_no_control(bench):
-    """Wait until the program finds that it has no control, and cannot go on."""
+    """Wait until the program gets the error that it does not have control."""
     wait_for(lambda: bench.driver.lost, "a program without control")
     assert "does not have control" in bench.driver.lost[-1]["why"]
 

@@ -1,4 +1,4 @@
-"""Everything that can happen to a page while a person holds W."""
+"""Faults of the page and of the browser while an operator holds W."""
 
 import os
 import signal
@@ -26,13 +26,13 @@ def test_a_killed_renderer_stops_the_robot(bench):
             process.kill()
 
     def back():
-        # The browser lives on, and so may its other tabs.
+        # The browser runs on, and so may its other tabs.
         bench.tab.close()
         bench.tab = None
         try:
             bench.open_page()
         except TimeoutError:
-            # Now and then a new tab is given to the process that was killed.
+            # Sometimes the browser gives a new tab to the killed process.
             bench.end_browser()
             bench.open_page()
 
@@ -70,7 +70,7 @@ def test_a_frozen_page_stops_the_robot(bench):
 
     def back():
         state("active")
-        # DevTools leaves the page hidden; coming back to the tab shows it again.
+        # DevTools leaves the page hidden; a change of tabs shows it again.
         bench.look_away_and_back()
 
     bench.prove(
@@ -145,7 +145,7 @@ JUMP = """(() => {
 @LONG
 @pytest.mark.parametrize(("hours", "way"), [(1, "ahead"), (-1, "back")])
 def test_a_jump_of_the_browser_clocks_stops_the_robot(bench, hours, way):
-    # The jump stays, so that all but the first trial drive by clocks that are wrong.
+    # The jump is permanent, so all trials after the first use wrong clocks.
     bench.prove(
         f"the browser's clocks jump an hour {way}",
         lambda: bench.tab.evaluate(JUMP.replace("SHIFT", str(hours * 3_600_000))),
@@ -173,23 +173,23 @@ FRENCH = [("z", "KeyW"), pytest.param("ArrowUp", "ArrowUp", marks=LONG)]
 
 @pytest.mark.parametrize(("letter", "place"), FRENCH)
 def test_keys_drive_by_their_position_and_not_by_their_letter(bench, letter, place):
-    """As on a French keyboard, which has Z where others have W, and W where Z is."""
+    """On a French keyboard, the keys W and Z are exchanged."""
 
-    def say(kind, key, code):
+    def send_key(kind, key, code):
         bench.tab.call("Input.dispatchKeyEvent", type=kind, key=key, code=code)
 
     begun = time.monotonic()
-    bench.heal()
-    say("keyDown", "w", "KeyZ")
+    bench.restore()
+    send_key("keyDown", "w", "KeyZ")
     pass_time(1.0)
-    say("keyUp", "w", "KeyZ")
-    assert bench.robot.log.moving_since(begun) == [], "the letter alone drives"
+    send_key("keyUp", "w", "KeyZ")
+    assert bench.robot.log.moving_since(begun) == [], "the letter of a key drives"
     for _ in range(5):
         pass_time(NEUTRAL)
-        say("keyDown", letter, place)
+        send_key("keyDown", letter, place)
         pass_time(1.5)
         driven = bench.steady()
-        say("keyUp", letter, place)
+        send_key("keyUp", letter, place)
         if driven:
             break
     assert driven, bench.tab.evaluate("document.body.innerText")

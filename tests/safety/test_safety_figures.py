@@ -57,7 +57,7 @@ def test_a_resumed_run_skips_only_complete_and_passing_figures_of_this_version(
     path = tmp_path / "figures.jsonl"
     monkeypatch.setenv("WEBMAP_SAFETY_FIGURES", str(path))
     monkeypatch.setenv("WEBMAP_SAFETY_RESUME", "1")
-    assert not is_measured("the page is frozen"), "nothing is, before the first"
+    assert not is_measured("the page is frozen"), "there is no figure yet"
     note(Figure("the page is frozen", "zero", 0.3, 0.01, 0.0, TRIALS))
     note(Figure("of another version", "zero", 0.3, 0.01, 0.0, TRIALS, version="0.0"))
     note(Figure("a broken promise", "zero", 0.3, 0.31, 0.0, TRIALS))
@@ -68,4 +68,4 @@ def test_a_resumed_run_skips_only_complete_and_passing_figures_of_this_version(
     assert not is_measured("a broken promise")
     assert not is_measured("the tab is closed")
     monkeypatch.delenv("WEBMAP_SAFETY_RESUME")
-    assert not is_measured("the page is frozen"), "a new run measures everything"
+    assert not is_measured("the page is frozen"), "a new run must measure everything"

@@ -1,4 +1,4 @@
-"""A gate alone, with a good robot that is driven and three bridges that flood it."""
+"""A gate without a display drives a good robot while three bridges flood the gate."""
 
 import itertools
 import json
@@ -18,11 +18,11 @@ from webmap.testing import Sentinel, WitnessRobot
 pytestmark = [pytest.mark.safety, pytest.mark.serial]
 
 PERIOD = 0.05
-"""Seconds between two commands, as of a page."""
+"""Seconds between two commands, the same as for a page."""
 
 
-class Hand:
-    """A page's side of ``/drive``, which holds the good robot's key as long as told."""
+class Page:
+    """A page on ``/drive``: sends commands to the good robot at 20 Hz."""
 
     def __init__(self, client):
         self.pressed = False
@@ -30,11 +30,11 @@ class Hand:
         self.ticks = []
         self._tick = None
         self._end = threading.Event()
-        self._connection = client.connect("Ann", "operator", self._hear, print)
+        self._connection = client.connect("Ann", "operator", self._receive, print)
         self._thread = threading.Thread(target=self._stream, daemon=True)
         self._thread.start()
 
-    def _hear(self, text):
+    def _receive(self, text):
         message = json.loads(text)
         if message["op"] == "tick":
             self._tick = message["tick"]
@@ -42,7 +42,7 @@ class Hand:
         elif message["op"] == "robot" and message["robot"] == "good":
             self.robot = message
 
-    def say(self, **command):
+    def send(self, **command):
         self._connection.receive(json.dumps(command))
 
     def _stream(self):
@@ -50,7 +50,7 @@ class Hand:
             if self._end.wait(PERIOD):
                 return
             if self._tick is not None and self.robot.get("mine"):
-                self.say(
+                self.send(
                     op="drive",
                     robot="good",
                     epoch=self.robot["epoch"],
@@ -81,7 +81,7 @@ def spec(id, url):
 
 
 class FloodedGate:
-    """A running gate, a good robot, and one more for each hostile bridge."""
+    """A running gate with a good robot, and with a robot for each hostile bridge."""
 
     def __init__(self, folder, monkeypatch, peers):
         monkeypatch.setenv("WEBMAP_STATE_DIR", str(folder))
@@ -99,8 +99,8 @@ class FloodedGate:
         self.client = GateClient()
         self.client.start()
         self._open.callback(self.client.stop)
-        self.hand = Hand(self.client)
-        self._open.callback(self.hand.end)
+        self.page = Page(self.client)
+        self._open.callback(self.page.end)
         self.client.declare(spec("good", self.robot.url))
         for number, url in enumerate(urls):
             self.client.declare(spec(f"h{number}", url))
@@ -111,23 +111,23 @@ class FloodedGate:
         self._open.close()
 
     def drive_off(self):
-        hand = self.hand
-        wait_for(lambda: hand.robot.get("armable") or hand.robot.get("mine"), "a robot")
-        hand.say(op="take", robot="good")
-        wait_for(lambda: hand.robot.get("mine"), "the lease")
+        page = self.page
+        wait_for(lambda: page.robot.get("armable") or page.robot.get("mine"), "a robot")
+        page.send(op="take", robot="good")
+        wait_for(lambda: page.robot.get("mine"), "control of the robot")
         pass_time(0.3)
-        hand.pressed = True
+        page.pressed = True
         wait_for(lambda: self.robot.velocity.vx == 1.0, "full speed")
 
     def stop(self):
-        """Say STOP, which resets nothing; return the seconds to the first zero."""
+        """Send STOP; return the seconds to the first zero, and the machine's delay."""
         begun = time.monotonic()
         self.client.stop_robot("good")
         zero = wait_for(lambda: self.robot.log.first_zero(begun), "a zero")
         late = self.sentinel.stolen(begun, zero)
-        self.hand.pressed = False
+        self.page.pressed = False
         pass_time(0.6)
-        self.client.reset("good", self.hand.robot["stop"]["id"])
+        self.client.reset("good", self.page.robot["stop"]["id"])
         return zero - begun, late
 
 
@@ -150,7 +150,7 @@ def test_stop_reaches_the_robot_within_50_ms_while_three_bridges_flood_the_gate(
             pass_time(1.5)
             ended = time.monotonic()
             received = [t for t in gate.robot.log.twists if begun <= t.at <= ended]
-            ticks = [at for at in gate.hand.ticks if begun <= at <= ended]
+            ticks = [at for at in gate.page.ticks if begun <= at <= ended]
             tick_gap = longest_gap(ticks, gate.sentinel)
             velocity_gap = longest_gap([t.at for t in received], gate.sentinel)
             stopped, stolen = gate.stop()
@@ -167,12 +167,12 @@ def test_stop_reaches_the_robot_within_50_ms_while_three_bridges_flood_the_gate(
             assert tick_gap < 0.15, figures
             assert velocity_gap < 0.15, figures
             if gate.sentinel.worst(begun - 0.3, ended) < 0.05:
-                # Else the hand itself may have been held up for too long.
+                # Otherwise the machine may have delayed the page for too long.
                 assert zeros == 0, figures
 
 
 def longest_gap(times, sentinel):
-    """Return the longest time between two of several times, less the machine's own."""
+    """Return the longest gap between successive times, without the machine's delay."""
     return max(
         b - a - grace(sentinel.stolen(a, b)) for a, b in itertools.pairwise(times)
     )

@@ -1,4 +1,4 @@
-"""Whatever comes from a browser: what is not whole never moves a robot."""
+"""Only a complete and valid command from a browser moves a robot."""
 
 import functools
 import json
@@ -23,29 +23,29 @@ MOTION = {
     "goal": {"x": 1.0, "y": 2.0, "yaw": 0.5},
     "locate": {"x": 1.0, "y": 2.0, "yaw": 0.5},
 }
-"""What moves a robot, or moves what it believes of where it is: fields by operation."""
+"""Fields of the operations that move a robot, or the pose that the robot estimates."""
 
 FIELDS = {"op", "robot", "epoch", "seq", "tick", "x", "y", "turn", "yaw"}
 
 
 def armed():
-    """A gate whose robot would move by the next good command, and just did."""
+    """Return a gate that has moved its robot and accepts further commands."""
     return pickle.loads(pickled())
 
 
 @functools.cache
 def pickled():
-    """Such a gate, of which each example takes a copy: to make one takes 40 ms."""
+    """Return such a gate as bytes to copy, because making a new one takes 40 ms."""
     bench = Bench().begin(spec(pose_topic="/initialpose"))
     bench.drive_off()
-    bench.hold(0.8)  # until its zeros have ended
+    bench.hold(0.8)  # until the gate sends no more zeros
     assert bench.report().armed
     bench.done.clear()
     return pickle.dumps(bench)
 
 
 def moved(bench):
-    """Return all that a robot was told since it was armed that may move it."""
+    """Return all messages to the robot since it was armed that may move it."""
     kinds = (actions.SendGoal, actions.SendPose)
     received = [each for kind in kinds for each in bench.did(kind)]
     return [
@@ -66,7 +66,7 @@ def filled(bench, text):
     return text
 
 
-def say(bench, text):
+def send(bench, text):
     data = text if isinstance(text, bytes) else text.encode(errors="surrogatepass")
     bench.handle(protocol.FromPage("a", data))
 
@@ -86,7 +86,7 @@ def good(bench, op="drive"):
 @pytest.mark.parametrize("op", MOTION)
 def test_the_valid_commands_of_the_fuzz_tests_move_the_robot(op):
     bench = armed()
-    say(bench, json.dumps(good(bench, op)))
+    send(bench, json.dumps(good(bench, op)))
     assert moved(bench)
 
 
@@ -94,14 +94,14 @@ def test_the_valid_original_of_the_corpus_commands_moves_the_robot():
     bench = armed()
     at = bench.now
     stamp = '"epoch":EPOCH,"seq":SEQ,"tick":TICK'
-    say(bench, filled(bench, f'{{{ROBOT},{stamp},"x":1.0,{REST}}}'))
+    send(bench, filled(bench, f'{{{ROBOT},{stamp},"x":1.0,{REST}}}'))
     assert bench.moving_since(at)
 
 
 @pytest.mark.parametrize("text", CORPUS, ids=range(len(CORPUS)))
 def test_no_text_of_the_corpus_starts_or_continues_motion(text):
     bench = armed()
-    say(bench, filled(bench, text))
+    send(bench, filled(bench, text))
     bench.run(0.1)
     assert moved(bench) == []
     assert bench.refusals()
@@ -109,7 +109,7 @@ def test_no_text_of_the_corpus_starts_or_continues_motion(text):
     bench = armed()
     bench.hold(0.3, x=1.0)
     since = bench.now
-    bench.run(0.5, lambda: say(bench, filled(bench, text)))
+    bench.run(0.5, lambda: send(bench, filled(bench, text)))
     assert bench.moving_since(since + 0.2101) == []
     assert bench.written[-1].twist.is_zero
 
@@ -134,7 +134,7 @@ values = st.recursive(
 def test_random_bytes_and_texts_never_move_the_robot(texts):
     bench = armed()
     for text in texts:
-        say(bench, text)
+        send(bench, text)
         bench.run(0.06)
     assert moved(bench) == []
 
@@ -144,7 +144,7 @@ def test_random_bytes_and_texts_never_move_the_robot(texts):
 def test_a_stop_command_with_any_bytes_after_its_beginning_still_stops_the_robot(rest):
     bench = armed()
     rest = rest if isinstance(rest, bytes) else rest.encode(errors="surrogatepass")
-    say(bench, b'{"op":"stop"' + rest)
+    send(bench, b'{"op":"stop"' + rest)
     assert bench.report().latched
     assert bench.written[-1].twist.is_zero
 
@@ -154,7 +154,7 @@ def test_a_stop_command_with_any_bytes_after_its_beginning_still_stops_the_robot
 def test_random_json_never_moves_the_robot(whole):
     bench = armed()
     for value in whole:
-        say(bench, json.dumps(value))
+        send(bench, json.dumps(value))
         bench.run(0.06)
     assert moved(bench) == []
 
@@ -184,7 +184,7 @@ def test_a_command_with_one_invalid_field_never_moves_the_robot(data):
             for key, value in command.items()
         ]
         text = f"{{{','.join(parts)}}}"
-    say(bench, text)
+    send(bench, text)
     bench.run(0.1)
     assert moved(bench) == []
 
@@ -195,16 +195,16 @@ def test_a_valid_command_among_invalid_ones_moves_the_robot_for_200_ms_at_most(k
     bench = armed()
     good_at = [bench.now]
 
-    def send():
+    def send_next():
         nonlocal kinds
         kind, kinds = kinds[0], [*kinds[1:], kinds[0]]
         if kind == 0:
             good_at.append(bench.now)
-            say(bench, json.dumps(good(bench)))
-        elif kind < 3:  # fewer than 20 a second, or the page is shown the door
-            say(bench, filled(bench, CORPUS[kind]))
+            send(bench, json.dumps(good(bench)))
+        elif kind < 3:  # more than 20 a second would close the page's connection
+            send(bench, filled(bench, CORPUS[kind]))
 
-    bench.run(2.0, send)
+    bench.run(2.0, send_next)
     for written in bench.moving_since(good_at[0]):
         assert min(written.at - at for at in good_at if at <= written.at) <= 0.2101
 
@@ -257,12 +257,12 @@ FROM_THE_PAGE = """(async () => {
 def test_no_text_of_the_corpus_sent_by_a_page_moves_the_robot(bench):
     bench.open_page()
     before = len(bench.robot.log.twists)
-    # What is too long is not even read: the server closes the socket.
+    # The server closes the socket at a too long message, without reading it.
     short = [text for text in CORPUS if len(text) < 1000]
     script = FROM_THE_PAGE.replace("CORPUS", json.dumps(short), 1)
     result = bench.tab.evaluate(script)
-    assert result["taken"], "the page's own socket did not get the robot"
-    assert result["alive"], "the page was shown the door, so the test shows little"
+    assert result["taken"], "the socket of the page did not get control"
+    assert result["alive"], "the gate closed the connection too early"
     assert result["refused"] > 0
     assert [t for t in bench.robot.log.twists[before:] if not t.is_zero] == []
     bench.drive_off()

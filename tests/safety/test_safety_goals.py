@@ -1,7 +1,7 @@
-"""STOP and cancel get through a rosbridge that does nothing else while something hangs.
+"""STOP and cancel reach the robot while a goal or a service call blocks a socket.
 
 A rosbridge of ROS 2 runs an action goal, and a service call, on the thread that reads
-its socket: what comes behind on the same socket waits until that has ended.
+the socket. All later messages on the same socket wait until the goal or call has ended.
 """
 
 import json
@@ -29,17 +29,17 @@ pytestmark = [pytest.mark.safety, pytest.mark.serial]
 SITE = Path(__file__).with_name("safety_goal_site.py")
 
 FAR = (0.0, 0.0, 0.0)
-"""A goal that the simulated robot drives to for half a minute."""
+"""A goal that the simulated robot reaches after half a minute."""
 
 STILL = 0.02
-"""Metres per second below which a robot stands."""
+"""The speed in metres per second below which a robot counts as not moving."""
 
 BRAKING = 2.0
-"""Seconds in which a simulated robot that is told to stop stands."""
+"""Seconds after which a simulated robot that receives STOP must not move."""
 
 
 class Simulator:
-    """A simulator's process, of ROS 2, and what its only robot's odometry says."""
+    """A simulator process of ROS 2 with one robot, and the odometry of the robot."""
 
     def __enter__(self):
         options = ["--robots", "1", "--dialect", "ros2", "--until-eof"]
@@ -58,7 +58,7 @@ class Simulator:
         subscribe = {"op": "subscribe", "topic": "/robot_0/odom"}
         self._socket.send(json.dumps(subscribe))
         self.speeds = []
-        """When each message came, and the speed in it."""
+        """The arrival time of each message, and its speed."""
         self._thread = threading.Thread(target=self._read)
         self._thread.start()
         return self
@@ -75,11 +75,11 @@ class Simulator:
         return bool(self.speeds) and self.speeds[-1][1] > 0.2
 
     @property
-    def stands(self):
+    def is_still(self):
         return bool(self.speeds) and self.speeds[-1][1] < STILL
 
-    def stays(self, seconds):
-        """Return whether the robot stood for the time from now on."""
+    def stays_still(self, seconds):
+        """Return whether the robot does not move for a time from now on."""
         begun = time.monotonic()
         wait_for(lambda: self.speeds[-1][0] > begun + seconds, "odometry")
         return all(speed < STILL for at, speed in self.speeds if at > begun)
@@ -94,7 +94,7 @@ class Simulator:
 
 
 class Page:
-    """A gate with one robot, a program that has it, and a page that looks on."""
+    """A gate with one robot, and with a program that sends goals, and a page."""
 
     def __init__(self, **robot):
         self.reports, self.refused = [], []
@@ -103,9 +103,9 @@ class Page:
 
     def __enter__(self):
         self.client.start()
-        self._socket = self.client.connect("Ann", "operator", self._hear, print)
+        self._socket = self.client.connect("Ann", "operator", self._receive, print)
         wait_for(lambda: self.reports, "a report")
-        wait_for(lambda: self.reports[-1]["armable"], "a robot to take")
+        wait_for(lambda: self.reports[-1]["armable"], "a robot that can be driven")
         return self
 
     def __exit__(self, *exception):
@@ -115,15 +115,15 @@ class Page:
         self.client.take("r1").result(10)
         self.client.move("r1", x, y, yaw)
 
-    def say(self, op, **fields):
+    def send(self, op, **fields):
         self._socket.receive(json.dumps({"op": op, "robot": "r1", **fields}))
 
     def reset(self):
         wait_for(lambda: self.reports[-1]["latched"], "STOP on the disk")
-        self.say("reset", stop=self.reports[-1]["stop"]["id"])
+        self.send("reset", stop=self.reports[-1]["stop"]["id"])
         wait_for(lambda: not self.reports[-1]["latched"], "the reset")
 
-    def _hear(self, text):
+    def _receive(self, text):
         message = json.loads(text)
         if message["op"] == "robot":
             self.reports.append(message)
@@ -150,36 +150,36 @@ def simulated(folder):
         ) as page,
     ):
         page.send_away(*FAR)
-        wait_for(lambda: robot.moves, "the robot on its way")
+        wait_for(lambda: robot.moves, "motion")
         yield robot, page
 
 
 def test_stop_ends_a_goal_that_blocks_its_socket_while_a_stop_hook_hangs(simulated):
     robot, page = simulated
-    page.say("stop")
-    wait_for(lambda: robot.stands, "standing still", BRAKING)
+    page.send("stop")
+    wait_for(lambda: robot.is_still, "a standstill", BRAKING)
     page.reset()
-    # Nobody says zero any more: if the goal were not called off, it would go on.
-    assert robot.stays(2.0), "the goal goes on after the reset"
+    # The gate sends no more zeros, so a goal that was not cancelled would continue.
+    assert robot.stays_still(2.0), "the goal continues after the reset"
 
 
 def test_cancel_ends_a_goal_that_blocks_its_socket(simulated):
     robot, page = simulated
-    page.say("cancel")
-    wait_for(lambda: robot.stands, "standing still", BRAKING)
-    assert robot.stays(1.0)
+    page.send("cancel")
+    wait_for(lambda: robot.is_still, "a standstill", BRAKING)
+    assert robot.stays_still(1.0)
 
 
 def test_cancel_ends_a_goal_while_a_stop_hook_hangs(simulated):
     robot, page = simulated
-    page.say("stop")
+    page.send("stop")
     page.reset()
-    wait_for(lambda: robot.stands, "standing still", BRAKING)
+    wait_for(lambda: robot.is_still, "a standstill", BRAKING)
     page.send_away(*FAR)
-    wait_for(lambda: robot.moves, "the robot on its way again")
-    page.say("cancel")
-    wait_for(lambda: robot.stands, "standing still", BRAKING)
-    assert robot.stays(1.0)
+    wait_for(lambda: robot.moves, "motion to the second goal")
+    page.send("cancel")
+    wait_for(lambda: robot.is_still, "a standstill", BRAKING)
+    assert robot.stays_still(1.0)
 
 
 def test_a_hanging_goal_and_service_call_do_not_delay_the_zero_of_a_stop(folder):
@@ -199,7 +199,7 @@ def test_a_hanging_goal_and_service_call_do_not_delay_the_zero_of_a_stop(folder)
         wait_for(lambda: robot.log.of("send_action_goal"), "the goal")
         robot.answers_services(False)
         stopped = time.monotonic()
-        page.say("stop")
+        page.send("stop")
         wait_for(lambda: robot.log.first_zero(stopped), "a zero")
         late = robot.log.first_zero(stopped) - stopped
         assert late < 0.1 + sentinel.stolen(stopped)
@@ -213,12 +213,12 @@ def test_a_hanging_goal_and_service_call_do_not_delay_the_zero_of_a_stop(folder)
         wait_for(lambda: wanted <= calls(), "the cancel and the hook")
         (goal,) = robot.log.of("send_action_goal")
         links = {received.link for received in robot.log.of("call_service")}
-        assert goal.link not in links, "behind the goal a call would wait for its end"
+        assert goal.link not in links, "a call on the link of the goal would wait"
 
 
 @pytest.fixture
 def page_of_goals(folder, monkeypatch, chromium):
-    """A page in a browser, with a robot whose goals block their socket."""
+    """A page in a browser that shows a robot whose goals block their socket."""
     with Simulator() as robot:
         monkeypatch.setenv("SAFETY_BRIDGE", robot.url)
         display = running("run", SITE, "--port", 0, "--no-browser", pattern=WEB)
@@ -229,7 +229,7 @@ def page_of_goals(folder, monkeypatch, chromium):
 
 
 def aim(robot, tab):
-    """Send the robot to the middle of the world; again if the goal came too late."""
+    """Send the robot to the middle of the world; retry if the goal arrives too late."""
     for _ in range(10):
         go = tab.get_by_role("button", name="Send goal")
         go.click()
@@ -239,7 +239,7 @@ def aim(robot, tab):
         tab.mouse.move(530, 350)
         tab.mouse.up()
         try:
-            wait_for(lambda: robot.moves, "the robot on its way", 3.0)
+            wait_for(lambda: robot.moves, "motion", 3.0)
         except AssertionError:
             continue
         return
@@ -251,13 +251,13 @@ def test_cancel_and_stop_on_the_page_end_goals_that_block_their_socket(page_of_g
     robot, tab = page_of_goals
     aim(robot, tab)
     tab.get_by_role("button", name="Cancel goal").first.click()
-    wait_for(lambda: robot.stands, "standing still after the cancel", BRAKING)
-    assert robot.stays(1.0)
+    wait_for(lambda: robot.is_still, "a standstill after the cancel", BRAKING)
+    assert robot.stays_still(1.0)
 
     aim(robot, tab)
     tab.keyboard.press("Space")
-    wait_for(lambda: robot.stands, "standing still after STOP", BRAKING)
+    wait_for(lambda: robot.is_still, "a standstill after STOP", BRAKING)
     expect(tab.locator(".webmap-teleop")).to_have_attribute("data-state", "stopped")
     reset(tab)
-    # Nobody says zero any more: if the goal were not called off, it would go on.
-    assert robot.stays(2.0), "the goal goes on after the reset"
+    # The gate sends no more zeros, so a goal that was not cancelled would continue.
+    assert robot.stays_still(2.0), "the goal continues after the reset"

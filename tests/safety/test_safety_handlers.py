@@ -1,8 +1,8 @@
-"""No handler of the page is all that stops a robot: it stops without each of them.
+"""The robot stops even if an event handler of the page is missing.
 
-The page is served as it is; what is injected before its scripts makes it deaf to one
-kind of event, as if the handlers of that kind were not there. Then what they are there
-for happens. The page's step, which looks for itself, or the gate's dead-man must do.
+The page is unchanged. A script that runs before the scripts of the page ignores one
+type of event, as if the page had no handlers for this type. Then such an event occurs.
+The periodic step of the page or the dead-man timeout of the gate must stop the robot.
 """
 
 import time
@@ -19,14 +19,14 @@ pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 PROMISED = 0.3
 """Seconds from the fault to the first zero at the robot (S1)."""
 
-DEAF = """
-window.deafTo = () => false;
+IGNORE_EVENTS = """
+window.isIgnored = () => false;
 const { addEventListener } = EventTarget.prototype;
 EventTarget.prototype.addEventListener = function (kind, listener, options) {
-    const hear = function (event) {
-        if (!window.deafTo(event)) listener.call(this, event);
+    const handler = function (event) {
+        if (!window.isIgnored(event)) listener.call(this, event);
     };
-    return addEventListener.call(this, kind, hear, options);
+    return addEventListener.call(this, kind, handler, options);
 };
 window.pad = null;
 navigator.getGamepads = () => [window.pad];
@@ -48,7 +48,7 @@ STICK = """(() => {
     const { left, top, width, height } = pad.getBoundingClientRect();
     return [left + width / 2, top + height / 2, width / 2];
 })()"""
-"""Where the stick is, which is called up first."""
+"""The middle and the radius of the stick; None if the stick must first open."""
 
 LOSE_CAPTURE = """(() => {
     const pad = document.querySelector('.webmap-stick');
@@ -66,15 +66,15 @@ FOCUS = """(() => {
 
 
 class Key:
-    """A finger on W."""
+    """The key W."""
 
     def __init__(self, bench):
         self.press, self.let_go = bench.press, bench.let_go
         self.hold_on = bench.repeat_press
 
 
-class Thumb:
-    """A thumb on the stick."""
+class Stick:
+    """The stick on a touchscreen."""
 
     def __init__(self, bench):
         self._tab = bench.tab
@@ -82,25 +82,25 @@ class Thumb:
         self._down = False
 
     def press(self):
-        self.say("touchStart")
+        self.send_touch("touchStart")
         self.hold_on()
 
     def hold_on(self):
         if self._down:
-            self.say("touchMove", up=0.9)
+            self.send_touch("touchMove", up=0.9)
 
     def let_go(self):
         if self._down:
-            self.say("touchEnd")
+            self.send_touch("touchEnd")
 
-    def say(self, kind, up=0.0):
+    def send_touch(self, kind, up=0.0):
         self._down = kind in ("touchStart", "touchMove")
         points = [{"x": self._x, "y": self._y - up * self._reach}] if self._down else []
         self._tab.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
 
 
 class Pad:
-    """A thumb on a gamepad's stick, and a finger on its dead-man button."""
+    """A gamepad: its stick, and its dead-man button."""
 
     def __init__(self, bench):
         self._tab = bench.tab
@@ -114,29 +114,29 @@ class Pad:
         self._tab.evaluate(PAD.replace("HELD", "false"))
 
 
-def nothing(bench, hand):
-    """Neither does anything happen before the fault, nor is anything to be mended."""
+def nothing(bench, device):
+    """Do nothing before the fault, or after it."""
 
 
-def look_away(bench, hand):
+def look_away(bench, device):
     bench.look_away()
 
 
-def look_back(bench, hand):
+def look_back(bench, device):
     bench.look_back()
 
 
-def press_meta(bench, hand):
-    say_meta(bench.tab, "rawKeyDown")
+def press_meta(bench, device):
+    send_meta_key(bench.tab, "rawKeyDown")
 
 
-def let_go_elsewhere(bench, hand):
-    """The other tab gets to hear of it, as it has the keyboard now."""
+def let_go_elsewhere(bench, device):
+    """Release W in the other tab, which has the keyboard focus now."""
     bench._other.up("w")
     bench.look_back()
 
 
-def say_meta(tab, kind):
+def send_meta_key(tab, kind):
     tab.call(
         "Input.dispatchKeyEvent",
         type=kind,
@@ -146,12 +146,12 @@ def say_meta(tab, kind):
     )
 
 
-def let_meta_go_elsewhere(bench, hand):
-    say_meta(bench._other, "keyUp")
+def let_meta_go_elsewhere(bench, device):
+    send_meta_key(bench._other, "keyUp")
     bench.look_back()
 
 
-def open_menu(bench, hand):
+def open_menu(bench, device):
     for kind in ("mousePressed", "mouseReleased"):
         bench.tab.call(
             "Input.dispatchMouseEvent",
@@ -163,45 +163,45 @@ def open_menu(bench, hand):
         )
 
 
-def type_something(bench, hand):
+def type_something(bench, device):
     bench.tab.evaluate(FOCUS)
 
 
-def type_no_more(bench, hand):
+def type_no_more(bench, device):
     bench.tab.evaluate("document.getElementById('field').remove()")
 
 
-def leave(bench, hand):
+def leave(bench, device):
     bench.tab.go("about:blank")
 
 
-def come_back(bench, hand):
+def come_back(bench, device):
     bench.close_page()
-    listen_deafly(bench)
+    prepare_page(bench)
 
 
-def freeze(bench, hand):
+def freeze(bench, device):
     bench.tab.call("Page.setWebLifecycleState", state="frozen")
 
 
-def thaw(bench, hand):
+def thaw(bench, device):
     bench.tab.call("Page.setWebLifecycleState", state="active")
     bench.look_away_and_back()
 
 
-def lift_thumb(bench, hand):
-    hand.let_go()
+def release_stick(bench, device):
+    device.let_go()
 
 
-def cancel_touch(bench, hand):
-    hand.say("touchCancel")
+def cancel_touch(bench, device):
+    device.send_touch("touchCancel")
 
 
-def lose_capture(bench, hand):
+def lose_capture(bench, device):
     bench.tab.evaluate(LOSE_CAPTURE)
 
 
-def unplug(bench, hand):
+def unplug(bench, device):
     bench.tab.evaluate(
         "window.pad = null, dispatchEvent(new Event('gamepaddisconnected'))"
     )
@@ -212,18 +212,18 @@ Act = Callable[[object, object], None]
 
 @dataclass
 class Deleted:
-    """A handler that is not there, and what happens then.
+    """A missing handler, and the actions of the test.
 
-    ``unheard`` happens first, where the page cannot know of it otherwise: the robot
-    must move on, which shows that the handler is deleted. ``fault`` is what takes the
-    page away from the operator after that.
+    ``unnoticed`` runs first. It causes an event that only the missing handler would
+    process, so the robot must still move: this shows that the handler is missing. After
+    that, ``fault`` is an event that must stop the robot.
     """
 
-    deaf: str
+    ignored: str
     fault: Act
     back: Act = nothing
-    unheard: Act = nothing
-    hand: type = Key
+    unnoticed: Act = nothing
+    device: type = Key
 
     META: ClassVar[str] = "event.key === 'Meta'"
 
@@ -250,62 +250,64 @@ DELETED = {
     "all of the window and the keyboard": Deleted(
         f"{Deleted.META} || {Deleted.to('keyup', *WINDOW)}", look_away, look_back
     ),
-    "pointerup": Deleted(Deleted.to("pointerup"), lift_thumb, hand=Thumb),
-    "pointercancel": Deleted(Deleted.to("pointercancel"), cancel_touch, hand=Thumb),
+    "pointerup": Deleted(Deleted.to("pointerup"), release_stick, device=Stick),
+    "pointercancel": Deleted(Deleted.to("pointercancel"), cancel_touch, device=Stick),
     "lostpointercapture": Deleted(
-        Deleted.to("lostpointercapture"), lose_capture, hand=Thumb
+        Deleted.to("lostpointercapture"), lose_capture, device=Stick
     ),
-    "all of the stick": Deleted(Deleted.to(*POINTER), lift_thumb, hand=Thumb),
-    "gamepaddisconnected": Deleted(Deleted.to("gamepaddisconnected"), unplug, hand=Pad),
+    "all of the stick": Deleted(Deleted.to(*POINTER), release_stick, device=Stick),
+    "gamepaddisconnected": Deleted(
+        Deleted.to("gamepaddisconnected"), unplug, device=Pad
+    ),
 }
 
 
-def listen_deafly(bench):
-    """Have a page on which handlers can be deleted, which none is yet."""
-    bench.heal()
-    if not bench.tab.evaluate("'deafTo' in window"):
-        bench.tab.call("Page.addScriptToEvaluateOnNewDocument", source=DEAF)
+def prepare_page(bench):
+    """Load the page with the script that can ignore events; ignore none yet."""
+    bench.restore()
+    if not bench.tab.evaluate("'isIgnored' in window"):
+        bench.tab.call("Page.addScriptToEvaluateOnNewDocument", source=IGNORE_EVENTS)
         bench.tab.call("Page.reload")
-        bench.tab.wait("'deafTo' in window")
+        bench.tab.wait("'isIgnored' in window")
         bench.tab.wait("document.querySelector('.robot.selected') !== null")
-    bench.tab.evaluate("window.deafTo = () => false, 0")
+    bench.tab.evaluate("window.isIgnored = () => false, 0")
 
 
 def drive_off(bench, case):
-    """Drive until it moves, also after what only the deleted handler hears of."""
-    hand = case.hand(bench)
+    """Drive until the robot moves, also after the event that the page ignores."""
+    device = case.device(bench)
     for _ in range(10):
-        hand.let_go()
+        device.let_go()
         pass_time(NEUTRAL)
-        bench.tab.evaluate(f"window.deafTo = (event) => {case.deaf}, 0")
-        hand.press()
+        bench.tab.evaluate(f"window.isIgnored = (event) => {case.ignored}, 0")
+        device.press()
         deadline = time.monotonic() + 2.5
         while time.monotonic() < deadline and not bench.steady():
             pass_time(0.01)
         if bench.steady():
-            case.unheard(bench, hand)
+            case.unnoticed(bench, device)
             pass_time(0.1)
             if bench.steady():
-                return hand
-        bench.tab.evaluate("window.deafTo = () => false, 0")
+                return device
+        bench.tab.evaluate("window.isIgnored = () => false, 0")
     raise AssertionError(bench.tab.evaluate("document.body.innerText"))
 
 
 @pytest.mark.parametrize("handler", DELETED)
 def test_the_robot_stops_when_an_event_handler_of_the_page_is_missing(bench, handler):
     case, log = DELETED[handler], bench.robot.log
-    listen_deafly(bench)
-    hand = drive_off(bench, case)
+    prepare_page(bench)
+    device = drive_off(bench, case)
     fault_at = time.monotonic()
-    case.fault(bench, hand)
+    case.fault(bench, device)
     wait_for(lambda: log.first_zero(fault_at), "a zero")
     stopped = log.first_zero(fault_at)
     jitter = bench.sentinel.stolen(fault_at - 0.1, stopped)
-    case.back(bench, hand)
-    hand.hold_on()
+    case.back(bench, device)
+    device.hold_on()
     pass_time(0.3)
     moved = log.moving_since(fault_at + PROMISED + jitter + 0.001)
-    bench.tab.evaluate("window.deafTo = () => false, 0")
-    hand.let_go()
+    bench.tab.evaluate("window.isIgnored = () => false, 0")
+    device.let_go()
     assert stopped - fault_at <= PROMISED + grace(jitter)
-    assert not moved, "it moves by what was held all the time"
+    assert not moved, "the robot moves by an input that was held all the time"

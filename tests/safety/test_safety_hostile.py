@@ -1,4 +1,4 @@
-"""A person drives a good robot while the bridges of others do what they like."""
+"""An operator drives a good robot while hostile bridges send arbitrary data."""
 
 import pytest
 from safety_hostile import beside, drive
@@ -8,17 +8,17 @@ pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 
 
 TRIALS = 7
-"""The most trials, if other processes disturb some of them."""
+"""The greatest number of trials, if other processes disturb some of them."""
 
 MOST_STOLEN = 0.1
 """Steal time, in seconds per quarter second, above which a trial may not count."""
 
 MOST_WAITED = 0.1
-"""Wait for a processor, in seconds per quarter second, above which the same holds."""
+"""Wait for a processor, in the same unit, above which a trial may not count."""
 
 
 def check(bench):
-    """Assert that the peers do not disturb the good robot, and never its STOP.
+    """Assert that the peers disturb neither the good robot nor its STOP.
 
     In a full run one trial decides. Otherwise a disturbed trial does not count if other
     processes or the host took the processors during the trial. After one disturbed
@@ -39,7 +39,7 @@ def check(bench):
 
 
 def undisturbed(driven):
-    """Return whether the robot drove as if it were alone."""
+    """Return whether the robot drove as well as without other robots."""
     late = grace(driven.driving_jitter)
     return (
         driven.refused == 0
@@ -50,7 +50,7 @@ def undisturbed(driven):
 
 
 def contended(driven):
-    """Return whether other processes or the host took the processors."""
+    """Return whether other processes or the host took processor time."""
     waited = max(driven.driving_jitter, driven.waited)
     return not FULL and (driven.stolen > MOST_STOLEN or waited > MOST_WAITED)
 

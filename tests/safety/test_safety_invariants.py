@@ -1,4 +1,4 @@
-"""The rules that a robot's log is held against: each finds what it is for."""
+"""Each rule for the log of a robot's velocities reports a log that breaks it."""
 
 import itertools
 import math
@@ -16,7 +16,7 @@ def received(*pairs, start=100.0):
 
 
 def drive(seconds=1.0, vx=0.5, start=0.0, zeros=0.5):
-    """A good activity: 20 Hz, then zeros, then silence."""
+    """Return a correct activity: velocities at 20 Hz, then zeros, then nothing."""
     moving = [(start + n * 0.05, vx) for n in range(round(seconds / 0.05))]
     stop = start + seconds
     return [*moving, *((stop + n * 0.05, 0.0) for n in range(round(zeros / 0.05)))]
@@ -38,7 +38,7 @@ def test_a_nonzero_last_velocity_is_reported():
 
 def test_a_missing_zero_is_reported_even_before_a_correct_second_activity():
     found = check_invariants(received(*drive(zeros=0.0), *drive(start=5.0)))
-    assert ["an activity ended" in words for words in found] == [True]
+    assert ["an activity ended" in text for text in found] == [True]
 
 
 def test_a_cut_link_excuses_a_missing_zero_if_the_next_velocity_is_zero():
@@ -130,4 +130,4 @@ def test_only_nonzero_velocities_in_a_quiet_period_are_reported(steps):
         log.append(ReceivedTwist(at, Twist(vx)))
     found = check_invariants(log, quiet=[Quiet(at / 2, math.inf, "here")])
     expected = any(t.at > at / 2 and not t.is_zero for t in log)
-    assert any(words.endswith("here") for words in found) == expected
+    assert any(text.endswith("here") for text in found) == expected

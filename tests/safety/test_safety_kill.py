@@ -1,4 +1,4 @@
-"""kill -9 of the gate, the display or both, at any moment: STOP stays, all is quiet."""
+"""kill -9 of the gate, the display or both: STOP stays active and nothing moves."""
 
 import json
 import os
@@ -24,20 +24,20 @@ pytestmark = [pytest.mark.safety, pytest.mark.serial]
 DRIVER = Path(__file__).with_name("safety_driver.py")
 
 LAST = 200
-"""The last of the gate's steps, of 10 ms each, after which it is killed."""
+"""The last step, of 10 ms each, after which a process is killed."""
 
 SCRIPT = [(0.0, "take"), (0.05, "x 0"), (0.5, "x 1"), (1.2, "stop"), (1.5, "x 1")]
-"""What the hand does, and after how many seconds: drive for 0.7 s, then STOP."""
+"""The orders to the operator and their times: drive for 0.7 s, then STOP."""
 
 KILLS = range(1, LAST + 1) if FULL else range(5, LAST, 10)
 KILLS_OF_BOTH = KILLS if FULL else KILLS[::7]
 
 LANES = 4
-"""How many robots are driven side by side: most of the time each only waits."""
+"""The number of robots that are driven at the same time; each mostly waits."""
 
 
 class Driver:
-    """A process with a gate and a hand."""
+    """A process of ``safety_driver.py``: an operator, and a gate as its child."""
 
     def __init__(self, url, state):
         self.reports, self.refused = [], []
@@ -67,7 +67,7 @@ class Driver:
 
     @property
     def now(self):
-        """What the gate said last of the robot."""
+        """The last report of the gate about the robot."""
         return self.reports[-1] if self.reports else {}
 
     @property
@@ -86,7 +86,7 @@ class Driver:
 
 
 def play(driver, robot, steps):
-    """Let the hand do as the script says until so many steps of the gate are over."""
+    """Send the orders of the script for some steps; return whether STOP is active."""
     wait_for(lambda: driver.now.get("armable") or driver.now.get("latched"), "a gate")
     begin = time.monotonic()
     todo = list(SCRIPT)
@@ -98,7 +98,7 @@ def play(driver, robot, steps):
 
 
 def try_to_drive(driver):
-    """Take the robot, show released keys, press: what a person would do."""
+    """Take control with released keys, then press, as an operator does."""
     driver.order("x 0")
     driver.order("take")
     pass_time(0.5)
@@ -113,7 +113,7 @@ def test_after_a_kill_no_motion_resumes_and_an_acknowledged_stop_stays_active(
 ):
     name = f"{WHAT[part]} killed after step n of {LAST}; STOP stays"
     if is_measured(name):
-        pytest.skip("the run that is resumed has it")
+        pytest.skip("the resumed run already has this figure")
     steps = KILLS_OF_BOTH if part == "both" else KILLS
     progress, kills = Progress(name, len(steps)), []
     with Sentinel() as sentinel, ThreadPoolExecutor(LANES) as lanes:
@@ -121,8 +121,8 @@ def test_after_a_kill_no_motion_resumes_and_an_acknowledged_stop_stays_active(
         for kill in lanes.map(once, steps):
             kills.append(kill)
             progress.add(kill.late, kill.jitter)
-    assert any(kill.acknowledged for kill in kills), "none came after a STOP"
-    assert any(kill.drove_again for kill in kills), "nothing could be driven again"
+    assert any(kill.acknowledged for kill in kills), "no kill came after a STOP"
+    assert any(kill.drove_again for kill in kills), "no robot could be driven again"
     note(
         Figure(
             name=name,
@@ -137,12 +137,12 @@ def test_after_a_kill_no_motion_resumes_and_an_acknowledged_stop_stays_active(
 
 def test_the_full_run_has_200_kills_and_the_quick_run_has_20_kills():
     assert len(KILLS) == (LAST if FULL else 20)
-    assert max(KILLS) * 0.01 > SCRIPT[-1][0], "the last kill comes after all is done"
+    assert max(KILLS) * 0.01 > SCRIPT[-1][0], "the last kill must come after the script"
 
 
 BY_ITSELF = ROBOT_TIMEOUT + 0.05
 PROMISED = {"gate": BY_ITSELF, "display": 0.3, "both": BY_ITSELF}
-"""Seconds until the robot stands: by its own timeout, or by the gate's zero."""
+"""Seconds until the robot stops, by its command timeout or by a zero of the gate."""
 
 WHAT = {
     "gate": "the gate is",
@@ -153,24 +153,24 @@ WHAT = {
 
 @dataclass(frozen=True)
 class Kill:
-    """What came of one; times in seconds."""
+    """The result of one kill; times are in seconds."""
 
     late: float
     jitter: float
     acknowledged: bool
-    """Whether a STOP stood before."""
+    """Whether the gate had reported an active STOP before the kill."""
 
     drove_again: bool
 
 
 def kill_after(steps, *, part, folder, sentinel):
-    """Kill a part after so many steps, with a robot and a state of its own."""
+    """Kill a part after a number of steps, with a separate robot and state folder."""
     with WitnessRobot(timeout=ROBOT_TIMEOUT) as robot:
         return kill_one(steps, part, robot, folder / str(steps), sentinel)
 
 
 def kill_one(steps, part, robot, state, sentinel):
-    """Kill a part after so many steps, and try to drive afterwards."""
+    """Kill a part after a number of steps, and try to drive afterwards."""
     begin = time.monotonic()
     with Driver(robot.url, state) as driver:
         acknowledged = play(driver, robot, steps)
@@ -178,7 +178,7 @@ def kill_one(steps, part, robot, state, sentinel):
         killed_at = time.monotonic()
         if part == "gate":
             driver.gate.kill()
-            # The hand goes on pressing while another gate is started.
+            # The operator still presses while the display starts another gate.
             wait_for(lambda: len(driver.reports) > seen + 1, "another gate")
             wait_for(lambda: driver.now.get("link") == "up", "its link")
             pass_time(0.8)
@@ -186,7 +186,7 @@ def kill_one(steps, part, robot, state, sentinel):
             try_to_drive(driver)
         else:
             if part == "both":
-                driver.gate.kill()  # first: it would see its pipe end
+                driver.gate.kill()  # first, or it would notice the end of its pipe
             driver.popen.kill()
             driver.popen.wait(10)
             pass_time(0.8)
@@ -200,14 +200,14 @@ def kill_one(steps, part, robot, state, sentinel):
     rest = robot.log.standstill(killed_at)
     moved = robot.log.moving_since(resumed_until)
     if acknowledged:
-        assert not moved, f"killed after step {steps}: STOP did not stand"
+        assert not moved, f"killed after step {steps}: STOP was not active"
     rests = [m for m in robot.log.moved if killed_at <= m.at < resumed_until]
     moving = [m.at for m in rests if abs(m.twist.vx) > 0.01]
     on = max(moving) - killed_at if moving else 0.0
     bound = PROMISED[part]
     bad_luck = sentinel.stolen(killed_at, killed_at + bound)
     assert on <= bound + grace(bad_luck), (
-        f"killed after step {steps}: it moved on for {on} s"
+        f"killed after step {steps}: the robot moved for {on} s"
     )
     assert rest is not None
     still = killed_at + 0.3 + bad_luck

@@ -1,4 +1,4 @@
-"""A person drives a good robot while others send messages that are far too large."""
+"""An operator drives a good robot while other robots send much too large messages."""
 
 import pytest
 from safety_hostile import beside
@@ -24,7 +24,7 @@ PEERS = {
     "a picture": ("large_picture",),
     "of other kinds": ("long_line", "many_lists", "fragments", "bombs"),
 }
-"""Several robots at a time, each of which sends one of these once a second."""
+"""Peers that send at the same time, each of them one message a second."""
 
 
 @pytest.mark.parametrize("peers", PEERS.values(), ids=PEERS)

@@ -1,4 +1,4 @@
-"""Everything that can happen to the two links while a person holds W."""
+"""Faults of the two links while an operator holds W."""
 
 import time
 
@@ -16,16 +16,16 @@ PROMISED = 0.3
 LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
 
 GATE_OF_LATENCY = 0.55
-"""The same where a link is not gone but becomes too slow by and by."""
+"""The same for a link that does not end but slowly becomes too slow."""
 
 LATE = 6
-"""Velocities that a stalled link may have taken (S11)."""
+"""The number of velocities that a stalled link may have stored (S11)."""
 
-WORD = 160
-"""Bytes of a velocity on the wire, and of the ping that goes with it."""
+VELOCITY_SIZE = 160
+"""Bytes of a velocity and its ping on the network."""
 
 BY_ITSELF = ROBOT_TIMEOUT + 0.05
-"""Seconds until a robot stands that no zero reaches: its own timeout and its brakes."""
+"""Seconds until a robot stops without a zero: its command timeout and its braking."""
 
 
 @pytest.mark.parametrize(
@@ -90,31 +90,31 @@ def test_latency_of_400_ms_between_browser_and_display_stops_the_robot(bench):
 
 
 NARROW = 1500
-"""Bytes a second that a narrow link carries."""
+"""Bytes a second of a narrow link."""
 
-SPOILT = {
+DEGRADED = {
     "becomes narrow, 1.5 kB/s": Shape(bandwidth=NARROW),
     "is cut into slices of 40 bytes": Shape(slice_size=40, slice_gap=0.1),
     "gets irregular latency": Shape(latency=0.16, jitter=0.3),
 }
-"""What else networks do to a link; none of them is cut, and nobody can drive by any."""
+"""Other faults of links: the link still works, but is too bad to drive a robot."""
 
 
 def smooth(bench, hop):
-    """Let a spoilt link be as it was, a second after the fault."""
+    """Remove the fault of a link after a second."""
     bench.linger(1.0)
     hop.shape(Shape())
 
 
-HOW = [pytest.param(how, marks=[] if "irregular" in how else LONG) for how in SPOILT]
+HOW = [pytest.param(how, marks=[] if "irregular" in how else LONG) for how in DEGRADED]
 
 
 @pytest.mark.parametrize("how", HOW)
 def test_a_degraded_link_between_browser_and_display_stops_the_robot(bench, how):
-    # What is late by less than the limit may still count, and then the dead-man does.
+    # Commands below the age limit still count, and then the dead-man timeout follows.
     bench.prove(
         f"the browser's link {how}",
-        lambda: bench.web_hop.shape(SPOILT[how]),
+        lambda: bench.web_hop.shape(DEGRADED[how]),
         within=GATE_OF_LATENCY,
         back=lambda: smooth(bench, bench.web_hop),
     )
@@ -163,7 +163,8 @@ def test_a_half_close_by_the_gate_stops_the_robot(bench):
 
 
 def test_latency_of_400_ms_between_gate_and_robot_stops_the_robot(bench):
-    # What was written before the doubt, 300 ms, is still on its way for 400 ms.
+    # The gate notices the latency after 300 ms. The robot receives the velocities
+    # from before that time for another 400 ms.
     bench.prove(
         "the robot's link gets 400 ms of latency each way",
         lambda: bench.robot_hop.shape(SLOW),
@@ -175,13 +176,13 @@ def test_latency_of_400_ms_between_gate_and_robot_stops_the_robot(bench):
 
 @pytest.mark.parametrize("how", HOW)
 def test_a_degraded_link_between_gate_and_robot_stops_the_robot(bench, how):
-    # The doubt comes after 300 ms; what was written before it is still on its way: on a
-    # narrow link that is the time for six velocities, and for pings and the zero.
-    narrow = SPOILT[how].bandwidth is not None
-    under_way = (LATE + 1) * WORD / NARROW if narrow else 0.5
+    # The gate notices the fault after 300 ms. Earlier velocities are still in transit:
+    # on a narrow link, six of them with their pings, and then the zero.
+    narrow = DEGRADED[how].bandwidth is not None
+    under_way = (LATE + 1) * VELOCITY_SIZE / NARROW if narrow else 0.5
     bench.prove(
         f"the robot's link {how}",
-        lambda: bench.robot_hop.shape(SPOILT[how]),
+        lambda: bench.robot_hop.shape(DEGRADED[how]),
         within=0.3 + under_way + 0.1,
         back=lambda: smooth(bench, bench.robot_hop),
         few_late=LATE,

@@ -1,4 +1,4 @@
-"""A person holds W while there is much to show and many watch."""
+"""An operator holds W under the full load: much data to show and many viewers."""
 
 import os
 import signal
@@ -12,7 +12,7 @@ pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 
 @pytest.fixture(scope="module")
 def loaded(bench):
-    """The bench, with all there is to show on the page."""
+    """The bench under the full load."""
     with under_load(bench):
         yield bench
 

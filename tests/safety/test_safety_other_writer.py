@@ -1,7 +1,7 @@
-"""What the page says while another program publishes velocities to the robot.
+"""The page reports that another program publishes velocities to the robot.
 
-From a second client of the robot's bridge, through the real gate and display, to the
-words in a real Chromium.
+The other program is a second client of the robot's bridge. The gate, the display and
+Chromium are real.
 """
 
 import json
@@ -13,13 +13,13 @@ from websockets.sync.client import connect
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 
-SAID = "nother program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s): /teleop_node"
-WORDS = "(document.querySelector('.webmap-teleop-state')?.innerText ?? '')"
+SHOWN = "nother program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s): /teleop_node"
+STATUS = "(document.querySelector('.webmap-teleop-state')?.innerText ?? '')"
 ALARM = "(document.querySelector('.webmap-alarm')?.innerText ?? '')"
 
 
 class OtherProgram:
-    """Publishes a velocity at 10 Hz for as long as it is used."""
+    """Publishes a velocity at 10 Hz for as long as the ``with`` block lasts."""
 
     def __init__(self, port):
         self._port = port
@@ -69,20 +69,20 @@ def test_the_page_names_another_program_before_driving_while_driving_and_in_alar
 ):
     bench.drive_off()
     bench.let_go()
-    bench.tab.wait(f"!{WORDS}.includes('nother program')")
+    bench.tab.wait(f"!{STATUS}.includes('nother program')")
     bench.others_publish = True
     with OtherProgram(bench.robot.port):
-        bench.tab.wait(f"{WORDS}.includes({json.dumps(SAID)})")
-        # A machine that stops for 0.3 s lets the robot stand for as long, and then the
-        # robot has obeyed.
+        bench.tab.wait(f"{STATUS}.includes({json.dumps(SHOWN)})")
+        # If the machine does not run for 0.3 s, the robot does not move for this time,
+        # and then the gate considers that the robot has obeyed.
         for within in (5.0, 5.0, 15.0):
             bench.press()
             bench.tab.wait(
-                f"{WORDS}.includes('You are driving') && {WORDS}.includes('{SAID}')"
+                f"{STATUS}.includes('You are driving') && {STATUS}.includes('{SHOWN}')"
             )
             bench.let_go()
-            if is_shown(bench.tab, f"{ALARM}.includes('{SAID}')", within):
+            if is_shown(bench.tab, f"{ALARM}.includes('{SHOWN}')", within):
                 break
         else:
             raise AssertionError("no alarm")
-    bench.tab.wait(f"!{WORDS}.includes('nother program')")
+    bench.tab.wait(f"!{STATUS}.includes('nother program')")

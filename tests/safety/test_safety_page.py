@@ -47,7 +47,7 @@ NUMBERS = list(range(1, 21))
 
 
 def test_every_promise_names_a_test_and_no_promise_is_missing():
-    """Each is a term with its number, a definition, and the names of its tests."""
+    """Each promise is a term with a number, and a definition that names its tests."""
     begin = PAGE.index("## What is promised")
     promised = PAGE[begin : PAGE.index("## What is not promised", begin)]
     promises = re.findall(r"\n([A-Z][^\n]+)\n: (.*?)(?=\n\n)", promised, re.DOTALL)

@@ -1,4 +1,4 @@
-"""Everything that can happen to our own processes while a person holds W."""
+"""Faults of the display and of the gate while an operator holds W."""
 
 import signal
 
@@ -14,7 +14,7 @@ PROMISED = 0.3
 """Seconds from the fault to the first zero at the robot (S1, S14)."""
 
 BY_ITSELF = ROBOT_TIMEOUT + 0.05
-"""Seconds until a robot stands to which nobody can speak: its timeout and brakes."""
+"""Seconds until a robot stops without a zero: its command timeout and its braking."""
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ def test_a_killed_or_terminated_display_stops_the_robot(bench, name, sig):
     def back():
         bench.end_display()
         bench.start_display()
-        # The page that was there has a key down still; then it is opened anew.
+        # The old page still has a key down; afterwards the test opens a new page.
         bench.repeat_press()
         bench.linger(1.0)
         bench.close_page()
@@ -35,7 +35,7 @@ def test_a_killed_or_terminated_display_stops_the_robot(bench, name, sig):
         lambda: bench.display.popen.send_signal(sig),
         within=PROMISED,
         back=back,
-        new_link=True,  # the next gate's, if this one did not get to write its last
+        new_link=True,  # the next gate sends the zeros if this one could not
     )
 
 
@@ -74,7 +74,7 @@ def test_releasing_the_key_stops_the_robot_while_user_code_blocks(bench):
     def block():
         bench.robot.publish("/block", {"data": bench.stretch(2.0, 1.0)})
         bench.linger(0.8, 0.5)
-        assert bench.steady(), "the robot does not go on while user code blocks"
+        assert bench.steady(), "the robot does not move on while user code blocks"
 
     bench.prove(
         "user code blocks for 2 s, then the key is released",
@@ -92,7 +92,7 @@ def test_releasing_the_key_stops_the_robot_while_a_service_call_hangs(bench):
         bench.robot.publish("/call", {"data": 1.0})
         wait_for(lambda: bench.robot.log.of("call_service"), "the call")
         pass_time(0.5)
-        assert bench.steady(), "the robot does not go on while a call hangs"
+        assert bench.steady(), "the robot does not move on while a call hangs"
 
     def back():
         bench.robot.answers_services(True)

@@ -1,4 +1,4 @@
-"""The fault proxy, with real sockets at both of its ends."""
+"""The fault proxy, with real sockets at both ends."""
 
 import socket
 import threading
@@ -127,7 +127,7 @@ def test_a_proxy_without_a_server_resets_new_links():
         port = listener.getsockname()[1]
     with (
         FaultProxy(port) as proxy,
-        # The reset may come before the kernel has told us that we are connected.
+        # The reset may arrive before connect() has returned.
         pytest.raises(ConnectionResetError),
         socket.create_connection(("127.0.0.1", proxy.port), 5) as link,
     ):

@@ -1,4 +1,4 @@
-"""When the bytes of a bad link arrive."""
+"""The times at which the bytes of a degraded link arrive."""
 
 import pytest
 from hypothesis import given

@@ -1,6 +1,6 @@
-"""Half an hour of everything at once: nothing grows, and the gate is never late.
+"""Half an hour under the full load: memory does not grow, and no zero is late.
 
-Only in a full run, or as long as WEBMAP_SAFETY_SOAK says, in minutes.
+It runs in a full run only, or for the minutes that WEBMAP_SAFETY_SOAK gives.
 """
 
 import itertools
@@ -21,19 +21,19 @@ pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 MINUTES = float(os.environ.get("WEBMAP_SAFETY_SOAK", "30" if FULL else "0"))
 
 WARM = 2.0
-"""Minutes until everybody has everything that they keep."""
+"""Minutes until all processes have the memory that they keep."""
 
 STEP = 0.01
-"""Seconds between two looks of the gate at its clock: a zero may be due in between."""
+"""Seconds between two checks of the clock by the gate; a zero may wait so long."""
 
 STOP_AGAIN = 240.0
-"""Seconds after which STOP is said again: the zeros of one end after ten minutes."""
+"""Seconds until the next STOP, as the zeros of a STOP end after ten minutes."""
 
 GROWTH = 0.1
 
 
 def processes(bench):
-    """Return the display and all that it has started, by what they are."""
+    """Return the display, its gate and its worker, by name."""
     display = psutil.Process(bench.display.popen.pid)
     found = {"display": display}
     for child in display.children(recursive=True):
@@ -46,10 +46,10 @@ def processes(bench):
 
 
 class Memory:
-    """Resident bytes of each of the processes, second by second.
+    """The resident memory of each process in bytes, measured every second.
 
-    A map of 16 million cells comes and goes, in several copies: what is left between
-    two of them is what is kept, so of a stretch of minutes the least counts.
+    Each map of 16 million cells needs memory for several copies for a short time. So
+    the smallest value of several minutes is the memory that a process keeps.
     """
 
     def __init__(self, bench):
@@ -61,13 +61,13 @@ class Memory:
         self._seen.append((time.monotonic(), sizes))
 
     def least(self, since, until):
-        """Return the least of each between two times."""
+        """Return the smallest value of each process between two times."""
         sizes = [sizes for at, sizes in self._seen if since <= at <= until]
         names = set.intersection(*map(set, sizes))
         return {name: min(one[name] for one in sizes) for name in sorted(names)}
 
 
-def say_stop(bench):
+def press_stop(bench):
     bench.space("keyDown")
     bench.space("keyUp")
 
@@ -77,14 +77,14 @@ def say_stop(bench):
 def test_half_an_hour_under_full_load_keeps_memory_stable_and_delays_no_zero(bench):
     memory = Memory(bench)
     with under_load(bench), maps_coming(bench):
-        say_stop(bench)
+        press_stop(bench)
         pids = {name: process.pid for name, process in processes(bench).items()}
         pass_time(60 * min(WARM, MINUTES / 3))
         again = begun = time.monotonic()
         end = begun + 60 * MINUTES
         while time.monotonic() < end:
             if time.monotonic() > again:
-                say_stop(bench)
+                press_stop(bench)
                 again = time.monotonic() + STOP_AGAIN
                 SHOW[-1](f"soak: {(end - again + STOP_AGAIN) / 60:.0f} min to go")
             memory.look()
@@ -96,7 +96,7 @@ def test_half_an_hour_under_full_load_keeps_memory_stable_and_delays_no_zero(ben
         alive = {name: process.pid for name, process in processes(bench).items()}
     part = (end - begun) / 4
     before, kept = memory.least(begun, begun + part), memory.least(end - part, end)
-    assert all(one.is_zero for one in received), "STOP stands"
+    assert all(one.is_zero for one in received), "the robot moved during STOP"
     gaps = [after.at - one.at for one, after in itertools.pairwise(received)]
     late = sorted(max(0.0, gap - HELD_PERIOD - STEP) for gap in gaps)
     most, usual = late[-1], late[int(len(late) * 0.999)]
@@ -113,7 +113,7 @@ def test_half_an_hour_under_full_load_keeps_memory_stable_and_delays_no_zero(ben
     note(Soak("delay of a zero of STOP, maximum", "ms", 50, 1000 * most))
     note(Soak("delay of a zero of STOP, 99.9 % of them", "ms", 20, 1000 * usual))
     note(Soak("delay of the machine, maximum", "ms", None, 1000 * jitter))
-    assert alive == pids, "none has died"
+    assert alive == pids, "a process has ended"
     for name, size in kept.items():
         assert size <= before[name] * (1 + GROWTH), (name, before, kept, UNDER_LOAD)
     assert most <= 0.05 + (0 if FULL else jitter)

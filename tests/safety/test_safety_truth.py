@@ -1,7 +1,7 @@
-"""What the page says of a robot that does not obey, and of a link that is slow.
+"""The page reports a robot that does not obey, and a slow link.
 
-From a finger on a key of a real Chromium, through the real display and gate, to a robot
-that notes what it is told; and back from its odometry to the words on the page.
+Keys go from a real Chromium through the real display and gate to a robot that records
+its commands. Its odometry goes back to the text on the page.
 """
 
 import time
@@ -21,13 +21,13 @@ COVERED = """(() => {
     return box.left <= 0 && box.top <= 0 &&
         box.right >= innerWidth && box.bottom >= innerHeight;
 })()"""
-WORDS = "document.body.innerText"
+TEXT = "document.body.innerText"
 
 EACH_WAY = 0.075
-"""Latency of the slow link in seconds: the loop is then older than 150 ms."""
+"""Latency of the slow link in seconds: a round trip then takes over 150 ms."""
 
 BLIND, STOPS_WITHIN = 0.25, 0.5
-"""What S15 grants the robot, in metres, and what it reckons with, in seconds."""
+"""The distance that S15 allows, in metres, and the time to stop, in seconds."""
 
 
 @pytest.fixture(scope="module")
@@ -47,22 +47,22 @@ def bench(stubborn):
 
 
 def drive_at_full_speed(bench):
-    """Drive until the link is quick, which on a busy machine takes more than a try."""
+    """Drive at full speed; on a busy machine this may need several attempts."""
     deadline = time.monotonic() + 40
     while time.monotonic() < deadline:
         bench.drive_off()
         if bench.robot.log.moving_since(0.0)[-1].twist.vx == pytest.approx(V_MAX):
             return
         bench.let_go()
-        pass_time(2.0)  # what was slow is forgotten by then
-    raise AssertionError(f"not at full speed: {bench.tab.evaluate(WORDS)}")
+        pass_time(2.0)  # the gate forgets slow round trips in this time
+    raise AssertionError(f"not at full speed: {bench.tab.evaluate(TEXT)}")
 
 
 def stop_and_reset(bench):
-    """Say STOP, which is said again and again, so that whatever moves stands."""
+    """Press STOP, whose repeated zeros stop the robot, and reset the STOP."""
     bench.space("keyDown")
     bench.space("keyUp")
-    wait_for(lambda: abs(bench.robot.velocity.vx) < 0.01, "standing still")
+    wait_for(lambda: abs(bench.robot.velocity.vx) < 0.01, "a standstill")
     bench.reset_stop()
 
 
@@ -72,14 +72,14 @@ def test_the_page_shows_an_alarm_until_a_disobeying_robot_stops(bench):
     bench.let_go()
     released = time.monotonic()
     bench.tab.wait(f"({ALARM} ?? '').includes('ROBOT NOT OBEYING')")
-    said_after = time.monotonic() - released
-    assert said_after > 0.9, "the robot has a second to brake"
-    # The page has to wait for a processor as well, and at a lower priority.
-    assert said_after < 1.6 + 3 * bench.sentinel.stolen(released)
-    said = bench.tab.evaluate(ALARM)
-    assert "Use the emergency stop of the robot." in said
-    assert "Bob" in said
-    assert "zero sent, still moving at" in said
+    shown_after = time.monotonic() - released
+    assert shown_after > 0.9, "the robot has a second to brake"
+    # The page also waits for a processor, with a lower priority.
+    assert shown_after < 1.6 + 3 * bench.sentinel.stolen(released)
+    alarm = bench.tab.evaluate(ALARM)
+    assert "Use the emergency stop of the robot." in alarm
+    assert "Bob" in alarm
+    assert "zero sent, still moving at" in alarm
     assert bench.tab.evaluate(COVERED), "the alarm does not cover the page"
     assert bench.robot.log.moving_since(released + 0.5) == []
     bench.robot.obeys = True
@@ -100,32 +100,32 @@ def test_no_velocity_is_sent_for_ten_seconds_after_a_key_release_and_its_zeros(b
     bench.drive_off()
     bench.let_go()
     pass_time(1.0)
-    said = len(bench.robot.log.twists)
+    count = len(bench.robot.log.twists)
     pass_time(10.0)
-    assert bench.robot.log.twists[said:] == []
+    assert bench.robot.log.twists[count:] == []
 
 
 def test_a_slow_link_lowers_the_speed_limit_and_the_page_shows_the_reason(bench):
     drive_at_full_speed(bench)
-    # Latency that comes at once is a gap, which may stop the robot: so from anew.
+    # A sudden latency is a gap that may stop the robot, so stop and drive again.
     bench.let_go()
     bench.web_hop.shape(Shape(latency=EACH_WAY))
     bench.drive_off(within=45.0)
-    said = bench.tab.evaluate(WORDS)
-    assert "slow connection: " in said, said
-    assert "Speed limit 0.2" in said, said
-    # The loop takes both ways at least; what it waits for a tick makes it slower.
+    text = bench.tab.evaluate(TEXT)
+    assert "slow connection: " in text, text
+    assert "Speed limit 0.2" in text, text
+    # A round trip takes both ways, and longer because of the wait for a tick.
     most = BLIND / (2 * EACH_WAY + DEADMAN + STOPS_WITHIN)
     now = time.monotonic()
     late = [received.speed for received in bench.robot.log.moving_since(now - 0.3)]
     assert late
     assert max(late) <= most, (max(late), most)
-    assert min(late) > 0.1, "a slow link is to slow it down, not to stop it"
+    assert min(late) > 0.1, "a slow link must slow the robot down, not stop it"
 
     bench.web_hop.shape(Shape())
     bench.let_go()
     drive_at_full_speed(bench)
-    assert "slow connection: " not in bench.tab.evaluate(WORDS)
+    assert "slow connection: " not in bench.tab.evaluate(TEXT)
 
 
 def test_a_link_slower_than_the_age_limit_stops_a_robot_despite_a_held_key(bench):

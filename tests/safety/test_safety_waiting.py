@@ -1,4 +1,4 @@
-"""What the scheduler lets a process wait."""
+"""How long processes wait for a processor."""
 
 import os
 import subprocess
@@ -13,7 +13,8 @@ from safety_waiting import Contention, Waiting, most_within, steal
 pytestmark = [
     pytest.mark.safety,
     pytest.mark.skipif(
-        not Path("/proc/self/schedstat").exists(), reason="nobody counts it here"
+        not Path("/proc/self/schedstat").exists(),
+        reason="Linux does not count waiting times here",
     ),
 ]
 
@@ -79,7 +80,7 @@ def test_contention_is_the_longest_wait_in_a_quarter_second():
         for _ in range(3):
             with Contention(Waiting([busy[0].pid])) as contention:
                 time.sleep(1)
-            # A reading that comes late counts the wait of a longer time.
+            # A late reading includes the wait of a longer time.
             if contention.waited < 0.5:
                 break
         assert 0.02 < contention.waited < 0.5

@@ -1,4 +1,4 @@
-"""The witness robot: it notes what it is told, moves, and stops by itself."""
+"""The witness robot: it records messages, moves, and stops by itself."""
 
 import json
 import time
@@ -17,7 +17,7 @@ def eventually(check, what, seconds=10.0):
         if found := check():
             return found
         time.sleep(0.005)
-    raise AssertionError(f"never came: {what}")
+    raise AssertionError(f"{what} did not happen")
 
 
 def twist(vx, wz=0.0):
@@ -51,11 +51,11 @@ def test_the_witness_robot_logs_velocities_with_their_arrival_time(robot, link):
 
 def test_the_witness_robot_stops_after_its_command_timeout(robot, link):
     link.send(twist(0.5))
-    # It may stand again before this thread looks.
+    # The robot may have stopped again before this thread checks.
     eventually(lambda: any(m.twist.vx == 0.5 for m in robot.log.moved[:]), "moving")
-    told_at = robot.log.twists[-1].at
-    rest = eventually(lambda: robot.log.standstill(told_at + 0.1), "standing still")
-    assert rest - told_at >= 0.2
+    received_at = robot.log.twists[-1].at
+    rest = eventually(lambda: robot.log.standstill(received_at + 0.1), "a standstill")
+    assert rest - received_at >= 0.2
     assert robot.log.first_zero(0) is None
 
 
@@ -63,11 +63,11 @@ def test_a_witness_robot_without_command_timeout_moves_until_a_zero_arrives():
     with WitnessRobot(timeout=None) as robot, connect(robot.url) as link:
         link.send(twist(0.5))
         eventually(lambda: robot.velocity.vx == 0.5, "moving")
-        told_at = robot.log.twists[-1].at
-        eventually(lambda: robot.log.moved[-1].at > told_at + 0.7, "a while")
+        received_at = robot.log.twists[-1].at
+        eventually(lambda: robot.log.moved[-1].at > received_at + 0.7, "a while")
         assert robot.velocity.vx == 0.5
         link.send(twist(0.0))
-        eventually(lambda: robot.velocity.vx == 0.0, "obeying all the same")
+        eventually(lambda: robot.velocity.vx == 0.0, "a stop")
 
 
 def test_a_disobeying_witness_robot_logs_velocities_but_does_not_move(robot, link):
@@ -85,7 +85,7 @@ def test_the_witness_robot_sends_odometry_with_its_velocity_to_subscribers(robot
         message = json.loads(link.recv(timeout=5))["msg"]
         if message["twist"]["twist"]["linear"]["x"] == 0.5:
             return
-    raise AssertionError("odometry never said that it moves")
+    raise AssertionError("odometry never reported motion")
 
 
 def test_a_witness_robot_without_telemetry_sends_no_odometry(robot, link):
@@ -110,14 +110,14 @@ def test_a_hanging_service_call_blocks_later_messages_of_the_same_socket(robot, 
     link.send(call("/e_stop"))
     link.send(twist(0.5))
     eventually(lambda: robot.log.of("call_service"), "the call")
-    assert link.ping().wait(5), "pings are not answered while it hangs"
+    assert link.ping().wait(5), "pings are not answered while the call hangs"
     assert robot.log.twists == []
     with connect(robot.url) as other:
         other.send(twist(0.25))
         eventually(lambda: robot.log.twists, "another socket's velocity")
     robot.unblock()
     assert json.loads(link.recv(timeout=5))["result"] is True
-    eventually(lambda: len(robot.log.twists) == 2, "what had to wait")
+    eventually(lambda: len(robot.log.twists) == 2, "the delayed velocity")
 
 
 def test_a_blocking_goal_delays_later_messages_until_the_goal_ends():
@@ -125,10 +125,10 @@ def test_a_blocking_goal_delays_later_messages_until_the_goal_ends():
         link.send(json.dumps({"op": "send_action_goal", "action": "/go", "id": "g"}))
         link.send(twist(0.5))
         eventually(lambda: robot.log.of("send_action_goal"), "the goal")
-        assert link.ping().wait(5), "pings are not answered while it runs"
+        assert link.ping().wait(5), "pings are not answered while the goal runs"
         assert robot.log.twists == []
         robot.unblock()
-        eventually(lambda: robot.log.twists, "what had to wait")
+        eventually(lambda: robot.log.twists, "the delayed velocity")
 
 
 def test_rosapi_lists_the_topics_of_the_witness_robot(robot, link):
@@ -156,7 +156,7 @@ def test_the_witness_robot_receives_a_velocity_after_invalid_messages(robot, lin
     for junk in ("{", "[]", "7", '{"op": "publish", "topic": "/cmd_vel", "msg": 7}'):
         link.send(junk)
     link.send(twist(0.5))
-    received = eventually(lambda: robot.log.moving_since(0)[1:], "the good one")
+    received = eventually(lambda: robot.log.moving_since(0)[1:], "the valid velocity")
     assert received[-1].twist.vx == 0.5
 
 

@@ -16,7 +16,7 @@ class FakeItem {
   }
 }
 
-/** Ages of so many items that are measured now, by a clock that starts at 0. */
+/** Ages of `count` items that are measured now, with a clock that starts at 0. */
 function agesOf(t, count) {
   let now = 0;
   t.mock.timers.enable({ apis: ["setInterval"] });

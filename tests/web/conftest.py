@@ -1,4 +1,4 @@
-"""Real Chromium, and a small display for it."""
+"""A real Chromium and a small display."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -12,7 +12,7 @@ from scene_host import SceneHost
 
 from real_browser import watched_tab
 
-# A browser whose pages can be hidden is with the tests of the browser.
+# A browser with pages that can be hidden is in the tests of the browser.
 sys.path.append(str(Path(__file__).parents[1] / "browser"))
 
 

@@ -1,4 +1,4 @@
-"""A page's server and a fake of the gate, as far as ``/drive`` goes, in a thread."""
+"""A server of a page and a fake gate for ``/drive``, in a thread."""
 
 import asyncio
 import json
@@ -31,7 +31,7 @@ class FakeDrive:
         self.ticking = True
         self.acking = True
         self.latching = False
-        """Whether STOP latches, as it does at a gate that is not of the first kind."""
+        """Whether STOP latches."""
         self.ignores_messages = False
         """Whether messages are recorded and not processed."""
         self.port = 0
@@ -57,12 +57,12 @@ class FakeDrive:
         return f"http://127.0.0.1:{self.port}/"
 
     def change(self, robot: str, **fields: object) -> None:
-        """Report a robot anew to every page."""
+        """Change a robot and send its report to every page."""
         self.robots[robot] |= fields
         self._loop.call_soon_threadsafe(self._send_all, dict(self.robots[robot]))
 
     def refuse(self, robot: str, what: str, why: str) -> None:
-        """Refuse something to every page."""
+        """Send a refusal to every page."""
         refused = {"op": "refused", "robot": robot, "what": what, "why": why}
         self._loop.call_soon_threadsafe(self._send_all, refused)
 

@@ -5,10 +5,10 @@ import { importOf } from "../../src/webmap/web/browser_parts.js";
 
 let modules = 0;
 
-/** The address of a module that was never asked for. */
+/** The URL of a module that was never requested. */
 const newAddress = () => `http://localhost/_webmap/modules/${(modules += 1)}.js`;
 
-/** What is asked for, where the first so many requests end in an error. */
+/** A loader whose first `failures` requests fail, and the requested URLs. */
 function loader(failures, error = new TypeError("Failed to fetch")) {
   const asked = [];
   const load = async (url) => {
@@ -19,7 +19,7 @@ function loader(failures, error = new TypeError("Failed to fetch")) {
   return { asked, load };
 }
 
-/** Let all that is waited for come. */
+/** Wait for a promise while all timers expire. */
 async function pass(promise) {
   let over = false;
   const ended = promise.finally(() => (over = true)).catch(() => {});
@@ -39,7 +39,7 @@ test("a module that could not be loaded is requested again with another URL", as
   assert.equal((await pass(importOf(url, load))).default, "attach");
   assert.deepEqual(asked, [url, `${url}?again=1`, `${url}?again=2`]);
   await importOf(url, load);
-  assert.equal(asked.at(-1), `${url}?again=2`, "or there would be two of it");
+  assert.equal(asked.at(-1), `${url}?again=2`, "the same URL is used again");
 });
 
 test("an import fails after three failed requests", async (t) => {

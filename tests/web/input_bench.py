@@ -55,9 +55,9 @@ class Bench:
         deadline = time.monotonic() + patience
         while not true():
             assert time.monotonic() < deadline, (
-                f"waited in vain; {self.gate.received[-3:]}"
+                f"timed out; last messages: {self.gate.received[-3:]}"
             )
-            # A turn of the loop in which the page's own events are handled.
+            # The wait lets the browser handle the events of the page.
             self.page.wait_for_timeout(10)
 
     def select(self, robot: str | None, map: int = 0) -> None:
@@ -70,46 +70,46 @@ class Bench:
         return self.page.locator(".webmap-teleop").first.get_attribute("data-state")
 
     def drive(self) -> float:
-        """Hold W until the robot moves; return when that was seen."""
+        """Hold W until the robot moves; return the time at which it moved."""
         self.select("r1")
         self.hold("w", self.gate.moves)
         return time.monotonic()
 
     def hold(self, key: str, true: Callable[[], object]) -> None:
-        """Press a key until it has its effect, and keep holding it."""
+        """Press a key until a condition is true, and keep holding the key."""
         for _ in range(5):
             self.page.keyboard.down(key)
             with suppress(AssertionError):
                 self.until(true, patience=1.5)
                 return
-            # On a busy machine the page may sleep for a moment, which blocks inputs.
+            # On a busy machine the page may pause for a moment, which blocks inputs.
             self.page.keyboard.up(key)
             self.page.wait_for_timeout(300)
         raise AssertionError(f"{key} never drove: {self.gate.received[-3:]}")
 
     @property
     def losses(self) -> int:
-        """How often the connection was lost: it may be open again when one looks."""
+        """The number of lost connections, as a lost connection is soon open again."""
         return self.page.evaluate("bench.losses()")
 
     def cut(self) -> None:
-        """Cut the page's connection, and see that it has noticed."""
+        """Cut the page's connection, and wait until the page has detected it."""
         before = self.losses
         self.gate.drop()
         self.until(lambda: self.losses > before)
 
     def still(self, seconds: float = 0.6, tolerance: float = 0.0) -> None:
-        """Check that nothing that moves a robot leaves the page from now on.
+        """Check that the page sends no command that moves a robot from now on.
 
-        What left it before may reach a gate that is busy later.
+        A busy gate may receive earlier commands later.
         """
         since = self.page.evaluate("performance.now()") + 1000 * tolerance
         self.page.wait_for_timeout(1000 * (seconds + tolerance))
         assert self.page.evaluate("(since) => bench.moves(since)", since) == []
 
     def neutral_within(self, ms: float) -> None:
-        """Check that after the last key, or mark, neutral left the page in time."""
+        """Check the time from the last key or mark to a neutral command."""
         self.until(lambda: self.page.evaluate("bench.neutralDelay()"))
         delay, jitter = self.page.evaluate("bench.neutralDelay()")
-        # The bound, and what a timer was late in the same moment on this machine.
+        # The delay of timers on this machine is added to the limit.
         assert delay <= ms + jitter

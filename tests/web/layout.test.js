@@ -40,14 +40,16 @@ function changed(change) {
 
 /**
  * @param {string} text
- * @param {...string} words
+ * @param {...string} fragments
  */
-function assertRefused(text, ...words) {
+function assertRefused(text, ...fragments) {
   assert.throws(
     () => readLayout(text),
     (error) => {
       assert.ok(error instanceof LayoutRefused, String(error));
-      for (const word of words) assert.ok(error.message.includes(word), error.message);
+      for (const fragment of fragments) {
+        assert.ok(error.message.includes(fragment), error.message);
+      }
       return true;
     },
   );
@@ -110,7 +112,9 @@ describe("a layout file", () => {
       [(l) => (l.camera.dock = "left"), 'camera.dock: expected "side"', 'got "left"'],
       [(l) => (l.camera.x = 2), "camera.x: expected a number from 0 to 1, got 2"],
     ]);
-    for (const [change, ...words] of wrong) assertRefused(changed(change), ...words);
+    for (const [change, ...fragments] of wrong) {
+      assertRefused(changed(change), ...fragments);
+    }
   });
 
   test("with any other key, such as a robot, is refused completely", () => {

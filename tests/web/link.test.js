@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { mock, test } from "node:test";
 
-/** A socket whose network is gone: it is being opened for ever. */
+/** A socket without a network: it never opens. */
 class Hanging {
   static CONNECTING = 0;
   static OPEN = 1;
@@ -30,33 +30,33 @@ function makeLink(t, first) {
   Hanging.made = [];
   mock.timers.enable({ apis: ["setTimeout"] });
   t.after(() => mock.timers.reset());
-  const said = [];
+  const reported = [];
   const events = {
-    opened: () => said.push("opened"),
-    received: (data, at) => said.push([data.byteLength, at]),
-    closed: (reason) => said.push(reason),
+    opened: () => reported.push("opened"),
+    received: (data, at) => reported.push([data.byteLength, at]),
+    closed: (reason) => reported.push(reason),
     refused: () => {},
   };
-  return { link: new Link(() => new URL("ws://localhost/"), events, first), said };
+  return { link: new Link(() => new URL("ws://localhost/"), events, first), reported };
 }
 
 test("a link that does not open is opened again with a longer timeout", (t) => {
   const now = t.mock.method(performance, "now", () => 0).mock;
-  const { link, said } = makeLink(t);
+  const { link, reported } = makeLink(t);
   const looksAt = (ms) => {
     now.mockImplementation(() => ms);
     link.look();
   };
   looksAt(4900);
-  assert.deepEqual(said, []);
+  assert.deepEqual(reported, []);
   looksAt(5000);
-  assert.deepEqual(said, ["no answer"]);
+  assert.deepEqual(reported, ["no answer"]);
   assert.ok(Hanging.made[0].closed);
   mock.timers.tick(1000);
   looksAt(14_900);
-  assert.equal(said.length, 1);
+  assert.equal(reported.length, 1);
   looksAt(15_000);
-  assert.equal(said.length, 2);
+  assert.equal(reported.length, 2);
   assert.ok(!link.opens);
 });
 
@@ -67,7 +67,7 @@ test("a new connection replaces a pending one when the network is back", (t) => 
   assert.equal(Hanging.made.length, 2);
 });
 
-/** @returns A socket that was opened before the link was made, and two messages of it. */
+/** @returns A socket that was opened before the link was made, with two messages. */
 function firstSocket(readyState) {
   const received = [
     { data: new ArrayBuffer(3), at: 20 },
@@ -77,18 +77,18 @@ function firstSocket(readyState) {
 }
 
 test("a link takes over an open socket, and what came before with its times", async (t) => {
-  const { link, said } = makeLink(t, firstSocket(Hanging.OPEN));
+  const { link, reported } = makeLink(t, firstSocket(Hanging.OPEN));
   assert.ok(link.isOpen);
-  assert.deepEqual(said, [], "events come after the constructor");
+  assert.deepEqual(reported, [], "events come after the constructor");
   await Promise.resolve();
-  assert.deepEqual(said, ["opened", [3, 20], [4, 70]]);
+  assert.deepEqual(reported, ["opened", [3, 20], [4, 70]]);
 });
 
 test("a link waits for a first socket that still opens", async (t) => {
-  const { link, said } = makeLink(t, firstSocket(Hanging.CONNECTING));
+  const { link, reported } = makeLink(t, firstSocket(Hanging.CONNECTING));
   assert.ok(link.opens);
   await Promise.resolve();
-  assert.deepEqual(said, []);
+  assert.deepEqual(reported, []);
   assert.equal(Hanging.made.length, 0);
 });
 

@@ -11,21 +11,21 @@ import { GAP, freePlace, meets } from "../../src/webmap/web/notices.js";
  */
 const box = (left, top, right, bottom) => ({ left, top, right, bottom });
 
-/** @param {number} width Words that fill 700 by 60 pixels. */
-const words = (width) => Math.ceil(700 / width) * 60;
+/** @param {number} width Of notices with a text of 700 by 60 pixels. */
+const textHeight = (width) => Math.ceil(700 / width) * 60;
 
 const DESKTOP = box(328, 72, 1280, 800);
 const PHONE = box(0, 52, 390, 726);
 
-/** @param {import("../../src/webmap/web/notices.js").Box[]} taken */
-function covered(area, taken) {
-  const place = freePlace(area, taken, words);
+/** @param {import("../../src/webmap/web/notices.js").Box[]} boxes */
+function covered(area, boxes) {
+  const place = freePlace(area, boxes, textHeight);
   if (!place) return null;
   const { left, top, width } = place;
-  const notices = box(left, top, left + width, top + words(width));
+  const notices = box(left, top, left + width, top + textHeight(width));
   assert.ok(left >= area.left && left + width <= area.right);
   assert.ok(top >= area.top && notices.bottom <= area.bottom);
-  return { ...place, count: taken.filter((one) => meets(one, notices)).length };
+  return { ...place, count: boxes.filter((one) => meets(one, notices)).length };
 }
 
 test("notices on an empty map are at the top, in the centre", () => {
@@ -61,11 +61,11 @@ test("notices never cover buttons at random places", () => {
   const random = () => (seed = (seed * 48271) % 2147483647) / 2147483647;
   let placed = 0;
   for (let round = 0; round < 300; round += 1) {
-    const taken = Array.from({ length: 8 }, () => {
+    const boxes = Array.from({ length: 8 }, () => {
       const [x, y] = [328 + 900 * random(), 72 + 680 * random()];
       return box(x, y, x + 90, y + 44);
     });
-    const place = covered(DESKTOP, taken);
+    const place = covered(DESKTOP, boxes);
     if (place) placed += 1;
     assert.equal(place?.count ?? 0, 0);
   }
@@ -73,5 +73,5 @@ test("notices never cover buttons at random places", () => {
 });
 
 test("there is no place for notices without room", () => {
-  assert.equal(freePlace(PHONE, [box(0, 0, 390, 844)], words), null);
+  assert.equal(freePlace(PHONE, [box(0, 0, 390, 844)], textHeight), null);
 });

@@ -1,4 +1,4 @@
-"""A display as small as can be: pages, files and ``/scene``, in a thread."""
+"""A minimal display with pages, files and ``/scene``, in a thread."""
 
 import asyncio
 import contextlib
@@ -199,10 +199,10 @@ class SceneHost:
                 await web_socket.send_bytes(frame)
             await asyncio.sleep(0.02)
 
-    # For tests, from their thread.
+    # Methods that tests call from their thread.
 
     def call(self, fn, *args, **kwargs):
-        """Call ``fn`` in the server's thread and return what it returns."""
+        """Call ``fn`` in the server's thread and return the result."""
 
         async def run():
             return fn(*args, **kwargs)
@@ -220,7 +220,7 @@ class SceneHost:
         asyncio.run_coroutine_threadsafe(cut(), self._loop).result(10)
 
     def send(self, data: bytes) -> None:
-        """Send bytes that are no frame to every page."""
+        """Send bytes that are not a frame to every page."""
 
         async def send() -> None:
             for shown in self.shown.values():
@@ -238,10 +238,10 @@ class SceneHost:
         return [event for event in self.one.events if isinstance(event, kind)]
 
     def until(self, true, patience: float = 10.0, tab=None):
-        """Wait for a condition and return what it gave."""
+        """Wait for a condition and return its value."""
         deadline = time.monotonic() + patience
         while not (value := true()):
-            assert time.monotonic() < deadline, "waited in vain"
+            assert time.monotonic() < deadline, "the condition did not become true"
             if tab is None:
                 time.sleep(0.01)
             else:
@@ -253,6 +253,6 @@ def wait(tab, expression, patience: float = 10.0):
     """Wait until an expression is true; a page's policy forbids polling in it."""
     deadline = time.monotonic() + patience
     while not (value := tab.evaluate(expression)):
-        assert time.monotonic() < deadline, f"waited in vain for {expression}"
+        assert time.monotonic() < deadline, f"{expression} did not become true"
         tab.wait_for_timeout(15)
     return value

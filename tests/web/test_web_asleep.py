@@ -1,4 +1,4 @@
-"""A page that sleeps, as on a phone: what is kept for it, and what it shows first."""
+"""A page that sleeps, as on a phone, shows the newest state first."""
 
 import os
 import signal
@@ -64,7 +64,7 @@ def test_a_page_that_slept_shows_the_newest_pose_at_once(host, tab, opened):
             time.sleep(0.01)
         sent = opened.frames - before
     wait(tab, "window.drawn.includes(2)")
-    # What was on its way, and then what is now; nothing in between.
+    # The page received the frames under way and the current state, nothing else.
     assert sent <= SceneSession.WINDOW
     assert tab.evaluate("drawn.indexOf(2)") <= SceneSession.WINDOW
     assert len(opened.hellos) == 1
@@ -77,7 +77,7 @@ def test_a_page_that_the_browser_froze_connects_again(host, opened):
         tab.wait("document.querySelector('.robot circle')?.tagName")
         (mine,) = [shown for shown in host.shown.values() if shown is not opened]
         tab.evaluate(f"({RECORD})()")
-        browser.new_tab()  # hides the first one
+        browser.new_tab()  # hides the first tab
         tab.wait("document.visibilityState === 'hidden'")
         tab.call("Page.setWebLifecycleState", state="frozen")
         before = mine.frames
@@ -89,4 +89,6 @@ def test_a_page_that_the_browser_froze_connects_again(host, opened):
         host.until(lambda: len(mine.hellos) == 2)
         browser.activate(tab)
         tab.wait("window.drawn.includes(2)")
-        assert tab.evaluate("drawn.find((x) => x !== null)") == 2, "the newest first"
+        assert tab.evaluate("drawn.find((x) => x !== null)") == 2, (
+            "the newest pose is drawn first"
+        )

@@ -1,4 +1,4 @@
-"""Many robots on a map, in a real Chromium: together when small, else one by one."""
+"""Many robots on a map in a real Chromium: drawn together when small, else singly."""
 
 import struct
 
@@ -31,7 +31,7 @@ COUNT = """() => {
     };
   }
 }"""
-"""Counts what a page writes into its document."""
+"""Counts the writes of a page to its document."""
 
 FAR = "document.querySelectorAll('.robots > .far').length"
 PATHS = "document.querySelectorAll('.far-robots > path').length"
@@ -179,7 +179,7 @@ def test_a_small_robot_is_hovered_and_clicked_like_any_other(host, tab):
     tab.goto(host.url)
     wait(tab, f"{FAR} === {MANY}")
     robots = host.one.fleet.robots
-    x, y = 10 + 350 - 100, 5 + 250 + 30  # of the first one
+    x, y = 10 + 350 - 100, 5 + 250 + 30  # of the first robot
     tab.mouse.move(x + 3, y + 2)
     wait(tab, f"{FAR} === {MANY - 1}")
     over = f"document.elementFromPoint({x}, {y}).parentNode.dataset.robot"
@@ -189,7 +189,7 @@ def test_a_small_robot_is_hovered_and_clicked_like_any_other(host, tab):
     assert event.element == robots[0].id
     tab.mouse.move(x - 100, y + 100)
     wait(tab, f"{FAR} === {MANY}")
-    # A finger presses beside a robot, without a pointer that was there before.
+    # A finger presses beside a robot, without a pointer move before the press.
     tab.evaluate(
         """([x, y]) => {
           const at = { clientX: x, clientY: y, bubbles: true, cancelable: true };

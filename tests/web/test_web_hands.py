@@ -1,4 +1,4 @@
-"""Hands on a page, in a real Chromium, against a fake of the gate."""
+"""The inputs of an operator in a real Chromium, against a fake of the gate."""
 
 import re
 import time
@@ -16,9 +16,9 @@ def test_holding_w_takes_control_and_drives_after_neutral_commands(
     bench.drive()
     assert bench.gate.of("take") == [{"op": "take", "robot": "r1"}]
     drives = bench.gate.of("drive")
-    first = next(i for i, said in enumerate(drives) if said["x"])
+    first = next(i for i, command in enumerate(drives) if command["x"])
     assert first >= 4
-    assert [said["seq"] for said in drives] == list(range(len(drives)))
+    assert [command["seq"] for command in drives] == list(range(len(drives)))
     assert drives[-1]["x"] == 1
     bench.until(lambda: bench.shown() == "driving")
 
@@ -50,7 +50,7 @@ def test_an_input_block_is_neutral_within_50_ms_and_a_held_key_does_not_resume(
     bench.page.evaluate(f"bench.mark(() => {{ {INPUT_BLOCKERS[blocker]} }})")
     bench.neutral_within(50)
     bench.page.wait_for_timeout(250)
-    # The keyboard repeats a key that is held, also after the hands had their rest.
+    # The keyboard repeats a held key, also after the rest time of the inputs.
     bench.page.keyboard.down("w")
     bench.still()
 
@@ -62,7 +62,7 @@ def test_a_key_held_since_before_the_selection_does_nothing_and_is_shown_as_bloc
     bench.select("r1")
     bench.until(lambda: bench.shown() == "free")
     bench.page.wait_for_timeout(250)
-    # The keyboard repeats it, and is heard for the first time.
+    # The keyboard repeats the key, and the page handles it for the first time.
     bench.page.keyboard.down("w")
     bench.until(lambda: bench.shown() == "hands-off")
     bench.still()
@@ -94,7 +94,7 @@ def test_a_gate_without_ticks_is_late_then_lost_and_a_held_key_moves_nothing(
     takes = bench.gate.of("take")
     losses = bench.losses
     bench.gate.ticking = False
-    # It is late for 200 ms, and lost then; tried again, it is late again.
+    # The loop is late for 200 ms and then lost; after a reconnection it is late again.
     bench.until(lambda: bench.shown() == "late")
     bench.still(0.1, tolerance=0.05)
     bench.until(lambda: bench.losses > losses)
@@ -173,15 +173,15 @@ def test_control_can_be_requested_from_another_operator(bench: Bench) -> None:
     bench.select("r1")
     bench.page.get_by_role("button", name="Request control of Robot r1").click()
     bench.until(lambda: bench.gate.of("ask") == [{"op": "ask", "robot": "r1"}])
-    words = bench.page.locator(".webmap-teleop-state")
+    state = bench.page.locator(".webmap-teleop-state")
     asked = re.compile(r"handed over in (\d) s unless Ann refuses")
-    bench.until(lambda: asked.search(words.inner_text()))
-    left = int(asked.search(words.inner_text())[1])
-    bench.until(lambda: int(asked.search(words.inner_text())[1]) < left)
+    bench.until(lambda: asked.search(state.inner_text()))
+    left = int(asked.search(state.inner_text())[1])
+    bench.until(lambda: int(asked.search(state.inner_text())[1]) < left)
     bench.page.keyboard.down("w")
     me = {"connection": "c1", "name": "me"}
     bench.gate.change("r1", asker=None, changing=True)
-    bench.until(lambda: "Handing over" in words.inner_text())
+    bench.until(lambda: "Handing over" in state.inner_text())
     bench.gate.change("r1", changing=False, holder=me, mine=True, epoch=8)
     bench.until(lambda: bench.gate.of("drive"))
     bench.still()
@@ -213,8 +213,8 @@ def test_the_operator_sees_a_request_for_control_and_can_answer(
         return
     bench.still(tolerance=0.05)
     bench.until(lambda: bench.shown() == "held")
-    said = [said for _, said in bench.gate.received]
-    before = said[said.index({"op": "grant", "robot": "r1"}) - 1]
+    messages = [message for _, message in bench.gate.received]
+    before = messages[messages.index({"op": "grant", "robot": "r1"}) - 1]
     assert (before["op"], before["x"], before["turn"]) == ("drive", 0, 0)
 
 
@@ -319,7 +319,7 @@ def test_keys_drive_only_the_robot_of_the_last_clicked_map(open_bench) -> None:
     since = time.monotonic()
     bench.page.wait_for_timeout(300)
     bench.hold("w", lambda: bench.gate.moves(since))
-    assert {said["robot"] for said in bench.gate.moves(since)} == {"r2"}
+    assert {command["robot"] for command in bench.gate.moves(since)} == {"r2"}
     assert bench.page.evaluate("bench.maps[1].sent") == [{"active": True}]
 
 
@@ -393,17 +393,19 @@ def test_two_fingers_zoom_rotate_and_move_the_view(open_bench) -> None:
     before = bench.view()
     touch = bench.context.new_cdp_session(bench.page)
 
-    def say(kind: str, *points: tuple[float, float]) -> None:
+    def touch_points(kind: str, *points: tuple[float, float]) -> None:
         fingers = [
             {"x": x + px, "y": y + py, "id": i} for i, (px, py) in enumerate(points)
         ]
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": fingers})
 
-    say("touchStart", (300, 150))
-    say("touchStart", (300, 150), (400, 150))
+    touch_points("touchStart", (300, 150))
+    touch_points("touchStart", (300, 150), (400, 150))
     for part in (0.25, 0.5, 0.75, 1):
-        say("touchMove", (300, 150 - 50 * part), (400 + 50 * part, 150 + 50 * part))
-    say("touchEnd")
+        touch_points(
+            "touchMove", (300, 150 - 50 * part), (400 + 50 * part, 150 + 50 * part)
+        )
+    touch_points("touchEnd")
     after = bench.view()
     assert world_at(after, 300, 100) == pytest.approx(world_at(before, 300, 150))
     assert world_at(after, 450, 200) == pytest.approx(world_at(before, 400, 150))
@@ -417,7 +419,7 @@ def test_plus_zooms_in_and_zero_shows_all_robots_on_the_focused_map(
     assert bench.view()["a"] == pytest.approx(50)
     bench.page.keyboard.press("0")
     view = bench.view()
-    # Two robots lie 2 m apart, 0.3 m in radius: 2.6 m fill the width.
+    # Two robots of 0.3 m radius are 2 m apart: 2.6 m fill the width.
     assert world_at(view, 400, 150) == pytest.approx((0, 1))
 
 
@@ -433,7 +435,7 @@ def test_a_goal_is_set_by_a_drag_and_cancelled_by_its_button(open_bench) -> None
     bench.page.mouse.up()
     bench.until(lambda: bench.gate.of("goal"))
     goal = bench.gate.of("goal")[0]
-    assert [said["op"] for _, said in bench.gate.received] == ["take", "goal"]
+    assert [message["op"] for _, message in bench.gate.received] == ["take", "goal"]
     assert (goal["x"], goal["y"]) == pytest.approx((2, 0))
     assert goal["yaw"] == pytest.approx(1.5707963)
     assert bench.view()["e"] == 400, "aiming does not move the view"
@@ -480,22 +482,22 @@ def test_a_stop_stays_active_until_two_separate_presses_on_reset(open_bench) -> 
     bench.page.keyboard.press("Space")
     bench.until(lambda: bench.shown() == "stopped")
     bench.gate.change("r1", stop=CONFIRMED)
-    words = bench.page.locator(".webmap-teleop-state")
-    bench.until(lambda: "STOP active By Ann, confirmed by" in words.inner_text())
+    state = bench.page.locator(".webmap-teleop-state")
+    bench.until(lambda: "STOP active By Ann, confirmed by" in state.inner_text())
     bench.page.keyboard.up("w")
     bench.page.wait_for_timeout(300)
     bench.page.keyboard.down("w")
     bench.still()
     assert len(bench.gate.of("take")) == 1
     reset = bench.page.locator(".webmap-teleop .webmap-reset")
-    # Both at once: on a busy machine those of a mouse may be far apart.
+    # A script clicks twice; on a busy machine two mouse clicks may be far apart.
     reset.evaluate("e => { e.click(); e.click(); }")
     bench.page.wait_for_timeout(450)
     assert bench.gate.of("reset") == []
     assert reset.inner_text() == "Press again to reset"
     reset.press("Enter")
-    said = [{"op": "reset", "robot": "r1", "stop": "s8"}]
-    bench.until(lambda: bench.gate.of("reset") == said)
+    resets = [{"op": "reset", "robot": "r1", "stop": "s8"}]
+    bench.until(lambda: bench.gate.of("reset") == resets)
     bench.still()
     bench.page.keyboard.up("w")
     bench.page.wait_for_timeout(300)
@@ -523,11 +525,11 @@ def test_an_unconfirmed_stop_is_shown_and_reset_all_resets_every_stop(
     bench.gate.change("r1", latched=True, state="stopped", stop=UNCONFIRMED)
     bench.gate.change("r2", latched=True, state="stopped", stop=CONFIRMED)
     standing = bench.page.locator(".webmap-stop-standing")
-    words = "STOP active: 2 robots, 1 NOT CONFIRMED."
-    bench.until(lambda: standing.inner_text() == words)
+    text = "STOP active: 2 robots, 1 NOT CONFIRMED."
+    bench.until(lambda: standing.inner_text() == text)
     assert bench.shown() == "unconfirmed"
-    said = bench.page.inner_text(".webmap-teleop-state")
-    assert said == "STOP NOT CONFIRMED By Ann: no connection to ws://bob."
+    shown = bench.page.inner_text(".webmap-teleop-state")
+    assert shown == "STOP NOT CONFIRMED By Ann: no connection to ws://bob."
     reset = bench.page.get_by_role("button", name="Reset all")
     reset.click()
     bench.page.wait_for_timeout(450)
@@ -538,19 +540,19 @@ def test_an_unconfirmed_stop_is_shown_and_reset_all_resets_every_stop(
     bench.until(lambda: not bench.page.locator(".webmap-stop-list").is_visible())
 
 
-STANDS = {"latched": True, "state": "stopped", "stop": CONFIRMED}
+STOPPED = {"latched": True, "state": "stopped", "stop": CONFIRMED}
 
 
 def test_a_stop_of_another_robot_cancels_the_first_press_on_reset(
     open_bench,
 ) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
-    bench.gate.change("r1", **STANDS)
+    bench.gate.change("r1", **STOPPED)
     reset = bench.page.locator(".webmap-stop .webmap-reset")
     reset.click()
     assert reset.inner_text() == "Press again to reset"
-    bench.gate.change("r2", **STANDS)
-    # Sooner than it is forgotten by itself.
+    bench.gate.change("r2", **STOPPED)
+    # Sooner than the timeout of the first press.
     bench.until(lambda: reset.inner_text() == "Reset all", patience=3.0)
     bench.page.wait_for_timeout(450)
     reset.click()
@@ -564,7 +566,7 @@ def test_a_newer_stop_of_another_operator_cancels_the_first_press_on_reset(
 ) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.select("r1")
-    bench.gate.change("r1", **STANDS)
+    bench.gate.change("r1", **STOPPED)
     reset = bench.page.locator(f".webmap-{panel} .webmap-reset")
     reset.wait_for()
     reset.press("Enter")
@@ -576,7 +578,7 @@ def test_a_newer_stop_of_another_operator_cancels_the_first_press_on_reset(
 
 def test_the_reason_of_a_refused_reset_is_shown_beside_the_button(open_bench) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
-    bench.gate.change("r1", **STANDS)
+    bench.gate.change("r1", **STOPPED)
     why = "Ben pressed STOP meanwhile; look at the robot, then press Reset again"
     bench.gate.refuse("r1", "reset", why)
     standing = bench.page.locator(".webmap-stop-standing")
@@ -587,7 +589,7 @@ def test_the_reason_of_a_refused_reset_is_shown_beside_the_button(open_bench) ->
 
 def test_selecting_another_robot_cancels_the_first_press_on_reset(bench: Bench) -> None:
     for robot in ("r1", "r2"):
-        bench.gate.change(robot, **STANDS)
+        bench.gate.change(robot, **STOPPED)
     bench.select("r1")
     reset = bench.page.locator(".webmap-teleop .webmap-reset")
     reset.wait_for()
@@ -607,7 +609,7 @@ def test_a_stop_between_two_presses_on_reset_cancels_the_first_press(
 ) -> None:
     bench = open_bench("?modules=stop/stop_button,drive/teleop")
     bench.select("r1")
-    bench.gate.change("r1", **STANDS)
+    bench.gate.change("r1", **STOPPED)
     reset = bench.page.locator(f".webmap-{panel} .webmap-reset")
     reset.wait_for()
     reset.press("Enter")
@@ -630,9 +632,9 @@ def test_stop_all_is_shown_as_not_confirmed_before_a_robot_is_known(
     verdicts = bench.page.locator(".webmap-stop-verdict")
     bench.until(lambda: "All robots: NOT CONFIRMED" in verdicts.inner_text())
     gate.robots |= robots
-    gate.change("r1", **STANDS)
-    words = "Robot r1: stopped, confirmed by odometry"
-    bench.until(lambda: verdicts.inner_text() == words)
+    gate.change("r1", **STOPPED)
+    text = "Robot r1: stopped, confirmed by odometry"
+    bench.until(lambda: verdicts.inner_text() == text)
 
 
 def test_stop_all_shows_the_verdict_of_the_gate_for_each_robot(open_bench) -> None:
@@ -663,8 +665,8 @@ def test_a_stop_without_an_answer_is_shown_as_not_confirmed(open_bench) -> None:
     bench.gate.ignores_messages = True
     bench.page.keyboard.press("Space")
     bench.until(lambda: bench.shown() == "unconfirmed")
-    words = bench.page.inner_text(".webmap-teleop-state")
-    assert words == "STOP NOT CONFIRMED No answer from the gate."
+    shown = bench.page.inner_text(".webmap-teleop-state")
+    assert shown == "STOP NOT CONFIRMED No answer from the gate."
     listed = bench.page.inner_text(".webmap-stop-verdict")
     assert "Robot r1: NOT CONFIRMED" in listed
 

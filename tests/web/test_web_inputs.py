@@ -24,7 +24,7 @@ PADS = """
 
 
 class Finger:
-    """Touches the page by the browser's own input."""
+    """Touches the page with touch events of the browser."""
 
     def __init__(self, bench: Bench) -> None:
         self._cdp: CDPSession = bench.context.new_cdp_session(bench.page)
@@ -32,12 +32,12 @@ class Finger:
         self.x, self.y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
         self.size = box["width"]
 
-    def say(
+    def touch(
         self, kind: str, right: float = 0, down: float = 0, too: Locator | None = None
     ) -> None:
-        """Say where the finger is, in shares of the pad's radius from its middle.
+        """Send a touch event, with the place in pad radii from the middle of the pad.
 
-        A second finger touches something else, too.
+        With ``too``, a second finger touches another element.
         """
         x, y = self.x + right * self.size / 2, self.y + down * self.size / 2
         points = [{"x": x, "y": y, "id": 0}]
@@ -47,8 +47,8 @@ class Finger:
             points.append({"x": x, "y": y, "id": 1})
         if kind in ("touchEnd", "touchCancel"):
             points = []
-        say = {"type": kind, "touchPoints": points}
-        self._cdp.send("Input.dispatchTouchEvent", say)
+        event = {"type": kind, "touchPoints": points}
+        self._cdp.send("Input.dispatchTouchEvent", event)
 
 
 @pytest.fixture
@@ -71,16 +71,16 @@ def padded(open_bench) -> Bench:
 def drive_by_finger(bench: Bench) -> Finger:
     finger = Finger(bench)
     for _ in range(5):
-        finger.say("touchStart")
-        finger.say("touchMove", down=-0.9)
+        finger.touch("touchStart")
+        finger.touch("touchMove", down=-0.9)
         try:
             bench.until(bench.gate.moves, patience=1.5)
         except AssertionError:
-            finger.say("touchEnd")
+            finger.touch("touchEnd")
             bench.page.wait_for_timeout(300)
         else:
             return finger
-    raise AssertionError("never drove")
+    raise AssertionError("the robot was never driven")
 
 
 def hold(bench: Bench, held: bool, *axes: float) -> None:
@@ -101,41 +101,41 @@ def drive_by_pad(bench: Bench) -> None:
             bench.page.wait_for_timeout(300)
         else:
             return
-    raise AssertionError("never drove")
+    raise AssertionError("the robot was never driven")
 
 
-@pytest.mark.serial  # a page that is kept waiting for a processor lets go
+@pytest.mark.serial  # a delayed page stops driving
 def test_a_touch_on_the_stick_drives_and_its_release_is_neutral(touched: Bench) -> None:
     finger = drive_by_finger(touched)
     touched.until(lambda: touched.gate.moves()[-1]["x"] == 1)
     assert finger.size >= 120
     since = time.monotonic()
-    finger.say("touchMove", right=-0.9)
+    finger.touch("touchMove", right=-0.9)
     touched.until(lambda: touched.gate.moves(since)[-1:] != [])
     touched.until(lambda: touched.gate.moves(since)[-1]["turn"] == 1)
     assert touched.gate.moves(since)[-1]["x"] == 0
     touched.page.evaluate(
         "addEventListener('pointerup', () => bench.mark(), {capture: true})"
     )
-    finger.say("touchEnd")
+    finger.touch("touchEnd")
     touched.neutral_within(50)
     touched.still()
-    assert touched.view()["e"] == 400, "the map did not move along"
+    assert touched.view()["e"] == 400, "the map did not move with the stick"
 
 
-@pytest.mark.serial  # a page that is kept waiting for a processor lets go
+@pytest.mark.serial  # a delayed page stops driving
 def test_a_layout_change_that_moves_the_stick_does_not_change_the_command(
     touched: Bench,
 ) -> None:
     finger = drive_by_finger(touched)
-    finger.say("touchMove", down=-0.4)
+    finger.touch("touchMove", down=-0.4)
     touched.until(lambda: 0 < touched.gate.moves()[-1]["x"] < 1)
     before = touched.gate.moves()[-1]
     touched.page.evaluate(
         "document.querySelector('.webmap-stick-place').style.marginBottom = '60px'"
     )
     since = time.monotonic()
-    finger.say("touchMove", down=-0.401)
+    finger.touch("touchMove", down=-0.401)
     touched.until(lambda: len(touched.gate.moves(since)) > 2)
     after = touched.gate.moves(since)[-1]
     assert after["x"] == pytest.approx(before["x"], abs=0.02)
@@ -146,7 +146,7 @@ def test_a_touch_cancelled_by_the_system_is_neutral(touched: Bench) -> None:
     touched.page.evaluate(
         "addEventListener('pointercancel', () => bench.mark(), {capture: true})"
     )
-    finger.say("touchCancel")
+    finger.touch("touchCancel")
     touched.neutral_within(50)
     touched.still()
 
@@ -162,7 +162,7 @@ def test_releasing_the_pointer_capture_of_the_stick_is_neutral(touched: Bench) -
         })"""
     )
     touched.neutral_within(50)
-    finger.say("touchMove", down=-0.8)
+    finger.touch("touchMove", down=-0.8)
     touched.still()
 
 
@@ -199,7 +199,7 @@ def test_a_finger_kept_on_the_stick_moves_nothing_after_an_input_block(
     touched.page.evaluate(f"bench.mark(() => {{ {INPUT_BLOCKERS[blocker]} }})")
     touched.neutral_within(50)
     touched.page.wait_for_timeout(250)
-    finger.say("touchMove", down=-0.8)
+    finger.touch("touchMove", down=-0.8)
     touched.still()
 
 
@@ -215,14 +215,14 @@ def test_a_second_finger_can_press_stop_while_the_first_holds_the_stick(
     bench.page.locator(".webmap-stick").wait_for()
     finger = drive_by_finger(bench)
     stop = bench.page.get_by_role("button", name=name)
-    finger.say("touchStart", down=-0.9, too=stop)
-    said = [{"op": "stop", "robot": robot}]
-    bench.until(lambda: bench.gate.of("stop") == said)
+    finger.touch("touchStart", down=-0.9, too=stop)
+    stop_commands = [{"op": "stop", "robot": robot}]
+    bench.until(lambda: bench.gate.of("stop") == stop_commands)
     bench.until(lambda: bench.shown() == "stopped")
     bench.still()
-    finger.say("touchEnd")
+    finger.touch("touchEnd")
     bench.still(0.3)
-    assert bench.gate.of("stop") == said
+    assert bench.gate.of("stop") == stop_commands
 
 
 def test_a_tap_on_stop_sends_one_stop(open_bench) -> None:
@@ -295,8 +295,8 @@ def test_keys_are_ignored_while_the_stick_drives(touched: Bench) -> None:
     since = time.monotonic()
     touched.page.keyboard.down("s")
     touched.until(lambda: len(touched.gate.moves(since)) > 4)
-    assert {said["x"] for said in touched.gate.moves(since)} == {1}
-    finger.say("touchEnd")
+    assert {command["x"] for command in touched.gate.moves(since)} == {1}
+    finger.touch("touchEnd")
     touched.still(tolerance=0.05)
 
 

@@ -36,7 +36,7 @@ def view(tab):
 
 
 def newest(host, name):
-    """What the newest report of the view says, if there was one."""
+    """Return a field of the newest view report, or ``None`` without a report."""
     reports = host.events(ViewReport)
     return getattr(reports[-1], name) if reports else None
 
@@ -141,18 +141,18 @@ def test_style_sheets_that_load_together_are_read_once(host, tab, opened):
 
 
 def test_the_page_shows_a_lost_link_and_reconnects(host, tab, opened):
-    # Written down in the page, as it may be connected again before anybody looks.
+    # The page records the text, as it may be connected again before the test looks.
     tab.evaluate(
         """() => {
-          window.said = "";
+          window.shownStatus = "";
           new MutationObserver(() => {
             const status = document.querySelector("html.disconnected [role=status]");
-            if (status) window.said = status.textContent;
+            if (status) window.shownStatus = status.textContent;
           }).observe(document, { attributes: true, childList: true, subtree: true });
         }"""
     )
     host.drop()
-    assert "restarting" in wait(tab, "window.said")
+    assert "restarting" in wait(tab, "window.shownStatus")
     wait(tab, "!document.documentElement.classList.contains('disconnected')")
     tab.wait_for_selector("[role=status]", state="detached")
     assert len(host.shown) == 1
@@ -179,7 +179,7 @@ def test_a_page_that_was_hidden_soon_replaces_a_connection_that_was_lost(
     host.silent = True
     tab.wait_for_timeout(500)
     tab.evaluate(hide % "false")
-    # Sooner than a page that was in use all the time, which waits for 10 s.
+    # Sooner than a page that is visible all the time, which waits for 10 s.
     host.until(lambda: len(opened.hellos) == 2, 7.0, tab=tab)
     host.silent = False
 
@@ -192,7 +192,7 @@ def test_the_view_is_kept_after_a_lost_link(host, tab, opened):
     tab.wait_for_selector(".robot circle")
     wait(tab, "!document.documentElement.classList.contains('disconnected')")
     assert view(tab) == before
-    # What a program does is applied once, however often it is told.
+    # An operation of the program is applied once, even if it is sent repeatedly.
     host.call(opened.session.view, opened.root.id, "translate", 0, 5)
     host.until(lambda: newest(host, "applied") == 2, tab=tab)
     assert view(tab)[5] == pytest.approx(before[5] + 5)
@@ -218,7 +218,7 @@ def test_another_tab_is_another_page(host, tab, opened):
 
 
 def test_a_tab_opened_by_a_page_is_another_page(host, tab, opened):
-    # A duplicated tab has a copy of the session's storage, as this one has.
+    # The new tab gets a copy of the session storage, like a duplicated tab.
     with tab.expect_popup() as popup:
         tab.evaluate("void window.open(location.href)")
     popup.value.wait_for_selector(".robot circle")

@@ -13,7 +13,7 @@ MAP = "(await import('/_webmap/web/page.js')).page.scene.maps[0]"
 
 
 def on_map(tab, body):
-    """Return what ``body`` returns in the page, where ``map`` is the map."""
+    """Run ``body`` in the page, where ``map`` is the map; return the result."""
     script = "async () => { const map = %s; %s }"
     return tab.evaluate(script % (MAP, body))
 
@@ -83,7 +83,7 @@ def test_view_operations_are_applied_in_order(host, tab, open_map):
 
     open_map(build=build)
     factor = 500 / 58.7
-    # Counter-clockwise: what was at (360, 270) is at (270, -360).
+    # Counter-clockwise: the point (360, 270) is now at (270, -360).
     expected = pytest.approx([0, -factor, -factor, 0, 270, -360], abs=1e-5)
     wait(tab, "document.querySelector('.world').transform.baseVal[0].matrix.f < 0")
     assert view(tab) == expected
@@ -161,7 +161,7 @@ def test_a_followed_robot_keeps_its_place_on_the_screen_until_the_view_is_moved(
     host.call(shown.robot.set_pose, 3, 4, 1)
     report = last_report(host, tab, lambda report: abs(report.e - 320) < 0.1)
     assert report.f == pytest.approx(290, abs=0.1)
-    # Zooming goes on following, where the robot is then; moving ends it.
+    # A zoom keeps following the robot; moving the view ends the following.
     on_map(tab, "map.setView({ ...map.view, a: 20, d: -20 })")
     assert on_map(tab, "return map.following") == shown.robot.id
     place = on_map(tab, "return map.toScreen(3, 4)")
@@ -285,7 +285,7 @@ def test_a_module_is_detached_when_its_map_is_removed(host, tab, open_map):
 
 
 @pytest.mark.parametrize(
-    ("module", "said"),
+    ("module", "message"),
     [
         ("broken.js", "broken.js failed"),
         ("absent.js", "absent.js failed"),
@@ -293,12 +293,12 @@ def test_a_module_is_detached_when_its_map_is_removed(host, tab, open_map):
     ],
 )
 def test_a_module_that_cannot_be_loaded_is_shown_and_reported(
-    host, tab, open_map, module, said
+    host, tab, open_map, module, message
 ):
     tab.allowed = ["404"]
     open_map(build=lambda shown: shown.session.attach(shown.root.id, 5, module, {}))
-    tab.wait_for_selector(f"[role=alert]:has-text('{said}')")
-    host.until(lambda: said in str(host.events(Trouble)), tab=tab)
+    tab.wait_for_selector(f"[role=alert]:has-text('{message}')")
+    host.until(lambda: message in str(host.events(Trouble)), tab=tab)
     assert tab.locator(".robot").count() == 1
 
 

@@ -21,7 +21,7 @@ PIXEL = bytes.fromhex(
 
 
 def matrix(tab, selector):
-    """Return the matrix that an element has in its parent."""
+    """Return the matrix of an element relative to its parent."""
     return tab.evaluate(
         """(selector) => {
           const element = document.querySelector(selector);
@@ -113,7 +113,7 @@ def test_image_urls_get_the_prefix_and_urls_of_other_servers_are_refused(host, t
         shown.root, _, _ = shown.add_map()
         shown.image = svg.image(href="/_webmap/images/x.png")
         shown.root.append(shown.image)
-        # What the allow-list in Python would never let through.
+        # The allow-list in Python would refuse this URL.
         shown.bad = svg.image()
         shown.bad._attributes["href"] = "https://evil.example/x.png"
         shown.root.append(shown.bad)
@@ -155,7 +155,7 @@ def test_a_fast_changing_image_skips_to_the_newest_url_after_each_load(host, tab
     host.until(lambda: len(asked) == 2, tab=tab)
     asked[1].fulfill(body="no image", content_type="image/png")
     host.call(host.one.image.set, href="/_webmap/images/5.png")
-    shows(5)  # what is no image holds up nothing
+    shows(5)  # a file that is not an image blocks nothing
     host.until(lambda: len(asked) == 3, tab=tab)
     host.call(host.one.image.unset, "href")
     tab.wait_for_selector("image:not([href])", state="attached")
@@ -189,7 +189,7 @@ def test_dots_are_squares_of_the_size_in_the_style(host, tab):
     # The size follows the style, without new points.
     host.call(host.one.robot.classes.add, "thick")
     tab.wait_for_selector("path[d^='M900 1900h200v200h-200']", state="attached")
-    # The unit and a pose of its own go together.
+    # The dots have both a unit and their own pose.
     host.call(host.one.dots.set_pose, 3, 4, 0)
     host.call(host.one.dots.set_dots, points, 0.01)
     tab.wait_for_selector("path[d^='M990 1990h20v20h-20']", state="attached")
@@ -241,7 +241,7 @@ def test_the_page_increases_ages_without_new_data(host, tab):
     host.call(host.one.robot.set_age, 0)
     tab.wait_for_selector(".robot:not(.stale)")
     host.call(host.one.span.set_age, 75)
-    # The page may look late: what it shows then, it counts on from.
+    # The page may show the age late; it then increases the shown age.
     tab.wait_for_selector(".age.stale:text-matches('^7[5-9] s$')")
     seconds = tab.inner_text(".age").removesuffix(" s")
     wait(tab, f"parseInt(document.querySelector('.age').textContent) > {seconds}")
@@ -386,9 +386,9 @@ def test_input_and_key_events_contain_the_value_the_checked_state_and_the_key(
     change, shift, key, typed = host.events(ElementEvent)
     assert (change.event, change.checked) == ("change", True)
     assert (shift.key, key.key, key.shift) == ("Shift", "X", True)
-    # The key itself was prevented.
+    # The default action of the key was prevented.
     assert (typed.event, typed.value) == ("input", "typed")
-    # A hand unticked what Python has ticked: Python can tick it again.
+    # After a person unticked the box, Python can tick it again.
     host.call(host.one.box.set, checked=True)
     tab.wait_for_selector("#box[checked]")
     tab.uncheck("#box")
@@ -408,7 +408,7 @@ def test_the_page_sends_no_event_after_the_listener_was_removed(host, tab):
     tab.goto(host.url)
     tab.click("#go")
     host.until(lambda: host.events(ElementEvent), tab=tab)
-    # In one frame with what shows that the page has it.
+    # The title in the same frame shows that the page has received the removal.
     host.call(lambda: (host.one.removal.remove(), host.one.button.set(title="deaf")))
     tab.wait_for_selector("#go[title=deaf]")
     tab.evaluate(

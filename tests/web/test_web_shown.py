@@ -1,4 +1,4 @@
-"""What a person sees of a robot that is driven, in a real Chromium."""
+"""What the page shows about a driven robot, in a real Chromium."""
 
 import pytest
 from input_bench import Bench
@@ -16,7 +16,7 @@ def test_a_halo_shows_the_stopping_distance_of_a_driven_robot(bench: Bench) -> N
     assert float(halo.get_attribute("r")) == pytest.approx(0.4)
     assert (halo.get_attribute("cx"), halo.get_attribute("cy")) == ("1", "1")
     behind = "halo => halo.nextElementSibling.matches('.robots')"
-    assert halo.evaluate(behind), "the halo lies behind the robots"
+    assert halo.evaluate(behind), "the halo is behind the robots"
     bench.page.evaluate(
         "document.querySelector('[data-robot=r1]')"
         ".setAttribute('transform', 'translate(2 3) rotate(90)')"
@@ -58,7 +58,7 @@ WITHOUT_LINK = """() => {
         shown.push(figures.checkVisibility(), document.querySelector("HALO") !== null);
     });
 }""".replace("HALO", HALO)
-"""Notes whether figures and halos are shown while the connection is lost."""
+"""Records whether figures and halos are shown while the connection is lost."""
 
 
 def test_speeds_and_halos_are_hidden_while_the_connection_is_lost(bench: Bench) -> None:
@@ -79,8 +79,8 @@ def test_the_command_timeout_and_the_stop_test_of_a_robot_are_shown(
     tested = {"stop_source": "tested", "stop_date": "2026-11-21"}
     bench.gate.change("r1", stop_time=0.31, **tested)
     own = bench.page.locator(".webmap-teleop-own")
-    words = "Command timeout of the base: 0.31 s (tested 2026-11-21)."
-    bench.until(lambda: own.inner_text() == words)
+    text = "Command timeout of the base: 0.31 s (tested 2026-11-21)."
+    bench.until(lambda: own.inner_text() == text)
     bench.gate.change("r1", test={"state": "creeping", "text": "creeping at 0.1 m/s"})
     test = bench.page.locator(".webmap-teleop-test")
     bench.until(lambda: test.inner_text() == "Stop test: creeping at 0.1 m/s")
@@ -101,13 +101,13 @@ def test_a_stop_test_starts_only_after_a_second_press(bench: Bench) -> None:
     )
     bench.gate.change("r1", test={"state": "creeping", "text": "creeping"})
     bench.until(lambda: not button.is_visible())
-    words = bench.page.locator(".webmap-teleop-state")
-    bench.until(lambda: "Stop test running" in words.inner_text())
+    state = bench.page.locator(".webmap-teleop-state")
+    bench.until(lambda: "Stop test running" in state.inner_text())
     bench.gate.change("r1", test={"state": "done", "text": ""}, stop_time=0.3)
     bench.until(lambda: "0.30 s" in bench.page.inner_text(".webmap-teleop-own"))
     bench.until(button.is_visible)
     assert button.inner_text() != "Robot will move slowly: press again", (
-        "it may be asked anew"
+        "a new stop test can be requested"
     )
 
 
@@ -116,10 +116,10 @@ def test_an_alarm_of_the_gate_covers_the_page_and_stop_still_works(open_bench) -
     bench.gate.change("r1", alarm="zero sent, still moving at 0.31 m/s")
     alarm = bench.page.get_by_role("alert")
     alarm.wait_for(timeout=5000)
-    said = alarm.inner_text()
-    assert "ROBOT NOT OBEYING" in said
-    assert "Use the emergency stop of the robot." in said
-    assert "Robot r1: zero sent, still moving at 0.31 m/s" in said
+    shown = alarm.inner_text()
+    assert "ROBOT NOT OBEYING" in shown
+    assert "Use the emergency stop of the robot." in shown
+    assert "Robot r1: zero sent, still moving at 0.31 m/s" in shown
     alarm.get_by_role("button", name="STOP ALL").click()
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "*"}])
     bench.page.keyboard.press("Shift+Escape")
@@ -130,7 +130,7 @@ def test_an_alarm_of_the_gate_covers_the_page_and_stop_still_works(open_bench) -
     alarm.wait_for(state="detached")
     bench.gate.change("r1", alarm="zero sent, still moving at 0.11 m/s")
     bench.page.wait_for_timeout(200)
-    assert alarm.count() == 0, "what was seen does not come again"
+    assert alarm.count() == 0, "an acknowledged alarm is not shown again"
     bench.gate.change("r1", alarm=None)
     alarm_of_r1 = "bench.drive.robots.get('r1').alarm"
     bench.until(lambda: bench.page.evaluate(alarm_of_r1) is None)
@@ -142,11 +142,11 @@ def test_an_alarm_of_the_gate_covers_the_page_and_stop_still_works(open_bench) -
 IN_THE_MIDDLE = """() => {
     const title = document.querySelector(".webmap-alarm-title").getBoundingClientRect();
     const page = [innerWidth / 2, innerHeight / 2];
-    const words = [title.x + title.width / 2, title.y + title.height / 2];
+    const heading = [title.x + title.width / 2, title.y + title.height / 2];
     const at = (x, y) => document.elementFromPoint(x, y).closest(".webmap-alarm");
-    return at(...page) !== null && at(...words) !== null;
+    return at(...page) !== null && at(...heading) !== null;
 }"""
-"""Whether what is seen there is the alarm."""
+"""Whether the alarm is visible in the middle of the page and at its title."""
 
 OPEN = """(kind) => {
     const cover = document.createElement(kind === "dialog" ? "dialog" : "section");

@@ -1,4 +1,4 @@
-"""The tools over a map and what they unfold, in a real Chromium."""
+"""The tools over a map and their panels, in a real Chromium."""
 
 from collections.abc import Callable
 
@@ -55,8 +55,8 @@ def test_the_driving_hint_on_a_touch_screen_names_no_keys(
     bench.select("r1")
     bench.page.locator(".webmap-teleop-lease").tap()
     bench.until(lambda: bench.shown() == "ready")
-    words = bench.page.locator(".webmap-teleop-detail")
-    assert words.inner_text() == "Hold the stick to drive. Release to stop."
+    detail = bench.page.locator(".webmap-teleop-detail")
+    assert detail.inner_text() == "Hold the stick to drive. Release to stop."
 
 
 @pytest.mark.parametrize("width", [360, 800])

@@ -5,8 +5,8 @@ import { REPORT_PERIOD, ViewReports } from "../../src/webmap/web/view.js";
 
 /**
  * @param {number} count
- * @returns {{reports: ViewReports, times: number[], all: Promise<void>}} What reports,
- *     when it did, and the promise that it did so often.
+ * @returns {{reports: ViewReports, times: number[], all: Promise<void>}} The reporter,
+ *     the times of its reports, and a promise that ends after `count` reports.
  */
 function reporting(count) {
   const times = [];
@@ -33,7 +33,7 @@ test("a change is reported soon, and the next report waits for the report period
   second.reports.settle();
   second.reports.soon();
   await second.all;
-  // Timers may be a millisecond early by this clock.
+  // By this clock, timers may end a millisecond early.
   assert.ok(second.times[1] - second.times[0] >= REPORT_PERIOD - 2);
 });
 

@@ -13,7 +13,7 @@ function read(name) {
   return bufferOf(readFileSync(new URL(name, GOLDEN)));
 }
 
-/** A frame whose header is right. */
+/** A frame with a valid header. */
 function frame(...bytes) {
   const buffer = new ArrayBuffer(15 + bytes.length);
   new DataView(buffer).setUint16(0, VERSION, true);
@@ -28,8 +28,9 @@ for (const name of golden) {
     const expected = JSON.parse(readFileSync(new URL(name.replace(".bin", ".json"), GOLDEN)));
     const tree = new Tree();
     const { reset, frame: number, now } = tree.apply(read(name));
-    const told = { reset, frame: number, now, picture: tree.picture(), said: tree.said };
-    assert.deepEqual(JSON.parse(JSON.stringify(told)), expected);
+    const picture = tree.picture();
+    const state = { reset, frame: number, now, picture, said: tree.said };
+    assert.deepEqual(JSON.parse(JSON.stringify(state)), expected);
   });
 
   test(`a truncated ${name} is refused or ends after a whole record`, () => {

@@ -1,4 +1,4 @@
-// Maps as the scene makes them, with the modules under test and a fake of the gate.
+// Maps like those of the scene, with the modules under test and a fake of the gate.
 
 import { Drive } from "/_webmap/web/drive.js";
 import { MapCanvas } from "/_webmap/web/map.js";
@@ -7,14 +7,14 @@ const SVG = "http://www.w3.org/2000/svg";
 const query = new URLSearchParams(location.search);
 const modules = (query.get("modules") ?? "drive/teleop,view/mouse_view_control").split(",");
 
-// "each": the robots' elements say so, and that of r1 does.
+// "each": an attribute of each robot's element decides; r1 is holonomic.
 const each = query.get("holonomic") === "each";
 const options = { holonomic: each ? null : query.has("holonomic") };
 
 const releaseAfter = Number(query.get("release") ?? 30_000);
 const drive = new Drive(new URL("/_webmap/", location.href), { id: "page1", releaseAfter });
 
-/** What left this page and when; what made it doubtful and when; late timers. */
+/** The sent messages with their times, the times of the last mark, the timer delay. */
 const log = { sent: [], from: 0, to: 0, late: 0 };
 const send = WebSocket.prototype.send;
 WebSocket.prototype.send = function (text) {
@@ -27,7 +27,7 @@ setInterval(() => {
   if (log.to) log.late = Math.max(log.late, now - Math.max(then, log.to) - 10);
   then = now;
 }, 10);
-// What is noticed at a step may wait for it, so as late as timers of its period are.
+// An event that a step detects waits for the step, so timers of its period count, too.
 let stepped = performance.now();
 setInterval(() => {
   const now = performance.now();
@@ -44,7 +44,7 @@ function mark(happen = () => {}) {
   log.to = performance.now();
 }
 
-/** How long after the last mark a neutral command left, and how late timers were. */
+/** The time from the last mark to a neutral command, and the delay of timers. */
 function neutralDelay() {
   const first = log.sent.find(
     ({ op, at, x, turn }) => op === "drive" && at >= log.from && x === 0 && turn === 0,
@@ -52,7 +52,7 @@ function neutralDelay() {
   return first ? [Math.max(0, first.at - log.to), log.late] : null;
 }
 
-/** What left this page since then and moves a robot. */
+/** The commands that move a robot and were sent since a time. */
 function moves(since) {
   return log.sent.filter(
     ({ op, at, x, y, turn }) => op === "drive" && at >= since && (x || y || turn),
@@ -64,7 +64,7 @@ drive.on("state", (state) => {
   if (state === "lost") losses += 1;
 });
 
-/** Done when the page has looked at everything once more. */
+/** Wait for the next step of the page. */
 function step() {
   return new Promise((resolve) => {
     const off = drive.on("step", () => {

@@ -17,7 +17,7 @@ afterEach(() => {
   for (const name of ["window", "Element", "document", "reportError"]) delete globalThis[name];
 });
 
-/** A desk with these claims on Escape, pressed once; what was stopped. */
+/** Press Escape once with these claims on it, and return what was stopped. */
 function escapeAt(...claims) {
   const stopped = [];
   const desk = devicesOf({
@@ -65,10 +65,10 @@ test("a tool that throws does not prevent Escape for another tool", () => {
 });
 
 /**
- * Press a key of a page with this status, and return what the page's inputs are then.
+ * Press a key on a page with this status, and return the resulting inputs of the page.
  *
  * @param {object} status
- * @param {(event: Event) => boolean} use What a tool does with the key.
+ * @param {(event: Event) => boolean} use The key handler of a tool.
  */
 function keyAt(status, use) {
   const inputs = [];

@@ -8,7 +8,7 @@ const AHEAD = [0, -1, 0, 0];
 let pads;
 let now;
 
-/** One gamepad whose news are as old as the reading, unless said otherwise. */
+/** A gamepad whose data is as old as the reading, unless `fields` has a timestamp. */
 function pad(held, fields = {}) {
   const buttons = Array.from({ length: 17 }, () => ({ pressed: false }));
   buttons[DEAD_MAN] = { pressed: held };

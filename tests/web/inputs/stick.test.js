@@ -3,7 +3,7 @@ import { beforeEach, test } from "node:test";
 
 import { Stick } from "../../../src/webmap/web/inputs/stick.js";
 
-/** As much of the pad as a stick needs. */
+/** A fake of the pad with the parts that a stick needs. */
 class Pad extends EventTarget {
   constructor() {
     super();

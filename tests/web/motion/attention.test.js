@@ -13,7 +13,7 @@ afterEach(() => {
   delete globalThis.document;
 });
 
-/** Watch, and return how often there was doubt while something is dragged. */
+/** Watch the attention during a drag, and return the number of doubts. */
 function doubtsOfDrag() {
   let doubts = 0;
   const stop = watchAttention(

@@ -6,13 +6,13 @@ import { Listeners } from "../../../src/webmap/web/motion/drive_events.js";
 test("a listener receives its events until its removal", () => {
   const listeners = new Listeners();
   /** @type {string[]} */
-  const heard = [];
-  const end = listeners.on("stop", (robot) => heard.push(robot));
+  const received = [];
+  const end = listeners.on("stop", (robot) => received.push(robot));
   listeners.emit("stop", "r1");
   listeners.emit("gone", "r2");
   end();
   listeners.emit("stop", "r3");
-  assert.deepEqual(heard, ["r1"]);
+  assert.deepEqual(received, ["r1"]);
 });
 
 test("an error in a listener is reported and does not affect other listeners", () => {
@@ -21,12 +21,12 @@ test("an error in a listener is reported and does not affect other listeners", (
   globalThis.reportError = (error) => reported.push(error);
   const listeners = new Listeners();
   const failure = new Error("broken display");
-  const heard = [];
+  const received = [];
   listeners.on("drop", () => {
     throw failure;
   });
-  listeners.on("drop", () => heard.push("drop"));
+  listeners.on("drop", () => received.push("drop"));
   listeners.emit("drop", null);
-  assert.deepEqual(heard, ["drop"]);
+  assert.deepEqual(received, ["drop"]);
   assert.deepEqual(reported, [failure]);
 });

@@ -58,8 +58,8 @@ describe("the stopping distance", () => {
 });
 
 test("the sent, the echoed and the measured velocity are listed", () => {
-  const told = motions(report({ measured: [-0.3, 0, -0.001] }));
-  assert.deepEqual(told, [
+  const figures = motions(report({ measured: [-0.3, 0, -0.001] }));
+  assert.deepEqual(figures, [
     { name: "Sent", kind: "motion", text: "0.40 m/s", more: ", 0.00 rad/s" },
     { name: "Echoed", kind: "motion", text: "unknown", more: "" },
     { name: "Measured", kind: "motion", text: "\u22120.30 m/s", more: ", 0.00 rad/s" },

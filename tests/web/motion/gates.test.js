@@ -5,8 +5,8 @@ import { PoseCommands } from "../../../src/webmap/web/motion/pose_commands.js";
 import { Session } from "../../../src/webmap/web/motion/session.js";
 
 /**
- * A page whose display has a gate of its own, with r1, and reaches the gate of the agent
- * "bay3", with r2. Each gate ticks, and acknowledges the commands to its robot.
+ * A page with two gates: the gate of the display has r1, and the gate of the agent
+ * "bay3" has r2. Each gate sends ticks, and acknowledges the commands to its robot.
  */
 class Bench {
   constructor() {
@@ -29,18 +29,18 @@ class Bench {
     this.greet();
   }
 
-  /** The display's own gate greets, and both gates report their robots. */
+  /** The gate of the display sends hello, and both gates report their robots. */
   greet() {
     this.session.receive({ op: "hello", connection: "c1" }, this.now);
-    this.say("r1");
-    this.say("r2");
+    this.report("r1");
+    this.report("r2");
   }
 
   /**
    * @param {'r1' | 'r2'} robot
    * @param {object} [fields]
    */
-  say(robot, fields = {}) {
+  report(robot, fields = {}) {
     const report = { robot, holder: null, mine: false, epoch: null, armable: true };
     const { field } = this.gates[robot];
     this.session.receive({ op: "robot", ...report, ...field, ...fields }, this.now);
@@ -49,7 +49,7 @@ class Bench {
   /** @param {'r1' | 'r2'} robot */
   grant(robot) {
     const holder = { connection: "c1", name: "me" };
-    this.say(robot, { holder, mine: true, epoch: ++this.epoch, armed: true });
+    this.report(robot, { holder, mine: true, epoch: ++this.epoch, armed: true });
   }
 
   /** @param {any[]} commands */
@@ -133,9 +133,9 @@ describe("a robot of an agent's gate", () => {
     bench.press(1);
     bench.grant("r2");
     bench.gates.r1.ack = 1000;
-    const said = bench.run(250);
-    assert.equal(said.length, 5);
-    assert.equal(moves(said, "r2"), false);
+    const sent = bench.run(250);
+    assert.equal(sent.length, 5);
+    assert.equal(moves(sent, "r2"), false);
     assert.equal(bench.session.pilot.settled, false);
     bench.gates.r2.acking = true;
     assert.equal(moves(bench.run(600), "r2"), true);
@@ -210,7 +210,7 @@ describe("an agent's gate without ticks", () => {
     bench.run(100);
     bench.press(0);
     bench.keep(bench.session.pilot.release("r2", bench.now));
-    bench.say("r2");
+    bench.report("r2");
     bench.run(300);
     bench.sent = [];
     bench.press(1);
@@ -222,7 +222,7 @@ describe("an agent's gate without ticks", () => {
     bench.session.receive({ op: "gone", robot: "r2" }, bench.now);
     bench.run(1000);
     Object.assign(bench.gates.r2, { tick: 30, ack: -1, ticking: true });
-    bench.say("r2");
+    bench.report("r2");
     bench.drive("r2");
     assert.equal(bench.run(50)[0].tick, bench.gates.r2.tick);
   });

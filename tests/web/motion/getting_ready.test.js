@@ -36,7 +36,7 @@ const MINE = {
 };
 const FORWARD = { x: 1, y: 0, turn: 0 };
 
-/** A page that loads: when it connects, and when its thread does nothing else; ms. */
+/** A page that loads: when it connects, and when its thread is blocked; in ms. */
 const CONNECTED = 300;
 const BUSY = [
   [400, 700],
@@ -45,17 +45,17 @@ const BUSY = [
 const END = 5000;
 
 /**
- * Open a page, press a key at some moment and hold it.
+ * Open a page, press a key at some time and hold it.
  *
  * @param {number} at When the key goes down, in ms after the page began.
- * @returns {{title: string, moved: boolean}} What the page said just before, and whether
- *     the robot moved.
+ * @returns {{title: string, moved: boolean}} The title just before the press, and
+ *     whether the robot moved.
  */
 function pressAt(at) {
   const session = new Session(0, {});
   const { pilot } = session;
-  let title = "Preparing input"; // as the page itself says before there is anything else
-  let [ack, tick, moved, heard] = [-1, 0, false, false];
+  let title = "Preparing input"; // the page shows this before anything else
+  let [ack, tick, moved, pressed] = [-1, 0, false, false];
   const take = (/** @type {any[]} */ commands, /** @type {number} */ now) => {
     for (const { op, seq, x } of commands) {
       if (op === "take") session.receive(MINE, now);
@@ -72,14 +72,14 @@ function pressAt(at) {
       pilot.choose("r1", now);
     }
     if (now > CONNECTED) session.receive({ op: "tick", tick: ++tick, ack }, now);
-    if (now >= at && !heard) {
-      heard = true;
+    if (now >= at && !pressed) {
+      pressed = true;
       session.inputs.set("keys", FORWARD, now);
       take(pilot.step(now, true), now);
     }
     if (now % 50 > 0) continue;
     take(pilot.step(now, true), now);
-    if (heard) continue;
+    if (pressed) continue;
     const status = { link: session.state, connection: "c1", ...pilot.status };
     title = describe(status, "r1", pilot.robots.get("r1") ?? null, true).title;
   }

@@ -7,7 +7,7 @@ import { Inputs, REST } from "../../../src/webmap/web/motion/inputs.js";
 const FORWARD = { x: 1, y: 0, turn: 0 };
 const LEFT = { x: 0, y: 0, turn: 1 };
 
-/** Inputs that had been neutral long enough before time 0. */
+/** Inputs that were neutral long enough before time 0. */
 function rested() {
   return new Inputs(-REST);
 }

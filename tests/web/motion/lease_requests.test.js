@@ -19,7 +19,7 @@ beforeEach(() => {
   const leases = new Leases();
   const stream = new Stream(inputs, new Loops(), 0);
   it = { inputs, leases, stream, reach: new LeaseRequests(inputs, leases, stream) };
-  say("r1", {}, 0);
+  reportRobot("r1", {}, 0);
   it.reach.choose("r1");
 });
 
@@ -28,7 +28,7 @@ beforeEach(() => {
  * @param {object} fields
  * @param {number} now
  */
-function say(robot, fields, now) {
+function reportRobot(robot, fields, now) {
   const free = { holder: null, mine: false, epoch: null, armable: true, latched: false };
   const report = /** @type {any} */ ({ robot, ...free, ...fields });
   it.reach.report(report, it.leases.report(report), now);
@@ -44,14 +44,14 @@ describe("a press", () => {
     assert.deepEqual(press(), TAKE);
     assert.deepEqual(it.reach.step(50), []);
     assert.equal(it.reach.robot, "r1");
-    say("r1", MINE, 100);
+    reportRobot("r1", MINE, 100);
     assert.equal(it.stream.lease?.epoch, 7);
     assert.equal(it.reach.robot, null);
     assert.equal(it.inputs.blocked, false);
   });
 
   test("uses an existing lease", () => {
-    say("r1", MINE, 0);
+    reportRobot("r1", MINE, 0);
     assert.deepEqual(press(), []);
     assert.equal(it.stream.lease?.robot, "r1");
   });
@@ -70,7 +70,7 @@ describe("a press", () => {
   };
   for (const [how, fields] of Object.entries(barred)) {
     test(`requests nothing and blocks the inputs for a robot that ${how}`, () => {
-      say("r1", fields, 0);
+      reportRobot("r1", fields, 0);
       assert.deepEqual(press(), []);
       assert.equal(it.inputs.blocked, true);
     });
@@ -78,21 +78,21 @@ describe("a press", () => {
 
   for (const connection of ["program", "west.4f/program"]) {
     test(`that takes control from the program ${connection} does not drive yet`, () => {
-      say("r1", { ...PROGRAM, holder: { connection, name: "a program" } }, 0);
+      reportRobot("r1", { ...PROGRAM, holder: { connection, name: "a program" } }, 0);
       assert.deepEqual(press(), TAKE);
-      say("r1", MINE, 50);
+      reportRobot("r1", MINE, 50);
       assert.equal(it.stream.lease?.robot, "r1");
       assert.equal(it.inputs.blocked, true);
     });
   }
 
   test("takes no control from a person whose name is program", () => {
-    say("r1", { ...ANN, holder: { connection: "c2", name: "program" } }, 0);
+    reportRobot("r1", { ...ANN, holder: { connection: "c2", name: "program" } }, 0);
     assert.deepEqual(press(), []);
   });
 
   const endings = {
-    "another was quicker": () => say("r1", ANN, 50),
+    "another was quicker": () => reportRobot("r1", ANN, 50),
     "the gate refuses": () => it.reach.refuse("r1", "take", "no", 50),
     "nobody answers": () => it.reach.step(TAKE_PATIENCE + 1),
   };
@@ -102,7 +102,7 @@ describe("a press", () => {
       happen();
       assert.equal(it.reach.robot, null);
       assert.equal(it.inputs.blocked, true);
-      say("r1", MINE, 60);
+      reportRobot("r1", MINE, 60);
       assert.equal(it.stream.lease, null);
     });
   }
@@ -112,41 +112,41 @@ describe("a lease that was requested without a key", () => {
   test("starts with blocked inputs", () => {
     assert.deepEqual(it.reach.take("r1", 0), TAKE);
     it.inputs.set("keys", { x: 1 }, 0);
-    say("r1", MINE, 50);
+    reportRobot("r1", MINE, 50);
     assert.equal(it.stream.lease?.robot, "r1");
     assert.equal(it.inputs.blocked, true);
   });
 
   test("of a robot that is not selected does not drive", () => {
     it.reach.take("r2", 0);
-    say("r2", MINE, 50);
+    reportRobot("r2", MINE, 50);
     assert.equal(it.stream.lease, null);
   });
 
   test("does not drive if the request was ended before the grant", () => {
     it.reach.take("r1", 0);
     it.reach.end();
-    say("r1", MINE, 50);
+    reportRobot("r1", MINE, 50);
     assert.equal(it.stream.lease, null);
   });
 });
 
 describe("a robot whose control was requested from its operator", () => {
   beforeEach(() => {
-    say("r1", ANN, 0);
+    reportRobot("r1", ANN, 0);
     assert.deepEqual(it.reach.ask("r1"), [{ op: "ask", robot: "r1" }]);
     it.inputs.set("keys", { x: 1 }, 0);
   });
 
   test("starts with blocked inputs", () => {
-    say("r1", MINE, 50);
+    reportRobot("r1", MINE, 50);
     assert.equal(it.stream.lease?.robot, "r1");
     assert.equal(it.inputs.blocked, true);
   });
 
   test("is kept without driving if another robot was selected before the grant", () => {
     it.reach.choose("r2");
-    say("r1", MINE, 50);
+    reportRobot("r1", MINE, 50);
     assert.equal(it.stream.lease, null);
     assert.deepEqual(it.leases.unused(50, 0), ["r1"]);
   });
@@ -159,7 +159,7 @@ describe("a robot whose control was requested from its operator", () => {
   for (const [how, happen] of Object.entries(endings)) {
     test(`is not driven by a late grant after the robot was ${how}`, () => {
       happen();
-      say("r1", MINE, 60);
+      reportRobot("r1", MINE, 60);
       assert.equal(it.stream.lease, null);
     });
   }
@@ -190,7 +190,7 @@ describe("a refusal", () => {
     it.reach.refuse("r1", "drive", "nobody has it", 0);
     assert.equal(it.reach.refusal, null);
     press();
-    say("r1", MINE, 0);
+    reportRobot("r1", MINE, 0);
     it.reach.refuse("r1", "drive", "too old", 50);
     assert.equal(it.reach.refusal, "too old");
     assert.equal(it.inputs.blocked, true);

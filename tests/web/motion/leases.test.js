@@ -14,30 +14,30 @@ beforeEach(() => {
  * @param {boolean} mine
  * @param {number | null} epoch
  */
-function say(robot, mine, epoch) {
+function reportRobot(robot, mine, epoch) {
   return leases.report(/** @type {any} */ ({ robot, mine, epoch }));
 }
 
 test("only a lease of this page has an epoch", () => {
   assert.equal(leases.epoch("r1"), null);
-  say("r1", true, 7);
+  reportRobot("r1", true, 7);
   assert.equal(leases.epoch("r1"), 7);
-  say("r1", false, 8);
+  reportRobot("r1", false, 8);
   assert.equal(leases.epoch("r1"), null);
 });
 
 test("a released lease is accepted again only with another epoch", () => {
-  say("r1", true, 7);
+  reportRobot("r1", true, 7);
   leases.giveBack("r1", 7);
-  say("r1", true, 7);
+  reportRobot("r1", true, 7);
   assert.equal(leases.epoch("r1"), null);
-  say("r1", true, 9);
+  reportRobot("r1", true, 9);
   assert.equal(leases.epoch("r1"), 9);
 });
 
 test("report() returns the previous report", () => {
-  assert.equal(say("r1", false, null), undefined);
-  assert.equal(say("r1", true, 3)?.mine, false);
+  assert.equal(reportRobot("r1", false, null), undefined);
+  assert.equal(reportRobot("r1", true, 3)?.mine, false);
 });
 
 test("a parked lease is unused after a time without use", () => {
@@ -56,7 +56,7 @@ test("a lease that ended in any way is no longer parked", () => {
     () => leases.unpark("*"),
     () => leases.gone("r1"),
     () => leases.forget(),
-    () => say("r1", false, null),
+    () => reportRobot("r1", false, null),
   ]) {
     leases.park("r1", 0);
     end();
@@ -65,14 +65,14 @@ test("a lease that ended in any way is no longer parked", () => {
 });
 
 test("all leases end with the connection, and robots stay known", () => {
-  say("r1", true, 7);
+  reportRobot("r1", true, 7);
   leases.forget();
   assert.equal(leases.epoch("r1"), null);
   assert.deepEqual([...leases.robots.keys()], ["r1"]);
 });
 
 test("a gone robot and its lease are removed", () => {
-  say("r1", true, 7);
+  reportRobot("r1", true, 7);
   leases.gone("r1");
   assert.equal(leases.robots.size, 0);
   assert.equal(leases.epoch("r1"), null);

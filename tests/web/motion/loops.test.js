@@ -9,9 +9,9 @@ let loops;
 beforeEach(() => {
   loops = new Loops();
   loops.open(0);
-  say("r1");
-  say("r2", "bay3", 0);
-  say("r3", "bay4", 0);
+  reportRobot("r1");
+  reportRobot("r2", "bay3", 0);
+  reportRobot("r3", "bay4", 0);
 });
 
 /**
@@ -19,7 +19,7 @@ beforeEach(() => {
  * @param {string} [gate]
  * @param {number} [now]
  */
-function say(robot, gate, now = 0) {
+function reportRobot(robot, gate, now = 0) {
   loops.report(/** @type {any} */ ({ robot, gate }), now);
 }
 
@@ -34,7 +34,7 @@ test("each robot has the ticks of its gate, one without a report those of the ow
 
 test("ticks that arrive before the first report of a gate count", () => {
   loops.receive({ tick: 70, ack: -1, gate: "bay9" }, 0);
-  say("r4", "bay9");
+  reportRobot("r4", "bay9");
   assert.equal(loops.of("r4").tick, 70);
 });
 
@@ -48,7 +48,7 @@ test("a gate acknowledges only the commands to its robots", () => {
 });
 
 test("each gate is late and lost by its own ticks, from its first message", () => {
-  say("r4", "bay9", 1000);
+  reportRobot("r4", "bay9", 1000);
   loops.receive({ tick: 100, ack: -1 }, 1000);
   const states = (/** @type {number} */ now) =>
     ["r1", "r2", "r4"].map((robot) => loops.of(robot).state(now));
@@ -61,8 +61,8 @@ test("each gate is late and lost by its own ticks, from its first message", () =
 test("a robot whose gate changes has the ticks of the new gate", () => {
   loops.receive({ tick: 100, ack: -1 }, 0);
   loops.receive({ tick: 5000, ack: -1, gate: "bay3" }, 0);
-  say("r1", "bay3");
-  say("r2");
+  reportRobot("r1", "bay3");
+  reportRobot("r2");
   assert.deepEqual(ticks(), [5000, 100, null, 100]);
 });
 
@@ -77,7 +77,7 @@ test("a new connection forgets the ticks and acknowledgements of all gates", () 
   loops.receive({ tick: 100, ack: 9 }, 0);
   loops.receive({ tick: 5000, ack: 9, gate: "bay3" }, 0);
   loops.open(1000);
-  say("r2", "bay3", 1000);
+  reportRobot("r2", "bay3", 1000);
   assert.deepEqual(ticks(), [null, null, null, null]);
   assert.equal(loops.of("r2").acknowledged(0), false);
   assert.equal(loops.of("r3"), loops.own);
@@ -85,7 +85,7 @@ test("a new connection forgets the ticks and acknowledgements of all gates", () 
 
 test("all gates send as few ticks as the hello states", () => {
   loops.greeted(2);
-  say("r5", "bay5", 0);
+  reportRobot("r5", "bay5", 0);
   assert.deepEqual(
     ["r1", "r2", "r5"].map((robot) => loops.of(robot).state(LOST + 450)),
     ["late", "late", "late"],

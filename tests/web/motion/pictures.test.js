@@ -21,13 +21,13 @@ test("a picture is too old after a second", () => {
 
 test("a picture age is a finite whole number", () => {
   const pictures = new Pictures();
-  for (const [age, said] of [
+  for (const [age, shown] of [
     [12.6, 13],
     [-5, 0],
     [Infinity, 1e9],
   ]) {
     pictures.goBy("r1", () => age);
-    assert.equal(pictures.age("r1"), said);
+    assert.equal(pictures.age("r1"), shown);
   }
 });
 

@@ -46,23 +46,23 @@ describe("the first press", () => {
   });
 
   test("does nothing on a robot of another operator", () => {
-    bench.say("r1", {
+    bench.report("r1", {
       holder: { connection: "c2", name: "Ann" },
       epoch: 9,
       state: "held",
     });
     assert.deepEqual(bench.press(), []);
-    bench.say("r1");
-    assert.deepEqual(bench.run(500), [], "nor when that one lets go");
+    bench.report("r1");
+    assert.deepEqual(bench.run(500), [], "the other operator released control");
   });
 
   test("does nothing on a robot that cannot be driven", () => {
-    bench.say("r1", { armable: false, reason: "link down" });
+    bench.report("r1", { armable: false, reason: "link down" });
     assert.deepEqual(bench.press(), []);
   });
 
   test("takes control from a program, and only a new press drives", () => {
-    bench.say("r1", {
+    bench.report("r1", {
       holder: { connection: "program", name: "program" },
       epoch: 9,
       state: "held",
@@ -130,7 +130,7 @@ describe("while a robot is driven", () => {
     [
       "the gate disarms",
       () => {
-        bench.say("r1", {
+        bench.report("r1", {
           mine: true,
           epoch: bench.epoch,
           armed: false,
@@ -165,7 +165,7 @@ describe("while a robot is driven", () => {
     [
       "the lease is lost and comes again",
       () => {
-        bench.say("r1");
+        bench.report("r1");
         bench.grant("r1");
       },
     ],
@@ -174,7 +174,7 @@ describe("while a robot is driven", () => {
       bench.drive();
       happen();
       bench.run(100);
-      // A key that is held and says so again is still not a new press.
+      // A held key that is reported again is not a new press.
       bench.inputs.set("keys", FORWARD, bench.now);
       assert.deepEqual(moves(bench.run(1500)), []);
     });
@@ -203,7 +203,7 @@ describe("while a robot is driven", () => {
     bench.drive();
     bench.acking = false;
     assert.ok(moves(bench.run(1000)).length <= 7);
-    assert.equal(bench.sent.at(-1).op, "drive", "and goes on, to be found alive again");
+    assert.equal(bench.sent.at(-1).op, "drive", "the stream is not ended");
   });
 });
 
@@ -325,7 +325,7 @@ describe("leases", () => {
     bench.drive();
     bench.pilot.stopped("r2", bench.now);
     assert.equal(bench.pilot.driven, "r1");
-    assert.deepEqual(moves(bench.run(500)), [], "but the inputs are dead");
+    assert.deepEqual(moves(bench.run(500)), [], "the inputs are blocked");
   });
 
   test("end with the connection", () => {
@@ -340,7 +340,7 @@ describe("a robot of another operator", () => {
   const holder = { connection: "c9", name: "Ann" };
 
   test("is neutral after a granted request until a new press", () => {
-    bench.say("r1", { holder, epoch: 3, state: "held" });
+    bench.report("r1", { holder, epoch: 3, state: "held" });
     bench.keep(bench.pilot.ask("r1"));
     bench.press();
     bench.grant("r1");
@@ -355,7 +355,7 @@ describe("a robot of another operator", () => {
 
   test("is released after a time if another robot was selected before the grant", () => {
     bench = new Bench({ releaseAfter: 5000 });
-    bench.say("r1", { holder, epoch: 3, state: "held" });
+    bench.report("r1", { holder, epoch: 3, state: "held" });
     bench.keep(bench.pilot.ask("r1"));
     bench.keep(bench.pilot.choose("r2", bench.now));
     bench.grant("r1");
@@ -364,7 +364,7 @@ describe("a robot of another operator", () => {
   });
 
   test("is not driven after a refused request, and the reason is shown", () => {
-    bench.say("r1", { holder, epoch: 3, state: "held" });
+    bench.report("r1", { holder, epoch: 3, state: "held" });
     bench.keep(bench.pilot.ask("r1"));
     bench.pilot.refuse("r1", "ask", "Ann keeps it", bench.now);
     assert.equal(bench.pilot.status.refusal, "Ann keeps it");
@@ -394,11 +394,11 @@ describe("a robot whose control is handed over", () => {
 
 describe("a robot with an active STOP", () => {
   test("is taken neither by a press nor by a key held during its Reset", () => {
-    bench.say("r1", { state: "stopped", latched: true });
+    bench.report("r1", { state: "stopped", latched: true });
     bench.press();
     bench.run(300);
     bench.pilot.reset("r1", bench.now);
-    bench.say("r1", { latched: false });
+    bench.report("r1", { latched: false });
     assert.deepEqual(bench.run(500), []);
     bench.letGo();
     bench.run(250);

@@ -6,7 +6,7 @@ import { Pilot } from "../../../src/webmap/web/motion/pilot.js";
 
 export const FORWARD = { x: 1, y: 0, turn: 0 };
 
-/** A gate of one page, as far as the page can tell, and a page stepped at 20 Hz. */
+/** A page that is stepped at 20 Hz, and a fake gate as the page sees it. */
 export class Bench {
   constructor(options = {}) {
     this.now = 0;
@@ -24,12 +24,12 @@ export class Bench {
     this.pilot = new Pilot(this.inputs, this.loops, 0, options);
     this.loops.open(0);
     this.loops.own.receive(this.tick, -1, 0);
-    this.say("r1");
-    this.say("r2");
+    this.report("r1");
+    this.report("r2");
     this.pilot.choose("r1", 0);
   }
 
-  say(robot, fields = {}) {
+  report(robot, fields = {}) {
     const report = {
       robot,
       name: robot,
@@ -55,7 +55,8 @@ export class Bench {
 
   grant(robot, epoch = ++this.epoch) {
     const holder = { connection: "c1", name: "me" };
-    this.say(robot, { holder, mine: true, epoch, state: "held", doing: "held", armed: this.arming });
+    const held = { state: "held", doing: "held", armed: this.arming };
+    this.report(robot, { holder, mine: true, epoch, ...held });
     return epoch;
   }
 

@@ -15,17 +15,17 @@ beforeEach(() => {
   const poseCommands = new PoseCommands(session.pilot, session.loops, send, () => it.now);
   it = { now: 0, sent: [], session, poseCommands };
   session.receive({ op: "hello", connection: "c1" }, 0);
-  say(false);
+  reportRobot(false);
 });
 
 /** @param {boolean} mine */
-function say(mine) {
+function reportRobot(mine) {
   const holder = mine ? { connection: "c1", name: "me" } : null;
   const report = { op: "robot", robot: "r1", mine, holder, epoch: mine ? 7 : null };
   it.session.receive(report, it.now);
 }
 
-/** A turn of the loop, in which promises go on. */
+/** Step, and let pending promises continue. */
 async function step(ms = 50) {
   it.now += ms;
   it.poseCommands.step(it.now);
@@ -36,26 +36,26 @@ async function step(ms = 50) {
 const acknowledge = (ack) =>
   it.session.receive({ op: "tick", tick: 100, ack }, it.now);
 
-const said = () => it.sent.map(({ op }) => op);
+const sentOps = () => it.sent.map(({ op }) => op);
 
 test("a goal for a free robot first takes control and is then sent", async () => {
   const placed = it.poseCommands.place("goal", "r1", POSE);
   await step();
-  assert.deepEqual(said(), ["take"]);
-  say(true);
+  assert.deepEqual(sentOps(), ["take"]);
+  reportRobot(true);
   await step();
-  assert.deepEqual(said(), ["take", "goal"]);
+  assert.deepEqual(sentOps(), ["take", "goal"]);
   const { epoch, seq, ...rest } = it.sent[1];
   assert.deepEqual([epoch, rest.x, rest.y, rest.yaw], [7, 1, 2, 0]);
   acknowledge(seq);
   await step();
-  assert.equal(await placed, true, "the lease was taken for it");
+  assert.equal(await placed, true, "the lease was requested for the goal");
 });
 
 test("a pose for a robot under control of this page is sent at once", async () => {
-  say(true);
+  reportRobot(true);
   const placed = it.poseCommands.place("locate", "r1", POSE);
-  assert.deepEqual(said(), ["locate"]);
+  assert.deepEqual(sentOps(), ["locate"]);
   acknowledge(it.sent[0].seq);
   await step();
   assert.equal(await placed, false);
@@ -64,20 +64,20 @@ test("a pose for a robot under control of this page is sent at once", async () =
 test("a lease that was taken for a refused goal is released", async () => {
   const placed = it.poseCommands.place("goal", "r1", POSE);
   const failed = assert.rejects(placed, /no such place/);
-  say(true);
+  reportRobot(true);
   await step();
-  it.poseCommands.refused("r1", "take", "a refusal of something else");
-  it.poseCommands.refused("r2", "goal", "a refusal of another's");
+  it.poseCommands.refused("r1", "take", "a refusal of another operation");
+  it.poseCommands.refused("r2", "goal", "a refusal for another robot");
   it.poseCommands.refused("r1", "goal", "no such place");
   await failed;
-  assert.deepEqual(said(), ["take", "goal", "release"]);
+  assert.deepEqual(sentOps(), ["take", "goal", "release"]);
 });
 
 test("a refused lease rejects the goal", async () => {
   const placed = it.poseCommands.place("goal", "r1", POSE);
   it.poseCommands.refused("r1", "take", "Ann has control");
   await assert.rejects(placed, /Ann has control/);
-  assert.deepEqual(said(), ["take"]);
+  assert.deepEqual(sentOps(), ["take"]);
 });
 
 test("a goal is rejected when the gate does not answer", async () => {

@@ -3,13 +3,13 @@ import { createHash } from "node:crypto";
 import { readFileSync, writeFileSync } from "node:fs";
 import { test } from "node:test";
 
-import { describe as words } from "../../../src/webmap/web/motion/status.js";
+import { describe } from "../../../src/webmap/web/motion/status.js";
 import { Bench } from "./pilot_bench.js";
 
 /**
- * What a page sends and shows for scripted inputs, as a digest of each script.
+ * Digests of what a page sends and shows for each script of random inputs.
  *
- * WEBMAP_SCRIPTED=write node --test tests/web/motion/scripted.test.js makes the file anew;
+ * WEBMAP_SCRIPTED=write node --test tests/web/motion/scripted.test.js writes the file;
  * with WEBMAP_SCRIPTED=print each step is printed.
  */
 const FILE = new URL("scripted.json", import.meta.url);
@@ -38,7 +38,7 @@ const POSE = { x: 1, y: 2, yaw: 0.5 };
 /** @typedef {<T>(from: T[]) => T} Pick */
 
 /**
- * What inputs, the gate and the connection do, by chance.
+ * Random events of the inputs, the gate and the connection.
  *
  * @type {Record<string, (bench: Bench, pick: Pick) => any>}
  */
@@ -53,10 +53,10 @@ const EVENTS = {
   acks: (bench, pick) => void (bench.acking = pick([true, true, false])),
   arming: (bench, pick) => void (bench.arming = pick([true, true, false])),
   granted: (bench, pick) => void bench.grant(pick(["r1", "r1", "r2"])),
-  stopped: (bench) => bench.say("r1", STOPPED),
-  other: (bench) => bench.say("r1", OTHER),
-  free: (bench, pick) => bench.say(pick(["r1", "r2"])),
-  barred: (bench) => bench.say("r1", BARRED),
+  stopped: (bench) => bench.report("r1", STOPPED),
+  other: (bench) => bench.report("r1", OTHER),
+  free: (bench, pick) => bench.report(pick(["r1", "r2"])),
+  barred: (bench) => bench.report("r1", BARRED),
   choose: ({ pilot, now }, pick) => pilot.choose(pick(["r1", "r1", "r2", null]), now),
   take: ({ pilot, now }, pick) => pilot.take(pick(["r1", "r2"]), now),
   ask: ({ pilot }) => pilot.ask("r1"),
@@ -78,7 +78,7 @@ const NAMES = [...Object.keys(EVENTS), ...Array(6).fill("driveOff"), "letGo", "l
 function driveOff(bench) {
   bench.attentive = bench.ticking = bench.acking = bench.arming = true;
   bench.letGo();
-  bench.say("r1");
+  bench.report("r1");
   bench.pilot.choose("r1", bench.now);
   bench.run(400);
   bench.press();
@@ -86,7 +86,7 @@ function driveOff(bench) {
   bench.run(300);
   const holder = { connection: "c1", name: "me" };
   const driven = { state: "driving", doing: "driven", armed: true };
-  bench.say("r1", { holder, mine: true, epoch, ...driven });
+  bench.report("r1", { holder, mine: true, epoch, ...driven });
   bench.run(300);
 }
 
@@ -111,7 +111,8 @@ function digestOf(seed) {
     bench.step();
     const { status } = bench.pilot;
     const report = bench.pilot.robots?.get("r1") ?? null;
-    const shown = words(/** @type {any} */ ({ link: "open", ...status }), "r1", report, true);
+    const open = /** @type {any} */ ({ link: "open", ...status });
+    const shown = describe(open, "r1", report, true);
     const line = JSON.stringify([name, bench.now, bench.sent.slice(before), status, shown]);
     if (MODE === "print") process.stdout.write(`${seed} ${line}\n`);
     hash.update(line);

@@ -26,7 +26,7 @@ beforeEach(() => {
 });
 
 /**
- * Drive r1 until it is given motion, with a gate that answers.
+ * Drive r1 until a command moves it, with a gate that answers.
  *
  * @returns {any} The last command.
  */
@@ -42,7 +42,7 @@ function drive() {
     session.sent(last, now);
     session.receive({ op: "tick", tick: 100 + now, ack: Number(last.seq) }, now);
   }
-  assert.equal(last?.x, 1, "it drives");
+  assert.equal(last?.x, 1, "the command drives");
   return last;
 }
 
@@ -50,10 +50,10 @@ describe("a connection", () => {
   test("is open after the hello of the gate and not before", () => {
     assert.deepEqual(session.judge(100), []);
     assert.equal(session.state, "connecting");
-    const { send: say, events: news } = session.receive(HELLO, 100);
-    assert.deepEqual([say, news], [[], [["state", "open"]]]);
+    const { send, events } = session.receive(HELLO, 100);
+    assert.deepEqual([send, events], [[], [["state", "open"]]]);
     assert.equal(session.connection, "c1");
-    assert.deepEqual(session.judge(110), [], "what is no news is not told");
+    assert.deepEqual(session.judge(110), [], "an unchanged state emits no event");
   });
 
   test("of a page that may not drive is open between two of its few ticks", () => {
@@ -85,8 +85,8 @@ describe("a connection", () => {
 
   test("to a restarted gate begins without control and with blocked inputs", () => {
     drive();
-    const { events: news } = session.receive({ op: "hello", connection: "c2" }, 800);
-    assert.deepEqual(news, [], "the link was open all the time");
+    const { events } = session.receive({ op: "hello", connection: "c2" }, 800);
+    assert.deepEqual(events, [], "the link was open all the time");
     assert.equal(session.connection, "c2");
     assert.equal(session.pilot.driven, null);
     assert.equal(session.inputs.blocked, true);
@@ -136,18 +136,18 @@ describe("a STOP", () => {
   });
 
   test("pressed during an active STOP is answered only by a new STOP", () => {
-    const stands = (/** @type {string} */ id) => ({
+    const active = (/** @type {string} */ id) => ({
       ...{ ...REPORT, state: "stopped", latched: true },
       stop: { by: "Ann", confirmed: true, why: "", id },
     });
     session.receive(HELLO, 0);
-    session.receive(stands("s1"), 0);
+    session.receive(active("s1"), 0);
     session.stopped("r1", true, 10);
-    session.receive(stands("s1"), 20);
-    session.receive(REPORT, 30); // somebody else's reset was quicker
+    session.receive(active("s1"), 20);
+    session.receive(REPORT, 30); // another operator was quicker with a reset
     session.lost(500);
     assert.deepEqual(session.receive(HELLO, 600).send, [{ op: "stop", robot: "r1" }]);
-    session.receive(stands("s2"), 650);
+    session.receive(active("s2"), 650);
     session.lost(700);
     assert.deepEqual(session.receive(HELLO, 800).send, []);
   });
@@ -155,8 +155,8 @@ describe("a STOP", () => {
   test("that a gate did not answer is sent again to the restarted gate", () => {
     drive();
     session.stopped("r1", true, 800);
-    const { send: say } = session.receive({ op: "hello", connection: "c2" }, 810);
-    assert.deepEqual(say, [{ op: "stop", robot: "r1" }]);
+    const { send } = session.receive({ op: "hello", connection: "c2" }, 810);
+    assert.deepEqual(send, [{ op: "stop", robot: "r1" }]);
   });
 
   test("ends the lease, blocks the inputs and gets a verdict", () => {
@@ -169,32 +169,32 @@ describe("a STOP", () => {
   });
 
   test("for all robots before any is known is answered by a stopped or gone robot", () => {
-    const again = (/** @type {object[]} */ ...said) => {
+    const again = (/** @type {object[]} */ ...messages) => {
       session = new Session(0, {});
       session.receive(HELLO, 0);
       session.stopped("*", true, 10);
-      for (const message of said) session.receive(message, 20);
+      for (const message of messages) session.receive(message, 20);
       session.lost(30);
       return session.receive({ ...HELLO, connection: "c2" }, 40).send;
     };
     const stop = [{ op: "stop", robot: "*" }];
     const latched = { ...REPORT, state: "stopped", latched: true };
     assert.deepEqual(again(), stop);
-    assert.deepEqual(again(REPORT), stop, "it may have been told before the STOP came");
-    assert.deepEqual(again(REPORT, { ...latched, robot: "r2" }), stop, "r1 moves yet");
-    assert.deepEqual(again({ op: "gone", robot: "r9" }), stop, "of none that is known");
+    assert.deepEqual(again(REPORT), stop, "the report may be older than the STOP");
+    assert.deepEqual(again(REPORT, { ...latched, robot: "r2" }), stop, "r1 still moves");
+    assert.deepEqual(again({ op: "gone", robot: "r9" }), stop, "r9 is not known");
     assert.deepEqual(again(latched), []);
     assert.deepEqual(again(REPORT, latched), []);
     assert.deepEqual(again(REPORT, { op: "gone", robot: "r1" }), []);
-    assert.deepEqual(again(latched, REPORT), [], "it was reset since");
+    assert.deepEqual(again(latched, REPORT), [], "the STOP was reset meanwhile");
   });
 });
 
 describe("a message of the gate", () => {
   test("about a robot updates the robot and its request and emits an event", () => {
     const asker = { connection: "c9", name: "Ann", left: 8 };
-    const { events: news } = session.receive({ ...REPORT, asker }, 0);
-    assert.equal(news[0][0], "robot");
+    const { events } = session.receive({ ...REPORT, asker }, 0);
+    assert.equal(events[0][0], "robot");
     assert.equal(session.pilot.robots.get("r1")?.name, "Bob");
     assert.equal(session.requests.requests(0)[0].who, "Ann");
   });

@@ -94,8 +94,8 @@ const cases = [
 
 for (const [state, status, report] of cases) {
   const { doing = null } = report ?? {};
-  const told = JSON.stringify({ ...status, doing });
-  test(`${told} is shown as ${state}`, () => {
+  const text = JSON.stringify({ ...status, doing });
+  test(`${text} is shown as ${state}`, () => {
     const description = describe({ ...STATUS, ...status }, "r1", report, true);
     assert.equal(description.state, state);
     assert.notEqual(description.title, "");
@@ -119,8 +119,8 @@ test("the title names the operator", () => {
 
 test("the detail names the operator if the title does not", () => {
   const report = { ...REPORT, holder: ANN, state: "stopping", doing: "stopping" };
-  const words = describe(STATUS, "r1", report, true);
-  assert.deepEqual([words.title, words.detail], ["Stopping", "Ann has control."]);
+  const shown = describe(STATUS, "r1", report, true);
+  assert.deepEqual([shown.title, shown.detail], ["Stopping", "Ann has control."]);
 });
 
 test("speeds are shown with their sign, and a driven robot at standstill as blocked", () => {
@@ -190,21 +190,21 @@ test("the speed limit is shown with its reason", () => {
 
 test("a failed stop hook is shown in every state of a connected robot", () => {
   const hooks = ["stop hook /e_stop: refused", "stop hook /lock: no answer within 2 s"];
-  const words = "Stop hook /e_stop: refused. Stop hook /lock: no answer within 2 s.";
+  const failures = "Stop hook /e_stop: refused. Stop hook /lock: no answer within 2 s.";
   const detail = (more, status = {}) =>
     describe({ ...STATUS, ...status }, "r1", { ...REPORT, hooks, ...more }, true).detail;
   const stop = { by: "Ann", confirmed: true, why: "" };
   const latched = { state: "stopped", doing: "stopped", latched: true, stop };
-  assert.equal(detail(latched), `By Ann, confirmed by odometry. ${words}`);
-  assert.equal(detail({}, { taking: true }), words);
+  assert.equal(detail(latched), `By Ann, confirmed by odometry. ${failures}`);
+  assert.equal(detail({}, { taking: true }), failures);
   const driving = detail({ ...ME, ...DRIVING }, { driven: "r1" });
-  assert.equal(driving, `0.00 m/s, 0.00 rad/s. ${words}`);
+  assert.equal(driving, `0.00 m/s, 0.00 rad/s. ${failures}`);
   assert.equal(detail({}, { link: "connecting" }), "Connecting.");
 });
 
 test("another program that publishes velocities is shown in every state", () => {
   const other_writer = "another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s)";
-  const said = "Another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s).";
+  const warning = "Another program publishes to /cmd_vel (0.10 m/s, -0.20 rad/s).";
   const mine = { ...STATUS, driven: "r1", settled: true };
   const stop = { by: "Ann", confirmed: true, why: "", id: "s1" };
   const states = [
@@ -214,9 +214,9 @@ test("another program that publishes velocities is shown in every state", () => 
     [STATUS, { state: "stopped", doing: "stopped", latched: true, stop }, "STOP active"],
   ];
   for (const [status, more, title] of states) {
-    const words = describe(status, "r1", { ...REPORT, other_writer, ...more }, true);
-    assert.equal(words.title, title);
-    assert.ok(words.detail.endsWith(said), words.detail);
+    const shown = describe(status, "r1", { ...REPORT, other_writer, ...more }, true);
+    assert.equal(shown.title, title);
+    assert.ok(shown.detail.endsWith(warning), shown.detail);
     const alone = describe(status, "r1", { ...REPORT, ...more }, true);
     assert.ok(!alone.detail.includes("nother program"));
   }

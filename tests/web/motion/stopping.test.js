@@ -35,12 +35,12 @@ function report(fields = {}) {
   };
 }
 
-/** Stop r1 at time 0, hear one report at `at`, and return the verdict at `now`. */
-function verdict(heard, at, now, connected = true) {
+/** Stop r1 at time 0, receive one report at `at`, and return the verdict at `now`. */
+function verdict(reported, at, now, connected = true) {
   const stopping = new Stopping();
   stopping.start("r1", new Map(), 0);
-  if (heard) stopping.report(heard, at);
-  const robots = new Map(heard ? [["r1", heard]] : []);
+  if (reported) stopping.report(reported, at);
+  const robots = new Map(reported ? [["r1", reported]] : []);
   return stopping.verdicts(robots, connected, now)[0];
 }
 
@@ -113,32 +113,32 @@ describe("a STOP for all robots before any robot is known", () => {
   const latched = { state: "stopped", latched: true };
   const free = { state: "free", latched: false };
 
-  /** Stop all at time 0, and return what is said at `now` of the robots heard of. */
-  function verdicts(heard, now, connected = true) {
+  /** Stop all at time 0, and return the verdicts at `now` after some reports. */
+  function verdicts(reports, now, connected = true) {
     const stopping = new Stopping();
     stopping.start("*", new Map(), 0);
     const robots = new Map();
-    for (const [at, said] of heard) {
-      robots.set(said.robot, said);
-      stopping.report(said, at);
+    for (const [at, reported] of reports) {
+      robots.set(reported.robot, reported);
+      stopping.report(reported, at);
     }
     return stopping.verdicts(robots, connected, now);
   }
 
   test("is shown as not confirmed", () => {
-    const [unheard, ...others] = verdicts([], 10, false);
+    const [unknown, ...others] = verdicts([], 10, false);
     assert.deepEqual(others, []);
-    assert.equal(unheard.name, "All robots");
-    assert.match(unheard.text, /^NOT CONFIRMED: no connection/);
+    assert.equal(unknown.name, "All robots");
+    assert.match(unknown.text, /^NOT CONFIRMED: no connection/);
     const [silent] = verdicts([], ANSWER_PATIENCE + 1);
     assert.equal(silent.text, "NOT CONFIRMED: no answer from the gate");
   });
 
   test("applies to robots that are reported before the answer", () => {
     const two = report({ ...free, robot: "r2" });
-    const said = verdicts([[10, report(free)], [11, two]], ANSWER_PATIENCE);
+    const shown = verdicts([[10, report(free)], [11, two]], ANSWER_PATIENCE);
     assert.deepEqual(
-      said.map(({ robot, state }) => [robot, state]),
+      shown.map(({ robot, state }) => [robot, state]),
       [["r1", "stopping"], ["r2", "stopping"]],
     );
     const later = verdicts([[10, report(free)], [11, two]], ANSWER_PATIENCE + 1);
@@ -148,9 +148,9 @@ describe("a STOP for all robots before any robot is known", () => {
   test("does not apply to a robot that is reported after the answer", () => {
     const later = report({ ...free, robot: "r2" });
     const stopped = report({ ...latched, stop: { by: "Ann", confirmed: true, why: "" } });
-    const said = verdicts([[10, report(free)], [20, stopped], [30, later]], 40);
+    const shown = verdicts([[10, report(free)], [20, stopped], [30, later]], 40);
     assert.deepEqual(
-      said.map(({ robot, state }) => [robot, state]),
+      shown.map(({ robot, state }) => [robot, state]),
       [["r1", "confirmed"]],
     );
   });
@@ -165,21 +165,22 @@ describe("a STOP for all robots before any robot is known", () => {
 });
 
 describe("a latched STOP", () => {
-  const word = (confirmed, why = "") => ({ by: "Ann", confirmed, why });
+  const stopOf = (confirmed, why = "") => ({ by: "Ann", confirmed, why });
   const latched = (fields) => report({ state: "stopped", latched: true, ...fields });
 
   test("is confirmed by the gate", () => {
-    const said = latched({ measured: null, stop: word(true) });
-    assert.equal(verdict(said, 100, 200).state, "confirmed");
+    const stopped = latched({ measured: null, stop: stopOf(true) });
+    assert.equal(verdict(stopped, 100, 200).state, "confirmed");
   });
 
   test("is not confirmed while the gate still checks, even if odometry shows standstill", () => {
-    assert.equal(verdict(latched({ stop: word(null) }), 100, 200).state, "stopping");
+    assert.equal(verdict(latched({ stop: stopOf(null) }), 100, 200).state, "stopping");
   });
 
   test("that is not confirmed shows the reason of the gate", () => {
-    const said = latched({ stop: word(false, "no connection to ws://bob") });
-    assert.equal(verdict(said, 100, 200).text, "NOT CONFIRMED: no connection to ws://bob");
+    const stopped = latched({ stop: stopOf(false, "no connection to ws://bob") });
+    const { text } = verdict(stopped, 100, 200);
+    assert.equal(text, "NOT CONFIRMED: no connection to ws://bob");
   });
 
   test("is not answered by a report that is not latched", () => {
@@ -189,7 +190,7 @@ describe("a latched STOP", () => {
 
   test("sent again needs no new answer", () => {
     const stopping = new Stopping();
-    const robots = new Map([["r1", latched({ stop: word(true) })]]);
+    const robots = new Map([["r1", latched({ stop: stopOf(true) })]]);
     stopping.start("r1", robots, 0);
     assert.equal(stopping.verdicts(robots, true, 400)[0].state, "confirmed");
   });
@@ -197,17 +198,17 @@ describe("a latched STOP", () => {
   test("is removed by its Reset", () => {
     const stopping = new Stopping();
     stopping.start("r1", new Map(), 0);
-    stopping.report(latched({ stop: word(false, "no odometry") }), 50);
+    stopping.report(latched({ stop: stopOf(false, "no odometry") }), 50);
     stopping.report(report({ state: "free", latched: false, stop: null }), 100);
     assert.deepEqual(stopping.verdicts(new Map(), true, 5000), []);
   });
 
   test("is shown with its operator and its confirmation", () => {
     const text = (stop) => stopText(latched({ stop })).text;
-    assert.equal(text(word(true)), "By Ann, confirmed by odometry.");
-    assert.equal(text(word(null)), "By Ann, waiting for odometry to confirm.");
-    assert.equal(text(word(false, "no odometry")), "By Ann: no odometry.");
-    assert.equal(text({ ...word(true), by: "" }), "Confirmed by odometry.");
+    assert.equal(text(stopOf(true)), "By Ann, confirmed by odometry.");
+    assert.equal(text(stopOf(null)), "By Ann, waiting for odometry to confirm.");
+    assert.equal(text(stopOf(false, "no odometry")), "By Ann: no odometry.");
+    assert.equal(text({ ...stopOf(true), by: "" }), "Confirmed by odometry.");
     assert.equal(text(null), "");
   });
 
@@ -216,49 +217,49 @@ describe("a latched STOP", () => {
     const text = (confirmed, why) =>
       stopText(latched({ stop: { by: "Ann", confirmed, why: `${why}; ${forgotten}` } }))
         .text;
-    const said = "stopped, confirmed by odometry";
-    assert.equal(text(true, said), `By Ann, confirmed by odometry; ${forgotten}.`);
+    const reason = "stopped, confirmed by odometry";
+    assert.equal(text(true, reason), `By Ann, confirmed by odometry; ${forgotten}.`);
     assert.equal(text(null, ""), `By Ann, waiting for odometry to confirm; ${forgotten}.`);
-    const stop = { by: "Ann", confirmed: true, why: `${said}; ${forgotten}` };
-    assert.equal(verdict(latched({ stop }), 100, 200).text, `${said}; ${forgotten}`);
+    const stop = { by: "Ann", confirmed: true, why: `${reason}; ${forgotten}` };
+    assert.equal(verdict(latched({ stop }), 100, 200).text, `${reason}; ${forgotten}`);
   });
 
   test("is listed beside STOP ALL", () => {
-    const one = latched({ stop: word(true) });
-    const doubtful = latched({ stop: word(false, "no odometry") });
+    const one = latched({ stop: stopOf(true) });
+    const doubtful = latched({ stop: stopOf(false, "no odometry") });
     assert.equal(standingStops([report()]), "");
     assert.equal(standingStops([one, report()]), "STOP active: Bob.");
     assert.equal(standingStops([doubtful]), "STOP active: Bob, NOT CONFIRMED.");
-    const words = "STOP active: 2 robots, 1 NOT CONFIRMED.";
-    assert.equal(standingStops([one, doubtful]), words);
+    const text = "STOP active: 2 robots, 1 NOT CONFIRMED.";
+    assert.equal(standingStops([one, doubtful]), text);
   });
 });
 
 describe("a robot", () => {
   const driven = report({ state: "driving", sent: GOING, measured: GOING });
-  const told = report({ measured: GOING });
+  const moving = report({ measured: GOING });
 
   function obedience(...reports) {
     const watch = new Obedience();
-    for (const [at, said] of reports) watch.report(said, at);
+    for (const [at, reported] of reports) watch.report(reported, at);
     return watch;
   }
 
   test("that still moves one second after zero does not obey", () => {
-    const watch = obedience([0, driven], [100, told], [900, told]);
+    const watch = obedience([0, driven], [100, moving], [900, moving]);
     assert.deepEqual(watch.disobeying(100 + STAND_PATIENCE), []);
     assert.equal(watch.disobeying(101 + STAND_PATIENCE)[0].name, "Bob");
   });
 
   test("that stood still after zero obeys, even when moving later", () => {
-    const watch = obedience([0, driven], [100, told], [500, report()], [600, told]);
+    const watch = obedience([0, driven], [100, moving], [500, report()], [600, moving]);
     assert.deepEqual(watch.disobeying(5000), []);
   });
 
   test("that drives to a goal obeys", () => {
-    const watch = obedience([0, told], [100, told]);
+    const watch = obedience([0, moving], [100, moving]);
     assert.deepEqual(watch.disobeying(5000), []);
-    const excused = obedience([0, driven], [100, told]);
+    const excused = obedience([0, driven], [100, moving]);
     excused.excuse("r1");
     assert.deepEqual(excused.disobeying(5000), []);
   });
@@ -280,7 +281,7 @@ describe("a failed stop hook", () => {
   });
 
   test("is shown beside STOP ALL", () => {
-    const words = "STOP active: Bob. Stop hooks failed: Bob.";
-    assert.equal(standingStops([failed, report()]), words);
+    const text = "STOP active: Bob. Stop hooks failed: Bob.";
+    assert.equal(standingStops([failed, report()]), text);
   });
 });

@@ -20,22 +20,22 @@ beforeEach(() => {
 });
 
 /**
- * Take steps of 50 ms with a gate that ticks, and acknowledges what it got.
+ * Take steps of 50 ms with a gate that sends ticks and acknowledges commands.
  *
  * @param {number} ms
  * @param {{armed?: boolean, attentive?: boolean, acking?: boolean}} [how]
- * @returns {any[]} What went out.
+ * @returns {any[]} The sent commands.
  */
 function run(ms, { armed = true, attentive = true, acking = true } = {}) {
-  const said = [];
+  const sent = [];
   for (const end = it.now + ms; it.now < end; ) {
     it.now += 50;
     it.stream.look(it.now, attentive, "r1");
-    said.push(...it.stream.step(armed, it.now));
-    const ack = acking ? Number(said.at(-1)?.seq ?? -1) : -1;
+    sent.push(...it.stream.step(armed, it.now));
+    const ack = acking ? Number(sent.at(-1)?.seq ?? -1) : -1;
     it.loops.own.receive(100 + it.now / 50, ack, it.now);
   }
-  return said;
+  return sent;
 }
 
 describe("a stream", () => {
@@ -61,10 +61,10 @@ describe("a stream", () => {
   });
 
   test("is neutral until the gate has received neutral for the settling time", () => {
-    const said = run(600);
-    const first = said.findIndex(({ x }) => x === 1);
+    const sent = run(600);
+    const first = sent.findIndex(({ x }) => x === 1);
     assert.ok(50 * first >= SETTLE, `moved after ${50 * first} ms`);
-    assert.ok(said.slice(first).every(({ x }) => x === 1));
+    assert.ok(sent.slice(first).every(({ x }) => x === 1));
   });
 
   test("stays neutral while the gate acknowledges nothing", () => {
@@ -102,7 +102,7 @@ describe("a stream", () => {
 describe("a stream that moves a robot", () => {
   beforeEach(() => {
     run(600);
-    assert.equal(it.inputs.blocked, false, "it moves");
+    assert.equal(it.inputs.blocked, false, "the inputs drive the robot");
   });
 
   const doubts = {
@@ -125,8 +125,8 @@ describe("a stream that moves a robot", () => {
       happen();
       assert.equal(it.inputs.blocked, true);
       assert.equal(it.stream.settled, false);
-      const [said] = it.stream.step(true, it.now);
-      assert.deepEqual([said.x, said.turn], [0, 0]);
+      const [command] = it.stream.step(true, it.now);
+      assert.deepEqual([command.x, command.turn], [0, 0]);
     });
   }
 

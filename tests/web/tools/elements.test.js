@@ -33,10 +33,10 @@ test("a STOP button sends STOP on every click without a pointer", () => {
   const button = makeButton();
   button.fire("click", { pointerId: -1 });
   assert.equal(button.stops, 1);
-  // That of a finger beside another one ends in no click.
+  // The press of a second finger does not end in a click.
   button.fire("pointerdown", { button: 0, pointerId: 7 });
   button.fire("click", { pointerId: -1 });
-  // Some browsers do not say whose click it is: once too often is no harm.
+  // Some browsers give no pointer ID for a click; one STOP too many is no harm.
   button.fire("click");
   assert.equal(button.stops, 4);
 });
@@ -54,7 +54,7 @@ test("a click after a pointerleave or without its own pointerdown sends STOP", (
   const mouse = { button: 0, pointerId: 1, pointerType: "mouse" };
   button.fire("pointerdown", mouse);
   button.fire("click", mouse);
-  // While another mouse button is held a press is told by its click alone.
+  // While another mouse button is held, a press sends only a click event.
   button.fire("click", mouse);
   assert.equal(button.stops, 2);
   button.fire("pointerdown", mouse);

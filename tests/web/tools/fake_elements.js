@@ -1,4 +1,4 @@
-/** As much of an element as buttons and drawings need; its document makes these alone. */
+/** A fake element with the parts that buttons and drawings need. */
 export class FakeElement extends EventTarget {
   constructor() {
     super();
@@ -31,7 +31,7 @@ export class FakeElement extends EventTarget {
     return null;
   }
 
-  /** Have something happen to it. */
+  /** Dispatch an event of some kind. */
   fire(kind, fields = {}) {
     this.dispatchEvent(Object.assign(new Event(kind), fields));
   }

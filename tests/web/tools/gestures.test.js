@@ -8,7 +8,7 @@ const VIEW = { a: 40, b: 5, c: 5, d: -40, e: 300, f: 200 };
 const ZOOM = { min: 1, max: 2000 };
 const wheel = { deltaX: 0, deltaY: 0, deltaMode: 0, ctrlKey: false, shiftKey: false };
 
-/** Numbers in [low, high) that are the same in every run. */
+/** Pseudo-random numbers in [low, high), the same in every run. */
 function* random(low, high, seed = 1) {
   for (let state = seed; ;) {
     state = (state * 48271) % 2147483647;

@@ -1,12 +1,12 @@
 import { afterEach, beforeEach, mock } from "node:test";
 
-/** Let what waits for nothing but promises go on. */
+/** Let code that waits only for promises continue. */
 export const settle = () => new Promise((resolve) => setImmediate(resolve));
 
 /**
  * Hold back every timeout of a file's tests.
  *
- * @returns {(times?: number) => Promise<void>} Lets those end that are waiting, so often.
+ * @returns {(times?: number) => Promise<void>} Ends all waiting timeouts.
  */
 export function holdTimeouts() {
   let held = [];

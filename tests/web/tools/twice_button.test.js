@@ -12,7 +12,7 @@ beforeEach(() => {
 });
 afterEach(() => mock.restoreAll());
 
-/** A button to reset these robots that was pressed once, and what was reset. */
+/** A reset button for these robots that was pressed once, and the resets. */
 function pressedOnce(robots) {
   const reset = [];
   const button = new TwiceButton("own", "Reset", "Again", (meant) => reset.push(...meant));
