@@ -38,7 +38,7 @@ demo: $(INSTALLED)
 
 ## test: everything: lint, types, contracts, unit, property, browser and peer tests, docs
 .PHONY: test
-test: check test-web test-gate test-python docs
+test: lint test-web test-gate test-plain test-beside test-serial
 
 ## check: lint, types, import contracts, generated files
 .PHONY: check
@@ -94,12 +94,26 @@ test-gate: $(DEV)
 	  --cov --cov-config=tests/gate/coverage.toml --cov-fail-under=100
 
 ## test-python: pytest without test-gate; tests that measure time run at the end
-.PHONY: test-python test-parallel test-serial
-test-python: test-parallel test-serial
+.PHONY: test-python test-plain test-schedules test-browser test-beside test-serial
+test-python: test-plain test-schedules test-browser test-serial
+SCHEDULES := tests/gate/test_gate_machine.py
+test-plain: $(DEV)
+	$(PY) tools/pytest_beside.py $(WAITING_JOBS) -m "not browser and not serial" \
+	  $(addprefix --ignore ,$(WITH_GATE) $(SCHEDULES))
+test-schedules: $(DEV)
+	$(BIN)/pytest -q $(SCHEDULES)
 WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | sort)
-test-parallel: $(DEV) $(NODE)
-	$(PY) tools/pytest_beside.py $(WAITING_JOBS) -m "not browser and not serial" $(addprefix --ignore ,$(WITH_GATE))
+test-browser: $(DEV) $(NODE)
 	$(PY) tools/pytest_beside.py $(JOBS) -m "browser and not serial" $(WITH_BROWSER)
+# Tests with a browser leave an eighth of the processors' time. Linux gives that time, and
+# no other, to what only computes.
+COMPUTING := types contracts test-schedules docs
+test-beside: $(DEV) $(NODE)
+	failed=0; log=$$(mktemp); \
+	chrt --idle 0 $(MAKE) --no-print-directory $(COMPUTING) >"$$log" 2>&1 & computing=$$!; \
+	$(MAKE) --no-print-directory test-browser || failed=1; \
+	wait $$computing || failed=1; \
+	cat "$$log"; rm "$$log"; exit $$failed
 # Tests that measure time wait most of the time, so two files of them run in parallel on
 # any machine, the longest first. Safety tests allow for the delays of the machine and do
 # not run again; the other tests run a second time if they fail. Tests under load run alone.
@@ -110,7 +124,7 @@ OF_TIME := $(sort $(filter-out tests/safety/%,$(shell grep -rl --include='test_*
 test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial -n 2 --dist loadfile $(OF_MOTION)
 	$(BIN)/pytest -q -m serial $(ALONE)
-	$(PY) tools/pytest_beside.py 2 -m serial $(OF_TIME)
+	$(PY) tools/pytest_beside.py 3 -m serial $(OF_TIME)
 
 ## test-safety: long tests of the motion guarantees, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
 .PHONY: test-safety

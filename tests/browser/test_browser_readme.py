@@ -60,7 +60,8 @@ def test_the_program_of_the_readme_shows_a_robot_that_can_be_selected_and_driven
                 ".getBoundingClientRect().width > before * 1.2",
                 arg=16,
             )
-            # The panel for driving leaves most of a small map free.
+            # Without control, the panel for driving leaves most of a small map free.
+            tab.get_by_role("button", name="Release control").click()
             tab.set_viewport_size({"width": 700, "height": 500})
             tab.wait_for_function(
                 """() => {
