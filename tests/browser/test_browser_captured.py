@@ -5,6 +5,7 @@ import json
 import math
 import re
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -109,8 +110,12 @@ def expect_recorded(tab, name: str, dialect: str) -> None:
         (x + cos * u - sin * v, y + sin * u + cos * v)
         for u, v in recorded_dots(dialect)
     ]
-    dots = dots_in_world(tab, robot(name))
-    assert len(dots) == len(expected) > 500
+    # There are fewer dots before the view is fitted to the robots.
+    deadline = time.monotonic() + 10.0
+    while len(dots := dots_in_world(tab, robot(name))) != len(expected):
+        assert time.monotonic() < deadline, f"{len(dots)} dots, not {len(expected)}"
+        tab.wait_for_timeout(100)
+    assert len(dots) > 500
     for dot, place in zip(dots, expected, strict=True):
         assert dot == pytest.approx(place, abs=0.003)
 

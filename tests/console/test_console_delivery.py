@@ -108,8 +108,10 @@ class Loading:
             self.first_picture = min(self.first_picture, event["timestamp"])
 
     def _wrote(self, event: dict) -> None:
-        if event["timestamp"] < self.first_picture:
-            self.asked.append(event["response"]["payloadData"])
+        text = event["response"]["payloadData"]
+        # Until it is reloaded, the page before still acknowledges its frames.
+        if event["timestamp"] < self.first_picture and '"op":"seen"' not in text:
+            self.asked.append(text)
 
     def _finished(self, event: dict) -> None:
         if event["requestId"] not in self.answers:
