@@ -3,19 +3,26 @@
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import IO, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from typing import IO
 
 from webmap.base.children import GRACE, python_command
 
 
-class ChildProcess(NamedTuple):
-    """A process that has written its first line."""
+@dataclass(frozen=True)
+class ChildProcess:
+    """A process whose first line reports that it is ready."""
 
     process: "subprocess.Popen[str]"
     stdin: IO[str]
     """Its standard input; the process ends when this is closed."""
-    line: str
-    """The first line that it wrote; empty if it ended before."""
+
+    @cached_property
+    def line(self) -> str:
+        """The first line, for which this waits; empty if the process ended before."""
+        assert self.process.stdout is not None
+        return self.process.stdout.readline()
 
 
 @contextmanager
@@ -28,10 +35,9 @@ def child_process(module: str, *arguments: object) -> Iterator[ChildProcess]:
         text=True,
         start_new_session=True,
     ) as process:
-        assert process.stdout is not None
         assert process.stdin is not None
         try:
-            yield ChildProcess(process, process.stdin, process.stdout.readline())
+            yield ChildProcess(process, process.stdin)
         finally:
             process.terminate()
             try:

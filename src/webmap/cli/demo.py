@@ -64,7 +64,6 @@ def demo(
     train on such a link.
     """
     import webmap
-    from webmap import console
 
     def serve() -> None:
         webmap.run(
@@ -89,6 +88,8 @@ def demo(
         bad_link(direct, delay, jitter, stall) as url,
         as_file(files("webmap.sim") / "data") as data,
     ):
+        from webmap import console
+
         bridge = webmap.Bridge(url, name="simulator")
         opened = console.open_console(
             [bridge],

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import NoReturn
 
 from webmap.base.child_process import child_process
@@ -32,6 +33,8 @@ def simulator(*arguments: object) -> Iterator[str]:
 
     """
     with child_process("webmap", "sim", "--with-parent", *arguments) as started:
+        # Both take half a second, at the same time on two processors.
+        import_module("webmap.console")
         if not started.line.startswith(READY):
             _give_up(started.process.wait(GRACE))
         yield started.line.removeprefix(READY).strip()
