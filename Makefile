@@ -124,7 +124,7 @@ OF_TIME := $(sort $(filter-out tests/safety/%,$(shell grep -rl --include='test_*
 test-serial: $(DEV) $(NODE)
 	$(BIN)/pytest -q -m serial -n 2 --dist loadfile $(OF_MOTION)
 	$(BIN)/pytest -q -m serial $(ALONE)
-	$(PY) tools/pytest_beside.py 3 -m serial $(OF_TIME)
+	$(PY) tools/pytest_beside.py 2 -m serial $(OF_TIME)
 
 ## test-safety: long tests of the motion guarantees, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
 .PHONY: test-safety
