@@ -105,8 +105,8 @@ test-schedules: $(DEV)
 WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | sort)
 test-browser: $(DEV) $(NODE)
 	$(PY) tools/pytest_beside.py $(JOBS) -m "browser and not serial" $(WITH_BROWSER)
-# Tests with a browser leave an eighth of the processors' time. Linux gives that time, and
-# no other, to what only computes.
+# Tests with a browser leave an eighth of the processors' time unused. At idle priority,
+# these targets use only that time.
 COMPUTING := types contracts test-schedules docs
 test-beside: $(DEV) $(NODE)
 	failed=0; log=$$(mktemp); \

@@ -33,7 +33,7 @@ def simulator(*arguments: object) -> Iterator[str]:
 
     """
     with child_process("webmap", "sim", "--with-parent", *arguments) as started:
-        # Both take half a second, at the same time on two processors.
+        # The simulator starts meanwhile, which takes half a second as well.
         import_module("webmap.console")
         if not started.line.startswith(READY):
             _give_up(started.process.wait(GRACE))
