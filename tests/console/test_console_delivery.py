@@ -70,11 +70,14 @@ class Loading:
         """When the first frame of the scene arrived, by the time of the browser."""
         self.asked: list[str] = []
         """The messages that the page sent before the first frame of the scene."""
+        self._sockets: set[str] = set()
+        """The sockets of this page; until a reload, the page before has others."""
         session = self._session = page.context.new_cdp_session(page)
         session.on("Network.requestWillBeSent", self._sent)
         session.on("Network.requestServedFromCache", self._from_cache)
         session.on("Network.responseReceived", self._answered)
         session.on("Network.loadingFinished", self._finished)
+        session.on("Network.webSocketCreated", self._opened)
         session.on("Network.webSocketFrameReceived", self._received)
         session.on("Network.webSocketFrameSent", self._wrote)
         session.send("Network.enable")
@@ -103,15 +106,18 @@ class Loading:
         answer.headers = {k.lower(): v for k, v in response["headers"].items()}
         answer.stored |= response.get("fromDiskCache", False)
 
+    def _opened(self, event: dict) -> None:
+        self._sockets.add(event["requestId"])
+
     def _received(self, event: dict) -> None:
-        if event["response"]["opcode"] == BINARY:
+        own = event["requestId"] in self._sockets
+        if own and event["response"]["opcode"] == BINARY:
             self.first_picture = min(self.first_picture, event["timestamp"])
 
     def _wrote(self, event: dict) -> None:
-        text = event["response"]["payloadData"]
-        # Until it is reloaded, the page before still acknowledges its frames.
-        if event["timestamp"] < self.first_picture and '"op":"seen"' not in text:
-            self.asked.append(text)
+        own = event["requestId"] in self._sockets
+        if own and event["timestamp"] < self.first_picture:
+            self.asked.append(event["response"]["payloadData"])
 
     def _finished(self, event: dict) -> None:
         if event["requestId"] not in self.answers:
