@@ -284,9 +284,10 @@ def test_robots_whose_state_is_the_same_set_no_attribute_of_their_lines(
     def scenario(page):
         (listed,) = [m for m in page.maps[0].modules if isinstance(m, RobotList)]
         listed.poll()
-        monkeypatch.setattr(Element, "set", lambda *args, **given: pytest.fail("set"))
-        listed.poll()
-        for robot in robots:
-            robot.notify_modules("on_report", None)
+        with monkeypatch.context() as patch:
+            patch.setattr(Element, "set", lambda *args, **given: pytest.fail("set"))
+            listed.poll()
+            for robot in robots:
+                robot.notify_modules("on_report", None)
 
     on_a_page(scenario, bridge, robots)

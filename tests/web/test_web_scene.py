@@ -196,6 +196,37 @@ def test_dots_are_squares_of_the_size_in_the_style(host, tab):
     assert matrix(tab, ".dot") == pytest.approx([0.01, 0, 0, 0.01, 3, 4])
 
 
+def test_new_elements_with_classes_do_not_make_the_page_read_the_size_of_dots(
+    host, tab
+):
+    def build(shown):
+        _, world, mount = shown.add_map()
+        shown.robot, _ = shown.add_robot(world, mount)
+        dots = svg.path(class_="dot")
+        dots.set_dots(struct.pack("<2h", 0, 0), 0.001)
+        shown.robot.append(dots)
+
+    host.build = build
+    tab.add_init_script(
+        """globalThis.read = 0;
+        const { getPropertyValue } = CSSStyleDeclaration.prototype;
+        CSSStyleDeclaration.prototype.getPropertyValue = function (name) {
+          globalThis.read += name === "--dot-size";
+          return getPropertyValue.call(this, name);
+        };"""
+    )
+    tab.goto(host.url)
+    tab.wait_for_selector(".dot[d]", state="attached")
+    tab.wait_for_timeout(500)
+    before = tab.evaluate("read")
+    for number in range(3):
+        host.call(host.one.robot.append, svg.circle(class_=f"new n{number}"))
+        tab.wait_for_selector(f".n{number}", state="attached")
+    assert tab.evaluate("read") == before
+    host.call(host.one.robot.classes.add, "thick")
+    wait(tab, f"read === {before + 1}")
+
+
 def test_a_page_has_no_dots_of_a_layer_that_it_does_not_show(host, tab):
     points = struct.pack("<4h", 1000, 2000, -1000, 0)
 

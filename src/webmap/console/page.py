@@ -120,7 +120,12 @@ def build(
     map.add_module("ScaleBar")
     map.add_module("PointerReadout")
     frame = map.add_module(Frame, title, floor)
-    listed = map.add_module(RobotList, page.element("robots"))
+    listed = map.add_module(
+        RobotList,
+        page.element("robots"),
+        none=page.element("no-robots"),
+        search=page.element("search-part"),
+    )
     most = (SPEED, ROTATION_SPEED)
     at = page.element("card")
     card = map.add_module(

@@ -88,6 +88,7 @@ class RobotCard:
         self._x, self._y, self._heading = html.span(), html.span(), html.span()
         self._age = html.dd(class_="age")
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
+        self.element.set_age(math.inf, limit=AGE_LIMIT)
         self._battery = html.dd()
         self._goal = GoalLine()
         self._cameras = CameraViews()
@@ -112,7 +113,7 @@ class RobotCard:
         self.element.set("data-robot", robot.id)
         self._name.set("title", robot.name).text = robot.name
         self._battery.text = "unknown"
-        self._age.set_age(math.inf)
+        self._show_age(math.inf)
         self._feed = robot.add_module(lambda owner: Feed(owner, self))
         self._cameras.show(robot)
         for module in robot.modules:
@@ -128,7 +129,11 @@ class RobotCard:
             self._cameras.poll()
             age = self._robot.pose_age
             if age is not None:
-                self._age.set_age(age)
+                self._show_age(age)
+
+    def _show_age(self, age: float) -> None:
+        for element in (self.element, self._age):
+            element.set_age(age)
 
     def show_pose(self) -> None:
         """Show the robot's pose."""

@@ -16,6 +16,9 @@ FULL = 18.0
 AGE_LIMIT = 1.0
 """Seconds after which a pose is shown as stale."""
 
+FEW = 8
+"""Robots that need no search."""
+
 
 class BatteryMark:
     """A battery symbol that shows the robot's charge, with the percentage beside it."""
@@ -51,11 +54,17 @@ class RobotList:
     Args:
         map: The map.
         element: The page's ``ul``.
+        none: What the page shows without robots.
+        search: What the page shows with many robots.
     """
 
-    def __init__(self, map: "Map", element: "Element") -> None:
+    def __init__(
+        self, map: "Map", element: "Element", *, none: "Element", search: "Element"
+    ) -> None:
         self.map = map
         self.element = element
+        self._none = none
+        self._search = search
         self._rows: dict[int, Row] = {}
         for robot in map.robots:
             self.on_add_robot(robot)
@@ -71,12 +80,14 @@ class RobotList:
         self._rows[id(robot)] = row
         self.element.append(row.element)
         row.on_state()
+        self._show_count()
 
     def on_remove_robot(self, robot: "Robot") -> None:
         """Remove the robot's line."""
         row = self._rows.pop(id(robot), None)
         if row is not None:
             robot.remove_module(row)
+        self._show_count()
 
     def on_select(self) -> None:
         """Mark the line of the selected robot."""
@@ -92,6 +103,10 @@ class RobotList:
         """Update the values without a trigger: ages, and lost connections."""
         for row in self._rows.values():
             row.poll()
+
+    def _show_count(self) -> None:
+        self._none.set(hidden=bool(self._rows))
+        self._search.set(hidden=len(self._rows) <= FEW)
 
 
 class Row:
@@ -130,6 +145,7 @@ class Row:
         self.element = html.li(self._button, label, class_="row")
         self.element.set("data-robot", robot.id)
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
+        self.element.set_age(math.inf, limit=AGE_LIMIT)
         self._shown: tuple[object, ...] | None = None
 
     def destroy(self) -> None:
@@ -177,12 +193,14 @@ class Row:
     def show_marked(self, marked: bool) -> None:
         """Tick the box if the robot is also selected for goals."""
         self._besides.set(checked=marked)
+        self.element.set("data-marked", "" if marked else None)
 
     def poll(self) -> None:
         """Update the age of the pose, and the state of the connection."""
         age = self.robot.pose_age
         if age is not None:
             self._age.set_age(age)
+            self.element.set_age(age)
         self.on_state()
 
 

@@ -1,5 +1,6 @@
 import { resolve } from "./addresses.js";
 import { BOOLEAN_ATTRIBUTES } from "./opcodes.js";
+import { setText } from "./tools/elements.js";
 
 /** @typedef {import('./wire.js').Matrix} Matrix */
 
@@ -252,7 +253,7 @@ export class Item {
     if (!this.crowd?.hides(this) && element.getAttribute("data-age") !== seconds) {
       element.setAttribute("data-age", seconds);
     }
-    if (text !== null && element.textContent !== text) element.textContent = text;
+    if (text !== null) setText(element, text);
   }
 }
 
@@ -326,6 +327,11 @@ export class Dots {
   forget(item) {
     this._all.delete(item);
     this._undrawn.delete(item);
+  }
+
+  /** @param {Item} item */
+  has(item) {
+    return this._all.has(item);
   }
 
   /** @returns {number[]} The ids of elements that are shown at no place of the page. */

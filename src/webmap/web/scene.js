@@ -461,8 +461,7 @@ export class Scene {
         this._arrived.add(item);
       }
     });
-    this._redraw();
-    this._dots.restyle();
+    this._restyle(id);
     this._reselected = true;
   }
 
@@ -473,8 +472,20 @@ export class Scene {
    */
   style(id, name, value) {
     this._each(id, (item) => item.setStyle(name, value));
+    this._restyle(id);
+  }
+
+  /**
+   * Note a new look of an element. The dots in it may have another size then; an element
+   * that is new, or is empty, has none.
+   *
+   * @param {number} id
+   */
+  _restyle(id) {
     this._redraw();
-    this._dots.restyle();
+    this._each(id, (item) => {
+      if (item.element.firstElementChild || this._dots.has(item)) this._dots.restyle();
+    });
   }
 
   /**

@@ -9,7 +9,11 @@ beforeEach(() => {
   reported = [];
   globalThis.window = new EventTarget();
   globalThis.Element = class {};
-  globalThis.document = { querySelector: () => null, querySelectorAll: () => [] };
+  globalThis.document = {
+    getElementsByTagName: () => [],
+    querySelector: () => null,
+    querySelectorAll: () => [],
+  };
   globalThis.reportError = (error) => reported.push(error);
 });
 

@@ -132,6 +132,7 @@ class RobotList {
     const rows = this._rows();
     const long = rows.length > MANY || rows.some(({ tag }) => tag);
     setHidden(byId("robot-tools"), !long);
+    byId("robots-part").classList.toggle("long", long);
     this._order.value = orderFor(this.choice.order, rows.length);
     this._group.value = this.choice.group;
     const states = long ? this.choice.states : [];

@@ -27,8 +27,19 @@ export function takesKeys(target) {
   );
 }
 
-/** Elements that cover the page, or forbid driving while open (`data-hands-off`). */
-const COVERS = ":modal, dialog[open][data-hands-off]";
+/**
+ * Called with each tick, so it looks at dialogs alone: a search for `:modal` looks at all
+ * elements of the page.
+ *
+ * @returns {boolean} Whether an element covers the page, or an open dialog forbids driving
+ *     (`data-hands-off`).
+ */
+function isCovered() {
+  if (document.fullscreenElement?.matches(":modal")) return true;
+  return [...document.getElementsByTagName("dialog")].some(
+    (dialog) => dialog.open && (dialog.matches(":modal") || "handsOff" in dialog.dataset),
+  );
+}
 
 /** @returns {boolean} Whether inputs may move a robot now. */
 export function attentive() {
@@ -36,7 +47,7 @@ export function attentive() {
     document.visibilityState === "visible" &&
     document.hasFocus() &&
     !takesKeys(document.activeElement) &&
-    document.querySelector(COVERS) === null
+    !isCovered()
   );
 }
 

@@ -92,13 +92,17 @@ export function stopButton(className, label, act) {
 
 /**
  * Set an element's text only if it differs: a screen reader reads a live region again
- * at every change.
+ * at every change. A text node that is there already is changed: another node would make
+ * the browser evaluate every `:has()` again.
  *
  * @param {Element} element
  * @param {string} text
  */
 export function setText(element, text) {
-  if (element.textContent !== text) element.textContent = text;
+  if (element.textContent === text) return;
+  const { firstChild: only } = element;
+  if (text !== "" && only?.nodeName === "#text" && !only.nextSibling) only.nodeValue = text;
+  else element.textContent = text;
 }
 
 /**

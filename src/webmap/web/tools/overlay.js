@@ -25,8 +25,7 @@ export function lay(map, panel, corner, place = "") {
   const own = ownPlace(place) ?? (corner ? ownCorner(corner) : null);
   if (own) {
     own.append(panel);
-    const next = [...own.children].find((other) => placeOf(other) > placeOf(panel));
-    if (next) own.insertBefore(panel, next);
+    sortSoon(own);
     return () => panel.remove();
   }
   const overlay = overlays.get(map) ?? new Overlay(map);
@@ -38,6 +37,35 @@ export function lay(map, panel, corner, place = "") {
     overlay.destroy();
     overlays.delete(map);
   };
+}
+
+/** @type {Set<Element>} The page's own elements with panels that are not in order yet. */
+const unsorted = new Set();
+
+/**
+ * Sort panels before the browser paints them: each reading of a place makes the browser
+ * compute styles, so all are read at once.
+ *
+ * @param {Element} own
+ */
+function sortSoon(own) {
+  if (unsorted.size === 0) requestAnimationFrame(sortAll);
+  unsorted.add(own);
+}
+
+function sortAll() {
+  const sorted = [...unsorted].map((own) => {
+    const panels = [...own.children].map((panel) => ({ panel, place: placeOf(panel) }));
+    return { own, panels: panels.sort((one, other) => one.place - other.place) };
+  });
+  unsorted.clear();
+  for (const { own, panels } of sorted) {
+    panels.forEach(({ panel }, index) => {
+      const there = own.children[index];
+      // A panel that is moved loses the focus.
+      if (there !== panel) own.insertBefore(panel, there ?? null);
+    });
+  }
 }
 
 /**
@@ -98,16 +126,12 @@ class Overlay {
     // Set here, because the style sheet may be loaded after the first measurement.
     Object.assign(this.element.style, { position: "absolute", left: "0", top: "0" });
     const host = svg.parentElement;
-    if (host && getComputedStyle(host).position === "static") {
-      // So that the overlay moves with the host.
-      host.style.position = "relative";
-    }
     svg.after(this.element);
     this._frame.addEventListener("toggle", makeRoom, { capture: true });
+    // It is called before the next paint, too.
     this._observer = new ResizeObserver(() => this._place());
     this._observer.observe(svg);
     if (host) this._observer.observe(host);
-    this._place();
   }
 
   /** Whether nothing is over the map any more. */
@@ -135,6 +159,11 @@ class Overlay {
 
   _place() {
     const { style } = this.element;
+    const host = this._svg.parentElement;
+    if (host && getComputedStyle(host).position === "static") {
+      // So that the overlay moves with the host.
+      host.style.position = "relative";
+    }
     const map = this._svg.getBoundingClientRect();
     const now = this.element.getBoundingClientRect();
     style.left = `${Number.parseFloat(style.left) + map.left - now.left}px`;
