@@ -1,10 +1,12 @@
 import pytest
 
-from webmap.server.html import base_of, make_page, prepare_page
+from webmap.server.html import NEXT, base_of, make_page, prepare_page
 from webmap.server.modules import STARTS
 
 PRELOADS = "".join(
-    f'<link rel="modulepreload" href="/_webmap/{name}">' for name in STARTS
+    f'<link rel="{"modulepreload" if name in STARTS[:2] else NEXT}" '
+    f'href="/_webmap/{name}">'
+    for name in STARTS
 )
 SHEET = '<link rel="stylesheet" href="/_webmap/web/webmap.css">' + PRELOADS
 SCRIPT = "".join(

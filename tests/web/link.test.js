@@ -1,5 +1,6 @@
 import assert from "node:assert/strict";
 import { mock, test } from "node:test";
+import { gzipSync } from "node:zlib";
 
 /** A socket without a network: it never opens. */
 class Hanging {
@@ -82,6 +83,43 @@ test("a link takes over an open socket, and what came before with its times", as
   assert.deepEqual(reported, [], "events come after the constructor");
   await Promise.resolve();
   assert.deepEqual(reported, ["opened", [3, 20], [4, 70]]);
+});
+
+/** @returns A link whose first socket received these messages, and its reports. */
+async function linkWith(t, messages) {
+  const received = messages.map((data, at) => ({ data: Uint8Array.from(data).buffer, at }));
+  const socket = Object.assign(new Hanging(), { readyState: Hanging.OPEN });
+  const made = makeLink(t, { socket, received });
+  await Promise.resolve();
+  return made;
+}
+
+/** Wait for a number of reports. */
+async function until(reported, count) {
+  for (let turns = 0; reported.length < count && turns < 10_000; turns++) {
+    await new Promise((done) => setImmediate(done));
+  }
+}
+
+test("messages after a compressed one wait for it", async (t) => {
+  const messages = [gzipSync(new Uint8Array(5000)), [1, 2, 3], [4, 5]];
+  const { reported } = await linkWith(t, messages);
+  await until(reported, 4);
+  assert.deepEqual(reported, ["opened", [5000, 0], [3, 1], [2, 2]]);
+});
+
+test("a compressed message that is damaged is passed on as it came", async (t) => {
+  const damaged = gzipSync(new Uint8Array(5000)).subarray(0, 12);
+  const { reported } = await linkWith(t, [damaged, [1]]);
+  await until(reported, 3);
+  assert.deepEqual(reported, ["opened", [12, 0], [1, 1]]);
+});
+
+test("a compressed message of a lost connection is dropped", async (t) => {
+  const { link, reported } = await linkWith(t, [gzipSync(new Uint8Array(5000))]);
+  link.renew();
+  await until(reported, 3);
+  assert.deepEqual(reported, ["opened", "no answer"]);
 });
 
 test("a link waits for a first socket that still opens", async (t) => {

@@ -15,6 +15,9 @@ from webmap.server.access import KEY
 from webmap.server.modules import STARTS
 from webmap.server.own_files import FOLDERS
 
+NEXT = "webmap-next"
+"""The relation of links to the modules that opening.js loads."""
+
 FOLDER = "/_webmap/"
 """The path of WebMap's own files and sockets, under the application's root."""
 
@@ -68,9 +71,15 @@ def make_page(title: str, base: str, key: str | None = None) -> str:
 
 
 def _preloads(base: str) -> str:
-    """Return the elements with which a browser loads all at once, not in turn."""
+    """Return the elements with which a browser loads modules at once, not in turn.
+
+    First those of the picture, with the style sheets. When these are there, opening.js
+    makes the browser load the others.
+    """
     return "".join(
-        f'<link rel="modulepreload" href="{escape(base)}{name}">' for name in STARTS
+        f'<link rel="{rel}" href="{escape(base)}{name}">'
+        for rel, names in (("modulepreload", STARTS[:2]), (NEXT, STARTS[2:]))
+        for name in names
     )
 
 

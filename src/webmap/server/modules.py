@@ -27,7 +27,7 @@ STARTS = (
     "features/stop/stop_button.js",
     "features/drive/teleop.js",
 )
-"""What a page loads at once: its first socket, the picture, the connection to the gate,
+"""What a page loads first: its first socket, the picture, the connection to the gate,
 STOP, driving.
 
 The first one is small: it is served with what it needs itself. What one of the others

@@ -24,6 +24,30 @@ const LONGEST_PATIENCE = 20_000;
  *     the times of `performance.now()`.
  */
 
+/**
+ * @param {ArrayBuffer} data
+ * @returns {boolean} Whether it is compressed with gzip; no frame starts so.
+ */
+function isPacked(data) {
+  const [first, second] = new Uint8Array(data, 0, Math.min(2, data.byteLength));
+  return first === 0x1f && second === 0x8b;
+}
+
+/**
+ * @param {ArrayBuffer} data
+ * @returns {Promise<ArrayBuffer>} Decompressed; unchanged if that fails, so that the
+ *     page reports a message that it cannot read.
+ */
+async function unpacked(data) {
+  if (!isPacked(data)) return data;
+  try {
+    const stream = new Blob([data]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return await new Response(stream).arrayBuffer();
+  } catch {
+    return data;
+  }
+}
+
 /** A WebSocket that reconnects; a message without a connection is dropped. */
 export class Link {
   /**
@@ -120,14 +144,24 @@ export class Link {
       opened = true;
       this._events.opened();
     };
+    /** @type {Promise<void> | null} Of the last message, if it waits. */
+    let last = null;
     /**
      * @param {unknown} data
      * @param {number} at
      */
     const message = (data, at) => {
-      if (this._socket === socket && data instanceof ArrayBuffer) {
-        this._events.received(data, at);
-      }
+      if (!(data instanceof ArrayBuffer)) return;
+      const deliver = (/** @type {ArrayBuffer} */ frame) => {
+        if (this._socket === socket) this._events.received(frame, at);
+      };
+      if (!last && !isPacked(data)) return deliver(data);
+      // Messages that come meanwhile wait, so that all stay in order.
+      const mine = Promise.all([unpacked(data), last]).then(([frame]) => {
+        if (last === mine) last = null;
+        deliver(frame);
+      });
+      last = mine;
     };
     socket.addEventListener("open", open);
     socket.addEventListener("message", ({ data }) => message(data, performance.now()));

@@ -10,6 +10,9 @@ import { LONGEST_TEXTS } from "./constants.js";
 import { protocols, takeIdentity, takeKey } from "./key.js";
 import { containers } from "./sizes.js";
 
+/** The relation of links to modules that a page loads when its first socket opens. */
+const NEXT = "webmap-next";
+
 takeKey();
 
 /** The path of this page, from the application's root. */
@@ -31,6 +34,7 @@ export function sceneAddress() {
     height: innerHeight,
     dpr: devicePixelRatio,
     theme: dark.matches ? "dark" : "light",
+    gzip: "DecompressionStream" in globalThis,
     containers: containers(),
   };
   return socketAddress("scene", { page: path, id, hello: JSON.stringify(hello) });
@@ -41,6 +45,11 @@ const socket = new WebSocket(sceneAddress(), protocols());
 socket.binaryType = "arraybuffer";
 /** @type {Array<{data: unknown, at: number}>} */
 const received = [];
+
+// Loaded after the style sheets and the modules of the picture, on a slow link.
+for (const link of document.querySelectorAll(`link[rel="${NEXT}"]`)) {
+  link.setAttribute("rel", "modulepreload");
+}
 
 /** @param {MessageEvent} message */
 function store({ data }) {

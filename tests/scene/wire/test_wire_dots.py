@@ -73,6 +73,16 @@ class Shown:
         return len(path.get("dots", {}).get("points", ())) // 2
 
 
+def test_a_page_that_opens_gets_its_dots_one_frame_after_the_robots(decoder):
+    shown = Shown()
+    shown.session.attach(shown.root.id, 7, "modules/x.js", {})
+    assert 0 < shown.tick() < 200
+    assert shown.dots(decoder) == 0
+    assert shown.tick() > 200
+    assert shown.dots(decoder) == 360
+    assert shown.tick() == 0
+
+
 def test_dots_out_of_the_view_are_not_sent(decoder):
     shown = Shown(x=100.0)
     shown.view()

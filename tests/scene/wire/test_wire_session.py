@@ -1,3 +1,5 @@
+import gzip
+import json
 import struct
 
 import pytest
@@ -169,6 +171,33 @@ def test_a_restart_sends_the_whole_scene_with_the_choices_of_the_page():
         assert part in first
         assert part in again
     assert struct.pack("<dd", 1, 2) in again
+
+
+def test_a_page_that_reads_gzip_gets_a_large_whole_scene_compressed_and_no_changes():
+    plain, packed = SceneSession(), SceneSession()
+    hello = {"op": "hello", "page": "page-0001", "url": "/", "width": 1, "height": 1}
+    plain.receive(json.dumps(hello))
+    packed.receive(json.dumps({**hello, "gzip": True}))
+    texts = [html.p(text="a long sentence") for _ in range(200)]
+    fragment = Fragment(html.div(*texts))
+    for session in (plain, packed):
+        session.restart()
+        session.mount(fragment, under=0)
+    whole, small = plain.frame(0.0), packed.frame(0.0)
+    assert len(small) < len(whole) / 3
+    assert gzip.decompress(small) == whole
+    texts[0].text = "another sentence " * 200
+    assert plain.frame(0.0) == packed.frame(0.0)
+
+
+def test_a_small_whole_scene_is_not_compressed():
+    session = SceneSession()
+    session.receive(
+        '{"op":"hello","page":"page-0001","url":"/","width":1,"height":1,"gzip":true}'
+    )
+    session.restart()
+    session.mount(Fragment(html.p(text="short")), under=0)
+    assert header(session.frame(0.0))[:2] == (VERSION, RESET)
 
 
 def test_a_restart_allows_two_new_unacknowledged_frames():

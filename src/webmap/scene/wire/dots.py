@@ -1,7 +1,9 @@
 """Which dots a page gets, how exactly, and their bytes, encoded once for all pages.
 
 A page gets the dots of an element while they are near its view and not switched off,
-and no dots otherwise: it must not show old ones when its viewer looks there.
+and no dots otherwise: it must not show old ones when its viewer looks there. A page
+that has just opened gets the dots on its maps one frame after the robots: dots are half
+of the bytes.
 """
 
 import math
@@ -64,6 +66,8 @@ class PageDots:
         self._off: frozenset[int] = frozenset()
         self._empty: set[int] = set()
         self._views: dict[Fragment, list[ViewReport | None]] = {}
+        self._first = True
+        self._held = False
         self.due = False
         """Whether the page may need dots of fragments that did not change."""
 
@@ -86,11 +90,13 @@ class PageDots:
         """Set that the page has nothing, and that all it shows is shown."""
         self._off = frozenset()
         self._empty.clear()
+        self._first = True
         self._look_again()
 
     def sent(self) -> None:
         """Set that the page got the records of all fragments."""
-        self.due = self._finer = False
+        self.due = self._held
+        self._finer = self._first = self._held = False
 
     def _look_again(self) -> None:
         self.due = True
@@ -105,6 +111,10 @@ class PageDots:
 
         """
         if not fragment.dotted:
+            return b""
+        if self._first and self._opens:
+            self._held = True
+            self._empty.update(fragment.dotted)
             return b""
         out: list[bytes] = []
         for element, place in _places(fragment):
@@ -122,6 +132,12 @@ class PageDots:
                 if had is None or max(element._attached, coded.since) > had:
                     out.append(coded.data)
         return b"".join(out)
+
+    @property
+    def _opens(self) -> bool:
+        """Whether the page has not reported the view of any of its maps yet."""
+        views = self._map_views.values()
+        return bool(views) and all(view.report is None for view in views)
 
     def _sees(self, fragment: Fragment, place: "Place | None") -> bool:
         views = self._views.get(fragment)

@@ -60,6 +60,9 @@ class Hello(Message, frozen=True, tag="hello"):
     theme: Literal["light", "dark"] = "light"
     """The preference of the viewer's system."""
 
+    gzip: bool = False
+    """Whether the page reads frames that are compressed with gzip."""
+
     containers: dict[_Name, tuple[float, float]] = {}
     """The width and height of each element with an id in the page, in pixels."""
 

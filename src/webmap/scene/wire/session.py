@@ -4,6 +4,7 @@ import itertools
 import math
 import secrets
 import struct
+import zlib
 from typing import Any
 
 import msgspec
@@ -17,6 +18,7 @@ from webmap.scene.wire.dots import PageDots
 from webmap.scene.wire.encode import delta, encode_changes
 from webmap.scene.wire.messages import (
     ElementEvent,
+    Hello,
     ModuleMessage,
     ModuleReady,
     PageEvent,
@@ -35,6 +37,7 @@ from webmap.scene.wire.page_state import (
 )
 
 _HEADER = struct.Struct("<HBId").pack
+_GZIP = 16 + zlib.MAX_WBITS
 
 
 class SceneSession:
@@ -53,11 +56,18 @@ class SceneSession:
     LATE_FOR = 10.0
     """Seconds for which a page whose answer was late gets each age at once."""
 
+    LEAST_PACKED = 2000
+    """Bytes of a whole scene that is compressed, for a page that reads gzip.
+
+    Changes are not compressed: they are small, and pages share them.
+    """
+
     def __init__(self) -> None:
         self._key = secrets.randbits(31)
         self._mounts: dict[int, Mount] = {}
         self._map_views: dict[int, MapView] = {}
         self._dots = PageDots(self._mounts, self._map_views)
+        self._reads_gzip = False
         self._attached: dict[int, tuple[int, bytes]] = {}
         # The revision of each fragment that the page has; None if none yet.
         self._fragments: dict[Fragment, int | None] = {}
@@ -297,6 +307,8 @@ class SceneSession:
         """
         message = read_message(text)
         match message:
+            case Hello(gzip=reads_gzip):
+                self._reads_gzip = reads_gzip
             case Seen(frame=frame):
                 if self._seen < frame <= self._frame:
                     self._seen = frame
@@ -348,14 +360,17 @@ class SceneSession:
             return None
         if body is None:
             body = self._everything()
-        head = _HEADER(VERSION, RESET * self._pending.send_all, self._frame + 1, now)
+        whole = self._pending.send_all
+        frame = _HEADER(VERSION, RESET * whole, self._frame + 1, now) + body
         self._frame += 1
         self._spoke = now
         if ages:
             self._aged = period
         self._pending.sent()
         self._dots.sent()
-        return head + body
+        if whole and self._reads_gzip and len(frame) >= self.LEAST_PACKED:
+            return zlib.compress(frame, level=1, wbits=_GZIP)
+        return frame
 
     def _changes(self, ages: bool) -> bytes | None:
         """Return the changes since the last frame; None if they were discarded.
