@@ -56,6 +56,7 @@ async def until(check):
             await asyncio.sleep(0.005)
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize(
     "piece",
     [
