@@ -58,9 +58,9 @@ class Shown:
     def send(self, **message):
         self.session.receive(json.dumps(message))
 
-    def tick(self):
+    def tick(self, now=0.0):
         """Return the size of the next frame; 0 without one."""
-        frames = look(self.session)
+        frames = look(self.session, now)
         self.frames += frames
         return sum(map(len, frames))
 
@@ -73,14 +73,37 @@ class Shown:
         return len(path.get("dots", {}).get("points", ())) // 2
 
 
-def test_a_page_that_opens_gets_its_dots_one_frame_after_the_robots(decoder):
+def test_a_page_that_opens_gets_its_dots_when_it_has_reported_its_view(decoder):
     shown = Shown()
     shown.session.attach(shown.root.id, 7, "modules/x.js", {})
     assert 0 < shown.tick() < 200
     assert shown.dots(decoder) == 0
+    assert shown.tick() == 0
+    shown.view()
     assert shown.tick() > 200
     assert shown.dots(decoder) == 360
     assert shown.tick() == 0
+
+
+def test_a_page_that_does_not_report_its_view_gets_its_dots_after_a_second(decoder):
+    shown = Shown()
+    shown.session.attach(shown.root.id, 7, "modules/x.js", {})
+    assert shown.tick() < 200
+    shown.path.set_rays(OTHER)
+    assert shown.tick(0.9) < 200
+    assert shown.tick(1.0) > 200
+    assert shown.dots(decoder) == 360
+    assert shown.tick(1.1) == 0
+
+
+def test_a_page_that_starts_again_gets_the_dots_for_its_view_at_once(decoder):
+    shown = Shown()
+    shown.session.attach(shown.root.id, 7, "modules/x.js", {})
+    shown.view()
+    shown.tick()
+    shown.session.restart()
+    assert shown.tick() > 200
+    assert shown.dots(decoder) == 360
 
 
 def test_dots_out_of_the_view_are_not_sent(decoder):

@@ -65,8 +65,8 @@ def shown(*scans, pixels=0.0, dpr=1.0):
     return session, root, path, frames
 
 
-def look(session):
-    frame = session.frame(0.0)
+def look(session, now=0.0):
+    frame = session.frame(now)
     if frame is None:
         return []
     session.receive(f'{{"op":"seen","frame":{session._frame}}}')

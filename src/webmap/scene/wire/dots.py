@@ -2,8 +2,8 @@
 
 A page gets the dots of an element while they are near its view and not switched off,
 and no dots otherwise: it must not show old ones when its viewer looks there. A page
-that has just opened gets the dots on its maps one frame after the robots: dots are half
-of the bytes.
+that has just opened gets dots when it has reported its view: dots are half of the bytes,
+and the robots are shown sooner without them.
 """
 
 import math
@@ -27,6 +27,9 @@ COARSEST = 1.0
 
 PARTS = 8
 """They are rounded to an eighth of a pixel, or finer."""
+
+PATIENCE = 1.0
+"""Seconds after its first frame in which a page reports its view."""
 
 MARGIN = 0.25
 """The part of a map's size by which dots may be outside of its view and are sent."""
@@ -66,8 +69,8 @@ class PageDots:
         self._off: frozenset[int] = frozenset()
         self._empty: set[int] = set()
         self._views: dict[Fragment, list[ViewReport | None]] = {}
-        self._first = True
-        self._held = False
+        self._waits = False
+        self._until: float | None = None
         self.due = False
         """Whether the page may need dots of fragments that did not change."""
 
@@ -90,13 +93,22 @@ class PageDots:
         """Set that the page has nothing, and that all it shows is shown."""
         self._off = frozenset()
         self._empty.clear()
-        self._first = True
+        self._until = None
         self._look_again()
+
+    def wait(self, now: float) -> None:
+        """Decide for the next frame whether all dots wait for the page's view."""
+        if self._until is None:
+            self._until = now + PATIENCE
+        views = self._map_views.values()
+        unknown = bool(views) and all(view.report is None for view in views)
+        waited, self._waits = self._waits, unknown and now < self._until
+        if waited and not self._waits:
+            self._look_again()
 
     def sent(self) -> None:
         """Set that the page got the records of all fragments."""
-        self.due = self._held
-        self._finer = self._first = self._held = False
+        self.due = self._finer = False
 
     def _look_again(self) -> None:
         self.due = True
@@ -112,8 +124,7 @@ class PageDots:
         """
         if not fragment.dotted:
             return b""
-        if self._first and self._opens:
-            self._held = True
+        if self._waits:
             self._empty.update(fragment.dotted)
             return b""
         out: list[bytes] = []
@@ -132,12 +143,6 @@ class PageDots:
                 if had is None or max(element._attached, coded.since) > had:
                     out.append(coded.data)
         return b"".join(out)
-
-    @property
-    def _opens(self) -> bool:
-        """Whether the page has not reported the view of any of its maps yet."""
-        views = self._map_views.values()
-        return bool(views) and all(view.report is None for view in views)
 
     def _sees(self, fragment: Fragment, place: "Place | None") -> bool:
         views = self._views.get(fragment)

@@ -353,6 +353,7 @@ class SceneSession:
             self._late = now
         if self._frame - self._seen >= self.WINDOW:
             return None
+        self._dots.wait(now)
         period = now // AGES_EVERY
         ages = period != self._aged or now - self._late < self.LATE_FOR
         body = None if self._pending.send_all else self._changes(ages)
