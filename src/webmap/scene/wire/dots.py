@@ -2,8 +2,8 @@
 
 A page gets the dots of an element while they are near its view and not switched off,
 and no dots otherwise: it must not show old ones when its viewer looks there. A page
-that has just opened gets dots when it has reported its view: dots are half of the bytes,
-and the robots are shown sooner without them.
+that has just opened gets dots when it has reported its view: dots are half of the
+bytes, and the robots are shown sooner without them.
 """
 
 import math
