@@ -38,7 +38,7 @@ demo: $(INSTALLED)
 
 ## test: everything: lint, types, contracts, unit, property, browser and peer tests, docs
 .PHONY: test
-test: lint test-web test-gate test-browser-beside test-serial-beside
+test: lint test-web test-gate test-plain test-beside test-serial
 
 ## check: lint, types, import contracts, generated files
 .PHONY: check
@@ -94,7 +94,7 @@ test-gate: $(DEV)
 	  --cov --cov-config=tests/gate/coverage.toml --cov-fail-under=100
 
 ## test-python: pytest without test-gate; tests that measure time run at the end
-.PHONY: test-python test-plain test-schedules test-browser test-serial
+.PHONY: test-python test-plain test-schedules test-browser test-beside test-serial
 test-python: test-plain test-schedules test-browser test-serial
 SCHEDULES := tests/gate/test_gate_machine.py
 test-plain: $(DEV)
@@ -105,16 +105,14 @@ test-schedules: $(DEV)
 WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | sort)
 test-browser: $(DEV) $(NODE)
 	$(PY) tools/pytest_beside.py $(JOBS) -m "browser and not serial" $(WITH_BROWSER)
-# Tests with a browser leave an eighth of the processors' time unused, and tests that
-# measure time leave a third. At idle priority, other targets use only that time.
-.PHONY: test-browser-beside test-serial-beside
-test-browser-beside: BESIDE := types contracts test-schedules docs
-test-serial-beside: BESIDE := test-plain
-test-browser-beside test-serial-beside: test-%-beside: $(DEV) $(NODE)
+# Tests with a browser leave an eighth of the processors' time unused. At idle priority,
+# these targets use only that time.
+COMPUTING := types contracts test-schedules docs
+test-beside: $(DEV) $(NODE)
 	failed=0; log=$$(mktemp); \
-	chrt --idle 0 $(MAKE) --no-print-directory $(BESIDE) >"$$log" 2>&1 & beside=$$!; \
-	$(MAKE) --no-print-directory test-$* || failed=1; \
-	wait $$beside || failed=1; \
+	chrt --idle 0 $(MAKE) --no-print-directory $(COMPUTING) >"$$log" 2>&1 & computing=$$!; \
+	$(MAKE) --no-print-directory test-browser || failed=1; \
+	wait $$computing || failed=1; \
 	cat "$$log"; rm "$$log"; exit $$failed
 # Tests that measure time wait most of the time, so two files of them run in parallel on
 # any machine, the longest first. Safety tests allow for the delays of the machine and do

@@ -103,6 +103,8 @@ class Records:
         except OSError:  # each file may be there nevertheless
             return set(keys)
         names = {name.partition(".")[0] for name in files if ".stop" in name}
+        if not names:
+            return set()
         return {key for key in keys if not names.isdisjoint(_names_of(key))}
 
     def stamp_of(self, key: Key) -> tuple[int, int] | None:
