@@ -255,3 +255,50 @@ def test_sending_to_a_closed_page_logs_no_traceback(caplog):
 
     asyncio.run(scenario())
     assert caplog.records == []
+
+
+class Stalled:
+    """A socket of a page that breaks a rule and sends STOP, while no thread runs."""
+
+    def __init__(self):
+        self._messages = asyncio.Queue()
+        self._mine, self._pages = socket.socketpair()
+        self.closed = None
+        self._came(b"x" * 2000)
+
+    def _came(self, data):
+        message = {"type": "websocket.receive", "text": data.decode()}
+        self._messages.put_nowait(message)
+
+    async def receive(self):
+        if self._messages.empty():
+            loop = asyncio.get_running_loop()
+            loop.add_reader(self._mine, lambda: self._came(self._mine.recv(100)))
+            loop.call_soon(self._stall)
+        return await self._messages.get()
+
+    def _stall(self):
+        # The timer of whoever waits and the message are due in the same turn.
+        self._pages.send(b"stop")
+        time.sleep(0.1)
+        self._stall = lambda: None
+
+    async def close(self, code, reason):
+        asyncio.get_running_loop().remove_reader(self._mine)
+        self._mine.close()
+        self._pages.close()
+        self.closed = code
+
+
+def test_a_stop_after_a_broken_rule_is_read_although_the_thread_did_not_run():
+    async def scenario():
+        page = Stalled()
+        calls = BatchedCallsByLoop().of_this_loop()
+        line = PageSocket(page, "drive", calls, DRIVE, DriveQueue())
+        rest = []
+        async with asyncio.timeout(10):
+            await line.run(print, lambda why: None, rest.append)
+        assert page.closed == 1008
+        return rest[1:]
+
+    assert asyncio.run(scenario()) == ["stop"]

@@ -30,7 +30,7 @@ seconds."""
 
 _GOODBYE_S = 0.5
 
-_REST_S = 0.05
+_REST_S = 0.5
 """How long messages that arrived before the end of the socket are read, in seconds."""
 
 _REST_PAUSE_S = 0.01
@@ -237,12 +237,18 @@ class PageSocket:
     async def _read_rest(self, on_rest: Callable[[str | bytes], None]) -> None:
         """Read messages that have already arrived, for a limited time."""
         until = time.monotonic() + _REST_S
-        while time.monotonic() < until:
+        pauses = 0
+        # If the thread did not run during a pause, a message may have come meanwhile.
+        while pauses < 2 and time.monotonic() < until:
             try:
                 async with asyncio.timeout(_REST_PAUSE_S):
                     message = await self._socket.receive()
-            except (TimeoutError, RuntimeError):
+            except TimeoutError:
+                pauses += 1
+                continue
+            except RuntimeError:
                 return
+            pauses = 0
             if message["type"] == "websocket.disconnect":
                 self._gone = True
                 return
