@@ -137,7 +137,9 @@ def opened(browser: Browser, url: str, *, slow: bool) -> Callable[[], Figures]:
 
     def run() -> Figures:
         with browser.new_context() as context:
-            return measure(context.new_page(), url, slow=slow)
+            page = context.new_page()
+            page.wait_for_timeout(700)  # until the window is there
+            return measure(page, url, slow=slow)
 
     return run
 
