@@ -174,6 +174,31 @@ def test_a_robot_whose_poses_end_while_nobody_looks_is_lost_later(
     assert len(names(play(script, monkeypatch))) == 1
 
 
+@pytest.mark.parametrize("why", ["nobody looks", "nobody drives"])
+def test_no_robot_is_lost_when_fewer_poses_come_right_after_a_pose(monkeypatch, why):
+    async def script(stage):
+        robot = stage.robot
+        robot.remove_modules()
+        stage.link.open()
+        robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
+        if why == "nobody drives":
+            looking._set(False)
+            robot.pose_source.keep_on(True)
+        stage.publish("/odom", odometry(0.0, stamp=100.0))
+        await stage.wait(0.1)
+        if why == "nobody drives":
+            robot.pose_source.keep_on(False)
+        else:
+            looking._set(False)
+        await stage.wait(4.8)
+        assert "lost" not in conditions(robot)
+        stage.publish("/odom", odometry(0.0, stamp=105.0))
+        await stage.wait(LOST_AFTER - 0.1)
+        assert "lost" not in conditions(robot)
+
+    assert names(play(script, monkeypatch)) == []
+
+
 def test_a_lost_robot_stays_lost_when_nobody_looks_any_more(monkeypatch):
     async def script(stage):
         robot = stage.robot

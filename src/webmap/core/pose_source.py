@@ -17,7 +17,7 @@ from webmap.poses.frames import Frames, frames_of
 from webmap.poses.odometry import ODOMETRY, OdometryFeed
 from webmap.poses.pipeline import PosePipeline, Problem, Step
 from webmap.poses.placing import Placing, PoseReading
-from webmap.poses.silence import SilenceWatch
+from webmap.poses.silence import LIMIT, PERIODS, SilenceWatch
 from webmap.ros.bridge import Bridge
 
 
@@ -54,7 +54,7 @@ class PoseSource:
         self.expected_at: float | None = None
         """When the newest pose arrived from a source that also sends at rest."""
         self.period = 0.0
-        """The least time to the next pose when that pose arrived, in seconds."""
+        """The least time from that pose to the next one, in seconds."""
         self._is_needed = False
         self._robot = robot
         self._show_pose = show_pose
@@ -148,9 +148,22 @@ class PoseSource:
             self._is_needed = needed
             self._pace()
 
+    def expect_fewer(self) -> None:
+        """Expect the next pose later: from now on, nobody looks or needs all poses.
+
+        A robot that is lost already stays lost.
+        """
+        feed, newest = self.feed, self.expected_at
+        if feed is None or newest is None:
+            return
+        if time.monotonic() - newest <= max(LIMIT, PERIODS * self.period):
+            self.period = max(self.period, feed.period)
+            self._silence.expect(self.period)
+
     def _pace(self) -> None:
         if self.feed is not None:
             self.feed.keep_on(self._is_needed)
+            self.expect_fewer()
         if self.frames is not None:
             self.frames.looking_changed()
 

@@ -412,6 +412,7 @@ class Robot(Listed):
     def looking_changed(self) -> None:
         """Show the pose and the state of now to who begins to look."""
         if not looking.somebody:
+            self.pose_source.expect_fewer()
             return
         if self.valid:
             self._draw_pose()

@@ -52,11 +52,15 @@ class Silence:
             period: The least time until the next pose.
 
         """
-        self.limit = max(LIMIT, PERIODS * period)
+        self.expect(period)
         took = now - self._last_pose_at if self._is_logged else None
         self._last_pose_at = self._counted_from = now
         self._is_logged = False
         return took
+
+    def expect(self, period: float) -> None:
+        """Set the least time between two poses from now on."""
+        self.limit = max(LIMIT, PERIODS * period)
 
     def look(self, now: float, *, linked: bool) -> float | None:
         """Return the time without poses, if the line is due now.
@@ -131,6 +135,10 @@ class SilenceWatch:
         if self._timer is None or self._loop is not loop:
             self._loop = loop
             self._look_at(loop, now + self._silence.limit)
+
+    def expect(self, period: float) -> None:
+        """Set the least time between two poses from now on, in seconds."""
+        self._silence.expect(period)
 
     def _look_at(self, loop: asyncio.AbstractEventLoop, when: float) -> None:
         self._due_at = when
