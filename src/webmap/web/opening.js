@@ -46,7 +46,7 @@ socket.binaryType = "arraybuffer";
 /** @type {Array<{data: unknown, at: number}>} */
 const received = [];
 
-// Loaded after the style sheets and the modules of the picture, on a slow link.
+// The style sheets are there now: on a slow link, these modules would delay them.
 for (const link of document.querySelectorAll(`link[rel="${NEXT}"]`)) {
   link.setAttribute("rel", "modulepreload");
 }
