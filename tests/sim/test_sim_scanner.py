@@ -128,3 +128,29 @@ def test_cells_near_a_solid_one_are_those_within_the_radius(radius, part):
     for row, column in np.argwhere(solid):
         near |= np.hypot(rows - row, columns - column) <= radius
     assert (dilate(solid, radius) == near).all()
+
+
+def test_a_robot_that_stands_still_costs_no_second_ray(monkeypatch):
+    cast = []
+
+    def counted(obstacles, xs, *rest):
+        cast.append(len(xs))
+        return cast_rays(obstacles, xs, *rest)
+
+    monkeypatch.setattr("webmap.sim.scanner.cast_rays", counted)
+    scanner = Scanner(Obstacles(room(10, 6)), ScannerOptions(range_max=30))
+    here, there = Pose(3.0, 2.0), Pose(4.0, 2.0, 1.0)
+    first = scanner.sweep([here, there])
+    again = scanner.sweep([there, here], discs=[[(6.0, 2.0, 0.3)], []])
+    assert cast == [720]
+    assert (again[1] == first[0]).all()
+    assert (again[0] < first[1]).any(), "another robot is in front of the wall"
+    assert (scanner.sweep([there])[0] == first[1]).all(), "a robot was kept as a wall"
+
+
+def test_rays_of_many_poses_are_not_kept_forever(monkeypatch):
+    monkeypatch.setattr("webmap.sim.scanner._MOST_KEPT", 1000)
+    scanner = Scanner(Obstacles(room(10, 6)), ScannerOptions(range_max=30))
+    for number in range(20):
+        scanner.sweep([Pose(1.0 + 0.1 * number, 2.0), Pose(2.0, 3.0)])
+        assert len(scanner._rays._kept) * 360 <= 1000

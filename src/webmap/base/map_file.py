@@ -195,6 +195,7 @@ def _read_image(file: Path, settings: _Settings) -> "NDArray[np.int8]":
 
     too_many = (Image.DecompressionBombError, Image.DecompressionBombWarning)
     begins = b""
+    Image.preinit()  # has readers of FORMATS; otherwise Pillow imports all readers
     try:
         with settings.image.open("rb") as stream:
             begins = stream.read(8)

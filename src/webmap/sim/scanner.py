@@ -1,4 +1,4 @@
-"""A planar laser scanner, with exact ray casting on the grid."""
+"""A planar laser scanner, and rays of other sensors, cast exactly on the grid."""
 
 import math
 from collections.abc import Sequence
@@ -13,6 +13,9 @@ from webmap.sim.obstacles import Obstacles
 _NUDGE = 1e-6
 _TINY = 1e-12
 _NAN_SHARE = 0.03
+
+_MOST_KEPT = 1 << 18
+"""Most lengths of rays that a sensor keeps, 8 bytes each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +44,8 @@ class Scanner:
         self.obstacles = obstacles
         self.options = options
         self._random = np.random.default_rng(seed)
-        self._bearings = -math.pi + np.arange(options.beams) * self.angle_increment
+        bearings = -math.pi + np.arange(float(options.beams)) * self.angle_increment
+        self._rays = Rays(obstacles, bearings, options.range_max)
 
     @property
     def angle_increment(self) -> float:
@@ -64,19 +68,7 @@ class Scanner:
             Ranges in metres, of shape (poses, beams).
 
         """
-        yaws = np.array([pose.yaw for pose in poses])[:, np.newaxis]
-        angles = yaws + self._bearings
-        along_x, along_y = np.cos(angles), np.sin(angles)
-        xs = np.repeat([pose.x for pose in poses], self.options.beams)
-        ys = np.repeat([pose.y for pose in poses], self.options.beams)
-        ranges = cast_rays(
-            self.obstacles,
-            xs,
-            ys,
-            along_x.ravel(),
-            along_y.ravel(),
-            self.options.range_max,
-        ).reshape(angles.shape)
+        along_x, along_y, ranges = self._rays.cast(poses)
         for i, round_things in enumerate(discs):
             for x, y, radius in round_things:
                 shade(ranges[i], along_x[i], along_y[i], poses[i], x, y, radius)
@@ -88,6 +80,65 @@ class Scanner:
         if self.options.nan:
             ranges[self._random.random(ranges.shape) < _NAN_SHARE] = np.nan
         return ranges.astype(np.float32)
+
+
+class Rays:
+    """The rays of a sensor that many robots have.
+
+    Most robots stand still, and several topics have what one sensor sees. So the
+    lengths for the newest poses are kept.
+
+    Args:
+        obstacles: The grid.
+        bearings: Angles of the rays from the heading, in radians, of shape (rays,).
+        farthest: Greatest length, in metres.
+
+    """
+
+    def __init__(
+        self, obstacles: Obstacles, bearings: NDArray[np.float64], farthest: float
+    ) -> None:
+        self._obstacles = obstacles
+        self._bearings = bearings
+        self._farthest = farthest
+        self._kept: dict[Pose, NDArray[np.float64]] = {}
+
+    def cast(self, poses: Sequence[Pose]) -> NDArray[np.float64]:
+        """Return directions and lengths of the rays from each pose.
+
+        Args:
+            poses: Poses of the sensors, in the map's frame.
+
+        Returns:
+            The directions along x and along y, of length 1, and the lengths in metres,
+            inf for rays without a hit; of shape (3, poses, rays).
+
+        """
+        angles = np.array([[pose.yaw] for pose in poses]) + self._bearings
+        along = np.cos(angles), np.sin(angles)
+        if (len(self._kept) + len(poses)) * len(self._bearings) > _MOST_KEPT:
+            self._kept.clear()
+        new = [i for i, pose in enumerate(poses) if pose not in self._kept]
+        if new:
+            self._keep([poses[i] for i in new], along[0][new], along[1][new])
+        return np.array([*along, [self._kept[pose] for pose in poses]])
+
+    def _keep(
+        self,
+        poses: Sequence[Pose],
+        along_x: NDArray[np.float64],
+        along_y: NDArray[np.float64],
+    ) -> None:
+        rays = len(self._bearings)
+        lengths = cast_rays(
+            self._obstacles,
+            np.repeat([pose.x for pose in poses], rays),
+            np.repeat([pose.y for pose in poses], rays),
+            along_x.ravel(),
+            along_y.ravel(),
+            self._farthest,
+        )
+        self._kept.update(zip(poses, lengths.reshape(-1, rays), strict=True))
 
 
 def cast_rays(

@@ -18,7 +18,7 @@ from webmap.sim.navigator import Goal, Navigator
 from webmap.sim.obstacles import Obstacles
 from webmap.sim.planner import Planner
 from webmap.sim.robot import BaseOptions, Robot
-from webmap.sim.scanner import Scanner, ScannerOptions, cast_rays
+from webmap.sim.scanner import Rays, Scanner, ScannerOptions, cast_rays
 
 WIDTH, HEIGHT = 320, 200
 FIELD = math.radians(80)
@@ -36,10 +36,10 @@ class Camera:
     """A pinhole camera at the front of a robot, looking along its x."""
 
     def __init__(self, obstacles: Obstacles) -> None:
-        self.obstacles = obstacles
         self._focal = WIDTH / 2 / math.tan(FIELD / 2)
         across = (WIDTH / 2 - 0.5 - np.arange(WIDTH)) / self._focal
         self._bearings = np.arctan(across)
+        self._rays = Rays(obstacles, self._bearings, _FARTHEST)
         self._rows = np.arange(HEIGHT)[:, np.newaxis] - HEIGHT / 2
 
     def jpeg(
@@ -60,12 +60,7 @@ class Camera:
         self, pose: Pose, robots: Sequence[tuple[float, float, float]] = ()
     ) -> NDArray[np.uint8]:
         """Return the pixels, of shape (height, width, 3)."""
-        angles = pose.yaw + self._bearings
-        ones = np.ones(WIDTH)
-        along_x, along_y = np.cos(angles), np.sin(angles)
-        reach = cast_rays(
-            self.obstacles, pose.x * ones, pose.y * ones, along_x, along_y, _FARTHEST
-        )
+        reach = self._rays.cast([pose])[2, 0]
         # Along the axis instead of along the ray, so that a flat wall looks flat.
         depth = np.minimum(reach, _FARTHEST) * np.cos(self._bearings)
         shown = self._background()

@@ -11,7 +11,7 @@ from webmap.sim.feeds.feed import Feed
 from webmap.sim.graph_node import Node
 from webmap.sim.messages import Message
 from webmap.sim.mounts import OPTICAL, mount, seen_from
-from webmap.sim.scanner import cast_rays, shade
+from webmap.sim.scanner import Rays, shade
 
 FRAME = "camera_optical"
 AHEAD, HEIGHT = 0.2, 0.4
@@ -32,7 +32,9 @@ NEAREST, FARTHEST = 0.3, 6.0
 ROBOT_TOP, WALL_TOP = 0.5, 2.5
 """Heights of robots and walls, in metres."""
 
-_COLUMNS = 61
+BEARINGS = np.linspace(-FIELD / 2, FIELD / 2, 61)
+"""Angle of each column of the picture from the axis, in radians."""
+
 POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
 
 
@@ -41,6 +43,7 @@ class DepthClouds:
 
     def __init__(self, node: Node) -> None:
         self._node = node
+        self._rays = Rays(node.world.obstacles, BEARINGS, FARTHEST)
         self.feed = Feed("camera/points", "sensor_msgs/PointCloud2", 0.2, self._make)
 
     def _make(self, index: int, topic: str, stamp: float) -> Message:
@@ -58,12 +61,7 @@ class DepthClouds:
         """Return the points in view, in the frame of the robot's base: (N, 3)."""
         world = self._node.world
         at = world.robots[index].pose @ Pose(AHEAD)
-        bearings = np.linspace(-FIELD / 2, FIELD / 2, _COLUMNS)
-        along_x, along_y = np.cos(at.yaw + bearings), np.sin(at.yaw + bearings)
-        ones = np.ones(_COLUMNS)
-        walls = cast_rays(
-            world.obstacles, at.x * ones, at.y * ones, along_x, along_y, FARTHEST
-        )
+        along_x, along_y, walls = self._rays.cast([at])[:, 0]
         walls = np.minimum(walls, 2 * FARTHEST)  # a ray without a hit has no height
         nearest = walls.copy()
         for disc in world.others(index):
@@ -78,8 +76,8 @@ class DepthClouds:
             hit = (reach >= NEAREST) & (reach <= FARTHEST) & (height < WALL_TOP)
             row = np.column_stack(
                 (
-                    AHEAD + reach * np.cos(bearings),
-                    reach * np.sin(bearings),
+                    AHEAD + reach * np.cos(BEARINGS),
+                    reach * np.sin(BEARINGS),
                     height,
                 )
             )

@@ -8,7 +8,7 @@ from webmap.base.geometry import Pose
 from webmap.sim.feeds.feed import Feed
 from webmap.sim.graph_node import Node
 from webmap.sim.messages import Message, float32
-from webmap.sim.scanner import cast_rays, shade
+from webmap.sim.scanner import Rays, shade
 
 FRAME = "sonar"
 MOUNTED = Pose(0.25)
@@ -25,18 +25,15 @@ class Sonars:
 
     def __init__(self, node: Node) -> None:
         self._node = node
+        bearings = np.linspace(-FIELD / 2, FIELD / 2, _RAYS)
+        self._rays = Rays(node.world.obstacles, bearings, FARTHEST)
         self.feed = Feed("sonar", "sensor_msgs/Range", 0.2, self._make)
 
     def distance(self, index: int) -> float:
         """Return the distance to the nearest obstacle in the cone; inf if none."""
         world = self._node.world
         at = world.robots[index].pose @ MOUNTED
-        turns = at.yaw + np.linspace(-FIELD / 2, FIELD / 2, _RAYS)
-        along_x, along_y = np.cos(turns), np.sin(turns)
-        ones = np.ones(_RAYS)
-        distances = cast_rays(
-            world.obstacles, at.x * ones, at.y * ones, along_x, along_y, FARTHEST
-        )
+        along_x, along_y, distances = self._rays.cast([at])[:, 0]
         for disc in world.others(index):
             shade(distances, along_x, along_y, at, *disc)
         nearest = float(distances.min())
