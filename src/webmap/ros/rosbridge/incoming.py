@@ -81,14 +81,13 @@ class Incoming:
 
     def feed(self, data: bytes) -> None:
         """Add received bytes."""
-        left = len(self)
-        if not left:
+        if not len(self):
             self._data = data
-        elif left <= len(data):
-            self._data = bytes(self._data[self._at :]) + data
         else:
-            if self._at or not isinstance(self._data, bytearray):
-                self._data = bytearray(self._data[self._at :])
+            if isinstance(self._data, bytearray):
+                del self._data[: self._at]  # moves no byte
+            else:
+                self._data = bytearray(memoryview(self._data)[self._at :])
             self._data += data
         self._at = 0
 
