@@ -17,15 +17,23 @@ from pathlib import Path
 import psutil
 
 from benchmarks.harness import Comparison, Contender, Figures, compare
+from webmap.base.looking import RARELY
 
 FLEETS = {"1,000 robots": (1000, 0), "100 robots with scans": (100, 360)}
 """The number of robots, and of the beams of their scans."""
 
 PROGRAM = Path(__file__).parent / "busy_fleet.py"
 
-BEGIN = 16.0
-"""Seconds until all robots are connected and no page counts as open; half of this
-time is for the robots."""
+CONNECTED = 8.0
+"""Seconds until all robots are connected."""
+
+SETTLED = 32.0
+"""Seconds until no page counts as open, and throttles hold no pose any more: they need
+three periods to follow a longer period of the bridge."""
+
+PERIOD = RARELY / 1000
+"""Seconds of a measurement. The poses of all robots may come together, within a part of
+this time."""
 
 
 @contextmanager
@@ -58,9 +66,7 @@ def _spent(display: "subprocess.Popen[str]") -> tuple[float, int]:
     return times.user + times.system, int(_line(display))
 
 
-def shown_to(
-    viewers: int, robots: int, beams: int, seconds: float
-) -> Callable[[], Figures]:
+def shown_to(viewers: int, robots: int, beams: int) -> Callable[[], Figures]:
     """Return a run of the display with robots, and with or without a viewer."""
 
     def run() -> Figures:
@@ -77,14 +83,14 @@ def shown_to(
                 )
             )
             url = _line(display).rpartition(" at ")[2]
-            time.sleep(BEGIN / 2 if viewers else BEGIN)
+            time.sleep(CONNECTED if viewers else SETTLED)
             if viewers:
-                watch = ("benchmarks.watchers", url, viewers, 2 * seconds)
+                watch = ("benchmarks.watchers", url, viewers, 2 * PERIOD)
                 if _line(running.enter_context(_running(*watch))) != "ready":
                     raise RuntimeError("the viewer saw no frame")
             cpu, messages = _spent(display)
             began = time.monotonic()
-            time.sleep(seconds)
+            time.sleep(PERIOD)
             cpu_then, messages_then = _spent(display)
             took = time.monotonic() - began
         return {
@@ -97,12 +103,11 @@ def shown_to(
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare no viewer with one, for each fleet."""
-    seconds = 3.0 if quick else 4.0
     return [
         compare(
             title,
             [
-                Contender(name, shown_to(viewers, *fleet, seconds))
+                Contender(name, shown_to(viewers, *fleet))
                 for name, viewers in (("1 viewer", 1), ("no viewer", 0))
             ],
             rounds,
