@@ -19,6 +19,7 @@ from webmap.scene.wire.messages import LONGEST_TEXTS, MOST_UNSEEN, PAGE_ID
 from webmap.scene.wire.opcodes import TABLES, VERSION
 from webmap.server.access import CODE, KEY, PROTOCOL
 from webmap.server.html import FOLDER
+from webmap.server.modules import PART_FOLDERS, PART_SHEETS, PARTS
 from webmap.server.page_socket import BROKEN_RULE, REPLACED
 
 WEB = Path(__file__).parent.parent / "src/webmap/web"
@@ -53,6 +54,9 @@ def constants_js() -> str:
     """Return the text of ``constants.js``."""
     constants = {
         "FOLDER": (FOLDER, "The path of WebMap's own files and sockets on the server."),
+        "PARTS": (PARTS, "The module with all of WebMap's own browser parts."),
+        "PART_FOLDERS": (list(PART_FOLDERS), "Where their own modules are."),
+        "PART_SHEETS": (PART_SHEETS, "The style sheet of these parts."),
         "PROTOCOL": (PROTOCOL, "The subprotocol of both sockets."),
         "CODE": (CODE, "The field of a query that signs in once."),
         "KEY": (KEY, "The element and the header with the secret of a page."),

@@ -24,7 +24,7 @@ MOST_BYTES = 110_000
 """The limits until the first robot is shown. The page needs about 14 requests and 97 kB
 with the images of the map."""
 
-MOST_REQUESTS_IN_ALL = 75
+MOST_REQUESTS_IN_ALL = 20
 
 BINARY = 2
 """The opcode of a frame of the scene; all other frames are text."""

@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 
 from webmap.server.modules import (
+    PART_FOLDERS,
+    PART_SHEETS,
+    PARTS,
     STARTS,
     served_modules,
     served_sheets,
@@ -42,7 +45,7 @@ def read():
         "modules": {name: text for name, text in served.items() if name in sources},
     }
     written = {f"written {name}": text for name, text in sources.items()}
-    given["modules"] |= written
+    given["modules"] |= written | {PARTS: served[PARTS]}
     node = shutil.which("node")
     assert node, "node is needed to test the browser's modules"
     done = subprocess.run(
@@ -72,7 +75,7 @@ def test_each_module_has_the_same_exports_as_its_source(read):
 def test_each_module_of_webmap_is_served_once_and_a_page_starts_with_few():
     sources = own_files(".js")
     served = served_modules(sources)
-    texts = {name: text for name, text in served.items() if name in sources}
+    texts = {name: text for name, text in served.items() if name.endswith(".js")}
     for name in sources:
         made = "$" + re.sub(r"\W", "_", name.removesuffix(".js"))
         where = [key for key, text in texts.items() if f"const {made} = (" in text]
@@ -123,22 +126,27 @@ FEW = {
 }
 
 
-def test_a_module_is_served_with_those_that_only_it_needs():
+def test_modules_that_a_page_does_not_start_with_are_served_as_one():
     served = served_modules(FEW, ["start.js"])
-    assert served["x/one.js"] == (
-        'import { $both } from "../start.js";\n'
-        'import { $tool } from "../tool.js";\n'
+    assert served[PARTS] == (
+        'import { $both } from "./start.js";\n'
         "const $x_own = (() => {\n"
         "const {\n  a,\n  b: c,\n} = $both;\n"
         "\nclass own {}\n"
         "\nreturn { own };\n})();\n"
+        "const $tool = (() => {\n"
+        "async function tool() {}\n"
+        "\nreturn { tool };\n})();\n"
         "const $x_one = (() => {\n"
         "const { b } = $both;\nconst { own } = $x_own;\nconst { tool } = $tool;\n"
         "function attach() {}\n"
         "\nreturn { default: attach };\n})();\n"
-        "export { $x_own, $x_one };\n"
-        "export default $x_one.default;\n"
-        "//# sourceMappingURL=one.js.map\n"
+        "const $x_two = (() => {\n"
+        "const { tool } = $tool;\nclass Two {}\n"
+        "\nreturn { default: Two };\n})();\n"
+        "export { $x_own, $tool, $x_one, $x_two };\n"
+        'export const parts = {\n"x/one.js": $x_one,\n"x/two.js": $x_two,\n};\n'
+        "//# sourceMappingURL=parts.js.map\n"
     )
 
 
@@ -148,11 +156,38 @@ def test_the_address_of_a_module_within_another_has_the_same_exports():
         'import { $both } from "./start.js";\nexport const { a, b } = $both;\n'
     )
     assert served["x/own.js"] == (
-        'import { $x_own } from "./one.js";\nexport const { own } = $x_own;\n'
+        'import { $x_own } from "../parts.js";\nexport const { own } = $x_own;\n'
     )
-    assert set(served) - set(FEW) == {
-        "start.js.map", "x/one.js.map", "x/two.js.map", "tool.js.map",
-    }  # fmt: skip
+    assert served["x/one.js"] == (
+        'import { $x_one } from "../parts.js";\nexport default $x_one.default;\n'
+    )
+    assert set(served) - set(FEW) == {PARTS, PARTS + ".map", "start.js.map"}
+
+
+def declared():
+    """Return the modules and style sheets of all browser parts in Python."""
+    texts = [path.read_text("utf-8") for path in PACKAGE.rglob("*.py")]
+    return {
+        name
+        for text in texts
+        if "add_browser_part" in text
+        for name in re.findall(r'"((?:features|console|web)/[\w/]+\.(?:js|css))"', text)
+    }
+
+
+def test_all_declared_browser_parts_are_served_with_their_styles():
+    parts = served_modules(own_files(".js"))[PARTS]
+    sheets = served_sheets(own_files(".css"))
+    names = declared()
+    assert len(names) > 30
+    for name in names:
+        if name.endswith(".js") and name not in STARTS:
+            assert name.startswith(PART_FOLDERS), name
+            assert f'"{name}": $' in parts, name
+        elif name.endswith(".css") and name.removesuffix(".css") + ".js" not in STARTS:
+            own = re.sub("@import.*", "", sheets[name]).strip()
+            assert own in sheets[PART_SHEETS], name
+    assert sheets[PART_SHEETS].count("@import") == 1
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,11 @@
 """WebMap's own ES modules and style sheets as browsers get them: few, and small.
 
-A page of many small modules waits for one round trip after another. So a module is
-served together with the modules that only it needs, in the order of their imports, each
-in a function of its own. Every module keeps its address and is one instance: at the
-address of one that is served within another is a module that exports the same objects.
+A page of many small modules waits for one round trip after another, and each request
+costs the browser some milliseconds. So the modules that a page starts with are served
+in five, and all others in one, in the order of their imports, each in a function of its
+own. Every module keeps its address and is one instance: at the address of one that is
+served within another is a module that exports the same objects. The style sheets of
+features are served as one too.
 
 Comments on lines of their own are left out, and their lines stay empty, so that lines
 have the same numbers everywhere. A source map has the sources as they were written; a
@@ -33,6 +35,18 @@ STOP, driving.
 The first one is small: it is served with what it needs itself. What one of the others
 shares with any other module is served with the second. A page loads these two once.
 """
+
+PARTS = "parts.js"
+"""The module with all others, which a page loads when its first picture is there."""
+
+PART_FOLDERS = ("console/", "features/")
+"""Where the modules are that a page gets from :data:`PARTS`: browser parts."""
+
+PART_SHEETS = "parts.css"
+"""The style sheet of these browser parts."""
+
+_SHEET_FOLDERS = ("features/", "web/tools/")
+"""Where these sheets are; a page starts with those of the console."""
 
 SHARED_SHEET = "web/style/controls.css"
 """The style sheet that those of features import."""
@@ -72,7 +86,9 @@ def served_modules(
         starts: The modules that a page loads at once.
 
     Returns:
-        Texts by name; the source map of ``x.js`` is ``x.js.map``.
+        Texts by name, also of :data:`PARTS`. It exports ``parts``, the exports of each
+        module in it that has a default export, by name. The source map of ``x.js`` is
+        ``x.js.map``.
 
     Raises:
         ValueError: If a module has an import or export of another form, imports a
@@ -88,9 +104,12 @@ def served_modules(
     for name, module in modules.items():
         if owners[name] != name:
             texts[name] = _reference(module, owners[name])
-            continue
-        within = [one for one in ordered if owners[one.name] == name]
-        texts[name], texts[name + ".map"] = _together(module, within, modules, owners)
+    for owner in (*first, PARTS):
+        within = [one for one in ordered if owners[one.name] == owner]
+        exports = _parts(within) if owner == PARTS else _exports(modules[owner])
+        text, texts[owner + ".map"] = _together(owner, within, modules, owners)
+        address = posixpath.basename(owner)
+        texts[owner] = f"{text}{exports}//# sourceMappingURL={address}.map\n"
     return texts
 
 
@@ -98,6 +117,8 @@ def served_sheets(
     sources: Mapping[str, str], shared: str = SHARED_SHEET
 ) -> dict[str, str]:
     """Return each style sheet with the sheets that it imports in place of the imports.
+
+    :data:`PART_SHEETS` is among them.
 
     Args:
         sources: The text of each sheet by name, such as ``"web/webmap.css"``.
@@ -117,7 +138,20 @@ def served_sheets(
         if "@import" in (rest if _SHEET.fullmatch(first) else text):
             raise ValueError(f"{name} has an import of another form or after rules")
         texts[name] = text
+    texts[PART_SHEETS] = _part_sheets(sources, shared)
     return texts
+
+
+def _part_sheets(sources: Mapping[str, str], shared: str) -> str:
+    """Return the sheets of all browser parts but those that a page starts with."""
+    first = f'@import url("{_address(shared, PART_SHEETS)}");'
+    text = first + "\n"
+    for name in sources:
+        own = name.startswith(_SHEET_FOLDERS)
+        if own and name.removesuffix(".css") + ".js" not in STARTS:
+            sheet = _sheet(name, PART_SHEETS, sources, shared)
+            text += sheet.lstrip().removeprefix(first)
+    return text
 
 
 def _sheet(name: str, seen_from: str, sources: Mapping[str, str], shared: str) -> str:
@@ -173,17 +207,25 @@ def _in_order(modules: Mapping[str, _Module], *starts: str) -> list[_Module]:
 
 def _owners(modules: Mapping[str, _Module], starts: tuple[str, ...]) -> dict[str, str]:
     """Return the module with which each module is served."""
-    needed = {need for module in modules.values() for need in module.needs}
     users: dict[str, list[str]] = {name: [] for name in modules}
-    for entry in {**dict.fromkeys(starts), **dict.fromkeys(modules.keys() - needed)}:
-        for module in _in_order(modules, entry):
-            users[module.name].append(entry)
+    for start in starts:
+        for module in _in_order(modules, start):
+            users[module.name].append(start)
+    needed_later = {
+        module.name
+        for name, entries in users.items()
+        if not entries
+        for module in _in_order(modules, name)
+    }
     owners = {}
     for name, entries in users.items():
-        if starts[0] in entries or len(entries) == 1:
+        if not entries:
+            owners[name] = PARTS
+        elif starts[0] in entries or name in starts:
             owners[name] = entries[0]
         else:
-            owners[name] = starts[1] if set(entries) & set(starts) else name
+            alone = len(entries) == 1 and name not in needed_later
+            owners[name] = entries[0] if alone else starts[1]
     return owners
 
 
@@ -205,8 +247,18 @@ def _exports(module: _Module) -> str:
     return text
 
 
+def _parts(within: Iterable[_Module]) -> str:
+    """Return the export of the modules that are browser parts."""
+    pairs = (
+        f"{json.dumps(module.name)}: {module.object},\n"
+        for module in within
+        if "default" in module.exports
+    )
+    return f"export const parts = {{\n{''.join(pairs)}}};\n"
+
+
 def _together(
-    entry: _Module,
+    owner: str,
     within: list[_Module],
     modules: Mapping[str, _Module],
     owners: Mapping[str, str],
@@ -215,17 +267,17 @@ def _together(
     others: dict[str, dict[str, None]] = {}
     for module in within:
         for need in module.needs:
-            if owners[need] != entry.name:
+            if owners[need] != owner:
                 objects = others.setdefault(owners[need], {})
                 objects[modules[need].object] = None
     text = "".join(
-        f'import {{ {", ".join(objects)} }} from "{_address(owner, entry.name)}";\n'
-        for owner, objects in others.items()
+        f'import {{ {", ".join(objects)} }} from "{_address(other, owner)}";\n'
+        for other, objects in others.items()
     )
     sections = []
     for module in within:
         text += f"const {module.object} = (() => {{\n"
-        sections.append(_section(module, entry, text.count("\n")))
+        sections.append(_section(module, owner, text.count("\n")))
         text += _body(module, modules)
         pairs = ", ".join(
             name if name == local else f"{name}: {local}"
@@ -233,8 +285,6 @@ def _together(
         )
         text += f"\nreturn {{ {pairs} }};\n}})();\n"
     text += f"export {{ {', '.join(module.object for module in within)} }};\n"
-    text += _exports(entry)
-    text += f"//# sourceMappingURL={posixpath.basename(entry.name)}.map\n"
     return text, json.dumps({"version": 3, "sections": sections})
 
 
@@ -252,7 +302,7 @@ def without_comments(text: str) -> str:
     return _COMMENT.sub(lambda found: "\n" * found[0].count("\n"), text)
 
 
-def _section(module: _Module, entry: _Module, line: int) -> dict[str, object]:
+def _section(module: _Module, owner: str, line: int) -> dict[str, object]:
     """Return the part of a source map for a module that begins at a line."""
     # Each line is that line of the source: the same column, the next line.
     mappings = "AAAA" + ";AACA" * module.source.count("\n")
@@ -260,7 +310,7 @@ def _section(module: _Module, entry: _Module, line: int) -> dict[str, object]:
         "offset": {"line": line, "column": 0},
         "map": {
             "version": 3,
-            "sources": [_address(module.name, entry.name)],
+            "sources": [_address(module.name, owner)],
             "sourcesContent": [module.source],
             "names": [],
             "mappings": mappings,

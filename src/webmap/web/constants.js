@@ -3,6 +3,15 @@
 /** The path of WebMap's own files and sockets on the server. */
 export const FOLDER = "/_webmap/";
 
+/** The module with all of WebMap's own browser parts. */
+export const PARTS = "parts.js";
+
+/** Where their own modules are. */
+export const PART_FOLDERS = Object.freeze(["console/", "features/"]);
+
+/** The style sheet of these parts. */
+export const PART_SHEETS = "parts.css";
+
 /** The subprotocol of both sockets. */
 export const PROTOCOL = "webmap";
 
