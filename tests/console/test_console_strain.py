@@ -1,5 +1,6 @@
 """The console with far too many robots, without robots, and without storage."""
 
+import re
 import signal
 from pathlib import Path
 
@@ -115,7 +116,9 @@ def test_all_robots_in_trouble_leave_the_map_and_the_stop_buttons_free(
     corner = page.locator(STOP_ALL).evaluate(CORNER)
     halt.send_signal(signal.SIGSTOP)
     expect(page.locator(".chip").first).to_have_text(f"{ROBOTS} lost", timeout=30_000)
-    expect(page.locator(".webmap-alert-badge")).to_have_text(str(ROBOTS))
+    # Some seconds after their poses, the connection for commands ends too.
+    either = re.compile(f"^({ROBOTS}|{2 * ROBOTS})$")
+    expect(page.locator(".webmap-alert-badge")).to_have_text(either)
     page.locator(STOP_ALL).click()
     page.locator(".webmap-alerts > summary").click()
     alerts = page.locator("[aria-label='New alerts'] > li")
