@@ -27,8 +27,8 @@ class Row:
 
 ROWS = [
     Row("bridge", 20, quick=True),
-    Row("viewers", 40, quick=True),
-    Row("wire", 30, quick=True),
+    Row("viewers", 30, quick=True),
+    Row("wire", 20, quick=True),
     Row("grids", 40),
     Row("drawing", 35, quick=True),
     Row("latency", 25),
@@ -39,7 +39,7 @@ ROWS = [
     Row("agents", 50),
     Row("uplink", 40),
     Row("narrow", 40),
-    Row("transports", 25),
+    Row("transports", 15),
     Row("router", 15),
     Row("idle", 20, quick=True),
     Row("unwatched", 40),

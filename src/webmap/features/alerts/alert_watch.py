@@ -72,7 +72,7 @@ def _reported(robot: "Robot") -> dict[str, str]:
 
 
 class AlertWatch:
-    """Looks at all robots twice a second, and every two seconds without a page.
+    """Looks at all robots twice a second, and every five seconds without a page.
 
     Args:
         alerts: The list to fill.
