@@ -27,7 +27,7 @@ class Row:
 
 ROWS = [
     Row("bridge", 20, quick=True),
-    Row("viewers", 30, quick=True),
+    Row("viewers", 40, quick=True),
     Row("wire", 20, quick=True),
     Row("grids", 40),
     Row("drawing", 35, quick=True),
