@@ -154,3 +154,8 @@ def test_rays_of_many_poses_are_not_kept_forever(monkeypatch):
     for number in range(20):
         scanner.sweep([Pose(1.0 + 0.1 * number, 2.0), Pose(2.0, 3.0)])
         assert len(scanner._rays._kept) * 360 <= 1000
+
+
+def test_a_sweep_from_no_pose_has_no_ranges():
+    scanner = Scanner(Obstacles(room(10, 6)), ScannerOptions(range_max=30))
+    assert scanner.sweep([]).shape == (0, 360)

@@ -114,14 +114,16 @@ class Rays:
             inf for rays without a hit; of shape (3, poses, rays).
 
         """
-        angles = np.array([[pose.yaw] for pose in poses]) + self._bearings
+        yaws = np.array([pose.yaw for pose in poses])[:, np.newaxis]
+        angles = yaws + self._bearings
         along = np.cos(angles), np.sin(angles)
         if (len(self._kept) + len(poses)) * len(self._bearings) > _MOST_KEPT:
             self._kept.clear()
         new = [i for i, pose in enumerate(poses) if pose not in self._kept]
         if new:
             self._keep([poses[i] for i in new], along[0][new], along[1][new])
-        return np.array([*along, [self._kept[pose] for pose in poses]])
+        lengths = np.array([self._kept[pose] for pose in poses])
+        return np.stack([*along, lengths.reshape(angles.shape)])
 
     def _keep(
         self,
