@@ -1,4 +1,4 @@
-"""Arrays of numbers from other processes arrive as views of memory."""
+"""Arrays of numbers arrive as lists, as bytes, or as views of memory."""
 
 from array import array
 
@@ -29,6 +29,25 @@ def test_many_received_bytes_are_not_copied():
 def test_numbers_of_another_width_are_converted():
     distances = Floats.from_wire(memoryview(array("d", [0.5, 2.0])))
     assert distances == Floats(array("f", [0.5, 2.0]))
+
+
+@pytest.mark.parametrize(
+    ("received", "numbers"),
+    [
+        ([], []),
+        ([0.25, 3, True], [0.25, 3.0, 1.0]),
+        ([None, 0.25, None], [float("nan"), 0.25, float("nan")]),
+        ([1e300, -1e300, 2**70], [float("inf"), float("-inf"), 2.0**70]),
+    ],
+)
+def test_a_list_of_json_becomes_floats_of_four_bytes(received, numbers):
+    assert Floats.from_wire(received) == Floats(array("f", numbers))
+
+
+@pytest.mark.parametrize("received", [["1"], [None, "1"], [[1.0]], [10**400], "1", 1])
+def test_what_is_no_array_of_numbers_is_an_error(received):
+    with pytest.raises(ValueError, match="expected an array of numbers, got"):
+        Floats.from_wire(received)
 
 
 def test_a_number_that_does_not_fit_is_an_error():
