@@ -5,6 +5,7 @@ A separate process takes half a second to start. Another test of each command us
 
 import io
 import logging
+import os
 import signal
 import sys
 from contextlib import ExitStack, redirect_stderr, redirect_stdout
@@ -42,6 +43,7 @@ def run_inside(*arguments: object, stdin: str = "") -> Done:
         for name in LOGGERS:
             logger = logging.getLogger(name)
             after.callback(logger.setLevel, logger.level)
+        after.enter_context(patch.dict(os.environ))
         # `webmap agent` sets the agent of its process.
         after.enter_context(patch.object(RobotMotion, "agent", ""))
         command = ["webmap", *map(str, arguments)]

@@ -189,3 +189,31 @@ def test_a_failing_script_is_named_with_its_error():
     assert result.returncode != 0
     assert "broken.py" in result.stderr
     assert "has no attribute 'Rbot'" in result.stderr
+
+
+THREADS = "OPENBLAS_NUM_THREADS"
+PRINTING = f"""
+import os, sys
+from webmap.cli import main
+try:
+    main()
+finally:
+    print("threads:", os.environ.get("{THREADS}"))
+"""
+
+
+def test_commands_limit_the_threads_of_linear_algebra_but_not_of_a_users_program(
+    tmp_path, monkeypatch
+):
+    def threads(*arguments):
+        command = [sys.executable, "-c", PRINTING, *map(str, arguments)]
+        result = subprocess.run(command, capture_output=True, text=True, timeout=30)
+        return result.stdout.split("threads: ")[1].strip()
+
+    program = tmp_path / "program.py"
+    program.write_text("raise SystemExit")
+    monkeypatch.delenv(THREADS, raising=False)
+    assert threads("check", program) == "1"
+    assert threads("run", program) == "None"
+    monkeypatch.setenv(THREADS, "3")
+    assert threads("check", program) == "3"

@@ -4,6 +4,7 @@ A command reads its options and calls another folder; robots and fleets are made
 ``webmap.fleet``. ``options`` has the options of several commands. Open ``view`` first.
 """
 
+import os
 import signal
 import sys
 from types import FrameType
@@ -83,6 +84,10 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _interrupt)
     # A shell makes processes that it starts in the background ignore SIGINT.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    # WebMap multiplies no large matrices. The library that does this for numpy starts a
+    # thread for each processor, and each of them waits actively for 0.1 s.
+    if _named_command() != "run":  # a user's program may need these threads
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         cli(standalone_mode=False)
     except click.exceptions.Exit as done:
