@@ -333,8 +333,8 @@ class Machine:
     def _update_watch(self, now: float) -> None:
         self.observation.update(
             self.authority.lease is not None
-            or not self.silent
             or self.latch.on
+            or not self.silent
             or self.authority.handover.successor is not None
             or (self.robots.has_odometry and self.obedience.watching(now))
         )

@@ -17,6 +17,7 @@ from webmap.gate.protocol import (
 )
 from webmap.gate.rules.health import LinkHealth, moves
 from webmap.gate.rules.machine import Machine
+from webmap.gate.rules.motion import ZERO
 from webmap.gate.rules.obedience import MOVES, TURNS
 from webmap.gate.rules.speeds import reaction
 
@@ -36,6 +37,8 @@ def report(machine: Machine, spec: RobotSpec, now: float) -> RobotReport:
     age, test = machine.speeds.ages.p95, machine.tests.last
     echoed, measured = machine.observation.echoed, machine.observation.shown(now)
     holder = None if lease is None else Holder(lease.connection, lease.name)
+    stop_time, reason = machine.speeds.stop_time, _reason(machine, now)
+    unavailable = reason if lease is None else machine.authority.why_unavailable(now)
     goals = machine.robots.goals[spec.id]
     return RobotReport(
         robot=spec.id,
@@ -59,14 +62,14 @@ def report(machine: Machine, spec: RobotSpec, now: float) -> RobotReport:
         alarm=machine.obedience.alarm(now),
         other_writer=machine.other_writer.description(machine.key.topic),
         age=None if age is None else round(age * 1000, 0),
-        reaction=round(reaction(age, machine.speeds.stop_time), 3),
+        reaction=round(reaction(age, stop_time), 3),
         brake=machine.robots.a_max or BRAKE,
-        stop_time=machine.speeds.stop_time,
-        stop_source=_stop_source(machine),
+        stop_time=stop_time,
+        stop_source=_stop_source(machine, stop_time),
         stop_date=None if machine.speeds.tested is None else machine.speeds.tested.date,
         test=None if test is None else TestReport(test.state, test.text),
-        armable=machine.authority.why_unavailable(now) is None,
-        reason=_reason(machine, now),
+        armable=unavailable is None,
+        reason=reason,
         method=goals.method,
         cancels=goals.can_cancel,
         locates=spec.pose_topic is not None,
@@ -119,10 +122,12 @@ def _link(machine: Machine, spec: RobotSpec) -> LinkHealth:
     return machine.control if spec.twist_topic else machine.robots.goals[spec.id].link
 
 
-def _stop_source(machine: Machine) -> Literal["stated", "tested"] | None:
+def _stop_source(
+    machine: Machine, stop_time: float | None
+) -> Literal["stated", "tested"] | None:
     if machine.speeds.tested is not None:
         return "tested"
-    return None if machine.speeds.stop_time is None else "stated"
+    return None if stop_time is None else "stated"
 
 
 def _asker(machine: Machine, now: float) -> AskerReport | None:
@@ -146,7 +151,9 @@ def _stop(machine: Machine) -> StopReport | None:
 
 
 def _velocity(twist: Twist) -> Velocity:
-    x, y, turn, z, rx, ry = (round(part, _DIGITS) + 0.0 for part in twist.numbers)
+    if twist is ZERO:  # the velocity sent to most robots
+        return ZERO.numbers
+    x, y, turn, z, rx, ry = [round(part, _DIGITS) + 0.0 for part in twist.numbers]
     return (x, y, turn, z, rx, ry)
 
 

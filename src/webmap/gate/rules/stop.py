@@ -356,16 +356,15 @@ class ActiveStop:
 
     def confirm(self, now: float) -> None:
         """Update the confirmation."""
+        drivable = self._robots.drivable
         since = self.confirmation.since
-        delivered = not self._robots.drivable or self._control.answered_since(since)
-        self.confirmation.judge(self._why_unobservable(), delivered, now)
+        delivered = not drivable or self._control.answered_since(since)
+        self.confirmation.judge(self._why_unobservable(drivable), delivered, now)
 
-    def _why_unobservable(self) -> str | None:
+    def _why_unobservable(self, drivable: bool) -> str | None:
         """Return why standstill cannot be observed, as text, or ``None``."""
         robots = self._robots
-        link = self._control
-        if not robots.drivable:
-            link = robots.goals[robots.newest.id].link
+        link = self._control if drivable else robots.goals[robots.newest.id].link
         if not link.up:
             return f"no connection to {self._url}"
         return None if robots.has_odometry else "no odometry"
