@@ -1,7 +1,9 @@
-"""The time of a velocity through an agent and a router, compared with a direct link.
+"""The time of a velocity through a gate, and through an agent and a router.
 
-The operator, the display, the router, the agent and the robot are on one computer, so
-the figures contain the cost of the processes and no cost of a network.
+The reference is a bare relay, which forwards a velocity from a WebSocket to a
+rosbridge. The operator, the display, the relay, the gate, the router, the agent and the
+robot are on one computer, so the figures contain the cost of the processes and no cost
+of a network.
 """
 
 import json
@@ -11,17 +13,21 @@ import tempfile
 import threading
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 
+from websockets.sync.client import connect
+
 from benchmarks.harness import Comparison, Contender, Figures, compare
+from benchmarks.latency import relayed, socket_of
 from benchmarks.processes import started
 from webmap.agents.gates import Gates
 from webmap.agents.peer import close_peers
 from webmap.gate.protocol import RobotSpec
+from webmap.ros.rosbridge import ops
 from webmap.testing import WitnessRobot
 
-VELOCITIES = 200
+VELOCITIES = 100
 PERIOD = 0.05
 FULL = 1.0
 """The robot's highest speed, in m/s."""
@@ -139,14 +145,37 @@ def delays(url: str, id: str, robot: WitnessRobot) -> list[float]:
         take_control(operator)
         sent: dict[int, float] = {}
         for number in range(VELOCITIES):
-            part = 0.2 + 0.001 * number
             sent[number] = time.monotonic()
-            operator.drive(part)
+            operator.drive(velocity(number) / FULL)
             time.sleep(PERIOD)
         operator.drive(0.0)
     finally:
         gates.stop()
         close_peers()
+    return arrived_after(sent, robot)
+
+
+def relay_delays(robot: WitnessRobot) -> list[float]:
+    """Return the times of velocities through a bare relay to the robot, in ms."""
+    zero = {"x": 0.0, "y": 0.0, "z": 0.0}
+    sent: dict[int, float] = {}
+    with relayed(robot.url) as url, connect(socket_of(url), compression=None) as relay:
+        time.sleep(0.5)  # until the relay has opened its own socket
+        for number in range(VELOCITIES):
+            twist = {"linear": {**zero, "x": velocity(number)}, "angular": zero}
+            sent[number] = time.monotonic()
+            relay.send(ops.publish(robot.TWIST_TOPIC, twist), text=True)
+            time.sleep(PERIOD)
+    return arrived_after(sent, robot)
+
+
+def velocity(number: int) -> float:
+    """Return a velocity in m/s by which the robot's log shows its number."""
+    return FULL * (0.2 + 0.001 * number)
+
+
+def arrived_after(sent: Mapping[int, float], robot: WitnessRobot) -> list[float]:
+    """Return the milliseconds from the times of sending to those in the robot's log."""
     arrived: dict[int, float] = {}
     for twist in robot.log.twists:
         number = round((twist.twist.vx / FULL - 0.2) / 0.001)
@@ -161,8 +190,22 @@ def delays(url: str, id: str, robot: WitnessRobot) -> list[float]:
     return found
 
 
+def figures(found: list[float]) -> Figures:
+    """Return the figures of the times of velocities, in ms."""
+    return {
+        "velocity to the robot, median (ms)": statistics.median(found),
+        "velocity to the robot, 99 % (ms)": statistics.quantiles(found, n=100)[-1],
+    }
+
+
+def bare() -> Figures:
+    """Run the bare relay."""
+    with WitnessRobot(timeout=0.5) as robot:
+        return figures(relay_delays(robot))
+
+
 def way(*, agent: bool) -> Callable[[], Figures]:
-    """Return a run over a direct link, or through an agent and a router."""
+    """Return a run through a gate here, or through a router and an agent's gate."""
 
     def run() -> Figures:
         with ExitStack() as running, tempfile.TemporaryDirectory() as _state:
@@ -178,19 +221,16 @@ def way(*, agent: bool) -> Callable[[], Figures]:
                     started("agent", robot.url, "--router", router, *options)
                 )
                 id = f"r{zlib.crc32(b'bay3/Bob'):08x}"
-            found = delays(url, id, robot)
-        return {
-            "velocity to the robot, median (ms)": statistics.median(found),
-            "velocity to the robot, 99 % (ms)": statistics.quantiles(found, n=100)[-1],
-        }
+            return figures(delays(url, id, robot))
 
     return run
 
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
-    """Compare the time through an agent with the time over a direct link."""
+    """Compare the time through a gate and through an agent with a bare relay."""
     contenders = [
-        Contender("direct", way(agent=False)),
-        Contender("agent and router", way(agent=True)),
+        Contender("bare relay", bare),
+        Contender("gate", way(agent=False)),
+        Contender("router and agent", way(agent=True)),
     ]
     return [compare("the way of a velocity", contenders, 1 if quick else rounds)]

@@ -4,7 +4,8 @@ Robot, rosbridge and clock are in this process. The page reports over a separate
 that it has set a transform or received a key. The time of a report is its arrival here,
 so the time of a pose includes one hop too many, and the time of a key lacks one hop.
 The reference is a bare relay with the same hops: browser, WebSocket, server in Python,
-WebSocket and rosbridge.
+WebSocket and rosbridge. A key passes through two processes of WebMap, the display and
+the gate, so its reference is two bare relays in a row.
 """
 
 import random
@@ -135,13 +136,18 @@ def _pressed(
     return 1000 * (moving[0].at - pressed[0]) if moving and pressed else None
 
 
+def socket_of(url: str) -> str:
+    """Return the address of a relay's WebSocket from the address of its page."""
+    return url.replace("http", "ws", 1) + "socket"
+
+
 Measure = Callable[[Page, WitnessRobot, Marks], list[float]]
 
 
 @contextmanager
-def relayed(robot: WitnessRobot, period: float) -> Iterator[str]:
-    """Run the relay; yield the address of its page."""
-    command = [sys.executable, "-m", "benchmarks.relay", robot.url, str(period)]
+def relayed(bridge: str, period: float = 0.0) -> Iterator[str]:
+    """Run a relay to a rosbridge or to another relay; yield the address of its page."""
+    command = [sys.executable, "-m", "benchmarks.relay", bridge, str(period)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as relay:
         try:
             assert relay.stdout is not None
@@ -150,11 +156,18 @@ def relayed(robot: WitnessRobot, period: float) -> Iterator[str]:
             relay.terminate()
 
 
-def bare(measure: Measure, period: float = 0.0) -> Callable[[], Figures]:
-    """Return a run of the bare relay."""
+def bare(
+    measure: Measure, period: float = 0.0, relays: int = 1
+) -> Callable[[], Figures]:
+    """Return a run of bare relays in a row."""
 
     def run() -> Figures:
-        with Robot() as robot, relayed(robot, period) as url:
+        with ExitStack() as running:
+            robot = running.enter_context(Robot())
+            bridge = robot.url
+            for _ in range(relays):
+                url = running.enter_context(relayed(bridge, period))
+                bridge = socket_of(url)
             return measured(url, robot, measure)
 
     return run
@@ -201,7 +214,7 @@ def bench(rounds: int, quick: bool = False) -> list[Comparison]:
         Contender("WebMap", webmap(poses)),
     ]
     driven = [
-        Contender("bare relay", bare(keys)),
+        Contender("two bare relays", bare(keys, relays=2)),
         Contender("WebMap", webmap(keys)),
     ]
     del quick  # fewer values would give no percentiles

@@ -166,7 +166,7 @@ def hold(operator: Operator, seconds: float) -> None:
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare a wide line with a narrow one, at each load."""
-    seconds = 3.0 if quick else 4.0
+    seconds = 3.0
     comparisons = []
     for robots in LOADS[-1:] if quick else LOADS:
         contenders = [

@@ -66,8 +66,18 @@ def _spent(display: "subprocess.Popen[str]") -> tuple[float, int]:
     return times.user + times.system, int(_line(display))
 
 
-def shown_to(viewers: int, robots: int, beams: int) -> Callable[[], Figures]:
-    """Return a run of the display with robots, and with or without a viewer."""
+def shown_to(
+    viewers: int, robots: int, beams: int, connected: float = CONNECTED
+) -> Callable[[], Figures]:
+    """Return a run of the display with robots and viewers.
+
+    Args:
+        viewers: The number of viewers; with 0, the run takes :data:`SETTLED` longer.
+        robots: The number of robots.
+        beams: The beams of their scans; 0 for robots without scans.
+        connected: Seconds until all robots are connected.
+
+    """
 
     def run() -> Figures:
         with ExitStack() as running:
@@ -83,7 +93,7 @@ def shown_to(viewers: int, robots: int, beams: int) -> Callable[[], Figures]:
                 )
             )
             url = _line(display).rpartition(" at ")[2]
-            time.sleep(CONNECTED if viewers else SETTLED)
+            time.sleep(connected if viewers else SETTLED)
             if viewers:
                 watch = ("benchmarks.watchers", url, viewers, 2 * PERIOD)
                 if _line(running.enter_context(_running(*watch))) != "ready":

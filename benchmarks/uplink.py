@@ -219,7 +219,7 @@ def in_json(scene: Scene, seconds: float) -> Callable[[], Figures]:
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare one display and viewer with several, and with rosbridge in JSON."""
-    seconds = 2.0 if quick else 4.0
+    seconds = 2.0 if quick else 3.0
     scene = watched_scene()
     thinned: list[object] = []
     for topic in scene.scans:
