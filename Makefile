@@ -106,11 +106,8 @@ test-gate: $(DEV)
 .PHONY: test-python test-plain test-headless test-schedules test-browser test-beside test-serial
 test-python: test-plain test-schedules test-browser test-serial
 SCHEDULES := tests/gate/test_gate_machine.py
-# No worker is alone with these files at the end.
-LONG_FILES := tests/wires/ tests/cli/
 test-plain: $(DEV)
 	$(PY) tools/pytest_beside.py $(WAITING_JOBS) -m "not browser and not serial" \
-	  $(LONG_FILES) $(filter-out $(LONG_FILES) tests/__pycache__/,$(wildcard tests/*/ tests/test_*.py)) \
 	  $(addprefix --ignore ,$(WITH_GATE) $(SCHEDULES))
 # Both take a sixth less time together than one after the other.
 test-headless: $(DEV)
