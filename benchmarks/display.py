@@ -11,6 +11,8 @@ from pathlib import Path
 
 import psutil
 
+from benchmarks.processes import module
+
 FLEET = Path(__file__).parent / "fleet.py"
 BRIDGED = Path(__file__).parent / "bridged.py"
 READY = "WebMap is ready at "
@@ -51,13 +53,8 @@ def display(robots: int, beams: int, *, console: bool = False) -> Iterator[Displ
 @contextmanager
 def stamped(robots: int, beams: int = 0) -> Iterator[str]:
     """Start a rosbridge with robots of ``stamped``; yield its address."""
-    command = [sys.executable, "-m", "benchmarks.stamped", str(robots), str(beams)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as bridge:
-        try:
-            assert bridge.stdout is not None
-            yield bridge.stdout.readline().strip()
-        finally:
-            bridge.terminate()
+    with module("benchmarks.stamped", robots, beams) as (url, _):
+        yield url
 
 
 @contextmanager

@@ -8,19 +8,19 @@ package with as many pings.
 
 import asyncio
 import os
-import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager, ExitStack
 
 import psutil
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.asyncio.server import ServerConnection, serve
 
 from benchmarks.harness import Comparison, Contender, Figures, compare
+from benchmarks.processes import module
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import Report, RobotReport, RobotSpec
 
@@ -68,16 +68,11 @@ async def _connect(port: str, robots: int) -> None:
     await asyncio.gather(*pinging)
 
 
-@contextmanager
-def _running(*arguments: object) -> Iterator[tuple[str, psutil.Process]]:
+def _running(
+    *arguments: object,
+) -> AbstractContextManager[tuple[str, psutil.Process]]:
     """Run a part of this module; yield its first line and its process."""
-    command = [sys.executable, "-m", "benchmarks.idle", *map(str, arguments)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            yield process.stdout.readline().strip(), psutil.Process(process.pid)
-        finally:
-            process.terminate()
+    return module("benchmarks.idle", *arguments)
 
 
 def _measured(process: psutil.Process, seconds: float) -> Figures:

@@ -10,8 +10,6 @@ the gate, so its reference is two bare relays in a row.
 
 import random
 import statistics
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -23,6 +21,7 @@ from benchmarks.display import BRIDGED, running
 from benchmarks.drawing import browser_page
 from benchmarks.frames import odometry
 from benchmarks.harness import Comparison, Contender, Figures, compare, percentile
+from benchmarks.processes import module
 from benchmarks.stamped import Y, topics
 from webmap.base.loop_thread import LoopThread
 from webmap.testing import WitnessRobot
@@ -147,13 +146,8 @@ Measure = Callable[[Page, WitnessRobot, Marks], list[float]]
 @contextmanager
 def relayed(bridge: str, period: float = 0.0) -> Iterator[str]:
     """Run a relay to a rosbridge or to another relay; yield the address of its page."""
-    command = [sys.executable, "-m", "benchmarks.relay", bridge, str(period)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as relay:
-        try:
-            assert relay.stdout is not None
-            yield relay.stdout.readline().strip()
-        finally:
-            relay.terminate()
+    with module("benchmarks.relay", bridge, period) as (url, _):
+        yield url
 
 
 def bare(

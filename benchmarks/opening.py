@@ -11,8 +11,6 @@ page, ``python -m benchmarks.opening``.
 """
 
 import socket
-import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -31,7 +29,7 @@ from starlette.websockets import WebSocket
 from benchmarks.display import display
 from benchmarks.drawing import browser_page
 from benchmarks.harness import Comparison, Contender, Figures, compare
-from benchmarks.processes import started
+from benchmarks.processes import module, started
 
 ROBOTS = 10
 BEAMS = 360
@@ -158,16 +156,9 @@ Command = Callable[[], AbstractContextManager[tuple[str, object]]]
 """Runs a command; its context yields the address of its page, and its process."""
 
 
-@contextmanager
-def bare_command() -> Iterator[tuple[str, psutil.Process]]:
+def bare_command() -> AbstractContextManager[tuple[str, psutil.Process]]:
     """Run this module, which serves the bare page."""
-    command = [sys.executable, "-m", "benchmarks.opening"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
-        try:
-            assert running.stdout is not None
-            yield running.stdout.readline().strip(), psutil.Process(running.pid)
-        finally:
-            running.terminate()
+    return module("benchmarks.opening")
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Commands of WebMap that run beside a benchmark, and their processor time."""
+"""Processes that run beside a benchmark, and their processor time."""
 
 import os
 import subprocess
@@ -7,6 +7,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import psutil
+
+
+@contextmanager
+def module(name: str, *arguments: object) -> Iterator[tuple[str, psutil.Process]]:
+    """Run a module of Python; yield its first line, and its process."""
+    command = [sys.executable, "-m", name, *map(str, arguments)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
+        try:
+            assert running.stdout is not None
+            yield running.stdout.readline().strip(), psutil.Process(running.pid)
+        finally:
+            running.terminate()
 
 
 @contextmanager
