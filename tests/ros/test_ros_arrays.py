@@ -1,10 +1,11 @@
 """Arrays of numbers arrive as lists, as bytes, or as views of memory."""
 
+import tracemalloc
 from array import array
 
 import pytest
 
-from webmap.ros.arrays import NOT_COPIED, Floats, Int8s
+from webmap.ros.arrays import MOST_PACKED, NOT_COPIED, Floats, Int8s
 
 
 @pytest.mark.parametrize("count", [0, 3, NOT_COPIED])
@@ -42,6 +43,19 @@ def test_numbers_of_another_width_are_converted():
 )
 def test_a_list_of_json_becomes_floats_of_four_bytes(received, numbers):
     assert Floats.from_wire(received) == Floats(array("f", numbers))
+
+
+@pytest.mark.parametrize("null", [None, 1.5])
+def test_a_long_list_of_json_becomes_floats_without_a_copy_of_its_references(null):
+    received = [0.25] * (4 * MOST_PACKED) + [null]
+    tracemalloc.start()
+    floats = Floats.from_wire(received)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    numbers = [float("nan") if item is None else item for item in received]
+    assert floats == Floats(array("f", numbers))
+    replaced = 9 * len(received) if null is None else 0  # a list that grows
+    assert most < 1.1 * len(bytes(floats)) + replaced
 
 
 @pytest.mark.parametrize("received", [["1"], [None, "1"], [[1.0]], [10**400], "1", 1])

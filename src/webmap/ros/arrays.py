@@ -20,6 +20,9 @@ _NAN = float("nan")
 NOT_COPIED = 1 << 20
 """Size in bytes above which an array uses the received bytes without a copy."""
 
+MOST_PACKED = 1 << 16
+"""Longest list that is packed: packing copies all its references."""
+
 
 class Numbers:
     """Numbers of one width; base class of :class:`Floats` and :class:`Int8s`."""
@@ -105,7 +108,7 @@ class Floats(Numbers):
     def _from_list(cls, value: list[Any]) -> "array[Any]":
         try:
             return _packed(value)
-        except struct.error:  # bridges write null for NaN and infinities
+        except (TypeError, struct.error):  # bridges write null for NaN and infinities
             return _packed([_NAN if item is None else item for item in value])
 
     def array(self) -> "NDArray[np.float32]":
@@ -117,6 +120,8 @@ class Floats(Numbers):
 
 def _packed(value: list[float]) -> "array[Any]":
     """Return the same as ``array("f", value)``, which takes twice as long."""
+    if len(value) > MOST_PACKED:
+        return array("f", value)
     return array("f", struct.pack(f"{len(value)}f", *value))
 
 
