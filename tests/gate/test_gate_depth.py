@@ -15,10 +15,13 @@ from webmap.gate.lanes import navigation, odometry, rosbridge
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import SocketHandlers, open_socket
 
+DEPTH = 12_000
+"""Deeper than Python follows, which is 10,000 levels since 3.12."""
+
 DEEP = [
-    b'{"op":"x","a":' + b"[" * 1000,
-    b'{"op":"x","a":' + b"[" * 5000 + b"]" * 5000 + b"}",
-    b'{"op":"x","a":' + b'{"a":' * 5000 + b"1" + b"}" * 5001,
+    b'{"op":"x","a":' + b"[" * DEPTH,
+    b'{"op":"x","a":' + b"[" * DEPTH + b"]" * DEPTH + b"}",
+    b'{"op":"x","a":' + b'{"a":' * DEPTH + b"1" + b"}" * (DEPTH + 1),
 ]
 GOAL = SendGoal(
     Key("ws://r", "/cmd_vel"), "r1", "g1", "navigate_to_pose", 0, 0, 0, "A", 9
@@ -127,7 +130,7 @@ async def test_a_link_with_deeply_nested_messages_stays_open_and_logs_once(caplo
         received.texts.append(data)
 
     async def talk(link):
-        deep = b'{"op":"x","a":' + b"[" * 1000
+        deep = DEEP[0]
         head = b"\x81\x7e" + len(deep).to_bytes(2, "big")
         await link.accept((head + deep) * 3 + frame(TEXT, b"{}"))
         await link.reader.read()

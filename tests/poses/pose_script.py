@@ -45,6 +45,10 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         return self.now
 
+    async def shutdown_default_executor(self, timeout: float | None = None) -> None:
+        """Wait without a limit: the limit of Python 3.12 would be over at once."""
+        await super().shutdown_default_executor()
+
 
 class Jumping(selectors.SelectSelector):
     """A selector that advances the loop's time instead of waiting."""

@@ -1,5 +1,6 @@
 """Reading of files that people name, and writing of whole files."""
 
+import errno
 import os
 import secrets
 import stat
@@ -52,13 +53,15 @@ def resolved(path: Path) -> Path:
 
     """
     try:
-        return path.resolve()
-    except RuntimeError:  # up to Python 3.12; later versions fail on open
-        raise ConfigError(
-            f"{path}: the symbolic links lead in a circle; expected a file"
-        ) from None
+        path.stat()
     except ValueError:
         raise _no_path(path) from None
+    except OSError as error:  # a path that leads nowhere is an absolute path, too
+        if error.errno == errno.ELOOP:
+            raise ConfigError(
+                f"{path}: the symbolic links lead in a circle; expected a file"
+            ) from None
+    return path.resolve()
 
 
 def refuse_special(path: Path) -> None:

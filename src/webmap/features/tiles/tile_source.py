@@ -145,6 +145,13 @@ class MBTiles:
         # Read only, and never with another process's journal or log.
         address = f"{file.resolve().as_uri()}?mode=ro&immutable=1"
         self._database = sqlite3.connect(address, uri=True, check_same_thread=False)
+        try:
+            self._read_metadata()
+        except ConfigError:
+            self.close()
+            raise
+
+    def _read_metadata(self) -> None:
         self._database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST)
         self._database.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
         # tables may be views; the functions in them must be harmless
@@ -156,8 +163,8 @@ class MBTiles:
         form = str(known.get("format", "png")).lower()
         if form in ("pbf", "mvt"):
             raise ConfigError(
-                f"tiles {str(file)!r}: vector tiles cannot be drawn; expected png, jpg "
-                "or webp"
+                f"tiles {str(self.file)!r}: vector tiles cannot be drawn; expected "
+                "png, jpg or webp"
             )
         self.attribution = plain(str(known.get("attribution") or ""))
         self.zooms: Sequence[int] = self._levels(known)
