@@ -13,7 +13,6 @@ from real_browser import hold
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
 
 BLOCKED = "Not moving: blocked?"
-MINUS = re.compile("\N{MINUS SIGN}")
 
 
 def test_the_bar_the_card_and_the_list_show_the_same_state(open_console):
@@ -93,6 +92,6 @@ def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):
     detail = page.locator(".webmap-teleop-detail")
     expect(detail).to_have_text(re.compile(r"^Sent: \d\.\d\d m/s.*Measured: 0\.00 m/s"))
     page.keyboard.up("w")
-    hold(page.keyboard, "s", lambda: "-" in MINUS.sub("-", detail.text_content()))
+    hold(page.keyboard, "s", lambda: "-" in detail.text_content())
     page.keyboard.up("s")
     page.get_by_role("button", name="Release control of Robot 2").click()

@@ -21,7 +21,7 @@ from webmap.core.robot_state import STATE_TEXTS
     ("value", "text"),
     [
         (1.234, "1.23"),
-        (-1.5, "\N{MINUS SIGN}1.50"),
+        (-1.5, "-1.50"),
         (-0.001, "0.00"),
         (math.nan, "\N{EN DASH}"),
         (math.inf, "\N{EN DASH}"),
@@ -39,7 +39,7 @@ def test_a_heading_is_in_whole_degrees_below_360(degrees, text):
 
 
 def test_driving_backwards_is_shown_as_a_negative_speed():
-    assert linear((-0.5, 0.0, 0.0)) == "\N{MINUS SIGN}0.50"
+    assert linear((-0.5, 0.0, 0.0)) == "-0.50"
     assert linear((0.3, 0.4, 0.0)) == "0.50"
 
 

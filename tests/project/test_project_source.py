@@ -129,3 +129,24 @@ def test_every_file_imported_by_a_script_or_style_sheet_is_served():
     }
     assert {file.suffix for file in imported} == {".css", ".js"}
     assert imported <= served
+
+
+def test_a_page_needs_no_character_that_a_common_font_does_not_have() -> None:
+    """Every font for texts has the characters of Windows code page 1252."""
+    missing = []
+    for path in sorted((ROOT / "src").rglob("*")):
+        if path.suffix not in {".js", ".css", ".html"}:
+            continue
+        escaped = path.read_text("utf-8")
+        text = re.sub(r"\\u\{?([\da-f]{4,5})\}?", lambda m: chr(int(m[1], 16)), escaped)
+        others = {character for character in text if not _is_common(character)}
+        missing += [f"{path.relative_to(ROOT)}: {character!r}" for character in others]
+    assert not missing
+
+
+def _is_common(character: str) -> bool:
+    try:
+        character.encode("cp1252")
+    except UnicodeEncodeError:
+        return False
+    return True

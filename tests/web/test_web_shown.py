@@ -45,7 +45,7 @@ def test_the_page_shows_the_sent_the_echoed_and_the_measured_velocity(
     figures = bench.page.locator(".webmap-teleop-figures dd")
     bench.until(lambda: figures.nth(0).inner_text() == "0.30 m/s, 0.00 rad/s")
     assert figures.nth(1).inner_text() == "0.20 m/s, 0.00 rad/s"
-    assert figures.nth(2).inner_text() == "\u22120.10 m/s, 0.50 rad/s"
+    assert figures.nth(2).inner_text() == "-0.10 m/s, 0.50 rad/s"
     assert figures.nth(3).inner_text() == "42 ms"
     bench.until(lambda: figures.nth(4).inner_text().endswith(" ms"))
 

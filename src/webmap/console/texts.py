@@ -92,13 +92,11 @@ def battery_tone(charge: float, low: float) -> str:
 
 
 def number(value: float, digits: int = 2) -> str:
-    """Return a number as text: with a real minus sign, and never minus zero."""
+    """Return a number as text, and never minus zero."""
     if not math.isfinite(value):
         return UNKNOWN
     text = f"{value:.{digits}f}"
-    if float(text) == 0:
-        text = text.removeprefix("-")
-    return text.replace("-", "\N{MINUS SIGN}")
+    return text.removeprefix("-") if float(text) == 0 else text
 
 
 def heading(yaw: float) -> str:

@@ -62,7 +62,7 @@ test("the sent, the echoed and the measured velocity are listed", () => {
   assert.deepEqual(figures, [
     { name: "Sent", kind: "motion", text: "0.40 m/s", more: ", 0.00 rad/s" },
     { name: "Echoed", kind: "motion", text: "unknown", more: "" },
-    { name: "Measured", kind: "motion", text: "\u22120.30 m/s", more: ", 0.00 rad/s" },
+    { name: "Measured", kind: "motion", text: "-0.30 m/s", more: ", 0.00 rad/s" },
   ]);
 });
 

@@ -127,12 +127,12 @@ test("speeds are shown with their sign, and a driven robot at standstill as bloc
   const driven = { ...STATUS, driven: "r1", settled: true };
   const report = { ...REPORT, ...ME, ...DRIVING, sent: [-1, 0, 0] };
   const back = describe(driven, "r1", { ...report, measured: [-0.98, 0, 0.1] }, true);
-  assert.equal(back.detail, "\u22120.98 m/s, 0.10 rad/s");
+  assert.equal(back.detail, "-0.98 m/s, 0.10 rad/s");
   const wall = describe(driven, "r1", { ...report, doing: "blocked" }, true);
   assert.equal(wall.title, "Not moving: blocked?");
   assert.equal(
     wall.detail,
-    "Sent: \u22121.00 m/s, 0.00 rad/s. Measured: 0.00 m/s, 0.00 rad/s.",
+    "Sent: -1.00 m/s, 0.00 rad/s. Measured: 0.00 m/s, 0.00 rad/s.",
   );
 });
 

@@ -286,7 +286,7 @@ class RouteTool {
     this._listed = key;
     const rows = this._points.map(({ x, y }, index) => {
       const where = `${x.toFixed(1)}, ${y.toFixed(1)} m`;
-      const up = button("webmap-route-up", "↑", () => this._raise(index));
+      const up = button("webmap-route-up", "Up", () => this._raise(index));
       up.setAttribute("aria-label", `Move point ${index + 1} up`);
       up.disabled = index === 0;
       const away = button("webmap-route-remove", "×", () => this._remove(index));

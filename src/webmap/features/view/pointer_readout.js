@@ -58,5 +58,5 @@ export default function attach(map, { digits = 2 }) {
 function metres(value, digits) {
   const text = value.toFixed(digits);
   // A number that rounds to zero has no sign.
-  return Number(text) === 0 ? (0).toFixed(digits) : text.replace("-", "\u2212");
+  return Number(text) === 0 ? (0).toFixed(digits) : text;
 }

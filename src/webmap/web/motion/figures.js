@@ -148,5 +148,5 @@ function duration(ms) {
 /** @param {number} value */
 export function signed(value) {
   const text = Math.abs(value).toFixed(2);
-  return value < 0 && Number(text) !== 0 ? `\u2212${text}` : text;
+  return value < 0 && Number(text) !== 0 ? `-${text}` : text;
 }
