@@ -13,6 +13,12 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # The tests start hundreds of processes. Without bytecode on disk each of them compiles
 # all modules that it imports, which takes longer than the import.
 unexport PYTHONDONTWRITEBYTECODE
+# Modules of a user's other projects would be imported instead of those in .venv.
+unexport PYTHONPATH PYTHONHOME
+# npm fails if it cannot write below the home folder.
+ifeq ($(shell [ -w "$$HOME" ] && echo yes),)
+export HOME := $(CURDIR)/.venv/.home
+endif
 
 # Each stamp is in the folder that it marks as complete, and is deleted with it.
 MADE := .venv/.made
@@ -23,17 +29,11 @@ NODE := node_modules/.installed
 # More tests with a browser at once take as long on two processors, and some of them fail.
 # Tests without a browser wait for half of their time.
 JOBS ?= 2
-WAITING_JOBS ?= 4
+WAITING_JOBS ?= 3
 ARGS ?=
-
-SUBMAKE := $(MAKE) --no-print-directory
-# $(call beside,COMMAND,OTHER) runs a command, and beside it another, whose output is
-# printed at the end.
-beside = failed=0; log=$$(mktemp); \
-	$(2) >"$$log" 2>&1 & other=$$!; \
-	$(1) || failed=1; \
-	wait $$other || failed=1; \
-	cat "$$log"; rm "$$log"; exit $$failed
+# The file for the outcome of each test, for the summary of "make test".
+RESULTS ?=
+TO_RESULTS = $(if $(RESULTS),"--results=$(RESULTS)")
 
 ## help: list the targets
 .PHONY: help
@@ -47,7 +47,8 @@ demo: $(INSTALLED)
 
 ## test: everything: lint, types, contracts, unit, property, browser and peer tests, docs
 .PHONY: test
-test: lint test-web test-headless test-beside test-serial
+test: $(DEV) $(NODE)
+	@$(PY) tools/run_tests.py
 
 ## check: lint, types, import contracts, generated files
 .PHONY: check
@@ -89,7 +90,9 @@ test-fast: $(DEV)
 ## test-web: the JavaScript that touches no DOM, in Node
 .PHONY: test-web
 test-web: $(NODE)
-	node --test $$(find tests -name '*.test.js' | sort)
+	node --test --test-reporter=spec --test-reporter-destination=stdout \
+	  $(if $(RESULTS),--test-reporter=./tools/node_results.js "--test-reporter-destination=$(RESULTS)") \
+	  $$(find tests -name '*.test.js' | sort)
 
 ## test-gate: every branch of the gate, and of all that it imports, is taken by a test
 .PHONY: test-gate
@@ -99,29 +102,21 @@ GATE_BESIDE := $(addprefix tests/gate/test_gate_,client.py assist_road.py machin
   tests/ros/test_ros_work.py
 WITH_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py tests/base/test_*.py tests/ros/test_*.py))
 test-gate: $(DEV)
-	$(BIN)/pytest -q -n $(JOBS) $(WITH_GATE) \
+	$(BIN)/pytest -q $(TO_RESULTS) -n $(JOBS) $(WITH_GATE) \
 	  --cov --cov-config=tests/gate/coverage.toml --cov-fail-under=100
 
 ## test-python: pytest without test-gate; tests that measure time run at the end
-.PHONY: test-python test-plain test-headless test-schedules test-browser test-beside test-serial
+.PHONY: test-python test-plain test-schedules test-browser test-serial
 test-python: test-plain test-schedules test-browser test-serial
 SCHEDULES := tests/gate/test_gate_machine.py
 test-plain: $(DEV)
-	$(PY) tools/pytest_beside.py $(WAITING_JOBS) -m "not browser and not serial" \
+	$(PY) tools/pytest_beside.py $(WAITING_JOBS) $(TO_RESULTS) -m "not browser and not serial" \
 	  $(addprefix --ignore ,$(WITH_GATE) $(SCHEDULES))
-# Both take a sixth less time together than one after the other.
-test-headless: $(DEV)
-	$(call beside,$(SUBMAKE) test-plain WAITING_JOBS=3,$(SUBMAKE) test-gate)
 test-schedules: $(DEV)
-	$(BIN)/pytest -q $(SCHEDULES)
+	$(BIN)/pytest -q $(TO_RESULTS) $(SCHEDULES)
 WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | sort)
 test-browser: $(DEV) $(NODE)
-	$(PY) tools/pytest_beside.py $(JOBS) -m "browser and not serial" $(WITH_BROWSER)
-# Tests with a browser leave an eighth of the processors' time unused. At idle priority,
-# these targets use only that time.
-COMPUTING := types contracts test-schedules docs
-test-beside: $(DEV) $(NODE)
-	$(call beside,$(SUBMAKE) test-browser,chrt --idle 0 $(SUBMAKE) $(COMPUTING))
+	$(PY) tools/pytest_beside.py $(JOBS) $(TO_RESULTS) -m "browser and not serial" $(WITH_BROWSER)
 # Tests that measure time wait most of the time, so two files of them run in parallel on
 # any machine, the longest first. Safety tests allow for the delays of the machine and do
 # not run again; the other tests run a second time if they fail. Tests under load run alone.
@@ -129,10 +124,14 @@ ALONE := $(wildcard tests/safety/test_*_load.py tests/safety/test_*_soak.py)
 LONG = $(ONE_LANE) $(OTHER_LANE)
 OF_MOTION = $(LONG) $(filter-out $(LONG) $(ALONE),$(wildcard tests/safety/test_*.py))
 OF_TIME := $(sort $(filter-out tests/safety/%,$(shell grep -rl --include='test_*.py' 'mark\.serial' tests)))
-test-serial: $(DEV) $(NODE)
-	$(BIN)/pytest -q -m serial -n 2 --dist loadfile $(OF_MOTION)
-	$(BIN)/pytest -q -m serial $(ALONE)
-	$(PY) tools/pytest_beside.py 2 -m serial $(OF_TIME)
+.PHONY: test-motion test-load test-time
+test-serial: test-motion test-load test-time
+test-motion: $(DEV) $(NODE)
+	$(BIN)/pytest -q $(TO_RESULTS) -m serial -n 2 --dist loadfile $(OF_MOTION)
+test-load: $(DEV) $(NODE)
+	$(BIN)/pytest -q $(TO_RESULTS) -m serial $(ALONE)
+test-time: $(DEV) $(NODE)
+	$(PY) tools/pytest_beside.py 2 $(TO_RESULTS) -m serial $(OF_TIME)
 
 ## test-safety: long tests of the motion guarantees, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
 .PHONY: test-safety

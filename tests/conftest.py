@@ -1,10 +1,12 @@
 """Settings and fixtures of all tests."""
 
 import gc
+import json
 import os
 import re
 import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -12,10 +14,13 @@ from playwright.sync_api import Browser, expect
 
 from command_fixtures import later_port, ros1, ros2
 from real_browser import launched
+from surroundings import use_own_surroundings
 from webmap.base.logs import budgets
 
 __all__ = ["later_port", "ros1", "ros2"]
 """Fixtures from another file."""
+
+use_own_surroundings()
 
 # On two busy cores, the time of an example does not depend on the code alone.
 settings.register_profile(
@@ -25,6 +30,32 @@ settings.load_profile("webmap")
 
 # This setting is for the whole process.
 expect.set_options(timeout=15_000)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--results",
+        type=Path,
+        help="a file that gets a line of JSON for the outcome of each test",
+    )
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """Write the outcome of each test, if the option asks for it."""
+    file = config.getoption("results")
+    if file is None:
+        return
+    kinds = {"passed": "passed", "skipped": "skipped", "xfailed": "skipped"}
+    kinds |= dict.fromkeys(("failed", "error", "xpassed"), "failed")
+    with file.open("a", encoding="utf-8") as results:
+        for kind, outcome in kinds.items():
+            for report in terminalreporter.stats.get(kind, []):
+                skipped = outcome == "skipped" and isinstance(report.longrepr, tuple)
+                why = report.longrepr[2].removeprefix("Skipped: ") if skipped else ""
+                line = {"test": report.nodeid, "outcome": outcome, "why": why}
+                results.write(json.dumps(line) + "\n")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

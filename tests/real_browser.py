@@ -1,5 +1,6 @@
-"""Debian's Chromium, and the errors and warnings that it reports."""
+"""A real Chromium, and the errors and warnings that it reports."""
 
+import os
 import re
 import shutil
 import time
@@ -57,6 +58,17 @@ CHROMIUM_ARGS = [
 ]
 
 
+def chromium_path() -> str:
+    """Return the path of the browser: ``CHROMIUM`` names one, or it is Debian's."""
+    named = os.environ.get("CHROMIUM") or "chromium"
+    if found := shutil.which(named):
+        return found
+    raise FileNotFoundError(
+        f"the tests need Chromium, and {named} is no program here: install Debian's "
+        "package chromium, or set CHROMIUM to the path of a Chromium or Chrome"
+    )
+
+
 @contextmanager
 def launched() -> Iterator[Browser]:
     """Run a browser.
@@ -66,7 +78,7 @@ def launched() -> Iterator[Browser]:
     """
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=CHROMIUM_ARGS
+            executable_path=chromium_path(), args=CHROMIUM_ARGS
         )
         yield browser
         browser.close()

@@ -4,7 +4,14 @@ set -euo pipefail
 here=$(dirname "${BASH_SOURCE[0]}")
 
 missing=()
-command -v chromium >/dev/null || missing+=(chromium)
+if [ -n "${CHROMIUM:-}" ]; then
+  if ! command -v "$CHROMIUM" >/dev/null; then
+    printf 'webmap: CHROMIUM is "%s", which is no program here; set it to the path of a Chromium or Chrome, or unset it.\n' "$CHROMIUM" >&2
+    exit 1
+  fi
+elif ! command -v chromium >/dev/null; then
+  missing+=(chromium)
+fi
 command -v node >/dev/null || missing+=(nodejs)
 command -v npm >/dev/null || missing+=(npm)
 # Playwright's driver, which controls Chromium, links to this library.

@@ -69,7 +69,9 @@ def main(jobs: str, *arguments: str) -> int:
     if failed.unsafe or not 0 < len(tests) <= MOST:
         return status
     print("\nNow a second time, alone:", flush=True)
-    status = subprocess.call([sys.executable, "-m", "pytest", "-q", "-rA", *tests])
+    results = [each for each in arguments if each.startswith("--results=")]
+    again = [sys.executable, "-m", "pytest", "-q", "-rA", *results, *tests]
+    status = subprocess.call(again)
     if status == 0:
         print(
             "Passed the second time; correct these tests:",

@@ -18,7 +18,7 @@ from typing import Any
 
 from websockets.sync.client import connect
 
-from real_browser import CHROMIUM_ARGS
+from real_browser import CHROMIUM_ARGS, chromium_path
 
 
 class Tab:
@@ -121,7 +121,7 @@ class Chromium:
         self._folder = tempfile.mkdtemp(prefix="webmap-chromium-")
         self.process = subprocess.Popen(
             [
-                shutil.which("chromium"),
+                chromium_path(),
                 "--headless",
                 *CHROMIUM_ARGS,
                 "--window-size=1200,900",

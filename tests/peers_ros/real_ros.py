@@ -15,6 +15,7 @@ from typing import NamedTuple
 from ros_facts import ROBOT
 from websockets.sync.client import connect
 
+from surroundings import outside
 from webmap.testing import FaultProxy
 
 HERE = Path(__file__).parent
@@ -33,6 +34,7 @@ def installed():
         [sys.executable, ROOT / "tools" / "make_ros.py", FOLDER],
         capture_output=True,
         text=True,
+        env=outside(),
         check=False,
     )
     if done.returncode == CANNOT:

@@ -11,6 +11,7 @@ import httpx
 import pytest
 
 import webmap
+from surroundings import outside
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src"
@@ -50,7 +51,7 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run(command: list[str | Path], cwd: Path | None = None) -> str:
     # The environment must not use any file of this checkout.
-    clean = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+    clean = {k: v for k, v in outside().items() if not k.startswith("PYTHON")}
     done = subprocess.run(command, cwd=cwd, env=clean, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
