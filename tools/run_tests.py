@@ -183,7 +183,7 @@ def summary(parts: list[Part], seconds: float) -> str:
             row += "  failed" if part.status else "  passed"
         lines.append(row)
     lines += _listed(
-        "Skipped, because this machine lacks something:",
+        "Skipped:",
         [
             f"{why} ({tests} test{'s' * (tests > 1)})"
             for why, tests in Counter(

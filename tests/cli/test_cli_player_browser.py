@@ -84,7 +84,9 @@ def opened(chromium, *arguments):
     with shown(chromium, "play", *arguments) as page:
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(1)
         page.locator("#robots .row").click()
-        yield page, Bar(page)
+        bar = Bar(page)
+        expect(bar.slider).to_be_enabled()
+        yield page, bar
 
 
 def test_the_mouse_pauses_seeks_and_changes_the_speed(chromium, bag):
