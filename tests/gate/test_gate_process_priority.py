@@ -44,6 +44,14 @@ def test_a_raised_thread_and_its_new_threads_get_realtime_priority():
 
 
 @linux
+def test_a_thread_with_permission_is_raised(monkeypatch):
+    asked = []
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *asked_: asked.append(asked_))
+    assert in_a_thread(process.rise)
+    assert asked == [(0, os.SCHED_RR, os.sched_param(process.REAL_TIME))]
+
+
+@linux
 def test_a_thread_without_permission_keeps_the_normal_priority(monkeypatch):
     def refuse(*_):
         raise PermissionError(1, "Operation not permitted")

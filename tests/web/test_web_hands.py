@@ -642,7 +642,7 @@ def test_stop_all_shows_the_verdict_of_the_gate_for_each_robot(open_bench) -> No
     bench.gate.latching = True
     bench.page.get_by_role("button", name="STOP ALL").click()
     verdicts = bench.page.locator(".webmap-stop-verdict")
-    bench.until(lambda: verdicts.count() == 2)
+    bench.until(lambda: verdicts.count() == 2 and bench.gate.robots["r2"]["latched"])
     bench.gate.change("r1", stop=CONFIRMED)
     bench.gate.change("r2", stop=UNCONFIRMED)
     bench.until(lambda: verdicts.nth(0).get_attribute("data-state") == "confirmed")
