@@ -22,7 +22,7 @@ from pathlib import Path
 from processes import Process
 from safety_bench import pass_time, wait_for
 
-from webmap.testing import FaultProxy, WitnessRobot
+from webmap.testing import FaultProxy, Sentinel, WitnessRobot
 
 DRIVER = Path(__file__).with_name("safety_driver.py")
 
@@ -99,6 +99,7 @@ class AgentBench:
         enter = self._open.enter_context
         os.environ["WEBMAP_STATE_DIR"] = str(self._folder / "agent")
         self.robot = enter(WitnessRobot(timeout=None))
+        self.sentinel = enter(Sentinel())
         self._open.callback(self.end_router)
         self.start_router()
         self.display_hop = enter(FaultProxy(self.port))

@@ -1,7 +1,7 @@
 """The number of trials of a run, its progress, and the figures that it has already.
 
-A full run has fifty trials or more; an environment variable sets the number. A full run
-asserts the promised times. A quick run adds the delay of the machine to them.
+A full run has twenty trials or more; an environment variable sets the number. A full
+run asserts the promised times. A quick run adds the delay of the machine to them.
 """
 
 import functools
@@ -15,7 +15,7 @@ from pathlib import Path
 import webmap
 
 TRIALS = int(os.environ.get("WEBMAP_SAFETY_TRIALS", "3"))
-FULL = TRIALS >= 50
+FULL = TRIALS >= 20
 
 SHOW: list[Callable[[str], None]] = [print]
 """Functions that print progress; the last one is used.
