@@ -4,7 +4,7 @@ import re
 from contextlib import suppress
 
 import pytest
-from console_ready import assert_free, expect_state, select, title, unfold
+from console_ready import assert_free, expect_state, select, send_away, title, unfold
 from playwright.sync_api import expect
 
 from real_browser import hold
@@ -69,6 +69,24 @@ def test_the_card_runs_a_stop_test_of_a_robot_with_a_stated_command_timeout(
     expect(bound).to_contain_text(tested)
     expect(page.get_by_role("button", name="Run stop test", exact=True)).to_be_enabled()
     page.get_by_role("button", name="Release control of Robot 2").click()
+
+
+def test_a_stop_test_runs_under_control_that_was_taken_for_a_goal(open_console):
+    page = open_console()
+    select(page, "Robot 1")
+    send_away(page)
+    page.locator("#card [data-act=cancel]").click()
+    expect_state(page, "You have control")
+    unfold(page)
+    button = page.locator("[data-act=stop-test]")
+    running = page.locator("#card .test", has_text="Stop test: ")
+    tested = page.locator("#card .own-stop", has_text="(tested ")
+    for _ in range(2):
+        page.wait_for_timeout(450)
+        button.click()
+    expect(running.or_(tested).first).to_be_attached()
+    expect(page.locator(".webmap-teleop-detail")).not_to_contain_text("Release all")
+    page.get_by_role("button", name="Release control of Robot 1").click()
 
 
 def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):

@@ -277,8 +277,7 @@ export class Drive {
    * @param {string} robot
    */
   stopTest(robot) {
-    this._pilot.goNeutral(performance.now());
-    this._send([{ op: "stop-test", robot }]);
+    this._pilot.stopTest(robot, performance.now());
   }
 
   /** End: neutral, control released, connection closed. */

@@ -446,3 +446,50 @@ describe("a camera that is used for driving", () => {
     assert.equal(last().video, 1e9);
   });
 });
+
+describe("a stop test", () => {
+  const TEST = [{ op: "stop-test", robot: "r1" }];
+  const tests = (messages) => messages.filter(({ op }) => op === "stop-test");
+
+  test("under control taken for a goal begins after neutral commands", () => {
+    bench.grant("r1");
+    bench.pilot.place("goal", "r1", { x: 1, y: 2, yaw: 0 }, bench.now);
+    assert.deepEqual(bench.run(500), []);
+    bench.pilot.stopTest("r1", bench.now);
+    const messages = bench.run(600);
+    const before = messages.slice(0, messages.findIndex(({ op }) => op === "stop-test"));
+    assert.ok(before.length >= 5 && before.every(({ op, x }) => op === "drive" && x === 0));
+    assert.deepEqual(tests(messages), TEST);
+  });
+
+  test("does not begin while an input is held, and the page says why", () => {
+    bench.drive();
+    bench.pilot.stopTest("r1", bench.now);
+    assert.deepEqual(tests(bench.run(2000)), []);
+    assert.equal(bench.pilot.status.refusal, "release all inputs first");
+  });
+
+  test("does not begin after an input was pressed, STOP, or another choice", () => {
+    for (const act of [
+      () => bench.press(),
+      () => bench.pilot.stopped("r1", bench.now),
+      () => bench.pilot.choose("r2", bench.now),
+      () => bench.pilot.goNeutral(bench.now, { drop: true }),
+    ]) {
+      bench = new Bench();
+      bench.grant("r1");
+      bench.pilot.stopTest("r1", bench.now);
+      bench.run(100);
+      act();
+      assert.deepEqual(tests(bench.run(2000)), []);
+    }
+  });
+
+  test("that the gate does not prepare for is requested anyway, for its reason", () => {
+    bench.arming = false;
+    bench.grant("r1");
+    bench.pilot.stopTest("r1", bench.now);
+    assert.deepEqual(tests(bench.run(1400)), []);
+    assert.deepEqual(tests(bench.run(200)), TEST);
+  });
+});

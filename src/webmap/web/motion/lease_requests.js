@@ -93,6 +93,20 @@ export class LeaseRequests {
   reset(robot) {
     if (robot === "*" || robot === this.choice) this.refusal = null;
   }
+  /**
+   * Send commands under the lease of the chosen robot, if this page has it.
+   *
+   * @param {number} now
+   * @returns {boolean} Whether it has it.
+   */
+  use(now) {
+    const { choice } = this;
+    const epoch = choice === null ? null : this._leases.epoch(choice);
+    if (choice === null || epoch === null) return false;
+    if (this._stream.lease === null) this._open(choice, epoch, now);
+    return true;
+  }
+
 
   /**
    * Request the lease if an input is pressed and there is none.
@@ -110,12 +124,8 @@ export class LeaseRequests {
       return [];
     }
     if (this._stream.lease || !choice || isNeutral(this._inputs.axes)) return [];
+    if (this.use(now)) return [];
     const report = this._leases.robots.get(choice);
-    const epoch = this._leases.epoch(choice);
-    if (epoch !== null) {
-      this._open(choice, epoch, now);
-      return [];
-    }
     if (!report || !mayTake(report)) {
       this._inputs.block(now);
       return [];

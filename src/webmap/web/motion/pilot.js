@@ -1,5 +1,5 @@
 import { Leases } from "./leases.js";
-import { LeaseRequests } from "./lease_requests.js";
+import { LeaseRequests, TAKE_PATIENCE } from "./lease_requests.js";
 import { Stream } from "./stream.js";
 
 /** @typedef {import('./inputs.js').Inputs} Inputs */
@@ -38,6 +38,11 @@ export class Pilot {
      */
     this._renewed = new Map();
     this._requests = new LeaseRequests(inputs, this._leases, this._stream);
+    /**
+     * The stop test to begin when the gate has received neutral commands for a while.
+     * @type {{robot: string, since: number} | null}
+     */
+    this._test = null;
   }
 
   /** The newest report of each robot. */
@@ -210,6 +215,35 @@ export class Pilot {
   }
 
   /**
+   * Begin a stop test as soon as the gate has received neutral commands for a while. A page
+   * that took control for a goal has sent none until now.
+   *
+   * @param {string} robot
+   * @param {number} now
+   */
+  stopTest(robot, now) {
+    this.goNeutral(now);
+    if (robot === this._requests.choice) this._requests.use(now);
+    this._test = { robot, since: now };
+  }
+
+  /**
+   * @param {number} now
+   * @returns {Command[]}
+   */
+  _beginTest(now) {
+    if (this._test === null) return [];
+    const { robot, since } = this._test;
+    const held = this.inputs.pressed;
+    const ready = this.driven === robot && this.settled;
+    if (!held && !ready && now - since < TAKE_PATIENCE) return [];
+    this._test = null;
+    if (!held) return [{ op: "stop-test", robot }];
+    this.refuse(robot, "stop-test", "release all inputs first", now);
+    return [];
+  }
+
+  /**
    * Go neutral now; inputs have no effect until they are released and pressed again.
    *
    * @param {number} now
@@ -217,6 +251,7 @@ export class Pilot {
    *     because this page may not receive their release.
    */
   goNeutral(now, how) {
+    this._test = null;
     this._stream.goNeutral(now, how);
   }
 
@@ -307,7 +342,8 @@ export class Pilot {
   step(now, attentive) {
     this._stream.look(now, attentive, this._requests.choice);
     const reached = this._requests.step(now);
-    return [...reached, ...this._stream.step(this._armed, now), ...this._tidy(now)];
+    const commands = [...reached, ...this._stream.step(this._armed, now)];
+    return [...commands, ...this._beginTest(now), ...this._tidy(now)];
   }
 
   /**
@@ -330,6 +366,7 @@ export class Pilot {
     if (lease) this._leases.giveBack(lease.robot, lease.epoch);
     this._requests.end();
     this._stream.close();
+    this._test = null;
   }
 
   /**

@@ -213,6 +213,9 @@ function ofInputs(status, report, title) {
   if (isTested(report)) return description("driving", "Stop test running", "Do not touch any input.");
   if (report.state === "driving") return null;
   if (report.reason) return description("fixed", title, sentence(report.reason));
+  if (status.refusal && status.refused === "stop-test") {
+    return description("ready", title, sentence(status.refusal));
+  }
   return status.pressed && status.blocked ? inputBlocked() : null;
 }
 
