@@ -15,6 +15,7 @@ def report(**changes):
         "v": 2.0,
         "brake": 0.5,
         "test": None,
+        "holder": SimpleNamespace(connection="c1", name="Ann"),
     }
     return SimpleNamespace(report=SimpleNamespace(**(known | changes)))
 
@@ -57,6 +58,11 @@ def test_a_failed_stop_test_is_shown_with_its_reason():
     assert text_of(report(test=failed)).endswith(
         "|Stop test: The robot did not move within 1.5 s."
     )
+
+
+def test_what_ended_a_stop_test_is_not_shown_after_the_end_of_control():
+    stopped = SimpleNamespace(state="failed", text="STOP by Ann")
+    assert text_of(report(test=stopped, holder=None)).endswith("|")
 
 
 def test_a_view_only_robot_has_no_bound_on_the_card():

@@ -154,7 +154,9 @@ class OwnStop:
         )
         self.elements[0].set("data-tone", "warn" if report.stop_time is None else None)
         test = report.test
-        shown = test is not None and test.state != "done"
+        # What ended the test, such as a STOP, may be over when control has ended.
+        over = ("done",) if report.holder else ("done", "failed")
+        shown = test is not None and test.state not in over
         self._test.text = f"Stop test: {sentence(test.text)}" if test and shown else ""
 
 

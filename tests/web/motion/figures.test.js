@@ -83,11 +83,14 @@ test("a robot is shown as not moving only if odometry shows standstill", () => {
 });
 
 test("a running or failed stop test is shown, a successful one is not", () => {
-  const text = (state) => stopTestText({ test: { state, text: "creeping" } });
+  const holder = { connection: "c1", name: "Ann" };
+  const text = (state) => stopTestText({ test: { state, text: "creeping" }, holder });
   assert.equal(text("creeping"), "Stop test: creeping");
   assert.equal(text("failed"), "Stop test: creeping");
   assert.equal(text("done"), "");
   assert.equal(stopTestText({ test: null }), "");
+  const stopped = { state: "failed", text: "STOP by Ann" };
+  assert.equal(stopTestText({ test: stopped, holder: null }), "");
   assert.equal(stopTestText({}), "");
 });
 

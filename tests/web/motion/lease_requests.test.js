@@ -172,7 +172,7 @@ describe("a refusal", () => {
     it.reach.refuse("r1", "goal", "too far", 0); // shown by the tool that sent it
     assert.equal(it.reach.refusal, null);
     it.reach.refuse("r1", "ask", "too often", 0);
-    assert.deepEqual([it.reach.refusal, it.reach.refused], ["too often", "ask"]);
+    assert.deepEqual([it.reach.refusal?.text, it.reach.refusal?.what], ["too often", "ask"]);
     for (const ask of [
       () => it.reach.take("r1", 0),
       () => it.reach.ask("r1"),
@@ -192,7 +192,51 @@ describe("a refusal", () => {
     press();
     reportRobot("r1", MINE, 0);
     it.reach.refuse("r1", "drive", "too old", 50);
-    assert.equal(it.reach.refusal, "too old");
+    assert.equal(it.reach.refusal?.text, "too old");
     assert.equal(it.inputs.blocked, true);
+  });
+
+  const text = () => it.reach.refusal?.text ?? null;
+
+  test("that another operator got control ends when that operator has it or is gone", () => {
+    reportRobot("r1", MINE, 0);
+    it.reach.refuse("r1", "lease", "control is handed over to Ann", 0);
+    reportRobot("r1", { changing: true }, 50);
+    assert.equal(text(), "control is handed over to Ann");
+    reportRobot("r1", {}, 100);
+    assert.equal(text(), null);
+  });
+
+  test("because of a STOP ends with the reset, or with another STOP", () => {
+    for (const next of [{}, { latched: true, stop: { id: "s2" } }]) {
+      reportRobot("r1", MINE, 0);
+      it.reach.refuse("r1", "lease", "STOP by Ann", 0);
+      reportRobot("r1", { latched: true, stop: { id: "s1" } }, 50);
+      it.reach.step(60_000);
+      assert.equal(text(), "STOP by Ann");
+      reportRobot("r1", next, 100);
+      assert.equal(text(), null);
+    }
+  });
+
+  test("because of another operator ends when that operator has no control any more", () => {
+    reportRobot("r1", ANN, 0);
+    it.reach.refuse("r1", "take", "Ann has control", 0);
+    it.reach.step(60_000);
+    assert.equal(text(), "Ann has control");
+    reportRobot("r1", {}, 50);
+    assert.equal(text(), null);
+  });
+
+  test("without a cause in a report, or of a request, ends after 10 s", () => {
+    it.reach.refuse("r1", "take", "viewers can only look", 0);
+    it.reach.step(10_000);
+    assert.equal(text(), "viewers can only look");
+    it.reach.step(10_001);
+    assert.equal(text(), null);
+    reportRobot("r1", ANN, 0);
+    it.reach.refuse("r1", "ask", "Ben has already requested control", 0);
+    it.reach.step(10_001);
+    assert.equal(text(), null);
   });
 });

@@ -4,6 +4,7 @@ import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { GoalMarks } from "./goal_marks.js";
 import { look, sendGoal, ShownGoals } from "../../web/tools/goal_texts.js";
 import { lay } from "../../web/tools/overlay.js";
+import { showNote } from "../../web/tools/robot_note.js";
 import { tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -169,6 +170,8 @@ class GoalTool {
   async _ask(places) {
     /** @type {string[]} */
     const problems = [];
+    /** @type {string[]} */
+    const refused = [];
     const asked = places.map(([robot, pose]) => {
       const goal = { pose, state: /** @type {'asked' | 'sent'} */ ("asked") };
       this._goals.set(robot, goal);
@@ -191,11 +194,13 @@ class GoalTool {
         if (this._goals.get(robot) === goal) this._goals.delete(robot);
         const why = error instanceof Error ? error.message : String(error);
         const name = this._drive.robots.get(robot)?.name ?? robot;
+        refused.push(robot);
         problems.push(places.length > 1 ? `${name}: ${why}` : why);
       }
       this._show();
     }
-    if (problems.length > 0) setText(this._message, `Goal not sent: ${problems.join("; ")}`);
+    if (problems.length === 0) return;
+    showNote(this._message, `Goal not sent: ${problems.join("; ")}`, this._drive, refused);
   }
 
   _callOff() {
@@ -233,7 +238,8 @@ class GoalTool {
    * @param {string} why
    */
   _refused(robot, what, why) {
-    if (what === "cancel" && robot !== null) setText(this._message, `Goal not cancelled: ${why}`);
+    if (what !== "cancel" || robot === null) return;
+    showNote(this._message, `Goal not cancelled: ${why}`, this._drive, [robot]);
   }
 
   /** @param {string} robot */

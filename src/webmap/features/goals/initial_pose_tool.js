@@ -2,6 +2,7 @@ import { scaleOf } from "../../web/view.js";
 import { onScreen, PressAim } from "../../web/tools/aim.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
+import { showNote } from "../../web/tools/robot_note.js";
 import { tool } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -148,7 +149,7 @@ class InitialPoseTool {
       this._send({ pose: { robot, ...pose } });
     } catch (error) {
       const why = error instanceof Error ? error.message : String(error);
-      setText(this._message, `Pose not sent: ${why}`);
+      showNote(this._message, `Pose not sent: ${why}`, this._drive, [robot]);
     }
     this._preview(null);
   }

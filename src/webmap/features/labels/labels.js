@@ -4,6 +4,7 @@ import { scaleOf, unapply } from "../../web/view.js";
 import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { LabelMove } from "./labels_move.js";
 import { lay } from "../../web/tools/overlay.js";
+import { showNote } from "../../web/tools/robot_note.js";
 import { tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -256,7 +257,8 @@ class Labels {
       this._send({ goal: { robot, ...place, yaw } });
       this._close(`Goal sent to ${label.dataset.name ?? "the label"}.`);
     } catch (error) {
-      setText(this._message, `Goal not sent: ${error instanceof Error ? error.message : error}`);
+      const why = error instanceof Error ? error.message : error;
+      showNote(this._message, `Goal not sent: ${why}`, this._map.drive, [robot]);
       this._fit();
     }
   }

@@ -128,8 +128,10 @@ export function ownStop({ stop_time, stop_source, stop_date, why }) {
  * @param {RobotReport} report
  * @returns {string} "" if {@link ownStop} contains everything.
  */
-export function stopTestText({ test }) {
-  return test && test.state !== "done" ? `Stop test: ${test.text}` : "";
+export function stopTestText({ test, holder }) {
+  if (!test || test.state === "done") return "";
+  // What ended the test, such as a STOP, may be over when control has ended.
+  return test.state === "failed" && !holder ? "" : `Stop test: ${test.text}`;
 }
 
 /**

@@ -1,4 +1,5 @@
 import { isNeutral } from "./axes.js";
+import { Note } from "./note.js";
 import { heldByAnother, mayTake } from "./report.js";
 
 /** @typedef {import('./inputs.js').Inputs} Inputs */
@@ -34,11 +35,9 @@ export class LeaseRequests {
     this.choice = null;
     /**
      * Why the gate refused the last request for the chosen robot.
-     * @type {string | null}
+     * @type {Note | null}
      */
     this.refusal = null;
-    /** The operation that was refused. */
-    this.refused = "";
     /**
      * The requested lease; `alive`: the press that requested it may drive the robot.
      * @type {{robot: string, since: number, alive: boolean} | null}
@@ -93,6 +92,7 @@ export class LeaseRequests {
   reset(robot) {
     if (robot === "*" || robot === this.choice) this.refusal = null;
   }
+
   /**
    * Send commands under the lease of the chosen robot, if this page has it.
    *
@@ -107,7 +107,6 @@ export class LeaseRequests {
     return true;
   }
 
-
   /**
    * Request the lease if an input is pressed and there is none.
    *
@@ -116,9 +115,10 @@ export class LeaseRequests {
    */
   step(now) {
     const { choice } = this;
+    this._look(now);
     if (this._asked) {
       if (now - this._asked.since > TAKE_PATIENCE) {
-        this.refusal = "no answer from the gate";
+        this.refusal = new Note("no answer from the gate", "take", now);
         this._giveUp(now);
       }
       return [];
@@ -145,6 +145,7 @@ export class LeaseRequests {
   report(report, before, now) {
     const { robot } = report;
     const epoch = this._leases.epoch(robot);
+    if (robot === this.choice) this._look(now);
     const asked = this._asked?.robot === robot ? this._asked : null;
     const handed = epoch !== null && this._requested.delete(robot);
     if (asked && epoch !== null) {
@@ -174,8 +175,8 @@ export class LeaseRequests {
     if (what === "goal" || what === "locate") return;
     // A command that arrived after the end of its lease needs no message.
     if (what === "drive" && !this._stream.lease) return;
-    this.refusal = why;
-    this.refused = what;
+    this.refusal = new Note(why, what, now);
+    this._look(now);
     if (what === "take" && this._asked?.robot === robot) this._giveUp(now);
     if (what === "drive") this._stream.goNeutral(now);
   }
@@ -194,6 +195,12 @@ export class LeaseRequests {
   forget() {
     this._asked = null;
     this._requested.clear();
+  }
+
+  /** @param {number} now End the note about a refusal with its cause. */
+  _look(now) {
+    const report = this._leases.robots.get(this.choice ?? "");
+    if (this.refusal?.isOver(report, now)) this.refusal = null;
   }
 
   /**

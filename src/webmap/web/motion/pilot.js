@@ -73,7 +73,7 @@ export class Pilot {
 
   /** The state of the chosen robot and of the inputs, for the operator. */
   get status() {
-    const { choice, refusal, refused, robot } = this._requests;
+    const { choice, refusal, robot } = this._requests;
     return {
       choice,
       report: choice === null ? null : (this.robots.get(choice) ?? null),
@@ -84,8 +84,8 @@ export class Pilot {
       pressed: this.inputs.pressed,
       blocked: this.inputs.blocked,
       axes: this.inputs.axes,
-      refusal,
-      refused,
+      refusal: refusal?.text ?? null,
+      refused: refusal?.what ?? "",
       delay: this._stream.delay,
     };
   }
