@@ -120,6 +120,7 @@ def test_a_press_of_a_mark_seeks_to_shortly_before_it(chromium, bag):
 
 def test_the_keyboard_pauses_seeks_and_changes_the_speed(chromium, bag):
     with opened(chromium, bag) as (page, bar):
+        page.keyboard.press("Tab")
         bar.play.focus()
         page.keyboard.press("Space")
         expect(bar.play).to_have_accessible_name("Play")

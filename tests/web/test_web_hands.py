@@ -244,6 +244,7 @@ def test_a_button_keeps_the_space_key_unless_this_page_drives(bench: Bench) -> N
         }"""
     )
     button = bench.page.locator("[data-webmap-keeps-space]")
+    bench.page.keyboard.press("Tab")
     button.press("Space")
     bench.until(lambda: button.inner_text() == "x")
     assert bench.gate.of("stop") == []
@@ -252,6 +253,33 @@ def test_a_button_keeps_the_space_key_unless_this_page_drives(bench: Bench) -> N
     bench.until(lambda: bench.gate.of("stop") == [{"op": "stop", "robot": "r1"}])
     bench.still(tolerance=0.05)
     assert button.inner_text() == "x"
+
+
+def test_stop_keys_without_a_position_stop_and_driving_keys_do_nothing(
+    bench: Bench,
+) -> None:
+    bench.select("r1")
+    keys = bench.page.context.new_cdp_session(bench.page)
+
+    def press(key: str, modifiers: int = 0) -> None:
+        for kind in ("keyDown", "keyUp"):
+            event = {"type": kind, "key": key, "code": "", "modifiers": modifiers}
+            keys.send("Input.dispatchKeyEvent", event)
+
+    for key in ("w", "ArrowUp"):
+        press(key)
+    detail = bench.page.locator(".webmap-teleop-detail")
+    bench.until(lambda: "This keyboard cannot drive" in detail.inner_text())
+    bench.still()
+    assert bench.gate.of("take") == []
+    shift = 8
+    for key, modifiers in ((" ", 0), ("Escape", 0), (" ", shift), ("Escape", shift)):
+        press(key, modifiers)
+    stops = ["r1", "r1", "r1", "*"]
+    bench.until(lambda: [each["robot"] for each in bench.gate.of("stop")] == stops)
+    bench.drive()
+    bench.page.keyboard.up("w")
+    bench.until(lambda: "This keyboard cannot drive" not in detail.inner_text())
 
 
 def test_escape_in_a_non_modal_dialog_sends_stop(bench: Bench) -> None:

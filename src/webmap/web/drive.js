@@ -81,6 +81,11 @@ export class Drive {
     return { link, connection: this.connection, ...status };
   }
 
+  /** Whether this page has control of any robot, or a goal moves one that it sent a goal to. */
+  get drives() {
+    return this._session.drives;
+  }
+
   /** The requests for control. */
   get requests() {
     return this._session.requests.requests(performance.now());

@@ -121,3 +121,95 @@ test("a key drives although a tool fails", () => {
   assert.equal(keyAt({}, fails)?.x, 1);
   assert.equal(reported.length, 1);
 });
+
+/**
+ * Press a key on a page, and return what was stopped.
+ *
+ * @param {object} key
+ * @param {{target?: object, before?: string[], drives?: boolean}} [where] `target`: the
+ *     focused element; `before`: earlier events, such as "pointerdown" or "Tab".
+ */
+function stoppedAt(key, { target = null, before = [], drives = false } = {}) {
+  const stopped = [];
+  const desk = devicesOf({
+    status: { driven: null, taking: false, choice: "r1" },
+    drives,
+    robots: new Map(),
+    on: () => () => {},
+    stop: (robot) => stopped.push(robot),
+    goNeutral() {},
+    setInput() {},
+  });
+  const close = desk.open();
+  const dispatch = (kind, fields) => {
+    const event = new Event(kind, { cancelable: true });
+    Object.defineProperty(event, "target", { value: target });
+    window.dispatchEvent(Object.assign(event, fields));
+    return event.defaultPrevented;
+  };
+  for (const each of before) {
+    if (each === "pointerdown") dispatch(each, {});
+    else dispatch("keydown", { key: each, code: each });
+  }
+  const down = dispatch("keydown", key);
+  const up = dispatch("keyup", key);
+  close();
+  return { stopped, prevented: [down, up] };
+}
+
+const STOPS = [
+  [{ code: "", key: "Escape" }, ["r1"]],
+  [{ code: "", key: "Esc" }, ["r1"]],
+  [{ code: "", key: "Escape", shiftKey: true }, ["*"]],
+  [{ code: "", key: " " }, ["r1"]],
+  [{ code: "", key: " ", shiftKey: true }, ["r1"]],
+  [{ code: "", key: "\u00a0", shiftKey: true }, ["r1"]],
+  [{ code: "", key: "Spacebar" }, ["r1"]],
+  [{ code: "CapsLock", key: "Escape" }, ["r1"]],
+  [{ code: "Space", key: "Unidentified" }, ["r1"]],
+  [{ code: "", key: " ", ctrlKey: true }, []],
+  [{ code: "", key: "Escape", altKey: true }, []],
+  [{ code: "", key: " ", metaKey: true }, []],
+  [{ code: "", key: " ", isComposing: true }, []],
+  [{ code: "", key: "Unidentified" }, []],
+];
+for (const [key, robots] of STOPS) {
+  test(`${JSON.stringify(key)} stops ${robots.join() || "nothing"}`, () => {
+    assert.deepEqual(stoppedAt(key).stopped, robots);
+  });
+}
+
+const SPACE = { code: "Space", key: " " };
+
+/** A focused element that matches one of these selectors. */
+function element(matched) {
+  return Object.assign(new Element(), {
+    matches: (selectors) => selectors.includes(matched),
+    closest: () => null,
+  });
+}
+
+test("Space is STOP on a check box unless the Tab key moved the focus after the pointer", () => {
+  globalThis.HTMLInputElement = globalThis.HTMLElement = class {};
+  const target = element("input[type=checkbox]");
+  const at = (...before) => stoppedAt(SPACE, { target, before }).stopped;
+  assert.deepEqual(at("pointerdown"), ["r1"]);
+  assert.deepEqual(at("pointerdown", "KeyW"), ["r1"]);
+  assert.deepEqual(at("Tab", "pointerdown"), ["r1"]);
+  assert.deepEqual(at("pointerdown", "Tab"), []);
+  assert.deepEqual(stoppedAt(SPACE, { target, before: ["Tab"], drives: true }).stopped, ["r1"]);
+});
+
+test("Space types in a text field, however the focus got there", () => {
+  globalThis.HTMLInputElement = globalThis.HTMLElement = class {};
+  const target = element("textarea");
+  for (const before of [["pointerdown"], ["Tab"]]) {
+    const { stopped, prevented } = stoppedAt(SPACE, { target, before, drives: true });
+    assert.deepEqual([stopped, prevented], [[], [false, false]]);
+  }
+});
+
+test("the release of Space presses no button after STOP", () => {
+  assert.deepEqual(stoppedAt(SPACE).prevented, [true, true]);
+  assert.deepEqual(stoppedAt({ ...SPACE, ctrlKey: true }).prevented, [false, false]);
+});

@@ -227,3 +227,29 @@ describe("a message of the gate", () => {
     assert.deepEqual(session.receive({ op: "sing" }, 0), { send: [], events: [] });
   });
 });
+
+describe("a page drives", () => {
+  const goal = (state) => ({ id: "g1", state });
+  const free = { ...REPORT, state: "free", holder: null, mine: false, epoch: null };
+
+  test("while it has control of any robot", () => {
+    session.receive(HELLO, 0);
+    session.receive({ ...free, robot: "r2" }, 0);
+    assert.equal(session.drives, false);
+    session.receive({ ...REPORT, robot: "r2" }, 0);
+    assert.equal(session.drives, true);
+  });
+
+  test("while a goal moves a robot that it sent a goal to, also on the next connection", () => {
+    session.receive(HELLO, 0);
+    session.receive({ ...free, goal: goal("under way") }, 0);
+    assert.equal(session.drives, false, "the goal of another page");
+    session.sent({ op: "goal", robot: "r1" }, 0);
+    session.lost(10);
+    session.receive({ ...HELLO, connection: "c2" }, 20);
+    session.receive({ ...free, goal: goal("under way") }, 20);
+    assert.equal(session.drives, true);
+    session.receive({ ...free, goal: goal("reached") }, 30);
+    assert.equal(session.drives, false);
+  });
+});

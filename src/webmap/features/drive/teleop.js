@@ -34,6 +34,9 @@ export default function attach(map, options, send) {
   return { destroy: () => teleop.destroy() };
 }
 
+/** Instead of the keys that drive, after a driving key without its position. */
+const NO_POSITIONS = "This keyboard cannot drive: use the stick.";
+
 /** The selected robot, if it can move sideways. */
 const SELECTED_HOLONOMIC = ".robot.selected[data-holonomic]";
 
@@ -168,6 +171,8 @@ class Teleop {
     const since = drawn?.getAttribute("data-since") ?? "";
     const more = { verdict, request, inputs, seen, since };
     const words = describe(status, robot, report, active, more);
+    const idle = words.state === "free" || words.state === "ready";
+    if (idle && this._devices.codeless) words.detail = NO_POSITIONS;
     this._panel.showState(withoutKeys(words, pointers, inputs), report, status.delay);
     const asking = request?.by === status.connection;
     this._panel.showButtons(report, asking, useful ? this._stick.wanted : null);

@@ -5,10 +5,12 @@
  * the inputs move a robot is decided in `../motion`.
  */
 
+import { takesKeys, takesText } from "../motion/attention.js";
 import { Gamepads } from "./pads.js";
 import { Keys } from "./keys.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
+/** @typedef {import('./keys.js').StopKey} StopKey */
 
 /**
  * A map that robots can be driven from.
@@ -70,6 +72,11 @@ export class Devices {
     return this._pads?.spent ?? false;
   }
 
+  /** Whether a driving key had no effect because the keyboard reports no positions. */
+  get codeless() {
+    return this._keys?.codeless ?? false;
+  }
+
   /**
    * Use the STOP keys and the inputs of the page, also if there is no robot to drive.
    *
@@ -84,7 +91,7 @@ export class Devices {
     this._pads ??= new Gamepads(this._drive, owner);
     this._keys ??= new Keys(this._drive, {
       ...owner,
-      stop: (all, event) => this._stop(all, event),
+      stop: (event, how) => this._stop(event, how),
       used: (event) => this._used(event),
     });
     let ended = false;
@@ -172,18 +179,20 @@ export class Devices {
   }
 
   /**
-   * @param {boolean} all
    * @param {KeyboardEvent} event
+   * @param {StopKey} how
    */
-  _stop(all, event) {
+  _stop({ target, shiftKey }, { escape, byTab }) {
     const { driven, taking, choice } = this._drive.status;
-    if (all) {
+    if (escape && shiftKey) {
       this._drive.stop("*");
       return true;
     }
+    if (!escape && takesText(target)) return false;
+    if (!escape && byTab && !this._drive.drives && keepsSpace(target)) return false;
     const drives = driven !== null || taking;
-    if (!drives && keepsKey(event)) return false;
-    if (!drives && event.code === "Escape") {
+    if (!drives && escape) {
+      if (keepsEscape(target)) return false;
       const held = choice !== null && this._drive.robots.get(choice)?.mine;
       if (!held && uses(closesMenu)) return true;
       for (const leave of this._escapes) if (uses(leave)) return true;
@@ -246,20 +255,25 @@ function uses(use) {
 }
 
 /**
- * @param {KeyboardEvent} event
- * @returns {boolean} Whether the focused element uses the key itself, and no other input (Enter,
- *     a click) does the same; or a button that everybody presses with Space, of a recording,
- *     in which no robot can be driven (`data-webmap-keeps-space`).
+ * @param {EventTarget | null} target
+ * @returns {boolean} Whether the focused element uses Escape itself.
  */
-function keepsKey(event) {
-  const target = event.target;
+function keepsEscape(target) {
   if (!(target instanceof Element)) return false;
-  if (event.code === "Escape") {
-    // A manual popover, such as the alarm, does not use Escape.
-    const closes = "dialog:modal, [popover]:not([popover=manual]), textarea, select";
-    return target.closest(closes) !== null || target.matches(TYPED);
-  }
-  return target.matches(
-    "input[type=checkbox], input[type=radio], select, summary, [data-webmap-keeps-space]",
-  );
+  // A manual popover, such as the alarm, does not use Escape.
+  const closes = "dialog:modal, [popover]:not([popover=manual]), textarea, select";
+  return target.closest(closes) !== null || target.matches(TYPED);
+}
+
+/** Elements that Space presses, besides lists and sliders. */
+const SPACE_KEPT = "input[type=checkbox], summary, [data-webmap-keeps-space]";
+
+/**
+ * @param {EventTarget | null} target
+ * @returns {boolean} Whether the focused element uses Space itself, and no other key does the
+ *     same; or a button that everybody presses with Space, of a recording, in which no robot
+ *     can be driven (`data-webmap-keeps-space`).
+ */
+function keepsSpace(target) {
+  return target instanceof Element && (takesKeys(target) || target.matches(SPACE_KEPT));
 }

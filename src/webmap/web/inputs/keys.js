@@ -1,4 +1,4 @@
-import { attentive, takesKeys } from "../motion/attention.js";
+import { attentive } from "../motion/attention.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
 /** @typedef {import('../motion/axes.js').Axes} Axes */
@@ -24,6 +24,31 @@ const SIDEWAYS = { KeyQ: { y: 1 }, KeyE: { y: -1 } };
 
 /** After a press of these keys, releases of others may be lost: shortcuts, other windows. */
 const MODIFIERS = new Set(["Control", "Alt", "AltGraph", "Meta", "OS"]);
+
+/** The letters and names of the driving keys, for keyboards that do not report positions. */
+const DRIVING_KEYS = /^([wasd]|Arrow(Up|Down|Left|Right))$/i;
+
+/** @param {KeyboardEvent} event On-screen keyboards and remote desktops have no `code`. */
+function isEscape({ code, key }) {
+  return code === "Escape" || key === "Escape" || key === "Esc";
+}
+
+/** @param {KeyboardEvent} event Some layouts have other spaces, with Shift for example. */
+function isSpace({ code, key }) {
+  return code === "Space" || key === "Spacebar" || /^\s$/.test(key);
+}
+
+/** @param {KeyboardEvent} event */
+function isShortcut({ ctrlKey, altKey, metaKey }) {
+  return ctrlKey || altKey || metaKey;
+}
+
+/**
+ * @typedef {object} StopKey
+ * @property {boolean} escape Whether it is Escape, else it is Space.
+ * @property {boolean} byTab Whether the Tab key was pressed since the last press of a
+ *     pointer: the keyboard has moved the focus to where it is.
+ */
 
 /**
  * @param {Iterable<string>} codes The keys that are held.
@@ -60,7 +85,7 @@ export class Keys {
    * @param {object} owner
    * @param {() => boolean} owner.wanted Whether there is a robot to drive.
    * @param {() => boolean} owner.holonomic Whether it can move sideways.
-   * @param {(all: boolean, event: KeyboardEvent) => boolean} owner.stop Called for a
+   * @param {(event: KeyboardEvent, how: StopKey) => boolean} owner.stop Called for a
    *     STOP key; returns whether it used the key.
    * @param {(event: KeyboardEvent) => boolean} [owner.used] Called for any other key;
    *     returns whether a tool used the key, which then drives nothing.
@@ -70,8 +95,14 @@ export class Keys {
     this._owner = owner;
     /** @type {Set<string>} */
     this._held = new Set();
+    this._byTab = false;
+    /** Whether the last press of Space was used for STOP. */
+    this._spaceUsed = true;
+    /** Whether a driving key came without its position on the keyboard. */
+    this.codeless = false;
     this._ending = new AbortController();
     const options = { capture: true, signal: this._ending.signal };
+    window.addEventListener("pointerdown", () => (this._byTab = false), options);
     window.addEventListener("keydown", (event) => this._down(event), options);
     window.addEventListener("keyup", (event) => this._up(event), options);
     this._off = drive.on("drop", () => this._held.clear());
@@ -87,6 +118,7 @@ export class Keys {
   /** @param {KeyboardEvent} event */
   _down(event) {
     if (this._isStop(event)) return;
+    if (event.key === "Tab" && !isShortcut(event)) this._byTab = true;
     if (MODIFIERS.has(event.key)) {
       this._drive.goNeutral();
       return;
@@ -96,11 +128,15 @@ export class Keys {
       event.stopImmediatePropagation();
       return;
     }
+    if (!event.code && DRIVING_KEYS.test(event.key) && this._listens(event)) {
+      this.codeless = true;
+    }
     if (!this._drives(event)) return;
     // Otherwise arrow keys scroll the page, also while they repeat.
     event.preventDefault();
     if (this._held.has(event.code)) return;
     this._held.add(event.code);
+    this.codeless = false;
     // If the first event is a repetition, this page did not receive the press.
     this._send({ fresh: !event.repeat });
   }
@@ -110,25 +146,26 @@ export class Keys {
     // On a Mac, keys that are released while Meta is held send no event. So after the
     // release of Meta too, the state of the other keys is unknown.
     if (event.key === "Meta" || event.key === "OS") this._drive.goNeutral();
+    // Some browsers press a button when Space is released.
+    if (isSpace(event) && this._spaceUsed) event.preventDefault();
     if (this._held.delete(event.code)) this._send();
   }
 
   /** @param {KeyboardEvent} event */
   _isStop(event) {
-    const escape = event.code === "Escape";
-    if (!escape && event.code !== "Space") return false;
-    if (event.isComposing || event.ctrlKey || event.altKey || event.metaKey) {
-      return false;
-    }
-    if (!escape && takesKeys(event.target)) return false;
+    const escape = isEscape(event);
+    if (!escape && !isSpace(event)) return false;
     if (event.repeat) {
       // Otherwise a held Space scrolls the page.
-      if (!escape) event.preventDefault();
+      if (!escape && this._spaceUsed) event.preventDefault();
       return true;
     }
-    if (!this._owner.stop(escape && event.shiftKey, event)) return false;
-    event.preventDefault();
-    return true;
+    const byTab = this._byTab;
+    const plain = !event.isComposing && !isShortcut(event);
+    const used = plain && this._owner.stop(event, { escape, byTab });
+    if (!escape) this._spaceUsed = used;
+    if (used) event.preventDefault();
+    return used;
   }
 
   /**
@@ -136,12 +173,15 @@ export class Keys {
    * @returns {boolean} Whether the key drives a robot now.
    */
   _drives(event) {
-    if (event.isComposing || event.ctrlKey || event.altKey || event.metaKey) {
-      return false;
-    }
-    if (!this._owner.wanted() || !attentive()) return false;
+    if (!this._listens(event)) return false;
     if (Object.hasOwn(MEANING, event.code)) return true;
     return this._owner.holonomic() && Object.hasOwn(SIDEWAYS, event.code);
+  }
+
+  /** @param {KeyboardEvent} event */
+  _listens(event) {
+    if (event.isComposing || isShortcut(event)) return false;
+    return this._owner.wanted() && attentive();
   }
 
   /** @param {{fresh?: boolean}} [how] */

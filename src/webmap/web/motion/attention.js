@@ -14,17 +14,28 @@ const BUTTON_LIKE = new Set([
   "color",
 ]);
 
+/** Elements without text that use keys. */
+const KEY_CONTROLS =
+  "input[type=radio], input[type=range], select, [role=slider], [role=listbox], [role=separator]";
+
+/**
+ * @param {EventTarget | null} target
+ * @returns {boolean} Whether text is typed in this element.
+ */
+export function takesText(target) {
+  if (!(target instanceof Element) || target.matches(KEY_CONTROLS)) return false;
+  if (target instanceof HTMLInputElement) return !BUTTON_LIKE.has(target.type);
+  if (target instanceof HTMLElement && target.isContentEditable) return true;
+  return target.matches("textarea, [role=textbox]");
+}
+
 /**
  * @param {EventTarget | null} target
  * @returns {boolean} Whether keys belong to this element: text fields, lists, sliders.
  */
 export function takesKeys(target) {
   if (!(target instanceof Element)) return false;
-  if (target instanceof HTMLInputElement) return !BUTTON_LIKE.has(target.type);
-  if (target instanceof HTMLElement && target.isContentEditable) return true;
-  return target.matches(
-    "textarea, select, [role=textbox], [role=slider], [role=listbox], [role=separator]",
-  );
+  return takesText(target) || target.matches(KEY_CONTROLS);
 }
 
 /**

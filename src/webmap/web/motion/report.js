@@ -117,6 +117,11 @@ export function isLatched(report) {
   return report.latched ?? report.state === "stopped";
 }
 
+/** @param {GoalReport} goal */
+export function isOver({ state }) {
+  return ["reached", "failed", "cancelled"].includes(state);
+}
+
 /**
  * @param {RobotReport} report
  * @returns {string} The STOP of a robot in one text. Another press of STOP makes another

@@ -11,6 +11,7 @@ import { Inputs } from "./inputs.js";
 import { Loops } from "./loops.js";
 import { Onset } from "./onset.js";
 import { Pilot } from "./pilot.js";
+import { isOver } from "./report.js";
 import { Stopping } from "./stopping.js";
 import { Unanswered } from "./unanswered.js";
 
@@ -50,6 +51,19 @@ export class Session {
      * @type {Set<string>}
      */
     this._unsent = new Set();
+    /**
+     * Robots that this page sent goals to.
+     * @type {Set<string>}
+     */
+    this._sentTo = new Set();
+  }
+
+  /** Whether this page has control of any robot, or a goal moves one that it sent a goal to. */
+  get drives() {
+    if (this.pilot.status.taking) return true;
+    return [...this.pilot.robots.values()].some(
+      ({ robot, mine, goal }) => mine || (this._sentTo.has(robot) && goal && !isOver(goal)),
+    );
   }
 
   /**
@@ -85,6 +99,7 @@ export class Session {
    * @param {number} now
    */
   sent(command, now) {
+    if (command.op === "goal") this._sentTo.add(command.robot);
     if (command.op !== "drive") return;
     const moving = ["x", "y", "turn"].some((axis) => command[axis] !== 0);
     this.onset.sent(command.robot, moving, now);

@@ -1,4 +1,5 @@
 import { GOALS } from "../constants.js";
+import { isOver } from "../motion/report.js";
 
 /** @typedef {import('../motion/report.js').GoalReport} GoalReport */
 
@@ -17,7 +18,7 @@ import { GOALS } from "../constants.js";
  */
 export function look(goal) {
   const [word, shape] = GOALS[goal.state] ?? GOALS.unknown;
-  const over = ["reached", "failed", "cancelled"].includes(goal.state);
+  const over = isOver(goal);
   const parts = [];
   if (goal.state === "under way" || goal.state === "cancelling") {
     if (goal.left !== null) parts.push(`${metres(goal.left)} to go`);
