@@ -108,10 +108,10 @@ def check_trigger(section, name, arguments):
     assert call[1].count(",") == count
 
 
-def test_generated_ids_are_unique_and_consist_of_webmap_and_a_number():
+def test_generated_ids_are_unique_and_contain_webmap_a_random_word_and_a_number():
     made = {webmap.generate_id() for _ in range(1000)}
     assert len(made) == 1000
-    assert all(re.fullmatch(r"WebMap-\d+", name) for name in made)
+    assert all(re.fullmatch(r"WebMap-[0-9a-f]{8}-\d+", name) for name in made)
 
 
 def test_the_svg_and_xlink_namespaces_have_their_standard_urls():

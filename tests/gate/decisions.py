@@ -77,7 +77,7 @@ class Decisions:
     def _note(self, event: Any, now: float, actions: Any) -> None:
         line = f"{now:.6f} {event!r} {text_of(actions)}"
         if "WebMap-" in line:
-            line = re.sub(r"WebMap-\d+", lambda match: self._number(match[0]), line)
+            line = re.sub(r"WebMap-\w+-\d+", lambda match: self._number(match[0]), line)
         self.count += 1
         self._digest.update(line.encode())
         if FOLDER:

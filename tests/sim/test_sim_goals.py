@@ -127,6 +127,15 @@ class TestActionlib:
         base = feedback["feedback"]["base_position"]["pose"]["position"]
         assert base["x"] > 2.0
 
+    def test_a_goal_whose_id_is_still_in_the_status_is_ignored(self):
+        made = bench("ros1")
+        client = made.client()
+        self.send(client, 7, 1.5, "g1")
+        made.run(1)
+        self.send(client, 2, 1.5, "g1")
+        made.run(15)
+        assert math.dist(where(made), (7, 1.5)) < 0.15
+
     @pytest.mark.parametrize("identifier", ["g1", ""])
     def test_any_client_may_cancel_a_goal_by_topic(self, identifier):
         made = bench("ros1")

@@ -22,7 +22,7 @@ CHANGING = {
 }
 """Fields of numbers that depend on time."""
 
-_GENERATED = re.compile(r"\bWebMap-(\d+)\b")
+_GENERATED = re.compile(r"\bWebMap-[0-9a-f]{8}-(\d+)\b")
 
 
 class Names:

@@ -85,6 +85,8 @@ class ActionlibServer:
         message = publication.message
         target = self.node.target(message["goal"]["target_pose"], self.index)
         goal_id = self._identify(message["goal_id"])
+        if any(tracked.goal_id["id"] == goal_id["id"] for tracked in self._goals):
+            return  # actionlib ignores a goal whose id is in its status
         if target is None:
             tracked = _Tracked(goal_id, None)
             self._goals.append(tracked)
