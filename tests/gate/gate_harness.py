@@ -151,7 +151,7 @@ class Bench:
     def keep(self, latch):
         """Finish a write to the disk and report the result."""
         if isinstance(latch, actions.SaveStopTest):
-            record = events.StopRecord(latch.seconds, "2026-11-21")
+            record = events.StopRecord(latch.seconds, "2026-11-21", latch.error)
             self.tests[latch.key] = record
             self.handle(events.StopTestSaved(latch.key, record))
             return

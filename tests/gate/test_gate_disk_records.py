@@ -173,7 +173,7 @@ class TestStopTest:
     @pytest.mark.parametrize("seconds", [0.27, None])
     def test_a_stop_test_result_is_stored_with_its_date(self, records, folder, seconds):
         assert records.stop_test_of(KEY) is None
-        record = StopRecord(seconds, "2026-11-21")
+        record = StopRecord(seconds, "2026-11-21", 0.12)
         records.keep_stop_test(KEY, record)
         assert Records(folder).stop_test_of(KEY) == record
         assert Records(folder).stop_test_of(OTHER) is None
@@ -189,6 +189,7 @@ class TestStopTest:
             '{"seconds": NaN, "date": "2026-11-21"}',
             '{"seconds": -1, "date": "2026-11-21"}',
             '{"seconds": 0.3, "date": 5}',
+            '{"seconds": 0.3, "date": "2026-11-21", "error": -1}',
         ],
     )
     def test_an_invalid_stop_test_file_is_ignored(self, records, folder, content):

@@ -18,6 +18,8 @@ class Machine:
         self.coarse = 0
         """Every so many odometry messages report zero, as from a coarse encoder."""
         self.sent = 0
+        self.every = 1
+        """Every so many commands there is an odometry message."""
 
     @property
     def speed(self):
@@ -31,6 +33,7 @@ class Machine:
         def each():
             if self.speaks:
                 self.sent += 1
+            if self.speaks and self.sent % self.every == 0:
                 between = self.coarse and self.sent % self.coarse == 0
                 speed = 0.0 if between else self.speed
                 self.bench.handle(events.OdometryReceived(KEY, Twist(speed)))
@@ -165,6 +168,28 @@ class TestRunning:
         assert state(bench) == "done"
         assert bench.report().v <= 0.3
         assert "command timeout of the base over 0.5 s: 1" in bench.report().why[0]
+
+    def test_the_error_of_the_measurement_is_stated_and_fails_no_base(self, bench):
+        """Odometry at 10 Hz and 40 ms to the base and back: 0.13 s too long."""
+        bench.rtt = 0.04
+        base = Machine(bench, timeout=0.48)
+        base.every = 2
+        begin(bench)
+        base.run(1.6)
+        report = bench.report()
+        assert 0.5 < report.stop_time < 0.65
+        (saved,) = bench.did(actions.SaveStopTest)
+        assert saved.error == pytest.approx(0.14, abs=0.015)
+        assert report.test.text == (
+            f"the base stopped after {report.stop_time:.2f} s, or up to "
+            f"{saved.error:.2f} s sooner (error of the measurement)"
+        )
+        assert not [why for why in report.why if "timeout" in why], report.why
+        bench.handle(events.StopTestSaved(KEY, StopRecord(0.8, "2026-11-21", 0.4)))
+        bench.run(0.1)
+        assert bench.report().why[0].startswith("command timeout of the base over"), (
+            "slow odometry excuses no long timeout"
+        )
 
     def test_a_stop_test_of_a_base_that_does_not_move_saves_no_result(self, bench):
         base = Machine(bench, timeout=0.0)

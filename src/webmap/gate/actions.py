@@ -138,6 +138,8 @@ class SaveStopTest:
 
     key: Key
     seconds: float | None
+    error: float = 0.0
+    """Seconds by which that may be too long."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -149,19 +149,21 @@ class Records:
             seconds, date = found["seconds"], found["date"]
             if seconds is not None:
                 seconds = float(seconds)
-            if not isinstance(date, str) or (seconds is not None and _odd(seconds)):
+            late = float(found.get("error", 0.0))
+            odd = _odd(late) or (seconds is not None and _odd(seconds))
+            if odd or not isinstance(date, str):
                 raise ValueError("invalid values")
         except FileNotFoundError:
             return None
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             log.warning("%s cannot be read (%s): no stop test known", path, error)
             return None
-        return StopRecord(seconds, date[:MAX_NAME])
+        return StopRecord(seconds, date[:MAX_NAME], late)
 
     def keep_stop_test(self, key: Key, record: StopRecord) -> None:
         """Keep the result of a stop test."""
         path = path_of(self._folder, key, "test")
-        found = {"seconds": record.seconds, "date": record.date}
+        found = {"seconds": record.seconds, "error": record.error, "date": record.date}
         try:
             self._write(path, {**found, "bridge": key.url, "topic": key.topic})
         except OSError as error:
@@ -319,6 +321,6 @@ class Disk:
                 self._stamps[action.key] = kept
             return StopSaved(action.key, action.number, error)
         today = datetime.datetime.now().astimezone().date().isoformat()
-        record = StopRecord(action.seconds, today)
+        record = StopRecord(action.seconds, today, action.error)
         self._records.keep_stop_test(action.key, record)
         return StopTestSaved(action.key, record)

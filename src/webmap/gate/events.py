@@ -215,6 +215,8 @@ class StopRecord:
     """Seconds from the last command to standstill; ``None`` if it did not stop."""
     date: str
     """The day of the test, as ``2026-11-21``."""
+    error: float = 0.0
+    """Seconds by which the measured time may be too long."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -82,7 +82,7 @@ class Machine:
         self.observation = Observation(key, emit)
         self.obedience = Obedience()
         self.other_writer = OtherWriter()
-        self.tests = StopTests(key, self.motion, self.observation, emit)
+        self.tests = StopTests(key, self.motion, self.observation, control.trips, emit)
         self.conditions = MotionConditions(
             key, self.robots, latch, control, pulse, self.observation
         )

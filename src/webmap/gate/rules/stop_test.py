@@ -15,6 +15,9 @@ test always ends with zero.
 
 One odometry message without motion proves nothing: a coarse encoder sends such messages
 between two of its steps. The base stopped when the first lasting standstill began.
+
+The measured time may be too long: by the time between two messages of odometry, and by
+the round trip, as the last command and the odometry were on their way.
 """
 
 from collections import Counter
@@ -24,7 +27,7 @@ from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, SaveStopTest
 from webmap.gate.commands import Refusal
 from webmap.gate.events import Key
-from webmap.gate.rules.health import Observation, Standstill, moves
+from webmap.gate.rules.health import Ages, Observation, Standstill, moves
 from webmap.gate.rules.motion import Motion
 
 CREEP = Twist(0.1)
@@ -63,8 +66,10 @@ class StopTest:
         """Whether the test ended with a result: the base stopped, or did not."""
         self.seconds: float | None = None
         """Seconds from the last command until the base stopped, if it did."""
+        self.error = 0.0
+        """Seconds by which that may be too long."""
         self._began_at = now
-        self._last_command_at = now
+        self._last_command_at = self._moving_at = now
         self._still = Standstill()
         self._unechoed: Counter[Twist] = Counter()
 
@@ -83,12 +88,15 @@ class StopTest:
         if self.state == "waiting" and self._unechoed[twist] < 0:
             self.abort(NOT_ALONE)
 
-    def observe(self, twist: Twist | None, last_command_at: float, now: float) -> None:
+    def observe(
+        self, twist: Twist | None, last_command_at: float, trip: float, now: float
+    ) -> None:
         """Process an odometry message.
 
         Args:
             twist: The velocity in the message, if it has one.
             last_command_at: When the last velocity other than zero was written.
+            trip: Seconds to the bridge of the base and back.
             now: The time.
 
         """
@@ -99,14 +107,20 @@ class StopTest:
                 "waiting",
                 "no more commands: waiting until the base stops",
             )
-            self._last_command_at = last_command_at
+            self._last_command_at, self._moving_at = last_command_at, now
         elif self.state == "waiting":
             self._still.observe(twist, now)
-            if self._still.reached:
-                assert self._still.since is not None  # when the standstill began
+            since = self._still.since
+            if since is None:
+                self._moving_at = now
+            elif self._still.reached:
                 self.state, self.concluded = "done", True
-                self.seconds = round(self._still.since - self._last_command_at, 3)
-                self.text = f"the base stopped after {self.seconds:.2f} s"
+                self.seconds = round(since - self._last_command_at, 3)
+                self.error = round(min(since - self._moving_at + trip, self.seconds), 3)
+                self.text = (
+                    f"the base stopped after {self.seconds:.2f} s, or up to "
+                    f"{self.error:.2f} s sooner (error of the measurement)"
+                )
 
     def step(self, now: float) -> None:
         """Fail a test that exceeds its time limits."""
@@ -132,18 +146,20 @@ class StopTests:
         key: The machine.
         motion: Writes its velocities.
         sight: Its newest odometry.
+        trips: The round trips of pings to its bridge.
         emit: Called with each action.
 
     """
 
     def __init__(
-        self, key: Key, motion: Motion, sight: Observation, emit: Emit
+        self, key: Key, motion: Motion, sight: Observation, trips: Ages, emit: Emit
     ) -> None:
         self.last: StopTest | None = None
         """The newest test, which may be running."""
         self._key = key
         self._motion = motion
         self._observation = sight
+        self._trips = trips
         self._emit = emit
 
     @property
@@ -189,7 +205,8 @@ class StopTests:
         test = self.running
         if test is not None:
             state = test.state
-            test.observe(measured, self._motion.moved_at, now)
+            trip = self._trips.p95 or 0.0
+            test.observe(measured, self._motion.moved_at, trip, now)
             if test.state != state:
                 self._apply_state(test, now)
 
@@ -208,7 +225,7 @@ class StopTests:
         else:
             self._motion.zero(now)
             if test.concluded:
-                self._emit(SaveStopTest(self._key, test.seconds))
+                self._emit(SaveStopTest(self._key, test.seconds, test.error))
 
     def halt(self, why: str, now: float) -> None:
         """Send zeros if the machine was driven or tested; ``why`` is the reason."""
