@@ -2,12 +2,12 @@
 
 import msgspec
 import pytest
-from gate_harness import URL, ZERO, Bench, spec
+from gate_harness import KEY, URL, ZERO, Bench, spec
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.gate import actions, commands, events, protocol
-from webmap.gate.rules.goals import ELSEWHERE, IN_VAIN
+from webmap.gate.rules.goals import ANSWER, ELSEWHERE, IN_VAIN, NOT_STOPPED, UNANSWERED
 from webmap.gate.rules.goals import MOVE_BASE as MOVE_BASE_TYPE
 from webmap.gate.specs import checked
 
@@ -498,6 +498,58 @@ class TestProgress:
         self.end(bench, "reached")
         bench.handle(events.GoalLost("r1", id, "no link"))
         assert bench.report().goal.state == "reached"
+
+    def test_a_goal_that_the_robot_never_answers_is_of_unknown_state_after_5_s(
+        self, bench
+    ):
+        bench.run(ANSWER - 0.3)
+        assert bench.report().goal.state == "sent"
+        assert bench.report().doing == "navigating_held"
+        bench.run(0.4)
+        goal = bench.report().goal
+        assert (goal.state, goal.why) == ("unknown", UNANSWERED)
+        assert bench.report().doing == "held"
+        bench.handle(events.EchoReceived(KEY, Twist(0.3)))
+        bench.handle(events.EchoReceived(KEY, Twist(0.3)))
+        assert bench.report().other_writer, "it may be another program that drives"
+        assert self.progress(bench, active=True).state == "under way"
+
+    def test_the_cancel_of_a_goal_that_was_never_answered_ends_after_5_s(self, bench):
+        bench.run(ANSWER + 0.1)
+        bench.send("b", op="cancel", robot="r1")
+        assert bench.report().goal.state == "cancelling"
+        bench.run(ANSWER + 0.1)
+        goal = bench.report().goal
+        assert goal.state == "cancelled"
+        assert goal.why == f"by B; {NOT_STOPPED}"
+        bench.done.clear()
+        bench.handle(events.GoalProgress("r1", goal.id, active=True))
+        assert cancels(bench) == 1, "a goal that runs nevertheless is cancelled again"
+
+    def test_an_unanswered_cancel_of_a_running_goal_leaves_an_unknown_state(self):
+        bench = Bench().begin(spec(action="/go", pose_topic="/initialpose"))
+        bench.take()
+        bench.goal()
+        self.progress(bench, active=True)
+        bench.send("b", op="cancel", robot="r1")
+        bench.run(ANSWER - 0.3)
+        self.progress(bench, active=True)
+        bench.run(ANSWER - 0.3)
+        assert bench.report().goal.state == "cancelling", "it still reports"
+        bench.run(0.2)
+        goal = bench.report().goal
+        assert (goal.state, goal.why) == ("unknown", NOT_STOPPED)
+        bench.hold(0.1)
+        bench.goal(op="locate")
+        assert bench.did(actions.SendPose), "the pose can be set again"
+        bench.send("b", op="cancel", robot="r1")
+        assert bench.report().goal.state == "cancelling"
+
+    def test_a_lost_goal_whose_cancel_is_not_answered_is_of_unknown_state(self, bench):
+        bench.handle(events.GoalLost("r1", goals(bench)[-1].id, "no link"))
+        bench.send("b", op="cancel", robot="r1")
+        bench.run(ANSWER + 0.1)
+        assert bench.report().goal.state == "unknown"
 
     def test_a_cancel_sent_to_a_dead_link_is_sent_again_on_the_next_link(self, bench):
         """The link seemed open for some seconds, so the cancel seemed to be written."""

@@ -188,7 +188,7 @@ GOALS = {
     "accepted": ("Goal accepted", "sent", "active"),
     "under way": ("Navigating to goal", "way", "active"),
     "cancelling": ("Cancelling goal", "cancelled", "warn"),
-    "unknown": ("Goal state unknown", "unknown", "warn"),
+    "unknown": ("State of the goal unknown", "unknown", "warn"),
     "reached": ("Goal reached", "reached", "good"),
     "failed": ("Goal failed", "failed", "bad"),
     "cancelled": ("Goal cancelled", "cancelled", ""),

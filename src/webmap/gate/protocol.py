@@ -259,7 +259,8 @@ class GoalReport(msgspec.Struct, frozen=True, kw_only=True):
         "failed",
         "cancelled",
     ]
-    """``unknown``: the source of progress was lost; the robot may still follow it."""
+    """``unknown``: the source of progress was lost, or the robot never answered; it may
+    follow the goal, or not."""
     why: str = ""
     """The reason for the state, as text."""
     left: float | None = None

@@ -56,7 +56,7 @@ export const GOALS = Object.freeze({
   "accepted": ["Goal accepted", "sent"],
   "under way": ["Navigating to goal", "way"],
   "cancelling": ["Cancelling goal", "cancelled"],
-  "unknown": ["Goal state unknown", "unknown"],
+  "unknown": ["State of the goal unknown", "unknown"],
   "reached": ["Goal reached", "reached"],
   "failed": ["Goal failed", "failed"],
   "cancelled": ["Goal cancelled", "cancelled"],

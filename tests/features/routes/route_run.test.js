@@ -168,6 +168,12 @@ test("a goal without progress counts as reached when the robot is near", () => {
 test("a goal with progress is not reached by distance alone", () => {
   const run = underWay();
   assert.equal(report(run, goal("g1"), { away: 0.1 }), null);
-  assert.equal(report(run, goal("g1", "unknown"), { away: 0.1 }), null);
   assert.equal(run.state, "going");
+});
+
+test("a goal of unknown state halts the route with the reason", () => {
+  const run = underWay();
+  assert.equal(report(run, goal("g1", "unknown", { why: "perhaps rejected" })), null);
+  assert.equal(run.state, "halted");
+  assert.equal(run.why, "the state of the goal is unknown: perhaps rejected");
 });

@@ -156,6 +156,9 @@ export class RouteRun {
       const what = goal.state === "failed" ? "the goal failed" : "the goal was cancelled";
       return this._halted(goal.why ? `${what}: ${goal.why}` : what);
     }
+    if (goal.state === "unknown") {
+      return this._halted(`the state of the goal is unknown: ${goal.why}`);
+    }
     const silent = goal.method === "topic" && away !== null && away < THERE;
     return silent ? this._arrived(goal.id, since) : null;
   }

@@ -163,7 +163,9 @@ class Aliases:
     def follow_goals(self) -> bool:
         """Whether a goal is active whose end the gate would notice."""
         return any(
-            goals.following and (goals.can_cancel or goals.method != "topic")
+            goals.following
+            and not goals.unknown
+            and (goals.can_cancel or goals.method != "topic")
             for goals in self.goals.values()
         )
 

@@ -27,6 +27,15 @@ INSIST = 1.0
 BRAKES = 2.0
 """Seconds after the end of a goal in which a robot may still move because of it."""
 
+ANSWER = 5.0
+"""Seconds within which the robot answers a goal or a cancel: by accepting it, by
+feedback or by its status. Some bridges never answer a goal that the robot rejects."""
+
+UNANSWERED = f"perhaps rejected: the robot did not answer within {ANSWER:g} s"
+"""The reason why the state of such a goal is unknown."""
+
+NOT_STOPPED = f"the robot did not answer the cancel within {ANSWER:g} s"
+
 OVER = ("reached", "failed", "cancelled")
 """The final states of a goal."""
 
@@ -59,6 +68,10 @@ class Goals:
         self._cancelled_at = self._insisted_at = float("-inf")
         self._driven_off_at: float | None = None
         self._over_at = float("-inf")
+        self._heard_at = float("-inf")
+        """When the robot last reported the goal, or a goal or cancel was sent."""
+        self._unheard = False
+        """Whether the robot has never reported the newest goal."""
         self._no_actions = False
         """Whether the bridge reported that it does not support action goals."""
 
@@ -90,17 +103,29 @@ class Goals:
         """Whether the robot follows a goal, as far as is known."""
         return self.report is not None and self.report.state not in OVER
 
+    @property
+    def unknown(self) -> bool:
+        """Whether it is unknown if the robot follows the newest goal."""
+        return self.report is not None and self.report.state == "unknown"
+
+    @property
+    def waits(self) -> bool:
+        """Whether an answer to a goal or a cancel is expected."""
+        report = self.report
+        if report is None or report.method == "topic" or self._cancel_owed:
+            return False
+        return report.state in ("sent", "cancelling")
+
     def navigates(self, *, moving: bool) -> bool:
         """Return whether the robot follows a goal.
 
-        A plain topic has no feedback: a goal on it counts while the robot moves.
+        A plain topic has no feedback: a goal on it counts while the robot moves, as a
+        goal of unknown state does.
         """
         report = self.report
-        return (
-            self.following
-            and report is not None
-            and (report.method != "topic" or moving)
-        )
+        if report is None or report.state in OVER:
+            return False
+        return moving or not (report.method == "topic" or self.unknown)
 
     def may_still_move(self, now: float) -> bool:
         """Return whether a goal that has ended may still cause motion at ``now``."""
@@ -131,17 +156,21 @@ class Goals:
         """
         if self.spec.pose_topic is None:
             raise Refusal("no topic for the initial pose is set")
-        # A goal without feedback and without a cancel would block this for ever.
-        if self.following and (self.can_cancel or self.method != "topic"):
+        # A goal without feedback and without a cancel would block this for ever, and so
+        # would one whose cancel was not answered.
+        in_vain = self.unknown and self._cancelled_at > float("-inf")
+        cancels = self.can_cancel or self.method != "topic"
+        if self.following and cancels and not in_vain:
             raise Refusal("the robot is navigating: cancel the goal first")
         if not self.link.up:
             raise Refusal("no connection to the bridge that takes the initial pose")
         until = now + WAIT_LIMIT
         self._emit(SendPose(self._key, self.spec.id, x, y, yaw, by, until))
 
-    def on_written(self, goal: GoalWritten) -> None:
+    def on_written(self, goal: GoalWritten, now: float) -> None:
         """Note that a goal was written."""
         self._running, self._by, self._perhaps = goal.id, goal.by, True
+        self._heard_at, self._unheard = now, True
         self._cancelled_at = float("-inf")  # it was for earlier goals
         method = self.method or "topic"
         self.report = GoalReport(
@@ -155,11 +184,24 @@ class Goals:
             why="this robot reports no progress" if method == "topic" else "",
         )
 
-    def progress(self, news: GoalProgress) -> None:
+    def step(self, now: float) -> None:
+        """Wait no longer for an answer to a goal or a cancel; see :data:`ANSWER`."""
+        if not self.waits or now - self._heard_at < ANSWER:
+            return
+        assert self.report is not None  # because an answer to it is expected
+        if self.report.state == "sent":
+            self._show("unknown", UNANSWERED, now)
+        elif self._unheard:  # as far as is known, the robot never followed the goal
+            self._show("cancelled", f"{self.report.why}; {NOT_STOPPED}", now)
+        else:
+            self._show("unknown", NOT_STOPPED, now)
+
+    def progress(self, news: GoalProgress, now: float) -> None:
         """Note the progress of a goal; only the newest goal counts."""
         report = self._report_on(news.id)
         if report is None or report.state in OVER:
             return
+        self._heard_at, self._unheard = now, False
         state = "under way" if news.active else "accepted"
         if report.state != "cancelling":
             report = msgspec.structs.replace(report, state=state, why="")
@@ -193,6 +235,7 @@ class Goals:
         report = self._report_on(lost.id)
         if report is None or report.state in OVER:
             return
+        self._unheard = False  # from now on, silence does not show that it is rejected
         if report.state == "cancelling":  # the cancel may be lost
             self.cancel(now, report.why)
         else:
@@ -213,6 +256,7 @@ class Goals:
             raise Refusal("no cancel topic and no action is set")
         self._running, self._by, self._perhaps = None, None, False
         self._cancel_owed, self._cancelled_at = not self.link.up, now
+        self._heard_at = now
         if self.link.up or self._cancels_by_service:
             self._emit(CancelGoals(self._key, self.spec.id))
         if self.following:
@@ -233,7 +277,7 @@ class Goals:
 
         """
         report = self._report_on(news.id)
-        cancelled = report is not None and report.state == "cancelling"
+        cancelled = report is not None and report.state in ("cancelling", "cancelled")
         due = now - self._insisted_at >= INSIST
         if due and (stopped or cancelled) and self.can_cancel:
             self._insisted_at = now

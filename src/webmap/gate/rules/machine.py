@@ -136,6 +136,7 @@ class Machine:
             or self.authority.handover.going_on
             or self.observation.on
             or self.other_writer.seen is not None
+            or any(goals.waits for goals in self.robots.goals.values())
         )
 
     @property
@@ -247,6 +248,8 @@ class Machine:
         self.authority.step(now)
         self.motion.step(now)
         self.other_writer.step(now)
+        for goals in self.robots.goals.values():
+            goals.step(now)
         if self.latch.on:
             self.active_stop.confirm(now)
         self._update_watch(now)
@@ -254,9 +257,9 @@ class Machine:
 
     # Events of the shell.
 
-    def on_goal_written(self, write: GoalWritten) -> None:
+    def on_goal_written(self, write: GoalWritten, now: float) -> None:
         """Note that a goal was written: from now on the robot may move by itself."""
-        self.robots.goals[write.robot].on_written(write)
+        self.robots.goals[write.robot].on_written(write, now)
         self.obedience.excuse()
 
     def on_written(self, write: TwistWritten, now: float) -> None:

@@ -374,7 +374,7 @@ class Machines:
             return
         if event.done:
             self._touched.add(machine.key)
-            machine.on_goal_written(event)
+            machine.on_goal_written(event, now)
             sent = SentGoal(event.robot, event.x, event.y, event.yaw, event.by)
             self._emit(SendToDisplay(sent))
         else:
@@ -391,7 +391,7 @@ class Machines:
 
     def _goal_progress(self, event: events.GoalProgress, now: float) -> None:
         if goals := self._goals_of(event.robot):
-            goals.progress(event)
+            goals.progress(event, now)
             goals.cancel_again(event, self._by_robot[event.robot].latch.on, now)
 
     def _goal_ended(self, event: events.GoalEnded, now: float) -> None:
