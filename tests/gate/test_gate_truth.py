@@ -65,6 +65,41 @@ class TestAlarm:
         self.run(bench, 3.0, 0.4, x=0.0)
         assert bench.report().alarm is None
 
+    def other(self, bench, seconds, speed, **drives):
+        """Let another program write 0.1 m/s, and odometry report a speed."""
+
+        def each():
+            bench.handle(events.EchoReceived(KEY, Twist(0.1)))
+            bench.handle(events.OdometryReceived(KEY, Twist(speed)))
+            if drives:
+                bench.drive(**drives)
+
+        bench.run(seconds, each)
+
+    def test_motion_by_another_program_after_the_zeros_raises_an_alarm(self, bench):
+        """The zeros of the gate hold the robot back while the other one drives it."""
+        self.other(bench, 2.0, 0.5, x=0.5)
+        bench.send("a", op="release", robot="r1")
+        self.other(bench, 0.45, 0.03)
+        assert bench.report().state == "stopping"
+        self.other(bench, 0.7, 0.1)
+        assert bench.report().alarm == "zero sent, still moving at 0.10 m/s"
+        assert "another program publishes" in bench.report().other_writer
+        self.other(bench, 0.5, 0.0)
+        assert bench.report().alarm is None
+
+    def test_a_standstill_during_a_stop_ends_the_alarm_while_another_program_drives(
+        self, bench
+    ):
+        self.other(bench, 2.0, 0.5, x=0.5)
+        bench.send("b", op="stop", robot="r1")
+        self.other(bench, 1.2, 0.1)
+        assert bench.report().alarm
+        self.other(bench, 0.5, 0.0)
+        assert bench.report().alarm is None
+        self.other(bench, 0.2, 0.1)
+        assert bench.report().alarm, "it moves again"
+
     def test_motion_after_a_goal_was_sent_raises_no_alarm(self, bench):
         bench.goal()
         self.run(bench, 3.0, 0.4, x=0.0)

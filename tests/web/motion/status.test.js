@@ -217,6 +217,7 @@ test("another program that publishes velocities is shown in every state", () => 
     const shown = describe(status, "r1", { ...REPORT, other_writer, ...more }, true);
     assert.equal(shown.title, title);
     assert.ok(shown.detail.endsWith(warning), shown.detail);
+    assert.equal(shown.warns, true);
     const alone = describe(status, "r1", { ...REPORT, ...more }, true);
     assert.ok(!alone.detail.includes("nother program"));
   }

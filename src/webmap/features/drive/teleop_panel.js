@@ -91,8 +91,9 @@ export class Panel {
    * @param {RobotReport | null} report
    * @param {number | null} delay
    */
-  showState({ state, title, detail }, report, delay) {
+  showState({ state, title, detail, warns = false }, report, delay) {
     if (this.element.dataset.state !== state) this.element.dataset.state = state;
+    this.element.classList.toggle("warns", warns);
     setText(this._title, title);
     setText(this._detail, detail);
     const stated = report?.why.some((why) => why.startsWith("slow connection"));

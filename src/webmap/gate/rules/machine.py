@@ -304,7 +304,9 @@ class Machine:
             handover.since
         ):
             handover.observe(measured, now)
-        self.obedience.observe(measured, now)
+        zeros = self.motion.stopping or self.motion.held
+        contested = zeros and self.other_writer.seen is not None
+        self.obedience.observe(measured, now, contested=contested)
         self.tests.observe(measured, now)
 
     def locked(self, lock: LockState, now: float) -> None:

@@ -44,6 +44,7 @@ class Obedience:
         self._moving: Twist | None = None
         self._moving_at = self._seen_at = float("-inf")
         self._driven = False
+        self._contested = False
         self._stuck: tuple[float, float] | None = None
         """When odometry first and last showed standstill of a driven machine."""
 
@@ -75,8 +76,14 @@ class Obedience:
         self._zero_at = self._moving = None
         self._firm = False
 
-    def observe(self, twist: Twist | None, now: float) -> None:
-        """Process an odometry message."""
+    def observe(
+        self, twist: Twist | None, now: float, *, contested: bool = False
+    ) -> None:
+        """Process an odometry message.
+
+        While the gate writes zeros and another program velocities (``contested``), a
+        standstill proves nothing: the machine may move on after the last zero.
+        """
         if twist is None:
             return
         if moves(twist):
@@ -89,8 +96,13 @@ class Obedience:
             self.excuse()  # no odometry for a while: others may drive it
             return
         self._seen_at = now
+        if contested != self._contested:
+            self._contested = contested
+            self._calm.begin()
         self._calm.observe(twist, now)
-        if self._calm.reached:
+        if self._calm.reached and contested:
+            self._moving = None
+        elif self._calm.reached:
             self.excuse()
         elif self._calm.since is None:
             self._moving, self._moving_at = twist, now

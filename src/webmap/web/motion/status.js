@@ -17,7 +17,11 @@ import { stopText } from "./stopping.js";
  *     'stopping' | 'stopped' | 'unconfirmed'} State
  */
 
-/** @typedef {{state: State, title: string, detail: string}} Description */
+/**
+ * `warns`: whether the detail names another program, or stop hooks that failed.
+ *
+ * @typedef {{state: State, title: string, detail: string, warns?: boolean}} Description
+ */
 
 /**
  * @typedef {object} More
@@ -62,7 +66,7 @@ export function describe(status, robot, report, active, more = {}) {
   if (!other && hooks.length === 0) return state;
   // In every state: another program that moves the robot, and failed stop hooks.
   const words = [state.detail, other ?? "", ...hooks].filter(Boolean).map(sentence);
-  return description(state.state, state.title, words.join(" "));
+  return { ...state, detail: words.join(" "), warns: true };
 }
 
 /**
