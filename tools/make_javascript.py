@@ -14,6 +14,7 @@ from webmap.console.card_parts import GOALS
 from webmap.core.robot_state import SEEN, STATE_TEXTS
 from webmap.features.goals.goal_tool import SPACING
 from webmap.features.routes.route_tool import LONGEST_NAME, MOST_POINTS
+from webmap.gate.protocol import MAY_MOVE
 from webmap.ros.messages_log import LEVELS
 from webmap.scene.wire.messages import LONGEST_TEXTS, MOST_UNSEEN, PAGE_ID
 from webmap.scene.wire.opcodes import TABLES, VERSION
@@ -77,6 +78,7 @@ def constants_js() -> str:
         "LONGEST_NAME": (LONGEST_NAME, "Most characters of a route's name."),
         "SPACING": (list(SPACING), "Metres between robots that are sent together."),
         "LEVELS": (list(LEVELS), "The levels of a log, the lowest first."),
+        "MAY_MOVE": (MAY_MOVE, "The alarm about a robot that zero cannot reach."),
         "GOALS": (
             {state: [words, shape] for state, (words, shape, _) in GOALS.items()},
             "The text and the shape of each state of a goal.",

@@ -12,12 +12,14 @@ from webmap.agents.far_gate import FarGate
 from webmap.base.errors import WireError
 from webmap.gate import commands
 from webmap.gate.protocol import (
+    MAY_MOVE,
     Connect,
     Forget,
     FromPage,
     FromProgram,
     GateDown,
     Hello,
+    Holder,
     Ready,
     RobotReport,
     RobotSpec,
@@ -173,6 +175,32 @@ def test_a_silent_agent_is_lost_and_its_robots_are_reported_as_unreachable(conne
     assert last.reason == down.why
     connected.far.send(STOP)
     assert connected.arrive(0.7) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "alarm"),
+    [
+        ({}, MAY_MOVE),
+        ({"state": "stopping"}, MAY_MOVE),
+        ({"state": "held", "measured": (0.3, 0, 0, 0, 0, 0)}, MAY_MOVE),
+        ({"state": "held", "measured": (0.0,) * 6}, None),
+        ({"holder": Holder(f"{NAME}/program", "program")}, MAY_MOVE),
+        ({"holder": Holder("ben.5e/c1", "Ben")}, None),
+        ({"holder": None, "state": "free"}, None),
+        ({"stop_time": 0.4}, None),
+    ],
+)
+def test_who_drives_a_robot_of_a_silent_agent_gets_the_alarm_that_it_may_move_on(
+    connected, changes, alarm
+):
+    connected.receive(msgspec.structs.replace(REPORT, **changes), 0.1)
+    connected.far.beat(0.61)
+    last = connected.owner.of(RobotReport)[-1]
+    assert (last.link, last.alarm) == ("down", alarm)
+    timeout = "the base stops by its own command timeout of 0.40 s"
+    assert (timeout in last.reason) == ("stop_time" in changes)
+    connected.receive(AllReports((REPORT,)), 5.0)
+    assert connected.owner.of(RobotReport)[-1].alarm is None
 
 
 def test_an_agent_that_returns_gets_the_pages_and_a_kept_stop_again(connected):

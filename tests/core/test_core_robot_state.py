@@ -10,7 +10,7 @@ import pytest
 from webmap.base.geometry import Twist
 from webmap.console.texts import GROUPS, LOOKS
 from webmap.core.robot_state import STATE_TEXTS, Facts, state_of
-from webmap.gate.protocol import Activity
+from webmap.gate.protocol import MAY_MOVE, Activity
 
 MOVES = (0.4, 0.0, 0.0)
 ANN = SimpleNamespace(connection="c2", name="Ann")
@@ -183,6 +183,7 @@ def seen(**changes):
 
 BY_PRECEDENCE = {
     "disobeying": report(alarm="zero sent, still moving at 0.30 m/s"),
+    "unreachable": report(alarm=MAY_MOVE),
     "no_bridge": no_link,
     "lost": seen(silent_for=4.0),
     "down": report(link="down"),
@@ -209,6 +210,9 @@ BY_PRECEDENCE = {
 OF_THE_GATE = set(get_args(Activity)) - {"down", "other"}
 """States of which the gate reports only one at a time."""
 
+ALARMS = {"disobeying", "unreachable"}
+"""Alarms, of which a report has one."""
+
 
 @pytest.mark.parametrize(
     ("first", "second"), list(itertools.combinations(BY_PRECEDENCE, 2))
@@ -216,7 +220,7 @@ OF_THE_GATE = set(get_args(Activity)) - {"down", "other"}
 def test_of_two_states_that_are_true_the_one_with_the_higher_precedence_is_shown(
     first, second
 ):
-    if {first, second} <= OF_THE_GATE:
+    if {first, second} <= OF_THE_GATE or {first, second} <= ALARMS:
         assert list(STATE_TEXTS).index(first) < list(STATE_TEXTS).index(second)
         return
     one = BY_PRECEDENCE[first](BY_PRECEDENCE[second](robot()))

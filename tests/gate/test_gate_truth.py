@@ -6,6 +6,7 @@ from gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, events
 from webmap.gate.limits import Speed
+from webmap.gate.protocol import MAY_MOVE
 from webmap.gate.rules.health import Ages
 from webmap.gate.rules.motion import DEADMAN
 from webmap.gate.rules.obedience import Obedience
@@ -99,6 +100,34 @@ class TestAlarm:
         assert bench.report().alarm is None
         self.other(bench, 0.2, 0.1)
         assert bench.report().alarm, "it moves again"
+
+    @pytest.mark.parametrize("timeout", [None, 0.4])
+    def test_a_driven_robot_without_a_timeout_may_move_on_when_its_bridge_is_lost(
+        self, timeout
+    ):
+        bench = Bench().begin(spec(odometry_topic="/odom", stops_within=timeout))
+        bench.break_links()
+        assert bench.report().alarm is None, "it was not driven"
+        bench.connect_links()
+        bench.take("a")
+        self.run(bench, 0.4, 0.0, x=0.0)
+        self.run(bench, 0.3, 0.3, x=0.5)
+        assert bench.report().state == "driving"
+        bench.break_links()
+        bench.run(1.0)
+        assert bench.report().alarm == (MAY_MOVE if timeout is None else None)
+        bench.connect_links()
+        assert bench.report().alarm is None
+        bench.run(4.0)
+        bench.break_links()
+        assert bench.report().alarm is None, "the zero has arrived"
+
+    def test_a_motion_of_an_earlier_gate_is_no_reason_for_the_alarm(self):
+        bench = Bench(was_driven=True)
+        bench.handle(spec(odometry_topic="/odom", stops_within=None))
+        bench.run(0.2)
+        assert bench.report().link == "down"
+        assert bench.report().alarm is None
 
     def test_motion_after_a_goal_was_sent_raises_no_alarm(self, bench):
         bench.goal()

@@ -166,6 +166,12 @@ PROMISES = (
         "",
         "test_released_inputs_send_zeros_at_once_for_500_ms_and_then_nothing",
     ),
+    Promise(
+        21,
+        "the driver of a lost robot gets an alarm",
+        "",
+        "test_the_driver_of_a_robot_whose_agent_is_silent_gets_the_alarm_that_it_may_move",
+    ),
 )
 
 

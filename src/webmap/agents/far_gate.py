@@ -21,10 +21,12 @@ from webmap.agents.displays import (
 )
 from webmap.agents.samples import Numbering, Order
 from webmap.base.errors import WireError
+from webmap.base.geometry import Twist
 from webmap.gate import commands, protocol
 from webmap.gate.commands import begins_like_stop
 from webmap.gate.display.supervisor import GateListener
-from webmap.gate.protocol import RobotReport
+from webmap.gate.protocol import MAY_MOVE, RobotReport
+from webmap.gate.rules.health import moves
 
 LOST = 0.5
 """Seconds without a sample after which the agent counts as lost."""
@@ -162,7 +164,7 @@ class FarGate:
         """Answer the newest sample, and note when the agent is silent; at 20 Hz."""
         with self._lock:
             if self.ready and now - self._heard_at > LOST:
-                self._lose(f"no connection to the agent {self.agent}")
+                self._lose(f"no connection to the agent {self.agent}", silent=True)
             listing = now - self._listed_at >= ANSWER
             if listing:
                 self._listed_at = now
@@ -304,20 +306,37 @@ class FarGate:
                 return msgspec.structs.replace(message, connection=self.connection)
         return protocol.FromPage(self.connection, json.dumps(fields).encode())
 
-    def _lose(self, why: str) -> None:
+    def _lose(self, why: str, *, silent: bool = False) -> None:
+        """Report the loss of the agent; ``silent`` if nothing comes from its gate."""
         self.ready, self.trouble = False, why
         for report in list(self._latest.values()):
-            self._owner.hear(unreachable(report, why))
+            driven = silent and self._drives(report)
+            self._owner.hear(unreachable(report, why, driven=driven))
         self._owner.gone(protocol.GateDown(why))
 
+    def _drives(self, report: RobotReport) -> bool:
+        """Return whether this display moved a robot, which perhaps got no zero yet."""
+        holder, seen = report.holder, report.measured
+        if holder is None or not holder.connection.startswith(f"{self.display}/"):
+            return False
+        moving = seen is not None and moves(Twist(*seen))
+        return moving or report.state in ("driving", "stopping")
 
-def unreachable(report: RobotReport, why: str) -> RobotReport:
+
+def unreachable(report: RobotReport, why: str, *, driven: bool = False) -> RobotReport:
     """Return the report of a robot whose agent cannot be reached.
 
-    What the robot does is unknown; a STOP that was active stays so.
+    What the robot does is unknown; a STOP that was active stays so. If this display has
+    ``driven`` it, perhaps nothing but the robot itself can stop it any more (S21).
     """
+    alarm, stop_time = None, report.stop_time
+    if driven and stop_time is None:
+        alarm = MAY_MOVE
+    elif driven:
+        why = f"{why}: the base stops by its own command timeout of {stop_time:.2f} s"
     return msgspec.structs.replace(
         report,
+        alarm=alarm,
         doing="down",
         holder=None,
         epoch=None,

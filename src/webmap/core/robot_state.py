@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from webmap.base.geometry import Twist
 from webmap.config.robot import BATTERY_LOW
-from webmap.gate.protocol import RobotReport
+from webmap.gate.protocol import MAY_MOVE, RobotReport
 from webmap.gate.rules.goals import BRAKES, OVER
 from webmap.gate.rules.health import moves
 from webmap.gate.rules.obedience import MOVES, TURNS
@@ -14,6 +14,7 @@ from webmap.ros.bridge import Bridge
 
 STATE_TEXTS = {
     "disobeying": "Does not obey: still moving",
+    "unreachable": "No connection: may still be moving",
     "no_bridge": "No connection to the bridge",
     "connecting": "Connecting",
     "gone": "No pose since {since}",
@@ -50,6 +51,7 @@ PRECEDENCE = {name: place for place, name in enumerate(STATE_TEXTS)}
 
 SEEN = (
     "disobeying",
+    "unreachable",
     "no_bridge",
     "connecting",
     "gone",
@@ -186,7 +188,7 @@ def _reported(facts: Facts) -> list[str]:
     if report is None:
         return names
     if report.alarm is not None:
-        names.append("disobeying")
+        names.append("unreachable" if report.alarm == MAY_MOVE else "disobeying")
     if report.link == "down":
         names.append("down")
     if report.other_writer is not None:

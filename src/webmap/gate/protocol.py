@@ -328,7 +328,8 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     measured: Velocity | None
     """The velocity in the newest odometry, if it is fresh."""
     alarm: str | None
-    """That the robot still moves although zero was sent, as text."""
+    """That the robot still moves although zero was sent, as text; or
+    :data:`MAY_MOVE`."""
     age: float | None
     """The age of the driver's loop in milliseconds, p95 of two seconds."""
     reaction: float
@@ -357,6 +358,13 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     nodes, as text."""
     hooks: tuple[str, ...] = ()
     """Which stop hooks failed or were not sent yet, and why, as text."""
+
+
+MAY_MOVE = (
+    "may still be moving. Only the base's own timeout or the button on the robot can "
+    "stop it"
+)
+"""The alarm about a driven robot without a known timeout that gets no zero (S21)."""
 
 
 class RobotGone(msgspec.Struct, frozen=True, tag="gone"):

@@ -50,6 +50,9 @@ export const SPACING = Object.freeze([0.3, 20.0]);
 /** The levels of a log, the lowest first. */
 export const LEVELS = Object.freeze(["debug", "info", "warn", "error", "fatal"]);
 
+/** The alarm about a robot that zero cannot reach. */
+export const MAY_MOVE = "may still be moving. Only the base's own timeout or the button on the robot can stop it";
+
 /** The text and the shape of each state of a goal. */
 export const GOALS = Object.freeze({
   "sent": ["Goal sent", "sent"],

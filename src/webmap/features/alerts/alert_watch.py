@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from webmap.base.lifecycle import lifecycle
 from webmap.base.looking import RARELY, looking
 from webmap.features.alerts.alerts import KINDS, Alerts
+from webmap.gate.protocol import MAY_MOVE
 from webmap.poses.silence import PERIODS
 
 if TYPE_CHECKING:
@@ -58,7 +59,8 @@ def _reported(robot: "Robot") -> dict[str, str]:
     found = {}
     if report.alarm is not None:
         others = [report.other_writer] if report.other_writer else []
-        found["disobeys"] = f"Not obeying: {'; '.join([report.alarm, *others])}"
+        title = "No connection" if report.alarm == MAY_MOVE else "Not obeying"
+        found["disobeys"] = f"{title}: {'; '.join([report.alarm, *others])}"
     if report.doing == "unconfirmed":
         why = report.stop.why if report.stop is not None else ""
         found["unconfirmed"] = f"STOP not confirmed: {why}".removesuffix(": ")

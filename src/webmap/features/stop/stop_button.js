@@ -1,3 +1,4 @@
+import { MAY_MOVE } from "../../web/constants.js";
 import { devicesOf } from "../../web/inputs/devices.js";
 import { isLatched, stopKey, stopOf } from "../../web/motion/report.js";
 import { Obedience, standingStops } from "../../web/motion/stopping.js";
@@ -25,7 +26,7 @@ const RESET_AT_ONCE = 60;
 /**
  * A button that stops all robots, always visible, and the result of every STOP.
  *
- * Also covers the page with an alarm when a robot moves although it was sent zero.
+ * Also covers the page with an alarm when a robot moves or may move in spite of zero.
  * Space and Escape stop the driven or selected robot, or all robots if there is none;
  * Shift with Escape stops all robots. The keys work with and without a `Teleop` on the
  * map.
@@ -191,7 +192,7 @@ function byName(one, other) {
   return one.name.localeCompare(other.name, undefined, { numeric: true });
 }
 
-/** Covers the page: a robot does not follow its commands. */
+/** Covers the page: a robot does not follow its commands, or perhaps gets none. */
 class Alarm {
   /**
    * @param {() => void} stopAll Used where no button of the page for STOP ALL is
@@ -201,6 +202,7 @@ class Alarm {
     // The figures change several times a second; screen readers must not read each
     // change.
     this._names = html("p", "webmap-alarm-names", { "aria-live": "off" });
+    this._title = html("p", "webmap-alarm-title");
     /** @type {Set<string>} */
     this._seen = new Set();
     /** @type {ReadonlyMap<string, string>} */
@@ -214,7 +216,7 @@ class Alarm {
       "webmap-alarm",
       { role: "alert", "aria-atomic": "false", popover: "manual" },
       this._twins.element,
-      html("p", "webmap-alarm-title", {}, "ROBOT NOT OBEYING"),
+      this._title,
       html("p", "webmap-alarm-act", {}, "Use the emergency stop of the robot."),
       this._names,
       this._stop,
@@ -236,6 +238,8 @@ class Alarm {
     for (const robot of this._seen) if (!alarms.has(robot)) this._seen.delete(robot);
     const news = [...alarms].filter(([robot]) => !this._seen.has(robot));
     setText(this._names, news.map(([, words]) => words).join(", "));
+    const silent = news.every(([, words]) => words.includes(MAY_MOVE));
+    setText(this._title, silent ? "ROBOT MAY STILL BE MOVING" : "ROBOT NOT OBEYING");
     if (news.length === 0) this.destroy();
     else {
       if (!this._element.isConnected) this._begin();

@@ -7,6 +7,7 @@ import msgspec
 from webmap.base.geometry import Twist
 from webmap.gate.commands import Velocity
 from webmap.gate.protocol import (
+    MAY_MOVE,
     Activity,
     AskerReport,
     Holder,
@@ -59,7 +60,7 @@ def report(machine: Machine, spec: RobotSpec, now: float) -> RobotReport:
         sent=_velocity(machine.motion.sent),
         echoed=None if echoed is None else _velocity(echoed),
         measured=None if measured is None else _velocity(measured),
-        alarm=machine.obedience.alarm(now),
+        alarm=_alarm(machine, stop_time, now),
         other_writer=machine.other_writer.description(machine.key.topic),
         age=None if age is None else round(age * 1000, 0),
         reaction=round(reaction(age, stop_time), 3),
@@ -108,6 +109,16 @@ def _activity(machine: Machine, spec: RobotSpec, now: float) -> Activity:
     if held:
         return "barred_held" if barred else "held"
     return "barred" if barred else "free"
+
+
+def _alarm(machine: Machine, stop_time: float | None, now: float) -> str | None:
+    """Return the alarm about the motion of the machine, as text, or ``None``."""
+    alarm, motion = machine.obedience.alarm(now), machine.motion
+    if alarm is not None or machine.control.up or stop_time is not None:
+        return alarm
+    # What an earlier gate owes may be weeks old.
+    ours = motion.moved_at > float("-inf")
+    return MAY_MOVE if ours and motion.owes_zero else None
 
 
 def _reason(machine: Machine, now: float) -> str | None:

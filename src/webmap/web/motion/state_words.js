@@ -6,6 +6,7 @@
  */
 export const WORDS = Object.freeze({
   disobeying: "Does not obey: still moving",
+  unreachable: "No connection: may still be moving",
   no_bridge: "No connection to the bridge",
   connecting: "Connecting",
   gone: "No pose since {since}",
@@ -38,6 +39,7 @@ export const WORDS = Object.freeze({
 /** The states that the display finds besides that of the gate. */
 export const SEEN = Object.freeze([
   "disobeying",
+  "unreachable",
   "no_bridge",
   "connecting",
   "gone",

@@ -263,6 +263,7 @@ function ofDoing(name, title, report, inputs) {
     case "settling":
       return description("stopping", title, speedOf(report));
     case "disobeying":
+    case "unreachable":
     case "moving":
     case "other":
       return description("moving", title, report.measured ? speedOf(report) : "");
