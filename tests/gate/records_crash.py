@@ -11,6 +11,7 @@ import signal
 import sys
 from pathlib import Path
 
+from webmap.base import plain_files
 from webmap.gate import disk
 from webmap.gate.disk import Records
 from webmap.gate.events import Key, Press
@@ -25,12 +26,12 @@ def press(by: str | None) -> Press | None:
 
 
 def die_after(lines: int) -> None:
-    """Kill this process after it has run a number of lines of the module."""
+    """Kill this process after it has run a number of lines of the modules."""
     left = lines
 
     def trace(frame, event, _):
         nonlocal left
-        if frame.f_code.co_filename != disk.__file__:
+        if frame.f_code.co_filename not in {disk.__file__, plain_files.__file__}:
             return None
         if event == "line":
             left -= 1

@@ -6,6 +6,7 @@ import os
 
 import pytest
 
+from webmap.gate import disk
 from webmap.gate.disk import UNKNOWN, Records, path_of
 from webmap.gate.events import Key, Press, StopRecord
 
@@ -76,7 +77,7 @@ class TestLatch:
 
         monkeypatch.setattr(os, "fsync", fsync)
         records.keep_latch(KEY, ANN, IDS)
-        assert flushed[0].startswith(str(folder / path_of(folder, KEY, "stop").stem))
+        assert flushed[0].startswith(f"{folder}/.{path_of(folder, KEY, 'stop').name}.")
         assert flushed[1] == str(folder)
         records.keep_latch(KEY, None, IDS)
         assert flushed[2:] == [str(folder)]
@@ -109,6 +110,55 @@ class TestLatch:
         path_of(folder, KEY, "stop").mkdir(parents=True)
         assert records.latch_of(KEY).by == UNKNOWN
         assert "cannot be written" in records.keep_latch(KEY, ANN, IDS)
+
+    def test_an_entry_of_any_kind_is_a_stop_that_a_person_can_reset(
+        self, records, folder, tmp_path
+    ):
+        path = path_of(folder, KEY, "stop")
+        folder.mkdir(parents=True)
+        (tmp_path / "other").write_text('{"by": "Eve", "id": "e1"}')
+        (tmp_path / "large").write_bytes(b" " * (disk.LARGEST + 1))
+        for make in (
+            lambda: os.mkfifo(path),
+            lambda: path.symlink_to("/dev/zero"),
+            lambda: path.symlink_to("nowhere"),
+            lambda: path.symlink_to(tmp_path / "other"),
+            lambda: (tmp_path / "large").rename(path),
+        ):
+            make()
+            assert records.may_be_stopped([KEY]) == {KEY}
+            press = records.latch_of(KEY)
+            assert press.by == UNKNOWN
+            assert records.stamp_of(KEY) is not None
+            assert records.keep_latch(KEY, None, frozenset({press.id})) is None
+            assert list(folder.iterdir()) == []
+        assert (tmp_path / "other").exists()
+
+    def test_a_folder_as_stop_stays_a_stop_after_a_reset_with_a_reason(
+        self, records, folder
+    ):
+        path_of(folder, KEY, "stop").mkdir(parents=True)
+        press = records.latch_of(KEY)
+        why = records.keep_latch(KEY, None, frozenset({press.id}))
+        assert "cannot be written to" in why
+        assert records.latch_of(KEY) == press
+
+    def test_a_link_left_in_the_folder_never_leads_a_write_to_another_file(
+        self, records, folder, tmp_path
+    ):
+        target, path = tmp_path / "target", path_of(folder, KEY, "stop")
+        target.write_text("precious")
+        folder.mkdir(parents=True)
+        for link in (path, path.with_suffix(".stop.new")):
+            link.symlink_to(target)
+        records.keep_latch(KEY, ANN, IDS)
+        assert (records.latch_of(KEY), target.read_text()) == (ANN, "precious")
+
+    def test_the_files_and_a_new_folder_are_for_the_owner_alone(self, records, folder):
+        records.keep_latch(KEY, ANN, IDS)
+        records.keep_stop_test(KEY, StopRecord(0.3, "2026-11-21"))
+        assert folder.stat().st_mode & 0o777 == 0o700
+        assert {file.stat().st_mode & 0o777 for file in folder.iterdir()} == {0o600}
 
     def test_a_name_that_is_too_long_is_cut(self, records):
         records.keep_latch(KEY, Press("x" * 500, "a1"), IDS)

@@ -9,7 +9,7 @@ from webmap.gate import locks as module
 from webmap.gate.clock import now
 from webmap.gate.disk import path_of
 from webmap.gate.events import Key
-from webmap.gate.locks import Locks, state_folder
+from webmap.gate.locks import Locks, keep_private, state_folder
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
 
@@ -55,6 +55,38 @@ def test_releasing_or_marking_a_lock_without_owning_the_lock_does_nothing(locks)
     locks.release(KEY)
     locks.mark(KEY, driven=True)
     assert locks.acquire(KEY).driven is False
+
+
+def test_a_pipe_or_a_link_in_place_of_a_lock_blocks_nothing(locks, folder, tmp_path):
+    folder.mkdir(parents=True)
+    path, target = path_of(folder, KEY, "lock"), tmp_path / "target"
+    os.mkfifo(path)
+    locks.tidy()
+    state = locks.acquire(KEY)
+    assert not state.held
+    assert state.why == f"{path}: expected a file, got a pipe"
+    path.unlink()
+    target.write_bytes(b"0")
+    path.symlink_to(target)
+    locks.tidy()
+    assert (path.is_symlink(), locks.acquire(KEY).held) == (True, False)
+    assert target.read_bytes() == b"0"
+
+
+def test_the_folder_is_for_its_owner_alone_also_one_of_an_earlier_version(
+    folder, monkeypatch, caplog
+):
+    for mode in (0o755, 0o700):
+        keep_private(folder)
+        assert folder.stat().st_mode & 0o777 == 0o700
+        folder.chmod(mode)
+    folder.chmod(0o755)
+    monkeypatch.setattr(os, "geteuid", lambda: folder.stat().st_uid + 1)
+    keep_private(folder)
+    assert folder.stat().st_mode & 0o777 == 0o755
+    assert "belongs to another user" in caplog.text
+    keep_private(folder / ("y" * 300))
+    assert "File name too long" in caplog.text
 
 
 @pytest.mark.parametrize("driven", [True, False])

@@ -101,7 +101,7 @@ class AlignmentStore:
             return None  # already applied or refused
         path = self.path(name)
         try:
-            content = json.loads(read_file(path, LARGEST_STATE))
+            content = json.loads(read_file(path, LARGEST_STATE, links=False))
             saved = alignment(*content["alignment"])
             instead_of = content["instead_of"]
         except FileNotFoundError:

@@ -1,7 +1,9 @@
 """The files that outlive the gate: active STOPs and stop test results.
 
-A file whose name ends in ``.stop`` means that STOP is active for the machine, whatever
-is in it. It contains who pressed STOP, but an empty or unreadable file stops as well.
+An entry whose name ends in ``.stop`` means that STOP is active for the machine,
+whatever it is: a file with the name of who pressed STOP, an empty or unreadable file, a
+pipe, a folder, or a link, also one that leads nowhere. Whoever made it may have meant a
+STOP, and a person can reset it. Only a regular file is read, up to :data:`LARGEST`.
 
 A disk may take a second to confirm a write, and a robot that must stop meanwhile cannot
 wait for that. So a thread writes one file after the other, and an event reports when
@@ -23,6 +25,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from webmap.base.plain_files import read_file, write_file
 from webmap.gate.actions import SaveStop, SaveStopTest
 from webmap.gate.commands import MAX_ID
 from webmap.gate.events import (
@@ -41,6 +44,12 @@ log = logging.getLogger("webmap.gate")
 
 UNKNOWN = "an earlier session"
 """Who pressed STOP if the file does not contain it."""
+
+LARGEST = 1 << 16
+"""Most bytes of a file."""
+
+UNSEEN = (0, 0)
+"""The stamp of a file that the next check reports in any case."""
 
 MAX_NAME = 80
 """The longest name of a person or page that is kept, in characters."""
@@ -67,11 +76,12 @@ def _names_of(key: Key) -> tuple[str, ...]:
     return tuple(hashlib.sha256("\n".join(k).encode()).hexdigest()[:24] for k in keys)
 
 
-def _found(folder: Path, key: Key, kind: str) -> Path:
-    """Return the file that exists, otherwise the path for a new one."""
-    paths = _paths_of(folder, key, kind)
-    # A STOP that was being lifted when a gate died has not been lifted.
-    return next(filter(os.path.lexists, [*paths, *map(_aside, paths)]), paths[0])
+def _places_of(folder: Path, key: Key) -> list[Path]:
+    """Return the paths where a STOP may be, in the order to look at them."""
+    paths = _paths_of(folder, key, "stop")
+    # A STOP that was being lifted when a gate died has not been lifted. Another gate
+    # may move it aside and back meanwhile, so the first ones are looked at again.
+    return [*paths, *map(_aside, paths), *paths]
 
 
 def _aside(path: Path) -> Path:
@@ -91,7 +101,8 @@ class Records:
 
     def latch_of(self, key: Key) -> Press | None:
         """Return the active STOP of a machine, if there is one."""
-        return _press_in(_found(self._folder, key, "stop"))
+        found = map(_press_in, _places_of(self._folder, key))
+        return next((press for press in found if press is not None), None)
 
     def may_be_stopped(self, keys: Iterable[Key]) -> set[Key]:
         """Return those of the machines that may have a STOP file, by one listing.
@@ -109,7 +120,8 @@ class Records:
 
     def stamp_of(self, key: Key) -> tuple[int, int] | None:
         """Return a value that changes with the STOP file; ``None`` without a file."""
-        return _stamp(_found(self._folder, key, "stop"))
+        found = map(_stamp, _places_of(self._folder, key))
+        return next((stamp for stamp in found if stamp is not None), None)
 
     def keep_latch(
         self, key: Key, press: Press | None, ids: frozenset[str]
@@ -143,9 +155,10 @@ class Records:
 
     def stop_test_of(self, key: Key) -> StopRecord | None:
         """Return the result of the last stop test of a machine, if there was one."""
-        path = _found(self._folder, key, "test")
+        paths = _paths_of(self._folder, key, "test")
+        path = next(filter(os.path.lexists, paths), paths[0])
         try:
-            found = json.loads(path.read_text("utf-8"))
+            found = json.loads(read_file(path, LARGEST, links=False))
             seconds, date = found["seconds"], found["date"]
             if seconds is not None:
                 seconds = float(seconds)
@@ -171,20 +184,14 @@ class Records:
 
     def _write(self, path: Path, content: dict[str, Any]) -> None:
         """Write a file so that a crash leaves the whole old or the whole new one."""
-        self._folder.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_suffix(f"{path.suffix}.new")
-        with temporary.open("w", encoding="utf-8") as file:
-            json.dump(content, file)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
+        write_file(path, json.dumps(content).encode())
         _flush_folder(self._folder)
 
 
 def _press_in(path: Path) -> Press | None:
-    """Return the STOP in a file; ``None`` if there is no such file."""
+    """Return the STOP in a file; ``None`` if there is nothing of that name."""
     try:
-        found = json.loads(path.read_text("utf-8"))
+        found = json.loads(read_file(path, LARGEST, links=False))
         by, id = found["by"], found.get("id")
     except FileNotFoundError:
         return None
@@ -201,7 +208,7 @@ def _press_in(path: Path) -> Press | None:
 
 def _stamp(path: Path) -> tuple[int, int] | None:
     try:
-        found = path.stat()
+        found = path.lstat()
     except OSError:
         return None
     return found.st_mtime_ns, found.st_ino
@@ -310,15 +317,22 @@ class Disk:
         if self._under_way:
             await asyncio.wait(self._under_way)
 
+    def _stamp_after(self, action: SaveStop) -> tuple[int, int] | None:
+        """Return the stamp of the file that this gate has just written.
+
+        Another gate may have replaced or removed the file since, and after a reset
+        the rules wait for the result: the next check then reports what is there.
+        """
+        stamp = self._records.stamp_of(action.key)
+        found = self._records.latch_of(action.key)
+        is_own = found and action.press and found.id == action.press.id
+        return stamp if is_own else UNSEEN
+
     def _do(self, action: SaveStop | SaveStopTest) -> Event:
         if isinstance(action, SaveStop):
             error = self._records.keep_latch(action.key, action.press, action.ids)
-            if action.key in self._stamps:
-                # Every later change is another gate's and is reported, also one that
-                # it made while this gate's file was being removed.
-                is_active = action.press is not None
-                kept = self._records.stamp_of(action.key) if is_active else None
-                self._stamps[action.key] = kept
+            if action.key in self._stamps and not (error and action.press):
+                self._stamps[action.key] = self._stamp_after(action)
             return StopSaved(action.key, action.number, error)
         today = datetime.datetime.now().astimezone().date().isoformat()
         record = StopRecord(action.seconds, today, action.error)

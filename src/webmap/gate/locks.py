@@ -10,6 +10,8 @@ import sys
 import time
 from pathlib import Path
 
+from webmap.base.errors import ConfigError
+from webmap.base.plain_files import open_regular
 from webmap.gate.disk import path_of
 from webmap.gate.events import Key, LockState
 
@@ -37,6 +39,25 @@ def state_folder() -> Path:
     return Path(user_state_dir("webmap"))
 
 
+def keep_private(folder: Path) -> None:
+    """Create the folder if missing, and let only its owner use it.
+
+    The folder of an earlier version may have wider rights. Everybody who may write
+    into it may end a STOP.
+    """
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if sys.platform == "win32":
+            return
+        found = folder.stat()
+        if found.st_uid != os.geteuid():
+            log.warning("%s belongs to another user, who can end every STOP", folder)
+        elif found.st_mode & 0o077:
+            folder.chmod(0o700)
+    except OSError as error:  # each file is still tried
+        log.warning("%s: %s", folder, error.strerror)
+
+
 class Locks:
     """The machines that only this gate, of all on this computer, may move.
 
@@ -52,8 +73,10 @@ class Locks:
     def acquire(self, key: Key) -> LockState:
         """Try to lock a machine."""
         try:
-            self._folder.mkdir(parents=True, exist_ok=True)
+            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             file = _open_locked(self._path(key))
+        except ConfigError as error:
+            return LockState(key, held=False, why=str(error))
         except OSError as error:
             why = f"{self._folder} cannot be written to ({error.strerror})"
             return LockState(key, held=False, why=why)
@@ -71,9 +94,9 @@ class Locks:
         """
         for path in self._folder.glob("*.lock"):
             try:
-                file = os.open(path, os.O_RDWR)
-            except OSError:
-                continue  # it was removed, or belongs to another user
+                file = open_regular(path, os.O_RDWR)
+            except (OSError, ConfigError):
+                continue  # it was removed, belongs to another user, or is no file
             try:
                 # Another gate may have removed and recreated the file meanwhile.
                 is_ours = _try_lock(file) and _is_at(file, path)
@@ -118,7 +141,7 @@ def _open_locked(path: Path) -> int | None:
     Another process may lock it for a moment and remove it, see :meth:`Locks.tidy`.
     """
     for left in reversed(range(TRIES)):
-        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+        file = open_regular(path, os.O_RDWR | os.O_CREAT)
         if _try_lock(file) and _is_at(file, path):
             return file
         os.close(file)
@@ -130,7 +153,7 @@ def _open_locked(path: Path) -> int | None:
 def _is_at(file: int, path: Path) -> bool:
     """Return whether an open file is still the file at ``path``."""
     try:
-        return os.path.samestat(os.fstat(file), path.stat())
+        return os.path.samestat(os.fstat(file), path.lstat())
     except FileNotFoundError:
         return False
 

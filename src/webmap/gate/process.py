@@ -18,7 +18,7 @@ from webmap.base.errors import WireError
 from webmap.base.logs import set_up_logging
 from webmap.gate import events, pipe, protocol
 from webmap.gate.disk import Disk, Records
-from webmap.gate.locks import Locks, state_folder
+from webmap.gate.locks import Locks, keep_private, state_folder
 from webmap.gate.pipe import BackgroundHandler, Outbox
 from webmap.gate.shell import Shell
 
@@ -63,6 +63,7 @@ def main() -> int:
 async def _serve(pipe_in: int, outbox: Outbox) -> int:
     loop = asyncio.get_running_loop()
     folder = state_folder()
+    keep_private(folder)
     locks = Locks(folder)
     locks.tidy()
     shell = Shell(outbox, locks, Disk(Records(folder)))

@@ -174,7 +174,7 @@ class LabelStore:
             ConfigError: If the file cannot be read.
         """
         try:
-            data = json.loads(read_file(self.file, LARGEST_STATE))
+            data = json.loads(read_file(self.file, LARGEST_STATE, links=False))
         except FileNotFoundError:
             return ()
         except (OSError, ValueError, RecursionError) as error:

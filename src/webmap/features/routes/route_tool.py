@@ -149,7 +149,9 @@ class RouteStore:
 
     def _read(self) -> Saved:
         try:
-            return msgspec.json.decode(read_file(self.file, LARGEST_STATE), type=Saved)
+            return msgspec.json.decode(
+                read_file(self.file, LARGEST_STATE, links=False), type=Saved
+            )
         except FileNotFoundError:
             return Saved(self._map)
         except (OSError, msgspec.DecodeError, RecursionError) as error:
