@@ -1,6 +1,7 @@
 """Two gates on one computer: one has the machine, and a STOP to either gate counts."""
 
 import asyncio
+import os
 import time
 
 import pytest
@@ -77,6 +78,28 @@ class TestOwner:
         owner.handle(StopFileChanged(KEY, owner.disk[KEY]))
         owner.run(0.1)
         assert not owner.report().latched
+
+    def test_a_reset_that_leaves_a_stop_on_disk_is_refused_with_the_reason(self, owner):
+        owner.send("a", op="stop", robot="r1")
+        owner.send("a", op="reset", robot="r1")
+        owner.handle(StopFileChanged(KEY, BEN))
+        assert owner.report().stop.by == "Ben"
+        refused = owner.refusals()[-1]
+        assert (refused.connection, refused.what) == ("a", "reset")
+        assert refused.why.startswith("Ben pressed STOP meanwhile; look at the robot")
+        owner.full_disk = True
+        owner.send("a", op="reset", robot="r1")
+        owner.handle(StopFileChanged(KEY, BEN))
+        assert owner.report().latched
+        assert owner.refusals()[-1].why == "STOP stays active: the disk is full"
+
+    def test_a_stop_after_a_completed_reset_refuses_no_reset(self, owner):
+        owner.send("a", op="stop", robot="r1")
+        owner.send("a", op="reset", robot="r1")
+        owner.handle(StopFileChanged(KEY, None))
+        before = len(owner.refusals())
+        owner.handle(StopFileChanged(KEY, BEN))
+        assert (owner.report().latched, len(owner.refusals())) == (True, before)
 
     def test_the_owner_ignores_the_stop_file_of_an_unknown_machine(self, owner):
         owner.handle(StopFileChanged(Key(URL, "/gone"), ANN))
@@ -175,6 +198,60 @@ def test_a_stop_of_another_gate_saved_during_a_reset_is_reported(tmp_path):
         await disk.settle()
         assert await disk.check() == [StopFileChanged(KEY, BEN)]
         assert received == [StopSaved(KEY, 1, None)]
+
+    asyncio.run(scenario())
+
+
+class Interleaved(Records):
+    """Another gate stores a STOP at one moment of a store of this gate.
+
+    Args:
+        folder: The folder of both gates.
+        monkeypatch: Intercepts the flush to the disk.
+        flush: After how many flushes of this gate that is.
+
+    """
+
+    def __init__(self, folder, monkeypatch, flush):
+        super().__init__(folder)
+        real, left = os.fsync, [flush]
+
+        def fsync(file):
+            real(file)
+            left[0] -= 1
+            if left[0] == 0:
+                assert Records(folder).keep_latch(KEY, BEN, frozenset({"b1"})) is None
+
+        monkeypatch.setattr(os, "fsync", fsync)
+
+
+@pytest.mark.parametrize("flush", [1, 2])
+def test_two_gates_that_store_a_stop_at_once_agree_on_the_one_in_the_file(
+    tmp_path, monkeypatch, flush
+):
+    async def scenario():
+        disk, received = Disk(Interleaved(tmp_path, monkeypatch, flush)), []
+        disk.recall(LockState(KEY, held=True))
+        disk.keep(actions.SaveStop(KEY, 1, ANN, frozenset({"a1"})), received.append)
+        await disk.settle()
+        newest = Records(tmp_path).latch_of(KEY)
+        assert newest == (ANN if flush == 1 else BEN)
+        seen = await disk.check()
+        assert received == [StopSaved(KEY, 1, None)]
+        assert seen == ([] if newest == ANN else [StopFileChanged(KEY, BEN)])
+        assert await disk.check() == []
+
+    asyncio.run(scenario())
+
+
+def test_a_stop_that_cannot_be_stored_is_not_reported_as_removed(tmp_path):
+    async def scenario():
+        (tmp_path / "state").write_text("a file")
+        disk = Disk(Records(tmp_path / "state"))
+        disk.recall(LockState(KEY, held=False))
+        disk.keep(actions.SaveStop(KEY, 1, ANN, IDS), lambda event: None)
+        await disk.settle()
+        assert await disk.check() == []
 
     asyncio.run(scenario())
 

@@ -156,7 +156,7 @@ class CommandHandler:
     def reset(self, robot: str, stop: str, by: Connection, now: float) -> None:
         """End the STOP with the identity ``stop`` of a robot."""
         check_role(by.role)
-        self._machines.reset(self._machines.find(robot), stop, now)
+        self._machines.reset(robot, stop, by.id, now)
 
     def take(self, connection: Connection, robot: str, now: float) -> int | None:
         """Give the lease and return its epoch; ``None`` if a standstill comes first."""

@@ -23,7 +23,7 @@ from webmap.gate.rules.goals import Goals
 from webmap.gate.rules.health import STALL_LIMIT, DisplayPulse, LinkHealth
 from webmap.gate.rules.machine import Machine
 from webmap.gate.rules.report import INTERVAL, Reporter, report
-from webmap.gate.rules.stop import StopLatch
+from webmap.gate.rules.stop import StopLatch, newer_stop
 from webmap.gate.specs import check_twist_type, checked, key_of
 
 log = logging.getLogger("webmap.gate")
@@ -56,6 +56,9 @@ class Machines:
         self._stopped_as: dict[events.Key, dict[events.Key, str]] = {}
         """For each machine with a STOP: the keys that it had before and under which the
         STOP is active too, each with the identity of its STOP."""
+        self._resets: dict[events.Key, tuple[str, str]] = {}
+        """Resets whose result on disk is not known yet: by which connection, and of
+        which robot."""
         self._by_robot: dict[str, Machine] = {}
         self._links: dict[tuple[str, events.Lane], LinkHealth] = {}
         self._reporters: dict[str, Reporter] = {}
@@ -142,12 +145,13 @@ class Machines:
         if robot is not None and robot not in self._by_robot:
             raise Refusal(f"there is no robot {robot!r}")
 
-    def reset(self, machine: Machine, stop: str, now: float) -> None:
-        """End the STOP of a machine, also under the keys that it had before.
+    def reset(self, robot: str, stop: str, by: str, now: float) -> None:
+        """End the STOP of a robot, also under the keys that its machine had before.
 
         Args:
-            machine: The machine.
+            robot: The robot.
             stop: The identity of the STOP to end.
+            by: The connection that resets; refused later if a STOP is left on disk.
             now: Seconds, monotonic.
 
         Raises:
@@ -155,7 +159,9 @@ class Machines:
                 machine.
 
         """
+        machine = self.find(robot)
         machine.reset(stop, now)
+        self._resets[machine.key] = by, robot
         for key, earlier in self._stopped_as.pop(machine.key, {}).items():
             # If a machine with that key still has robots, the STOP is theirs too.
             there, latch = self._by_key.get(key), self._latches[key]
@@ -163,6 +169,7 @@ class Machines:
             same = latch.press is not None and latch.press.id in (earlier, stop)
             if left and same:
                 latch.reset()
+                self._resets[key] = by, robot
                 if there is not None:
                     self._sort(there)
 
@@ -445,8 +452,16 @@ class Machines:
 
     def _stop_file_changed(self, event: events.StopFileChanged, now: float) -> None:
         machine = self._of_key(event.key)
-        if machine is not None:
-            machine.on_stop_file_changed(event.press, now)
+        if machine is None:
+            return
+        latch = machine.latch
+        # The first report after the file was to be removed shows the result.
+        reset = self._resets.pop(event.key, None) if latch.settled else None
+        trouble = latch.trouble
+        machine.on_stop_file_changed(event.press, now)
+        if reset is not None and event.press is not None and latch.on:
+            kept = trouble and f"STOP stays active: {trouble}"
+            self._refuse(*reset, "reset", kept or newer_stop(event.press), now)
 
     def _writer_nodes(self, message: WriterNodes, now: float) -> None:
         machine = self._by_robot.get(message.robot)

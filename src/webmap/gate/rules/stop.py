@@ -41,6 +41,13 @@ def new_press(by: str) -> Press:
     return Press(by, secrets.token_hex(8))
 
 
+def newer_stop(press: Press) -> str:
+    """Return why a reset does not end this STOP, for the person who reset."""
+    return (
+        f"{press.by} pressed STOP meanwhile; look at the robot, then press Reset again"
+    )
+
+
 class StopLatch:
     """Whether STOP is active for one machine, and whether that is on disk.
 
@@ -93,6 +100,7 @@ class StopLatch:
     def found(self, press: Press) -> None:
         """Take over a press that an earlier or another gate saved on disk."""
         self.press = self.shown = press
+        self.trouble = None
         self._ids.add(press.id)
 
     def is_new(self, press: Press | None) -> bool:
@@ -129,10 +137,7 @@ class StopLatch:
         if self.press is None:
             raise Refusal("no STOP is active")
         if self.press.id != stop:
-            raise Refusal(
-                f"{self.press.by} pressed STOP meanwhile; look at the robot, then "
-                "press Reset again"
-            )
+            raise Refusal(newer_stop(self.press))
 
     def reset(self) -> None:
         """Deactivate STOP."""
