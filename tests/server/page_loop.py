@@ -88,11 +88,22 @@ def make_model(loop, function, max_pages=1000):
     return OpenPages(loop.runtime, {"/": entry}, Published(), max_pages=max_pages)
 
 
-def open_page(model, page_id="page0001", viewer=ANN):
+def begin_page(model, page_id="page0001", viewer=ANN):
+    """Open a page; it is built later, when it is the turn of its viewer."""
     socket = PageSocket()
     handle = model.open_scene("/", page_id, viewer, socket)
     handle.receive(json.dumps({**HELLO, "page": page_id}))
     return handle, socket
+
+
+def open_page(model, page_id="page0001", viewer=ANN):
+    """Open a page; the page function has begun when this returns."""
+    opened = begin_page(model, page_id, viewer)
+    for _ in range(2):
+        done = threading.Event()
+        model.runtime.call(done.set)
+        assert done.wait(30)
+    return opened
 
 
 def wait_for(condition):

@@ -2,12 +2,15 @@
 
 import asyncio
 import gc
+import threading
 import weakref
+from types import SimpleNamespace
 
-from page_loop import make_model, open_page, wait_for
+from page_loop import begin_page, make_model, open_page, wait_for
 
 import webmap
 from webmap.base.errors import ConfigError
+from webmap.core.page import Viewer
 from webmap.server import open_pages as host_module
 
 
@@ -60,6 +63,55 @@ def test_an_exception_in_a_cancelled_page_function_is_not_logged_as_a_failure(
     loop.call(lambda: True)
     assert "page '/' of Ann was closed" in errors[0]
     assert "the page function failed" not in caplog.text
+
+
+def test_pages_that_close_before_their_turn_are_not_built(loop):
+    built, busy = [], threading.Event()
+    model = make_model(loop, lambda page: built.append(page.viewer.name))
+    loop.runtime.call(busy.wait, 30)
+    for number in range(300):
+        begin_page(model, f"page{number:04}")[0].closed()
+    begin_page(model, "page0000", Viewer("v2", "Ben"))
+    busy.set()
+    wait_for(lambda: built)
+    assert loop.call(lambda: len(model._hosts)) == 1
+    assert (built, model._unbuilt, model._closed) == (["Ben"], {}, 0)
+    loop.call(lambda: model.close() or True)
+
+
+def test_the_viewers_take_turns_and_the_thread_works_between_two_pages(loop):
+    done, busy = [], threading.Event()
+    model = make_model(loop, lambda page: done.append(page.viewer.name))
+    loop.runtime.call(busy.wait, 30)
+    for number in range(20):
+        begin_page(model, f"page{number:04}")
+    begin_page(model, "page0000", Viewer("v2", "Ben"))
+    loop.runtime.call(loop.runtime.call, done.append, "a tick")
+    busy.set()
+    wait_for(lambda: len(done) == 22)
+    assert done[:4] == ["Ann", "a tick", "Ben", "Ann"]
+    loop.call(lambda: model.close() or True)
+
+
+def test_garbage_of_closed_pages_is_not_collected_while_somebody_drives(
+    loop, monkeypatch
+):
+    collected = []
+    monkeypatch.setattr(gc, "collect", lambda: collected.append(len(collected)))
+    bob = webmap.Robot("Bob")
+    model = make_model(loop, lambda page: None)
+    bob.report = SimpleNamespace(holder="Ann")
+    loop.call(lambda: setattr(model, "_closed", host_module.CLOSED_AT_MOST - 1) or True)
+    open_page(model)
+    assert collected == []
+    loop.call(lambda: setattr(model, "_closed", host_module.CLOSED_AT_MOST) or True)
+    open_page(model, "page0002")
+    assert collected == [0]
+    bob.report = SimpleNamespace(holder=None)
+    loop.call(lambda: setattr(model, "_closed", host_module.CLOSED) or True)
+    open_page(model, "page0003")
+    assert collected == [0, 1]
+    loop.call(lambda: [model.close(), bob.destroy()])
 
 
 def test_at_the_page_limit_the_page_that_was_lost_first_is_removed(loop):

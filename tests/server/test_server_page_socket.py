@@ -14,11 +14,15 @@ from webmap.server.outbox import (
     FrameQueue,
 )
 from webmap.server.page_socket import (
+    COME_BACK,
     DRIVE,
+    MOST_VIEWERS,
+    OPENS_AT_ONCE,
     REPLACED,
     SCENE,
     Allowance,
     Bounds,
+    Opens,
     OpenSockets,
     short,
 )
@@ -138,6 +142,49 @@ def test_a_socket_above_the_limit_is_refused():
     sockets.remove(("w", "p"), second)
     sockets.remove(("v", "p"), first)
     assert sockets.add(("w", "p"), second)
+
+
+def test_the_viewer_with_the_most_pages_yields_the_newest_one():
+    sockets, guests = OpenSockets(3), {n: Guest() for n in range(5)}
+    for number in range(3):
+        assert sockets.add(("v", f"p{number}"), guests[number])
+    assert sockets.add(("w", "p"), guests[3])
+    assert [guest.received for guest in guests.values()] == [
+        [],
+        [],
+        [COME_BACK],
+        [],
+        [],
+    ]
+    # Two and one would become one and two.
+    assert not sockets.add(("w", "q"), guests[4])
+    assert len(sockets) == 3
+
+
+def test_pages_that_always_get_a_place_replace_the_oldest_of_the_most():
+    sockets, guests = OpenSockets(3, always=True), [Guest() for _ in range(5)]
+    for number, guest in enumerate(guests[:4]):
+        assert sockets.add(("v", f"p{number}"), guest)
+    assert sockets.add(("w", "p"), guests[4])
+    assert [guest.received for guest in guests] == [
+        [COME_BACK],
+        [COME_BACK],
+        [],
+        [],
+        [],
+    ]
+
+
+def test_each_viewer_may_open_many_pages_at_once_and_then_two_a_second():
+    opens = Opens(OPENS_AT_ONCE)
+    assert all(opens.may_open("v", 0.0) for _ in range(OPENS_AT_ONCE))
+    assert not any(opens.may_open("v", 0.0) for _ in range(100))
+    assert opens.may_open("w", 0.0)
+    # Attempts that were refused cost nothing.
+    assert [opens.may_open("v", 1.0) for _ in range(3)] == [True, True, False]
+    for number in range(MOST_VIEWERS):
+        opens.may_open(f"x{number}", 1.0)
+    assert len(opens._until) == MOST_VIEWERS
 
 
 def test_batched_calls_from_another_thread_run_in_order():

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import json
 import logging
 import socket as sockets
 from urllib.parse import urlencode
@@ -14,7 +15,8 @@ from websockets.frames import Frame, Opcode
 
 from webmap.server.access import Settings
 from webmap.server.app import WebApp
-from webmap.server.page_socket import REPLACED
+from webmap.server.drive_socket import MOST_STOP_ONLY
+from webmap.server.page_socket import OPENS_AT_ONCE, REPLACED, TOO_SOON
 
 TICK = '{"op":"tick","tick":%d,"ack":-1}'
 
@@ -387,18 +389,108 @@ def test_two_viewers_can_use_the_same_page_id(rooms, server, open_socket):
     assert len({scene.viewer.id for scene in rooms.model.scenes}) == 2
 
 
-@pytest.mark.parametrize("name", ["scene", "drive"])
-def test_a_page_above_the_limit_is_refused(rooms, open_socket, name):
+def test_a_page_above_the_limit_is_refused(rooms, open_socket):
     async def scenario():
         async with contextlib.AsyncExitStack() as stack:
             for number in range(4):
-                await stack.enter_async_context(open_socket(f"{name}?id={number}"))
-            async with open_socket(f"{name}?id=last") as socket:
+                await stack.enter_async_context(open_socket(f"scene?id={number}"))
+            async with open_socket("scene?id=last") as socket:
                 return await reason_of(socket)
 
     code, reason = asyncio.run(scenario())
     assert code == 1013
     assert "too many open pages" in reason
+
+
+@pytest.mark.parametrize("name", ["scene", "drive"])
+def test_a_viewer_with_all_places_yields_one_to_another_viewer(
+    rooms, server, open_socket, name
+):
+    async def scenario():
+        async with contextlib.AsyncExitStack() as stack:
+            enter = stack.enter_async_context
+            sockets = [await enter(open_socket(f"{name}?id={n}")) for n in range(4)]
+            other = await enter(open_socket(f"{name}?id=0", server.sign_in()))
+            reason = await reason_of(sockets[-1])
+            for socket in (*sockets[:-1], other):
+                await (await socket.ping())
+            return reason
+
+    code, reason = asyncio.run(scenario())
+    assert code == 1013
+    assert "too many open pages" in reason
+
+
+def test_a_stop_is_served_at_every_limit_of_places_and_rates(
+    rooms, server, open_socket
+):
+    stop, take = '{"op":"stop","robot":"*"}', '{"op":"take","robot":"r1"}'
+
+    async def scenario():
+        async with contextlib.AsyncExitStack() as stack:
+            enter = stack.enter_async_context
+            for number in range(4 + MOST_STOP_ONLY):
+                await enter(open_socket(f"drive?id=more{number}"))
+            for number in range(40):
+                async with open_socket(f"scene?id={number}"):
+                    pass
+            # Of five viewers with one page each, the last has no place to drive.
+            for number in range(1, 4):
+                await enter(open_socket(f"drive?id={number}", server.sign_in()))
+            late = await enter(open_socket("drive?id=late", server.sign_in()))
+            await late.send(take)
+            refused = json.loads(await late.recv())
+            await late.send(stop)
+            await asyncio.to_thread(
+                wait_for,
+                lambda: any(c.received == [stop] for c in rooms.gate.connections),
+            )
+            await late.send("x" * 1025)  # ends the socket
+            await late.send(stop)
+            assert (await reason_of(late))[0] == 1008
+            return refused
+
+    refused = asyncio.run(scenario())
+    assert refused == {
+        "op": "refused",
+        "robot": "r1",
+        "what": "take",
+        "why": "too many open pages: this page can only stop robots",
+    }
+    (connection,) = [c for c in rooms.gate.connections if c.received]
+    assert (connection.role, connection.received) == ("viewer", [stop, stop])
+
+
+def test_a_page_that_can_only_stop_connects_again_when_there_is_a_place(
+    rooms, server, open_socket
+):
+    async def scenario():
+        async with contextlib.AsyncExitStack() as stack:
+            enter = stack.enter_async_context
+            own = [await enter(open_socket(f"drive?id={n}")) for n in range(4)]
+            more = await enter(open_socket("drive?id=more"))
+            await own[0].close()
+            return await reason_of(more)
+
+    code, reason = asyncio.run(scenario())
+    assert (code, reason) == (1013, "there is a place now: connect again")
+
+
+def test_a_viewer_who_opens_pages_too_fast_must_wait_and_others_need_not(
+    rooms, server, open_socket
+):
+    async def scenario():
+        for _ in range(OPENS_AT_ONCE):
+            async with open_socket("scene?id=p"):
+                pass
+        async with open_socket("scene?id=p") as socket:
+            reason = await reason_of(socket)
+        async with open_socket("scene?id=p", server.sign_in()) as socket:
+            await (await socket.ping())
+        return reason
+
+    code, reason = asyncio.run(scenario())
+    assert (code, reason) == (1013, TOO_SOON)
 
 
 def test_a_page_that_stops_reading_is_closed(rooms, open_socket):

@@ -1,18 +1,22 @@
 """The ``/_webmap/drive`` sockets: commands to the gate, its messages to the page.
 
 It is a socket of its own, so that no large message delays a command. The page's
-messages go to the gate unread; only the gate decides.
+messages go to the gate unread; only the gate decides. A page beyond the limit can only
+stop: STOP is never refused for lack of room.
 """
 
 import logging
 import secrets
 from collections.abc import Callable
+from dataclasses import replace
 
 from starlette.websockets import WebSocket
 
 from webmap.core.page import Viewer
-from webmap.gate.commands import begins_like_stop
-from webmap.gate.protocol import Role
+from webmap.gate.commands import Refusal as InvalidCommand
+from webmap.gate.commands import begins_like_stop, op_of, parse, stop_in
+from webmap.gate.display.pages import refused_text
+from webmap.gate.protocol import Refused, Role
 from webmap.server.open_pages import GateConnection, OpenPages
 from webmap.server.outbox import BatchedCallsByLoop, DriveQueue
 from webmap.server.page_socket import (
@@ -35,6 +39,11 @@ to the page and close its socket; they may be called from any thread."""
 
 log = logging.getLogger("webmap.server")
 
+MOST_STOP_ONLY = 32
+"""The greatest number of pages that can only stop; each new one gets a place."""
+
+NO_PLACE = "too many open pages: this page can only stop robots"
+
 MOST_LAST_STOPS = 60
 """The greatest number of STOPs that are served for a disconnected page: those of one
 second."""
@@ -54,6 +63,7 @@ class DriveSockets:
         self._connect_to_gate = connect_to_gate
         self._calls = calls
         self._open = OpenSockets(limit)
+        self._stop_only = OpenSockets(MOST_STOP_ONLY, always=True)
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""
@@ -69,14 +79,25 @@ class DriveSockets:
         page_socket = PageSocket(
             socket, name, self._calls.of_this_loop(), DRIVE, DriveQueue()
         )
-        async with self._open.holding((viewer.id, page_id), page_socket) as has_room:
+        key = (viewer.id, page_id)
+        async with self._open.holding(key, page_socket) as has_room:
             if has_room:
                 await self._carry(page_socket, page_id, viewer, limited=named)
-            else:
-                await page_socket.refuse_full()
+        if not has_room:
+            viewer = replace(viewer, role="viewer")
+            async with self._stop_only.holding(key, page_socket):
+                await self._carry(page_socket, page_id, viewer, stops_only=True)
+        elif not self._open.full:
+            self._stop_only.end_oldest("there is a place now: connect again")
 
     async def _carry(
-        self, page_socket: PageSocket, page_id: str, viewer: Viewer, *, limited: bool
+        self,
+        page_socket: PageSocket,
+        page_id: str,
+        viewer: Viewer,
+        *,
+        limited: bool = True,
+        stops_only: bool = False,
     ) -> None:
         try:
             connection = self._connect(page_socket, viewer)
@@ -94,6 +115,13 @@ class DriveSockets:
 
             last_stops = iter(range(MOST_LAST_STOPS))
 
+            def receive(message: str) -> None:
+                refusal = _unless_stop(message) if stops_only else None
+                if refusal is None:
+                    connection.receive(message)
+                else:
+                    page_socket.offer(refused_text(refusal))
+
             def rest(message: str | bytes) -> None:
                 # A STOP of a disconnected page is still served (S10).
                 if isinstance(message, str):
@@ -104,7 +132,7 @@ class DriveSockets:
                     connection.receive(message)
 
             await page_socket.run(
-                connection.receive, lambda why: self._pages.refused(viewer, why), rest
+                receive, lambda why: self._pages.refused(viewer, why), rest
             )
         finally:
             # The gate first: the connection's leases end with it, and robots stop.
@@ -116,3 +144,15 @@ class DriveSockets:
             page_socket.end(BROKEN_RULE, reason)
 
         return self._connect_to_gate(viewer.name, viewer.role, page_socket.offer, close)
+
+
+def _unless_stop(message: str) -> Refused | None:
+    """Return the refusal of a message of a page without a place, unless it stops."""
+    data = message.encode(errors="replace")
+    if stop_in(data) is not None:
+        return None
+    try:
+        command = parse(data)
+    except InvalidCommand:
+        return Refused("", None, "command", NO_PLACE)
+    return Refused("", command.robot, op_of(command), NO_PLACE)

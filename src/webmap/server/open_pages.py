@@ -20,6 +20,7 @@ from webmap.base.tasks import begin
 from webmap.core.page import Page, PageEntry, Viewer
 from webmap.core.pictures import Publisher
 from webmap.core.refused import refusals
+from webmap.core.robot import robots
 from webmap.core.runtime import Runtime
 from webmap.core.view import Rect
 from webmap.scene.element import Event
@@ -58,11 +59,17 @@ SAME = (
 DONE = ("click", "change")
 """The events whose answer the operator waits for: the page gets a frame at once."""
 
+Sizes = Mapping[str, tuple[float, float]]
+"""The sizes of a page's containers, in pixels."""
+
 PageKey = tuple[str, str, str]
 """The path of a page, the page's own identifier, and its viewer's."""
 
 CLOSED = 10
 """Closed pages after which a collection of garbage looks at all pages."""
+
+CLOSED_AT_MOST = 500
+"""The same while somebody has control of a robot, whom the collection would stop."""
 
 KEPT_FOR = 30.0
 """Seconds for which a page is kept for its viewer after its socket was lost."""
@@ -151,6 +158,9 @@ class PageHost:
             return
         self._socket = None
         self._stop_watching()
+        if self._page is None:  # nothing to keep, and nothing to build any more
+            self.close()
+            return
         self.lost_at = time.monotonic()
         self._giving_up = asyncio.get_running_loop().call_later(KEPT_FOR, self.close)
 
@@ -167,10 +177,19 @@ class PageHost:
 
     # From the page.
 
-    def _hello(self, sizes: Mapping[str, tuple[float, float]]) -> None:
+    def _hello(self, sizes: Sizes) -> None:
         self._session.restart()
         if self._page is None:
-            self._open(sizes)
+            self._pages.build_soon(self, sizes)
+        else:
+            self._show()
+
+    def build(self, sizes: Sizes) -> None:
+        """Build the page and show it."""
+        self._open(sizes)
+        self._show()
+
+    def _show(self) -> None:
         self._stop_watching()
         self._watching = self._pages.runtime.watch(self)
         # The viewer sees nothing yet, so this frame waits for no tick.
@@ -210,7 +229,7 @@ class PageHost:
         """Close the page permanently."""
         self._stop_watching()
         self._stay()
-        self._pages.forget(self._key, self)
+        self._pages.forget(self._key, self, built=self._page is not None)
         if self._page is not None:
             self._page.close()
             self._page = None
@@ -223,7 +242,7 @@ class PageHost:
         if self.drive is not None and self._page is not None:
             self.drive.set_speeds(*self._page.speeds)
 
-    def _open(self, sizes: Mapping[str, tuple[float, float]]) -> None:
+    def _open(self, sizes: Sizes) -> None:
         page = self._page = Page(
             self._entry, self._session, self.viewer, self._pages.publisher, sizes
         )
@@ -325,6 +344,8 @@ class OpenPages:
         self.publisher = publisher
         self._max_pages = max_pages
         self._hosts: dict[PageKey, PageHost] = {}
+        self._unbuilt: dict[str, dict[PageHost, Sizes]] = {}
+        """The pages to build, by viewer; the viewer whose turn is next comes first."""
         self._closed = 0
         self._drives: dict[tuple[str, str], GateConnection] = {}
 
@@ -368,20 +389,48 @@ class OpenPages:
             host.drive = self._drives.get(key[1:])
         return self._hosts[key]
 
-    def forget(self, key: PageKey, host: PageHost) -> None:
-        """Remove a page that was closed."""
+    def forget(self, key: PageKey, host: PageHost, *, built: bool) -> None:
+        """Remove a page that was closed, and note whether it had been built."""
         if self._hosts.get(key) is host:
             del self._hosts[key]
-        self._closed += 1
+        waiting = self._unbuilt.get(host.viewer.id, {})
+        if waiting.pop(host, None) is not None and not waiting:
+            del self._unbuilt[host.viewer.id]
+        self._closed += built
+
+    def build_soon(self, host: PageHost, sizes: Sizes) -> None:
+        """Build a page when it is the turn of its viewer.
+
+        One page is built at a time, and the viewers take turns. Between two pages the
+        thread does everything else, so that pages that have closed are not built.
+        """
+        if not self._unbuilt:
+            asyncio.get_running_loop().call_soon(self._build_next)
+        self._unbuilt.setdefault(host.viewer.id, {})[host] = sizes
+
+    def _build_next(self) -> None:
+        if not self._unbuilt:
+            return
+        viewer = next(iter(self._unbuilt))
+        waiting = self._unbuilt.pop(viewer)
+        host = next(iter(waiting))
+        sizes = waiting.pop(host)
+        if waiting:
+            self._unbuilt[viewer] = waiting  # now the last
+        if self._unbuilt:
+            asyncio.get_running_loop().call_soon(self._build_next)
+        host.build(sizes)
 
     def built(self) -> None:
         """Except the objects of all pages from collections of garbage.
 
         A collection that looks at hundreds of pages stops every thread for half a
         second, and the gate stops the robots of a display after half of that. What
-        remains of closed pages may be in cycles, so it is collected now and then.
+        remains of closed pages may be in cycles, so it is collected now and then, if
+        possible while nobody drives.
         """
-        if self._closed >= CLOSED:
+        driven = any(r.report and r.report.holder for r in list(robots.values()))
+        if self._closed >= (CLOSED_AT_MOST if driven else CLOSED):
             self._closed = 0
             gc.unfreeze()
             gc.collect()

@@ -9,6 +9,7 @@ import contextlib
 import logging
 import re
 import time
+from collections import Counter, OrderedDict
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -45,6 +46,10 @@ _PAGE_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
 Key = tuple[str, str]
 """A viewer and one of its pages."""
 
+FULL = "too many open pages: close one, or try again later"
+
+TOO_SOON = "too many new pages in a short time: try again later"
+
 REPLACED = 4001
 """The close code of a socket whose page has opened another one."""
 
@@ -66,6 +71,40 @@ class Bounds:
 SCENE = Bounds(max_bytes=16 * 1024, rate=120.0, burst=240.0)
 # 20 commands a second for the 6 s after which a silent connection is given up.
 DRIVE = Bounds(max_bytes=1024, rate=60.0, burst=120.0)
+
+OPENS = 2.0
+"""Pages that one viewer may open each second."""
+
+OPENS_AT_ONCE = 30
+"""Pages that one viewer may open at once, if not more have a place."""
+
+MOST_VIEWERS = 1024
+"""Viewers whose new pages are counted; who opened one longest ago is forgotten."""
+
+
+class Opens:
+    """How often each viewer may open a page: many at once, then a few a second.
+
+    Args:
+        burst: Pages at once, :data:`OPENS_AT_ONCE` or more.
+
+    """
+
+    def __init__(self, burst: int) -> None:
+        self._longest = max(burst, OPENS_AT_ONCE) / OPENS
+        self._until: OrderedDict[str, float] = OrderedDict()
+        """When each viewer will have opened no more than its rate allows."""
+
+    def may_open(self, viewer: str, now: float) -> bool:
+        """Count a page that a viewer opens, unless it comes too soon."""
+        until = max(self._until.get(viewer, now), now) + 1 / OPENS
+        if until - now > self._longest:
+            return False
+        self._until[viewer] = until
+        self._until.move_to_end(viewer)
+        if len(self._until) > MOST_VIEWERS:
+            self._until.popitem(last=False)
+        return True
 
 
 class Allowance:
@@ -152,12 +191,6 @@ class PageSocket:
         """Close the socket with a reason before any message was passed."""
         self._end(code, reason)
         await self._send_close()
-
-    async def refuse_full(self) -> None:
-        """Close the socket because too many pages are open."""
-        await self.refuse(
-            COME_BACK, "too many open pages: close one, or try again later"
-        )
 
     async def run(
         self,
@@ -303,31 +336,61 @@ def short(reason: str) -> str:
 class OpenSockets:
     """The open sockets of one kind: one for each page.
 
+    When there are too many, a viewer with more of them yields to one with fewer, so
+    that nobody can take all places.
+
     Args:
         limit: The greatest number of pages with a socket.
+        always: Whether each new page gets a place, however many its viewer has.
 
     """
 
-    def __init__(self, limit: int) -> None:
+    def __init__(self, limit: int, *, always: bool = False) -> None:
         self._limit = limit
+        self._always = always
         self._sockets: dict[Key, PageSocket] = {}
 
     def __len__(self) -> int:
         return len(self._sockets)
 
+    @property
+    def full(self) -> bool:
+        """Whether no place is left."""
+        return len(self._sockets) >= self._limit
+
     def add(self, key: Key, socket: PageSocket) -> bool:
-        """Add a page's socket; return False if too many other pages have one.
+        """Add a page's socket; return False if there is no place for it.
 
         It replaces the previous socket of this page, whose connection may be lost
         without either side having detected it.
         """
-        before = self._sockets.get(key)
-        if before is None and len(self._sockets) >= self._limit:
+        before = self._sockets.pop(key, None)
+        if before is None and self.full and not self._make_room(key[0]):
             return False
-        self._sockets[key] = socket
+        self._sockets[key] = socket  # the newest at the end
         if before is not None:
             before.end(REPLACED, "this page was opened again in another tab")
         return True
+
+    def _make_room(self, viewer: str) -> bool:
+        """Close a socket of the viewer with the most; return whether that was fair."""
+        numbers = Counter(owner for owner, _ in self._sockets)
+        most, number = numbers.most_common(1)[0]
+        if not self._always and number <= numbers[viewer] + 1:
+            return False
+        # The oldest pages are rather in use; of those that can only stop, none is.
+        order = self._sockets if self._always else reversed(self._sockets)
+        self.end(next(key for key in order if key[0] == most), FULL)
+        return True
+
+    def end(self, key: Key, reason: str) -> None:
+        """Close a page's socket, so that its place is free at once."""
+        self._sockets.pop(key).end(COME_BACK, reason)
+
+    def end_oldest(self, reason: str) -> None:
+        """Close the socket that was opened first, if there is one."""
+        if self._sockets:
+            self.end(next(iter(self._sockets)), reason)
 
     def remove(self, key: Key, socket: PageSocket) -> None:
         """Remove a page's socket, unless another one has replaced it."""

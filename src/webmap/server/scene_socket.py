@@ -5,6 +5,7 @@ round trip less; other programs may send it as their first message.
 """
 
 import logging
+import time
 
 from starlette.websockets import WebSocket
 
@@ -13,8 +14,12 @@ from webmap.server.open_pages import OpenPages
 from webmap.server.outbox import BatchedCallsByLoop, FrameQueue
 from webmap.server.page_socket import (
     BROKEN_RULE,
+    COME_BACK,
     FAILED,
+    FULL,
     SCENE,
+    TOO_SOON,
+    Opens,
     OpenSockets,
     PageSocket,
     accept,
@@ -41,6 +46,7 @@ class SceneSockets:
         self._pages = pages
         self._calls = calls
         self._open = OpenSockets(limit)
+        self._opens = Opens(limit)
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""
@@ -58,12 +64,15 @@ class SceneSockets:
         page_socket = PageSocket(
             socket, name, self._calls.of_this_loop(), SCENE, FrameQueue()
         )
+        if not self._opens.may_open(viewer.id, time.monotonic()):
+            await page_socket.refuse(COME_BACK, TOO_SOON)
+            return
         async with self._open.holding((viewer.id, page_id), page_socket) as has_room:
             if has_room:
                 hello = socket.query_params.get("hello")
                 await self._carry(page_socket, entry.path, page_id, viewer, hello)
             else:
-                await page_socket.refuse_full()
+                await page_socket.refuse(COME_BACK, FULL)
 
     async def _carry(
         self,
