@@ -142,6 +142,25 @@ def test_pipes_and_devices_are_refused_but_folders_are_accepted(tmp_path):
     refuse_special(tmp_path)
 
 
+def test_a_socket_is_refused_and_a_path_that_leads_nowhere_is_a_path(
+    tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind("socket")
+        with pytest.raises(ConfigError, match="got a socket"):
+            refuse_special(tmp_path / "socket")
+    assert resolved(tmp_path / "nowhere") == (tmp_path / "nowhere").resolve()
+
+
+def test_a_file_that_webmap_keeps_is_private_and_no_link(tmp_path):
+    write_file(tmp_path / "a", b"abc")
+    assert (tmp_path / "a").stat().st_mode & 0o777 == 0o600
+    (tmp_path / "b").symlink_to("a")
+    with pytest.raises(OSError, match="symbolic link"):
+        read_file(tmp_path / "b", 3, links=False)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

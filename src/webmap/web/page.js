@@ -67,6 +67,12 @@ export class Page {
     this._isNew = false;
     this._failures = 0;
     this._listening = performance.now();
+    /**
+     * Removes the STOP of a page without a picture; null once there was a picture.
+     * @type {(() => void) | null}
+     */
+    this._hideBareStop = () => {};
+    this._offersStop = false;
     /** Why the server ended the last connection, if it did. */
     this._why = "";
     /** Whether the page was hidden when it last received something. */
@@ -145,6 +151,8 @@ export class Page {
 
   _connected() {
     this._link.settle();
+    this._hideBareStop?.();
+    this._hideBareStop = null;
     const { classList } = document.documentElement;
     if (!classList.contains("disconnected")) return;
     classList.remove("disconnected");
@@ -164,6 +172,20 @@ export class Page {
     this._why = reason;
     const what = reason ? `No connection to WebMap: ${reason}.` : "No connection to WebMap.";
     this._disconnected(`${what} ${forGood ? "Reload the page." : "Reconnecting…"}`);
+    void this._offerStop();
+  }
+
+  /** Show STOP, if the page never got a picture: modules would bring their own. */
+  async _offerStop() {
+    if (this._offersStop || !this._hideBareStop) return;
+    this._offersStop = true;
+    try {
+      await this._loadDrive();
+      const { showBareStop } = await importOf(new URL("bare_stop.js", import.meta.url).href);
+      if (this._hideBareStop) this._hideBareStop = showBareStop(this.drive);
+    } catch {
+      this._offersStop = false; // without a network; the next attempt may succeed
+    }
   }
 
   /** Ask why the server refuses a socket to this page, and show what to do. */
