@@ -1,10 +1,14 @@
 """What an agent accepts from displays, and when the pages of a display end."""
 
+from contextlib import suppress
+
 import msgspec
 import pytest
 from agent_reports import REPORT
 
-from webmap.agents.displays import Answer, Displays, ReportAll, Unknown
+from webmap.agents import displays as displays_module
+from webmap.agents.agent_gate import AgentGate
+from webmap.agents.displays import Answer, Displays, Page, Took
 from webmap.agents.samples import Numbering, Order
 from webmap.base.errors import WireError
 from webmap.gate import commands
@@ -16,7 +20,9 @@ from webmap.gate.protocol import (
     FromPage,
     FromProgram,
     Heartbeat,
+    Hello,
     Holder,
+    Ready,
     RobotGone,
     RobotSpec,
     Speeds,
@@ -26,7 +32,10 @@ from webmap.gate.protocol import (
 
 PAGE = Connect("west/c1", "Ann", "operator")
 PROGRAM = Connect("west/program", "the program", "operator", program=True)
+ANN = Page("c1", "Ann", "operator")
+OWN = Page("program", "the program", "operator")
 STOP = b'{"op":"stop","robot":"*"}'
+STOP_R1 = b'{"op":"stop","robot":"r1"}'
 
 
 class West:
@@ -37,15 +46,20 @@ class West:
         self.numbering = Numbering()
         self.order = Order()
 
-    def send(self, message, now=0.0):
-        sample = self.numbering.next(msgspec.msgpack.encode(message))
-        return self.displays.receive("west", sample, now)
+    def send(self, message, now=0.0, name="west", numbering=None):
+        numbering = numbering or self.numbering
+        sample = numbering.next(msgspec.msgpack.encode(message))
+        return self.displays.receive(name, sample, now)
+
+    def connects(self, *pages, now=0.0, name="west"):
+        numbering = None if name == "west" else Numbering()
+        return self.send(Answer(0, 0, pages), now, name, numbering)
 
     def receive(self, tick, now):
         self.order.take(self.displays.send(Tick(tick, {}), now))
 
-    def answers(self, now, connections=None):
-        answer = Answer(self.order.session or 0, self.order.newest, connections)
+    def answers(self, now, pages=None, reports=False):
+        answer = Answer(self.order.session or 0, self.order.newest, pages, reports)
         return self.send(answer, now)
 
     def reports_control_of(self, connection, now=0.0):
@@ -62,11 +76,10 @@ def west():
 def test_a_page_and_its_commands_reach_the_gate(west):
     speeds = Speeds("west/c1", 1.0, 2.0)
     command = FromPage("west/c1", b'{"op":"take","robot":"r1"}')
-    assert [west.send(each) for each in (PAGE, speeds, command)] == [
-        [PAGE],
-        [speeds],
-        [command],
-    ]
+    assert west.connects(ANN) == [PAGE]
+    assert west.connects(msgspec.structs.replace(ANN, speeds=(1.0, 2.0))) == [speeds]
+    assert west.connects(msgspec.structs.replace(ANN, speeds=(1.0, 2.0))) == []
+    assert west.send(command) == [command]
     assert west.displays.introduction() == [PAGE, speeds]
 
 
@@ -77,6 +90,9 @@ def test_a_page_and_its_commands_reach_the_gate(west):
         Forget("r1"),
         WriterNodes("r1", ("/a",)),
         Heartbeat(),
+        PAGE,
+        Disconnect("west/c1"),
+        Speeds("west/c1", 1.0, 2.0),
     ],
 )
 def test_a_display_can_declare_no_robot_and_send_nothing_else(west, message):
@@ -85,18 +101,20 @@ def test_a_display_can_declare_no_robot_and_send_nothing_else(west, message):
 
 
 def test_a_display_uses_only_connections_of_its_own(west):
-    with pytest.raises(WireError, match="expected one that begins with west/"):
-        west.send(Connect("east/c1", "Ann", "operator"))
+    west.connects(ANN)
+    assert west.connects(ANN, name="east") == [Connect("east/c1", "Ann", "operator")]
+    assert west.send(FromPage("east/c1", b'{"op":"take","robot":"r1"}')) == []
 
 
 def test_a_display_gives_its_pages_at_most_its_own_role():
     west = West(west="viewer")
-    assert west.send(PAGE) == [Connect("west/c1", "Ann", "viewer")]
+    assert west.connects(ANN) == [Connect("west/c1", "Ann", "viewer")]
 
 
 def test_a_message_of_an_unknown_page_is_dropped_but_stop_is_obeyed(west):
     assert west.send(FromPage("west/c7", b'{"op":"take","robot":"r1"}')) == []
-    assert west.send(FromPage("west/c7", STOP)) == [FromProgram(Stop(None))]
+    (_, stop) = west.send(FromPage("west/c7", STOP))
+    assert stop == FromProgram(Stop(None))
 
 
 def velocity(**changes):
@@ -124,7 +142,7 @@ def from_program(command, connection="west/program"):
     ],
 )
 def test_the_commands_of_a_program_reach_the_gate_under_its_connection(west, command):
-    assert west.send(PROGRAM) == [PROGRAM]
+    assert west.connects(OWN) == [PROGRAM]
     message = from_program(command)
     assert west.send(message) == [message]
     assert west.displays.introduction() == [PROGRAM]
@@ -132,24 +150,14 @@ def test_the_commands_of_a_program_reach_the_gate_under_its_connection(west, com
 
 @pytest.mark.parametrize("connection", ["program", "east/program", "west/c1", "west/"])
 def test_a_program_uses_no_other_connection(west, connection):
-    west.send(PAGE)
-    west.send(PROGRAM)
-    hello = Connect(connection, "Ann", "operator", program=True)
-    for message in (hello, from_program(Take("r1"), connection)):
-        with pytest.raises(WireError, match="display west: got"):
-            west.send(message)
-    assert west.displays.introduction() == [PAGE, PROGRAM]
-
-
-def test_no_page_uses_the_connection_of_a_program(west):
-    with pytest.raises(WireError, match="got a page as 'west/program'"):
-        west.send(Connect("west/program", "Ann", "operator"))
+    west.connects(ANN, OWN)
+    with pytest.raises(WireError, match="display west: got"):
+        west.send(from_program(Take("r1"), connection))
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        Stop("r1"),
         commands.Reset("r1", "5f"),
         commands.Cancel("r1"),
         Take("r" * 65),
@@ -161,13 +169,13 @@ def test_no_page_uses_the_connection_of_a_program(west):
     ],
 )
 def test_what_a_page_could_not_send_or_needs_no_control_is_refused(west, command):
-    west.send(PROGRAM)
+    west.connects(OWN)
     with pytest.raises(WireError, match="got a command of its program"):
         west.send(from_program(command))
 
 
 def test_a_velocity_of_another_form_is_refused(west):
-    west.send(PROGRAM)
+    west.connects(OWN)
     for velocity_ in ((0.5, 0.0), ("a", 0, 0, 0, 0, 0), None):
         with pytest.raises(WireError, match="got no message"):
             west.send(from_program(velocity(velocity=velocity_)))
@@ -175,24 +183,17 @@ def test_a_velocity_of_another_form_is_refused(west):
 
 def test_a_program_has_at_most_the_role_of_its_display():
     west = West(west="viewer")
-    (got,) = west.send(PROGRAM)
+    (got,) = west.connects(OWN)
     assert (got.role, got.program) == ("viewer", True)
 
 
-def test_a_program_that_is_not_known_moves_nothing_and_is_asked_for(west):
+def test_a_program_that_is_not_known_moves_nothing(west):
     assert west.send(from_program(Take("r1"))) == []
     assert west.send(from_program(velocity())) == []
-    assert west.displays.unknown("west") is None, (
-        "a new introduction would end its control"
-    )
-    assert west.answers(0.0, ("west/program",)) == []
-    assert west.displays.unknown("west") == Unknown("west", ("west/program",))
-    assert west.send(FromPage("west/program", STOP)) == [FromProgram(Stop(None))]
 
 
 def test_the_program_of_a_silent_display_ends_after_half_a_second(west):
-    west.send(PAGE, 0.0)
-    west.send(PROGRAM, 0.0)
+    west.connects(ANN, OWN)
     west.reports_control_of("west/program")
     west.receive(1, 0.05)
     west.answers(0.1)
@@ -205,7 +206,7 @@ def test_the_program_of_a_silent_display_ends_after_half_a_second(west):
 
 
 def test_a_program_that_its_display_no_longer_lists_ends(west):
-    west.send(PROGRAM)
+    west.connects(OWN)
     assert west.answers(0.0, ()) == [Disconnect("west/program")]
 
 
@@ -213,72 +214,205 @@ def test_the_role_is_that_of_the_user_and_counts_for_each_of_its_displays():
     displays = Displays({"": "viewer", "ann": "operator"})
     for user, role in (("ann", "operator"), ("bob", "viewer")):
         name = f"{user}.4f"
-        hello = Connect(f"{name}/c1", "A page", "operator")
+        hello = Answer(0, 0, (Page("c1", "A page", "operator"),))
         sample = Numbering().next(msgspec.msgpack.encode(hello))
         (got,) = displays.receive(name, sample, 0.0)
         assert got.role == role
 
 
 def test_a_page_that_the_display_no_longer_lists_ends(west):
-    other = Connect("west/c2", "Ben", "operator")
-    west.send(PAGE)
-    west.send(other)
-    assert west.answers(0.0, ("west/c2",)) == [Disconnect("west/c1")]
-    assert west.displays.introduction() == [other]
+    ben = Page("c2", "Ben", "operator")
+    west.connects(ANN, ben)
+    assert west.connects(ben) == [Disconnect("west/c1")]
+    assert west.displays.introduction() == [Connect("west/c2", "Ben", "operator")]
 
 
-def test_pages_that_ended_while_the_display_was_slow_are_asked_for(west):
-    west.send(PAGE, 0.0)
-    west.displays.look(3.1)
-    west.answers(3.1, ("west/c1", "west/program"))
-    unknown = west.displays.unknown("west")
-    assert unknown == Unknown("west", ("west/c1", "west/program"))
-    assert west.displays.unknown("west") is None
+def test_pages_that_ended_while_the_display_was_slow_return_with_its_next_list(west):
+    west.connects(ANN)
+    assert west.displays.look(3.1) == [Disconnect("west/c1")]
+    assert west.answers(3.1, (ANN, OWN)) == [PAGE, PROGRAM]
 
 
-def test_a_display_that_lost_a_sample_gets_all_reports_once(west):
-    assert not west.displays.wants_reports(1.0)
-    assert west.send(ReportAll()) == []
-    assert west.displays.wants_reports(1.0)
-    assert not west.displays.wants_reports(1.0)
+def test_a_page_that_has_missed_its_hello_gets_it_again(west):
+    west.connects(ANN)
+    waiting = msgspec.structs.replace(ANN, greeted=False)
+    assert west.connects(waiting) == [], "the gate has not greeted it"
+    west.displays.send(Hello("west/c1"), 0.0)
+    assert west.connects(waiting) == [Hello("west/c1")]
+    west.displays.send(Ready(7), 0.0)  # another gate, which greets it by itself
+    assert west.connects(waiting) == []
 
 
 def test_displays_that_ask_for_all_reports_again_and_again_get_them_with_pauses(west):
+    assert not west.displays.wants_reports(0.5)
     sent = 0
     for step in range(100):
-        assert west.send(ReportAll()) == []
+        assert west.answers(1.0, reports=True) == []
         sent += west.displays.wants_reports(1.0 + step / 100)
     assert sent == 5
 
 
-def test_an_agent_remembers_a_bounded_number_of_displays(monkeypatch):
-    monkeypatch.setattr("webmap.agents.displays.MOST_DISPLAYS", 2)
-    displays = Displays()
+# Who sends too much has less room, and all others have theirs. STOP always counts.
 
-    def connect(name):
-        hello = Connect(f"{name}/c1", "Ann", "operator")
-        return displays.receive(
-            name, Numbering().next(msgspec.msgpack.encode(hello)), 0.0
-        )
 
-    connect("a")
-    connect("b")
-    with pytest.raises(WireError, match="more than 2 displays"):
-        connect("c")
-    displays.look(3.1)
-    assert connect("c")
+def test_displays_and_pages_that_a_user_pretends_leave_the_room_of_others(west):
+    refused = 0
+    for number in range(140):
+        try:
+            west.connects(ANN, name=f"eve.{number}")
+        except WireError:
+            refused += 1
+    assert refused == 40
+    many = [Page(f"c{number}", "Eve", "operator") for number in range(250)]
+    for number in range(5):
+        got = west.connects(*many, name=f"mal.{number}")
+        assert len(got) == displays_module.MOST_PAGES
+    assert west.connects(*many, name="mal.6") == []
+    assert west.connects(ANN) == [PAGE]
+    command = FromPage("west/c1", b'{"op":"take","robot":"r1"}')
+    assert west.send(command) == [command]
+
+
+def stops_of(messages):
+    """Return for which robots messages to the gate are a STOP."""
+    found = [each.command for each in messages if isinstance(each, FromProgram)]
+    found += [commands.stop_in(m.text) for m in messages if isinstance(m, FromPage)]
+    return [each.robot for each in found if isinstance(each, Stop)]
+
+
+@pytest.mark.parametrize(
+    "limit",
+    [
+        "users",
+        "displays",
+        "pages",
+        "samples of a display",
+        "samples of a user",
+        "number",
+        "session",
+        "connection",
+        "program",
+    ],
+)
+def test_a_stop_is_obeyed_whatever_limit_is_reached(west, limit):
+    west.reports_control_of(None)  # the robot is known
+    name, message, numbering = "eve.1", FromPage("eve.1/c1", STOP_R1), Numbering(5)
+    west.connects(ANN, name=name)
+    match limit:
+        case "users":
+            name = "zoe.1"
+            for number in range(60):
+                west.connects(ANN, name=f"user{number}.1")
+        case "displays":
+            name = "eve.200"
+            for number in range(2, 101):
+                west.connects(ANN, name=f"eve.{number}")
+            with pytest.raises(WireError):
+                west.connects(ANN, name=name)
+        case "pages":
+            message = FromPage("eve.1/c199", STOP_R1)
+        case "samples of a display" | "samples of a user":
+            for number in range(5000):
+                other = f"eve.{number % 9}" if limit.endswith("user") else name
+                with suppress(WireError):
+                    west.send(Answer(0, 0), 0.0, other, numbering)
+            with pytest.raises(WireError, match="sends too much"):
+                west.send(Answer(0, 0), 0.0, name, numbering)
+        case "number":
+            numbering.sent = (1 << 64) - 2
+            west.send(Answer(0, 0), 0.0, name, numbering)
+            numbering.sent = 3
+        case "session":
+            for _ in range(3):
+                west.send(Answer(0, 0), 0.0, name, Numbering())
+        case "connection":
+            message = FromPage("west/c1", STOP_R1)
+        case "program":
+            message = FromProgram(Stop("r1"), 0, "eve.1/program")
+    assert stops_of(west.send(message, 0.0, name, numbering)) == ["r1"]
+
+
+def test_the_second_copy_of_a_stop_is_no_second_stop(west):
+    west.connects(ANN)
+    sample = west.numbering.next(msgspec.msgpack.encode(FromPage("west/c1", STOP)))
+    took = Took("west", west.numbering.session, west.numbering.sent)
+    assert west.displays.receive("west", sample, 0.0) == [
+        took,
+        FromPage("west/c1", STOP),
+    ]
+    west.connects(ANN)
+    assert west.displays.receive("west", sample, 9.0) == []
+    assert west.displays.waiting_stops() == []
+
+
+def test_a_stop_of_an_unknown_page_is_kept_for_the_next_gate():
+    gate, published = AgentGate(lambda sample: published.append(sample)), []
+    sample = Numbering().next(msgspec.msgpack.encode(FromPage("eve.1/c1", STOP)))
+    gate.take_sample("eve.1", sample)
+    assert len(published) == 1, "the acknowledgement"
+    assert gate.introduction() == [FromProgram(Stop(None))]
+
+
+def test_a_flood_of_stops_is_few_stops_and_delays_none_of_another_user(west):
+    west.reports_control_of(None)
+    passed = []
+    for number in range(2000):
+        now = number / 1000
+        text = b'{"op":"stop","robot":"%d"}' % number
+        passed += west.send(FromPage("eve.1/c1", text), now, "eve.1")
+        if number == 1000:
+            message = FromPage("west/c1", STOP_R1)
+            assert stops_of(west.send(message, now)) == ["r1"]
+        if number % 50 == 49:  # a tick
+            passed += west.displays.waiting_stops()
+    assert stops_of(passed) == [None] * 80
+    assert len(passed) < 130, "with the acknowledgements"
+
+
+def test_a_stop_that_waits_for_a_tick_is_for_its_robot(west):
+    west.reports_control_of(None)
+    west.connects(ANN)
+    message = FromPage("west/c1", STOP_R1)
+    assert stops_of(west.send(message, 1.0)) == ["r1"]
+    assert west.send(message, 1.01) == []
+    assert west.displays.waiting_stops() == [FromProgram(Stop("r1"))]
+    assert west.displays.waiting_stops() == []
+
+
+def test_a_display_that_replaces_its_pages_all_the_time_sends_too_much(west):
+    changed = 0
+    for turn in range(50):
+        pages = [Page(f"c{turn}.{n}", "Ann", "operator") for n in range(100)]
+        with suppress(WireError):
+            changed += len(west.connects(*pages))
+    assert changed < 1500
+
+
+def test_a_command_and_a_list_have_a_greatest_size(west):
+    west.connects(ANN)
+    long = FromPage("west/c1", b"x" * displays_module.MOST_COMMAND)
+    with pytest.raises(WireError, match="got a command of"):
+        west.send(long)
+    name = "\U0001f916" * displays_module.MOST_NAME
+    pages = [
+        Page(f"c{number:05}.12345", name, "operator", (0.5, 0.5), False)
+        for number in range(displays_module.MOST_PAGES)
+    ]
+    assert len(west.connects(*pages)) == 1 + 2 * len(pages)
+    answer = Answer(1 << 63, 1 << 63, tuple(pages), reports=True)
+    assert len(msgspec.msgpack.encode(answer)) < displays_module.MOST_SAMPLE - 16
 
 
 def test_a_sample_that_comes_twice_or_late_is_dropped(west):
-    first = west.numbering.next(msgspec.msgpack.encode(PAGE))
-    second = west.numbering.next(msgspec.msgpack.encode(Disconnect("west/c1")))
+    first = west.numbering.next(msgspec.msgpack.encode(Answer(0, 0, (ANN,))))
+    second = west.numbering.next(msgspec.msgpack.encode(Answer(0, 0, ())))
     assert west.displays.receive("west", second, 0.0) == []
     assert west.displays.receive("west", first, 0.0) == []
     assert west.displays.receive("west", second, 0.0) == []
 
 
 def test_the_pages_of_a_silent_display_with_control_end_after_1_s(west):
-    west.send(PAGE, 0.0)
+    west.connects(ANN)
     west.reports_control_of("west/c1")
     west.receive(1, 0.05)
     west.answers(0.1)
@@ -288,8 +422,7 @@ def test_the_pages_of_a_silent_display_with_control_end_after_1_s(west):
 
 
 def test_control_that_begins_long_after_an_answer_is_not_ended_at_once(west):
-    west.send(PAGE, 0.0)
-    west.send(PROGRAM, 0.0)
+    west.connects(ANN, OWN)
     west.receive(1, 0.05)
     west.answers(0.1)
     west.reports_control_of("west/program", 1.5)  # from another display
@@ -300,8 +433,7 @@ def test_control_that_begins_long_after_an_answer_is_not_ended_at_once(west):
 
 @pytest.mark.parametrize("end", ["released", "gone", "of another"])
 def test_the_pages_of_a_silent_display_without_control_end_after_3_s(west, end):
-    west.send(PAGE, 0.0)
-    west.send(PROGRAM, 0.0)
+    west.connects(ANN, OWN)
     west.reports_control_of("east/c1" if end == "of another" else "west/c1")
     match end:
         case "released":
@@ -317,7 +449,7 @@ def test_the_pages_of_a_silent_display_without_control_end_after_3_s(west, end):
 
 
 def test_an_answer_to_an_old_sample_is_no_sign_of_life(west):
-    west.send(PAGE, 0.0)
+    west.connects(ANN)
     west.reports_control_of("west/c1")
     for tick in range(30):
         west.receive(tick, 0.05 * tick)
@@ -327,10 +459,11 @@ def test_an_answer_to_an_old_sample_is_no_sign_of_life(west):
 
 
 def test_a_display_that_restarts_loses_its_pages(west):
-    west.send(PAGE)
+    west.connects(ANN)
     west.numbering = Numbering()
     again = Connect("west/c2", "Ann", "operator")
-    assert west.send(again) == [Disconnect("west/c1"), again]
+    page = Page("c2", "Ann", "operator")
+    assert west.connects(page) == [Disconnect("west/c1"), again]
 
 
 @pytest.mark.parametrize("sample", [b"", b"x" * 15, b"x" * 40, b"x" * 2_000_000])

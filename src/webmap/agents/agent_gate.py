@@ -2,19 +2,27 @@
 
 import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
-from webmap.agents.displays import AllReports, Displays, ToDisplays, Took
+from webmap.agents.displays import (
+    MOST_USERS,
+    AllReports,
+    Displays,
+    Passed,
+    ToDisplays,
+    Took,
+    user_of,
+)
 from webmap.base.errors import WireError
 from webmap.gate import protocol
-from webmap.gate.commands import Stop, begins_like_stop
+from webmap.gate.commands import Stop
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import FromGate, FromPage, FromProgram, Role
 
 log = logging.getLogger("webmap.agent")
 
 QUIET = 10.0
-"""Seconds for which the same mistake of a display is not logged again."""
+"""Seconds for which no other mistake of the same user is logged."""
 
 
 class AgentGate(GateClient):
@@ -34,7 +42,8 @@ class AgentGate(GateClient):
         super().__init__()
         self.displays = Displays(roles)
         self._publish = publish
-        self._complained_at = float("-inf")
+        self._complained_at: dict[str, float] = {}
+        """When a mistake of each user was logged."""
 
     def introduction(self) -> list[protocol.ToGate]:
         """Return the first messages for a new gate."""
@@ -47,40 +56,37 @@ class AgentGate(GateClient):
             try:
                 messages = self.displays.receive(display, sample, now)
             except WireError as error:
-                if now - self._complained_at > QUIET:
-                    self._complained_at = now
+                user = user_of(display)
+                if now - self._complained_at.get(user, float("-inf")) > QUIET:
+                    if len(self._complained_at) > MOST_USERS:
+                        self._complained_at.clear()
+                    self._complained_at[user] = now
                     log.warning("%s", error)
                 return
-            for message in messages:
-                if _is_stop(message):
-                    session, number = self.displays.newest(display)
-                    if isinstance(message, FromPage):
-                        self._keep_stop_of_page(message)
-                    self._send_out(Took(display, session, number))
-                self.send(message)
-            unknown = self.displays.unknown(display)
-            if unknown is not None:
-                self._send_out(unknown)
+            self._pass_on(messages)
             if self.displays.wants_reports(now):
                 self._send_out(AllReports(tuple(self._pages.latest)))
+
+    def _pass_on(self, messages: Iterable[Passed]) -> None:
+        for message in messages:
+            match message:
+                case Took() | protocol.Hello():
+                    self._send_out(message)
+                    continue
+                case FromPage():
+                    self._keep_stop_of_page(message)
+                case FromProgram(command=Stop(robot)):
+                    self._keep_stop(None, robot)
+            self.send(message)
 
     def hear(self, message: FromGate) -> None:
         """Process a message from the gate, and pass it on to the displays."""
         super().hear(message)
         with self._lock:
             if isinstance(message, protocol.Tick):
-                for ended in self.displays.look(time.monotonic()):
-                    self.send(ended)
+                self._pass_on(self.displays.waiting_stops())
+                self._pass_on(self.displays.look(time.monotonic()))
             self._send_out(message)
 
     def _send_out(self, message: ToDisplays) -> None:
         self._publish(self.displays.send(message, time.monotonic()))
-
-
-def _is_stop(message: protocol.ToGate) -> bool:
-    match message:
-        case FromPage():
-            return begins_like_stop(message.text)
-        case FromProgram():
-            return isinstance(message.command, Stop)
-    return False

@@ -4,7 +4,7 @@ from typing import Any
 
 import msgspec
 
-PROTOCOL = 2
+PROTOCOL = 3
 """The version of what agents and displays exchange."""
 
 

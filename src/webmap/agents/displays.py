@@ -13,12 +13,14 @@ old sample, which the network delivers late, is no sign of life.
 import logging
 from collections import deque
 from collections.abc import Mapping
+from typing import Annotated
 
 import msgspec
 
-from webmap.agents.samples import Numbering, Order
+from webmap.agents.samples import HEAD_BYTES, Numbering, Order, head_of
 from webmap.base.errors import WireError
-from webmap.gate.commands import ControlCommand, Refusal, check, stop_in
+from webmap.gate.commands import ControlCommand, Refusal, Stop, check, stop_in
+from webmap.gate.lanes.budget import FRAMES, Budget
 from webmap.gate.protocol import (
     PROGRAM,
     Connect,
@@ -26,7 +28,8 @@ from webmap.gate.protocol import (
     FromGate,
     FromPage,
     FromProgram,
-    Holder,
+    Hello,
+    Ready,
     RobotGone,
     RobotReport,
     Role,
@@ -60,28 +63,59 @@ A program has no inputs that it could release: after a pause of its display it w
 drive on where it was.
 """
 
-MOST_PAGES = 200
-"""The greatest number of pages of one display."""
+MOST_SAMPLE = 64 << 10
+"""The longest sample of a display, in bytes: the state of :data:`MOST_PAGES` pages."""
 
+MOST_COMMAND = 3 << 10
+"""The longest sample of a display with a command, in bytes."""
+
+MOST_NAME = 64
+"""The longest name of a page, in characters."""
+
+MOST_PAGES = 200
+"""The greatest number of pages of one display, with its program."""
+
+MOST_PAGES_OF_USER = 1000
+"""The greatest number of pages of all displays of one user."""
 
 MOST_DISPLAYS = 100
-"""The greatest number of displays that an agent remembers."""
+"""The greatest number of displays of one user that an agent remembers."""
+
+MOST_USERS = 20
+"""The greatest number of users with limits of their own; all others share theirs."""
+
+OF_USER, OF_DISPLAY = 2, 4
+"""The parts of the :class:`Budget` of a link that a user and a display have: a half
+(2000 samples and 8 MiB a second) and a quarter. Both copies of a sample count."""
+
+STOP_PAUSE = 0.05
+"""Seconds after a STOP of a user in which another one for the same robot waits for the
+next tick. The gate gets one for all that wait, however many come."""
 
 
-class Answer(msgspec.Struct, frozen=True, tag="answer"):
+class Page(msgspec.Struct, frozen=True, array_like=True):
+    """All that a display states of one of its pages, or of its program."""
+
+    id: Annotated[str, msgspec.Meta(max_length=32)]
+    """Its connection without the name of the display."""
+    name: Annotated[str, msgspec.Meta(max_length=MOST_NAME)]
+    role: Role
+    speeds: tuple[float, float] | None = None
+    """The speed limits of its ``Teleop``, in m/s and rad/s."""
+    greeted: bool = True
+    """Whether the display has received its :class:`Hello`."""
+
+
+class Answer(msgspec.Struct, frozen=True, tag="answer", omit_defaults=True):
     """A display has received this sample of the agent; sent 1 to 20 times a second."""
 
     session: int
     number: int
-    connections: tuple[str, ...] | None = None
-    """The program and all pages that the display has now; once a second.
-
-    A lost message about a page that has closed is made good by this.
-    """
-
-
-class ReportAll(msgspec.Struct, frozen=True, tag="report-all"):
-    """A display has lost a sample of the agent, and needs all reports again."""
+    pages: tuple[Page, ...] | None = None
+    """The program and all pages with all their state, after each change and once a
+    second: no lost sample leaves a lasting error."""
+    reports: bool = False
+    """Whether the display needs all reports, because it has lost a sample."""
 
 
 class AllReports(msgspec.Struct, frozen=True, tag="reports"):
@@ -98,46 +132,51 @@ class Took(msgspec.Struct, frozen=True, tag="took"):
     number: int
 
 
-class Unknown(msgspec.Struct, frozen=True, tag="unknown"):
-    """The agent does not know these pages of a display, or no longer."""
-
-    display: str
-    connections: tuple[str, ...]
-
-
-ToDisplays = FromGate | AllReports | Took | Unknown
+ToDisplays = FromGate | AllReports | Took
 """What an agent sends to all displays."""
 
-FromDisplay = (
-    Connect | Disconnect | FromPage | FromProgram | Speeds | Answer | ReportAll
-)
+Passed = ToGate | Took | Hello
+"""What a sample of a display causes: for the gate, or for all displays."""
+
+FromDisplay = FromPage | FromProgram | Answer
 """What a display may send. Everything else is refused whole."""
 
 _decode = msgspec.msgpack.Decoder(FromDisplay).decode
 _encode = msgspec.msgpack.Encoder().encode
 
 
+class User:
+    """A user of the router, and the displays of this user."""
+
+    def __init__(self) -> None:
+        self.displays: dict[str, Display] = {}
+        self.budget = Budget()
+        self.stops: deque[tuple[str, int, int]] = deque(maxlen=100)
+        """The newest STOPs that were obeyed: display, session and number of each."""
+        self.stopped_at: dict[str | None, float] = {}
+        """When a STOP went to the gate at once, by robot; None is for all."""
+
+
 class Display:
     """What the agent knows of one display."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, user: User) -> None:
         self.name = name
+        self.user = user
         self.program = f"{name}/{PROGRAM}"
         """The connection of its program."""
         self.order = Order()
-        self.wants_reports = False
-        """Whether it needs all reports again."""
-        self.unknown: tuple[str, ...] = ()
-        """Its pages that are not known here."""
+        self.budget = Budget()
         self.alive_at = float("-inf")
         """When it was alive for certain."""
         self.pages: dict[str, list[Connect | Speeds]] = {}
         """The messages that make each of its pages and its program known to a gate, by
         connection."""
 
-    def owns(self, connection: str) -> bool:
-        """Return whether a connection has the form that this display may use."""
-        return connection.startswith(f"{self.name}/")
+    def spend(self, count: int, size: int, now: float) -> None:
+        """Count messages of this display, with their bytes."""
+        self.user.budget.spend(OF_USER * count, OF_USER * size, 0.0, now)
+        self.budget.spend(OF_DISPLAY * count, OF_DISPLAY * size, 0.0, now)
 
 
 class Displays:
@@ -150,24 +189,33 @@ class Displays:
     """
 
     def __init__(self, roles: Mapping[str, Role] | None = None) -> None:
-        self._roles = dict(roles or {"": "operator"})
-        self._displays: dict[str, Display] = {}
+        self._roles: dict[str, Role] = dict(roles or {"": "operator"})
+        self._users = {"": User()}
+        """Users of the router; "" is for those above :data:`MOST_USERS`."""
         self._numbering = Numbering()
         self._sent: deque[tuple[int, float]] = deque()
+        self._wanted = False
+        """Whether a display needs all reports again."""
         self._reported_at = float("-inf")
+        self._robots: set[str] = set()
         self._holders: dict[str, tuple[str, float]] = {}
         """The connection that has control of each robot, and since when."""
+        self._greeted: set[str] = set()
+        """The pages that the gate knows."""
+        self._waiting: set[str | None] = set()
+        """The robots for which a STOP waits for the next tick; None is for all."""
 
     @property
-    def names(self) -> list[str]:
-        """The displays that have pages now."""
-        return [name for name, display in self._displays.items() if display.pages]
+    def _displays(self) -> list[Display]:
+        return [
+            each for user in self._users.values() for each in user.displays.values()
+        ]
 
     def introduction(self) -> list[ToGate]:
         """Return the messages that make all pages known to a new gate."""
         return [
             message
-            for display in self._displays.values()
+            for display in self._displays
             for messages in display.pages.values()
             for message in messages
         ]
@@ -177,19 +225,10 @@ class Displays:
 
         They go to all displays, so those that ask within :data:`PAUSE` get the same.
         """
-        wanting = [each for each in self._displays.values() if each.wants_reports]
-        if not wanting or now - self._reported_at < PAUSE:
+        if not self._wanted or now - self._reported_at < PAUSE:
             return False
-        for each in wanting:
-            each.wants_reports = False
-        self._reported_at = now
+        self._wanted, self._reported_at = False, now
         return True
-
-    def unknown(self, name: str) -> Unknown | None:
-        """Return the pages that a display must introduce again, if there are any."""
-        display = self._displays[name]
-        connections, display.unknown = display.unknown, ()
-        return Unknown(name, connections) if connections else None
 
     def send(self, message: ToDisplays, now: float) -> bytes:
         """Return the sample that carries a message of the gate to all displays.
@@ -200,10 +239,18 @@ class Displays:
         match message:
             case Tick(tick, acks):
                 message = Tick(tick, {id: ack for id, ack in acks.items() if ack >= 0})
-            case RobotReport(robot=robot, holder=Holder(connection)):
-                if self._holders.get(robot, ("", 0.0))[0] != connection:
-                    self._holders[robot] = (connection, now)
-            case RobotReport(robot=robot) | RobotGone(robot):
+            case Hello(connection):
+                self._greeted.add(connection)
+            case Ready():
+                self._greeted.clear()
+            case RobotReport(robot=robot, holder=holder):
+                self._robots.add(robot)
+                if holder is None:
+                    self._holders.pop(robot, None)
+                elif self._holders.get(robot, ("", 0.0))[0] != holder.connection:
+                    self._holders[robot] = (holder.connection, now)
+            case RobotGone(robot):
+                self._robots.discard(robot)
                 self._holders.pop(robot, None)
         sample = self._numbering.next(_encode(message))
         self._sent.append((self._numbering.sent, now))
@@ -211,8 +258,10 @@ class Displays:
             self._sent.popleft()
         return sample
 
-    def receive(self, name: str, sample: bytes, now: float) -> list[ToGate]:
-        """Return what the gate gets from a sample of a display.
+    def receive(self, name: str, sample: bytes, now: float) -> list[Passed]:
+        """Return what the gate gets from a sample of a display, and what displays get.
+
+        A STOP is read before any limit and is never refused.
 
         Args:
             name: The display, by the key on which the router accepted the sample.
@@ -220,43 +269,58 @@ class Displays:
             now: Seconds, monotonic.
 
         Raises:
-            WireError: If the sample is not one that a display may send.
+            WireError: If a display may not send the sample, or it is one too many.
 
         """
-        display = self._displays.get(name)
-        if display is None:
-            self._make_room()
-            display = self._displays[name] = Display(name)
+        found = _stop_of(sample)
+        if found is not None:
+            return self._obey(name, sample, *found, now)
+        display = self._display(name)
+        if display.user.budget.wait(now) or display.budget.wait(now):
+            raise WireError(
+                f"display {name} or its user sends too much; all but STOP is dropped: "
+                f"{FRAMES // OF_DISPLAY} messages a second at most"
+            )
+        display.spend(1, len(sample), now)
         body, restarted = display.order.take(sample)
-        lost: list[ToGate] = self._end(display) if restarted else []
+        passed: list[Passed] = []
+        if restarted:
+            passed += self._end(display)
         if body is None:
-            return lost
+            return passed
         try:
             message = _decode(body)
         except (msgspec.DecodeError, RecursionError) as error:
             raise WireError(f"display {name}: got no message: {error}") from error
-        match message:
-            case Answer():
-                self._answered(display, message)
-                if message.connections is None:
-                    return lost
-                return lost + self._end_others(display, message.connections)
-            case ReportAll():
-                display.wants_reports = True
-                return lost
-        assert not isinstance(message, Answer | ReportAll)
-        if not display.owns(message.connection):
+        if isinstance(message, Answer):
+            self._answered(display, message)
+            self._wanted |= message.reports
+            if message.pages is not None:
+                changed = self._update(display, message.pages, now)
+                display.spend(len(changed), 0, now)
+                passed += changed
+            return passed
+        if len(sample) > MOST_COMMAND:
             raise WireError(
-                f"display {name}: got the connection {message.connection!r}, "
-                f"expected one that begins with {name}/"
+                f"display {name}: got a command of {len(sample)} bytes, "
+                f"expected {MOST_COMMAND} at most"
             )
-        return lost + self._pass_on(display, message, now)
+        if isinstance(message, FromProgram):
+            _check_program(display, message)
+        if message.connection in display.pages:  # otherwise it counts as lost
+            passed.append(message)
+        return passed
 
-    def look(self, now: float) -> list[ToGate]:
+    def waiting_stops(self) -> list[FromProgram]:
+        """Return the STOPs that wait for a tick; no acknowledgement is needed."""
+        waiting, self._waiting = self._waiting, set()
+        return [FromProgram(Stop(robot)) for robot in waiting]
+
+    def look(self, now: float) -> list[Disconnect]:
         """Return what ends the pages of displays that give no sign of life."""
-        ended: list[ToGate] = []
+        ended: list[Disconnect] = []
         holders = dict(self._holders.values())
-        for display in self._displays.values():
+        for display in self._displays:
             controls = holders.keys() & display.pages.keys()
             # Control may begin long after the last answer of an idle display.
             since = [display.alive_at, *(holders[id] for id in controls)]
@@ -265,18 +329,57 @@ class Displays:
                 log.warning("display %s gives no sign of life", display.name)
                 ended += self._end(display)
             elif display.program in controls and silent > PROGRAM_SILENT:
-                del display.pages[display.program]
-                ended.append(Disconnect(display.program))
+                ended.append(self._drop(display, display.program))
         return ended
 
-    def _make_room(self) -> None:
-        """Forget the oldest display without pages if there are too many."""
-        if len(self._displays) < MOST_DISPLAYS:
-            return
-        empty = [name for name, each in self._displays.items() if not each.pages]
-        if not empty:
-            raise WireError(f"got more than {MOST_DISPLAYS} displays")
-        del self._displays[empty[0]]
+    def _obey(
+        self,
+        name: str,
+        sample: bytes,
+        message: FromPage | FromProgram,
+        stop: Stop,
+        now: float,
+    ) -> list[Passed]:
+        """Obey a STOP, whoever sent it and whatever its number is."""
+        user = self._user(name)
+        session, number = head_of(sample)
+        if (name, session, number) in user.stops:
+            return []  # the second copy
+        user.stops.append((name, session, number))
+        robot = stop.robot if stop.robot in self._robots else None
+        if now - user.stopped_at.get(robot, float("-inf")) < STOP_PAUSE:
+            self._waiting.add(robot)
+            return []  # the display sends it once more, as it is not acknowledged
+        user.stopped_at[robot] = now
+        display = user.displays.get(name)
+        known = display is not None and message.connection in display.pages
+        if not known or isinstance(message, FromProgram):
+            message = FromProgram(Stop(robot))
+        return [Took(name, session, number), message]
+
+    def _user(self, display: str) -> User:
+        name = user_of(display)
+        if name not in self._users and len(self._users) <= MOST_USERS:
+            self._users[name] = User()
+        return self._users.get(name, self._users[""])
+
+    def _display(self, name: str) -> Display:
+        """Return a display, which may be new.
+
+        Raises:
+            WireError: If the user has too many.
+
+        """
+        user = self._user(name)
+        display = user.displays.get(name)
+        if display is None:
+            if len(user.displays) >= MOST_DISPLAYS:
+                empty = [id for id, each in user.displays.items() if not each.pages]
+                if not empty:
+                    raise WireError(f"{name}: got more than {MOST_DISPLAYS} displays")
+                del user.displays[empty[0]]
+            display = user.displays[name] = Display(name, user)
+        return display
 
     def _answered(self, display: Display, answer: Answer) -> None:
         if answer.session != self._numbering.session:
@@ -285,81 +388,78 @@ class Displays:
             if number == answer.number:
                 display.alive_at = max(display.alive_at, at)
 
-    def _pass_on(
-        self,
-        display: Display,
-        message: Connect | Disconnect | FromPage | FromProgram | Speeds,
-        now: float,
-    ) -> list[ToGate]:
-        match message:
-            case Connect():
-                _check_kind(display, message.connection, program=message.program)
-                if not display.pages:  # it answers as soon as it gets hello
-                    display.alive_at = max(display.alive_at, now)
-                if len(display.pages) >= MOST_PAGES:
-                    raise WireError(
-                        f"display {display.name}: got more than {MOST_PAGES} pages"
-                    )
-                allowed = self._allowed(display, message)
-                display.pages[message.connection] = [allowed]
-                return [allowed]
-            case Disconnect():
-                known = display.pages.pop(message.connection, None)
-                return [] if known is None else [message]
-            case Speeds():
-                known = display.pages.get(message.connection)
-                if known is not None:
-                    known[1:] = [message]
-            case FromProgram():
-                _check_program(display, message)
-                known = display.pages.get(message.connection)
-            case _:
-                known = display.pages.get(message.connection)
-                if known is None:  # it counts as lost: the display slept
-                    stop = stop_in(message.text)
-                    if stop is not None:  # it is obeyed all the same
-                        return [FromProgram(stop)]
-                    display.unknown = (message.connection,)
-        return [] if known is None else [message]
+    def _update(
+        self, display: Display, pages: tuple[Page, ...], now: float
+    ) -> list[Passed]:
+        """Return what makes the pages of a display known with all their state."""
+        there = {f"{display.name}/{page.id}": page for page in pages}
+        changed: list[Passed] = [
+            self._drop(display, id) for id in list(display.pages) if id not in there
+        ]
+        if not display.pages:  # it answers as soon as it gets hello
+            display.alive_at = max(display.alive_at, now)
+        of_user = sum(len(each.pages) for each in display.user.displays.values())
+        room = min(MOST_PAGES - len(display.pages), MOST_PAGES_OF_USER - of_user)
+        for connection, page in there.items():
+            known = display.pages.get(connection)
+            if known is None:
+                room -= 1
+                if room < 0:
+                    continue  # it may stop robots, and nothing else
+            state = self._state(display, connection, page)
+            display.pages[connection] = state
+            if known is None or known[0] != state[0]:
+                changed += state
+            elif known[1:] != state[1:]:
+                changed += state[1:]
+            elif not page.greeted and connection in self._greeted:
+                changed.append(Hello(connection))  # the first was lost
+        if room < 0:
+            log.warning("display %s has %d pages too many", display.name, -room)
+        return changed
 
-    def newest(self, name: str) -> tuple[int, int]:
-        """Return session and number of the newest sample of a display."""
-        order = self._displays[name].order
-        return order.session or 0, order.newest
+    def _state(
+        self, display: Display, connection: str, page: Page
+    ) -> list[Connect | Speeds]:
+        """Return the messages for a page, with at most the role of its display."""
+        order: tuple[Role, ...] = ("viewer", "operator", "admin")
+        most = self._roles.get(user_of(display.name), self._roles.get("", "viewer"))
+        role = min(page.role, most, key=order.index)
+        program = connection == display.program
+        state: list[Connect | Speeds] = [Connect(connection, page.name, role, program)]
+        if page.speeds is not None:
+            state.append(Speeds(connection, *page.speeds))
+        return state
 
-    def _end_others(self, display: Display, there: tuple[str, ...]) -> list[ToGate]:
-        """End the pages that a display no longer has."""
-        listed = set(there)
-        gone = [each for each in display.pages if each not in listed]
-        display.unknown = tuple(each for each in there if each not in display.pages)
-        for connection in gone:
-            del display.pages[connection]
-        return [Disconnect(connection) for connection in gone]
+    def _end(self, display: Display) -> list[Disconnect]:
+        return [self._drop(display, connection) for connection in list(display.pages)]
 
-    def _allowed(self, display: Display, connect: Connect) -> Connect:
-        """Return a page's introduction with at most the role of its display."""
-        order = ("viewer", "operator", "admin")
-        user = display.name.partition(".")[0]
-        most = self._roles.get(user, self._roles.get("", "viewer"))
-        role = min(connect.role, most, key=order.index)
-        return msgspec.structs.replace(connect, role=role)
-
-    def _end(self, display: Display) -> list[ToGate]:
-        ended: list[ToGate] = [Disconnect(connection) for connection in display.pages]
-        display.pages.clear()
-        return ended
+    def _drop(self, display: Display, connection: str) -> Disconnect:
+        del display.pages[connection]
+        self._greeted.discard(connection)
+        return Disconnect(connection)
 
 
-def _check_kind(display: Display, connection: str, *, program: bool) -> None:
-    """Check that the program of a display, and no page, has the program's connection.
+def user_of(display: str) -> str:
+    """Return the user of the router to whom a display belongs."""
+    return display.partition(".")[0]
 
-    Raises:
-        WireError: If not.
 
-    """
-    if program != (connection == display.program):
-        kind = "a program" if program else "a page"
-        raise WireError(f"display {display.name}: got {kind} as {connection!r}")
+def _stop_of(sample: bytes) -> tuple[FromPage | FromProgram, Stop] | None:
+    """Return a message that is a STOP, and the STOP; this costs little for others."""
+    if len(sample) > MOST_COMMAND or b"stop" not in sample:
+        return None
+    try:
+        message = _decode(sample[HEAD_BYTES:])
+    except (msgspec.DecodeError, RecursionError):
+        return None
+    match message:
+        case FromPage(text=text):
+            stop = stop_in(text)
+            return None if stop is None else (message, stop)
+        case FromProgram(command=Stop() as stop):
+            return message, stop
+    return None
 
 
 def _check_program(display: Display, message: FromProgram) -> None:
@@ -369,8 +469,9 @@ def _check_program(display: Display, message: FromProgram) -> None:
         WireError: If it is none, or a page could not send its values.
 
     """
-    _check_kind(display, message.connection, program=True)
     try:
+        if message.connection != display.program:
+            raise Refusal(f"it came from {message.connection!r}")
         if not isinstance(message.command, ControlCommand):
             raise Refusal("it needs no control, so it has the form of a page's")
         check(message.command)

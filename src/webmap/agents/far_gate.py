@@ -6,24 +6,25 @@ samples and times and returns samples; ``peer.py`` carries them.
 
 import json
 import threading
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 
 import msgspec
 
 from webmap.agents.displays import (
+    MOST_NAME,
+    MOST_PAGES,
     AllReports,
     Answer,
     FromDisplay,
-    ReportAll,
+    Page,
     ToDisplays,
     Took,
-    Unknown,
 )
 from webmap.agents.samples import Numbering, Order
 from webmap.base.errors import WireError
 from webmap.base.geometry import Twist
 from webmap.gate import commands, protocol
-from webmap.gate.commands import begins_like_stop
+from webmap.gate.commands import robot_in, stop_in
 from webmap.gate.display.supervisor import GateListener
 from webmap.gate.protocol import MAY_MOVE, RobotReport
 from webmap.gate.rules.health import moves
@@ -34,6 +35,9 @@ LOST = 0.5
 AGAIN = 0.1
 """Seconds until a STOP that the agent has not acknowledged is sent again."""
 
+ASK_AGAIN = 0.3
+"""Seconds until this display asks again for all reports."""
+
 ANSWER = 1.0
 """Seconds between two answers to the agent while nothing of this display has control
 or sends commands, and between two answers with the list of all pages."""
@@ -43,8 +47,6 @@ COMMANDING = 1.0
 
 The answers then help TCP to notice lost commands, and their age is known sooner.
 """
-
-ASLEEP = "the agent heard nothing of this page for a moment: try again"
 
 _decode = msgspec.msgpack.Decoder(ToDisplays).decode
 _encode = msgspec.msgpack.Encoder().encode
@@ -87,13 +89,20 @@ class FarGate:
         self._numbering = Numbering()
         self._heard_at = float("-inf")
         self._pages: dict[str, protocol.Connect] = {}
+        self._speeds: dict[str, tuple[float, float]] = {}
         self._greeted: set[str] = set()
-        self._reported = False
-        """Whether a robot was reported since the agent was found."""
+        self._commanded: set[str] = set()
+        """The connections that sent a command to a robot of this agent."""
+        self._changed = False
+        """Whether the agent does not have the newest state of the pages yet."""
+        self._reported: set[str] = set()
+        """The robots that were reported since the agent was found."""
+        self._lacks_reports = False
+        """Whether a sample was lost that may have been a report."""
         self._stops: dict[int, tuple[float, protocol.FromPage]] = {}
         """The STOPs without an acknowledgement, by number, each with its time."""
         self._latest: dict[str, RobotReport] = {}
-        self._listed_at = self._commanded_at = float("-inf")
+        self._listed_at = self._commanded_at = self._asked_at = float("-inf")
 
     def start(self) -> None:
         """Do nothing: the gate runs already, or its agent is away."""
@@ -116,21 +125,36 @@ class FarGate:
         """
         with self._lock:
             match message:
-                case protocol.Connect():
-                    self._pages[message.connection] = message
-                case protocol.Disconnect():
-                    self._pages.pop(message.connection, None)
-                    self._greeted.discard(message.connection)
-                case protocol.FromProgram():
-                    self._begin_commands()
+                case protocol.Connect(connection):
+                    self._pages[connection] = message
+                    self._changed = True
+                    return
+                case protocol.Disconnect(connection):
+                    self._pages.pop(connection, None)
+                    self._speeds.pop(connection, None)
+                    self._greeted.discard(connection)
+                    self._changed = True
+                    if self.ready and connection in self._commanded:
+                        self._list()  # now: its robots must stop
+                    self._commanded.discard(connection)
+                    return
+                case protocol.Speeds(connection, v, w):
+                    self._speeds[connection] = (v, w)
+                    self._changed = True
+                    return
+                case protocol.FromProgram(command):
+                    robot = command.robot
                     message = self._of_program(message)
-                case protocol.FromPage():
-                    self._begin_commands()
-                case protocol.Speeds():
-                    pass
+                case protocol.FromPage(connection, text):
+                    robot = None if connection in self._commanded else robot_in(text)
                 case _:
                     return
+            if robot in self._latest:
+                self._commanded.add(message.connection)
+            self._begin_commands()
             if self.ready:
+                if self._changed:
+                    self._list()
                 self._put(message)
 
     def take(self, sample: bytes, now: float) -> None:
@@ -157,35 +181,35 @@ class FarGate:
             if not self.ready:
                 self._begin(now)
             elif self._order.lost != lost:
-                self._put(ReportAll())
+                self._lacks_reports = True
             self._hear(message)
+            if self._asks_for_reports:
+                self._answer()
 
     def beat(self, now: float) -> None:
         """Answer the newest sample, and note when the agent is silent; at 20 Hz."""
         with self._lock:
             if self.ready and now - self._heard_at > LOST:
                 self._lose(f"no connection to the agent {self.agent}", silent=True)
-            listing = now - self._listed_at >= ANSWER
-            if listing:
+            due = now - self._listed_at >= ANSWER
+            if due:
                 self._listed_at = now
             if not self.ready:
-                if listing:
+                if due:
                     self._answer()
                 return
             for number, (at, stop) in list(self._stops.items()):
                 if now - at >= AGAIN:
                     del self._stops[number]
                     self._put(stop, now)
-            if listing:
-                missing = [id for id in self._pages if id not in self._greeted]
-                if missing:  # a message was lost
-                    self._introduce(missing)
-                if not self._reported:
-                    self._put(ReportAll())
-                idle = not self._commands(now)
-                self._answer((self.connection, *self._pages), idle=idle)
-            elif self._commands(now):
+            if due or self._changed:
+                self._list(idle=not self._changed and not self._commands(now))
+            elif self._commands(now) or self._asks_for_reports:
                 self._answer()
+
+    @property
+    def _asks_for_reports(self) -> bool:
+        return self._lacks_reports and self._heard_at - self._asked_at >= ASK_AGAIN
 
     def _commands(self, now: float) -> bool:
         """Return whether this display has control of a robot or sends commands."""
@@ -205,7 +229,7 @@ class FarGate:
         self._commanded_at = self._heard_at
 
     def _answer(
-        self, connections: tuple[str, ...] | None = None, *, idle: bool = False
+        self, pages: tuple[Page, ...] | None = None, *, idle: bool = False
     ) -> None:
         """Name the newest sample of the agent, if there was one.
 
@@ -214,17 +238,43 @@ class FarGate:
         """
         if self._order.session is None:
             return
-        answer = Answer(self._order.session, self._order.newest, connections)
+        asks = self._asks_for_reports
+        if asks:
+            self._asked_at = self._heard_at
+        answer = Answer(self._order.session, self._order.newest, pages, asks)
         self._put(answer, only=self._numbering.sent if idle else None)
 
+    def _list(self, *, idle: bool = False) -> None:
+        """Send the agent the whole state of the pages and of the program."""
+        self._changed = False
+        program = Page(protocol.PROGRAM, f"program of {self.display}", "operator")
+        pages = [
+            Page(
+                id.removeprefix(f"{self.display}/"),
+                page.name[:MOST_NAME],
+                page.role,
+                self._speeds.get(id),
+                id in self._greeted,
+            )
+            for id, page in list(self._pages.items())[: MOST_PAGES - 1]
+        ]
+        self._answer((program, *pages), idle=idle)
+
     def _begin(self, now: float) -> None:
+        """Begin a session: the agent ends what was connected and controlled before."""
         self.ready, self.trouble, self._listed_at = True, None, now
         self._greeted.clear()
-        self._reported = False
-        self._put(self._program)
+        self._commanded.clear()
+        self._reported.clear()
+        self._lacks_reports, self._asked_at = True, float("-inf")
+        self._numbering, self._changed = Numbering(), True
+        stops, self._stops = list(self._stops.values()), {}
         for each in self._owner.introduction():
             self.send(each)
-        self._put(ReportAll())
+        if self._changed:
+            self._list()
+        for _, stop in stops:
+            self._put(stop)
         self._owner.hear(protocol.Ready(0))
 
     def _hear(self, message: ToDisplays) -> None:
@@ -238,53 +288,36 @@ class FarGate:
                 ):
                     self._stops.pop(message.number, None)
                 return
-            case Unknown():
-                if message.display == self.display:
-                    self._greeted.difference_update(message.connections)
-                    self._introduce(message.connections)
-                return
             case protocol.Tick():
                 quiet = dict.fromkeys(self._greeted, -1)
                 message = protocol.Tick(message.tick, quiet | message.acks)
-            case protocol.Hello():
-                if message.connection not in self._pages:
+            case protocol.Hello(connection):
+                if connection not in self._pages:
                     return
-                self._greeted.add(message.connection)
+                self._greeted.add(connection)
             case AllReports(reports):
+                self._lacks_reports, self._asked_at = False, float("-inf")
+                for robot in self._reported - {report.robot for report in reports}:
+                    self._hear(protocol.RobotGone(robot))
                 for report in reports:
                     self._hear(report)
                 return
             case protocol.RobotReport():
                 self._latest[message.robot] = message
-                self._reported = True
+                self._reported.add(message.robot)
             case protocol.RobotGone():
                 self._latest.pop(message.robot, None)
+                self._reported.discard(message.robot)
         self._owner.hear(message)
-
-    @property
-    def _program(self) -> protocol.Connect:
-        return protocol.Connect(
-            self.connection, f"program of {self.display}", "operator", program=True
-        )
-
-    def _introduce(self, connections: Collection[str]) -> None:
-        """Introduce again what the agent has ended, as this display was slow."""
-        for each in (self._program, *self._owner.introduction()):
-            if (
-                isinstance(each, protocol.Connect | protocol.Speeds)
-                and each.connection in connections
-            ):
-                self._put(each)
-        for connection in connections:
-            self._owner.hear(protocol.Refused(connection, None, "drive", ASLEEP))
 
     def _put(
         self, message: FromDisplay, now: float | None = None, only: int | None = None
     ) -> None:
         sample = self._numbering.next(_encode(message))
-        if isinstance(message, protocol.FromPage) and begins_like_stop(message.text):
-            at = self._heard_at if now is None else now
-            self._stops[self._numbering.sent] = (at, message)
+        match message:
+            case protocol.FromPage(text=text) if b"stop" in text and stop_in(text):
+                at = self._heard_at if now is None else now
+                self._stops[self._numbering.sent] = (at, message)
         self._publish(sample, only)
 
     def _of_program(

@@ -13,11 +13,19 @@ from webmap.base.errors import WireError
 
 _head = struct.Struct("<QQ")
 
+HEAD_BYTES = _head.size
+
 MAX_BYTES = 1 << 20
 """The longest sample, in bytes."""
 
-SESSIONS = 16
+SESSIONS = 64
 """Ended sessions that are remembered; a slow connection may bring more of them."""
+
+
+def head_of(sample: bytes) -> tuple[int, int]:
+    """Return the session and the number of a sample."""
+    session, number = _head.unpack_from(sample)
+    return session, number
 
 
 class Numbering:
@@ -57,12 +65,12 @@ class Order:
             WireError: If the bytes are no sample.
 
         """
-        if not _head.size <= len(sample) <= MAX_BYTES:
+        if not HEAD_BYTES <= len(sample) <= MAX_BYTES:
             raise WireError(
                 f"got a sample of {len(sample)} bytes, "
-                f"expected {_head.size} to {MAX_BYTES}"
+                f"expected {HEAD_BYTES} to {MAX_BYTES}"
             )
-        session, number = _head.unpack_from(sample)
+        session, number = head_of(sample)
         restarted = session != self.session and session not in self._ended
         if restarted:
             if self.session is not None:
@@ -72,4 +80,4 @@ class Order:
             return None, False
         self.lost += number - self.newest - 1
         self.newest = number
-        return sample[_head.size :], restarted
+        return sample[HEAD_BYTES:], restarted
