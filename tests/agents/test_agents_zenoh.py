@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from webmap.agents import address
+from webmap.agents.displays import MOST_SAMPLE
 from webmap.agents.peer import Peer, User, zenoh_config
 from webmap.agents.router import free_port, read_users, router_settings
 
@@ -64,6 +65,20 @@ def users(tmp_path):
     file = tmp_path / "users.toml"
     file.write_text(USERS)
     return read_users(file)
+
+
+@pytest.mark.parametrize("by", ["router", "agent"])
+def test_a_large_sample_of_a_display_is_dropped_unread(by):
+    got = []
+    key = address.gate_in("bay3", "west", "1") if by == "router" else "webmap/other"
+    with router() as place, peers(place, User(), User()) as (one, other):
+        most = None if by == "router" else MOST_SAMPLE
+        other.listen(key, lambda _, data: got.append(len(data)), gate=True, most=most)
+        wait_for(lambda: one.put_gate(key, b"x") or got)
+        for size in (1 << 20, MOST_SAMPLE + 1, MOST_SAMPLE):
+            one.put_gate(key, bytes(size))
+        wait_for(lambda: max(got) > 1)
+        assert max(got) == MOST_SAMPLE
 
 
 def test_messages_arrive_with_their_keys_and_questions_are_answered():

@@ -122,7 +122,7 @@ class Peer:
         self._ended = threading.Event()
         self._gate: list[zenoh.Session] = []
         self._data: zenoh.Session | None = None
-        self._handlers: dict[int, tuple[str, Handler, bool]] = {}
+        self._handlers: dict[int, tuple[str, Handler, bool, int | None]] = {}
         self._answers: dict[str, Callable[[], bytes]] = {}
         self._declared: dict[int, list[Any]] = {}
         self._number = 0
@@ -157,7 +157,9 @@ class Peer:
             if session is not None:
                 session.close()  # type: ignore[no-untyped-call]
 
-    def listen(self, key: str, fn: Handler, *, gate: bool = False) -> int:
+    def listen(
+        self, key: str, fn: Handler, *, gate: bool = False, most: int | None = None
+    ) -> int:
         """Call ``fn`` with each message under a key; return a number to end it.
 
         Args:
@@ -165,12 +167,13 @@ class Peer:
             fn: Receives the messages.
             gate: Whether they are samples of :meth:`put_gate`. Each comes up to
                 :data:`COPIES` times, in as many threads.
+            most: The longest message in bytes; longer ones are dropped unread.
 
         """
         with self._lock:
             self._number += 1
             number = self._number
-            self._handlers[number] = (key, fn, gate)
+            self._handlers[number] = (key, fn, gate, most)
             self._declare(number)
         return number
 
@@ -345,12 +348,16 @@ class Peer:
         self.trouble = trouble
 
     def _declare(self, number: int) -> None:
-        key, fn, gate = self._handlers[number]
+        key, fn, gate, most = self._handlers[number]
         if self._data is None or number in self._declared:
             return
 
         def call(sample: "zenoh.Sample") -> None:
             try:
+                size = len(sample.payload)
+                if most is not None and size > most:
+                    log.warning("%s: dropped %d bytes", sample.key_expr, size)
+                    return
                 fn(str(sample.key_expr), sample.payload.to_bytes())
             except Exception:
                 log.exception("%s: a message was lost", key)

@@ -13,7 +13,8 @@ from typing import Any
 
 import msgspec
 
-from webmap.agents.address import EVERY, checked_name, here, locator
+from webmap.agents.address import EVERY, checked_name, gate_in, here, locator
+from webmap.agents.displays import MOST_SAMPLE
 from webmap.base.errors import ConfigError
 
 MOST_SESSIONS = 10_000
@@ -126,6 +127,14 @@ def router_settings(
         "mode": "router",
         "listen": {"endpoints": [place]},
         "transport": transport,
+        "low_pass_filter": [
+            {
+                "flows": ["ingress"],
+                "messages": ["put"],
+                "key_exprs": [f"{gate_in(EVERY, EVERY, EVERY)}/*"],
+                "size_limit": MOST_SAMPLE,
+            }
+        ],
     }
     if users is not None:
         transport["auth"] = {"usrpwd": {"dictionary_file": _dictionary(users)}}

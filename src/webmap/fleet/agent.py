@@ -27,6 +27,7 @@ from webmap.agents.description import (
     Beacon,
     read_beacon,
 )
+from webmap.agents.displays import MOST_SAMPLE
 from webmap.agents.peer import Peer, peer_of
 from webmap.agents.scans import lean_scan
 from webmap.base.children import python_command
@@ -158,9 +159,8 @@ class Agent:
         for picture in pictures:
             key = address.about_picture(name, picture)
             peer.answer(key, partial(pictures.__getitem__, picture))
-        peer.listen(
-            address.gate_in(name, everybody, everybody), self._sample, gate=True
-        )
+        gate_in = address.gate_in(name, everybody, everybody)
+        peer.listen(gate_in, self._sample, gate=True, most=MOST_SAMPLE)
         peer.listen(address.data_in(name, everybody, everybody, everybody), self._piece)
         self._cameras.start(asyncio.get_running_loop())
         self._serving = True
