@@ -20,6 +20,7 @@ from webmap.base.errors import WireError
 from webmap.gate import commands
 from webmap.gate.protocol import (
     MAY_MOVE,
+    CloseConnection,
     Connect,
     Disconnect,
     Forget,
@@ -29,6 +30,8 @@ from webmap.gate.protocol import (
     Hello,
     Holder,
     Ready,
+    Refused,
+    RefusedCount,
     RobotGone,
     RobotReport,
     RobotSpec,
@@ -369,6 +372,36 @@ def test_the_first_command_of_an_idle_display_follows_an_answer(connected):
     connected.sent.clear()
     connected.far.send(take)
     assert len(connected.sent) == 1
+
+
+# What an agent says reaches its own robots and those who commanded them.
+
+
+def test_the_words_of_an_agent_reach_only_pages_that_commanded_its_robots(connected):
+    connected.receive(REPORT)
+    words = Refused(PAGE.connection, "r9", "drive", "the agent heard nothing" * 100)
+    connected.receive(words)
+    stop_all = FromPage(PAGE.connection, b'{"op":"stop","robot":"*"}')
+    connected.far.send(stop_all)
+    connected.receive(words)
+    connected.receive(Hello(PAGE.connection))
+    assert connected.owner.of(Refused) == []
+    connected.far.send(FromPage(PAGE.connection, b'{"op":"take","robot":"r1"}'))
+    connected.receive(words)
+    (got,) = connected.owner.of(Refused)
+    assert got.robot is None
+    assert got.why.startswith("agent bay3: the agent heard nothing")
+    assert len(got.why) < 350
+
+
+def test_an_agent_closes_no_page_and_its_counts_name_it(connected):
+    connected.receive(REPORT)
+    connected.far.send(FromPage(PAGE.connection, b'{"op":"take","robot":"r1"}'))
+    connected.receive(CloseConnection(PAGE.connection, "too many messages"))
+    connected.receive(RefusedCount("Ann", 3, "drive: too old"))
+    assert connected.owner.of(CloseConnection) == []
+    (count,) = connected.owner.of(RefusedCount)
+    assert count.by == "Ann (agent bay3)"
 
 
 # A lost sample leaves no lasting error.

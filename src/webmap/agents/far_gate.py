@@ -48,6 +48,9 @@ COMMANDING = 1.0
 The answers then help TCP to notice lost commands, and their age is known sooner.
 """
 
+MOST_WORDS = 300
+"""The most characters of an agent's words to a page."""
+
 _decode = msgspec.msgpack.Decoder(ToDisplays).decode
 _encode = msgspec.msgpack.Encoder().encode
 
@@ -92,7 +95,8 @@ class FarGate:
         self._speeds: dict[str, tuple[float, float]] = {}
         self._greeted: set[str] = set()
         self._commanded: set[str] = set()
-        """The connections that sent a command to a robot of this agent."""
+        """The connections that sent a command to a robot of this agent: those get its
+        words."""
         self._changed = False
         """Whether the agent does not have the newest state of the pages yet."""
         self._reported: set[str] = set()
@@ -308,6 +312,17 @@ class FarGate:
             case protocol.RobotGone():
                 self._latest.pop(message.robot, None)
                 self._reported.discard(message.robot)
+            case protocol.Refused(connection, robot, what, why):
+                if connection not in self._commanded:
+                    return
+                about = robot if robot in self._latest else None
+                why = f"agent {self.agent}: {why[:MOST_WORDS]}"
+                message = protocol.Refused(connection, about, what, why)
+            case protocol.RefusedCount(by, count, last):
+                by = f"{by[:MOST_NAME]} (agent {self.agent})"
+                message = protocol.RefusedCount(by, count, last[:MOST_WORDS])
+            case protocol.CloseConnection():
+                return  # the page may drive robots of other gates
         self._owner.hear(message)
 
     def _put(
