@@ -466,6 +466,21 @@ def test_a_display_that_restarts_loses_its_pages(west):
     assert west.connects(page) == [Disconnect("west/c1"), again]
 
 
+@pytest.mark.parametrize("message", [Heartbeat(), from_program(Take(""))])
+def test_the_gate_hears_of_the_end_of_pages_after_a_bad_sample_of_a_new_session(
+    west, message
+):
+    west.connects(ANN, OWN)
+    west.numbering = Numbering()
+    with pytest.raises(WireError):
+        west.send(message)
+    assert west.connects(ANN) == [
+        Disconnect("west/c1"),
+        Disconnect("west/program"),
+        PAGE,
+    ]
+
+
 @pytest.mark.parametrize("sample", [b"", b"x" * 15, b"x" * 40, b"x" * 2_000_000])
 def test_bytes_that_are_no_sample_are_refused(west, sample):
     with pytest.raises(WireError):

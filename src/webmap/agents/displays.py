@@ -282,33 +282,32 @@ class Displays:
                 f"{FRAMES // OF_DISPLAY} messages a second at most"
             )
         display.spend(1, len(sample), now)
-        body, restarted = display.order.take(sample)
-        passed: list[Passed] = []
-        if restarted:
-            passed += self._end(display)
-        if body is None:
-            return passed
+        # It is checked first: an error must not hide that pages have ended.
         try:
-            message = _decode(body)
+            message = _decode(sample[HEAD_BYTES:])
         except (msgspec.DecodeError, RecursionError) as error:
             raise WireError(f"display {name}: got no message: {error}") from error
-        if isinstance(message, Answer):
-            self._answered(display, message)
-            self._wanted |= message.reports
-            if message.pages is not None:
-                changed = self._update(display, message.pages, now)
-                display.spend(len(changed), 0, now)
-                passed += changed
-            return passed
-        if len(sample) > MOST_COMMAND:
+        if len(sample) > MOST_COMMAND and not isinstance(message, Answer):
             raise WireError(
                 f"display {name}: got a command of {len(sample)} bytes, "
                 f"expected {MOST_COMMAND} at most"
             )
         if isinstance(message, FromProgram):
             _check_program(display, message)
-        if message.connection in display.pages:  # otherwise it counts as lost
-            passed.append(message)
+        body, restarted = display.order.take(sample)
+        passed: list[Passed] = list(self._end(display)) if restarted else []
+        if body is None:
+            return passed
+        if not isinstance(message, Answer):
+            if message.connection in display.pages:  # otherwise it counts as lost
+                passed.append(message)
+            return passed
+        self._answered(display, message)
+        self._wanted |= message.reports
+        if message.pages is not None:
+            changed = self._update(display, message.pages, now)
+            display.spend(len(changed), 0, now)
+            passed += changed
         return passed
 
     def waiting_stops(self) -> list[FromProgram]:
