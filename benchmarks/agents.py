@@ -12,7 +12,6 @@ import statistics
 import tempfile
 import threading
 import time
-import zlib
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 
@@ -23,6 +22,7 @@ from benchmarks.latency import relayed, socket_of
 from benchmarks.processes import started
 from webmap.agents.gates import Gates
 from webmap.agents.peer import close_peers
+from webmap.core.motion import id_at_agent
 from webmap.gate.protocol import RobotSpec
 from webmap.ros.rosbridge import ops
 from webmap.testing import WitnessRobot
@@ -220,7 +220,7 @@ def way(*, agent: bool) -> Callable[[], Figures]:
                 url, _ = running.enter_context(
                     started("agent", robot.url, "--router", router, *options)
                 )
-                id = f"r{zlib.crc32(b'bay3/Bob'):08x}"
+                id = id_at_agent("bay3", "Bob")
             return figures(delays(url, id, robot))
 
     return run

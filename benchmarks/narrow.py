@@ -12,7 +12,6 @@ age of the data that arrives.
 import asyncio
 import tempfile
 import time
-import zlib
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
@@ -25,6 +24,7 @@ from webmap import Bridge
 from webmap.agents.gates import Gates
 from webmap.agents.peer import close_peers
 from webmap.base.loop_thread import LoopThread
+from webmap.core.motion import id_at_agent
 from webmap.gate.protocol import RobotSpec
 from webmap.ros.messages import LaserScanMsg, OdometryMsg
 
@@ -114,7 +114,7 @@ def under_load(
 
 def measured(agent: str, line: Line, robots: int, seconds: float) -> Figures:
     """Return the figures of an operator and the data of some robots."""
-    robot = f"r{zlib.crc32(b'bay3/robot_0'):08x}"
+    robot = id_at_agent("bay3", "robot_0")
     gates, arrivals = Gates(), Arrivals()
     gates.start()
     try:

@@ -35,6 +35,7 @@ from webmap.gate.protocol import (
     RobotGone,
     RobotReport,
     RobotSpec,
+    SentTwist,
     Speeds,
     TakeReply,
     Tick,
@@ -51,7 +52,11 @@ class Owner:
         self.received = []
 
     def introduction(self):
-        return [RobotSpec(id="r1", name="Bob", bridge_url="zenoh://h/bay3"), PAGE]
+        robots = [
+            RobotSpec(id=id, name="Bob", bridge_url="zenoh://h/bay3")
+            for id in ("r1", "r2")
+        ]
+        return [*robots, PAGE]
 
     def hear(self, message):
         self.received.append(message)
@@ -379,7 +384,7 @@ def test_the_first_command_of_an_idle_display_follows_an_answer(connected):
 
 def test_the_words_of_an_agent_reach_only_pages_that_commanded_its_robots(connected):
     connected.receive(REPORT)
-    words = Refused(PAGE.connection, "r9", "drive", "the agent heard nothing" * 100)
+    words = Refused(PAGE.connection, None, "drive", "the agent heard nothing" * 100)
     connected.receive(words)
     stop_all = FromPage(PAGE.connection, b'{"op":"stop","robot":"*"}')
     connected.far.send(stop_all)
@@ -394,14 +399,11 @@ def test_the_words_of_an_agent_reach_only_pages_that_commanded_its_robots(connec
     assert len(got.why) < 350
 
 
-def test_an_agent_closes_no_page_and_its_counts_name_it(connected):
+def test_an_agent_closes_no_page_that_drives_its_robots(connected):
     connected.receive(REPORT)
     connected.far.send(FromPage(PAGE.connection, b'{"op":"take","robot":"r1"}'))
     connected.receive(CloseConnection(PAGE.connection, "too many messages"))
-    connected.receive(RefusedCount("Ann", 3, "drive: too old"))
     assert connected.owner.of(CloseConnection) == []
-    (count,) = connected.owner.of(RefusedCount)
-    assert count.by == "Ann (agent bay3)"
 
 
 # A lost sample leaves no lasting error.
@@ -517,3 +519,51 @@ def test_after_each_kind_of_lost_sample_both_sides_agree_again(lost, seed):
     assert bench.far._stops == {}
     shown = {m.robot: m for m in bench.owner.received if hasattr(m, "robot")}
     assert shown == {"r1": changed, "r2": RobotGone("r2")}
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        msgspec.structs.replace(REPORT, robot="r9"),
+        AllReports((msgspec.structs.replace(REPORT, robot="bay4/r1"),)),
+        RobotGone("r9"),
+        Refused(PAGE.connection, "r9", "take", "Ann drives it"),
+        Refused(PAGE.connection, None, "drive", "any text"),
+        TakeReply(1, "r9", 3, None, PROGRAM.connection),
+        SentTwist("r9", 1.0, 0.0, 0.0, None),
+        CloseConnection(PAGE.connection, "any text"),
+    ],
+)
+def test_an_agent_says_nothing_about_robots_and_sockets_that_are_not_its_own(
+    connected, message
+):
+    before = list(connected.owner.received)
+    connected.receive(message, 0.1)
+    assert connected.owner.received == before
+
+
+def test_an_agent_cannot_report_a_robot_or_a_person_by_another_name(connected):
+    connected.receive(msgspec.structs.replace(REPORT, name="Forklift"), 0.1)
+    connected.receive(RefusedCount("Ann", 3, "drive: too old"), 0.1)
+    assert connected.owner.received[-2:] == [
+        REPORT,
+        RefusedCount("the agent bay3", 3, "Ann: drive: too old"),
+    ]
+
+
+def test_a_robot_that_is_declared_later_is_reported_at_once(connected):
+    late = RobotSpec(id="r3", name="Bob", bridge_url="zenoh://h/bay3")
+    report = msgspec.structs.replace(REPORT, robot="r3")
+    connected.receive(REPORT, 0.1)
+    connected.receive(report, 0.1)
+    connected.arrive()
+    connected.displays.wants_reports(0.1)
+    connected.far.send(late)
+    connected.far.beat(0.4)
+    connected.arrive()
+    assert connected.displays.wants_reports(0.4)
+    connected.receive(AllReports((REPORT, report)), 0.4)
+    assert connected.owner.received[-1] == report
+    connected.far.send(Forget("r3"))
+    connected.receive(report, 0.5)
+    assert connected.owner.received.count(report) == 1

@@ -5,10 +5,14 @@ import json
 import pytest
 
 from webmap.agents.gates import Gates
+from webmap.base.errors import ConfigError
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import FromPage, RobotSpec
 
 AGENT = "zenoh://127.0.0.1:7447/bay3"
+
+THERE = "bay3/r1"
+"""A robot of the agent."""
 
 
 class Link:
@@ -24,6 +28,18 @@ class Link:
             self.texts.append(message.text)
 
 
+def spec(robot, url):
+    return RobotSpec(
+        id=robot,
+        name=robot,
+        bridge_url=url,
+        twist_topic="/cmd_vel",
+        stops_within=0.0,
+        v_max=1.0,
+        w_max=1.5,
+    )
+
+
 class Page:
     """A page of a display with a robot of its own and one of an agent."""
 
@@ -33,18 +49,9 @@ class Page:
         gates.own = GateClient(self._link)
         gates.far[AGENT] = GateClient(self._link, "bay3", "ann.4f/")
         self.own, self.far = self.links
-        for robot, url in (("here", "ws://127.0.0.1:9090"), ("there", AGENT)):
-            gates.declare(
-                RobotSpec(
-                    id=robot,
-                    name=robot,
-                    bridge_url=url,
-                    twist_topic="/cmd_vel",
-                    stops_within=0.0,
-                    v_max=1.0,
-                    w_max=1.5,
-                )
-            )
+        for robot, url in (("here", "ws://127.0.0.1:9090"), (THERE, AGENT)):
+            gates.declare(spec(robot, url))
+        self.gates = gates
         self._socket = gates.connect("Ann", "operator", print, print)
 
     def _link(self, owner, lock):
@@ -70,7 +77,7 @@ def page():
 
 def test_a_command_reaches_the_gate_of_its_robot_alone(page):
     for op in ("take", "stop", "cancel"):
-        for robot, expected in (("here", (True, False)), ("there", (False, True))):
+        for robot, expected in (("here", (True, False)), (THERE, (False, True))):
             assert page.send(json.dumps({"op": op, "robot": robot})) == expected
 
 
@@ -104,3 +111,22 @@ def test_a_stop_for_no_known_robot_reaches_every_gate(page, text):
 )
 def test_a_frame_that_is_no_command_is_refused_by_the_own_gate(page, text):
     assert page.send(text) == (True, False)
+
+
+@pytest.mark.parametrize(
+    ("robot", "url"),
+    [
+        ("here", AGENT),
+        ("bay4/r1", AGENT),
+        (THERE, "ws://127.0.0.1:9090"),
+        (THERE, "zenoh://elsewhere:7447/bay3"),
+    ],
+)
+def test_a_robot_with_the_identifier_of_another_gate_is_refused(page, robot, url):
+    with pytest.raises(
+        ConfigError, match=r"robot of another gate|has an agent bay3 already"
+    ):
+        page.gates.declare(spec(robot, url))
+    for own, expected in (("here", (True, False)), (THERE, (False, True))):
+        assert page.send(json.dumps({"op": "stop", "robot": own})) == expected
+    assert page.send('{"op":"stop","robot":"*"}') == (True, True)

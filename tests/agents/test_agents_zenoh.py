@@ -10,6 +10,7 @@ from webmap.agents import address
 from webmap.agents.displays import MOST_SAMPLE
 from webmap.agents.peer import Peer, User, zenoh_config
 from webmap.agents.router import free_port, read_users, router_settings
+from webmap.base.errors import WireError
 
 zenoh = pytest.importorskip("zenoh")
 
@@ -184,6 +185,8 @@ def test_a_display_reaches_the_agents_that_its_user_may_drive(users):
             peer.answer(address.about(agent), agent.encode)
         wait_for(lambda: display.ask(address.about("bay3")) == b"bay3")
         assert display.ask(address.about("bay4")) is None
+        with pytest.raises(WireError, match="got 4 bytes, expected 3 at most"):
+            display.ask(address.about("bay3"), most=3)
         mine = address.gate_in("bay3", "west", west.instance)
         wait_for(lambda: (display.put_gate(mine, b"mine"), time.sleep(0.05), got)[2])
         for key in (

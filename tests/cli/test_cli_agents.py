@@ -12,11 +12,9 @@ import pytest
 
 from cli_inside import run_inside
 from webmap.agents import address
-from webmap.agents.description import PROTOCOL
+from webmap.agents.description import PROTOCOL, Beacon, read_about
 from webmap.agents.peer import Peer, User
 from webmap.fleet.agent import (
-    About,
-    Beacon,
     parse_beams,
     parse_operators,
     parse_rates,
@@ -152,15 +150,15 @@ def test_an_agent_describes_the_robots_of_its_fleet_file_and_listens_on_nothing(
                 assert key == "webmap/bay3/here"
                 assert msgspec.json.decode(piece, type=Beacon).protocol == PROTOCOL
                 answer = peer.ask(address.about("bay3"))
-                about = msgspec.json.decode(answer, type=About)
+                about, robots, _ = read_about(answer)
                 topics = asyncio.run(ask_topics(own, wait=10.0))
                 assert listening("agent") == []
         finally:
             peer.close()
-    (robot,) = about.robots
-    assert robot.config["name"] == "Forklift"
-    assert robot.config["twist"]["v_max"] == 0.7
-    assert robot.config["tags"] == ["yard"]
+    (robot,) = robots.values()
+    assert robot.name == "Forklift"
+    assert robot.motion.twist.v_max == 0.7
+    assert robot.tags == ["yard"]
     assert about.alignment == pytest.approx((3.0, 4.0, 90.0))
     assert topics["/robot_0/odom"] == "nav_msgs/Odometry"
 

@@ -67,8 +67,9 @@ def test_an_agent_with_another_protocol_is_named_with_both_versions(version):
         lines_of("view", router, *OPTIONS) as lines,
     ):
         expected = (
-            f"the agent bay3 speaks version {version} of the protocol, this display "
-            f"version {PROTOCOL}: install the same WebMap on both"
+            "the robots of the agent bay3 are not shown: the agent speaks version "
+            f"{version} of the protocol, this display version {PROTOCOL}: install the "
+            "same WebMap on both"
         )
         assert any(expected in line for line in lines)
 

@@ -4,12 +4,15 @@ import asyncio
 import socket
 import sys
 
+import msgspec
 import pytest
 
-from webmap.agents.description import About, AgentRobot
+from webmap import Robot
+from webmap.agents.description import DEEPEST, MOST_OF_ROBOT, MOST_ROBOTS, About
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
 from webmap.console import Console
+from webmap.core.motion import id_at_agent
 from webmap.core.pictures import pictures
 from webmap.fleet import held, of_agents
 from webmap.fleet.held import open_at
@@ -84,7 +87,7 @@ class FakePeer:
     def listen(self, key, fn, *, gate=False):
         return 0
 
-    def ask(self, key, patience=0.0):
+    def ask(self, key, patience=0.0, most=0):
         return self.answers.get(key)
 
 
@@ -98,17 +101,23 @@ def shown(monkeypatch):
     monkeypatch.setattr(of_agents.runtime, "notice", notices.append)
     agents, console = of_agents.Agents("zenoh://hall/bay3"), Console()
 
-    def show(*robots):
+    async def apply(agent, answer, beside):
+        task = beside and asyncio.create_task(beside)
+        await agents._apply(agent, answer, console)
+        if task:
+            task.cancel()
+
+    def show(*robots, beside=None):
         agent = agents._known["bay3"]
-        configs = [
-            AgentRobot(f"r{index}", {"bridge": "b", "odometry": "/odom", **each})
-            for index, each in enumerate(robots)
-        ]
-        agents._apply(agent, About(["b"], configs, []), console)
+        configs = [{"bridge": "b", "odometry": "/odom", **each} for each in robots]
+        described = [msgspec.Raw(msgspec.json.encode(each)) for each in configs]
+        answer = msgspec.json.encode(About(["b"], described, []))
+        asyncio.run(apply(agent, answer, beside))
         if of_agents._undrawn(agent):
             asyncio.run(agents._draw(agent))
         return {robot.name: robot for robot in console.robots}
 
+    show.agents = agents
     yield show, peer, notices
     for robot in list(console.robots):
         robot.destroy()
@@ -166,3 +175,64 @@ def test_a_robot_that_cannot_be_shown_leaves_the_others(shown):
 def test_every_display_has_the_same_name_for_a_robot(shown):
     show, _, _ = shown
     assert list(show({"name": "Bob"}, {"name": "Bay3"})) == ["Bob (bay3)", "Bay3"]
+
+
+def test_the_identifier_of_an_agents_robot_contains_its_agent_and_is_not_sent(shown):
+    show, _, notices = shown
+    other = Robot("Victim")
+    (bob,) = show({"name": "Bob"}, {"name": "Eve", "id": other.id}).values()
+    assert bob.id == id_at_agent("bay3", "Bob")
+    assert bob.id.startswith("bay3/")
+    (notice,) = notices
+    assert notice.startswith("Agent bay3: robot 2 is not shown: ")
+    other.destroy()
+
+
+def test_of_two_robots_of_an_agent_with_one_name_the_first_is_shown(shown):
+    show, _, notices = shown
+    (bob,) = show({"name": "Bob", "tags": "first"}, {"name": "Bob"}).values()
+    assert bob.tags == ("first",)
+    assert notices == [
+        "Agent bay3: robot 2 is not shown: a second robot has the name 'Bob'."
+    ]
+    assert list(show({"name": "Bob"}).values()) == [bob]
+    assert show() == {}
+    (again,) = show({"name": "Bob"}).values()
+    assert again.id == bob.id
+
+
+def test_a_description_is_refused_beyond_its_limits_before_anything_is_built(shown):
+    show, _, notices = shown
+    deep = {"tag": "g"}
+    for _ in range(DEEPEST):
+        deep = {"tag": "g", "children": [deep]}
+    names = [{"name": f"Bob {number}"} for number in range(MOST_ROBOTS)]
+    assert len(show(*names, {"name": "Eve"})) == MOST_ROBOTS
+    long = {"name": "Eve", "classes": ["a" * MOST_OF_ROBOT]}
+    assert show(long, {"name": "Eve", "model": deep}) == {}
+    assert notices == [
+        "Agent bay3: only the first robots are shown: got 201 robots, expected 200 at "
+        "most.",
+        "Agent bay3: robot 1 is not shown: got 65597 bytes, expected 65536 at most.",
+        "Agent bay3: robot 2 is not shown: got values nested deeper than 32 levels.",
+    ]
+
+
+def test_an_agent_that_changes_all_the_time_is_asked_a_few_times(shown):
+    show, _, _ = shown
+    agent = show.agents._known["bay3"]
+    asked = [agent.may_be_asked(0.5 * number) for number in range(130)]
+    assert asked.count(True) == 30
+
+
+def test_other_work_goes_on_while_many_robots_are_built(shown):
+    show, _, _ = shown
+    turns = []
+
+    async def work():
+        while True:
+            turns.append(None)
+            await asyncio.sleep(0)
+
+    show(*({"name": f"Bob {number}"} for number in range(50)), beside=work())
+    assert len(turns) > 50

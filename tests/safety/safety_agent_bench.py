@@ -15,18 +15,18 @@ import subprocess
 import sys
 import threading
 import time
-import zlib
 from contextlib import ExitStack
 from pathlib import Path
 
 from processes import Process
 from safety_bench import pass_time, wait_for
 
+from webmap.core.motion import id_at_agent
 from webmap.testing import FaultProxy, Sentinel, WitnessRobot
 
 DRIVER = Path(__file__).with_name("safety_driver.py")
 
-ROBOT = f"r{zlib.crc32(b'bay3/Bob'):08x}"
+ROBOT = id_at_agent("bay3", "Bob")
 """The identifier that the agent gives to the robot."""
 
 READY = r"is ready at zenoh://127\.0\.0\.1:(\d+)"

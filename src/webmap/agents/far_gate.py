@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable
 
 import msgspec
+from msgspec.structs import replace
 
 from webmap.agents.displays import (
     MOST_NAME,
@@ -91,6 +92,8 @@ class FarGate:
         self._order = Order()
         self._numbering = Numbering()
         self._heard_at = float("-inf")
+        self._robots: dict[str, str] = {}
+        """The names of the agent's robots by id: nothing else is heard of here."""
         self._pages: dict[str, protocol.Connect] = {}
         self._speeds: dict[str, tuple[float, float]] = {}
         self._greeted: set[str] = set()
@@ -125,10 +128,20 @@ class FarGate:
     def send(self, message: protocol.ToGate) -> None:
         """Send a message to the gate, if it can be reached and takes it from displays.
 
-        The agent itself declares the robots.
+        The agent itself declares the robots: what it reports of others is left out.
         """
         with self._lock:
             match message:
+                case protocol.RobotSpec():
+                    if message.id not in self._robots:
+                        self._lacks_reports, self._asked_at = True, float("-inf")
+                    self._robots[message.id] = message.name
+                    return
+                case protocol.Forget():
+                    self._robots.pop(message.robot, None)
+                    self._latest.pop(message.robot, None)
+                    self._reported.discard(message.robot)
+                    return
                 case protocol.Connect(connection):
                     self._pages[connection] = message
                     self._changed = True
@@ -282,9 +295,15 @@ class FarGate:
         self._owner.hear(protocol.Ready(0))
 
     def _hear(self, message: ToDisplays) -> None:
+        robot = getattr(message, "robot", None)
+        if robot is not None and robot not in self._robots:
+            return
         match message:
-            case protocol.Ready():
-                return
+            case protocol.Ready() | protocol.CloseConnection():
+                return  # the page has robots of other gates too
+            case protocol.RefusedCount():
+                last = f"{message.by}: {message.last}"
+                message = replace(message, by=f"the agent {self.agent}", last=last)
             case Took():
                 if (message.display, message.session) == (
                     self.display,
@@ -307,6 +326,7 @@ class FarGate:
                     self._hear(report)
                 return
             case protocol.RobotReport():
+                message = replace(message, name=self._robots[message.robot])
                 self._latest[message.robot] = message
                 self._reported.add(message.robot)
             case protocol.RobotGone():
@@ -319,8 +339,9 @@ class FarGate:
                 why = f"agent {self.agent}: {why[:MOST_WORDS]}"
                 message = protocol.Refused(connection, about, what, why)
             case protocol.RefusedCount(by, count, last):
-                by = f"{by[:MOST_NAME]} (agent {self.agent})"
-                message = protocol.RefusedCount(by, count, last[:MOST_WORDS])
+                last = f"{by[:MOST_NAME]}: {last[:MOST_WORDS]}"
+                by = f"the agent {self.agent}"  # one row, whatever names it makes up
+                message = protocol.RefusedCount(by, count, last)
             case protocol.CloseConnection():
                 return  # the page may drive robots of other gates
         self._owner.hear(message)
@@ -351,7 +372,7 @@ class FarGate:
             case commands.Cancel(robot):
                 fields = {"op": "cancel", "robot": robot}
             case _:
-                return msgspec.structs.replace(message, connection=self.connection)
+                return replace(message, connection=self.connection)
         return protocol.FromPage(self.connection, json.dumps(fields).encode())
 
     def _lose(self, why: str, *, silent: bool = False) -> None:
@@ -382,7 +403,7 @@ def unreachable(report: RobotReport, why: str, *, driven: bool = False) -> Robot
         alarm = MAY_MOVE
     elif driven:
         why = f"{why}: the base stops by its own command timeout of {stop_time:.2f} s"
-    return msgspec.structs.replace(
+    return replace(
         report,
         alarm=alarm,
         doing="down",

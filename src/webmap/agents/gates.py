@@ -13,6 +13,7 @@ from functools import partial
 from webmap.agents import address
 from webmap.agents.far_gate import FarGate
 from webmap.agents.peer import Peer, peer_of
+from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.base.scope import Removal
 from webmap.gate import protocol
@@ -177,13 +178,19 @@ class Gates:
         """Declare a robot to its gate; see :meth:`GateClient.declare`.
 
         An agent declares its robots itself: here its gate only learns their names.
+
+        Raises:
+            ConfigError: If ``spec`` has an invalid value, or the identifier of a robot
+                of another gate.
+
         """
+        if spec.id.rpartition("/")[0] != _agent_at(spec.bridge_url):
+            raise ConfigError(
+                f"robot {spec.name!r} has the identifier of a robot of another gate"
+            )
         client = self._client(spec.bridge_url)
         with self._lock:
-            before = self._homes.get(spec.id)
             self._homes[spec.id] = client
-        if before is not None and before is not client:
-            before.forget(spec.id)
         client.declare(spec)
 
     def forget(self, robot_id: str) -> None:
@@ -246,7 +253,11 @@ class Gates:
             return self.far[url]
 
     def _add(self, url: str) -> None:
-        agent, peer = address.agent_in(url) or "", peer_of(url)
+        agent = _agent_at(url)
+        for other in self.far:
+            if address.agent_in(other) == agent:
+                raise ConfigError(f"{other} has an agent {agent} already")
+        peer = peer_of(url)
         user = peer.user
         display = address.Sender(user.name, user.instance).display
         key = address.gate_in(agent, user.name, user.instance)
@@ -294,3 +305,8 @@ class Gates:
                     link.beat(time.monotonic())
                 except Exception:
                     log.exception("the agent %s got no sign of life", link.agent)
+
+
+def _agent_at(url: str) -> str:
+    """Return the agent of a bridge; "" for a bridge of the gate of this computer."""
+    return (address.agent_in(url) or "") if is_agent_url(url) else ""

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from webmap.agents.address import ANYONE, checked_name, locator
 from webmap.agents.reach import why_not_reached
-from webmap.base.errors import ConfigError
+from webmap.base.errors import ConfigError, WireError
 from webmap.base.outside_text import one_line
 
 if TYPE_CHECKING:
@@ -192,14 +192,26 @@ class Peer:
             if self._data is not None:
                 self._declare_answer(key)
 
-    def ask(self, key: str, patience: float = ASK_PATIENCE) -> bytes | None:
-        """Return the answer of another peer; None if there is none. Waits for it."""
+    def ask(
+        self, key: str, patience: float = ASK_PATIENCE, most: int = 1 << 20
+    ) -> bytes | None:
+        """Return the answer of another peer; None if there is none. Waits for it.
+
+        Raises:
+            WireError: If the answer has more than ``most`` bytes; it is not copied.
+
+        """
         session = self._data
         if session is None:
             return None
         for reply in session.get(key, timeout=patience):
             if reply.ok is not None:
-                return reply.ok.payload.to_bytes()
+                payload = reply.ok.payload
+                if len(payload) > most:
+                    raise WireError(
+                        f"got {len(payload)} bytes, expected {most} at most"
+                    )
+                return payload.to_bytes()
         return None
 
     def put_gate(self, key: str, data: bytes, only: int | None = None) -> None:

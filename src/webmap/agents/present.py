@@ -6,9 +6,9 @@ from collections.abc import Callable
 import msgspec
 
 from webmap.agents import address
-from webmap.agents.description import About
+from webmap.agents.description import MOST_BYTES, About
 from webmap.agents.peer import peer_of
-from webmap.base.errors import BridgeClosed, ConfigError
+from webmap.base.errors import BridgeClosed, ConfigError, WireError
 from webmap.ros.names import is_agent_url, normalise_url
 
 LISTEN = 1.5
@@ -100,8 +100,9 @@ def one_agent(
 
 def about_agent(url: str) -> About | None:
     """Return the description of an agent; None if it gives none."""
-    answer = peer_of(url).ask(address.about(address.agent_in(url) or ""))
+    key = address.about(address.agent_in(url) or "")
     try:
+        answer = peer_of(url).ask(key, most=MOST_BYTES)
         return None if answer is None else msgspec.json.decode(answer, type=About)
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, RecursionError, WireError):
         return None

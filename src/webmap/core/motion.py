@@ -1,5 +1,6 @@
 """The commands of one robot to the gate, and the gate's reports on it."""
 
+import hashlib
 import logging
 import math
 import time
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
 
-from webmap.base.errors import MotionError
+from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Pose, Twist
 from webmap.base.lifecycle import lifecycle
 from webmap.base.tasks import spawn
@@ -68,7 +69,22 @@ _used: Counter[str] = Counter()
 
 
 given_id: ContextVar[str | None] = ContextVar("given_id", default=None)
-"""The identifier of the robot that is made, if its agent has given it one."""
+"""The identifier of the robot that a display makes, if it is a robot of an agent."""
+
+
+def id_at_agent(agent: str, name: str) -> str:
+    """Return the identifier of a robot of an agent.
+
+    Agent and displays derive it, so nobody sends it. It begins with the agent's name,
+    which the router's access rules protect, and "/", which no other robot's has.
+
+    Args:
+        agent: The name of the agent.
+        name: The name of the robot at the agent.
+
+    """
+    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()
+    return f"{agent}/r{digest[:16]}"
 
 
 def _id_of(name: str) -> str:
@@ -76,12 +92,18 @@ def _id_of(name: str) -> str:
 
     It is the same after a restart, in whatever order robots are created: a page may
     still have to send a STOP that it could not deliver before.
+
+    Raises:
+        ConfigError: If it is that of a robot of an agent which exists already.
+
     """
     given = given_id.get()
+    if given is None and RobotMotion.agent:
+        given = id_at_agent(RobotMotion.agent, name)
     if given is not None:
+        if any(each.id == given for each in robot_motions):
+            raise ConfigError("its agent has another robot of this name")
         return given
-    if RobotMotion.agent:
-        name = f"{RobotMotion.agent}/{name}"
     id = f"r{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
     _used[id] += 1
     return id if _used[id] == 1 else f"{id}-{_used[id]}"

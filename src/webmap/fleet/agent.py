@@ -23,7 +23,6 @@ from webmap.agents.clients import Call, Clients
 from webmap.agents.description import (
     PROTOCOL,
     About,
-    AgentRobot,
     Beacon,
     read_beacon,
 )
@@ -199,7 +198,10 @@ class Agent:
 
     def _describe(self) -> None:
         held = self._held.robots()
-        robots = [AgentRobot(id, passed_on(config).to_dict()) for id, config in held]
+        robots = [
+            msgspec.Raw(msgspec.json.encode(passed_on(each.config).to_dict()))
+            for each in held
+        ]
         self._cameras.hold(held)
         names = sorted({self.url, self._held.bridge.name})
         grids = list(self._held.grids().items())

@@ -1,10 +1,13 @@
 """The robots of agents on the console: found, changed and removed with their agents."""
 
 import asyncio
+import contextlib
 import logging
 import time
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -12,27 +15,30 @@ import msgspec
 import webmap
 from webmap.agents import address
 from webmap.agents.description import (
+    MOST_BYTES,
+    MOST_GRIDS,
     PROTOCOL,
-    About,
-    AgentRobot,
     Beacon,
+    read_about,
     read_beacon,
 )
 from webmap.agents.peer import peer_of
 from webmap.base.counted import counted
 from webmap.base.echo import echo, notify
-from webmap.base.errors import WebMapError
+from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import no_scope
 from webmap.base.tasks import spawn
+from webmap.config.fleet import MapConfig
+from webmap.config.reading import read_part
 from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.console import Console, make_robot
 from webmap.console.fleet import draw_picture
 from webmap.core.configure import apply
-from webmap.core.motion import given_id, shown_name
+from webmap.core.motion import given_id, id_at_agent, shown_name
 from webmap.core.pictures import pictures
 from webmap.core.runtime import runtime
-from webmap.fleet.passed_on import accepted, received_picture
+from webmap.fleet.passed_on import LARGEST, accepted, received_picture
 from webmap.poses.alignment import align_bridge
 
 if TYPE_CHECKING:
@@ -54,6 +60,21 @@ PICTURE_AGAIN = 5.0
 
 AWAY = 3.0
 """Seconds without a sign of an agent after which it is shown as away."""
+
+MOST_AGENTS = 100
+"""The greatest number of agents of one router that a display shows."""
+
+ASKED = 10
+"""How often an agent is asked for its description within :data:`ASKED_WITHIN`."""
+
+ASKED_WITHIN = 30.0
+"""Seconds; an agent may change its description all the time."""
+
+MOST_PICTURES = 32
+"""The greatest number of pictures of the robots of one agent."""
+
+MOST_COMPLAINTS = 20
+"""The greatest number of sentences about the description of one agent."""
 
 
 @dataclass(eq=False)
@@ -78,10 +99,21 @@ class KnownAgent:
     robots: dict[str, _Shown] = field(default_factory=dict)
     """The robots on the console, by their ids."""
     alignment: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    complained: str = ""
+    asked: deque[float] = field(default_factory=lambda: deque(maxlen=ASKED))
+    """When it was asked for its description, on the monotonic clock."""
+    describing: "asyncio.Task[None] | None" = None
+    complaints: set[str] = field(default_factory=set)
     pictures: dict[str, str] = field(default_factory=dict)
     """The URLs of the pictures of its robots, by name; "" for what is no picture."""
     drawing: "asyncio.Task[None] | None" = None
+
+    def may_be_asked(self, now: float) -> bool:
+        """Return whether it may be asked for its description now; note that it is."""
+        asked = self.asked
+        if len(asked) == ASKED and now - asked[0] < ASKED_WITHIN:
+            return False
+        asked.append(now)
+        return True
 
 
 class Agents:
@@ -93,6 +125,8 @@ class Agents:
     """
 
     def __init__(self, router: str) -> None:
+        self._turn = asyncio.Lock()
+        """Held while a robot is built or destroyed."""
         self.url = router.rstrip("/")
         self.only = address.agent_in(router)
         self._place = self.url if self.only is None else self.url.rpartition("/")[0]
@@ -142,6 +176,8 @@ class Agents:
             return "connecting", f"no agent is at {self.url} yet"
         away = sorted(name for name, is_there in heard.items() if not is_there)
         text = f"{counted(len(heard) - len(away), 'agent')} connected"
+        if len(heard) == MOST_AGENTS:
+            text += f"; no more than {MOST_AGENTS} are shown"
         return "open", f"{text}; away: {', '.join(away)}" if away else text
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
@@ -150,17 +186,21 @@ class Agents:
 
     async def stop(self) -> None:
         """Stop to show changes."""
-        tasks = [self._task, *(agent.drawing for agent in self._known.values())]
+        tasks = [self._task]
+        for agent in self._known.values():
+            tasks += [agent.describing, agent.drawing]
         running = [task for task in tasks if task is not None]
         for task in running:
             task.cancel()
         if running:
             await asyncio.wait(running)
+        self._turn = asyncio.Lock()  # the next loop needs its own
 
     def _heard(self, key: str, piece: bytes) -> None:
-        beacon = read_beacon(piece)
-        if beacon is not None:
-            name = key.split("/")[1]
+        beacon, name = read_beacon(piece), key.split("/")[1]
+        if beacon is None or not address.NAME.fullmatch(name):
+            return
+        if name in self._news or len(self._news) < MOST_AGENTS:
             self._news[name] = beacon
             self._news_at[name] = time.monotonic()
 
@@ -178,76 +218,97 @@ class Agents:
         while True:
             for name, beacon in list(self._news.items()):
                 agent = self._get(name, beacon)
-                if self._console is not None and agent.about != beacon.about:
-                    try:
-                        await self._describe(agent, self._console)
-                    except Exception:
-                        log.exception("the robots of the agent %s are not shown", name)
+                if (
+                    self._console is not None
+                    and agent.about != beacon.about
+                    and agent.describing is None
+                    and agent.may_be_asked(time.monotonic())
+                ):
+                    agent.describing = spawn(self._describe(agent, self._console))
                 if agent.drawing is None and _undrawn(agent):
                     agent.drawing = spawn(self._draw(agent))
             await asyncio.sleep(LOOK)
 
     async def _describe(self, agent: KnownAgent, console: Console) -> None:
+        """Ask an agent for its description, and show its robots."""
         beacon = agent.beacon
-        if beacon.protocol != PROTOCOL:
-            self._complain(
-                agent,
-                f"the agent {agent.name} speaks version {beacon.protocol} of the "
-                f"protocol, this display version {PROTOCOL}: install the same WebMap "
-                "on both",
-            )
-            return
-        answer = await asyncio.to_thread(self._peer.ask, address.about(agent.name))
-        if answer is None:
-            return
         try:
-            about = msgspec.json.decode(answer, type=About)
-            self._apply(agent, about, console)
-        except (msgspec.DecodeError, WebMapError) as error:
+            if beacon.protocol != PROTOCOL:
+                raise ConfigError(
+                    f"the agent speaks version {beacon.protocol} of the protocol, this "
+                    f"display version {PROTOCOL}: install the same WebMap on both"
+                )
+            ask = partial(self._peer.ask, address.about(agent.name), most=MOST_BYTES)
+            answer = await asyncio.to_thread(ask)
+            if answer is None:
+                return
+            await self._apply(agent, answer, console)
+        except WebMapError as error:
             self._complain(
-                agent, f"the robots of the agent {agent.name} cannot be read: {error}"
+                agent, f"the robots of the agent {agent.name} are not shown: {error}"
             )
+        except Exception:
+            log.exception("the robots of the agent %s are not shown", agent.name)
+        finally:
+            agent.describing = None
         agent.about = beacon.about
 
     def _complain(self, agent: KnownAgent, text: str) -> None:
-        agent.about = agent.beacon.about
-        if agent.complained != text:
-            agent.complained = text
+        if text not in agent.complaints and len(agent.complaints) < MOST_COMPLAINTS:
+            agent.complaints.add(text)
             log.error("%s", text)
             runtime.notice(f"{text[0].upper()}{text[1:]}.")
 
-    def _apply(self, agent: KnownAgent, about: About, console: Console) -> None:
+    async def _apply(self, agent: KnownAgent, answer: bytes, console: Console) -> None:
+        """Show the described robots, one after the other."""
+        about, robots, mistakes = await asyncio.to_thread(read_about, answer)
+        for text in mistakes:
+            self._complain(agent, f"agent {agent.name}: {text}")
         if agent.alignment != about.alignment:
             agent.alignment = about.alignment
             align_bridge(agent.bridge, *about.alignment)
-        for topic, options in about.grids:
-            console.add_grid(agent.bridge, topic, **options)
-        there = {each.id: each for each in about.robots}
-        for id in [id for id in agent.robots if id not in there]:
-            shown = agent.robots.pop(id)
-            console.forget(shown.robot)
-            shown.robot.destroy()
-            notify(f"{shown.robot.name} is no longer a robot of the agent {agent.name}")
+        for topic, given in about.grids[:MOST_GRIDS]:
+            grid = read_part(MapConfig, "map", {**given, "topic": topic}, agent.name)
+            options = {"palette": grid.palette, "order": grid.order}
+            chosen = {key: value for key, value in options.items() if value is not None}
+            console.add_grid(agent.bridge, grid.topic, **chosen)
+        there = {id_at_agent(agent.name, name): each for name, each in robots.items()}
+        for id in agent.robots.keys() - there.keys():
+            async with self._piece_of_work():
+                shown = agent.robots.pop(id)
+                console.forget(shown.robot)
+                shown.robot.destroy()
+                name = shown.robot.name
+                notify(f"{name} is no longer a robot of the agent {agent.name}")
         bridges = dict.fromkeys([*about.bridges, agent.bridge.url], agent.bridge)
-        for each in there.values():
+        for id, config in there.items():
             try:
-                self._show(agent, each, bridges, console)
+                async with self._piece_of_work():
+                    self._show(agent, id, config, bridges, console)
             except WebMapError as error:
-                name = each.config.get("name", each.id)
-                self._complain(
-                    agent, f"{name} of the agent {agent.name} is not shown: {error}"
-                )
+                text = f"{config.name} of the agent {agent.name} is not shown: {error}"
+                self._complain(agent, text)
+
+    @contextlib.asynccontextmanager
+    async def _piece_of_work(self) -> AsyncIterator[None]:
+        """Let all other work have as much time as the work within took."""
+        async with self._turn:
+            began = time.monotonic()
+            try:
+                yield
+            finally:
+                await asyncio.sleep(time.monotonic() - began)
 
     def _show(
         self,
         agent: KnownAgent,
-        each: AgentRobot,
+        id: str,
+        given: RobotConfig,
         bridges: "dict[str, Bridge]",
         console: Console,
     ) -> None:
-        given = RobotConfig.from_dict(each.config)
-        config, picture = accepted(given, agent.bridge.url, each.id, bridges)
-        shown = agent.robots.get(each.id)
+        config, picture = accepted(given, agent.bridge.url, id, bridges)
+        shown = agent.robots.get(id)
         if shown is not None:
             shown.picture = picture
             config = msgspec.structs.replace(config, name=shown.config.name)
@@ -260,13 +321,13 @@ class Agents:
             return
         name = shown_name(config.name, agent.name)
         config = msgspec.structs.replace(config, name=name)
-        token = given_id.set(each.id)
+        token = given_id.set(id)
         try:
             with no_scope():
                 robot = make_robot(config, bridges)
         finally:
             given_id.reset(token)
-        agent.robots[each.id] = _Shown(robot, config, picture)
+        agent.robots[id] = _Shown(robot, config, picture)
         console.add(robot)
         notify(f"{robot.name} is a robot of the agent {agent.name}")
 
@@ -292,11 +353,14 @@ class Agents:
         """Publish a picture of an agent; return whether it is one."""
         if name not in agent.pictures:
             key = address.about_picture(agent.name, name)
-            answer = await asyncio.to_thread(self._peer.ask, key, PICTURE_PATIENCE)
-            if answer is None:
-                await asyncio.sleep(PICTURE_AGAIN)
-                return False
+            ask = self._peer.ask
             try:
+                if len(agent.pictures) >= MOST_PICTURES:
+                    raise ConfigError(f"it has more than {MOST_PICTURES} pictures")
+                answer = await asyncio.to_thread(ask, key, PICTURE_PATIENCE, LARGEST)
+                if answer is None:
+                    await asyncio.sleep(PICTURE_AGAIN)
+                    return False
                 found = await asyncio.to_thread(received_picture, name, answer)
                 agent.pictures[name] = pictures.publish(*found)
             except WebMapError as error:
