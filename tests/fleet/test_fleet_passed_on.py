@@ -7,12 +7,20 @@ import pytest
 from PIL import Image
 
 from webmap.agents.far_camera import FarCamera
-from webmap.base.errors import ConfigError
+from webmap.base.errors import ConfigError, WireError
 from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.core.registry import map_modules, robot_modules
 from webmap.fleet import passed_on as passed
 from webmap.fleet.held import held_in_file
-from webmap.fleet.passed_on import LARGEST, OPENING, accepted, is_served, passed_on
+from webmap.fleet.passed_on import (
+    LARGEST,
+    OPENING,
+    accepted,
+    actions,
+    check_parameters,
+    is_served,
+    passed_on,
+)
 
 AGENT = "zenoh://hall/bay3"
 URL = "http://me:secret@cam:8080/stream?token=x"
@@ -214,3 +222,51 @@ def test_a_picture_and_its_place_on_the_robot_are_kept():
         msgspec.json.decode(msgspec.json.encode(config.to_dict()))
     )
     assert accepted(passed_on(given), AGENT, "r1", {"b"})[1] == picture
+
+
+BUTTONS = [
+    {"label": "Dock", "service": "eve/dock"},
+    {"label": "Lamp", "topic": "eve/lamp", "message": {}, "type": "std_msgs/Empty"},
+    {"label": "Slow", "node": "eve/base", "parameter": "v_max", "value": 0.2},
+    {"label": "Old", "parameter": "/eve/v_max", "value": 0.2},
+]
+ROS2 = "/eve/base/set_parameters"
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        {"buttons": BUTTONS},
+        {"modules": [{"name": "Buttons", "args": [{"bridge": "b"}, BUTTONS]}]},
+        {
+            "modules": [
+                {
+                    "name": "Buttons",
+                    "args": [{"bridge": "b"}],
+                    "options": {"buttons": BUTTONS},
+                }
+            ]
+        },
+    ],
+)
+def test_displays_may_write_what_any_button_of_the_agent_writes(config):
+    found = actions(RobotConfig.from_dict({"name": "Eve", "bridge": "b", **config}))
+    assert [each.get("topic") or each["service"] for each in found] == [
+        "/eve/dock",
+        "/eve/lamp",
+        ROS2,
+        "/rosapi/set_param",
+    ]
+    v_max, other = {"name": "v_max", "value": {}}, {"name": "other", "value": {}}
+    check_parameters("/eve/dock", {"any": 1}, found)
+    check_parameters(ROS2, {"parameters": [v_max]}, found)
+    check_parameters("/rosapi/set_param", {"name": "/eve/v_max", "value": "0"}, found)
+    for service, args in (
+        (ROS2, {"parameters": [v_max, other]}),
+        (ROS2, [[v_max]]),
+        (ROS2, None),
+        ("/rosapi/set_param", {"name": "/eve/other", "value": "0"}),
+        ("/rosapi/set_param", {"name": "/eve/other", "parameters": [v_max]}),
+    ):
+        with pytest.raises(WireError, match="has no button for this parameter"):
+            check_parameters(service, args, found)

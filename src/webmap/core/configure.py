@@ -78,8 +78,8 @@ def apply(
     """Apply the differences between two configurations to a robot.
 
     Parts that both have in common stay, and so does everything that neither has, such
-    as modules that a program added. Name, model and base frame are never changed. New
-    bridges and modules belong to the scope in which this is called.
+    as modules that a program added. Name and model are never changed. New bridges and
+    modules belong to the scope in which this is called.
 
     Args:
         robot: The robot.
@@ -106,6 +106,11 @@ def apply(
             robot.svg.classes.remove(name)
     for name in new.classes:
         robot.svg.classes.add(name)
+    if old.base_link != new.base_link:
+        robot.base_link = robot.motion.base_frame = new.base_link
+        robot.motion.declare()
+        if new.tf is not None:  # it may name no other base
+            old = old.with_part("tf", None)
     if old.tags != new.tags:
         robot.set_tags(new.tags)
     if old.battery_low != new.battery_low:

@@ -36,7 +36,7 @@ from webmap.base.loading import load_soon
 from webmap.base.tasks import spawn
 from webmap.core.runtime import runtime
 from webmap.fleet.held import Held, open_at, warn_of_open_bridge
-from webmap.fleet.passed_on import passed_on
+from webmap.fleet.passed_on import actions, check_parameters, passed_on
 from webmap.gate.protocol import Role
 from webmap.poses.alignment import alignments
 from webmap.ros.names import normalise_topic
@@ -81,6 +81,7 @@ class Agent:
         self.url = url = held.bridge.url
         self._held = held
         self._session = secrets.token_hex(8)
+        self._buttons: list[dict[str, str]] = []
         self._about = b""
         self._open_at: list[str] | None = None
         self._peer: Peer = peer_of(router)
@@ -209,7 +210,7 @@ class Agent:
         placed = (pose.x, pose.y, math.degrees(pose.yaw))
         about = About(names, robots, grids, placed, self._open_at)
         self._about = msgspec.json.encode(about)
-        buttons = [button for each in held for button in each.config.buttons]
+        self._buttons = buttons = [a for each in held for a in actions(each.config)]
         self._allowed = (
             frozenset(button["topic"] for button in buttons if "topic" in button),
             frozenset(button["service"] for button in buttons if "service" in button),
@@ -281,6 +282,7 @@ class Agent:
     async def _answer(self, call: Call) -> None:
         try:
             args: Any = clients.args_of(call)
+            check_parameters(call.service, args, self._buttons)
             values = await self._calls.call(call.service, args, call.type, 30.0)
             frame = clients.answered(call, values)
         except (BridgeError, WireError, ValueError, TypeError) as error:

@@ -19,6 +19,7 @@ from webmap.fleet.made import make_bridges
 from webmap.fleet.overrides import Overrides
 from webmap.fleet.passed_on import check_passed_on, load_pictures
 from webmap.ros.rosbridge.checks import is_loopback, listening_addresses
+from webmap.ros.tf import Buffer
 
 if TYPE_CHECKING:
     from webmap import Bridge
@@ -111,11 +112,17 @@ _kept: list[object] = []
 
 
 def moving_parts(config: RobotConfig) -> RobotConfig:
-    """Return what an agent itself needs of a robot: that which moves it."""
+    """Return what an agent itself needs of a robot: that which moves it.
+
+    The robot needs no frames, only the name of its own, which a TwistStamped has.
+    """
+    base, tf = config.base_link, config.tf
+    if tf is not None:
+        base = Buffer().name(tf.base_frame or base, tf.namespace)
     return RobotConfig(
         name=config.name,
         bridge=config.bridge,
-        base_link=config.base_link,
+        base_link=base,
         odometry=config.odometry,
         alignment=config.alignment,
         motion=config.motion,

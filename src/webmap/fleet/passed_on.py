@@ -8,13 +8,15 @@ names.
 import hashlib
 import re
 from collections.abc import Container, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from webmap.agents.far_camera import FarCamera
-from webmap.base.errors import ConfigError
+from webmap.base.errors import ConfigError, WireError
+from webmap.config.buttons import read_buttons
 from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.fleet import FleetConfig
 from webmap.config.robot import (
@@ -26,6 +28,7 @@ from webmap.config.robot import (
 from webmap.fleet.files import check_picture, picture_file
 from webmap.ros.image_address import parse_address
 from webmap.ros.messages_image import MAX_PIXELS
+from webmap.ros.rosbridge.graph import SET_PARAM
 from webmap.server.files import MEDIA_TYPES
 
 LARGEST = 1 << 20
@@ -155,6 +158,42 @@ def passed_on(config: RobotConfig) -> RobotConfig:
         for each in named_cameras(config.cameras)
     ]
     return msgspec.structs.replace(config, cameras=cameras)
+
+
+def actions(config: RobotConfig) -> list[dict[str, str]]:
+    """Return the topic or the service, and the parameter, that each button writes."""
+    found = []
+    for _, module in config.layers():
+        if module.name != "Buttons":
+            continue
+        given = module.args[1] if module.args[1:] else module.options.get("buttons")
+        with suppress(ConfigError, TypeError):  # then no display shows the robot
+            for spec in read_buttons(given or ()):
+                action = {spec.kind: spec.name, "type": spec.type or ""}
+                if spec.kind == "parameter":
+                    of_node = f"{spec.node}/set_parameters"
+                    action["service"] = of_node if spec.node else SET_PARAM
+                found.append(action)
+    return found
+
+
+def check_parameters(service: str, args: Any, actions: list[dict[str, str]]) -> None:
+    """Check that a call sets no other parameter of a node than those of buttons.
+
+    Raises:
+        WireError: If it does.
+
+    """
+    own = {each.get("parameter") for each in actions if each.get("service") == service}
+    if not own or None in own:  # no parameter, or a button that calls the service
+        return
+    try:
+        given = [args] if service == SET_PARAM else args["parameters"]
+        is_own = own.issuperset(each["name"] for each in given)
+    except (TypeError, KeyError):
+        is_own = False
+    if not is_own:
+        raise WireError("the agent has no button for this parameter")
 
 
 def accepted(

@@ -43,9 +43,12 @@ def label(drawn: "Element", topic: str, robot: "Robot") -> None:
 
 
 def short(topic: str, name: str) -> str:
-    """Return a topic without the namespace of a robot of that name."""
+    """Return a topic without the namespace of a robot of that name.
+
+    The name of its agent or its bridge may follow that of the robot, in brackets.
+    """
     first, _, rest = topic.strip("/").partition("/")
-    own = rest and first.casefold() == name.strip().casefold()
+    own = rest and first.casefold() == name.partition(" (")[0].strip().casefold()
     return rest if own else f"/{topic.strip('/')}"
 
 

@@ -18,6 +18,9 @@ ACTIONS = {"navigate_to_pose": "nav2_msgs/action/NavigateToPose"}
 BRIEF = 2.0
 """Seconds for rosapi to report the type of a service, after the press of a button."""
 
+SET_PARAM = "/rosapi/set_param"
+"""The service that sets a parameter of ROS 1."""
+
 CLIENTS = ("rosbridge", "webmap")
 """Parts of the names of nodes that publish for their clients, such as WebMap."""
 
@@ -113,9 +116,7 @@ class Graph:
 
         """
         text = json.dumps(value, ensure_ascii=False)
-        await self._call(
-            "/rosapi/set_param", {"name": name, "value": text}, timeout=patience
-        )
+        await self._call(SET_PARAM, {"name": name, "value": text}, timeout=patience)
         # rosapi does not report a parameter that it may not set, so read it.
         answer = await self._call(
             "/rosapi/get_param", {"name": name, "default": ""}, timeout=patience
