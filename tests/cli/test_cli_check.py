@@ -61,3 +61,23 @@ def test_check_refuses_a_pipe_instead_of_a_file(tmp_path):
     result = run_inside("check", tmp_path / "pipe")
     assert result.returncode == 2
     assert f"{tmp_path / 'pipe'}: expected a file, got a pipe" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("robots", "counted"),
+    [
+        ("", "0 robots and the robots of agents behind 1 bridge"),
+        (
+            '\nhall = "ws://a"\n[[robots]]\nname = "Bob"\nodometry = "/odom"\n',
+            "1 robot and the robots of agents behind 2 bridges",
+        ),
+    ],
+)
+def test_check_counts_the_bridges_of_agents(tmp_path, robots, counted):
+    file = tmp_path / "fleet.toml"
+    file.write_text(f'[bridges]\nyard = "zenoh://hall:7447"{robots}')
+    result = run_inside("check", file)
+    assert (result.returncode, result.stdout) == (
+        0,
+        f"{file}: {counted}, no mistakes\n",
+    )

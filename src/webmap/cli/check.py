@@ -22,5 +22,7 @@ def check(file: Path) -> None:
 
     ready = prepare(file)
     robots = counted(len(ready.robots), "robot")
-    bridges = counted(len(ready.bridges), "bridge")
+    if ready.agents:
+        robots += " and the robots of agents"
+    bridges = counted(len(ready.fleet.bridges), "bridge")
     echo(f"{file}: {robots} behind {bridges}, no mistakes")
