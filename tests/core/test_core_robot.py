@@ -5,6 +5,7 @@ import contextlib
 import math
 import subprocess
 import sys
+import zlib
 
 import pytest
 
@@ -491,6 +492,14 @@ def test_the_id_of_a_robot_does_not_depend_on_other_robots():
     before, after = ids("Bob", "Ann"), ids("Cid", "Ann", "Bob")
     assert before == {name: after[name] for name in before}
     assert len(set(after.values())) == 3
+
+
+def test_the_id_of_a_robot_does_not_depend_on_a_name_with_the_same_checksum():
+    names = ("plumless", "buckeroo")
+    assert zlib.crc32(names[0].encode()) == zlib.crc32(names[1].encode())
+    first = [Robot(name) for name in names]
+    assert not any("-" in robot.id for robot in first)
+    assert first[0].id != first[1].id
 
 
 def test_two_robots_of_the_same_name_have_different_ids():

@@ -4,7 +4,6 @@ import hashlib
 import logging
 import math
 import time
-import zlib
 from collections import Counter
 from collections.abc import Mapping
 from concurrent.futures import Future
@@ -83,8 +82,13 @@ def id_at_agent(agent: str, name: str) -> str:
         name: The name of the robot at the agent.
 
     """
-    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()
-    return f"{agent}/r{digest[:16]}"
+    return f"{agent}/{_digest(name)}"
+
+
+def _digest(name: str) -> str:
+    """Return a part of an identifier; nobody finds a second name with the same one."""
+    data = name.encode("utf-8", "surrogatepass")
+    return f"r{hashlib.sha256(data).hexdigest()[:16]}"
 
 
 def _id_of(name: str) -> str:
@@ -104,7 +108,7 @@ def _id_of(name: str) -> str:
         if any(each.id == given for each in robot_motions):
             raise ConfigError("its agent has another robot of this name")
         return given
-    id = f"r{zlib.crc32(name.encode('utf-8', 'surrogatepass')):08x}"
+    id = _digest(name)
     _used[id] += 1
     return id if _used[id] == 1 else f"{id}-{_used[id]}"
 
