@@ -24,7 +24,11 @@ class Process:
     """A command of WebMap that runs until the test ends it."""
 
     def __init__(
-        self, *command: object, cwd: Path | None = None, module: str = "webmap"
+        self,
+        *command: object,
+        cwd: Path | None = None,
+        module: str = "webmap",
+        **environment: str,
     ) -> None:
         # No pipe: a pipe that is not read fills up and blocks the process.
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 - closed at its end
@@ -34,7 +38,7 @@ class Process:
             stderr=self._stderr,
             cwd=cwd,
             start_new_session=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
+            env={**os.environ, "PYTHONUNBUFFERED": "1", **environment},
         )
         self._log = b""
 
