@@ -1,5 +1,6 @@
 """Peers and a real router: users, rules, TLS and lost connections."""
 
+import socket
 import time
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -284,3 +285,78 @@ def test_of_messages_that_wait_for_a_slow_link_the_newest_are_kept():
     assert list(waiting["small"]) == [b"%d" % n for n in range(1990, 2000)]
     assert [each[5000:] for each in waiting["large"]] == [b"1999"]
     assert len(waiting["answers"]) == 1000
+
+
+def test_what_is_larger_than_expected_is_dropped_before_it_fills_the_memory():
+    got = []
+    with router() as place, peers(place, User()) as (sender,):
+        small = Peer(place, User(), most=1 << 20)
+        try:
+            small.start()
+            wait_for(lambda: small.connected)
+            small.listen("k", lambda key, data: got.append(len(data)), most=1000)
+            small.listen("l", lambda key, data: got.append(len(data)))
+            wait_for(lambda: (sender.put_data("l", b"1"), time.sleep(0.05), got)[2])
+            sender.put_data("k", bytes(1001))
+            sender.put_data("l", bytes(8 << 20))
+            sender.put_data("k", bytes(999))
+            wait_for(lambda: 999 in got)
+            assert small.connected
+        finally:
+            small.close()
+    assert set(got) == {1, 999}
+
+
+def test_what_waits_for_a_slow_link_does_not_fill_the_memory():
+    peer = Peer("tcp/127.0.0.1:1", User())
+    peer.trouble = None
+    for _ in range(20):
+        peer.put_data("k", bytes(2 << 20), all=True)
+    assert sum(map(len, peer._waiting["k"])) <= 12 << 20
+
+
+def test_a_self_signed_certificate_that_zenoh_refuses_is_no_wrong_password(users):
+    certificate = str(TLS / "self-signed.pem")
+    key = str(TLS / "self-signed.key")
+    tls = {"certificate": certificate, "key": key}
+    with router("tls/127.0.0.1:0", users, **tls) as place:
+        peer = Peer(place, User("west", "two", certificate))
+        try:
+            peer.start()
+            wait_for(lambda: "cannot reach the router" in (peer.trouble or ""))
+            assert "its certificate is not valid: it is that of an" in peer.trouble
+            assert "password" not in peer.trouble
+        finally:
+            peer.close()
+
+
+def test_a_closed_peer_leaves_no_thread_inside_zenoh():
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        peer = Peer(f"tcp/127.0.0.1:{silent.getsockname()[1]}", User())
+        peer.start()
+        time.sleep(0.3)
+        peer.close()
+    assert not any(thread.is_alive() for thread in peer._threads)
+
+
+def test_an_agent_hears_only_from_the_router_what_it_may_send(users):
+    heard = []
+    with (
+        router(users=users) as place,
+        peers(place, User("bay3", "one"), User("west", "two")) as both,
+    ):
+        for peer in both:
+            name = peer.user.name
+            peer.listen(
+                "webmap/bay3/here", lambda *_, name=name: heard.append(name), back=True
+            )
+        both[1].put_data("webmap/bay3/here", b"x")
+        time.sleep(0.5)
+        assert heard == []
+        wait_for(
+            lambda: (
+                both[0].put_data("webmap/bay3/here", b"x"),
+                time.sleep(0.05),
+                {*heard} == {"bay3", "west"},
+            )[2]
+        )

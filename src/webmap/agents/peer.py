@@ -37,6 +37,9 @@ COPIES = 2
 RETRY = 0.2
 """Seconds between two attempts to reach the router."""
 
+OPENING = 4.0
+"""Seconds for the router to open a session."""
+
 EXPLAIN = 25
 """Failed attempts between two looks for the reason."""
 
@@ -51,6 +54,12 @@ MOST_WAITING = 10
 
 MOST_OF_ALL = 1000
 """Messages under a key that wait at most where every one counts."""
+
+MOST_WAITING_BYTES = 8 << 20
+"""Bytes under a key that wait at most besides the newest message."""
+
+MOST_BYTES = 68 << 20
+"""Bytes of the largest message: the largest of a rosbridge, and its packing."""
 
 ASK_PATIENCE = 5.0
 """Seconds for an answer of another peer."""
@@ -72,6 +81,13 @@ class User:
         self.instance = secrets.token_hex(4)
         self.password = password
         self.ca = ca
+
+    @property
+    def may_not(self) -> str:
+        """What to add where no agent is found: a router shows it only to its users."""
+        return (
+            "" if self.name == ANYONE else f", or the user {self.name} may not see it"
+        )
 
     @classmethod
     def from_environment(cls) -> Self:
@@ -105,29 +121,34 @@ class Peer:
     Args:
         router: The router's address.
         user: Who this process is.
+        most: Bytes of the largest message that it receives; larger ones are dropped
+            before they fill the memory.
 
     Raises:
         ConfigError: If the address is none, or Zenoh is not installed.
 
     """
 
-    def __init__(self, router: str, user: User | None = None) -> None:
+    def __init__(
+        self, router: str, user: User | None = None, most: int = MOST_BYTES
+    ) -> None:
         self.locator = locator(router)
         self.user = user or User.from_environment()
         self.trouble: str | None = f"waiting for the router at {self.locator}"
         """Why the router is not connected; None if it is."""
-        self._config = self._client_config()
+        self._config = self._client_config(most)
         zenoh_config()  # to fail here, not in a thread
         self._lock = threading.Lock()
         self._ended = threading.Event()
         self._gate: list[zenoh.Session] = []
         self._data: zenoh.Session | None = None
-        self._handlers: dict[int, tuple[str, Handler, bool, int | None]] = {}
+        self._handlers: dict[int, tuple[str, Handler, bool, int, bool]] = {}
         self._answers: dict[str, Callable[[], bytes]] = {}
         self._declared: dict[int, list[Any]] = {}
         self._number = 0
         self._waiting: OrderedDict[str, deque[bytes]] = OrderedDict()
         self._wake = threading.Condition()
+        self._putting = threading.Lock()
         self._threads: list[threading.Thread] = []
 
     @property
@@ -145,20 +166,34 @@ class Peer:
             thread.start()
 
     def close(self) -> None:
-        """Close the sessions; a process that does not close them hangs at its end."""
+        """Close the sessions; a process that does not close them hangs at its end.
+
+        Then no thread is inside Zenoh. Python ends the threads that come back from
+        there after its own end, and so aborts the process: Rust does not allow that.
+        """
         self._ended.set()
         with self._wake:
             self._wake.notify_all()
-        for thread in self._threads:
-            thread.join(5.0)
-        sessions = (*self._gate, self._data)
-        self._gate, self._data = [], None
+        keeping, sending = self._threads or (None, None)
+        if keeping is not None:
+            keeping.join(3 * OPENING)
+        with self._putting:
+            sessions = (*self._gate, self._data)
+            self._gate, self._data = [], None
         for session in sessions:
             if session is not None:
                 session.close()  # type: ignore[no-untyped-call]
+        if sending is not None:
+            sending.join(OPENING)  # a closed session sends nothing
 
     def listen(
-        self, key: str, fn: Handler, *, gate: bool = False, most: int | None = None
+        self,
+        key: str,
+        fn: Handler,
+        *,
+        gate: bool = False,
+        most: int = MOST_BYTES,
+        back: bool = False,
     ) -> int:
         """Call ``fn`` with each message under a key; return a number to end it.
 
@@ -167,13 +202,15 @@ class Peer:
             fn: Receives the messages.
             gate: Whether they are samples of :meth:`put_gate`. Each comes up to
                 :data:`COPIES` times, in as many threads.
-            most: The longest message in bytes; longer ones are dropped unread.
+            most: Bytes of the largest message; larger ones are dropped unread.
+            back: Whether data that this process itself sends comes only if the router
+                sends it back.
 
         """
         with self._lock:
             self._number += 1
             number = self._number
-            self._handlers[number] = (key, fn, gate, most)
+            self._handlers[number] = (key, fn, gate, most, back)
             self._declare(number)
         return number
 
@@ -226,17 +263,18 @@ class Peer:
         """
         import zenoh
 
-        for copy, session in enumerate(self._gate):
-            if only is not None and copy != only % len(self._gate):
-                continue
-            with suppress(zenoh.ZError):  # it was closed just now
-                session.put(
-                    f"{key}/{copy}",
-                    data,
-                    congestion_control=zenoh.CongestionControl.DROP,
-                    priority=zenoh.Priority.REAL_TIME,
-                    express=True,
-                )
+        with self._putting:
+            for copy, session in enumerate(self._gate):
+                if only is not None and copy != only % len(self._gate):
+                    continue
+                with suppress(zenoh.ZError):  # it was closed just now
+                    session.put(
+                        f"{key}/{copy}",
+                        data,
+                        congestion_control=zenoh.CongestionControl.DROP,
+                        priority=zenoh.Priority.REAL_TIME,
+                        express=True,
+                    )
 
     def put_data(self, key: str, data: bytes, *, all: bool = False) -> None:
         """Send data as soon as the link accepts it.
@@ -255,7 +293,9 @@ class Peer:
             if waiting is None:
                 waiting = self._waiting[key] = deque()
             most = MOST_WAITING if len(data) <= SMALL else 1
-            while len(waiting) >= (MOST_OF_ALL if all else most):
+            while len(waiting) >= (MOST_OF_ALL if all else most) or (
+                sum(map(len, waiting)) > MOST_WAITING_BYTES
+            ):
                 waiting.popleft()
             waiting.append(data)
             self._wake.notify()
@@ -287,7 +327,7 @@ class Peer:
             except zenoh.ZError as error:
                 log.warning("%s: data was not sent: %s", self.locator, error)
 
-    def _client_config(self) -> dict[str, Any]:
+    def _client_config(self, most: int) -> dict[str, Any]:
         endpoint = self.locator
         settings: dict[str, Any] = {
             "mode": "client",
@@ -302,10 +342,17 @@ class Peer:
                 },
             },
         }
-        link: dict[str, Any] = {"tx": {"queue": {"size": {"data": 1, "real_time": 1}}}}
+        link: dict[str, Any] = {
+            "tx": {"queue": {"size": {"data": 1, "real_time": 1}}},
+            "rx": {"max_message_size": most},
+        }
         if endpoint.startswith("tls/") and self.user.ca:
             link["tls"] = {"root_ca_certificate": self.user.ca}
-        settings["transport"] = {"link": link, "shared_memory": {"enabled": False}}
+        settings["transport"] = {
+            "link": link,
+            "unicast": {"open_timeout": int(OPENING * 1000)},
+            "shared_memory": {"enabled": False},
+        }
         if self.user.password:
             settings["transport"]["auth"] = {
                 "usrpwd": {"user": self.user.name, "password": self.user.password}
@@ -360,21 +407,21 @@ class Peer:
         self.trouble = trouble
 
     def _declare(self, number: int) -> None:
-        key, fn, gate, most = self._handlers[number]
+        key, fn, gate, most, back = self._handlers[number]
         if self._data is None or number in self._declared:
             return
 
         def call(sample: "zenoh.Sample") -> None:
             try:
                 size = len(sample.payload)
-                if most is not None and size > most:
+                if size > most:
                     log.warning("%s: dropped %d bytes", sample.key_expr, size)
                     return
                 fn(str(sample.key_expr), sample.payload.to_bytes())
             except Exception:
                 log.exception("%s: a message was lost", key)
 
-        places = [(self._data, key)]
+        places = [(self._gate[0] if back else self._data, key)]
         if gate:
             places = [
                 (session, f"{key}/{copy}") for copy, session in enumerate(self._gate)
@@ -399,15 +446,21 @@ _peers: dict[str, Peer] = {}
 _peers_lock = threading.Lock()
 
 
-def peer_of(router: str) -> Peer:
-    """Return the peer of this process for a router; it is started."""
+def peer_of(router: str, most: int = MOST_BYTES) -> Peer:
+    """Return the peer of this process for a router; it is started.
+
+    Args:
+        router: The router's address.
+        most: Bytes of the largest message that a new peer receives.
+
+    """
     with _peers_lock:
         place = locator(router)
         peer = _peers.get(place)
         if peer is None:
             if not _peers:
                 atexit.register(close_peers)
-            peer = _peers[place] = Peer(router)
+            peer = _peers[place] = Peer(router, most=most)
             peer.start()
         return peer
 

@@ -45,7 +45,8 @@ def agents_behind(
     try:
         while listened < LISTEN or not names:
             waited = time.monotonic() - began
-            why = peer.trouble or (None if names else f"no agent is at {url} yet")
+            nobody = f"no agent is at {url} yet{peer.user.may_not}"
+            why = peer.trouble or (None if names else nobody)
             if why is not None and waited > max(wait, LISTEN):
                 break
             if why is not None and waited > LISTEN and not reported:
@@ -59,7 +60,7 @@ def agents_behind(
     if trouble is not None:
         raise _closed(trouble, trouble)
     if not names:
-        why = f"no agent is at {url}"
+        why = f"no agent is at {url}{peer.user.may_not}"
         raise _closed(
             why,
             f"{why}; start one beside the robot: webmap agent ws://localhost:9090 "

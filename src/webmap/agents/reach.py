@@ -1,7 +1,13 @@
 """Why a router cannot be reached, in words: Zenoh reports only that it cannot."""
 
+import re
 import socket
 import ssl
+
+_OF_AUTHORITY = re.compile(
+    rb"\x06\x03\x55\x1d\x13(\x01\x01\xff)?\x04.\x30.\x01\x01\xff", re.DOTALL
+)
+"""The part of a certificate with ``basicConstraints`` and ``CA:TRUE``."""
 
 PATIENCE = 2.0
 """Seconds for an answer."""
@@ -38,7 +44,7 @@ def why_not_reached(locator: str, user: str, ca: str) -> str:
     if user:
         return (
             f"it does not let the user {user} in: the name or the password is wrong, "
-            "or it is not a Zenoh router"
+            "it has no users, or it is not a Zenoh router"
         )
     return (
         "it lets nobody in without a user: set WEBMAP_ROUTER_USER and "
@@ -54,9 +60,16 @@ def _why_no_tls(link: socket.socket, host: str, ca: str) -> str:
     # Zenoh does not require what Python requires since 3.13.
     context.verify_flags &= ~ssl.VERIFY_X509_STRICT
     try:
-        context.wrap_socket(link, server_hostname=host).close()
+        with context.wrap_socket(link, server_hostname=host) as secured:
+            certificate = secured.getpeercert(binary_form=True) or b""
     except ssl.SSLCertVerificationError as error:
         return f"its certificate is not valid: {error.verify_message}"
     except OSError as error:
         return f"it does not speak TLS: {error}"
+    if _OF_AUTHORITY.search(certificate):  # Python accepts it, Zenoh does not
+        return (
+            "its certificate is not valid: it is that of an authority (CA:TRUE), as "
+            "self-signed ones are by default; give the router one that the authority "
+            "signed, or a self-signed one with CA:FALSE"
+        )
     return ""

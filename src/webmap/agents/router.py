@@ -15,6 +15,7 @@ import msgspec
 
 from webmap.agents.address import EVERY, checked_name, gate_in, here, locator
 from webmap.agents.displays import MOST_SAMPLE
+from webmap.agents.peer import MOST_BYTES
 from webmap.base.errors import ConfigError
 
 MOST_SESSIONS = 10_000
@@ -118,10 +119,12 @@ def router_settings(
     transport: dict[str, Any] = {
         "shared_memory": {"enabled": False},
         "unicast": {"max_sessions": MOST_SESSIONS},
+        "link": {"rx": {"max_message_size": MOST_BYTES}},
     }
     if tls:
-        transport["link"] = {
-            "tls": {"listen_certificate": certificate, "listen_private_key": key}
+        transport["link"]["tls"] = {
+            "listen_certificate": certificate,
+            "listen_private_key": key,
         }
     settings: dict[str, Any] = {
         "mode": "router",

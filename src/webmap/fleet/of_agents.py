@@ -173,7 +173,8 @@ class Agents:
         now = time.monotonic()
         heard = {name: now - at < AWAY for name, at in list(self._news_at.items())}
         if not heard:
-            return "connecting", f"no agent is at {self.url} yet"
+            may_not = self._peer.user.may_not
+            return "connecting", f"no agent is at {self.url} yet{may_not}"
         away = sorted(name for name, is_there in heard.items() if not is_there)
         text = f"{counted(len(heard) - len(away), 'agent')} connected"
         if len(heard) == MOST_AGENTS:
@@ -398,8 +399,7 @@ def find_agents(routers: Sequence[str], bridges: "list[Bridge]") -> list[Agents]
         if each.trouble is not None:
             echo(f"{each.trouble}. Its robots appear when it is there.", err=True)
         elif not each.heard:
-            echo(
-                f"No agent is at {each.url} yet. Robots appear when one is there.",
-                err=True,
-            )
+            text = each.describe()[1]
+            text = f"{text[0].upper()}{text[1:]}. Robots appear when one is there."
+            echo(text, err=True)
     return found
