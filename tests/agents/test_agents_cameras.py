@@ -157,8 +157,9 @@ def test_what_is_no_picture_is_not_sent_and_every_display_reads_why(bench, data,
 def test_the_number_of_displays_at_a_camera_is_bounded(bench):
     for number in range(MOST_DISPLAYS):
         bench.look(Sender("ann", str(number)))
-    with pytest.raises(WireError, match="500 displays"):
-        bench.look(BEN)
+    with pytest.raises(WireError, match="100 displays of the user ann"):
+        bench.look(Sender("ann", "more"))
+    bench.look(BEN)  # another user has places of its own
     bench.look(ANN._replace(instance="0"))
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from webmap.agents import data
 from webmap.agents.address import Sender
+from webmap.agents.allowance import Allowance
 from webmap.agents.clients import Clients
 from webmap.base.errors import WireError
 from webmap.ros.rosbridge import ops
@@ -24,7 +25,7 @@ class Bench:
             call=self.calls.append,
             **options,
         )
-        self.clients.opened("s1")
+        self.clients.opened("s1", 0.0)
 
     def send(self, client, frame, now=0.0):
         self.clients.receive(client, data.pack_frame(frame), now)
@@ -48,9 +49,9 @@ def test_the_agent_subscribes_once_for_all_displays(bench):
     assert (op["op"], op["topic"], op["compression"]) == ("subscribe", "/map", "cbor")
     bench.subscribe(BEN, type="nav_msgs/OccupancyGrid", compression="cbor")
     assert bench.took() == []
-    bench.send(ANN, ops.unsubscribe("/map", id="1"))
+    bench.send(ANN, ops.unsubscribe("/map", id="1"), 2.0)
     assert bench.took() == []
-    bench.send(BEN, ops.unsubscribe("/map", id="1"))
+    bench.send(BEN, ops.unsubscribe("/map", id="1"), 2.0)
     assert [op["op"] for op in bench.took()] == ["unsubscribe"]
     assert bench.clients.topics == []
 
@@ -58,7 +59,7 @@ def test_the_agent_subscribes_once_for_all_displays(bench):
 def test_the_subscription_serves_the_display_that_wants_most(bench):
     bench.subscribe(ANN, "/odom", throttle_rate=200)
     assert bench.took()[0]["throttle_rate"] == 200
-    bench.subscribe(BEN, "/odom", throttle_rate=100)
+    bench.subscribe(BEN, "/odom", throttle_rate=100, now=2.0)
     assert [(op["op"], op.get("throttle_rate")) for op in bench.took()] == [
         ("unsubscribe", None),
         ("subscribe", 100),
@@ -108,7 +109,7 @@ def test_a_new_connection_to_the_rosbridge_subscribes_again(bench):
     bench.clients.closed("the connection was lost")
     bench.subscribe(BEN, "/odom")
     assert bench.took() == []
-    bench.clients.opened("s2")
+    bench.clients.opened("s2", 1.0)
     assert [op["topic"] for op in bench.took()] == ["/map", "/odom"]
 
 
@@ -144,6 +145,10 @@ def test_a_display_calls_services_that_only_read(bench):
 @pytest.mark.parametrize(
     "frame",
     [
+        ops.call_service("/rosapi/message_details", {"type": "std_msgs/Bool"}, id="7"),
+        ops.call_service("/rosapi/get_param", {"name": "/x"}, id="7"),
+        ops.call_service("/rosapi/node_details", {"node": "/x"}, id="7"),
+        ops.advertise("/lamp", "std_msgs/String", id="7"),
         ops.call_service("/rosapi/set_param", {"name": "x", "value": "1"}, id="7"),
         ops.call_service("/dock", id="7"),
         ops.advertise("/cmd_vel", "geometry_msgs/Twist", id="7"),
@@ -152,7 +157,8 @@ def test_a_display_calls_services_that_only_read(bench):
         b'{"op":"call_service","service":"/rosapi/topics/../set_param","id":"7"}',
     ],
 )
-def test_everything_else_is_refused_and_reaches_no_robot(bench, frame):
+def test_everything_else_is_refused_and_reaches_no_robot(frame):
+    bench = Bench(publishes=lambda: {"/lamp": "std_msgs/Bool"})
     bench.send(ANN, frame)
     assert (bench.took(), bench.calls) == ([], [])
     ((client, answer),) = bench.replies
@@ -163,7 +169,7 @@ def test_everything_else_is_refused_and_reaches_no_robot(bench, frame):
 
 
 def test_the_buttons_of_the_agent_may_be_pressed_on_a_display():
-    bench = Bench(publishes=lambda: {"/lamp"}, calls=lambda: {"/dock"})
+    bench = Bench(publishes=lambda: {"/lamp": "std_msgs/Bool"}, calls=lambda: {"/dock"})
     bench.send(ANN, ops.call_service("/dock", id="7"))
     bench.send(ANN, ops.advertise("/lamp", "std_msgs/Bool", id="8"))
     bench.send(ANN, ops.publish("/lamp", {"data": True}))
@@ -190,6 +196,15 @@ def test_a_frame_that_unpacks_to_too_much_is_refused():
         data.unpack(bomb)
 
 
+@pytest.mark.parametrize("size", [data.MOST_OF_DISPLAY + 1, 50_000_000])
+@pytest.mark.parametrize("pack", [lambda frame: data.FRAME + frame, data.pack_frame])
+def test_what_a_display_sends_is_small_packed_and_unpacked(bench, size, pack):
+    frame = ops.subscribe("/map", id="1") + b" " * size
+    with pytest.raises(WireError, match=f"{data.MOST_OF_DISPLAY}"):
+        bench.clients.receive(ANN, pack(frame), 0.0)
+    assert bench.took() == []
+
+
 @pytest.mark.parametrize("frame", [b"{}", b"x" * 10_000, bytes(range(256)) * 8])
 def test_a_frame_arrives_as_it_was(frame):
     piece = data.pack_frame(frame)
@@ -200,5 +215,127 @@ def test_a_frame_arrives_as_it_was(frame):
 def test_too_many_connections_of_displays_are_refused(bench, monkeypatch):
     monkeypatch.setattr("webmap.agents.clients.MOST_CLIENTS", 1)
     bench.subscribe(ANN)
-    with pytest.raises(WireError, match="more than 1 connections"):
-        bench.subscribe(BEN)
+    with pytest.raises(WireError, match="more than 1 connections of the user ann"):
+        bench.subscribe(Sender("ann", "4f", "2"))
+    bench.subscribe(BEN)  # another user has places of its own
+
+
+def test_a_user_has_so_many_subscriptions_and_others_have_theirs(bench, monkeypatch):
+    monkeypatch.setattr("webmap.agents.clients.MOST_WISHES", 2)
+    bench.subscribe(ANN, "/a")
+    bench.subscribe(ANN, "/a")
+    bench.subscribe(ANN, "/b")
+    with pytest.raises(WireError, match="more than 2 subscriptions of the user ann"):
+        bench.subscribe(ANN, "/c")
+    bench.subscribe(BEN, "/c")
+    bench.send(ANN, ops.unsubscribe("/a", id="1"))
+    bench.subscribe(ANN, "/d")
+
+
+def test_calls_that_are_not_answered_count_for_their_user(bench):
+    others = [Sender("ann", f"{number}", "1") for number in range(3)]
+    for display in others:
+        for _ in range(20):
+            bench.send(display, ops.call_service("/rosapi/topics", {}, id="7"))
+    per_display = [call.client for call in bench.calls]
+    assert [per_display.count(each) for each in others] == [16, 16, 0]
+    assert "too many calls" in json.loads(bench.replies[-1][1])["values"]
+    bench.send(BEN, ops.call_service("/rosapi/topics", {}, id="7"))
+    assert bench.calls[-1].client == BEN
+    bench.clients.returned(bench.calls[0])
+    bench.send(others[0], ops.call_service("/rosapi/topics", {}, id="7"))
+    assert bench.calls[-1].client == others[0]
+
+
+SCAN = "sensor_msgs/LaserScan"
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        {"type": SCAN, "compression": "none"},
+        {"type": SCAN, "compression": "png"},
+        {"type": SCAN, "compression": "cbor-raw"},
+        {"type": SCAN, "compression": "cbor", "queue_length": 100_000},
+        {"compression": "none"},
+    ],
+)
+@pytest.mark.parametrize("is_known", [False, True])
+def test_a_display_does_not_change_how_others_get_a_topic(bench, wish, is_known):
+    if is_known:
+        bench.clients.typed({"/scan": "sensor_msgs/msg/LaserScan"}, 0.0)
+    good = {"type": SCAN, "throttle_rate": 100, "compression": "cbor"}
+    bench.subscribe(ANN, "/scan", **good)
+    (before,) = bench.took()
+    bench.subscribe(BEN, "/scan", **{"throttle_rate": 300_000, **wish}, now=2.0)
+    assert bench.took() == []
+    assert (before["compression"], before["throttle_rate"]) == ("cbor", 100)
+
+
+def test_of_two_types_the_rosbridge_knows_the_right_one(bench):
+    bench.subscribe(BEN, "/scan", type="std_msgs/String")
+    bench.subscribe(ANN, "/scan", type=SCAN, compression="cbor", now=2.0)
+    assert "type" not in bench.took()[-1]
+    assert bench.clients.asks_types
+    bench.clients.typed({"/scan": "sensor_msgs/msg/LaserScan"}, 4.0)
+    op = bench.took()[-1]
+    assert (op["type"], op["compression"]) == (SCAN, "cbor")
+    assert not bench.clients.asks_types
+    bench.subscribe(Sender("eve", "6d", "1"), "/scan", type="std_msgs/String", now=9.0)
+    assert bench.took() == []
+
+
+def test_a_display_that_wants_all_at_once_is_served_at_the_least_throttle(bench):
+    bench.subscribe(ANN, "/scan", type=SCAN, throttle_rate=0, queue_length=50)
+    (op,) = bench.took()
+    assert (op["throttle_rate"], op["queue_length"]) == (50, 1)
+
+
+def test_a_subscription_changes_once_a_second_at_most(bench):
+    bench.subscribe(ANN, "/odom", throttle_rate=1000)
+    for step in range(100):
+        bench.subscribe(BEN, "/odom", throttle_rate=100 + step % 2, now=step / 100)
+    assert len(bench.took()) == 1
+    bench.clients.look(1.5)
+    assert [op.get("throttle_rate") for op in bench.took()] == [None, 101]
+
+
+def test_a_map_too_large_for_cbor_comes_in_json_and_another_one_does_not(bench):
+    large = {"type": "nav_msgs/OccupancyGrid", "compression": "none"}
+    bench.subscribe(ANN, **large)
+    (op,) = bench.took()
+    assert (op["compression"], op["throttle_rate"]) == ("none", 300_000)
+    bench.clients.message("/map", b"{}", 3.0, in_parts=True)
+    bench.clients.look(4.0)
+    assert bench.took() == []
+    bench.clients.message("/map", b"{}", 5.0)
+    bench.clients.look(6.0)
+    assert bench.took()[-1]["compression"] == "cbor"
+
+
+@pytest.mark.parametrize(("ros", "answers"), [("sensor_msgs", 1), ("x/msg", 0)])
+def test_only_a_rosbridge_of_ros_1_is_asked_for_the_types_of_buttons(ros, answers):
+    bench = Bench(details=lambda: {"my_msgs/Dock"})
+    bench.clients.typed({"/scan": f"{ros}/LaserScan"}, 0.0)
+    for type in ("my_msgs/Dock", "std_msgs/Bool"):
+        call = ops.call_service("/rosapi/message_details", {"type": type}, id="7")
+        bench.send(ANN, call)
+    assert len(bench.calls) == answers
+
+
+def test_a_late_subscription_that_comes_again_and_again_gets_the_map_rarely(bench):
+    bench.subscribe(ANN)
+    bench.clients.message("/map", b"x" * (10 << 20), 1.0)
+    for step in range(200):
+        bench.subscribe(BEN, now=2.0 + step / 100)
+    assert len(bench.replies) <= 5
+
+
+def test_a_user_that_sends_too_much_is_left_out_and_others_are_not():
+    allowance = Allowance("messages", pieces=100, size=1000)
+    flood = [allowance.admits("ann", 1, 0.0) for _ in range(2000)]
+    assert flood.count(True) == pytest.approx(1000, abs=1)
+    assert allowance.admits("ben", 1, 0.0)
+    assert allowance.admits("ann", 5000, 0.5)  # a large piece is taken whole
+    assert not allowance.admits("ann", 1, 4.0)
+    assert allowance.admits("ann", 1, 5.1)

@@ -156,3 +156,31 @@ def test_a_connection_listens_to_a_topic_until_its_last_subscription_ends(clock)
     clock.advance(60.0)
     assert taken == [b"{}"]
     assert len(peer.sent) == 5  # the agent gets each operation
+
+
+def test_a_new_agent_is_noticed_though_a_ping_to_the_old_one_has_no_answer(
+    clock, monkeypatch
+):
+    class Restarted(Peer):
+        def put_data(self, key, piece, *, all):
+            if not 101.0 < clock.now < 103.0:
+                session = "old" if clock.now < 102.0 else "new"
+                number = data.unpack(piece).number
+                lane._take(data.pack_note(data.Pong(number, session)))
+
+    async def sleep(seconds):
+        clock.now += seconds
+        lane._take(data.pack_frame(b"{}"))  # of what another display shows
+
+    lane = AgentLane(
+        "zenoh://router/bay3",
+        opened=lambda: None,
+        received=lambda frame: None,
+        closed=print,
+        failed=print,
+    )
+    lane._peer, lane._loop, lane._key_in = Restarted(), clock, "in"
+    lane._session = "old"
+    monkeypatch.setattr(asyncio, "sleep", sleep)
+    assert asyncio.run(lane._keep_open()) == "the agent has connected again"
+    assert clock.now <= 104.0

@@ -17,6 +17,7 @@ import msgspec
 
 from webmap.agents import address, looks
 from webmap.agents.address import Sender, sender_of
+from webmap.agents.allowance import Allowance
 from webmap.agents.looks import CameraPicture, Look, LookAway, Looked
 from webmap.agents.peer import Peer
 from webmap.base.errors import ProtocolError, WireError
@@ -36,8 +37,8 @@ AHEAD = 2
 PATIENCE = 3.0
 """Seconds after which a picture that no display has got counts as lost."""
 
-MOST_DISPLAYS = 500
-"""Displays that look at one camera at once."""
+MOST_DISPLAYS = 100
+"""Displays of one user that look at one camera at once."""
 
 THROTTLE = 200
 """The least milliseconds between two pictures, if the configuration states none."""
@@ -134,8 +135,13 @@ class Cameras:
         if watched is None:
             watched = self._watched[name] = _Watched(camera)
             self._begin(name, camera)
-        elif client not in watched.looks and len(watched.looks) >= MOST_DISPLAYS:
-            raise WireError(f"more than {MOST_DISPLAYS} displays look at one camera")
+        elif client not in watched.looks:
+            mine = [each for each in watched.looks if each.user == client.user]
+            if len(mine) >= MOST_DISPLAYS:
+                raise WireError(
+                    f"more than {MOST_DISPLAYS} displays of the user {client.user} "
+                    "look at one camera"
+                )
         watched.looks[client] = now
         self._answer(client, Looked(look.number, now, watched.trouble))
         if any(number == look.newest for number, _ in watched.flying):
@@ -208,6 +214,7 @@ class AgentCameras:
         self._peer = peer
         self._loop: asyncio.AbstractEventLoop | None = None
         self._pulls: dict[Name, Pull] = {}
+        self._allowance = Allowance("looks at cameras")
         self._cameras = Cameras(
             begin=self._begin, end=self._end, send=self._send, answer=self._answer
         )
@@ -216,7 +223,11 @@ class AgentCameras:
         """Begin to listen to displays; called in the loop's thread."""
         self._loop = loop
         every = address.EVERY
-        self._peer.listen(address.looks_in(self._agent, every, every), self._arrived)
+        self._peer.listen(
+            address.looks_in(self._agent, every, every),
+            self._arrived,
+            most=looks.MOST_BYTES,
+        )
 
     async def stop(self) -> None:
         """End all downloads."""
@@ -232,8 +243,13 @@ class AgentCameras:
         self._cameras.look(now)
 
     def _arrived(self, key: str, piece: bytes) -> None:
-        if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._take, sender_of(key), piece)
+        client = sender_of(key)
+        if (
+            self._loop is not None
+            and not self._loop.is_closed()
+            and self._allowance.admits(client.user, len(piece), time.monotonic())
+        ):
+            self._loop.call_soon_threadsafe(self._take, client, piece)
 
     def _take(self, client: Sender, piece: bytes) -> None:
         try:

@@ -5,7 +5,7 @@ or a note of the connection itself, as JSON.
 """
 
 import zlib
-from typing import Literal
+from typing import Annotated, Literal, TypeAlias
 
 import msgspec
 
@@ -19,6 +19,9 @@ WORTH_PACKING = 256
 MOST = 64 << 20
 """Bytes of the largest frame."""
 
+MOST_OF_DISPLAY = 64 << 10
+"""Bytes of the largest frame of a display, packed and unpacked: it subscribes, and
+publishes and calls what a button does."""
 
 DICTIONARY = (
     b'"covariance": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "twist": {"twist": {"linear": '
@@ -74,42 +77,51 @@ def pack_frame(frame: bytes | bytearray) -> bytes:
     return FRAME + bytes(frame)
 
 
-def unpack(piece: bytes) -> Note | bytes:
+def unpack(piece: bytes, most: int = MOST) -> Note | bytes:
     """Return the note or the frame in a piece.
+
+    Args:
+        piece: The bytes.
+        most: Bytes of the largest frame, packed and unpacked.
 
     Raises:
         WireError: If the bytes are neither.
 
     """
+    if len(piece) > most + 1:
+        raise WireError(f"got {len(piece)} bytes, expected {most} at most")
     kind, body = piece[:1], piece[1:]
     try:
         if kind == FRAME:
             return body
         if kind == PACKED:
             unpacking = zlib.decompressobj(zdict=DICTIONARY)
-            frame = unpacking.decompress(body, MOST)
+            frame = unpacking.decompress(body, most)
             if not unpacking.eof:
-                raise WireError(f"got a frame of more than {MOST} bytes")
+                raise WireError(f"got a frame of more than {most} bytes")
             return frame
         if kind == NOTE:
             note: Note = _note(body)
             return note
-    except (zlib.error, msgspec.DecodeError) as error:
+    except (zlib.error, msgspec.DecodeError, RecursionError) as error:
         raise WireError(f"got data that cannot be read: {error}") from error
     raise WireError(f"got data of the kind {kind!r}, expected one of 3")
+
+
+_Name: TypeAlias = Annotated[str, msgspec.Meta(max_length=512)]
 
 
 class SubscribeOp(msgspec.Struct, omit_defaults=True):
     """An operation of a display on a topic or a service."""
 
     op: str = ""
-    topic: str = ""
-    id: str | None = None
-    type: str | None = None
+    topic: _Name = ""
+    id: _Name | None = None
+    type: _Name | None = None
     throttle_rate: int = 0
     queue_length: int = 1
     compression: Literal["none", "png", "cbor", "cbor-raw"] | None = None
-    service: str = ""
+    service: _Name = ""
     args: msgspec.Raw = msgspec.Raw(b"{}")
 
 
@@ -125,5 +137,5 @@ def read_op(frame: bytes) -> SubscribeOp:
     """
     try:
         return _op(frame)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, RecursionError) as error:
         raise WireError(f"got an operation that cannot be read: {error}") from error

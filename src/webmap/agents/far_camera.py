@@ -16,6 +16,7 @@ from urllib.parse import parse_qs, urlencode, urlsplit
 import msgspec
 
 from webmap.agents import address, looks
+from webmap.agents.allowance import Allowance
 from webmap.agents.looks import AgentClock, Look, LookAway
 from webmap.agents.peer import Peer, peer_of
 from webmap.base.errors import ConfigError, WireError
@@ -100,6 +101,7 @@ class FarPull:
         self._show = show
         self._complain = complain
         self._clock = AgentClock()
+        self._allowance = Allowance("pictures", pieces=200, size=32 << 20)
         self._newest = 0
         self._heard = 0.0
         self._peer: Peer | None = None
@@ -115,9 +117,11 @@ class FarPull:
         self._in = address.looks_in(agent, user.name, user.instance)
         out = address.looks_out(agent, user.name, user.instance)
         self._listening = [
-            peer.listen(out, self._later(self._take_answer)),
+            peer.listen(out, self._later(self._take_answer), most=looks.MOST_BYTES),
             peer.listen(
-                address.camera_key(agent, robot, camera), self._later(self._take)
+                address.camera_key(agent, robot, camera),
+                self._later(self._take),
+                most=looks.MOST_PICTURE,
             ),
         ]
         self._heard = time.monotonic()
@@ -162,6 +166,9 @@ class FarPull:
         """Return a function that calls ``fn`` in the model's thread."""
 
         def call(_key: str, piece: bytes) -> None:
+            name = self._camera.name
+            if not self._allowance.admits(name, len(piece), time.monotonic()):
+                return
             with contextlib.suppress(RuntimeError):  # the loop has been closed
                 self._loop.call_soon_threadsafe(self._unless_ended, fn, piece)
 

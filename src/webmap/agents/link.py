@@ -7,8 +7,9 @@ import time
 from typing import Any
 
 from webmap.agents import address, data
+from webmap.agents.allowance import Allowance
 from webmap.agents.heard import Heard
-from webmap.agents.peer import Peer, peer_of
+from webmap.agents.peer import Handler, Peer, peer_of
 from webmap.base.errors import BridgeClosed, WireError
 from webmap.ros.bridge import LINKS
 from webmap.ros.rosbridge.connection import CLOSED_HERE, Lane, Liveness
@@ -24,6 +25,11 @@ PATIENCE = 3.0
 
 Less than a service call waits, so that it fails with the reason of the attempt.
 """
+
+
+PIECES, BYTES = 4000, 32 << 20
+"""Pieces and bytes per second, packed and unpacked, that a display takes from an
+agent."""
 
 
 class AgentLane(Lane):
@@ -45,6 +51,7 @@ class AgentLane(Lane):
         self._trouble = ""
         self._listening: int | None = None
         self._topics: dict[str, Heard] = {}
+        self._allowance = Allowance("messages", pieces=PIECES, size=BYTES)
 
     def send(self, frame: bytes) -> None:
         """Send an operation, now.
@@ -79,7 +86,7 @@ class AgentLane(Lane):
                 self._agent, user.name, user.instance, self._id
             )
             out = address.data_out(self._agent, user.name, user.instance, self._id)
-            self._listening = peer.listen(out, self._arrived)
+            self._listening = peer.listen(out, self._admitted(self._arrived))
             while True:
                 self.state = "connecting"
                 if await self._reached():
@@ -104,7 +111,6 @@ class AgentLane(Lane):
         """Ask the agent until it answers; return whether its rosbridge is there."""
         assert self._peer is not None
         self._session, self._trouble = "", ""
-        self._liveness = Liveness(time.monotonic())
         deadline = time.monotonic() + PATIENCE
         while not self._session:
             if time.monotonic() > deadline or self._trouble:
@@ -112,9 +118,11 @@ class AgentLane(Lane):
                     self._peer.trouble
                     or self._why_no_bridge()
                     or f"no answer from the agent {self._agent}"
+                    + self._peer.user.may_not
                 )
                 self._failed(_not_reached(self.url, why))
                 return False
+            self._pings += 1
             self._ask()
             await asyncio.sleep(LOOK)
         return True
@@ -132,7 +140,9 @@ class AgentLane(Lane):
             if self._peer is not None and self._peer.trouble is not None:
                 return self._peer.trouble  # what was sent meanwhile is lost
             if liveness.is_ping_due(time.monotonic()):
+                self._pings += 1
                 liveness.pinged(time.monotonic())
+            if liveness.is_waiting:  # a new agent did not receive the first one
                 self._ask()
             await asyncio.sleep(LOOK)
             heard = self._heard
@@ -151,7 +161,6 @@ class AgentLane(Lane):
         self._closed(reason)
 
     def _ask(self) -> None:
-        self._pings += 1
         self._put(data.pack_note(data.Ping(self._pings)))
 
     def _put(self, piece: bytes) -> None:
@@ -167,7 +176,7 @@ class AgentLane(Lane):
             heard = self._topics[op.topic] = Heard(self._take, self._loop)
             heard.subscribe(op.id, op.throttle_rate)
             key = address.topic_key(self._agent, op.topic)
-            heard.number = self._peer.listen(key, heard.arrived)
+            heard.number = self._peer.listen(key, self._admitted(heard.arrived))
         else:
             heard.subscribe(op.id, op.throttle_rate)
 
@@ -178,6 +187,19 @@ class AgentLane(Lane):
         if heard.number is not None and self._peer is not None:
             self._peer.unlisten(heard.number)
         heard.forget()
+
+    def _admitted(self, fn: Handler) -> Handler:
+        """Return a handler that leaves out what the agent sends too much."""
+
+        def call(key: str, piece: bytes) -> None:
+            if self._admits(piece):
+                fn(key, piece)
+
+        return call
+
+    def _admits(self, piece: bytes) -> bool:
+        now = time.monotonic()
+        return self._allowance.admits(self._agent or "", len(piece), now)
 
     def _arrived(self, _key: str, piece: bytes) -> None:
         """Pass data to the model's thread; called in a thread of Zenoh."""
@@ -192,7 +214,7 @@ class AgentLane(Lane):
             return
         self._heard = time.monotonic()
         if isinstance(received, bytes):
-            if self.state == "open":
+            if self.state == "open" and self._admits(received):
                 self._deliver(received)
         elif isinstance(received, data.Pong):
             self._session, self._trouble = received.session, received.trouble

@@ -11,11 +11,15 @@ from typing import NamedTuple
 import msgspec
 
 from webmap.base.errors import WireError
+from webmap.ros.messages_image import MAX_BYTES
 
 MOST_BYTES = 4096
 """The longest message of a display about a camera, in bytes."""
 
 _head = struct.Struct("<Qd")
+
+MOST_PICTURE = _head.size + MAX_BYTES
+"""The longest message with a picture, in bytes."""
 
 
 class Look(msgspec.Struct, frozen=True, tag="look"):

@@ -18,6 +18,7 @@ import msgspec
 from webmap.agents import address, clients, data
 from webmap.agents.address import Sender, sender_of
 from webmap.agents.agent_gate import AgentGate
+from webmap.agents.allowance import Allowance
 from webmap.agents.cameras import AgentCameras
 from webmap.agents.clients import Call, Clients
 from webmap.agents.description import (
@@ -28,6 +29,7 @@ from webmap.agents.description import (
 )
 from webmap.agents.displays import MOST_SAMPLE
 from webmap.agents.peer import Peer, peer_of
+from webmap.agents.samples import MAX_BYTES
 from webmap.agents.scans import lean_scan
 from webmap.base.children import python_command
 from webmap.base.errors import BridgeError, ConfigError, WireError
@@ -43,12 +45,19 @@ from webmap.ros.names import normalise_topic
 from webmap.ros.rosbridge.calls import Calls
 from webmap.ros.rosbridge.connection import Lane
 from webmap.ros.rosbridge.events import Publish
+from webmap.ros.rosbridge.graph import Graph
 from webmap.ros.rosbridge.protocol import Protocol
 
 log = logging.getLogger("webmap.agent")
 
 BEACON = 0.5
 """Seconds between two signs that the agent is there."""
+
+TYPES = 5.0
+"""Seconds between two questions for the types of topics, and for their answer."""
+
+UNHEARD = 5.0
+"""Seconds after which a router that has sent no sign of an agent back hides it."""
 
 LISTEN = 2.0
 """Seconds for which an agent listens for another one of its name before it begins."""
@@ -84,26 +93,37 @@ class Agent:
         self._buttons: list[dict[str, str]] = []
         self._about = b""
         self._open_at: list[str] | None = None
-        self._peer: Peer = peer_of(router)
+        self._peer: Peer = peer_of(router, most=2 * MAX_BYTES)
         self.address = f"{address.url(self._peer.locator)}/{self.name}"
         """The address of the agent for displays."""
         self._cameras = AgentCameras(self.name, self._peer)
         self._serving = False
         self._rival: str | None = None
+        self._unheard: float | None = 0.0
+        """Seconds for which the router has not sent a sign back; None after the first,
+        and after the complaint."""
         self._out = address.gate_out(self.name)
         self._protocol = Protocol()
-        self._calls = Calls(url)
-        self._allowed: tuple[frozenset[str], frozenset[str]] = (
-            frozenset(),
-            frozenset(),
+        self._calls: dict[str, Calls] = {}
+        """The calls of each user: one that hangs delays no other user's."""
+        self._graph = Graph(
+            lambda service, args=None, timeout=TYPES: self._calls_of("").call(
+                service, args, None, timeout
+            )
         )
+        self._allowance = Allowance("messages")
         self._clients = Clients(
             upstream=self._upstream,
             reply=self._reply,
             note=self._note,
             call=self._call,
-            publishes=lambda: self._allowed[0],
-            calls=lambda: self._allowed[1],
+            publishes=lambda: {
+                each["topic"]: each.get("type", "")
+                for each in self._buttons
+                if "topic" in each
+            },
+            calls=lambda: _each("service", self._buttons),
+            details=lambda: _each("type", self._buttons) - {""},
             throttles=throttles,
         )
         self._beams = dict(beams or {})
@@ -144,14 +164,15 @@ class Agent:
             await asyncio.wait([self._task])
         await self._cameras.stop()
         await self._lane.stop()
-        await self._calls.stop()
+        for calls in self._calls.values():
+            await calls.stop()
 
     # The agent and the router.
 
     async def _run(self) -> None:
         peer, name = self._peer, self.name
         load_soon("numpy")  # for scans
-        peer.listen(address.here(name), self._heard_of)
+        peer.listen(address.here(name), self._heard_of, back=True)
         await self._wait_for_own_name()
         everybody = address.EVERY
         peer.answer(address.about(name), lambda: self._about)
@@ -161,15 +182,25 @@ class Agent:
             peer.answer(key, partial(pictures.__getitem__, picture))
         gate_in = address.gate_in(name, everybody, everybody)
         peer.listen(gate_in, self._sample, gate=True, most=MOST_SAMPLE)
-        peer.listen(address.data_in(name, everybody, everybody, everybody), self._piece)
+        data_in = address.data_in(name, everybody, everybody, everybody)
+        peer.listen(data_in, self._piece, most=data.MOST_OF_DISPLAY + 1)
+        typing = spawn(self._learn_types())
         self._cameras.start(asyncio.get_running_loop())
         self._serving = True
+        try:
+            await self._serve()
+        finally:
+            typing.cancel()
+
+    async def _serve(self) -> None:
+        peer, name = self._peer, self.name
         while True:
             self._describe()
             beacon = Beacon(
                 PROTOCOL, self._session, hashlib.sha256(self._about).hexdigest()[:16]
             )
             peer.put_data(address.here(name), msgspec.json.encode(beacon))
+            self._note_unheard()
             self._clients.look(time.monotonic())
             self._cameras.look(time.monotonic())
             await asyncio.sleep(BEACON)
@@ -194,8 +225,28 @@ class Agent:
 
     def _heard_of(self, _key: str, piece: bytes) -> None:
         beacon = read_beacon(piece)
-        if beacon is not None and beacon.session != self._session:
+        if beacon is None:
+            return
+        if beacon.session == self._session:
+            self._unheard = None
+        else:
             self._rival = beacon.session
+
+    def _note_unheard(self) -> None:
+        """Log once if the router passes on nothing of this agent."""
+        if self._unheard is None:
+            return
+        self._unheard = self._unheard + BEACON if self._peer.connected else 0.0
+        if self._unheard > UNHEARD:
+            self._unheard = None
+            log.error(
+                "the router passes on nothing of this agent, so no display sees it: "
+                "the router's user %s may not act as the agent %s; use the user of "
+                'the router\'s file with agent = "%s"',
+                self._peer.user.name,
+                self.name,
+                self.name,
+            )
 
     def _describe(self) -> None:
         held = self._held.robots()
@@ -210,11 +261,7 @@ class Agent:
         placed = (pose.x, pose.y, math.degrees(pose.yaw))
         about = About(names, robots, grids, placed, self._open_at)
         self._about = msgspec.json.encode(about)
-        self._buttons = buttons = [a for each in held for a in actions(each.config)]
-        self._allowed = (
-            frozenset(button["topic"] for button in buttons if "topic" in button),
-            frozenset(button["service"] for button in buttons if "service" in button),
-        )
+        self._buttons = [each for one in held for each in actions(one.config)]
 
     def _sample(self, key: str, sample: bytes) -> None:
         if self.gate is not None:
@@ -223,8 +270,13 @@ class Agent:
     # Data.
 
     def _piece(self, key: str, piece: bytes) -> None:
-        if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._take, sender_of(key), piece)
+        client = sender_of(key)
+        if (
+            self._loop is not None
+            and not self._loop.is_closed()
+            and self._allowance.admits(client.user, len(piece), time.monotonic())
+        ):
+            self._loop.call_soon_threadsafe(self._take, client, piece)
 
     def _take(self, client: Sender, piece: bytes) -> None:
         try:
@@ -238,7 +290,7 @@ class Agent:
         if self._open_at and self._open_at != places:
             warn_of_open_bridge(self.url, self._open_at)
         self._protocol = Protocol()
-        self._clients.opened(secrets.token_hex(8))
+        self._clients.opened(secrets.token_hex(8), time.monotonic())
 
     def _upstream(self, frame: bytes) -> None:
         if self._lane.state == "open":
@@ -248,7 +300,7 @@ class Agent:
         now = time.monotonic()
         event = self._protocol.receive(frame, now)
         if isinstance(event, Publish) and self._clients.message(
-            event.topic, event.frame, now
+            event.topic, event.frame, now, in_parts=event.in_parts
         ):
             key = address.topic_key(self.name, event.topic)
             frame = self._lean(event.topic, event.frame)
@@ -276,6 +328,23 @@ class Agent:
         key = address.data_out(self.name, *client)
         self._peer.put_data(key, piece, all=True)
 
+    async def _learn_types(self) -> None:
+        """Ask the rosbridge for the types of topics that displays subscribe to."""
+        while True:
+            await asyncio.sleep(BEACON)
+            if self._clients.asks_types:
+                try:
+                    types = await self._graph.topics()
+                except BridgeError:
+                    types = {}
+                self._clients.typed(types, time.monotonic())
+                await asyncio.sleep(TYPES)
+
+    def _calls_of(self, user: str) -> Calls:
+        if user not in self._calls:
+            self._calls[user] = Calls(self.url)
+        return self._calls[user]
+
     def _call(self, call: Call) -> None:
         spawn(self._answer(call))
 
@@ -283,11 +352,18 @@ class Agent:
         try:
             args: Any = clients.args_of(call)
             check_parameters(call.service, args, self._buttons)
-            values = await self._calls.call(call.service, args, call.type, 30.0)
+            calls = self._calls_of(call.client.user)
+            values = await calls.call(call.service, args, call.type, 30.0)
             frame = clients.answered(call, values)
         except (BridgeError, WireError, ValueError, TypeError) as error:
             frame = clients.answered(call, str(error), well=False)
+        finally:
+            self._clients.returned(call)
         self._reply(call.client, frame)
+
+
+def _each(key: str, buttons: Sequence[Mapping[str, Any]]) -> frozenset[str]:
+    return frozenset(button[key] for button in buttons if key in button)
 
 
 def parse_operators(text: str) -> dict[str, Role]:

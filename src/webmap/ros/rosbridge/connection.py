@@ -312,6 +312,11 @@ class Liveness:
         self._ponged = now
         self._looked = now
 
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a ping is not answered yet."""
+        return self._pinged is not None
+
     def is_ping_due(self, now: float) -> bool:
         """Return whether the next ping is due."""
         if self._pinged is not None:
