@@ -432,6 +432,8 @@ def begins_like_stop(data: bytes) -> bool:
 
 def stop_in(data: bytes) -> Stop | None:
     """Return the STOP that a frame is, valid or not; ``None`` if it is none."""
+    if not (b"stop" in data or b"\\" in data):  # most frames; JSON escapes begin so
+        return None
     try:
         command = parse(data)
     except Refusal:

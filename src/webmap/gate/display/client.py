@@ -265,8 +265,6 @@ class GateClient:
 
     def _keep_stop_of_page(self, message: protocol.FromPage) -> None:
         """Keep a page's STOP, in case no gate receives it."""
-        if b"stop" not in message.text:
-            return
         stop = stop_in(message.text)
         if stop is None:
             return
