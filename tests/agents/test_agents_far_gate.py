@@ -104,7 +104,7 @@ def connected(bench):
     bench.receive(Tick(1, {}))
     assert bench.arrive() == [PROGRAM, PAGE]
     bench.receive(Hello(PAGE.connection))
-    bench.receive(AllReports(()))
+    bench.receive(AllReports((), ()))
     return bench
 
 
@@ -218,7 +218,7 @@ def test_who_drives_a_robot_of_a_silent_agent_gets_the_alarm_that_it_may_move_on
     assert (last.link, last.alarm) == ("down", alarm)
     timeout = "the base stops by its own command timeout of 0.40 s"
     assert (timeout in last.reason) == ("stop_time" in changes)
-    connected.receive(AllReports((REPORT,)), 5.0)
+    connected.receive(AllReports((REPORT,), ("r1",)), 5.0)
     assert connected.owner.of(RobotReport)[-1].alarm is None
 
 
@@ -262,8 +262,14 @@ def test_lost_samples_make_the_display_ask_for_all_reports(connected):
 
 def test_all_reports_come_as_one_sample(connected):
     other = msgspec.structs.replace(REPORT, robot="r2")
-    connected.receive(AllReports((REPORT, other)), 0.1)
+    connected.receive(AllReports((REPORT, other), ("r1", "r2")), 0.1)
     assert connected.owner.of(RobotReport) == [REPORT, other]
+
+
+def test_a_gate_that_has_just_started_removes_no_robot(connected):
+    connected.receive(REPORT)
+    connected.receive(AllReports((), ("r1",)), 0.1)
+    assert connected.owner.of(RobotGone) == []
 
 
 def test_all_pages_are_listed_again_each_second(connected):
@@ -466,7 +472,7 @@ class Lossy(Bench):
         self.obey(self.displays.waiting_stops())
         self.obey(self.displays.look(self.now))
         if self.displays.wants_reports(self.now):
-            self.report(AllReports(tuple(self.robots.values())))
+            self.report(AllReports(tuple(self.robots.values()), tuple(self.robots)))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -525,7 +531,7 @@ def test_after_each_kind_of_lost_sample_both_sides_agree_again(lost, seed):
     "message",
     [
         msgspec.structs.replace(REPORT, robot="r9"),
-        AllReports((msgspec.structs.replace(REPORT, robot="bay4/r1"),)),
+        AllReports((msgspec.structs.replace(REPORT, robot="bay4/r1"),), ("r1",)),
         RobotGone("r9"),
         Refused(PAGE.connection, "r9", "take", "Ann drives it"),
         Refused(PAGE.connection, None, "drive", "any text"),
@@ -562,7 +568,7 @@ def test_a_robot_that_is_declared_later_is_reported_at_once(connected):
     connected.far.beat(0.4)
     connected.arrive()
     assert connected.displays.wants_reports(0.4)
-    connected.receive(AllReports((REPORT, report)), 0.4)
+    connected.receive(AllReports((REPORT, report), ("r1", "r3")), 0.4)
     assert connected.owner.received[-1] == report
     connected.far.send(Forget("r3"))
     connected.receive(report, 0.5)

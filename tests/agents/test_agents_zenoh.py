@@ -74,8 +74,8 @@ def test_a_large_sample_of_a_display_is_dropped_unread(by):
     got = []
     key = address.gate_in("bay3", "west", "1") if by == "router" else "webmap/other"
     with router() as place, peers(place, User(), User()) as (one, other):
-        most = None if by == "router" else MOST_SAMPLE
-        other.listen(key, lambda _, data: got.append(len(data)), gate=True, most=most)
+        most = {} if by == "router" else {"most": MOST_SAMPLE}
+        other.listen(key, lambda _, data: got.append(len(data)), gate=True, **most)
         wait_for(lambda: one.put_gate(key, b"x") or got)
         for size in (1 << 20, MOST_SAMPLE + 1, MOST_SAMPLE):
             one.put_gate(key, bytes(size))

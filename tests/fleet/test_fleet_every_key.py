@@ -149,7 +149,7 @@ def test_every_key_has_the_same_effect_directly_and_through_an_agent(
 
     peer = FakePeer()
     for module in (agent, of_agents):
-        monkeypatch.setattr(module, "peer_of", lambda _: peer)
+        monkeypatch.setattr(module, "peer_of", lambda _, **_limits: peer)
         monkeypatch.setattr(module, "lifecycle", Lifecycle())
     monkeypatch.setattr(RobotMotion, "agent", "bay3")
     held = held_in_file(fleet)

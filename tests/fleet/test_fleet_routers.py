@@ -3,6 +3,7 @@
 import msgspec
 
 from webmap.agents.description import PROTOCOL, Beacon
+from webmap.agents.peer import User
 from webmap.base.lifecycle import lifecycle
 from webmap.console import Console
 from webmap.fleet import of_agents
@@ -13,6 +14,7 @@ class FakePeer:
     """A router that may be unreachable, and the signs of its agents."""
 
     def __init__(self):
+        self.user = User()
         self.trouble = "cannot reach the router: nothing listens there"
 
     def listen(self, key, fn):

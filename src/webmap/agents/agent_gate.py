@@ -65,7 +65,8 @@ class AgentGate(GateClient):
                 return
             self._pass_on(messages)
             if self.displays.wants_reports(now):
-                self._send_out(AllReports(tuple(self._pages.latest)))
+                reports, robots = tuple(self._pages.latest), tuple(self._specs)
+                self._send_out(AllReports(reports, robots))
 
     def _pass_on(self, messages: Iterable[Passed]) -> None:
         for message in messages:

@@ -444,5 +444,5 @@ def args_of(call: Call) -> object:
     """
     try:
         return msgspec.json.decode(call.args)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise WireError(f"got arguments that cannot be read: {error}") from error

@@ -103,7 +103,7 @@ def unpack(piece: bytes, most: int = MOST) -> Note | bytes:
         if kind == NOTE:
             note: Note = _note(body)
             return note
-    except (zlib.error, msgspec.DecodeError, RecursionError) as error:
+    except (zlib.error, ValueError, RecursionError) as error:
         raise WireError(f"got data that cannot be read: {error}") from error
     raise WireError(f"got data of the kind {kind!r}, expected one of 3")
 
@@ -137,5 +137,5 @@ def read_op(frame: bytes) -> SubscribeOp:
     """
     try:
         return _op(frame)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise WireError(f"got an operation that cannot be read: {error}") from error

@@ -59,7 +59,7 @@ def read_beacon(piece: bytes) -> Beacon | None:
         return None
     try:
         return msgspec.json.decode(piece, type=Beacon)
-    except msgspec.DecodeError:
+    except ValueError:
         return None
 
 
@@ -72,7 +72,7 @@ def read_about(answer: bytes) -> tuple[About, dict[str, RobotConfig], list[str]]
     """
     try:
         about = msgspec.json.decode(answer, type=About)
-    except (msgspec.DecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise ConfigError(str(error)) from error
     robots: dict[str, RobotConfig] = {}
     mistakes = []
@@ -82,7 +82,7 @@ def read_about(answer: bytes) -> tuple[About, dict[str, RobotConfig], list[str]]
             if config.name in robots:
                 raise ConfigError(f"a second robot has the name {config.name!r}")
             robots[config.name] = config
-        except (ConfigError, msgspec.DecodeError, RecursionError) as error:
+        except (ConfigError, ValueError, RecursionError) as error:
             mistakes.append(f"robot {number} is not shown: {error}")
     if len(about.robots) > MOST_ROBOTS:
         count = f"got {len(about.robots)} robots, expected {MOST_ROBOTS} at most"

@@ -122,6 +122,8 @@ class AllReports(msgspec.Struct, frozen=True, tag="reports"):
     """The newest report of each robot, in one sample: some of many would be lost."""
 
     reports: tuple[RobotReport, ...]
+    robots: tuple[str, ...]
+    """All robots: a gate that has just started has reported none of them yet."""
 
 
 class Took(msgspec.Struct, frozen=True, tag="took"):
@@ -285,7 +287,7 @@ class Displays:
         # It is checked first: an error must not hide that pages have ended.
         try:
             message = _decode(sample[HEAD_BYTES:])
-        except (msgspec.DecodeError, RecursionError) as error:
+        except (ValueError, RecursionError) as error:
             raise WireError(f"display {name}: got no message: {error}") from error
         if len(sample) > MOST_COMMAND and not isinstance(message, Answer):
             raise WireError(
@@ -450,7 +452,7 @@ def _stop_of(sample: bytes) -> tuple[FromPage | FromProgram, Stop] | None:
         return None
     try:
         message = _decode(sample[HEAD_BYTES:])
-    except (msgspec.DecodeError, RecursionError):
+    except (ValueError, RecursionError):
         return None
     match message:
         case FromPage(text=text):

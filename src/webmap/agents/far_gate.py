@@ -188,7 +188,7 @@ class FarGate:
                 return
             try:
                 message = _decode(body)
-            except (msgspec.DecodeError, RecursionError) as error:
+            except (ValueError, RecursionError) as error:
                 raise WireError(
                     f"agent {self.agent}: got no message: {error}"
                 ) from error
@@ -318,9 +318,9 @@ class FarGate:
                 if connection not in self._pages:
                     return
                 self._greeted.add(connection)
-            case AllReports(reports):
+            case AllReports(reports, robots):
                 self._lacks_reports, self._asked_at = False, float("-inf")
-                for robot in self._reported - {report.robot for report in reports}:
+                for robot in self._reported.difference(robots):
                     self._hear(protocol.RobotGone(robot))
                 for report in reports:
                     self._hear(report)

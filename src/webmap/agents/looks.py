@@ -77,7 +77,7 @@ def read_look(piece: bytes) -> Look | LookAway:
         raise WireError(f"got a look of {len(piece)} bytes, {MOST_BYTES} at most")
     try:
         look: Look | LookAway = _look(piece)
-    except msgspec.DecodeError as error:
+    except ValueError as error:
         raise WireError(f"got a look that cannot be read: {error}") from error
     return look
 
@@ -91,7 +91,7 @@ def read_looked(piece: bytes) -> Looked:
     """
     try:
         looked: Looked = _looked(piece)
-    except msgspec.DecodeError as error:
+    except ValueError as error:
         raise WireError(f"got an answer that cannot be read: {error}") from error
     return looked
 

@@ -105,5 +105,5 @@ def about_agent(url: str) -> About | None:
     try:
         answer = peer_of(url).ask(key, most=MOST_BYTES)
         return None if answer is None else msgspec.json.decode(answer, type=About)
-    except (msgspec.DecodeError, RecursionError, WireError):
+    except (ValueError, RecursionError, WireError):
         return None

@@ -75,7 +75,7 @@ class Unpacker:
     def _read(self, body: bytes, messages: list[Any]) -> None:
         try:
             messages.append(self._decode(body))
-        except (msgspec.DecodeError, RecursionError) as error:
+        except (ValueError, RecursionError) as error:
             log.error("not a message on the gate's pipe: %s", error)
 
 

@@ -207,7 +207,7 @@ def parse(data: bytes) -> Received | None:
         frame = _decode_frame(data)
     except RecursionError:
         raise too_deep() from None
-    except msgspec.DecodeError:
+    except ValueError:
         frame = _lenient(data)
     if frame is None:
         return None
