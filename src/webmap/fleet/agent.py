@@ -27,7 +27,7 @@ from webmap.agents.description import (
     Beacon,
     read_beacon,
 )
-from webmap.agents.displays import MOST_SAMPLE
+from webmap.agents.displays import MOST_SAMPLE, MOST_USERS
 from webmap.agents.peer import Peer, peer_of
 from webmap.agents.samples import MAX_BYTES
 from webmap.agents.scans import lean_scan
@@ -341,6 +341,8 @@ class Agent:
                 await asyncio.sleep(TYPES)
 
     def _calls_of(self, user: str) -> Calls:
+        if len(self._calls) > MOST_USERS and user not in self._calls:
+            user = ""  # a router without users has any number of names
         if user not in self._calls:
             self._calls[user] = Calls(self.url)
         return self._calls[user]
