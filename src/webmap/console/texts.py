@@ -34,7 +34,7 @@ class Look(NamedTuple):
 
 LOOKS = {
     "disobeying": Look("state-disobeying", "bad", "not obeying"),
-    "unreachable": Look("state-disobeying", "bad", "lost"),
+    "unreachable": Look("state-down", "bad", "lost"),
     "no_bridge": Look("state-down", "bad", "lost"),
     "connecting": Look("state-waiting", "", "connecting"),
     "gone": Look("state-old", "", "lost"),
