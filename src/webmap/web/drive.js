@@ -86,6 +86,14 @@ export class Drive {
     return this._session.drives;
   }
 
+  /**
+   * @param {string} robot
+   * @returns {boolean} Whether this page has control of the robot, or sent it to a goal.
+   */
+  moves(robot) {
+    return this._session.moves(robot);
+  }
+
   /** The requests for control. */
   get requests() {
     return this._session.requests.requests(performance.now());

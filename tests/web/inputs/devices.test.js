@@ -27,6 +27,7 @@ function escapeAt(...claims) {
   const desk = devicesOf({
     status: { driven: null, taking: false, choice: "r1" },
     robots: new Map(),
+    moves: () => false,
     on: () => () => {},
     stop: (robot) => stopped.push(robot),
     setInput() {},
@@ -79,6 +80,7 @@ function keyAt(status, use) {
   const desk = devicesOf({
     status: { driven: null, taking: false, choice: "r1", ...status },
     robots: new Map(),
+    moves: () => false,
     on: () => () => {},
     stop() {},
     choose() {},
@@ -134,6 +136,7 @@ function stoppedAt(key, { target = null, before = [], drives = false } = {}) {
   const desk = devicesOf({
     status: { driven: null, taking: false, choice: "r1" },
     drives,
+    moves: () => drives,
     robots: new Map(),
     on: () => () => {},
     stop: (robot) => stopped.push(robot),

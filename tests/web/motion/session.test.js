@@ -229,7 +229,7 @@ describe("a message of the gate", () => {
 });
 
 describe("a page drives", () => {
-  const goal = (state) => ({ id: "g1", state });
+  const goal = (state, id = "g1") => ({ id, state });
   const free = { ...REPORT, state: "free", holder: null, mine: false, epoch: null };
 
   test("while it has control of any robot", () => {
@@ -242,8 +242,13 @@ describe("a page drives", () => {
 
   test("while a goal moves a robot that it sent a goal to, also on the next connection", () => {
     session.receive(HELLO, 0);
-    session.receive({ ...free, goal: goal("under way") }, 0);
+    session.receive({ ...free, goal: goal("under way", "g0") }, 0);
     assert.equal(session.drives, false, "the goal of another page");
+    session.receive({ ...free, goal: goal("reached", "g0") }, 0);
+    session.sent({ op: "goal", robot: "r1" }, 0);
+    assert.equal(session.moves("r1"), true, "before the gate reports the goal");
+    session.receive({ op: "refused", robot: "r1", what: "goal", why: "no" }, 0);
+    assert.equal(session.moves("r1"), false, "a goal that was refused");
     session.sent({ op: "goal", robot: "r1" }, 0);
     session.lost(10);
     session.receive({ ...HELLO, connection: "c2" }, 20);

@@ -193,7 +193,7 @@ export class Devices {
     const drives = driven !== null || taking;
     if (!drives && escape) {
       if (keepsEscape(target)) return false;
-      const held = choice !== null && this._drive.robots.get(choice)?.mine;
+      const held = choice !== null && this._drive.moves(choice);
       if (!held && uses(closesMenu)) return true;
       for (const leave of this._escapes) if (uses(leave)) return true;
     }

@@ -52,18 +52,26 @@ export class Session {
      */
     this._unsent = new Set();
     /**
-     * Robots that this page sent goals to.
-     * @type {Set<string>}
+     * Robots that this page sent goals to, each with the goal that was reported before.
+     * @type {Map<string, string | undefined>}
      */
-    this._sentTo = new Set();
+    this._sentTo = new Map();
   }
 
   /** Whether this page has control of any robot, or a goal moves one that it sent a goal to. */
   get drives() {
-    if (this.pilot.status.taking) return true;
-    return [...this.pilot.robots.values()].some(
-      ({ robot, mine, goal }) => mine || (this._sentTo.has(robot) && goal && !isOver(goal)),
-    );
+    return this.pilot.status.taking || [...this.pilot.robots.keys()].some((id) => this.moves(id));
+  }
+
+  /**
+   * @param {string} robot
+   * @returns {boolean} Whether this page has control of the robot, or sent a goal to it that is
+   *     not over, also before the gate reports the goal.
+   */
+  moves(robot) {
+    const { mine = false, goal = null } = this.pilot.robots.get(robot) ?? {};
+    if (mine || !this._sentTo.has(robot)) return mine;
+    return !goal || !isOver(goal) || goal.id === this._sentTo.get(robot);
   }
 
   /**
@@ -99,7 +107,8 @@ export class Session {
    * @param {number} now
    */
   sent(command, now) {
-    if (command.op === "goal") this._sentTo.add(command.robot);
+    const { robot } = command;
+    if (command.op === "goal") this._sentTo.set(robot, this.pilot.robots.get(robot)?.goal?.id);
     if (command.op !== "drive") return;
     const moving = ["x", "y", "turn"].some((axis) => command[axis] !== 0);
     this.onset.sent(command.robot, moving, now);
@@ -189,6 +198,7 @@ export class Session {
         for (const one of this._watching) one.gone(message.robot, now);
         return [["gone", message.robot]];
       case "refused":
+        if (message.what === "goal") this._sentTo.delete(message.robot);
         this.pilot.refuse(message.robot, message.what, message.why, now);
         return [["refused", message]];
       default:
