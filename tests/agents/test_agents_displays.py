@@ -113,7 +113,7 @@ def test_a_display_gives_its_pages_at_most_its_own_role():
 
 def test_a_message_of_an_unknown_page_is_dropped_but_stop_is_obeyed(west):
     assert west.send(FromPage("west/c7", b'{"op":"take","robot":"r1"}')) == []
-    (_, stop) = west.send(FromPage("west/c7", STOP))
+    (stop, _) = west.send(FromPage("west/c7", STOP))
     assert stop == FromProgram(Stop(None))
 
 
@@ -337,8 +337,8 @@ def test_the_second_copy_of_a_stop_is_no_second_stop(west):
     sample = west.numbering.next(msgspec.msgpack.encode(FromPage("west/c1", STOP)))
     took = Took("west", west.numbering.session, west.numbering.sent)
     assert west.displays.receive("west", sample, 0.0) == [
-        took,
         FromPage("west/c1", STOP),
+        took,
     ]
     west.connects(ANN)
     assert west.displays.receive("west", sample, 9.0) == []

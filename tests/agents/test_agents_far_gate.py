@@ -158,11 +158,11 @@ def test_a_stop_is_sent_again_until_the_agent_has_it(connected, text):
     connected.sent.clear()  # lost
     for now in (0.05, 0.1):
         connected.far.beat(now)
-    took, got = connected.arrive(0.1)
+    got, took = connected.arrive(0.1)
     assert got == stop
     connected.receive(Took(NAME, took.session, took.number - 1), 0.12)  # of another
     connected.far.beat(0.25)
-    took, got = connected.arrive(0.25)
+    got, took = connected.arrive(0.25)
     assert got == stop
     connected.receive(took, 0.3)
     connected.far.beat(0.45)
@@ -171,7 +171,7 @@ def test_a_stop_is_sent_again_until_the_agent_has_it(connected, text):
 
 def test_the_acknowledgement_of_another_display_ends_nothing(connected):
     connected.far.send(STOP)
-    took, _ = connected.arrive()
+    _, took = connected.arrive()
     connected.receive(Took("ben.5e", took.session, took.number), 0.05)
     connected.far.beat(0.15)
     assert STOP in connected.arrive(0.15)
@@ -300,7 +300,7 @@ def test_samples_that_are_none_are_refused(connected):
 )
 def test_a_program_stops_resets_and_cancels_at_an_agent(connected, command, text):
     connected.far.send(FromProgram(command))
-    *_, got = connected.arrive()
+    got = next(each for each in connected.arrive() if not isinstance(each, Took))
     assert got.connection == PROGRAM.connection or got == FromProgram(command)
     if isinstance(got, FromPage):
         assert json.loads(got.text) == text

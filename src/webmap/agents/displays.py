@@ -356,7 +356,7 @@ class Displays:
         known = display is not None and message.connection in display.pages
         if not known or isinstance(message, FromProgram):
             message = FromProgram(Stop(robot))
-        return [Took(name, session, number), message]
+        return [message, Took(name, session, number)]  # the gate first: it must stop
 
     def _user(self, display: str) -> User:
         name = user_of(display)
