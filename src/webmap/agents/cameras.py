@@ -226,7 +226,7 @@ class AgentCameras:
         self._peer.listen(
             address.looks_in(self._agent, every, every),
             self._arrived,
-            most=looks.MOST_BYTES,
+            most=looks.MOST_OF_LOOK,
         )
 
     async def stop(self) -> None:

@@ -10,7 +10,7 @@ from webmap.config.robot import RobotConfig
 PROTOCOL = 3
 """The version of what agents and displays exchange."""
 
-MOST_BYTES = 2 << 20
+MOST_OF_ABOUT = 2 << 20
 """The longest description, in bytes."""
 
 MOST_OF_ROBOT = 64 << 10

@@ -117,7 +117,7 @@ class FarPull:
         self._in = address.looks_in(agent, user.name, user.instance)
         out = address.looks_out(agent, user.name, user.instance)
         self._listening = [
-            peer.listen(out, self._later(self._take_answer), most=looks.MOST_BYTES),
+            peer.listen(out, self._later(self._take_answer), most=looks.MOST_OF_LOOK),
             peer.listen(
                 address.camera_key(agent, robot, camera),
                 self._later(self._take),

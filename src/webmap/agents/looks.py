@@ -13,7 +13,7 @@ import msgspec
 from webmap.base.errors import WireError
 from webmap.ros.messages_image import MAX_BYTES
 
-MOST_BYTES = 4096
+MOST_OF_LOOK = 4096
 """The longest message of a display about a camera, in bytes."""
 
 _head = struct.Struct("<Qd")
@@ -73,8 +73,8 @@ def read_look(piece: bytes) -> Look | LookAway:
         WireError: If the bytes are nothing of the kind.
 
     """
-    if len(piece) > MOST_BYTES:
-        raise WireError(f"got a look of {len(piece)} bytes, {MOST_BYTES} at most")
+    if len(piece) > MOST_OF_LOOK:
+        raise WireError(f"got a look of {len(piece)} bytes, {MOST_OF_LOOK} at most")
     try:
         look: Look | LookAway = _look(piece)
     except ValueError as error:

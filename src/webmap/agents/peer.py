@@ -415,7 +415,12 @@ class Peer:
             try:
                 size = len(sample.payload)
                 if size > most:
-                    log.warning("%s: dropped %d bytes", sample.key_expr, size)
+                    log.warning(
+                        "%s: a message of %d bytes was dropped, expected %d at most",
+                        sample.key_expr,
+                        size,
+                        most,
+                    )
                     return
                 fn(str(sample.key_expr), sample.payload.to_bytes())
             except Exception:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import msgspec
 
 from webmap.agents import address
-from webmap.agents.description import MOST_BYTES, About
+from webmap.agents.description import MOST_OF_ABOUT, About
 from webmap.agents.peer import peer_of
 from webmap.base.errors import BridgeClosed, ConfigError, WireError
 from webmap.ros.names import is_agent_url, normalise_url
@@ -103,7 +103,7 @@ def about_agent(url: str) -> About | None:
     """Return the description of an agent; None if it gives none."""
     key = address.about(address.agent_in(url) or "")
     try:
-        answer = peer_of(url).ask(key, most=MOST_BYTES)
+        answer = peer_of(url).ask(key, most=MOST_OF_ABOUT)
         return None if answer is None else msgspec.json.decode(answer, type=About)
     except (ValueError, RecursionError, WireError):
         return None

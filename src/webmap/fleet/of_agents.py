@@ -15,8 +15,8 @@ import msgspec
 import webmap
 from webmap.agents import address
 from webmap.agents.description import (
-    MOST_BYTES,
     MOST_GRIDS,
+    MOST_OF_ABOUT,
     PROTOCOL,
     Beacon,
     read_about,
@@ -239,7 +239,7 @@ class Agents:
                     f"the agent speaks version {beacon.protocol} of the protocol, this "
                     f"display version {PROTOCOL}: install the same WebMap on both"
                 )
-            ask = partial(self._peer.ask, address.about(agent.name), most=MOST_BYTES)
+            ask = partial(self._peer.ask, address.about(agent.name), most=MOST_OF_ABOUT)
             answer = await asyncio.to_thread(ask)
             if answer is None:
                 return
