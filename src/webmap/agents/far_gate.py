@@ -342,8 +342,6 @@ class FarGate:
                 last = f"{by[:MOST_NAME]}: {last[:MOST_WORDS]}"
                 by = f"the agent {self.agent}"  # one row, whatever names it makes up
                 message = protocol.RefusedCount(by, count, last)
-            case protocol.CloseConnection():
-                return  # the page may drive robots of other gates
         self._owner.hear(message)
 
     def _put(
