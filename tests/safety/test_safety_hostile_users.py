@@ -40,5 +40,6 @@ def test_an_operator_drives_and_stops_a_robot_beside_a_hostile_user(bench, acts)
     before = bench.memory()
     with bench.beside(*acts.split()):
         for bench.stops_all in (True, False):
-            check(bench)
+            # The hostile users work on the processors of this computer too.
+            check(bench, strict=False)
     assert bench.memory() < before + MORE_MEMORY
