@@ -24,16 +24,20 @@ endif
 MADE := .venv/.made
 INSTALLED := .venv/.installed
 DEV := .venv/.installed-dev
+DOCS := .venv/.installed-docs
 NODE := node_modules/.installed
 
 # More tests with a browser at once take as long on two processors, and some of them fail.
 # Tests without a browser wait for half of their time.
 JOBS ?= 2
-WAITING_JOBS ?= 3
+WAITING_JOBS ?= 4
 ARGS ?=
 # The file for the outcome of each test, for the summary of "make test".
 RESULTS ?=
 TO_RESULTS = $(if $(RESULTS),"--results=$(RESULTS)")
+# Which tests of a part run: "not thorough" in "make test", the others in "make test-rest".
+PICK ?=
+PICKED = $(if $(PICK), and ($(PICK)))
 
 ## help: list the targets
 .PHONY: help
@@ -45,10 +49,16 @@ help:
 demo: $(INSTALLED)
 	@exec $(BIN)/webmap demo $(ARGS)
 
-## test: everything: lint, types, contracts, unit, property, browser and peer tests, docs
-.PHONY: test
+## test: lint, types, contracts and the tests of every feature and promise, in ten minutes
+## test-all: make test, and then make test-rest
+## test-rest: what make test leaves out: thorough tests, more trials of each fault, docs
+.PHONY: test test-all test-rest
 test: $(DEV) $(NODE)
-	@$(PY) tools/run_tests.py
+	@$(PY) tools/run_tests.py test
+test-rest: $(DEV) $(DOCS) $(NODE)
+	@$(PY) tools/run_tests.py rest
+test-all: $(DEV) $(DOCS) $(NODE)
+	@$(PY) tools/run_tests.py test rest
 
 ## check: lint, types, import contracts, generated files
 .PHONY: check
@@ -85,7 +95,7 @@ generated: $(DEV)
 ## test-fast: the tests that need neither a browser nor a peer nor a quiet machine
 .PHONY: test-fast
 test-fast: $(DEV)
-	$(BIN)/pytest -q -n $(WAITING_JOBS) --dist loadfile -m "not browser and not peer and not serial and not slow"
+	$(BIN)/pytest -q -n $(WAITING_JOBS) --dist loadfile -m "not browser and not peer and not serial and not slow and not thorough"
 
 ## test-web: the JavaScript that touches no DOM, in Node
 .PHONY: test-web
@@ -105,18 +115,14 @@ test-gate: $(DEV)
 	$(BIN)/pytest -q $(TO_RESULTS) -n $(JOBS) $(WITH_GATE) \
 	  --cov --cov-config=tests/gate/coverage.toml --cov-fail-under=100
 
-## test-python: pytest without test-gate; tests that measure time run at the end
-.PHONY: test-python test-plain test-schedules test-browser test-serial
-test-python: test-plain test-schedules test-browser test-serial
-SCHEDULES := tests/gate/test_gate_machine.py
+# The parts of pytest besides test-gate; tests that measure time are in the last three.
+.PHONY: test-plain test-browser test-motion test-load test-time
 test-plain: $(DEV)
-	$(PY) tools/pytest_beside.py $(WAITING_JOBS) $(TO_RESULTS) -m "not browser and not serial" \
-	  $(addprefix --ignore ,$(WITH_GATE) $(SCHEDULES))
-test-schedules: $(DEV)
-	$(BIN)/pytest -q $(TO_RESULTS) $(SCHEDULES)
+	$(PY) tools/pytest_beside.py $(WAITING_JOBS) $(TO_RESULTS) -m "not browser and not serial$(PICKED)" \
+	  $(addprefix --ignore ,$(WITH_GATE))
 WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | sort)
 test-browser: $(DEV) $(NODE)
-	$(PY) tools/pytest_beside.py $(JOBS) $(TO_RESULTS) -m "browser and not serial" $(WITH_BROWSER)
+	$(PY) tools/pytest_beside.py $(JOBS) $(TO_RESULTS) -m "browser and not serial$(PICKED)" $(WITH_BROWSER)
 # Tests that measure time wait most of the time, so two files of them run in parallel on
 # any machine, the longest first. Safety tests allow for the delays of the machine and do
 # not run again; the other tests run a second time if they fail. Tests under load run alone.
@@ -124,22 +130,21 @@ ALONE := $(wildcard tests/safety/test_*_load.py tests/safety/test_*_soak.py)
 LONG = $(ONE_LANE) $(OTHER_LANE)
 OF_MOTION = $(LONG) $(filter-out $(LONG) $(ALONE),$(wildcard tests/safety/test_*.py))
 OF_TIME := $(sort $(filter-out tests/safety/%,$(shell grep -rl --include='test_*.py' 'mark\.serial' tests)))
-.PHONY: test-motion test-load test-time
-test-serial: test-motion test-load test-time
+TRIALS ?=
 test-motion: $(DEV) $(NODE)
-	$(BIN)/pytest -q $(TO_RESULTS) -m serial -n 2 --dist loadfile $(OF_MOTION)
+	$(if $(TRIALS),WEBMAP_SAFETY_TRIALS=$(TRIALS)) \
+	  $(BIN)/pytest -q $(TO_RESULTS) -m "serial$(PICKED)" -n 2 --dist loadfile $(OF_MOTION)
 test-load: $(DEV) $(NODE)
 	$(BIN)/pytest -q $(TO_RESULTS) -m serial $(ALONE)
 test-time: $(DEV) $(NODE)
-	$(PY) tools/pytest_beside.py 2 $(TO_RESULTS) -m serial $(OF_TIME)
+	$(PY) tools/pytest_beside.py 2 $(TO_RESULTS) -m "serial$(PICKED)" $(OF_TIME)
 
-## test-safety: long tests of the motion guarantees, and the table of figures (TRIALS=50, RESUME=1, LANES=2)
+## test-safety: long tests of the motion guarantees, and the table of figures (TRIALS=20, RESUME=1, LANES=2)
 .PHONY: test-safety
-TRIALS ?= 50
 RESUME ?=
 LANES ?= 1
 FIGURES := docs/_build/safety-figures.jsonl
-SAFETY := WEBMAP_SAFETY_TRIALS=$(TRIALS) WEBMAP_SAFETY_RESUME=$(RESUME) \
+SAFETY := WEBMAP_SAFETY_TRIALS=$(or $(TRIALS),20) WEBMAP_SAFETY_RESUME=$(RESUME) \
   WEBMAP_SAFETY_FIGURES="$(abspath $(FIGURES))" $(BIN)/pytest -v --timeout 3600
 ONE_LANE := tests/safety/test_safety_links.py
 OTHER_LANE := tests/safety/test_safety_browser.py tests/safety/test_safety_processes.py
@@ -160,7 +165,7 @@ test-safety: $(DEV) $(NODE)
 
 ## docs: the documentation, in docs/_build/html
 .PHONY: docs
-docs: $(DEV)
+docs: $(DOCS)
 	$(BIN)/sphinx-build -n -W --keep-going -q -b html docs docs/_build/html
 
 ## bench: measure WebMap beside others, in 15 minutes; see benchmarks/README.md (ARGS="bridge")
@@ -217,7 +222,12 @@ $(INSTALLED): pyproject.toml $(MADE)
 $(DEV): pyproject.toml $(INSTALLED)
 	@echo "webmap: installing the dependencies of the checks and tests into .venv"
 	$(PY) -m pip install --quiet --upgrade "pip>=25.1"
-	$(PY) -m pip install --quiet --group dev --group docs
+	$(PY) -m pip install --quiet --group dev
+	touch $@
+
+$(DOCS): pyproject.toml $(DEV)
+	@echo "webmap: installing the dependencies of the documentation into .venv"
+	$(PY) -m pip install --quiet --group docs
 	touch $@
 
 # Checked every time: it is quick, and a missing browser is reported at once.

@@ -4,6 +4,7 @@ import gc
 import json
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,12 +16,16 @@ from playwright.sync_api import Browser, expect
 from command_fixtures import later_port, ros1, ros2
 from real_browser import launched
 from surroundings import use_own_surroundings
+from thorough import is_thorough
 from webmap.base.logs import budgets
 
 __all__ = ["later_port", "ros1", "ros2"]
 """Fixtures from another file."""
 
 use_own_surroundings()
+
+# Else each run of pytest compiles all tests again.
+sys.dont_write_bytecode = False
 
 # On two busy cores, the time of an example does not depend on the code alone.
 settings.register_profile(
@@ -59,7 +64,13 @@ def pytest_terminal_summary(
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run the slow files first: a slow file that begins last runs alone."""
+    """Mark the thorough tests, and run the slow files first.
+
+    A slow file that begins last runs alone.
+    """
+    for item in items:
+        if is_thorough(item.nodeid):
+            item.add_marker("thorough")
     long = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in long)
 

@@ -1,9 +1,11 @@
-"""Run all parts of the tests, and end with a summary.
+"""Run the parts of the tests, and end with a summary.
 
 A part is a target of the Makefile. If a part fails, the other parts run all the same.
 The output of each part is also in ``test-results/log``.
 
-Usage: run_tests.py
+Usage: run_tests.py RUN...
+
+A run is ``test`` or ``rest``: what the first leaves out.
 """
 
 import json
@@ -22,16 +24,21 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "test-results" / "log"
 
-STAGES = (
-    (("lint", "test-web"),),
-    (("test-plain",), ("test-gate",)),
-    (("test-browser",), ("types", "contracts", "test-schedules", "docs")),
-    (("test-motion", "test-load", "test-time"),),
-)
-"""The stages, in order. The rows of a stage run at the same time."""
+RUNS = {
+    "test": (
+        ("test-motion", "test-load", "test-time", "test-browser"),
+        ("lint", "test-web", "test-plain", "types", "contracts", "test-gate"),
+    ),
+    "rest": (("test-motion", "test-time", "test-browser"), ("test-plain", "docs")),
+}
+"""The parts of each run. Those of the second row use only the time of the processors
+that those of the first row leave."""
 
-IDLE = {"types", "contracts", "test-schedules", "docs"}
-"""The parts that use only the time that tests with a browser leave."""
+VARIABLES = {
+    "test": ("PICK=not thorough", "TRIALS=1"),
+    "rest": ("PICK=thorough or trials", "TRIALS=3"),
+}
+"""The variables of ``make`` in each run."""
 
 PROCESSORS = 2
 """The number of processors that the tests are made for."""
@@ -53,7 +60,8 @@ class Part:
     """A part of the tests and its results.
 
     Attributes:
-        name: The target of the Makefile.
+        target: The target of the Makefile.
+        run_name: The run that it belongs to.
         seconds: The time that it took.
         status: The exit status of ``make``.
         outcomes: The last outcome of each test, by its id.
@@ -62,12 +70,18 @@ class Part:
 
     """
 
-    name: str
+    target: str
+    run_name: str = "test"
     seconds: float = 0.0
     status: int = 0
     outcomes: dict[str, str] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
     again: list[str] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """The target, and the run if it is another one than ``test``."""
+        return self.target + ("" if self.run_name == "test" else f" {self.run_name}")
 
     @property
     def log(self) -> Path:
@@ -79,10 +93,16 @@ class Part:
         """The file with a line of JSON for each test that ended."""
         return FOLDER / f"{self.name}.jsonl"
 
-    def run(self, *, shown: bool) -> None:
-        """Run the part, and print its output meanwhile if it is to be shown."""
-        command = ["make", "--no-print-directory", self.name, f"RESULTS={self.results}"]
-        if self.name in IDLE and shutil.which("chrt"):
+    def run(self, *, first: bool) -> None:
+        """Run the part, and print its output meanwhile if it is of the first row."""
+        command = [
+            "make",
+            "--no-print-directory",
+            self.target,
+            *VARIABLES[self.run_name],
+        ]
+        command.append(f"RESULTS={self.results}")
+        if not first and shutil.which("chrt"):
             command = ["chrt", "--idle", "0", *command]
         begin = time.monotonic()
         with (
@@ -94,7 +114,7 @@ class Part:
             assert process.stdout is not None
             while chunk := os.read(process.stdout.fileno(), 65536):
                 log.write(chunk)
-                if shown:
+                if first:
                     sys.stdout.buffer.write(chunk)
                     sys.stdout.flush()
         self.status = process.returncode
@@ -119,7 +139,7 @@ class Part:
         ]
         yield from ((test, repeat(test)) for test in failed)
         if self.status and not failed:
-            yield self.name, f"make {self.name}"
+            yield self.name, f"make {self.target}"
 
 
 def repeat(test: str) -> str:
@@ -132,30 +152,23 @@ def repeat(test: str) -> str:
     return f".venv/bin/pytest {shlex.quote(test)}"
 
 
-def run(stages: tuple[tuple[tuple[str, ...], ...], ...]) -> list[Part]:
-    """Run the parts of all stages; return them in their order."""
-    parts = []
-    for number, stage in enumerate(stages, 1):
-        first, *others = ([Part(name) for name in row] for row in stage)
-        names = ", ".join(part.name for row in (first, *others) for part in row)
-        print(f"\nStage {number} of {len(stages)}: {names}", flush=True)
-        threads = [
-            threading.Thread(target=_run_row, args=(row, False)) for row in others
-        ]
-        for thread in threads:
-            thread.start()
-        _run_row(first, True)
-        for thread, row in zip(threads, others, strict=True):
-            thread.join()
-            for part in row:
-                sys.stdout.buffer.write(part.log.read_bytes())
-        parts += [part for row in (first, *others) for part in row]
-    return parts
+def run(name: str) -> list[Part]:
+    """Run the parts of a run; return them."""
+    first, second = ([Part(target, name) for target in row] for row in RUNS[name])
+    names = ", ".join(part.name for part in [*first, *second])
+    print(f"\nRunning {names}", flush=True)
+    beside = threading.Thread(target=_run_row, args=(second, False))
+    beside.start()
+    _run_row(first, True)
+    beside.join()
+    for part in second:
+        sys.stdout.buffer.write(part.log.read_bytes())
+    return [*first, *second]
 
 
-def _run_row(row: list[Part], shown: bool) -> None:
+def _run_row(row: list[Part], first: bool) -> None:
     for part in row:
-        part.run(shown=shown)
+        part.run(first=first)
 
 
 def summary(parts: list[Part], seconds: float) -> str:
@@ -254,17 +267,17 @@ def loop() -> float:
     return time.perf_counter() - begin
 
 
-def main() -> int:
-    """Run all parts; return the exit status."""
+def main(*names: str) -> int:
+    """Run all parts of the named runs; return the exit status."""
     begin = time.monotonic()
     shutil.rmtree(FOLDER, ignore_errors=True)
     FOLDER.mkdir(parents=True)
     for line in complaints(len(os.sched_getaffinity(0)), loop()):
         print(f"webmap: {line}", flush=True)
-    parts = run(STAGES)
+    parts = [part for name in names for part in run(name)]
     print("\n" + summary(parts, time.monotonic() - begin), flush=True)
     return int(any(part.status for part in parts))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(*sys.argv[1:]))

@@ -24,7 +24,7 @@ def test_a_page_with_an_old_token_asks_the_user_to_open_the_new_address(tab, tmp
     script = tmp_path / "page.py"
     script.write_text(SCRIPT)
     command = ("run", script, "--no-browser", "--port")
-    status = tab.get_by_role("status")
+    status = tab.locator(".webmap-notice.status")
     with running(*command, 0, pattern=WEB) as first:
         tab.goto(first.url)
         tab.wait_for_selector("svg.webmap")

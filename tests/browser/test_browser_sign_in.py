@@ -153,7 +153,7 @@ def test_a_page_without_a_key_explains_the_sign_in_and_resumes_afterwards(
         shows_its_map(tab)
         tab.evaluate("localStorage.clear()")
         tab.goto(root + "lab")
-        status = tab.get_by_role("status")
+        status = tab.locator(".webmap-notice.status")
         expect(status).to_contain_text("Open the address that WebMap printed")
         tab.screenshot(path=str(tmp_path / "signed-out.png"))
         second = tab.context.new_page()

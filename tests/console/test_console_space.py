@@ -172,6 +172,7 @@ def test_space_is_stop_at_every_element_of_every_state(open_console):
     page.keyboard.press("Shift+Escape")
     expect_state(page, "STOP active")
     walker.both("STOP is active")
+    end_stops(page.locator(".webmap-stop-list .webmap-reset"))
     assert walker.wrong == []
     assert walker.pressed > 150
     assert walker.tabbed > 300
@@ -204,6 +205,7 @@ def test_space_stops_the_selected_robot_after(
 ):
     page = open_console()
     select(page, "Robot 1")
+    expect(shown_state(page)).not_to_have_text("STOP active")
     act(page)
     page.keyboard.press("Space")
     expect(shown_state(page)).to_have_text("STOP active")

@@ -584,7 +584,7 @@ def note_done(request):
 
 
 @pytest.mark.timeout(1800)
-@pytest.mark.parametrize("thousand", range(10 if TRIALS >= 50 else 1))
+@pytest.mark.parametrize("thousand", range(10 if TRIALS >= 20 else 1))
 def test_no_sequence_of_events_breaks_a_safety_promise(note_done, thousand):
     run_state_machine_as_test(
         Motion,

@@ -12,10 +12,14 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 import webmap
 
 TRIALS = int(os.environ.get("WEBMAP_SAFETY_TRIALS", "3"))
 FULL = TRIALS >= 20
+
+LONG = pytest.mark.skipif(not FULL, reason="takes long: make test-safety runs it")
 
 SHOW: list[Callable[[str], None]] = [print]
 """Functions that print progress; the last one is used.

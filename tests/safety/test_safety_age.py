@@ -10,13 +10,11 @@ import time
 
 import pytest
 from safety_bench import pass_time, wait_for
-from safety_run import FULL
+from safety_run import LONG
 
 from webmap.testing import Shape
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
-
-LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
 
 MAX_AGE = 0.3
 """The age in seconds above which the gate refuses a command."""

@@ -6,11 +6,14 @@ import time
 
 import pytest
 from safety_bench import NEUTRAL, pass_time, send_only
-from safety_run import FULL
+from safety_run import LONG
 
-pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
-
-LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
+pytestmark = [
+    pytest.mark.safety,
+    pytest.mark.browser,
+    pytest.mark.serial,
+    pytest.mark.trials,
+]
 
 PROMISED = 0.3
 """Seconds from the fault to the first zero at the robot (S1)."""

@@ -4,16 +4,19 @@ import time
 
 import pytest
 from safety_bench import ROBOT_TIMEOUT, SLOW, wait_for
-from safety_run import FULL
+from safety_run import LONG
 
 from webmap.testing import Shape
 
-pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
+pytestmark = [
+    pytest.mark.safety,
+    pytest.mark.browser,
+    pytest.mark.serial,
+    pytest.mark.trials,
+]
 
 PROMISED = 0.3
 """Seconds from the fault to the first zero at the robot (S1)."""
-
-LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
 
 GATE_OF_LATENCY = 0.55
 """The same for a link that does not end but slowly becomes too slow."""

@@ -4,11 +4,14 @@ import signal
 
 import pytest
 from safety_bench import ROBOT_TIMEOUT, pass_time, wait_for
-from safety_run import FULL
+from safety_run import LONG
 
-pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
-
-LONG = pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
+pytestmark = [
+    pytest.mark.safety,
+    pytest.mark.browser,
+    pytest.mark.serial,
+    pytest.mark.trials,
+]
 
 PROMISED = 0.3
 """Seconds from the fault to the first zero at the robot (S1, S14)."""

@@ -72,7 +72,7 @@ def press_stop(bench):
     bench.space("keyUp")
 
 
-@pytest.mark.skipif(not MINUTES, reason="takes half an hour: WEBMAP_SAFETY_TRIALS=50")
+@pytest.mark.skipif(not MINUTES, reason="takes half an hour: make test-safety runs it")
 @pytest.mark.timeout(5400)
 def test_half_an_hour_under_full_load_keeps_memory_stable_and_delays_no_zero(bench):
     memory = Memory(bench)

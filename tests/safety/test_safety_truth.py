@@ -8,7 +8,7 @@ import time
 
 import pytest
 from safety_bench import V_MAX, Bench, pass_time, wait_for
-from safety_run import FULL
+from safety_run import LONG
 
 from webmap.gate.rules.motion import DEADMAN
 from webmap.testing import Shape
@@ -95,7 +95,7 @@ def test_the_page_shows_no_alarm_for_a_robot_that_obeys(bench):
         assert bench.tab.evaluate(ALARM) is None
 
 
-@pytest.mark.skipif(not FULL, reason="takes long: WEBMAP_SAFETY_TRIALS=50")
+@LONG
 def test_no_velocity_is_sent_for_ten_seconds_after_a_key_release_and_its_zeros(bench):
     bench.drive_off()
     bench.let_go()
