@@ -92,7 +92,12 @@ class QuaternionMsg(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def quaternion(self) -> Quaternion:
-        """The same numbers as a value of :mod:`webmap.base.geometry`."""
+        """The rotation to draw; zeros, which nobody has set, are none, as in RViz.
+
+        The pose of a robot is not read with this: with zeros it is refused.
+        """
+        if self.x == self.y == self.z == self.w == 0.0:
+            return Quaternion()
         return Quaternion(self.x, self.y, self.z, self.w)
 
 
@@ -126,8 +131,8 @@ class PoseMsg(Unstamped, frozen=True):
         """Position and heading in the plane, checked.
 
         Raises:
-            ProtocolError: If a number is NaN or infinite, the quaternion is zero, or
-                the position is farther away than any robot can be.
+            ProtocolError: If a number is NaN or infinite, the quaternion is almost but
+                not exactly zero, or the position is farther away than any robot can be.
 
         """
         p, q = self.position, self.orientation
@@ -146,14 +151,12 @@ class PoseMsg(Unstamped, frozen=True):
                 f"a pose must be within {FARTHEST:g} m of the plane, got a height of "
                 f"{p.z:g}"
             )
-        if self.turns_nowhere:
-            raise ProtocolError("a pose has a quaternion of zeros, which turns nowhere")
+        length = q.quaternion.norm
+        if length <= 1e-6:
+            raise ProtocolError(
+                f"a pose has a quaternion of length {length:g}, which is no rotation"
+            )
         return self.planar
-
-    @property
-    def turns_nowhere(self) -> bool:
-        """Whether the quaternion is zero, as in an uninitialized message."""
-        return self.orientation.quaternion.norm <= 1e-6
 
     @property
     def place(self) -> "PoseMsg":

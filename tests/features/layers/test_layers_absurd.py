@@ -21,7 +21,7 @@ from test_layers_markers import (
     TEXT,
     marker,
 )
-from test_layers_poses import ZEROS, covariance, doubtful, polygon, sonar
+from test_layers_poses import covariance, doubtful, polygon, sonar
 from test_layers_robot import scan
 from test_layers_ways import path
 
@@ -191,18 +191,6 @@ def test_range_limits_beyond_single_precision_are_applied_without_warnings(low):
         points = points_of(scan_rays(scan([1.0, 2.0, 1e30], low=low, high=1e39)))
         assert len(points_of(scan_rays(scan([1.0], low=1e39, high=1e39)))) == 0
     assert np.allclose(points, [[1, 0], [0, 2]])
-
-
-def test_poses_with_zero_quaternions_are_left_out_of_a_pose_array(link, robot):
-    module = robot.add_module("PoseArray", link, "/particles")
-    nowhere = {**pose(1, 2), "orientation": ZEROS}
-    poses = [pose(3, 4), nowhere, pose(5, 6), nowhere]
-    link.publish("/particles", {"header": header(), "poses": poses})
-    assert [(each.x, each.y) for each in module.poses] == [(3, 4), (5, 6)]
-    (problem,) = robot.problems.values()
-    assert "2 of 4 poses have a quaternion of zeros" in problem
-    link.publish("/particles", {"header": header(), "poses": poses[:1]})
-    assert not robot.problems
 
 
 def test_a_tilted_marker_with_an_absurd_height_is_refused(map, link, channel):

@@ -164,13 +164,6 @@ BAD = {
     "one is 101": grid([[0, 101]]),
     "one is -2": grid([[0, -2]]),
     "finite": grid(CORNERS, origin=pose(math.nan, 0)),
-    "quaternion of zeros": grid(
-        CORNERS,
-        origin={
-            "position": {"x": 0, "y": 0, "z": 0},
-            "orientation": {"x": 0, "y": 0, "z": 0, "w": 0},
-        },
-    ),
     "expected an array of numbers": {**grid(CORNERS), "data": ["a"] * 6},
     "missing required field `info`": {"data": []},
 }

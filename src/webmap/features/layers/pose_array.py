@@ -61,8 +61,6 @@ POSES, PARTICLES = "geometry_msgs/PoseArray", "nav2_msgs/ParticleCloud"
 class PoseArray(RobotLayer):
     """An arrow for each of many poses, such as ``/particlecloud`` of AMCL in ROS 1.
 
-    Poses with a quaternion of zeros are left out, and their number is reported.
-
     Style them by CSS: ``.posearray > .arrow``.
     """
 
@@ -96,14 +94,14 @@ class PoseArray(RobotLayer):
 
     @property
     def poses(self) -> list[Pose]:
-        """All newest poses, except those with a quaternion of zeros.
+        """All newest poses.
 
         Raises:
             ProtocolError: If a pose is not finite; only the drawn poses were checked
                 before.
         """
         given = self._message.poses if self._message is not None else []
-        return [pose.usable for pose in given if not pose.turns_nowhere]
+        return [pose.usable for pose in given]
 
     def read(
         self, message: PoseArrayMsg | ParticleCloudMsg
@@ -116,14 +114,7 @@ class PoseArray(RobotLayer):
         given = message.poses
         # Only these are checked: 20,000 would delay the other robots by 0.1 s.
         chosen = [given[index] for index in thinned(len(given), self.max_poses)]
-        poses = [pose.usable for pose in chosen if not pose.turns_nowhere]
-        missing = len(chosen) - len(poses)
-        if missing:
-            self.complain(
-                f"{missing} of {len(chosen)} poses have a quaternion of zeros, which "
-                "turns nowhere, and are left out"
-            )
-        return message, poses
+        return message, [pose.usable for pose in chosen]
 
     def draw(
         self, found: tuple[PoseArrayMsg | ParticleCloudMsg, list[Pose]], at: Transform

@@ -72,7 +72,7 @@ class PoseStamped(RobotLayer):
         """Return a pose that can be drawn, and its frame.
 
         Raises:
-            ProtocolError: If it is not finite or its quaternion is zero.
+            ProtocolError: If it is not finite or its quaternion is no rotation.
         """
         return message.pose.usable, message.frame_id
 

@@ -52,7 +52,7 @@ class PoseWithCovarianceStampedMsg(Stamped, frozen=True, kw_only=True):
         """Position and heading in the plane.
 
         Raises:
-            ProtocolError: If it is not finite, or its quaternion is zero.
+            ProtocolError: If it is not finite, or its quaternion is no rotation.
         """
         return self.pose.pose.usable
 

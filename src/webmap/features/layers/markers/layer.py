@@ -1,7 +1,6 @@
 """Markers: shapes that ROS programs publish for people."""
 
 import asyncio
-import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,19 +16,12 @@ from webmap.features.layers.markers.messages import (
     MarkerArrayMsg,
     MarkerMsg,
 )
-from webmap.features.layers.markers.shapes import (
-    lies_unturned,
-    look_of,
-    place,
-    shape_of,
-)
+from webmap.features.layers.markers.shapes import look_of, place, shape_of
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.layer_frames import LayerFrames, not_known
 from webmap.modules.map_layer import MapLayer
 from webmap.ros.tf import Transform, TransformError
 from webmap.scene.element import Element
-
-log = logging.getLogger("webmap.modules")
 
 Put = Callable[[Transform], object]
 """Places a marker at the present pose of its frame."""
@@ -163,8 +155,7 @@ class Markers(MapLayer):
 
     Arrows, cubes, spheres, cylinders, lines, lists of them, points, triangles and texts
     are drawn, with their colours; meshes are not. A marker that is not valid is left
-    out and reported; all others are drawn. A sphere, a list of spheres or points with a
-    quaternion of zeros are drawn without rotation, and this is logged once.
+    out and reported; all others are drawn.
 
     Each marker is drawn where its own frame was at its stamp, and a ``frame_locked``
     marker follows the frame. A marker whose frame is unknown is drawn without a
@@ -195,7 +186,6 @@ class Markers(MapLayer):
         self._looks: dict[Key, tuple[object, ...]] = {}
         self._ends: dict[Key, float] = {}
         self._timer: asyncio.TimerHandle | None = None
-        self._unturned_logged = False
         self._left_out: set[Key] = set()
         """Markers beyond :data:`MAX_MARKERS`."""
         self._count_timer: asyncio.TimerHandle | None = None
@@ -266,7 +256,6 @@ class Markers(MapLayer):
         except WebMapError:
             self.frames.forget(key)
             raise
-        self._log_unturned(marker)
         self._ends.pop(key, None)
         if lifetime > 0:
             self._ends[key] = time.monotonic() + lifetime
@@ -310,22 +299,6 @@ class Markers(MapLayer):
             self._drop(key)
             if _MOVED not in self.problems:
                 self.set_problem(_MOVED, f"{self.topic}: {_wrong(marker, error)}")
-
-    def _log_unturned(self, marker: MarkerMsg) -> None:
-        """Log once that orientations are missing; they are drawn as in RViz.
-
-        This is not a lasting problem, because it changes nothing on the map.
-        """
-        if not self._unturned_logged and lies_unturned(marker):
-            self._unturned_logged = True
-            log.warning(
-                "%s: %s: marker %d of %r has a quaternion of zeros and is drawn "
-                "unturned, as all such markers are",
-                self.bridge.url,
-                self.topic,
-                marker.id,
-                marker.ns,
-            )
 
     def _show(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
         """Place a marker, and draw it again if it looks different from above."""

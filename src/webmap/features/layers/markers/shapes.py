@@ -8,7 +8,6 @@ from webmap.features.layers.markers import messages as kinds
 from webmap.features.layers.markers.drawing import CLASSES, LETTERS, draw, sizes
 from webmap.features.layers.markers.messages import MarkerMsg
 from webmap.modules.drawing import check_finite, flat, in_space
-from webmap.ros.messages import PoseMsg, QuaternionMsg
 from webmap.ros.tf import Transform
 from webmap.scene import svg
 from webmap.scene.element import Element
@@ -19,20 +18,8 @@ MAX_POINTS = 20_000
 SEEN = 3
 """Decimals of a rotation that decide whether a tilting marker is drawn again."""
 
-UNTURNED = QuaternionMsg(0.0, 0.0, 0.0, 1.0)
-
 AS_IT_COMES = Transform()
 """The identity: draws a marker with its own coordinates."""
-
-
-def lies_unturned(marker: MarkerMsg) -> bool:
-    """Return whether a marker's orientation was not set, so that it is not rotated.
-
-    ROS 1 initializes an orientation with zeros, and RViz draws it without rotation. A
-    quaternion that is only too short was computed, and wrongly.
-    """
-    q = marker.pose.orientation
-    return marker.type != kinds.TEXT_VIEW_FACING and q.x == q.y == q.z == q.w == 0.0
 
 
 def shape_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> Element:
@@ -108,9 +95,8 @@ def _split(marker: MarkerMsg, frame: Transform) -> tuple[Pose, Transform]:
         (found,) = flat(in_space([at]), frame)
         return Pose(*found), Transform()
     (place,) = in_space([marker.pose.position])
-    orientation = UNTURNED if lies_unturned(marker) else marker.pose.orientation
-    _ = PoseMsg(marker.pose.position, orientation).usable
-    q = orientation.quaternion
+    _ = marker.pose.usable
+    q = marker.pose.orientation.quaternion
     n = q.norm
     turn = Quaternion(q.x / n, q.y / n, q.z / n, q.w / n)
     pose, tilt = (frame @ Transform(place, turn)).heading_and_tilt

@@ -1,0 +1,63 @@
+"""Messages that other tools draw, although they are unusual."""
+
+import json
+from pathlib import Path
+
+import pytest
+from module_fakes import images, pixel
+
+MESSAGES = json.loads(Path(__file__).with_name("unusual_messages.json").read_text())
+ZEROS = dict.fromkeys("xyzw", 0.0)
+PLACE = {"position": {"x": 1.0, "y": 2.0, "z": 0.0}, "orientation": ZEROS}
+HEADER = {"frame_id": "map"}
+
+
+def test_a_map_with_a_quaternion_of_zeros_is_drawn_without_rotation(map, link):
+    module = map.add_module("OccupancyGrid", link, "/map")
+    link.publish("/map", MESSAGES["zero quaternion"])
+    (image,) = images(module.layer)
+    assert pixel(image, 0.75, -0.75) == (0, 0, 0, 255)
+    assert pixel(image, -0.75, -0.75) == (255, 255, 255, 255)
+    assert module.layer.problems == {}
+
+
+POSES = {
+    "PoseStamped": {"header": HEADER, "pose": PLACE},
+    "PoseWithCovariance": {
+        "header": HEADER,
+        "pose": {"pose": PLACE, "covariance": [0.1] * 36},
+    },
+    "PoseArray": {"header": HEADER, "poses": [PLACE]},
+    "Path": {"header": HEADER, "poses": [{"header": HEADER, "pose": PLACE}] * 2},
+}
+
+
+@pytest.mark.parametrize("layer", POSES)
+def test_a_pose_with_a_quaternion_of_zeros_is_drawn_without_rotation(
+    link, robot, layer
+):
+    message, looks = json.dumps(POSES[layer]), []
+    for text in (message, message.replace('"w": 0.0', '"w": 1.0')):
+        module = robot.add_module(layer, link, "/topic")
+        link.publish("/topic", text)
+        looks.append([(e.attributes, e._transform) for e in module.svg.children])
+        module.svg.remove()
+    assert looks[0] == looks[1]
+    assert robot.problems == {}
+
+
+@pytest.mark.parametrize("layer", ["PoseStamped", "PoseArray"])
+def test_a_quaternion_of_almost_zeros_is_still_refused(link, robot, layer):
+    robot.add_module(layer, link, "/topic")
+    text = json.dumps(POSES[layer]).replace('"w": 0.0', '"w": 1e-9')
+    link.publish("/topic", text)
+    (problem,) = robot.problems.values()
+    assert "a quaternion of length 1e-09, which is no rotation" in problem
+
+
+def test_the_pose_of_a_robot_with_a_quaternion_of_zeros_is_still_refused(link, robot):
+    robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
+    link.publish("/odom", POSES["PoseStamped"])
+    assert robot.position.x == 0.0
+    (problem,) = robot.problems.values()
+    assert "a quaternion of zeros was ignored" in problem
