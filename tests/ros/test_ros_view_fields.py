@@ -42,6 +42,9 @@ def views():
 
 VIEWS = views()
 
+ROS1_ONLY = {"seq"}
+"""Fields of a header of ROS 1 that ROS 2 has not."""
+
 
 def misfits(struct, fields, others=()):
     """Return the fields of a view that do not match a definition, as sentences.
@@ -58,7 +61,7 @@ def misfits(struct, fields, others=()):
         name = field.encode_name
         field_of_ros = known.get(name)
         if field_of_ros is None:
-            if field.required or name not in elsewhere:
+            if field.required or name not in (ROS1_ONLY | elsewhere.keys()):
                 wrong.append(f"there is no {name}")
         elif not fits(hints[field.name], field_of_ros):
             wrong.append(f"{name} is no {hints[field.name]}")

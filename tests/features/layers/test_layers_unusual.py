@@ -7,6 +7,27 @@ import pytest
 from module_fakes import images, pixel
 
 MESSAGES = json.loads(Path(__file__).with_name("unusual_messages.json").read_text())
+
+
+@pytest.mark.parametrize("ros2", [True, False])
+def test_delete_all_is_limited_to_a_namespace_in_ros_2_only(map, link, ros2):
+    layer = map.add_module("Markers", link, "/markers").layer
+    for message in MESSAGES["one namespace"]:
+        for marker in message["markers"] if not ros2 else ():
+            marker["header"]["seq"] = 7
+        link.publish("/markers", message)
+    assert list(layer.shapes) == ([("zones", 2)] if ros2 else [])
+
+
+def test_delete_all_without_a_namespace_deletes_all_markers(map, link):
+    layer = map.add_module("Markers", link, "/markers").layer
+    first, second = json.loads(json.dumps(MESSAGES["one namespace"]))
+    second["markers"][0]["ns"] = ""
+    link.publish("/markers", first)
+    link.publish("/markers", second)
+    assert layer.shapes == {}
+
+
 ZEROS = dict.fromkeys("xyzw", 0.0)
 PLACE = {"position": {"x": 1.0, "y": 2.0, "z": 0.0}, "orientation": ZEROS}
 HEADER = {"frame_id": "map"}

@@ -155,7 +155,8 @@ class Markers(MapLayer):
 
     Arrows, cubes, spheres, cylinders, lines, lists of them, points, triangles and texts
     are drawn, with their colours; meshes are not. A marker that is not valid is left
-    out and reported; all others are drawn.
+    out and reported; all others are drawn. The action DELETEALL deletes all markers of
+    the topic; in ROS 2, with a namespace, only those of the namespace.
 
     Each marker is drawn where its own frame was at its stamp, and a ``frame_locked``
     marker follows the frame. A marker whose frame is unknown is drawn without a
@@ -229,8 +230,11 @@ class Markers(MapLayer):
             self._forget_left_out({key})
             self._drop(key)
         elif marker.action == DELETE_ALL:
-            self._forget_left_out(set(self._left_out))
-            for each in tuple(self.shapes):
+            cleared = {
+                k for k in (*self.shapes, *self._left_out) if marker.clears(k[0])
+            }
+            self._forget_left_out(cleared)
+            for each in cleared:
                 self._drop(each)
         else:
             raise ProtocolError(

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import msgspec
 
-from webmap.ros.messages import PointMsg, PoseMsg, Stamped, Time
+from webmap.ros.messages import Header, PointMsg, PoseMsg, Stamped, Time
 
 ARROW, CUBE, SPHERE, CYLINDER, LINE_STRIP, LINE_LIST = range(6)
 CUBE_LIST, SPHERE_LIST, POINTS, TEXT_VIEW_FACING, MESH_RESOURCE, TRIANGLE_LIST = range(
@@ -23,9 +23,17 @@ class ColorMsg(msgspec.Struct, frozen=True, gc=False):
     a: float = 1.0
 
 
+class MarkerHeader(Header, frozen=True, gc=False):
+    """The header of a marker."""
+
+    seq: int | None = None
+    """The number of the message; only ROS 1 has one."""
+
+
 class MarkerMsg(Stamped, frozen=True, kw_only=True):
     """``visualization_msgs/Marker``."""
 
+    header: MarkerHeader = MarkerHeader()
     type: int
     action: int
     pose: PoseMsg
@@ -47,6 +55,14 @@ class MarkerMsg(Stamped, frozen=True, kw_only=True):
     text: str = ""
     frame_locked: bool = False
     """Whether the marker moves with its frame."""
+
+    def clears(self, ns: str) -> bool:
+        """Return whether the action :data:`DELETE_ALL` deletes markers of a namespace.
+
+        In ROS 2, a namespace limits it to the markers of this namespace. ROS 1 deletes
+        all markers of the topic, whatever the namespace.
+        """
+        return self.ns in ("", ns) or self.header.seq is not None
 
 
 class MarkerArrayMsg(msgspec.Struct, frozen=True):
