@@ -76,6 +76,44 @@ def test_a_quaternion_of_almost_zeros_is_still_refused(link, robot, layer):
     assert "a quaternion of length 1e-09, which is no rotation" in problem
 
 
+GREEN, YELLOW = (0, 255, 0, 255), (255, 255, 0, 255)
+
+
+@pytest.mark.parametrize("palette", ["map", "costmap"])
+def test_cells_of_other_values_are_marked_and_reported_once(
+    map, link, channel, caplog, palette
+):
+    module = map.add_module("OccupancyGrid", link, "/map", palette=palette)
+    above, below = MESSAGES["other values"]
+    for _ in range(3):
+        link.publish("/map", above)
+    (image,) = images(module.layer)
+    assert pixel(image, 0.75, 0.25)[3] == 255, "the other cells are drawn"
+    assert pixel(image, 1.75, 0.25) == GREEN
+    link.publish("/map", below)
+    (image,) = images(module.layer)
+    assert pixel(image, 0.75, 0.25) == YELLOW
+    assert pixel(image, 1.25, 0.25)[:2] == (255, 252)
+    assert pixel(image, 1.75, 0.25)[3] == 0, "-1 is unknown"
+    (problem,) = channel.errors
+    assert "cells are -1 to 100, but 1 of 4 are not: one is 101" in problem
+    assert len(caplog.records) == 1
+    link.publish("/map", {**above, "data": [0, 50, 100, 100]})
+    assert module.layer.problems == {}
+
+
+def test_an_update_with_other_values_is_drawn_and_reported(map, link, channel):
+    module = map.add_module("OccupancyGrid", link, "/map")
+    link.publish("/map", {**MESSAGES["other values"][0], "data": [0] * 4})
+    patch = {"x": 0, "y": 0, "width": 1, "height": 1, "data": [101]}
+    for _ in range(3):
+        link.publish("/map_updates", {"header": HEADER, **patch})
+    (image,) = images(module.layer)
+    assert pixel(image, 0.25, 0.25) == GREEN
+    (problem,) = channel.errors
+    assert problem.startswith("/map: cells are -1 to 100, but 1 of 1 are not")
+
+
 def test_the_pose_of_a_robot_with_a_quaternion_of_zeros_is_still_refused(link, robot):
     robot.set_odometry_topic(link, "/odom", type="geometry_msgs/PoseStamped")
     link.publish("/odom", POSES["PoseStamped"])

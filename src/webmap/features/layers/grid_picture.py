@@ -107,16 +107,27 @@ Colour = tuple[int, int, int, int]
 CLEAR: Colour = (0, 0, 0, 0)
 
 
+def _other_colour(value: int) -> Colour:
+    """Return the colour of a cell that is neither a cost nor a probability."""
+    if value == 255:
+        return CLEAR
+    if value <= 127:
+        return (0, 255, 0, 255)
+    return (255, 255 * (value - 128) // 126, 0, 255)
+
+
 def _map_colour(value: int) -> Colour:
     if value > 100:
-        return CLEAR
+        return _other_colour(value)
     grey = 255 - 255 * value // 100
     return (grey, grey, grey, 255)
 
 
 def _costmap_colour(value: int) -> Colour:
-    if value == 0 or value > 100:
+    if value == 0:
         return CLEAR
+    if value > 100:
+        return _other_colour(value)
     if value == 100:
         return (255, 0, 255, 255)
     if value == 99:
@@ -131,4 +142,7 @@ PALETTES: dict[str, list[Colour]] = {
     "costmap": [_costmap_colour(value) for value in range(256)],
     "raw": [(255 - value, 255 - value, 255 - value, 255) for value in range(256)],
 }
-"""The colours of each palette; those of RViz where RViz has the palette."""
+"""The colours of each palette; those of RViz where RViz has the palette.
+
+A cell above 100 is green, and one below -1 is red to yellow: these values mean nothing.
+"""

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
     Found: TypeAlias = tuple[MapMetaDataMsg, NDArray[np.int8]]
 
+_OTHER_VALUES = "other values"
+"""The problem of cells that are not -1 to 100."""
+
 
 class OccupancyGridUpdateMsg(Stamped, frozen=True, kw_only=True):
     """``map_msgs/OccupancyGridUpdate``: a rectangle of a grid."""
@@ -97,7 +100,9 @@ class OccupancyGrid(MapLayer):
 
     The topic has the type ``nav_msgs/OccupancyGrid``; the topic with ``_updates`` added
     has the type ``map_msgs/OccupancyGridUpdate``. Unknown cells are transparent. Cells
-    must be -1 to 100; other values are refused, unless the palette is ``"raw"``.
+    are -1 to 100; other values are drawn in green if they are above 100 and in red to
+    yellow if they are below -1, and a notice reports them, unless the palette is
+    ``"raw"``.
 
     A grid of more than a million cells is drawn as tiles of 512 x 512 cells, each an
     image. A tile is drawn and sent again only when its cells have changed. Of a grid of
@@ -180,7 +185,7 @@ class OccupancyGrid(MapLayer):
         """Return size and position of a grid, and its cells.
 
         Raises:
-            ProtocolError: If its size, its position or a cell is not valid.
+            ProtocolError: If its size or its position is not valid.
         """
         info = message.info
         resolution = info.resolution
@@ -196,13 +201,14 @@ class OccupancyGrid(MapLayer):
                 f"a grid has sides of at most {FARTHEST:g} m, got "
                 f"{info.width} x {info.height} cells of {resolution:g} m"
             )
-        check_values(cells, self.palette)
         return info, cells
 
     def draw(self, found: "Found", at: Transform) -> None:
         """Draw the grid."""
         self.info, self.cells = found
         self._updates.clear()
+        if not self._report_other_values(self.cells):
+            self.clear_problem(_OTHER_VALUES)
         self.tiles.show(self.cells, self.info.resolution, self.info.origin.planar)
         if self.tiles.coarse > 1:
             height, width = self.cells.shape
@@ -217,8 +223,7 @@ class OccupancyGrid(MapLayer):
         """Change a rectangle of the grid; does nothing without a grid.
 
         Raises:
-            ProtocolError: If the rectangle extends beyond the grid, or a cell is not
-                valid.
+            ProtocolError: If the rectangle extends beyond the grid.
         """
         if self.cells is None:
             return
@@ -229,7 +234,7 @@ class OccupancyGrid(MapLayer):
                 f"an update of {update.width} x {update.height} cells at column {x}, "
                 f"row {y} reaches out of a grid of {width} x {height}"
             )
-        check_values(patch, self.palette)
+        self._report_other_values(patch)
         self._updates.append(update)
         if not self.cells.flags.writeable and self.cells.size > SMALL:
             if self._copying is None:
@@ -238,6 +243,12 @@ class OccupancyGrid(MapLayer):
         if not self.cells.flags.writeable:
             self.cells = self.cells.copy()
         self._update()
+
+    def _report_other_values(self, cells: "NDArray[np.int8]") -> bool:
+        text = other_values(cells, self.palette)
+        if text:
+            self.set_problem(_OTHER_VALUES, f"{self.topic}: {text}")
+        return bool(text)
 
     async def _copy(self) -> None:
         """Copy the cells of a large message, which others may use, for the updates.
@@ -273,18 +284,13 @@ class OccupancyGrid(MapLayer):
             self.set_problem(self, f"{self.topic}: {problem}")
 
 
-def check_values(cells: "NDArray[np.int8]", palette: str) -> None:
-    """Check that the palette has a colour for all cells.
-
-    Raises:
-        ProtocolError: If it has not; the error names one of the values.
-    """
-    if palette == "raw":
-        return
+def other_values(cells: "NDArray[np.int8]", palette: str) -> str:
+    """Return a sentence about cells that are not -1 to 100; empty if there are none."""
     low, high = int(cells.min()), int(cells.max())
-    if low < -1 or high > 100:
-        wrong = low if low < -1 else high
-        count = int(((cells < -1) | (cells > 100)).sum())
-        raise ProtocolError(
-            f"cells are -1 to 100, but {count} of {cells.size} are not: one is {wrong}"
-        )
+    if palette == "raw" or (low >= -1 and high <= 100):
+        return ""
+    count = int(((cells < -1) | (cells > 100)).sum())
+    return (
+        f"cells are -1 to 100, but {count} of {cells.size} are not: one is "
+        f"{low if low < -1 else high}; they are drawn in green, or in red to yellow"
+    )
