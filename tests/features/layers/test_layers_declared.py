@@ -205,7 +205,7 @@ PRIVATE = {
     # Layers that draw more than one topic, or in several frames at once.
     "Diagnostics": {"refusing", "Removal", "keep", "robot_modules"},
     "Markers": {"LayerFrames", "TransformError", "not_known", "Removal", "keep"},
-    "OccupancyGrid": {"refusing", "spawn"},
+    "OccupancyGrid": {"Refusing", "spawn"},
     # Names that only these layers use.
     "LaserScanner": {"Rays", "scan_name"},
     "NavSatFix": {"LocalPlane"},

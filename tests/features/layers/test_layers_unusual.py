@@ -1,12 +1,106 @@
 """Messages that other tools draw, although they are unusual."""
 
+import asyncio
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from module_fakes import images, pixel
 
+from webmap import Bridge
+from webmap.features.layers import occupancy_grid
+from webmap.ros.rosbridge.events import Publish
+
 MESSAGES = json.loads(Path(__file__).with_name("unusual_messages.json").read_text())
+COSTMAP, UPDATES = "/global_costmap/costmap", "/global_costmap/costmap_updates"
+LETHAL = [(2, 2)]
+
+
+def lethal(layer) -> list[tuple[int, int]]:
+    """Return column and row of the lethal cells."""
+    rows, columns = np.nonzero(layer.cells == 100)
+    return list(zip(columns.tolist(), rows.tolist(), strict=True))
+
+
+def test_updates_that_overtake_a_grid_in_the_throttle_are_drawn_on_it(map, page):
+    async def scenario():
+        bridge = Bridge("ws://127.0.0.1:9")  # it is not connected
+        bridge._fan_out.begin(asyncio.get_running_loop())
+        options = {"palette": "costmap", "throttle": 500}
+        layer = map.add_module("OccupancyGrid", bridge, COSTMAP, **options).layer
+        before = 0.0
+        for each in MESSAGES["costmap"]:
+            await asyncio.sleep((each["at"] - before) / 10)
+            before, topic = each["at"], each["topic"]
+            op = {"op": "publish", "topic": topic, "msg": each["msg"]}
+            event = Publish(topic, json.dumps(op).encode())
+            bridge._received(bridge._topics[topic], event)
+        assert layer.cells.shape == (4, 8)
+        assert lethal(layer) == [], "an update waits for the grid that it belongs to"
+        assert layer.problems
+        async with asyncio.timeout(10):
+            while layer.cells.shape != (4, 12):
+                await asyncio.sleep(0.01)
+        assert lethal(layer) == LETHAL
+        assert layer.problems == {}
+        page.close()
+        await bridge.stop()
+
+    asyncio.run(scenario())
+
+
+@pytest.fixture
+def costmap(map, link):
+    options = {"palette": "costmap", "throttle": 5000}
+    return map.add_module("OccupancyGrid", link, COSTMAP, **options).layer
+
+
+def send(link, seconds: int = 100, *numbers: int) -> None:
+    """Publish some messages of the costmap, as of a second of the robot's clock."""
+    for number in numbers:
+        each = MESSAGES["costmap"][number]
+        stamped = {**each["msg"]["header"], "stamp": {"sec": seconds, "nanosec": 0}}
+        link.publish(each["topic"], {**each["msg"], "header": stamped})
+
+
+@pytest.mark.parametrize(
+    ("updated", "sent", "drawn"),
+    [
+        (100, 100, LETHAL),
+        (101, 100, LETHAL),
+        (99, 100, [(10, 1)]),  # the grid is newer
+        (500, 100, [(10, 1)]),  # the clock was set back
+        (5, 0, [(10, 1)]),  # the grid has no stamp
+    ],
+)
+def test_the_stamps_decide_which_updates_are_drawn_on_a_later_grid(
+    link, costmap, updated, sent, drawn
+):
+    send(link, updated, 0, 2, 3)
+    send(link, sent, 1)
+    assert lethal(costmap) == drawn
+
+
+def test_an_update_that_fits_no_grid_does_not_end_the_updates(
+    link, costmap, monkeypatch
+):
+    now = [0.0]
+    monkeypatch.setattr(occupancy_grid.time, "monotonic", lambda: now[0])
+    send(link, 100, 0, 2, 3)
+    assert lethal(costmap) == []
+    now[0] += 5 + occupancy_grid.SOON
+    send(link, 107, 2)
+    assert lethal(costmap) == []
+    send(link, 107, 3)
+    assert lethal(costmap) == LETHAL
+    assert costmap.problems == {}
+
+
+def test_the_kept_updates_of_a_grid_are_limited(link, costmap, monkeypatch):
+    monkeypatch.setattr(occupancy_grid, "MOST", 3)
+    send(link, 100, 0, *[3] * 300)
+    assert len(costmap._newest) == 3
 
 
 @pytest.mark.parametrize("ros2", [True, False])

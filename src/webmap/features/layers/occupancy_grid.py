@@ -2,12 +2,15 @@
 
 import asyncio
 import math
+import time
+from collections import deque
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST
 from webmap.base.tasks import spawn
-from webmap.core.problems import refusing
+from webmap.core.problems import Refusing
 from webmap.features.layers.grid_picture import Palette, check_palette
 from webmap.features.layers.grid_tiles import MOST, SMALL, GridTiles
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
@@ -26,6 +29,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Found: TypeAlias = tuple[MapMetaDataMsg, NDArray[np.int8]]
+
+LATE = 15.0
+"""Seconds, besides the throttle, by which a whole grid may come after its updates."""
+
+SOON = 2.0
+"""Seconds, besides the throttle, within which a whole grid follows an update that does
+not fit the grid before."""
+
+KEPT = 200
+"""The number of updates that are kept for a whole grid that is still to come."""
 
 _OTHER_VALUES = "other values"
 """The problem of cells that are not -1 to 100."""
@@ -104,6 +117,10 @@ class OccupancyGrid(MapLayer):
     yellow if they are below -1, and a notice reports them, unless the palette is
     ``"raw"``.
 
+    The throttle delays whole grids and no updates. So the updates that came before a
+    whole grid but have a newer stamp, or the same one, are drawn on that grid too. When
+    an update does not fit the grid, the updates wait for the next whole grid.
+
     A grid of more than a million cells is drawn as tiles of 512 x 512 cells, each an
     image. A tile is drawn and sent again only when its cells have changed. Of a grid of
     more than 16 million cells, several cells are drawn as one, with the greatest of
@@ -158,7 +175,11 @@ class OccupancyGrid(MapLayer):
         self.cells: NDArray[np.int8] | None = None
         """The newest cells, of shape (height, width), the lowest row first."""
         self._updates: list[OccupancyGridUpdateMsg] = []
-        """Updates that wait until the cells are copied, the oldest first."""
+        """Updates that are not drawn yet, the oldest first."""
+        self._newest: deque[tuple[float, OccupancyGridUpdateMsg]] = deque(maxlen=KEPT)
+        """The newest updates and their stamps, for a whole grid that is to come."""
+        self._outgrown: tuple[float, str] | None = None
+        """Until when updates wait for the next whole grid, and why."""
         self._copying: asyncio.Task[None] | None = None
         self.svg.classes.add(self.palette)
         # Each of several maps has its own switch.
@@ -171,10 +192,11 @@ class OccupancyGrid(MapLayer):
         """Make the tiles, and subscribe to the grid and to its updates."""
         super().start()
         updates = self.topic.rstrip("/") + "_updates"
+        self._refusing_updates = Refusing(self, updates)
         # Every update counts, so none may be delayed or replaced by the next.
         self.bridge.subscribe(
             updates,
-            refusing(self, updates, self.on_update),
+            partial(self._refusing_updates.take, self.on_update),
             "map_msgs/OccupancyGridUpdate",
             decode=OccupancyGridUpdateMsg,
             encoding="binary",
@@ -203,6 +225,28 @@ class OccupancyGrid(MapLayer):
             )
         return info, cells
 
+    def take(self, message: OccupancyGridMsg) -> None:
+        """Draw a grid, and the updates that were sent after it but came before it.
+
+        Raises:
+            ProtocolError: If it cannot be drawn.
+        """
+        super().take(message)
+        self._outgrown = None
+        self.clear_problem(self._refusing_updates)
+        stamp = first = message.stamp
+        if not self.throttle:  # of two equal stamps, the later message is the newer one
+            first = math.nextafter(stamp, math.inf)
+        last = stamp + LATE + self.throttle / 1000
+        if stamp:
+            self._updates = [
+                update
+                for at, update in self._newest
+                if first <= at <= last and self._fits(update)
+            ]
+        if self._updates:
+            self._change()
+
     def draw(self, found: "Found", at: Transform) -> None:
         """Draw the grid."""
         self.info, self.cells = found
@@ -223,19 +267,48 @@ class OccupancyGrid(MapLayer):
         """Change a rectangle of the grid; does nothing without a grid.
 
         Raises:
-            ProtocolError: If the rectangle extends beyond the grid.
+            ProtocolError: If the rectangle extends beyond the grid, or one did shortly
+                before: the update then waits for the next whole grid.
         """
+        patch, now = update.cells, time.monotonic()
+        self._newest.append((update.stamp, update))
+        while sum(each.width * each.height for _, each in self._newest) > MOST:
+            self._newest.popleft()
         if self.cells is None:
             return
-        x, y, patch = update.x, update.y, update.cells
-        height, width = self.cells.shape
-        if not (0 <= x <= width - update.width and 0 <= y <= height - update.height):
-            raise ProtocolError(
-                f"an update of {update.width} x {update.height} cells at column {x}, "
-                f"row {y} reaches out of a grid of {width} x {height}"
-            )
         self._report_other_values(patch)
-        self._updates.append(update)
+        if self._fits(update):
+            self._updates.append(update)
+        else:
+            height, width = self.cells.shape
+            why = (
+                f"an update of {update.width} x {update.height} cells at column "
+                f"{update.x}, row {update.y} reaches out of a grid of {width} x "
+                f"{height}: the updates wait for the next whole grid"
+            )
+            until, _ = self._outgrown or (now + self.throttle / 1000 + SOON, "")
+            self._outgrown = until, why
+            raise ProtocolError(why)
+        if self._outgrown is not None and now < self._outgrown[0]:
+            raise ProtocolError(self._outgrown[1])
+        self._change()
+
+    def _fits(self, update: OccupancyGridUpdateMsg) -> bool:
+        """Return whether the rectangle of an update is a part of the grid."""
+        assert self.cells is not None
+        height, width = self.cells.shape
+        left, above = width - update.width, height - update.height
+        return bool(0 <= update.x <= left and 0 <= update.y <= above)
+
+    def _report_other_values(self, cells: "NDArray[np.int8]") -> bool:
+        text = other_values(cells, self.palette)
+        if text:
+            self.set_problem(_OTHER_VALUES, f"{self.topic}: {text}")
+        return bool(text)
+
+    def _change(self) -> None:
+        """Draw the updates that wait, once the cells of a message are copied."""
+        assert self.cells is not None
         if not self.cells.flags.writeable and self.cells.size > SMALL:
             if self._copying is None:
                 self._copying = spawn(self._copy())
@@ -243,12 +316,6 @@ class OccupancyGrid(MapLayer):
         if not self.cells.flags.writeable:
             self.cells = self.cells.copy()
         self._update()
-
-    def _report_other_values(self, cells: "NDArray[np.int8]") -> bool:
-        text = other_values(cells, self.palette)
-        if text:
-            self.set_problem(_OTHER_VALUES, f"{self.topic}: {text}")
-        return bool(text)
 
     async def _copy(self) -> None:
         """Copy the cells of a large message, which others may use, for the updates.
