@@ -2,6 +2,7 @@
 
 import json
 import zlib
+from types import SimpleNamespace
 
 import pytest
 
@@ -10,7 +11,9 @@ from webmap.agents.address import Sender
 from webmap.agents.allowance import Allowance
 from webmap.agents.clients import Clients
 from webmap.base.errors import WireError
+from webmap.fleet.agent import Agent
 from webmap.ros.rosbridge import ops
+from webmap.ros.rosbridge.protocol import Protocol
 
 ANN, BEN = Sender("ann", "4f", "1"), Sender("ben", "5e", "1")
 
@@ -70,6 +73,36 @@ def test_the_agent_limits_the_rate_of_a_topic():
     bench = Bench(throttles={"/scan": 500})
     bench.subscribe(ANN, "/scan", throttle_rate=100)
     assert bench.took()[0]["throttle_rate"] == 500
+
+
+def test_the_agent_does_not_limit_the_rate_of_changes_as_each_of_them_counts():
+    bench = Bench(throttles={"/markers": 500})
+    type = "visualization_msgs/MarkerArray"
+    bench.subscribe(ANN, "/markers", throttle_rate=1, type=type)
+    assert bench.took()[0]["throttle_rate"] == 1
+
+
+@pytest.mark.parametrize(
+    ("topic", "type", "every"),
+    [
+        ("/markers", "visualization_msgs/MarkerArray", True),
+        ("/map_updates", "map_msgs/OccupancyGridUpdate", True),
+        ("/tf_static", "tf2_msgs/TFMessage", True),
+        ("/map", "nav_msgs/OccupancyGrid", False),
+        ("/odom", None, False),
+    ],
+)
+def test_an_agent_leaves_out_no_message_that_changes_earlier_ones(
+    bench, topic, type, every
+):
+    sent, agent = [], object.__new__(Agent)
+    agent.name, agent._clients, agent._protocol = "bay3", bench.clients, Protocol()
+    agent._beams, agent._whole = {}, set()
+    put = lambda _key, _data, *, all=False, size=0: sent.append(all)  # noqa: E731
+    agent._peer = SimpleNamespace(put_data=put)
+    bench.subscribe(ANN, topic, type=type)
+    agent._received(ops.publish(topic, {}))
+    assert sent == [every]
 
 
 def test_a_late_display_gets_the_only_message_of_a_latched_topic(bench):

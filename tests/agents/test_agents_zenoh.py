@@ -281,10 +281,12 @@ def test_of_messages_that_wait_for_a_slow_link_the_newest_are_kept():
         peer.put_data("small", b"%d" % number)
         peer.put_data("large", bytes(5000) + b"%d" % number)
         peer.put_data("answers", b"%d" % number, all=True)
+        peer.put_data("changes", bytes(1000), all=True, size=10_000)
     waiting = peer._waiting
     assert list(waiting["small"]) == [b"%d" % n for n in range(1990, 2000)]
     assert [each[5000:] for each in waiting["large"]] == [b"1999"]
     assert len(waiting["answers"]) == 1000
+    assert len(waiting["changes"]) == 11
 
 
 def test_what_is_larger_than_expected_is_dropped_before_it_fills_the_memory():

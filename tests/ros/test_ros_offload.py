@@ -2,6 +2,7 @@ import asyncio
 import os
 import signal
 from array import array
+from collections import deque
 
 import cbor2
 import msgspec
@@ -11,6 +12,7 @@ from fake_rosbridge import bridged, until
 from captured_frames import CAPTURED
 from webmap.base.errors import ProtocolError
 from webmap.ros import offload, worker
+from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg, OccupancyGridMsg
 from webmap.ros.offload import Offload
 from webmap.ros.rosbridge.events import Publish
@@ -156,6 +158,39 @@ def test_a_newer_message_replaces_a_waiting_one_and_the_order_is_kept():
         await aside.stop()
 
     run(scenario)
+
+
+@pytest.mark.parametrize(
+    ("type", "came"),
+    [
+        ("visualization_msgs/MarkerArray", ["1", "2", "3", "last"]),
+        ("map_msgs/msg/OccupancyGridUpdate", ["1", "2", "3", "last"]),
+        ("nav_msgs/Path", ["1", "last"]),
+    ],
+)
+def test_no_message_that_changes_earlier_ones_is_replaced_by_a_newer_one(type, came):
+    async def scenario():
+        bridge, got = Bridge("ws://127.0.0.1:9"), []  # it is not connected
+        bridge.subscribe("/a", lambda message: got.append(message["data"]), type)
+        small = Publish("/a", b'{"op":"publish","topic":"/a","msg":{"data":"last"}}')
+        for message in (large("1"), large("2"), large("3"), small):
+            bridge._received(bridge._topics["/a"], message)
+        await until(lambda: got[-1:] == ["last"])
+        assert got == came
+        await bridge.stop()
+
+    run(scenario)
+
+
+def test_of_many_changes_that_wait_for_the_decoding_the_newest_are_kept(monkeypatch):
+    waiting = deque()
+    for number in range(20):
+        offload._join(waiting, offload._Job(large(str(number)), frozenset(), (), True))
+    assert len(waiting) == offload.MOST_WAITING
+    assert waiting[-1].message.decode()["data"] == "19"
+    monkeypatch.setattr(offload, "MAX_FRAME", 3 * offload.LARGE)
+    offload._join(waiting, offload._Job(large("20"), frozenset(), (), True))
+    assert [each.message.decode()["data"] for each in waiting] == ["19", "20"]
 
 
 def test_two_callbacks_for_one_message_are_both_called():

@@ -31,8 +31,11 @@ def run(scenario):
         offload._shared = None  # for the next test
 
 
-def take(aside, message, view, got):
-    aside.decode(message, frozenset([view]), lambda type: got.append(read(message)))
+def take(aside, message, view, got, **options):
+    def then(_):
+        got.append(read(message))
+
+    aside.decode(message, frozenset([view]), then, **options)
 
     def read(message):
         return message.decode(view)
@@ -185,7 +188,7 @@ def test_no_static_transform_is_dropped_when_newer_messages_arrive():
         aside, got = Offload(), []
         for count in (5000, 3, 4000):
             frame = transforms(count).replace(b'"/t"', b'"/r1/tf_static"')
-            take(aside, Publish("/r1/tf_static", frame), TFMessage, got)
+            take(aside, Publish("/r1/tf_static", frame), TFMessage, got, counts=True)
         await until(lambda: not aside._waiting)
         assert sum(len(part.transforms) for part in got) == 9003
         await aside.stop()

@@ -32,6 +32,7 @@ from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.checks import PARAMETER
 from webmap.ros.rosbridge.graph import QUESTIONS
 from webmap.ros.rosbridge.wire_subscription import BULK, REPLACED, THROTTLE
+from webmap.ros.subscriptions import each_counts
 
 log = logging.getLogger("webmap.agent")
 
@@ -107,6 +108,8 @@ class AgentTopic:
         types = {wish.type for wish in wishes if wish.type}
         type = known or (types.pop() if len(types) == 1 else None)
         least, compression = least_throttle, "none"
+        if each_counts(self.name, type):
+            least = 0
         queue = min(max(wish.queue for wish in wishes), ops.BURST)
         if type and is_type(type, *REPLACED, "sensor_msgs/LaserScan"):
             least, queue = max(least, LEAST_THROTTLE), 1
@@ -273,11 +276,10 @@ class Clients:
         topic.at = now
         return True
 
-    def has_scans(self, name: str) -> bool:
-        """Return whether displays expect laser scans on a topic."""
+    def type_of(self, name: str) -> str | None:
+        """Return the type of a topic as it is subscribed; None if unknown."""
         topic = self._topics.get(name)
-        type = topic.sent.type if topic is not None and topic.sent is not None else None
-        return type is not None and same_type(type, "sensor_msgs/LaserScan")
+        return topic.sent.type if topic is not None and topic.sent is not None else None
 
     def _do(self, client: Sender, op: SubscribeOp, frame: bytes, now: float) -> None:
         match op.op:

@@ -58,6 +58,9 @@ MOST_OF_ALL = 1000
 MOST_WAITING_BYTES = 8 << 20
 """Bytes under a key that wait at most besides the newest message."""
 
+MOST_CHANGES_BYTES = 256 << 10
+"""The same under the key of a topic where each message counts: more would be late."""
+
 MOST_BYTES = 68 << 20
 """Bytes of the largest message: the largest of a rosbridge, and its packing."""
 
@@ -276,7 +279,14 @@ class Peer:
                         express=True,
                     )
 
-    def put_data(self, key: str, data: bytes, *, all: bool = False) -> None:
+    def put_data(
+        self,
+        key: str,
+        data: bytes,
+        *,
+        all: bool = False,
+        size: int = MOST_WAITING_BYTES,
+    ) -> None:
         """Send data as soon as the link accepts it.
 
         Args:
@@ -284,6 +294,7 @@ class Peer:
             data: The data.
             all: Whether every message counts. Otherwise the oldest that wait under the
                 key are left out.
+            size: Bytes that wait at most besides the newest message.
 
         """
         if not self.connected:
@@ -294,7 +305,7 @@ class Peer:
                 waiting = self._waiting[key] = deque()
             most = MOST_WAITING if len(data) <= SMALL else 1
             while len(waiting) >= (MOST_OF_ALL if all else most) or (
-                sum(map(len, waiting)) > MOST_WAITING_BYTES
+                sum(map(len, waiting)) > size
             ):
                 waiting.popleft()
             waiting.append(data)

@@ -28,7 +28,7 @@ from webmap.agents.description import (
     read_beacon,
 )
 from webmap.agents.displays import MOST_SAMPLE, MOST_USERS
-from webmap.agents.peer import Peer, peer_of
+from webmap.agents.peer import MOST_CHANGES_BYTES, Peer, peer_of
 from webmap.agents.samples import MAX_BYTES
 from webmap.agents.scans import lean_scan
 from webmap.base.children import python_command
@@ -41,12 +41,13 @@ from webmap.fleet.held import Held, open_at, warn_of_open_bridge
 from webmap.fleet.passed_on import actions, check_parameters, passed_on
 from webmap.gate.protocol import Role
 from webmap.poses.alignment import alignments
-from webmap.ros.names import normalise_topic
+from webmap.ros.names import is_type, normalise_topic
 from webmap.ros.rosbridge.calls import Calls
 from webmap.ros.rosbridge.connection import Lane
 from webmap.ros.rosbridge.events import Publish
 from webmap.ros.rosbridge.graph import Graph
 from webmap.ros.rosbridge.protocol import Protocol
+from webmap.ros.subscriptions import each_counts
 
 log = logging.getLogger("webmap.agent")
 
@@ -303,12 +304,19 @@ class Agent:
             event.topic, event.frame, now, in_parts=event.in_parts
         ):
             key = address.topic_key(self.name, event.topic)
-            frame = self._lean(event.topic, event.frame)
-            self._peer.put_data(key, data.pack_frame(frame))
+            type = self._clients.type_of(event.topic)
+            frame = self._lean(event.topic, type, event.frame)
+            piece = data.pack_frame(frame)
+            if each_counts(event.topic, type):
+                self._peer.put_data(key, piece, all=True, size=MOST_CHANGES_BYTES)
+            else:
+                self._peer.put_data(key, piece)
 
-    def _lean(self, topic: str, frame: bytes | bytearray) -> bytes | bytearray:
+    def _lean(
+        self, topic: str, type: str | None, frame: bytes | bytearray
+    ) -> bytes | bytearray:
         beams = self._beams.get(topic)
-        is_scan = beams is not None or self._clients.has_scans(topic)
+        is_scan = beams is not None or (type and is_type(type, "sensor_msgs/LaserScan"))
         if not is_scan or topic in self._whole:
             return frame
         try:

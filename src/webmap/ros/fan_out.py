@@ -84,4 +84,5 @@ class FanOut:
                     listener.deliver(message)
 
         types = frozenset(listener.decode for listener in listeners)
-        self._offload.decode(message, types, deliver)
+        counts = any(listener.each_counts for listener in listeners)
+        self._offload.decode(message, types, deliver, counts=counts)

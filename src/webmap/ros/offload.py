@@ -15,7 +15,7 @@ from webmap.base.children import python_command
 from webmap.base.errors import ProtocolError
 from webmap.ros.arrays import dec_hook
 from webmap.ros.decoding import Unreadable, convert
-from webmap.ros.limits import LARGE, TooLarge
+from webmap.ros.limits import LARGE, MAX_FRAME, TooLarge
 from webmap.ros.received import ReceivedMessage
 from webmap.ros.worker import (
     LENGTH,
@@ -34,8 +34,8 @@ PATIENCE = 20.0
 CHUNK = 1 << 20
 """Bytes that are copied at a time; the event loop waits for each copy."""
 
-MOST_STATIC = 16
-"""Most ``/tf_static`` messages that wait for the decoding; each is sent only once."""
+MOST_WAITING = 16
+"""Most messages of a topic that wait for the decoding, where each message counts."""
 
 
 class Reply(NamedTuple):
@@ -260,10 +260,13 @@ class _Job(NamedTuple):
     message: ReceivedMessage
     types: frozenset[Any]
     then: tuple[Callable[[Any], None], ...]
+    counts: bool
 
 
 class Offload:
     """Decodes the large frames of one bridge: in order within a topic, the newest wins.
+
+    Where each message counts, all of them are decoded, if the worker is fast enough.
 
     The worker has at most one frame of a bridge at a time. After each frame the bridge
     waits for as long as the decoding took, so the worker is free at least half of the
@@ -286,14 +289,17 @@ class Offload:
         message: ReceivedMessage,
         types: frozenset[Any],
         then: Callable[[Any], None],
+        *,
+        counts: bool = False,
     ) -> None:
         """Decode ``message`` in the worker as each of ``types``; then call ``then``.
 
         ``then`` is called once for each type, or once for each part of a ``separable``
         one. A newer message of the topic replaces a message that waits, and ends the
-        delivery of a message in parts.
+        delivery of a message in parts, unless ``counts`` is set: see
+        :func:`webmap.ros.subscriptions.each_counts`.
         """
-        job = _Job(message, types, (then,))
+        job = _Job(message, types, (then,), counts)
         waiting = self._waiting.get(message.topic)
         if waiting is not None:
             _join(waiting, job)
@@ -379,23 +385,23 @@ class Offload:
 
 
 def _join(waiting: deque[_Job], job: _Job) -> None:
-    """Queue a message in place of the older one; keep each static transform."""
+    """Queue a message in place of the older one, unless each message counts."""
     if waiting and waiting[-1].message is job.message:
         last = waiting.pop()
-        job = _Job(job.message, last.types | job.types, last.then + job.then)
-    elif not _counts(job) or len(waiting) >= MOST_STATIC:
+        counts = last.counts or job.counts
+        job = _Job(job.message, last.types | job.types, last.then + job.then, counts)
+    elif not job.counts:
         waiting.clear()
     waiting.append(job)
+    while len(waiting) > MOST_WAITING or (
+        sum(len(each.message.frame) for each in waiting) > MAX_FRAME
+    ):
+        waiting.popleft()
 
 
 def _is_late(job: _Job, waiting: deque[_Job]) -> bool:
     """Return whether a newer message has come that replaces this one."""
-    return bool(waiting) and not _counts(job)
-
-
-def _counts(job: _Job) -> bool:
-    """Return whether a message is sent only once and must not be dropped."""
-    return job.message.topic.endswith("/tf_static")
+    return bool(waiting) and not job.counts
 
 
 def _call(job: _Job, type: Any) -> None:

@@ -3,6 +3,7 @@
 import time
 from asyncio import AbstractEventLoop, TimerHandle
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
@@ -26,6 +27,21 @@ at this rate waits for no timer."""
 _ENCODINGS = ("text", "binary", "raw")
 _LATCHED_TYPES = ("nav_msgs/OccupancyGrid",)
 _LATCHED_TOPICS = ("/tf_static", "/robot_description")
+
+CHANGES = (
+    "map_msgs/OccupancyGridUpdate",
+    "visualization_msgs/Marker",
+    "visualization_msgs/MarkerArray",
+    "diagnostic_msgs/DiagnosticArray",
+)
+"""Types whose messages change what earlier messages showed, without repeating them."""
+
+
+@lru_cache(maxsize=4096)  # an agent asks for each message
+def each_counts(topic: str, type: str | None) -> bool:
+    """Return whether no message of a topic may be left out in favour of a newer one."""
+    changes = type is not None and is_type(type, *CHANGES)
+    return changes or topic.endswith("/tf_static")
 
 
 class SubscriptionOptions(NamedTuple):
@@ -179,6 +195,11 @@ class Subscription:
         self._scope: Scope | None = current_scope()
         if self._scope is not None:
             self._scope.add(self)
+
+    @property
+    def each_counts(self) -> bool:
+        """Whether no message may be left out in favour of a newer one."""
+        return each_counts(self.topic, self._of.message_type)
 
     def remove(self) -> None:
         """End this subscription and no other; the second call has no effect."""
