@@ -21,6 +21,13 @@ YUV = {
 ``yuv422`` has the order of UYVY, as defined in ``sensor_msgs/image_encodings.hpp``.
 """
 
+SEMI_PLANAR = {"nv12": (0, 1, 3), "nv21": (0, 3, 1)}
+"""The encodings with a plane of all Y, then one of U and V for each 2 x 2 pixels.
+
+The values are those of :data:`YUV`, after Y and the other plane are interleaved. The
+height of a message is that of the picture: its data has half as many rows again.
+"""
+
 
 class Mosaic(NamedTuple):
     """The order of the colour filters of a sensor, in squares of 2 x 2 values."""
@@ -57,7 +64,7 @@ def from_yuv(
 
     Args:
         rows: The bytes, of shape (height, 2 * width).
-        order: One of :data:`YUV`.
+        order: One of :data:`YUV` or :data:`SEMI_PLANAR`.
 
     Returns:
         Red, green and blue, of shape (height, width, 3), by BT.601 with Y from 16 to
@@ -199,10 +206,11 @@ _CHANNELS = {
     "rgba8": (0, 1, 2),
     "bgra8": (2, 1, 0),
     "8UC3": (2, 1, 0),
+    "8UC4": (2, 1, 0),
 }
 """For each encoding, the positions of red, green and blue in the bytes of a pixel."""
 
-_WIDE = {"rgba8": 4, "bgra8": 4}
+_WIDE = {"rgba8": 4, "bgra8": 4, "8UC4": 4}
 _GREY = {"mono8": "u1", "8UC1": "u1", "mono16": "u2", "16UC1": "u2", "32FC1": "f4"}
 
 
@@ -273,13 +281,29 @@ class ImageMsg(msgspec.Struct):
             return grey if grey.dtype.itemsize == 1 else _stretched(grey)
         if self.encoding in YUV:
             return from_yuv(self._rows("u1", 2), YUV[self.encoding])
+        if self.encoding in SEMI_PLANAR:
+            return from_yuv(self._interleaved(), SEMI_PLANAR[self.encoding])
         if self.encoding in BAYER:
             mosaic = self._rows(f"u{BAYER[self.encoding].octets}", 1)
             if mosaic.dtype.itemsize > 1:
                 mosaic = _stretched(mosaic)
             return from_bayer(mosaic, BAYER[self.encoding])
-        known = ", ".join(sorted({*_CHANNELS, *_GREY, *YUV, *BAYER}))
+        known = ", ".join(sorted({*_CHANNELS, *_GREY, *YUV, *SEMI_PLANAR, *BAYER}))
         raise ProtocolError(f"the encoding {self.encoding!r}; known are {known}")
+
+    def _interleaved(self) -> "NDArray[np.uint8]":
+        """Return the rows of two planes, as of ``yuyv``."""
+        import numpy as np
+
+        height = self.height
+        count = height + (height + 1) // 2
+        # Some drivers set the step to the size of all data divided by the height.
+        packed = len(self.data) == count * self.width
+        step = self.width if packed else self.step
+        planes = msgspec.structs.replace(self, height=count, step=step)
+        rows = planes._rows("u1", 1)
+        shared = rows[height:].repeat(2, axis=0)[:height]
+        return np.stack([rows[:height], shared], axis=-1).reshape(height, -1)
 
     def _rows(self, kind: str, channels: int) -> "NDArray[np.uint8]":
         import numpy as np
@@ -288,8 +312,8 @@ class ImageMsg(msgspec.Struct):
         used = self.width * channels * item.itemsize
         if self.step < used or len(self.data) < self.height * self.step:
             raise ProtocolError(
-                f"{len(self.data)} bytes in rows of {self.step} are too few for "
-                f"{self.width} x {self.height} of {self.encoding}"
+                f"{len(self.data)} bytes with a step of {self.step} are too few for "
+                f"{self.height} rows of {self.width} in {self.encoding}"
             )
         rows = np.frombuffer(self.data, np.uint8, self.height * self.step)
         rows = rows.reshape(self.height, self.step)[:, :used]

@@ -148,6 +148,7 @@ def test_raw_pixels_are_in_rgb_order_without_row_padding():
     assert (raw("bgr8", red[..., ::-1].copy(), pad=3).pixels() == red).all()
     with_alpha = np.dstack([red, np.full((4, 5), 9, np.uint8)])
     assert (raw("rgba8", with_alpha).pixels() == red).all()
+    assert (raw("8UC4", with_alpha[..., [2, 1, 0, 3]]).pixels() == red).all()
 
 
 # White, black, red and blue in BT.601: Y, U and V.
@@ -171,6 +172,25 @@ def test_yuv422_pixels_share_a_colour_but_keep_their_own_brightness(encoding, or
     assert seen[1, 1].tolist() == [128, 128, 128]
     for number, colour in enumerate(RGB):
         assert np.allclose(seen[1, 2 * number], colour, atol=3), number
+
+
+@pytest.mark.parametrize(("pad", "step"), [(0, 8), (5, 13), (0, 12)])
+@pytest.mark.parametrize(("encoding", "swapped"), [("nv12", 0), ("nv21", 1)])
+def test_yuv420_pixels_of_two_rows_share_a_colour(encoding, swapped, pad, step):
+    luma = [y for y, _, _ in YUV for _ in range(2)]
+    dark = [126, *luma[1:]]
+    chroma = [c for _, u, v in YUV for c in ((v, u) if swapped else (u, v))]
+    rows = np.array([luma, dark, luma, chroma, chroma], np.uint8)
+    image = raw(encoding, rows, pad=pad)
+    image.height, image.step = 3, step
+    seen = image.pixels()
+    assert seen.shape == (3, 8, 3)
+    assert seen[1, 0].tolist() == [128, 128, 128]
+    for number, colour in enumerate(RGB):
+        assert np.allclose(seen[:, 2 * number + 1], colour, atol=3), number
+    image.data = image.data[:-1]
+    with pytest.raises(ProtocolError, match="too few for 5 rows of 8 in nv"):
+        image.pixels()
 
 
 @pytest.mark.parametrize("bits", [8, 16])
@@ -207,7 +227,7 @@ def test_big_endian_pixels_are_decoded():
         (ImageMsg(10, 10, "rgb8", 29, b"\0" * 300), "too few"),
         (ImageMsg(100000, 100000, "rgb8", 300000, b""), "at most"),
         (ImageMsg(0, 10, "rgb8", 30, b""), "at most"),
-        (ImageMsg(1, 1, "nv21", 2, b"\0\0"), "known are"),
+        (ImageMsg(1, 1, "nv24", 2, b"\0\0"), "known are"),
         (ImageMsg(1, 1, "yuv422", 2, b"\0\0"), "width must be even, got 1"),
         (ImageMsg(1, 9, "bayer_rggb8", 9, b"\0" * 9), "9 x 1, 2 x 2 at least"),
     ],
