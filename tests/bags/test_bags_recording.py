@@ -137,7 +137,9 @@ def test_a_file_with_an_unknown_suffix_is_refused_with_the_known_suffixes(tmp_pa
 
 
 def test_a_folder_without_metadata_is_refused(tmp_path):
-    assert "there is no metadata.yaml in this folder" in refusal(tmp_path)
+    error = refusal(tmp_path)
+    assert "there is no metadata.yaml in this folder" in error
+    assert "`ros2 bag reindex`" in error
 
 
 def test_bags_of_ros_1_and_ros_2_together_are_refused(tmp_path):
@@ -171,10 +173,33 @@ def test_a_too_large_metadata_file_is_refused(tmp_path):
     assert "for the description of a bag" in error
 
 
-@pytest.mark.parametrize("name", ["empty.bag", "empty.mcap", "empty.db3"])
-def test_an_empty_file_is_refused(tmp_path, name):
+@pytest.mark.parametrize(
+    ("name", "tools"),
+    [
+        ("empty.bag", ["rosbag reindex"]),
+        ("empty.mcap", ["mcap recover", "ros2 bag reindex"]),
+        ("empty.db3", ["ros2 bag reindex"]),
+    ],
+)
+@pytest.mark.parametrize("by_folder", [False, True])
+def test_an_empty_file_is_refused_with_the_tools_that_repair_such_files(
+    tmp_path, name, tools, by_folder
+):
     (tmp_path / name).touch()
-    assert refusal(tmp_path / name).startswith(f"{name} cannot be read as a recording")
+    (tmp_path / "metadata.yaml").touch()
+    given = tmp_path if by_folder and name != "empty.bag" else tmp_path / name
+    error = refusal(given)
+    assert error.startswith(f"{given.name} cannot be read as a recording")
+    assert re.findall("`(.*?)`", error) == tools
+
+
+def test_a_file_that_the_system_does_not_open_has_no_tool(tmp_path, monkeypatch):
+    def closed(*args, **options):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("rosbags.highlevel.AnyReader", closed)
+    (tmp_path / "a.bag").touch()
+    assert refusal(tmp_path / "a.bag").endswith("Permission denied")
 
 
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
@@ -183,7 +208,10 @@ def test_a_truncated_file_is_refused(made, bag, tmp_path, share):
     short = tmp_path / f"short{whole.suffix}"
     data = whole.read_bytes()
     short.write_bytes(data[: int(len(data) * share)])
-    assert refusal(short).startswith(f"{short.name} cannot be read as a recording: ")
+    error = refusal(short)
+    assert error.startswith(f"{short.name} cannot be read as a recording: ")
+    tool = "`rosbag reindex`" if made.dialect == "ros1" else "`mcap recover`"
+    assert tool in error
 
 
 @pytest.mark.parametrize("name", ["noise.bag", "noise.mcap", "noise.db3"])

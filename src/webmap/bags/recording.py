@@ -128,7 +128,7 @@ class Recording:
         self._warn = warn
         self._failed: set[str] = set()
         self._closed = False
-        self._reader = _opened(paths, self.name, self.dialect)
+        self._reader = _opened(paths, self.dialect)
         try:
             self.begin = self._reader.start_time
             """Time of the first message, in nanoseconds since 1970."""
@@ -143,7 +143,7 @@ class Recording:
             raise
         except Exception as error:
             self.close()
-            raise unreadable(self.name, error) from None
+            raise unreadable(self.paths, error) from None
         self._messages = Messages(self.schema)
 
     @property
@@ -268,7 +268,7 @@ class Recording:
                 name = self._names[connection.topic]
                 yield Recorded(name, time, connection, data)
         except Exception as error:
-            raise unreadable(self.name, error) from None
+            raise unreadable(self.paths, error) from None
 
     def _usable(self) -> "list[Connection]":
         """Return the connections that can be played; register topics and types."""
@@ -314,9 +314,28 @@ def recording_name(paths: Sequence[Path]) -> str:
     return first if len(paths) == 1 else f"{first} and {len(paths) - 1} more"
 
 
-def unreadable(name: str, error: Exception) -> ConfigError:
-    """Return the error for a file that cannot be read."""
-    return ConfigError(f"{name} cannot be read as a recording: {_reason(error)}")
+def unreadable(paths: Sequence[Path], error: Exception) -> ConfigError:
+    """Return the error for a recording that cannot be read.
+
+    It names the tools that repair a file that was not closed, unless the system refused
+    to read the file.
+    """
+    text = f"{recording_name(paths)} cannot be read as a recording: {_reason(error)}"
+    return ConfigError(
+        text if isinstance(error, OSError) else f"{text}; {_repair(paths)}"
+    )
+
+
+def _repair(paths: Sequence[Path]) -> str:
+    """Return which tools may repair a damaged recording."""
+    files = [each for path in paths for each in (path, *path.glob("*"))]
+    suffixes = {file.suffix for file in files if not file.is_dir()}
+    if ROS1 in suffixes:
+        return "if the file was not closed, `rosbag reindex` repairs it"
+    folder = "`ros2 bag reindex` repairs the metadata.yaml of its folder"
+    if ".mcap" in suffixes:
+        return f"if the file was not closed, `mcap recover` repairs it, and {folder}"
+    return f"if the file was not closed, {folder}"
 
 
 def _reason(error: Exception) -> str:
@@ -336,7 +355,8 @@ def _dialect(paths: Sequence[Path]) -> DialectName:
         if path.is_dir() and not (path / METADATA).exists():
             raise ConfigError(
                 f"{path}: there is no metadata.yaml in this folder, so it is not a bag "
-                f"of ROS 2; give the .mcap or .db3 file in it instead"
+                f"of ROS 2; give the .mcap or .db3 file in it instead, or write the "
+                f"metadata.yaml with `ros2 bag reindex`"
             )
         if path.is_file() and path.suffix not in (ROS1, *ROS2):
             raise ConfigError(
@@ -366,7 +386,7 @@ def _refuse_endless(path: Path) -> None:
         )
 
 
-def _opened(paths: Sequence[Path], name: str, dialect: DialectName) -> "AnyReader":
+def _opened(paths: Sequence[Path], dialect: DialectName) -> "AnyReader":
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -376,7 +396,7 @@ def _opened(paths: Sequence[Path], name: str, dialect: DialectName) -> "AnyReade
         reader = AnyReader([*paths], default_typestore=get_typestore(default))
         reader.open()
     except Exception as error:
-        raise unreadable(name, error) from None
+        raise unreadable(paths, error) from None
     return reader
 
 
