@@ -71,8 +71,14 @@ class Message:
 
     @property
     def frame_id(self) -> str:
-        """The frame of the numbers; empty if the message has none."""
-        return self._header.frame_id
+        """The frame of the numbers; empty if the message has none.
+
+        If the header names none, it is the frame of the first part of a list.
+        """
+        lists = (each for each in self._fields.values() if isinstance(each, list))
+        firsts = (each[0] for each in lists if each and isinstance(each[0], dict))
+        frames = (Message(each).frame_id for each in firsts if "header" in each)
+        return self._header.frame_id or next(filter(None, frames), "")
 
     @property
     def stamp(self) -> float:

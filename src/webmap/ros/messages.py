@@ -357,6 +357,12 @@ class PathMsg(Stamped, frozen=True, kw_only=True):
 
     poses: list[PoseStampedMsg]
 
+    @property
+    def frame_id(self) -> str:
+        """The frame of the header; without one, the first frame of a pose."""
+        frames = (pose.frame_id for pose in self.poses)
+        return self.header.frame_id or next(filter(None, frames), "")
+
 
 class TransformMsg(msgspec.Struct, frozen=True, gc=False):
     """``geometry_msgs/Transform``."""

@@ -10,6 +10,7 @@ from test_layers_poses import sonar
 from test_layers_ways import in_world, near, path
 
 from webmap.base.geometry import Affine
+from webmap.modules.topic_layer import Message
 from webmap.poses.frames import _shared_frames
 
 
@@ -51,8 +52,7 @@ def odometry(link, x, y, yaw):
 def test_a_path_in_the_odometry_frame_is_placed_by_that_frame(link, robot):
     module = robot.add_module("Path", link, "/plan")
     send_transforms(link, transform("map", "odom", *ODOM))
-    message = path([(1.0, 2.0), (3.0, 4.0)])
-    message["header"] = header("odom")
+    message = path([(1.0, 2.0), (3.0, 4.0)], "odom")
     link.publish("/plan", message)
     wanted = [IN_ODOM.apply(1, 2), IN_ODOM.apply(3, 4)]
     assert in_world(module.line) == near(wanted)
@@ -62,12 +62,49 @@ def test_a_path_in_the_odometry_frame_is_placed_by_that_frame(link, robot):
     assert in_world(module.line) == near([(1, 2), (3, 4)])
 
 
+def test_a_path_without_a_frame_is_placed_by_the_frame_of_its_poses(link, robot):
+    module = robot.add_module("Path", link, "/plan")
+    send_transforms(link, transform("map", "odom", *ODOM))
+    message = path([(0.0, 0.0), (1.0, 2.0), (3.0, 4.0)])
+    message["header"] = header("")
+    for each, name in zip(message["poses"], ("", "odom", "/odom"), strict=True):
+        each["header"] = header(name)
+    link.publish("/plan", message)
+    wanted = [IN_ODOM.apply(0, 0), IN_ODOM.apply(1, 2), IN_ODOM.apply(3, 4)]
+    assert in_world(module.line) == near(wanted)
+    assert robot.problems == {}
+
+
+def test_a_path_with_poses_of_two_frames_is_drawn_in_one_and_reported(link, robot):
+    module = robot.add_module("Path", link, "/plan")
+    send_transforms(link, transform("map", "odom", *ODOM))
+    message = path([(1.0, 2.0), (3.0, 4.0)])
+    message["poses"][1]["header"] = header("odom")
+    link.publish("/plan", message)
+    assert in_world(module.line) == near([(1, 2), (3, 4)])
+    (problem,) = robot.problems.values()
+    assert problem == (
+        "/plan: poses of this path name the frame 'odom'; all its poses are drawn in "
+        "'map'"
+    )
+    message["poses"][1]["header"] = header("map")
+    link.publish("/plan", message)
+    assert robot.problems == {}
+
+
+def test_a_message_without_a_frame_has_the_frame_of_the_first_of_its_parts():
+    parts = [{"header": header("camera")}, {"header": header("laser")}]
+    fields = {"header": header(""), "words": ["a"], "none": [], "boxes": parts}
+    assert Message(fields).frame_id == "camera"
+    assert Message({**fields, "header": header("map")}).frame_id == "map"
+    assert Message({"points": [{"x": 1.0}]}).frame_id == ""
+
+
 def test_a_frame_is_looked_up_at_the_stamp_of_the_message(link, robot):
     module = robot.add_module("Path", link, "/plan")
     send_transforms(link, transform("map", "odom", 1, 0, 0, secs=3))
     send_transforms(link, transform("map", "odom", 2, 0, 0, secs=4))
-    message = path([(0.0, 0.0), (0.0, 4.0)])
-    message["header"] = header("odom")
+    message = path([(0.0, 0.0), (0.0, 4.0)], "odom")
     link.publish("/plan", message)
     assert in_world(module.line) == near([(1, 0), (1, 4)])
 
@@ -100,8 +137,7 @@ def test_a_configured_sensor_position_overrides_the_frames(link, robot):
 
 def test_an_unknown_frame_is_a_problem_until_it_is_known(link, robot):
     module = robot.add_module("Path", link, "/plan")
-    message = path([(1.0, 2.0), (3.0, 4.0)])
-    message["header"] = header("odom")
+    message = path([(1.0, 2.0), (3.0, 4.0)], "odom")
     link.publish("/plan", message)
     assert in_world(module.line) == near([(1, 2), (3, 4)])
     (problem,) = robot.problems.values()
@@ -110,7 +146,7 @@ def test_an_unknown_frame_is_a_problem_until_it_is_known(link, robot):
     link.publish("/plan", message)
     assert robot.problems == {}
     assert len(numbers(module.line.get("points"))) == 4
-    link.publish("/plan", {**message, "header": header("nowhere")})
+    link.publish("/plan", path([(1.0, 2.0)], "nowhere"))
     assert len(robot.problems) == 1
     robot.remove_module(module)
     assert robot.problems == {}

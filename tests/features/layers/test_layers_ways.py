@@ -9,11 +9,10 @@ from module_fakes import header, numbers, pose, to_root
 from webmap.base.geometry import Quaternion
 
 
-def path(points, *, ros2=False) -> dict:
-    return {
-        "header": header(ros2=ros2),
-        "poses": [{"header": header(ros2=ros2), "pose": pose(x, y)} for x, y in points],
-    }
+def path(points, frame="map", *, ros2=False) -> dict:
+    head = header(frame, ros2=ros2)
+    poses = [{"header": head, "pose": pose(x, y)} for x, y in points]
+    return {"header": head, "poses": poses}
 
 
 def go(link, x, y, yaw=0.0, frame="odom"):

@@ -42,7 +42,9 @@ class Path(RobotLayer):
     """A line that stays in place on the map while the robot moves.
 
     Fires ``on_path_update``. The poses are in the map's frame, or in the frame of the
-    message if the robot has frames. A path without poses removes the line.
+    message if the robot has frames: that of its header, or of its first pose that names
+    one. Poses that name another frame are drawn in that frame too, and this is
+    reported. A path without poses removes the line.
 
     Style it by CSS: ``.path > polyline``, and one of several by its name: ``.path.local
     > polyline``.
@@ -103,8 +105,16 @@ class Path(RobotLayer):
         """
         # Only these are checked, so that a long path does not delay other robots.
         kept = thinned(len(message.poses), self.max_points)
-        chosen = [message.poses[index].pose.position for index in kept]
+        stamped = [message.poses[index] for index in kept]
+        chosen = [each.pose.position for each in stamped]
         check_finite([(place.x, place.y) for place in chosen], "a path")
+        frame = message.frame_id.strip("/")
+        others = {each.frame_id.strip("/") for each in stamped} - {frame, ""}
+        if others:
+            self.complain(
+                f"poses of this path name the frame {min(others)!r}; all its poses are "
+                f"drawn in {frame!r}"
+            )
         return in_space(chosen)
 
     def draw(self, found: list[Vector3], at: Transform) -> None:
