@@ -24,6 +24,17 @@ def test_a_robot_selected_in_the_list_is_selected_on_the_map(open_console):
     expect(row(page, "Robot 3")).to_have_attribute("aria-pressed", "true")
 
 
+def test_a_gamepad_without_the_standard_mapping_is_named_until_it_is_gone(open_console):
+    page = open_console()
+    pad = "{index: 0, id: 'Joystick', connected: true, mapping: '', buttons: [], axes: []}"
+    page.evaluate(f"navigator.getGamepads = () => [{pad}]")
+    notice = page.locator('.webmap-notice:has-text("Joystick")')
+    expect(notice).to_contain_text("cannot drive: the browser reports no mapping")
+    expect(notice).to_have_count(1)
+    page.evaluate("navigator.getGamepads = () => []")
+    expect(notice).to_have_count(0)
+
+
 def test_a_click_on_a_robot_on_the_map_opens_its_card(open_console):
     page = open_console()
     page.locator('.robot[data-name="Robot 1"] .hit').click()

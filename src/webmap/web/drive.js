@@ -133,6 +133,11 @@ export class Drive {
 
   // Inputs ---------------------------------------------------------------------
 
+  /** @param {string} why Why a gamepad cannot drive; empty when it is gone. */
+  refuseGamepad(why) {
+    this._listeners.emit("gamepad", why);
+  }
+
   /**
    * Set the axes of an input. Only one input drives at a time.
    *

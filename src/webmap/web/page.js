@@ -99,7 +99,12 @@ export class Page {
   get drive() {
     if (this._drive) return this._drive;
     if (!this._Drive) throw new Error("drive.js has not been loaded");
-    return (this._drive = new this._Drive(BASE, { id: this.id }));
+    this._drive = new this._Drive(BASE, { id: this.id });
+    this._drive.on("gamepad", (why) => {
+      if (why) this.notices.show("gamepad", why, "alert");
+      else this.notices.hide("gamepad");
+    });
+    return this._drive;
   }
 
   async _loadDrive() {

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 
-import { DEAD_MAN, Pads, SILENT } from "../../../src/webmap/web/inputs/pads.js";
+import { DEAD_MAN, Gamepads, Pads, SILENT } from "../../../src/webmap/web/inputs/pads.js";
 
 const AHEAD = [0, -1, 0, 0];
 
@@ -57,6 +57,44 @@ for (const [what, fields] of Object.entries({
     assert.equal(read(pad(true, fields)), null);
   });
 }
+
+test("a gamepad without the standard mapping is named, with what to do, until it is gone", () => {
+  const other = (mapping) => pad(true, { index: 1, id: "Joystick", mapping });
+  assert.equal(read(pad(true), other("")), null);
+  assert.match(pads.refusal, /^The gamepad "Joystick" cannot drive: .* reports no mapping /);
+  assert.match(pads.refusal, /expected "standard"\. Switch it to another mode/);
+  read(other("xr-standard"));
+  assert.match(pads.refusal, /reports the mapping "xr-standard"/);
+  read(pad(true), { ...other(""), connected: false });
+  assert.equal(pads.refusal, "");
+});
+
+test("the page shows a refused gamepad once, and removes that when it is gone", () => {
+  globalThis.window = new EventTarget();
+  globalThis.document = { hasFocus: () => false, querySelector: () => null };
+  const shown = [];
+  const on = {};
+  const gamepads = new Gamepads(
+    {
+      on: (kind, fn) => ((on[kind] = fn), () => {}),
+      setInput: (name, axes) => assert.equal(axes, null),
+      refuseGamepad: (why) => shown.push(why !== ""),
+    },
+    { wanted: () => true, holonomic: () => false },
+  );
+  const list = [pad(true, { mapping: "" })];
+  const browser = { value: { getGamepads: () => list }, configurable: true };
+  Object.defineProperty(globalThis, "navigator", browser);
+  on.read();
+  on.read();
+  assert.deepEqual(shown, [true]);
+  list.pop();
+  on.read();
+  assert.deepEqual(shown, [true, false]);
+  gamepads.destroy();
+  assert.deepEqual(shown, [true, false]);
+  for (const name of ["window", "document", "navigator"]) delete globalThis[name];
+});
 
 test("a reconnected gamepad does nothing until its dead-man button is released", () => {
   read(pad(false));

@@ -37,6 +37,8 @@ export class Pads {
     this._known = new Map();
     /** Whether a dead-man button is held without effect. */
     this.spent = false;
+    /** Why a connected gamepad cannot drive, in a sentence; empty if all can. */
+    this.refusal = "";
   }
 
   /** Whether there is a gamepad for driving. */
@@ -55,8 +57,13 @@ export class Pads {
     /** @type {Axes | null} */
     let axes = null;
     this.spent = false;
+    this.refusal = "";
     for (const pad of pads) {
-      if (!pad?.connected || pad.mapping !== "standard") continue;
+      if (!pad?.connected) continue;
+      if (pad.mapping !== "standard") {
+        this.refusal ||= refusalOf(pad);
+        continue;
+      }
       const key = `${pad.index} ${pad.id}`;
       seen.add(key);
       if (!this._drives(key, pad, now)) continue;
@@ -91,6 +98,16 @@ export class Pads {
   }
 }
 
+/** @param {Pad} pad */
+function refusalOf({ id, mapping }) {
+  const got = mapping ? `the mapping "${mapping}"` : "no mapping";
+  return (
+    `The gamepad "${id.slice(0, 80)}" cannot drive: the browser reports ${got} of its ` +
+    'buttons, expected "standard". Switch it to another mode, such as XInput, or use ' +
+    "another gamepad."
+  );
+}
+
 /**
  * The left stick drives and turns. For a holonomic base the left stick drives in all
  * directions, and the right stick turns.
@@ -120,6 +137,7 @@ export class Gamepads {
     this._drive = drive;
     this._owner = owner;
     this._pads = new Pads();
+    this._refusal = "";
     this._ending = new AbortController();
     const options = { signal: this._ending.signal };
     window.addEventListener("gamepaddisconnected", () => this._lost(), options);
@@ -144,6 +162,7 @@ export class Gamepads {
     this._ending.abort();
     for (const off of this._offs) off();
     this._drive.setInput("gamepad", null);
+    this._report("");
   }
 
   _read() {
@@ -151,6 +170,14 @@ export class Gamepads {
     if (!attentive()) this._pads.drop();
     const axes = this._pads.read(listed(), performance.now(), { holonomic });
     this._drive.setInput("gamepad", this._owner.wanted() ? axes : null);
+    this._report(this._pads.refusal);
+  }
+
+  /** @param {string} refusal */
+  _report(refusal) {
+    if (refusal === this._refusal) return;
+    this._refusal = refusal;
+    this._drive.refuseGamepad(refusal);
   }
 
   /** A gamepad is gone; the browser's list may still contain it. */

@@ -6,7 +6,8 @@
  *
  * `robot`: the gate's newest report on a robot. `gone`: the gate does not know a robot any
  * more. `state`: the link's state changed. `refused`: the gate refused an operation.
- * `stop`: STOP was sent for a robot or "*". `goal`: a goal was sent for a robot. `read`:
+ * `stop`: STOP was sent for a robot or "*". `goal`: a goal was sent for a robot.
+ * `gamepad`: why a gamepad cannot drive, in a sentence; empty when it is gone. `read`:
  * inputs without events of their own (gamepads) must be read now. `drop`: inputs must
  * forget what is pressed. `step`: a 20 Hz step has ended.
  *
@@ -17,6 +18,7 @@
  * @property {{robot: string | null, what: string, why: string}} refused
  * @property {string} stop
  * @property {string} goal
+ * @property {string} gamepad
  * @property {null} read
  * @property {null} drop
  * @property {null} step
