@@ -26,7 +26,7 @@ def test_a_robot_selected_in_the_list_is_selected_on_the_map(open_console):
 
 def test_a_gamepad_without_the_standard_mapping_is_named_until_it_is_gone(open_console):
     page = open_console()
-    pad = "{index: 0, id: 'Joystick', connected: true, mapping: '', buttons: [], axes: []}"
+    pad = "{index: 0, id: 'Joystick', connected: true, mapping: '', buttons: []}"
     page.evaluate(f"navigator.getGamepads = () => [{pad}]")
     notice = page.locator('.webmap-notice:has-text("Joystick")')
     expect(notice).to_contain_text("cannot drive: the browser reports no mapping")
