@@ -34,11 +34,22 @@ def test_a_bridge_is_open_late_connecting_or_lost(bridge, link, text):
     assert describe_link(bridge) == (link, text)
 
 
+def test_an_open_bridge_names_the_faults_of_its_frames(monkeypatch):
+    faults = ["a transform was left out: 'a' -> 'b' would close a loop", "2", "3", "4"]
+    monkeypatch.setattr("webmap.console.bar.frame_faults", lambda bridge: faults)
+    assert describe_link(bridge()) == ("faulty", f"open; {faults[0]}; 2; 3")
+    slow = f"slow connection, 1.4 s; {faults[0]}; 2; 3"
+    assert describe_link(bridge(lag=1.44)) == ("late", slow)
+    assert describe_link(bridge("connecting")) == ("connecting", "connecting")
+
+
 @pytest.mark.parametrize(
     ("links", "text"),
     [
         (["open"], "Bridge open"),
         (["late"], "Bridge slow"),
+        (["faulty"], "Frames faulty"),
+        (["faulty", "open"], "2 bridges open, faulty frames"),
         (["lost"], "No connection to the bridge"),
         (["connecting"], "Connecting to the bridge"),
         (["open", "open"], "2 bridges open"),

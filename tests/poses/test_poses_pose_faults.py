@@ -7,6 +7,7 @@ from pose_script import ODOMETRY, header, odometry, play, transform, transforms
 
 from webmap import RobotLayer, layer
 from webmap.core.registry import robot_modules
+from webmap.poses.frames import frame_faults
 
 
 def tilted(parent, child, roll, stamp):
@@ -108,5 +109,58 @@ def test_no_jump_is_reported_after_a_listener_removed_the_pose_source(monkeypatc
         await stage.wait(60)
         assert stage.robot.feed is None
         assert stage.robot.problems == {}
+
+    play(script, monkeypatch)
+
+
+def zeros(parent, child):
+    """Return a transform with a quaternion of zeros, as of a message nobody filled."""
+    found = transform(parent, child, 0.0, stamp=0.0)
+    found["transform"]["rotation"] = dict.fromkeys("xyzw", 0.0)
+    return found
+
+
+@pytest.mark.parametrize("by", ["a valid transform", "a new connection"])
+def test_a_fault_of_static_frames_is_shown_until_its_correction(monkeypatch, by):
+    async def script(stage):
+        robot, link = stage.robot, stage.link
+        link.open()
+        robot.set_tf(link)
+        await stage.wait(0.5)
+        wrong = transform("base_link", "laser", math.nan, stamp=0.0)
+        stage.publish("/tf_static", transforms(wrong))
+        await stage.wait(30)  # it is sent once
+        text = robot.problems["frames"]
+        assert "'base_link' -> 'laser': its position or rotation is not finite" in text
+        assert frame_faults(link) == [text]
+        if by == "a new connection":
+            link.close()
+            link.open()
+        else:
+            right = transform("base_link", "laser", 0.2, stamp=0.0)
+            stage.publish("/tf_static", transforms(right))
+        await stage.wait(11)
+        assert "frames" not in robot.problems
+        assert frame_faults(link) == []
+
+    play(script, monkeypatch)
+
+
+def test_a_fault_of_moving_frames_ends_though_nothing_comes_any_more(monkeypatch):
+    async def script(stage):
+        stage.link.open()
+        stage.robot.set_tf(stage.link)
+        await stage.wait(0.5)
+        loop = [("map", "base_link"), ("base_link", "map")]
+        moves = [transform(*names, 0.0, stamp=1.0) for names in loop]
+        stage.publish("/tf", transforms(*moves, zeros("arm", "hand")))
+        await stage.wait(5)
+        problem = stage.robot.problems["frames"]
+        assert "would close a loop: 'map' -> 'base_link' -> 'map'" in problem
+        _, of_no_robot = frame_faults(stage.link)
+        assert "'arm' -> 'hand': the rotation has a norm of 0 (it is all" in of_no_robot
+        await stage.wait(16)
+        assert "frames" not in stage.robot.problems
+        assert frame_faults(stage.link) == []
 
     play(script, monkeypatch)

@@ -315,15 +315,11 @@ def recording_name(paths: Sequence[Path]) -> str:
 
 
 def unreadable(paths: Sequence[Path], error: Exception) -> ConfigError:
-    """Return the error for a recording that cannot be read.
-
-    It names the tools that repair a file that was not closed, unless the system refused
-    to read the file.
-    """
+    """Return the error for a recording that cannot be read, with tools for a repair."""
     text = f"{recording_name(paths)} cannot be read as a recording: {_reason(error)}"
-    return ConfigError(
-        text if isinstance(error, OSError) else f"{text}; {_repair(paths)}"
-    )
+    if not isinstance(error, OSError):  # the system did not refuse to read it
+        text += f"; {_repair(paths)}"
+    return ConfigError(text)
 
 
 def _repair(paths: Sequence[Path]) -> str:

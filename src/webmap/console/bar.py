@@ -6,17 +6,21 @@ from typing import TYPE_CHECKING
 from webmap import html, refusals
 from webmap.base.counted import counted
 from webmap.console.texts import icon
+from webmap.poses.frames import frame_faults
 
 if TYPE_CHECKING:
     from datetime import datetime
 
     from webmap import Bridge, Element
 
-WORST = ("lost", "connecting", "late")
-"""States that are not well, the worst first."""
+WORST = ("lost", "connecting", "late", "faulty")
+"""States that are not well, the worst first; ``faulty`` is about the frames."""
 
 LATE = 0.5
 """Seconds of delay from which a bridge's connection is shown as slow."""
+
+MOST_FAULTS = 3
+"""The greatest number of faults of frames that the line of a bridge names."""
 
 
 class BridgeList:
@@ -98,10 +102,11 @@ class BridgeList:
 
 def describe_link(bridge: "Bridge") -> tuple[str, str]:
     """Return the page's name for a bridge's state, and a sentence that describes it."""
-    if bridge.state == "open" and bridge.lag >= LATE:
-        return "late", f"slow connection, {bridge.lag:.1f} s"
     if bridge.state == "open":
-        return "open", "open"
+        late, faults = bridge.lag >= LATE, frame_faults(bridge)
+        text = f"slow connection, {bridge.lag:.1f} s" if late else "open"
+        state = "late" if late else "faulty" if faults else "open"
+        return state, "; ".join([text, *faults[:MOST_FAULTS]])
     if bridge.lost:
         why = f": {bridge.trouble}" if bridge.trouble else ""
         return "lost", f"no connection{why}; reconnecting"
@@ -110,7 +115,7 @@ def describe_link(bridge: "Bridge") -> tuple[str, str]:
 
 def summary(links: Sequence[str], routers: Sequence[str] = ()) -> str:
     """Return a short text for the states of all bridges and routers."""
-    total, open_ = len(links), sum(link in ("open", "late") for link in links)
+    total, open_ = len(links), sum(link not in WORST[:2] for link in links)
     late, lost = links.count("late"), "lost" in routers
     if lost and not open_:
         return "No connection to the router"
@@ -121,11 +126,14 @@ def summary(links: Sequence[str], routers: Sequence[str] = ()) -> str:
             "open": "Bridge open",
             "lost": "No connection to the bridge",
             "late": "Bridge slow",
+            "faulty": "Frames faulty",
         }.get(links[0], "Connecting to the bridge")
     elif open_ == total and not late:
         text = f"{total} bridges open"
     else:
         text = f"{open_} of {total} bridges open" + (f", {late} slow" if late else "")
+    if total > 1 and "faulty" in links:
+        text += ", faulty frames"
     return f"{text}, no connection to a router" if lost else text
 
 

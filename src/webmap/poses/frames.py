@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 
 from webmap.base.errors import ProtocolError
-from webmap.base.geometry import Quaternion, Vector3
 from webmap.base.looking import looking
 from webmap.base.scope import Removal, no_scope
 from webmap.poses.lasting import Lasting
@@ -37,7 +36,7 @@ PERIOD = 0.05
 meanwhile share one call, however many nodes share the topic."""
 
 KEPT_FOR = 10.0
-"""Seconds for which a fault is shown after it last occurred."""
+"""Seconds for which a fault of frames that move is shown after it last occurred."""
 
 MOST = 50
 """The greatest number of frames whose faults are kept."""
@@ -69,7 +68,9 @@ class FrameFaults:
         """Whether there is a fault."""
         return bool(self._faults)
 
-    def note(self, parent: str, child: str, text: str, now: float) -> bool:
+    def note(
+        self, parent: str, child: str, text: str, now: float, *, lasts: bool = False
+    ) -> bool:
         """Add a fault of a transform.
 
         Args:
@@ -77,19 +78,32 @@ class FrameFaults:
             child: The frame that is placed.
             text: The fault in a sentence.
             now: The time of any monotonic clock, in seconds.
+            lasts: Whether it lasts until :meth:`mend`, since its message is not sent
+                again.
 
         Returns:
             Whether it is new; a fault of every message is new once.
 
         """
-        known = self._faults.get(child)
+        known, seen = self._faults.get(child), math.inf if lasts else now
         if known is not None:
-            known.seen = now
+            known.seen = max(known.seen, seen)
             return False
         if len(self._faults) >= MOST:
             return False
-        self._faults[child] = _Fault((parent, child), text, now)
+        self._faults[child] = _Fault((parent, child), text, seen)
         return True
+
+    def mend(self, child: str) -> None:
+        """Remove a lasting fault of a frame, which has a valid transform now."""
+        if child in self._faults and self._faults[child].seen == math.inf:
+            del self._faults[child]
+
+    def current(self, now: float) -> list[_Fault]:
+        """Return all faults, and forget those that last occurred too long ago."""
+        for child in [c for c, f in self._faults.items() if now >= f.seen + KEPT_FOR]:
+            del self._faults[child]
+        return list(self._faults.values())
 
     def of(self, base: str, now: float) -> str | None:
         """Return a fault of the frames that place a robot, or None.
@@ -102,17 +116,14 @@ class FrameFaults:
         """
         if not self._faults:
             return None
-        for child in [c for c, f in self._faults.items() if now > f.seen + KEPT_FOR]:
-            del self._faults[child]
         space = base.rpartition("/")[0]
         chain = set(self._buffer.chain(base))
-        texts = [
-            fault.text
-            for fault in self._faults.values()
-            if chain.intersection(fault.frames)
-            or (space and any(name.startswith(f"{space}/") for name in fault.frames))
-        ]
-        return texts[0] if texts else None
+        for fault in self.current(now):
+            if chain.intersection(fault.frames) or (
+                space and any(name.startswith(f"{space}/") for name in fault.frames)
+            ):
+                return fault.text
+        return None
 
 
 class Frames:
@@ -226,14 +237,17 @@ class Frames:
         self._timer = self._loop.call_at(when, self._wake)
 
     def _opened(self) -> None:
+        self.faults = FrameFaults(self.buffer)  # static frames are sent again
         if self._loop is None:
             self._loop = asyncio.get_running_loop()
             self._since = time.monotonic()
-            self.wake(GRACE)
+        self.wake(GRACE)
 
     def _wake(self) -> None:
         self._timer = None
         self._notify()
+        if self.faults.any:  # to forget them when nothing comes any more
+            self.wake(KEPT_FOR)
 
     def _notify_soon(self) -> None:
         """Call all listeners; later if they were only just called."""
@@ -283,29 +297,36 @@ class Frames:
         for each in message.transforms:
             parent = self.buffer.name(each.frame_id, self.namespace)
             child = self.buffer.name(each.child_frame_id, self.namespace)
-            place, turn = each.transform.translation, each.transform.rotation
+            move, lasts = each.transform, static
             try:
                 note = self.buffer.add(
                     parent,
                     child,
-                    Transform(
-                        Vector3(place.x, place.y, place.z),
-                        Quaternion(turn.x, turn.y, turn.z, turn.w),
-                    ),
+                    Transform(move.translation.vector, move.rotation.quaternion),
                     each.stamp,
                     static=static,
                 )
+                lasts = False
+                self.faults.mend(child)
             except TransformError as error:
                 note = f"a transform was left out: {error}"
                 parent, child = parent[:LONGEST_NAME], child[:LONGEST_NAME]
             except ProtocolError as error:  # An error of the stamp; it names no frames.
                 note = f"a transform was left out: {parent!r} -> {child!r}: {error}"
-            if note and self.faults.note(parent, child, note, now):
+            if note and self.faults.note(parent, child, note, now, lasts=lasts):
                 log.warning("%s: %s", self.bridge.name, note)
+                self.wake(KEPT_FOR)
         if not static or self.faults.any:
             if self._pending_since is None:
                 self._pending_since = now
             self._notify_soon()
+
+
+def frame_faults(bridge: Bridge) -> list[str]:
+    """Return the recent faults of the frames of a ROS system, in sentences."""
+    now, shared = time.monotonic(), _shared_frames.items()
+    faults = [frames.faults for (link, _), frames in shared if link is bridge]
+    return [fault.text for each in faults for fault in each.current(now)]
 
 
 def frames_of(bridge: Bridge, namespace: str = "") -> Frames:

@@ -1,7 +1,6 @@
 """Checks whether frames lead from the map to a robot; without I/O."""
 
 from webmap.base.errors import ProtocolError
-from webmap.base.geometry import Quaternion, Vector3
 from webmap.discovery.tf_robots import MAP
 from webmap.ros.messages import TFMessage
 from webmap.ros.received import ReceivedMessage
@@ -26,16 +25,12 @@ class FrameListening:
             refused.append(f"{message.topic} cannot be read: {error}")
             return
         for each in transforms:
-            place, turn = each.transform.translation, each.transform.rotation
-            transform = Transform(
-                Vector3(place.x, place.y, place.z),
-                Quaternion(turn.x, turn.y, turn.z, turn.w),
-            )
+            move = each.transform
             try:
                 buffer.add(
                     each.frame_id,
                     each.child_frame_id,
-                    transform,
+                    Transform(move.translation.vector, move.rotation.quaternion),
                     each.stamp,
                     static=name == "tf_static",
                     namespace=namespace,

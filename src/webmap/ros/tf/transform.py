@@ -132,7 +132,8 @@ class Transform:
         t, q = self.translation, self.rotation
         numbers = (t.x, t.y, t.z, q.x, q.y, q.z, q.w)
         if not all(map(math.isfinite, numbers)):
-            raise TransformError(f"a number is not finite: {t}, {q}")
+            got = ", ".join(f"{number:g}" for number in numbers)
+            raise TransformError(f"its position or rotation is not finite: {got}")
         if max(abs(t.x), abs(t.y), abs(t.z)) > FARTHEST:
             raise TransformError(
                 f"a frame must be within {FARTHEST:g} m, got ({t.x:g}, {t.y:g}, "
@@ -140,7 +141,8 @@ class Transform:
             )
         norm = q.norm
         if abs(norm - 1.0) > NEARLY:
-            raise TransformError(f"the rotation has a norm of {norm:g}, expected 1")
+            got = f"{norm:g}" if norm else "0 (it is all zeros)"
+            raise TransformError(f"the rotation has a norm of {got}, expected 1")
         return Transform(t, Quaternion(q.x / norm, q.y / norm, q.z / norm, q.w / norm))
 
 
