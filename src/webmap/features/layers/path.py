@@ -43,8 +43,8 @@ class Path(RobotLayer):
 
     Fires ``on_path_update``. The poses are in the map's frame, or in the frame of the
     message if the robot has frames: that of its header, or of its first pose that names
-    one. Poses that name another frame are drawn in that frame too, and this is
-    reported. A path without poses removes the line.
+    one. All poses are drawn in this frame; if some name another, this is reported. A
+    path without poses removes the line.
 
     Style it by CSS: ``.path > polyline``, and one of several by its name: ``.path.local
     > polyline``.
