@@ -246,7 +246,8 @@ class Frames:
     def _wake(self) -> None:
         self._timer = None
         self._notify()
-        if self.faults.any:  # to forget them when nothing comes any more
+        # Faults end also when nothing comes any more, or by the next connection.
+        if self.faults.any and self.bridge.state == "open":
             self.wake(KEPT_FOR)
 
     def _notify_soon(self) -> None:
