@@ -45,7 +45,8 @@ class Calls:
 
         """
         id = generate_id()
-        frame = ops.call_service(service, args, id=id, type=type)
+        # A bridge may give up sooner, and report as failed what is still being done.
+        frame = ops.call_service(service, args, id=id, type=type, timeout=patience)
         if self._lane is None or self._lane.is_over:
             self._lane = _CallsLane(self.url, self._lane_type)
         lane = self._lane

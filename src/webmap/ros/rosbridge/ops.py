@@ -85,12 +85,12 @@ def subscribe(
 
     The frame never carries a ``throttle_rate`` of 0 or a ``queue_length`` of 0:
 
-    - rosbridge 2.1.0 for ROS 2 keeps a queue and a thread for each subscription with a
-      ``queue_length`` above 0. When the client unsubscribes, closes or is cut off while
-      a message is queued, the thread sends that message again and again until less than
-      ``throttle_rate`` has passed since the last one. With 0 it never ends: the bridge
-      uses all its processor time and answers no handshake (rosbridge_suite, issue 891).
-      With 1 ms it ends after one message.
+    - rosbridge for ROS 2 before 2.2 keeps a queue and a thread for each subscription
+      with a ``queue_length`` above 0. When the client unsubscribes, closes or is cut
+      off while a message is queued, the thread sends that message again and again until
+      less than ``throttle_rate`` has passed since the last one. With 0 it never ends:
+      the bridge uses all its processor time and answers no handshake (rosbridge_suite,
+      issue 891). With 1 ms it ends after one message.
     - A ``queue_length`` of 0 has no such thread, but with a ``throttle_rate`` of 1 it
       drops each message that comes within 1 ms of the one before. A burst loses its
       last messages: transforms of several publishers, latched ``tf_static``, feedback
@@ -145,8 +145,18 @@ def call_service(
     *,
     id: str,
     type: str | None = None,
+    timeout: float | None = None,
 ) -> bytes:
     """Call ``service``; the response carries ``id``.
+
+    Args:
+        service: The resolved name of the service.
+        args: The fields of its request.
+        id: The id of the call.
+        type: The type of the service.
+        timeout: Seconds after which the bridge ends the call as failed. rosbridge for
+            ROS 2 since 2.2 takes its own ``default_call_service_timeout`` otherwise,
+            5 s by default; older bridges wait for ever in any case.
 
     Raises:
         ValueError: If a number in ``args`` is NaN or infinite.
@@ -159,6 +169,7 @@ def call_service(
         service=service,
         type=type,
         args={} if args is None else args,
+        timeout=timeout,
     )
 
 
