@@ -82,6 +82,8 @@ def test_version_prints_the_version_of_the_package():
         (("sim", "--flat", "--robots", "2"), "one robot only"),
         (("sim", "--quirks", "polite,odd"), "no quirk is called 'odd'; there are"),
         (("sim", "--quirks", "real", "--polite"), "give only one"),
+        (("sim", "--rosbridge", "1.0"), "rosbridge must be one of ['0.11', '2.1',"),
+        (("sim", "--rosbridge", "4.1", "--dialect", "ros1"), "give only one"),
         (("demo", "--host", "0.0.0.0"), "--insecure-lan"),
     ],
 )

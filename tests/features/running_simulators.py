@@ -9,7 +9,7 @@ from typing import Any
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.graph import Graph
-from webmap.ros.rosbridge.server.quirks import parse_quirks
+from webmap.ros.rosbridge.server.quirks import dialect_of, parse_quirks
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.server import RosbridgeServer
@@ -20,15 +20,21 @@ from webmap.sim.world import World, WorldOptions
 
 
 class Running:
-    """A simulator, its world and its last message on each topic."""
+    """A simulator, its world and its last message on each topic.
 
-    def __init__(self, dialect: str, *, tilted: bool = False) -> None:
-        quirks = parse_quirks("real", dialect)
+    Args:
+        version: A version of rosbridge, or a dialect for its usual version.
+        tilted: Whether the lasers are mounted upside down.
+
+    """
+
+    def __init__(self, version: str, *, tilted: bool = False) -> None:
+        quirks = parse_quirks("real", version)
         # Without drift, odometry would be the pose on the map.
         base = BaseOptions(drift=1e-9)
         options = WorldOptions(robots=2, seed=4, base=base)
         self.world = World(load_map(FLOOR), options)
-        schema = Schema(Dialect(dialect))
+        schema = Schema(Dialect(dialect_of(version)))
         graph = Graph(schema)
         Rosapi(graph, quirks).start()
         self.node = RobotsNode(self.world, graph, "Twist", quirks, tilted=tilted)
@@ -55,9 +61,9 @@ class Running:
 
 
 @contextlib.contextmanager
-def simulators(*dialects: str, tilted: bool = False) -> Iterator[dict[str, Running]]:
-    """Run a simulator of each dialect in a separate thread."""
-    found = {dialect: Running(dialect, tilted=tilted) for dialect in dialects}
+def simulators(*versions: str, tilted: bool = False) -> Iterator[dict[str, Running]]:
+    """Run a simulator of each version or dialect in a separate thread."""
+    found = {version: Running(version, tilted=tilted) for version in versions}
     ready, stop = threading.Event(), threading.Event()
 
     async def run() -> None:

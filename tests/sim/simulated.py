@@ -13,7 +13,7 @@ from webmap.base.geometry import Pose
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.graph import Graph
-from webmap.ros.rosbridge.server.quirks import parse_quirks
+from webmap.ros.rosbridge.server.quirks import dialect_of, parse_quirks
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.session import Session
@@ -63,11 +63,14 @@ def coast(robot, seconds, *, now, dt=0.025):
 
 
 class Bench:
-    """A world, its ROS graph, and clients whose frames are lists."""
+    """A world, its ROS graph, and clients whose frames are lists.
+
+    The server has a dialect, or is of a version such as ``4.2``.
+    """
 
     def __init__(
         self,
-        dialect="ros1",
+        version="ros1",
         quirks="polite",
         *,
         robots=2,
@@ -79,7 +82,7 @@ class Bench:
         tilted=False,
         errands=0,
     ):
-        behaviour = parse_quirks(quirks, dialect)
+        behaviour = parse_quirks(quirks, version)
         self.world = World(
             plan or room(),
             WorldOptions(
@@ -89,7 +92,7 @@ class Bench:
                 errands=errands,
             ),
         )
-        schema = Schema(Dialect(dialect))
+        schema = Schema(Dialect(dialect_of(version)))
         self.time = 1_700_000_000.25
         self.graph = Graph(schema, clock=lambda: self.time)
         self.rosapi = Rosapi(self.graph, behaviour)

@@ -111,18 +111,19 @@ def test_invalid_simulator_options_are_refused(options):
 
 def test_quirks_are_parsed_from_their_names():
     assert parse_quirks("polite", "ros2") == POLITE
-    assert parse_quirks("real", "ros2") == REAL["ros2"]
+    assert parse_quirks("real", "ros2") == REAL["2.1"]
     assert parse_quirks("polite, bare_nan", "ros1") == Quirks(bare_nan=True)
     assert not parse_quirks("real,-silent", "ros1").silent
 
 
-def test_the_reference_lists_every_quirk_with_its_dialects():
-    rows = re.findall(r"^\| `(\w+)` \| .+? \| (yes)? ?\| (yes)? ?\|$", REFERENCE, re.M)
+def test_the_reference_lists_every_quirk_with_its_versions():
+    row = r"^\| `(\w+)` \| .+? \| (yes)? ?\| (yes)? ?\| (yes)? ?\|$"
+    rows = re.findall(row, REFERENCE, re.M)
     real = {
-        name: (getattr(REAL["ros1"], name), getattr(REAL["ros2"], name))
+        name: [getattr(REAL[version], name) for version in ("0.11", "2.1", "4.2")]
         for name in (field.name for field in fields(Quirks))
     }
-    assert {name: (bool(one), bool(two)) for name, one, two in rows} == real
+    assert {name: [bool(each) for each in marks] for name, *marks in rows} == real
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 import click
+from click.core import ParameterSource
 
 from webmap.base.children import end_with_parent
 from webmap.base.echo import echo
@@ -88,6 +89,12 @@ from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
     help="Mount lasers upside down; send the depth cloud in its optical frame.",
 )
 @click.option(
+    "--rosbridge",
+    metavar="VERSION",
+    help="Behave like this version of rosbridge: 0.11 (ROS 1), 2.1, 2.7, 3.2, 3.3, 4.1 "
+    "or 4.2 (ROS 2). By default 0.11 or 2.1, by --dialect.",
+)
+@click.option(
     "--polite",
     is_flag=True,
     help="Let the rosbridge report mistakes of clients; short for --quirks polite.",
@@ -129,6 +136,7 @@ def sim(
     flat: bool,
     extras: bool,
     tilted: bool,
+    rosbridge: str | None,
     polite: bool,
     quirks: str | None,
     take_nan: bool,
@@ -146,6 +154,11 @@ def sim(
     if polite and quirks:
         raise click.UsageError(
             "--polite is short for --quirks polite; give only one of them"
+        )
+    dialect_from = click.get_current_context().get_parameter_source("dialect")
+    if rosbridge and dialect_from is not ParameterSource.DEFAULT:
+        raise click.UsageError(
+            "--rosbridge determines the dialect; give only one of them"
         )
     if with_parent:
         end_with_parent(lambda: os.kill(os.getpid(), signal.SIGTERM))
@@ -167,6 +180,7 @@ def sim(
             flat=flat,
             extras=extras,
             tilted=tilted,
+            rosbridge=rosbridge,
             quirks="polite" if polite else quirks or "real",
             refuse_nan=not take_nan,
             http_camera=http_camera,

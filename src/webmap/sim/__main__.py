@@ -57,6 +57,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--seed", type=int, default=1, help="random seed (1)")
     add("--map", help="map_server YAML file; by default a floor made for this")
     add("--dialect", choices=("ros1", "ros2"), default="ros1")
+    add("--rosbridge", help="version to behave like, such as 4.1; sets --dialect")
     add("--twist", choices=("Twist", "TwistStamped"), default="Twist")
     add(
         "--robot-timeout",

@@ -153,7 +153,6 @@ _NAV2_STATUS = {
     GoalState.CANCELED: 5,
     GoalState.ABORTED: 6,
 }
-_UNKNOWN_STATUS = 0
 _FAILED = 9000
 _ALL_GOALS = bytes(16)
 _ERROR_NONE, _ERROR_REJECTED, _ERROR_UNKNOWN_GOAL = 0, 1, 2
@@ -193,13 +192,15 @@ class NavigateToPose:
 
     def send_goal(
         self, goal: dict[str, Any], on_feedback: OnFeedback, on_result: OnResult
-    ) -> GoalHandle:
-        """Drive to a goal; the previous one ends as canceled."""
-        handle = _Handle(self, on_feedback, on_result, self.node.world.now)
+    ) -> GoalHandle | None:
+        """Drive to a goal; the previous one ends as canceled.
+
+        A goal in a frame that the robot does not know is rejected.
+        """
         target = self.node.target(goal["pose"], self.index)
         if target is None:
-            on_result(_UNKNOWN_STATUS, _result("the goal is in no known frame"))
-            return handle
+            return None
+        handle = _Handle(self, on_feedback, on_result, self.node.world.now)
         handle.goal = Goal(target, handle.end)
         self._running[handle.uuid] = handle
         self.node.world.send_goal(self.index, handle.goal)

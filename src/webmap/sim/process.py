@@ -28,6 +28,7 @@ async def run_simulator(
     seed: int = 1,
     map: Path | str | None = None,
     dialect: Literal["ros1", "ros2"] = "ros1",
+    rosbridge: str | None = None,
     twist: Literal["Twist", "TwistStamped"] = "Twist",
     robot_timeout: float | None = 0.25,
     drift: float = 0.0,
@@ -54,6 +55,8 @@ async def run_simulator(
         seed: Seed of everything random: the same seed gives the same positions.
         map: A map_server YAML file; None for the floor that comes with the package.
         dialect: The dialect of the server's type names and times.
+        rosbridge: The version of rosbridge to behave like, such as ``4.1``, which
+            replaces ``dialect`` by its own; None for the usual one of ``dialect``.
         twist: The type of ``cmd_vel``.
         robot_timeout: Command timeout of the bases, in seconds; None for a base that
             never stops by itself.
@@ -89,7 +92,7 @@ async def run_simulator(
     from webmap.ros.rosbridge.server.dialect import Dialect
     from webmap.ros.rosbridge.server.encode import Encoder
     from webmap.ros.rosbridge.server.graph import Graph
-    from webmap.ros.rosbridge.server.quirks import parse_quirks
+    from webmap.ros.rosbridge.server.quirks import dialect_of, parse_quirks
     from webmap.ros.rosbridge.server.rosapi import Rosapi
     from webmap.ros.rosbridge.server.schema import Schema
     from webmap.ros.rosbridge.server.server import RosbridgeServer
@@ -109,7 +112,9 @@ async def run_simulator(
         )
     if errands and wander:
         raise ConfigError("robots either wander or have errands: give only one of them")
-    behaviour = parse_quirks(quirks, dialect)
+    version = rosbridge or dialect
+    dialect = dialect_of(version)
+    behaviour = parse_quirks(quirks, version)
     options = WorldOptions(
         robots=robots,
         seed=seed,

@@ -35,7 +35,7 @@ BULK = (
 
 A bridge encodes CBOR faster, and only once. JSON that it encodes for longer than the
 throttle can hang it when a client leaves: see :func:`.ops.subscribe`. Types with an
-array of fixed length are excluded, since bridges cannot send them as CBOR.
+array of fixed length are excluded, since bridges before 2.5 cannot send them as CBOR.
 """
 
 REPLACED = (

@@ -77,8 +77,11 @@ class ActionServer(Protocol):
         goal: dict[str, Any],
         on_feedback: Callable[[dict[str, Any]], None],
         on_result: Callable[[int, dict[str, Any]], None],
-    ) -> GoalHandle:
-        """Accept a goal; ``on_result`` is called once, with a status of action_msgs."""
+    ) -> GoalHandle | None:
+        """Accept a goal, or return None to reject it.
+
+        ``on_result`` is called once for an accepted goal, with a status of action_msgs.
+        """
 
 
 class Graph:

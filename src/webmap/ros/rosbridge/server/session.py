@@ -71,8 +71,9 @@ class Session(Client):
         return []
 
     def poll(self) -> float | None:
-        """Release throttled messages; return seconds to the next one, if any."""
-        return self._topics.poll()
+        """Do what is due; return the seconds until more is due, if any."""
+        waits = (self._topics.poll(), self._services.poll())
+        return min((wait for wait in waits if wait is not None), default=None)
 
     @property
     def overflowed(self) -> bool:
@@ -209,6 +210,10 @@ class IncomingText:
         return found, "" if rest_from is None else text[rest_from:]
 
 
+CALL_TIMEOUT = 5.0
+"""The default of ``default_call_service_timeout`` in rosbridge_websocket, seconds."""
+
+
 class Services:
     """One client's calls and the services that it has advertised."""
 
@@ -218,6 +223,8 @@ class Services:
         self._served: set[str] = set()
         self._asked: dict[str, Respond] = {}
         self._numbers = count(1)
+        self._timed: dict[int, tuple[float, Respond]] = {}
+        """The calls that fail if they are not answered in time, with that time."""
 
     @property
     def handlers(self) -> Handlers:
@@ -238,14 +245,29 @@ class Services:
             _, respond = self._asked.popitem()
             respond("the client that answered the service has gone", ok=False)
 
+    def poll(self) -> float | None:
+        """End the calls whose time is over; return seconds to the next one, if any."""
+        now = self._client.now()
+        for due, respond in list(self._timed.values()):
+            if now >= due:
+                respond("Timeout exceeded while waiting for service response", ok=False)
+        dues = [due for due, _ in self._timed.values()]
+        return min(dues) - now if dues else None
+
     def _call(self, operation: Operation) -> None:
         service = text(operation, "service")
         identifier = operation.get("id")
         size = operation.get("fragment_size")
         blocks = self._client.encoder.quirks.blocking_services
         unblock: Callable[[], None] = self._client.block() if blocks else _nothing
+        number, is_open = next(self._numbers), True
 
         def respond(values: Any, *, ok: bool = True) -> None:
+            nonlocal is_open
+            self._timed.pop(number, None)
+            if not is_open:
+                return  # an answer after the timeout
+            is_open = False
             response = {
                 "op": "service_response",
                 "service": service,
@@ -255,6 +277,10 @@ class Services:
             self._client.reply(response, identifier, size)
             unblock()
 
+        timeout = operation.get("timeout", CALL_TIMEOUT)
+        if self._client.encoder.quirks.timed_calls and timeout > 0:
+            self._timed[number] = (self._client.now() + timeout, respond)
+            self._client.wake()
         self._graph.call(service, operation.get("args", {}), respond)
 
     def _advertise(self, operation: Operation) -> None:
@@ -308,16 +334,24 @@ class Goals:
         identifier = operation.get("id")
         server = self._graph.actions.get(resolve(action))
         type_name = canonical(text(operation, "action_type"))
+        quirks = self._client.encoder.quirks
+        unblock = self._client.block() if quirks.blocking_goals else _nothing
+
+        def refuse(reason: str) -> None:
+            if not quirks.unanswered_goals:
+                self._finish(action, identifier, _UNKNOWN, reason, ok=False)
+                unblock()
+
         if server is None or server.type != type_name:
-            reason = f"Action server {action} of type {type_name} is not available"
-            self._finish(action, identifier, _UNKNOWN, reason, ok=False)
+            refuse("No action server available")
             return
         args = operation.get("args", {})
-        goal = self._graph.conform(f"{server.type}_Goal", args, finite=True)
+        try:
+            goal = self._graph.conform(f"{server.type}_Goal", args, finite=True)
+        except GraphError:
+            unblock()
+            raise
         key = (resolve(action), identifier)
-        unblock: Callable[[], None] | None = None
-        if self._client.encoder.quirks.blocking_goals:
-            unblock = self._client.block()
         ended = False
 
         def on_feedback(values: dict[str, Any]) -> None:
@@ -330,11 +364,12 @@ class Goals:
             ended = True
             self._handles.pop(key, None)
             self._finish(action, identifier, status, values, ok=True)
-            if unblock:
-                unblock()
+            unblock()
 
         handle = server.send_goal(goal, on_feedback, on_result)
-        if not ended:
+        if handle is None:
+            refuse("Action goal was rejected")
+        elif not ended:
             self._handles[key] = handle
 
     def _cancel(self, operation: Operation) -> None:

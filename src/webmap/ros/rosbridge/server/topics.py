@@ -202,18 +202,20 @@ class Topics:
 
     def _publish(self, operation: Operation) -> None:
         topic = resolve(text(operation, "topic"))
-        known = self._graph.topics.get(topic)
-        if known is None:
+        known, quirks = self._graph.topics.get(topic), self._client.encoder.quirks
+        if known is not None:
+            type_name = known.type
+        elif quirks.typed_publish and operation.get("type"):
+            type_name = text(operation, "type")
+        else:
             raise GraphError(
                 f"Cannot infer the type of {topic}: the topic does not exist"
             )
         message = self._graph.conform(
-            known.type,
-            operation.get("msg", {}),
-            finite=not self._client.encoder.quirks.lenient_numbers,
+            type_name, operation.get("msg", {}), finite=not quirks.lenient_numbers
         )
         if topic not in self._advertised:
-            self._graph.advertise(self, topic, known.type)
+            self._graph.advertise(self, topic, type_name)
             self._advertised.add(topic)
         self._graph.publish(self, topic, message)
 
