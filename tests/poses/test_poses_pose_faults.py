@@ -22,6 +22,7 @@ def tilted(parent, child, roll, stamp):
 @pytest.fixture
 def fussy(monkeypatch):
     """A layer whose drawing fails while the test sets ``fails``."""
+    robot_modules.names()  # a module that is first imported later would be lost
     monkeypatch.setattr(robot_modules, "_registered", dict(robot_modules._registered))
 
     @layer("geometry_msgs/PointStamped")

@@ -27,6 +27,7 @@ ROBOT = {"/a/odom": "nav_msgs/Odometry", "/a/cmd_vel": "geometry_msgs/Twist"}
 @pytest.fixture(autouse=True)
 def _forget_layers(monkeypatch):
     for namespace in (robot_modules, map_modules):
+        namespace.names()  # a module that is first imported later would be lost
         monkeypatch.setattr(namespace, "_registered", dict(namespace._registered))
 
 

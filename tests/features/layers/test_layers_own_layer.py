@@ -47,6 +47,7 @@ TOPICS = {
 def own_layers(monkeypatch, tmp_path):
     """Import the file from another folder, and remove its layers afterwards."""
     for namespace in (robot_modules, map_modules):
+        namespace.names()  # a module that is first imported later would be lost
         monkeypatch.setattr(namespace, "_registered", dict(namespace._registered))
     file = tmp_path / "my_own_layers.py"
     file.write_text(FILE.read_text("utf-8"), "utf-8")
