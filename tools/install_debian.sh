@@ -14,5 +14,16 @@ if [ "$(id -u)" -ne 0 ]; then
 fi
 printf 'webmap: installing %s\n' "$*" >&2
 export DEBIAN_FRONTEND=noninteractive
-apt-get update -qq
-apt-get install -y -qq --no-install-recommends -o Dpkg::Use-Pty=0 "$@" >/dev/null
+# Another apt-get may run. The installation waits for its lock by itself, but the update
+# of the lists has no option for this.
+for ((attempt = 1; ; attempt++)); do
+  if message=$(LC_ALL=C apt-get update -qq 2>&1); then
+    break
+  fi
+  if [[ $message != *"Could not get lock"* ]] || ((attempt == 120)); then
+    printf '%s\n' "$message" >&2
+    exit 1
+  fi
+  sleep 5
+done
+apt-get install -o DPkg::Lock::Timeout=600 -y -qq --no-install-recommends -o Dpkg::Use-Pty=0 "$@" >/dev/null
