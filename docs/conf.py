@@ -38,6 +38,7 @@ nitpick_ignore_regex = [
 ]
 
 html_theme = "furo"
+html_extra_path = ["images/demo.webp"]  # of the README on a package index
 html_title = f"WebMap {release}"
 
 # The public name of each object, by the module and name that define it.

@@ -1,10 +1,12 @@
-"""The wheel has all files of WebMap, and runs in an empty environment."""
+"""Wheel and sdist have all files, and the wheel runs in an empty environment."""
 
 import os
 import re
 import subprocess
 import sys
+import tarfile
 import zipfile
+from email import message_from_bytes
 from pathlib import Path
 
 import httpx
@@ -21,21 +23,15 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="session")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("wheel")
-    run(
-        [
-            sys.executable,
-            "-m",
-            "build",
-            "--wheel",
-            "--no-isolation",
-            "-o",
-            folder,
-            ROOT,
-        ],
-        cwd=folder,
-    )
-    return next(folder.glob("*.whl"))
+    return built("wheel", tmp_path_factory.mktemp("wheel"))
+
+
+def built(kind: str, folder: Path) -> Path:
+    """Return the file of a wheel or an sdist of this checkout."""
+    build = [sys.executable, "-m", "build", f"--{kind}", "--no-isolation"]
+    run([*build, "-o", folder, ROOT], cwd=folder)
+    (file,) = folder.iterdir()
+    return file
 
 
 @pytest.fixture(scope="session")
@@ -65,6 +61,42 @@ def test_the_wheel_contains_every_file_of_the_package(wheel: Path) -> None:
     }
     assert "webmap/py.typed" in wanted
     assert wanted <= set(zipfile.ZipFile(wheel).namelist())
+
+
+INCLUDED = re.compile(r"^```\{(?:literal)?include\} (\S+)$", re.M)
+"""A file that a page of the documentation includes."""
+
+
+def test_the_sdist_contains_every_file_that_the_documentation_includes(
+    tmp_path: Path,
+) -> None:
+    with tarfile.open(built("sdist", tmp_path)) as archive:
+        there = {name.partition("/")[2] for name in archive.getnames()}
+    wanted = {
+        (page.parent / name).resolve().relative_to(ROOT).as_posix()
+        for page in (ROOT / "docs").rglob("*.md")
+        for name in INCLUDED.findall(page.read_text("utf-8"))
+    }
+    assert {"CONTRIBUTING.md", "examples/simple/simple.py"} <= wanted
+    assert wanted <= there
+
+
+def test_the_package_description_links_to_pages_that_the_documentation_has(
+    wheel: Path,
+) -> None:
+    archive = zipfile.ZipFile(wheel)
+    (name,) = (each for each in archive.namelist() if each.endswith("/METADATA"))
+    metadata = message_from_bytes(archive.read(name))
+    links = re.findall(r"\]\(([^)]*)\)", str(metadata.get_payload()))
+    site = "https://webmap.readthedocs.io/en/latest/"
+    assert f"{site}demo.webp" in links
+    pages = {link.removeprefix(site) for link in links} - {"demo.webp"}
+    there = {
+        page.relative_to(ROOT / "docs").with_suffix(".html").as_posix()
+        for page in (ROOT / "docs").rglob("*.md")
+    }
+    assert len(pages) > 5
+    assert pages <= there
 
 
 def test_an_installed_wheel_prints_its_version(installed: Path, tmp_path: Path) -> None:
