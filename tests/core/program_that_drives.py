@@ -4,7 +4,6 @@ import asyncio
 import json
 import math
 import sys
-import threading
 import time
 
 import webmap
@@ -98,18 +97,11 @@ async def drive() -> None:
 
 
 def main() -> None:
-    done = threading.Event()
-    tasks = []
-
-    def begin() -> None:
-        tasks.append(asyncio.get_running_loop().create_task(drive()))
-        tasks[0].add_done_callback(lambda _: done.set())
-
     webmap.start()
-    webmap.call(begin)
-    done.wait(90)
-    webmap.stop()
-    tasks[0].result()  # raises the error of the program, if any
+    try:
+        webmap.call(drive)
+    finally:
+        webmap.stop()
     print(json.dumps(received))
 
 

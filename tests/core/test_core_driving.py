@@ -10,6 +10,7 @@ import pytest
 from webmap_process import simulator
 
 PROGRAM = Path(__file__).with_name("program_that_drives.py")
+SCRIPT = Path(__file__).parents[2] / "examples" / "script" / "script.py"
 
 
 @pytest.fixture(scope="module")
@@ -50,3 +51,19 @@ def test_the_robot_receives_the_goal_in_its_own_map_and_frame(received):
 @pytest.mark.parametrize("command", ["twist", "move"])
 def test_a_program_that_released_control_cannot_move_the_robot(received, command):
     assert received[f"{command} afterwards"] == "NoLease"
+
+
+def test_the_script_of_the_guide_drives_a_robot_and_waits_for_its_goal(tmp_path):
+    text = SCRIPT.read_text("utf-8")
+    assert text.count("ws://localhost:9090") == 1
+    script = tmp_path / "script.py"
+    with simulator("--flat", "--no-extras", "--seed", "7") as url:
+        script.write_text(text.replace("ws://localhost:9090", url), "utf-8")
+        done = subprocess.run(
+            [sys.executable, script],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+        )
+    assert (done.stdout, done.returncode) == ("The goal is reached\n", 0), done.stderr

@@ -1,7 +1,11 @@
 """The start: the error of one robot is reported, and the others start."""
 
+import asyncio
+import threading
+
 import pytest
 
+import webmap
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
@@ -58,3 +62,38 @@ def test_a_robot_refused_by_the_gate_does_not_prevent_the_start_of_the_others(
     assert "Eve: it cannot be moved: robot 'Eve': no such thing" in caplog.text
     for robot in robots:
         robot.destroy()
+
+
+@pytest.fixture
+def model(gate):
+    model = Runtime()
+    model.start()
+    yield model
+    model.stop()
+
+
+def test_call_returns_the_result_of_a_coroutine_function_in_the_models_thread(model):
+    async def thread_after_a_pause(name):
+        await asyncio.sleep(0.01)
+        return name, threading.current_thread()
+
+    assert model.run(thread_after_a_pause, "Bob") == ("Bob", model._thread)
+    assert model.run(threading.current_thread) is model._thread
+
+
+def test_call_raises_the_error_of_the_function(model):
+    async def fail():
+        raise ConfigError("no such robot")
+
+    with pytest.raises(ConfigError, match="no such robot"):
+        model.run(fail)
+
+
+def test_call_in_the_models_thread_is_refused(model):
+    with pytest.raises(RuntimeError, match="await it"):
+        model.run(lambda: model.run(print))
+
+
+def test_call_before_the_start_is_refused():
+    with pytest.raises(RuntimeError, match=r"call webmap\.start"):
+        webmap.call(print)

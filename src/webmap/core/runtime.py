@@ -6,6 +6,7 @@ bytes from it.
 """
 
 import asyncio
+import inspect
 import logging
 import sys
 import threading
@@ -119,10 +120,36 @@ class Runtime:
             RuntimeError: If WebMap has not been started.
 
         """
-        loop = self._loop
-        if loop is None:
+        self._started_loop().call_soon_threadsafe(fn, *args)
+
+    def _started_loop(self) -> asyncio.AbstractEventLoop:
+        if self._loop is None:
             raise RuntimeError("WebMap has not been started: call webmap.start()")
-        loop.call_soon_threadsafe(fn, *args)
+        return self._loop
+
+    def run(self, fn: Callable[..., Any], /, *args: Any) -> Any:
+        """Call ``fn`` in the model's thread and wait for its result.
+
+        Raises:
+            RuntimeError: If WebMap has not been started, or this is the model's thread.
+
+        """
+        loop = self._started_loop()
+        if threading.current_thread() is self._thread:
+            raise RuntimeError(
+                "webmap.call waits for the model's thread, and this is that thread: "
+                "call the function itself, or await it"
+            )
+
+        async def called() -> Any:
+            result = fn(*args)
+            return await result if inspect.isawaitable(result) else result
+
+        work = asyncio.run_coroutine_threadsafe(called(), loop)
+        try:
+            return work.result()
+        finally:
+            work.cancel()  # it has not ended if the waiting was interrupted
 
     def serve_pages(self) -> None:
         """Receive what is only shown less often while no page is open."""

@@ -1,4 +1,4 @@
-"""``webmap.page``, ``run``, ``start``, ``stop`` and ``asgi_app``."""
+"""``webmap.page``, ``run``, ``start``, ``stop``, ``call`` and ``asgi_app``."""
 
 import logging
 from collections.abc import AsyncIterator, Callable, Iterable
@@ -41,16 +41,21 @@ def stop() -> None:
     runtime.stop()
 
 
-def call(fn: Callable[..., object], /, *args: Any) -> None:
-    """Schedule a call of ``fn`` in the model's thread, where robots and maps live.
+def call(fn: Callable[..., Any], /, *args: Any) -> Any:
+    """Call ``fn`` in the model's thread, where robots and maps live, and wait for it.
 
-    Everything that a script uses after :func:`start` belongs to that thread.
+    Everything that a script uses after :func:`start` belongs to that thread. A
+    coroutine function runs there until it has ended. If the waiting is interrupted, as
+    by Ctrl+C, the coroutine is cancelled.
+
+    Returns:
+        The result of ``fn``. An exception of ``fn`` is raised here.
 
     Raises:
-        RuntimeError: If WebMap has not been started.
+        RuntimeError: If WebMap has not been started, or this is the model's thread.
 
     """
-    runtime.call(fn, *args)
+    return runtime.run(fn, *args)
 
 
 def asgi_app(
