@@ -105,6 +105,8 @@ def test_a_robot_takes_its_pose_from_each_pose_type(type_name, known):
         assert robot.valid
         assert (robot.position.x, robot.position.y) == (1.0, 2.0)
         assert robot.angle == pytest.approx(90.0)
+        pose = (robot.position.x, robot.position.y, robot.yaw)
+        assert (robot.pose.x, robot.pose.y, robot.pose.yaw) == pose
         assert robot.yaw == pytest.approx(math.pi / 2)
         (topic, _, asked, throttle, _) = link.subscribed[0]
         assert (topic, asked, throttle) == ("/odom", type_name, 50)

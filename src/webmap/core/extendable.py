@@ -75,6 +75,13 @@ class Extendable:
         made = (self._made.get(id(module)) for module in self.modules)
         return [arguments for arguments in made if arguments is not None]
 
+    def find_module(self, name: str) -> Any:
+        """Return the first module that was added by this name, or None."""
+        for module in self.modules:
+            if self._made.get(id(module), ("",))[0] == name:
+                return module
+        return None
+
     def arguments_of(
         self, module: Any
     ) -> tuple[str, tuple[Any, ...], dict[str, Any]] | None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 from webmap.base.errors import ConfigError
-from webmap.base.geometry import Quaternion, Twist, Vector3
+from webmap.base.geometry import Pose, Quaternion, Twist, Vector3
 from webmap.base.looking import looking
 from webmap.base.scope import Removal, keep
 from webmap.config.reading import read_part
@@ -142,6 +142,11 @@ class Robot(Listed):
     def angle(self) -> float:
         """The heading, in degrees, counter-clockwise from x."""
         return math.degrees(self.yaw)
+
+    @property
+    def pose(self) -> Pose:
+        """The pose in the plane: ``x`` and ``y`` in metres, ``yaw`` in radians."""
+        return Pose(self.position.x, self.position.y, self.yaw)
 
     @property
     def pose_age(self) -> float | None:

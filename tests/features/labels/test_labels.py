@@ -39,6 +39,21 @@ async def saved(layer) -> None:
         await asyncio.sleep(0.005)
 
 
+def test_a_label_is_found_by_its_name(map, page, said):
+    async def scenario():
+        labels = map.add_module("Labels", [DESK])
+        labels.on_message({"add": {"name": "Dock", "x": 3, "y": 4}})
+        labels.on_message({"add": {"name": "Desk", "x": 5, "y": 6}})
+        assert map.find_module("Labels") is labels
+        assert (labels.find("Dock").x, labels.find("Desk").x) == (3.0, 1.0)
+        assert labels.find("Lift") is None
+        assert map.find_module("MapFile") is None
+        await saved(labels.layer)
+        page.close()
+
+    asyncio.run(scenario())
+
+
 def test_an_added_label_is_on_every_map_and_is_saved(map, page, state, said):
     async def scenario():
         one = map.add_module("Labels", [DESK])

@@ -163,6 +163,27 @@ def test_the_battery_passes_its_charge_or_none_to_other_modules(percentage, char
     assert received == [charge]
 
 
+def test_a_map_module_gets_the_battery_of_the_selected_robot_only(map):
+    received = []
+
+    class Listener:
+        def __init__(self, map) -> None:
+            pass
+
+        def on_battery_update(self, battery):
+            received.append((battery.robot.name, battery.charge))
+
+    map.add_module(Listener)
+    for name in ("Ann", "Bob"):
+        link, robot = Link(), Robot(name)
+        robot.add_module("Battery", link, "/battery")
+        map.add_robot(robot)
+        publish_percentages(link, 0.25)
+        map.set_selected(robot)
+        publish_percentages(link, 0.5)
+    assert received == [("Ann", 0.5), ("Bob", 0.5)]
+
+
 def test_from_dict_adds_the_modules_of_a_robot():
     link = Link()
     robot = Robot.from_dict(

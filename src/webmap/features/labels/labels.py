@@ -311,6 +311,15 @@ class Labels:
             "features/labels/labels.css",
         )
 
+    def find(self, name: str) -> Label | None:
+        """Return the label of a name, or None.
+
+        Of several labels with the name, the first one is returned: labels of the
+        program and of files come before those that were added on pages.
+        """
+        every = (*self.layer.configured.values(), *self.layer.added.labels.values())
+        return next((label for label in every if label.name == name), None)
+
     def on_message(self, message: dict[str, Any]) -> None:
         """Add, move or remove a label, or record where a robot was sent."""
         try:

@@ -21,6 +21,8 @@ FULL = 1.2
 class Battery:
     """Follows a ``sensor_msgs/BatteryState`` and fires ``on_battery_update``.
 
+    It fires on modules of the robot, and on those of maps that have the robot selected.
+
     The message defines a percentage from 0 to 1, but some drivers publish 0 to 100.
     After one value above 1.2, the layer treats all values of the topic as 0 to 100.
 
@@ -61,6 +63,9 @@ class Battery:
         self.voltage = voltage if math.isfinite(voltage) else None
         self.stamp = time.monotonic() - self._bridge.lag
         self.robot.notify_modules("on_battery_update", self)
+        for map in tuple(self.robot.maps):
+            if map.selected is self.robot:
+                map.notify_modules("on_battery_update", self)
 
     def _charge_of(self, percentage: float) -> float | None:
         """Return a charge from 0 to 1; None if it is unknown or impossible."""
