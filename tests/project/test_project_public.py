@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 
@@ -51,6 +52,68 @@ def test_every_public_name_can_be_imported(name: str) -> None:
 @pytest.mark.parametrize("name", webmap.__all__)
 def test_every_public_name_is_in_the_api_reference(name: str) -> None:
     assert re.search(rf"webmap\.{name}\b", API)
+
+
+PAGE_IMPORTS = """
+import importlib, sys
+import webmap
+
+def attribute(name):
+    value = webmap
+    for part in name.split(".")[1:]:
+        value = getattr(value, part)
+    return value
+
+shown, documented, page = sys.argv[1:]
+packages = {"webmap.console", "webmap.testing"}
+for name in shown.split():
+    importlib.import_module(name) if name in packages else attribute(name)
+for name in documented.split():
+    before, _, last = name.rpartition(".")
+    try:
+        attribute(name)
+    except AttributeError:
+        getattr(importlib.import_module(before), last)
+exec(page)
+"""
+
+
+def test_every_name_of_the_api_reference_is_imported_as_the_page_shows() -> None:
+    table = API.partition("## Run")[0]
+    shown = re.findall(r"`(webmap\.[\w.]+)`", table.partition("| group |")[2])
+    documented = re.findall(r"^\.\. (?:auto|py:)\w+:: (webmap[\w.]+)", API, re.M)
+    (example,) = re.findall(r"```python\n(.*?)```", table, re.S)
+    assert len(shown) > 30
+    assert len(documented) > 80
+    command = [sys.executable, "-c", PAGE_IMPORTS]
+    names = [" ".join(shown), " ".join(documented), example]
+    done = subprocess.run([*command, *names], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+ALIASES = sorted(
+    f"webmap.{name}" for name, home in webmap._HOMES.items() if ":" not in home
+)
+
+
+def test_the_api_reference_lists_the_attributes_that_are_no_modules() -> None:
+    (listed,) = re.findall(r"^(`webmap.*) are attributes and no files", API, re.M)
+    only = [name for name in ALIASES if find_spec(name) is None]
+    assert re.findall(r"`([^`]+)`", listed) == only
+
+
+def test_no_page_imports_from_an_attribute_that_is_no_module() -> None:
+    wrong = [
+        f"{page.relative_to(ROOT)}: {found}"
+        for folder in ("docs", "examples")
+        for page in (ROOT / folder).rglob("*.*")
+        if page.suffix in {".md", ".py"}
+        for found in re.findall(
+            r"^(?:from|import) (webmap\.\w+)", page.read_text("utf-8"), re.M
+        )
+        if find_spec(found) is None
+    ]
+    assert not wrong
 
 
 def test_every_public_name_is_listed_once() -> None:
