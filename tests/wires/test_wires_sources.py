@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from wires_recording import WRITES, compare
+from wires_recording import WRITES, agreed, compare
 from wires_sources import SOURCES, WRONG
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -23,7 +23,13 @@ def recordings(tmp_path_factory, request):
         for name in (*SOURCES, *WRONG)
         if any(f"[{name}]" in item.name for item in request.session.items)
     ]
-    mode = "write" if WRITES else "compare"
+    if WRITES:
+        return agreed(played(folder, "write", chosen), played(folder, "write", chosen))
+    return played(folder, "compare", chosen)
+
+
+def played(folder, mode, chosen):
+    """Play the chosen sources and return their recordings."""
     done = subprocess.run(
         [sys.executable, PROGRAM, folder / "played.json", mode, *chosen],
         capture_output=True,

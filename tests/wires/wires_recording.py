@@ -1,7 +1,7 @@
 """Recordings of the messages on all connections, and comparison with them.
 
-A recording is a text of sections. ``WEBMAP_WIRES=write pytest tests/wires`` writes all
-of them again; ``git diff`` then shows the changes.
+A recording is a text of sections. ``WEBMAP_WIRES=write pytest tests/wires`` makes all
+of them twice, and writes those that are the same; ``git diff`` then shows the changes.
 """
 
 import difflib
@@ -29,6 +29,25 @@ def recorded(name: str) -> str:
     """Return a recording; empty if there is none."""
     file = path_of(name)
     return file.read_text("utf-8") if file.exists() else ""
+
+
+def agreed(one: dict[str, str], other: dict[str, str]) -> dict[str, str]:
+    """Return recordings that were made twice; a failure in place of one that differs.
+
+    A recording without an earlier one is complete when no message comes for a while. On
+    a busy machine that may be too early, and then the recording lacks its end.
+    """
+    return {
+        name: text
+        if text == other.get(name)
+        else "it failed: it was not the same twice, so one of the recordings may lack "
+        f"messages; record again on a quiet machine\n{_diff(text, other.get(name, ''))}"
+        for name, text in one.items()
+    }
+
+
+def _diff(one: str, other: str) -> str:
+    return "\n".join(difflib.unified_diff(one.splitlines(), other.splitlines(), n=1))
 
 
 def compare(name: str, text: str) -> None:
