@@ -8,6 +8,7 @@ from gate_harness import ZERO, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, commands, protocol
 from webmap.gate.protocol import PROGRAM
+from webmap.gate.rules.motion import DEADMAN
 
 
 @pytest.fixture
@@ -68,7 +69,7 @@ def test_a_program_without_new_commands_is_stopped_but_keeps_its_lease(bench):
     at = bench.now
     twist(bench, 0.5, 0.0, 0.0)
     bench.run(1.0)
-    assert 0.2 <= bench.written[1].at - at <= 0.2101
+    assert DEADMAN <= bench.written[1].at - at <= DEADMAN + 0.0101
     assert bench.state == "held"
     at = bench.now
     twist(bench, 0.5, 0.0, 0.0)
@@ -263,7 +264,7 @@ class TestProgramsOfOtherDisplays:
         at = bench.now
         self.twist(bench)
         bench.run(1.0)
-        assert 0.2 <= bench.written[1].at - at <= 0.2101
+        assert DEADMAN <= bench.written[1].at - at <= DEADMAN + 0.0101
         assert bench.written[1].twist == ZERO
         assert bench.report().holder.connection == ANN
 

@@ -6,6 +6,7 @@ from gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, events, protocol
 from webmap.gate.events import StopRecord
+from webmap.gate.rules.motion import DEADMAN
 
 
 class Machine:
@@ -92,7 +93,7 @@ class TestRunning:
     ):
         begin(bench)
         at = bench.now
-        base.run(0.15, x=None)
+        base.run(DEADMAN - 0.05, x=None)
         assert bench.since(at) == []
         bench.drive(x=0.0)
         assert len(bench.since(at - 0.01)) == 1

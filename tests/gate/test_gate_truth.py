@@ -296,8 +296,8 @@ class TestLoopAge:
         )
 
     def test_the_reaction_time_adds_loop_age_dead_man_and_command_timeout(self):
-        assert reaction(None, None) == pytest.approx(0.7)
-        assert reaction(0.1, 0.25) == pytest.approx(0.55)
+        assert reaction(None, None) == pytest.approx(DEADMAN + 0.5)
+        assert reaction(0.1, 0.25) == pytest.approx(0.1 + DEADMAN + 0.25)
 
     def test_commands_with_old_ticks_reduce_the_speed_and_report_the_reason(self):
         bench = Bench().begin(spec(v_max=2.0, stops_within=0.25))
@@ -314,9 +314,9 @@ class TestLoopAge:
         report = bench.report()
         assert 200 <= report.age <= 250
         assert any(why.startswith("slow connection: 2") for why in report.why)
-        bound = 0.25 / (report.age / 1000 + 0.2 + 0.25)
-        assert bench.written[-1].twist.vx <= bound
-        assert report.reaction == pytest.approx(report.age / 1000 + 0.45, abs=0.001)
+        reacted = report.age / 1000 + DEADMAN + 0.25
+        assert bench.written[-1].twist.vx <= 0.25 / reacted
+        assert report.reaction == pytest.approx(reacted, abs=0.001)
 
     def test_the_loop_age_includes_the_round_trip_to_the_robot(self):
         trips = Ages()
@@ -345,9 +345,10 @@ class TestLoopAge:
         assert rtt * 1000 <= report.age <= rtt * 1000 + 50
         slow = report.age > 150
         assert any(why.startswith("slow connection") for why in report.why) == slow
-        bound = 0.25 / (report.age / 1000 + 0.45) if slow else 2.0
+        reacted = report.age / 1000 + DEADMAN + 0.25
+        bound = 0.25 / reacted if slow else 2.0
         assert bench.written[-1].twist.vx == report.v == pytest.approx(bound, abs=0.01)
-        assert report.reaction == pytest.approx(report.age / 1000 + 0.45, abs=0.001)
+        assert report.reaction == pytest.approx(reacted, abs=0.001)
 
     def test_a_robot_whose_bridge_answers_after_more_than_300_ms_is_not_driven(self):
         bench = Bench(rtt=0.9).begin()
