@@ -206,5 +206,5 @@ def test_an_invalid_url_is_refused_with_one_line(url):
     process = Process("view", url, "--port", 0, "--no-browser")
     assert process.popen.wait(30) == 2
     assert process.log.count("\n") == 1
-    assert "is not the address of a rosbridge" in process.log
+    assert "is not the address of a bridge" in process.log
     process.end()

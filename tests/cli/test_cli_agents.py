@@ -54,7 +54,7 @@ service = "/dock"
         (("agent", "ws://h", *NAME), "Missing option '--router'"),
         (("agent", "ws://h", *ROUTER), "Missing option '--name'"),
         (("agent", "ws://h", *ROUTER, "--name", "a/b"), "got the agent 'a/b'"),
-        (("agent", "http://h", *ROUTER, *NAME), "is not the address of a rosbridge"),
+        (("agent", "http://h", *ROUTER, *NAME), "is not the address of a bridge"),
         (("agent", "ws://h", "--router", "ws://h", *NAME), "got the router 'ws://h'"),
         (("agent", "ws://h", *ROUTER, *NAME, "--rate", "/scan"), "/scan=5"),
         (("agent", "ws://h", *ROUTER, *NAME, "--rate", "/scan=0"), "/scan=5"),

@@ -1,13 +1,16 @@
-"""Valid and invalid outlines of a robot."""
+"""Valid and invalid outlines and addresses of a robot."""
 
 import math
 
 import pytest
+from gate_harness import spec
 from hypothesis import given
 from hypothesis import strategies as st
 
+from webmap.base.errors import ConfigError
 from webmap.gate.rules.assist import polygon_around
-from webmap.gate.specs import MOST_CORNERS, why_no_outline
+from webmap.gate.specs import MOST_CORNERS, checked, why_no_outline
+from webmap.ros import names
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 HOOK = ((0, 0), (2, 0), (2, 2), (1, 2), (1, 1), (0, 1))
@@ -51,3 +54,10 @@ def test_only_corners_in_order_around_the_robot_make_an_outline(corners):
     steps = [round(turn % math.tau * 7 / math.tau) for turn in turns]
     is_round = steps in ([0, 1, 2, 3, 4, 5, 6], [0, 6, 5, 4, 3, 2, 1])
     assert (why_no_outline(corners) is None) == is_round
+
+
+@pytest.mark.parametrize("key", ["bridge_url", "goal_url"])
+def test_an_address_that_the_gate_has_no_lane_for_is_refused(monkeypatch, key):
+    monkeypatch.setitem(names._DEFAULT_PORT, "pigeon", 7)
+    with pytest.raises(ConfigError, match="cannot move robots behind pigeon://loft"):
+        checked(spec(**{key: "pigeon://loft"}))

@@ -29,7 +29,7 @@ def _address(value: Any) -> str:
         return normalise_url(value)
     except ConfigError:
         raise ConfigError(
-            'the address of a rosbridge, such as "ws://robot:9090"'
+            'the address of a bridge, such as "ws://robot:9090"'
         ) from None
 
 

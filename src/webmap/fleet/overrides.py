@@ -1,6 +1,7 @@
 """A person's settings that replace guesses of discovery, one topic at a time."""
 
 import difflib
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -8,6 +9,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.config.checks import same_name
+from webmap.config.motion import MotionConfig
 from webmap.config.robot import RobotConfig, named_cameras
 from webmap.discovery.found import (
     ACTIONS,
@@ -22,7 +24,9 @@ from webmap.discovery.layers import is_own, role_of
 from webmap.discovery.robots import host_name
 from webmap.discovery.rules import VELOCITY
 from webmap.fleet.given import Candidate, check_name, set_twice
-from webmap.ros.names import is_topic, is_type
+from webmap.ros.names import has_gate, is_topic, is_type
+
+log = logging.getLogger("webmap.cli")
 
 FORM = "ROBOT.ROLE=TOPIC, as in robot_1.scan=/robot_1/front/scan"
 
@@ -143,6 +147,9 @@ class Overrides:
 
         """
         config = robot.config(url)
+        if not has_gate(url):
+            log.warning("%s: no gate can move robots behind %s", robot.name, url)
+            config = msgspec.structs.replace(config, motion=MotionConfig())
         cameras = named_cameras(config.cameras[:MOST_CAMERAS])
         twist = config.motion.twist
         if twist is not None:

@@ -15,6 +15,7 @@ from webmap.base.errors import ConfigError
 from webmap.gate.events import Key
 from webmap.gate.protocol import AssistSpec, Point, RobotSpec
 from webmap.ros.names import (
+    has_gate,
     is_type,
     normalise_topic,
     normalise_url,
@@ -221,6 +222,12 @@ def checked(spec: RobotSpec) -> RobotSpec:
     if spec.odometry_type:
         split_type(spec.odometry_type)
     url = normalise_url(spec.bridge_url)
+    for each in (url, spec.goal_url or url):
+        if not has_gate(each):
+            raise ConfigError(
+                f"robot {spec.name!r}: the gate cannot move robots behind {each}; they "
+                "can only be watched"
+            )
     return msgspec.structs.replace(
         spec,
         bridge_url=url,

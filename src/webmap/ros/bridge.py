@@ -34,14 +34,15 @@ from webmap.ros.topic_faults import TopicFaults
 
 log = logging.getLogger("webmap.ros")
 
-LINKS: dict[str, type[RosbridgeLink]] = {"ws": RosbridgeLink, "wss": RosbridgeLink}
+LINKS: dict[str, Callable[..., Any]] = {"ws": RosbridgeLink, "wss": RosbridgeLink}
 """The kind of link by the scheme of the URL: *A new kind of link* in the design."""
 
 _HOMES = {"zenoh": "webmap.agents.link", "zenohs": "webmap.agents.link"}
 """Modules that add a kind of link when they are imported."""
 
 
-def _link_type(url: str) -> type[RosbridgeLink]:
+def _link_type(url: str) -> Callable[..., RosbridgeLink]:
+    # Another kind has the methods and attributes of this one.
     scheme = url.partition(":")[0]
     if scheme not in LINKS:
         importlib.import_module(_HOMES[scheme])
@@ -64,7 +65,7 @@ class Bridge:
         name: Name shown to people; the address if not given.
 
     Raises:
-        ConfigError: If ``url`` is not a WebSocket address.
+        ConfigError: If ``url`` is not the address of a bridge.
 
     """
 

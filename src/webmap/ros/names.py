@@ -15,6 +15,7 @@ _TYPE = re.compile(
 _HOST = re.compile(r"(?:[A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(?::\d{1,5})?(?:/[^\s]*)?")
 _DEFAULT_PORT = {"ws": 80, "wss": 443, "zenoh": 7447, "zenohs": 7447}
 _AGENTS = ("zenoh", "zenohs")
+_WITH_GATE = ("ws", "wss", *_AGENTS)
 _MAX_NAME = 255
 _THIS_COMPUTER = ("localhost", "127.0.0.1", "[::1]")
 
@@ -111,6 +112,11 @@ def is_agent_url(url: str) -> bool:
     return url.partition("://")[0].strip().lower() in _AGENTS
 
 
+def has_gate(url: str) -> bool:
+    """Return whether a gate can move the robots behind a bridge with this address."""
+    return url.partition("://")[0].strip().lower() in _WITH_GATE
+
+
 def agent_named(url: str) -> str:
     """Return the agent in an address; empty if it is no address of an agent."""
     return urlsplit(url).path.strip("/") if is_agent_url(url) else ""
@@ -123,26 +129,26 @@ def normalise_url(url: str) -> str:
     end are removed. So two spellings of one address compare equal.
 
     Raises:
-        ConfigError: If the text is not a WebSocket address.
+        ConfigError: If the text is not the address of a bridge.
 
     """
     hint = "expected one such as 'ws://localhost:9090' or 'wss://robot.example/ros'"
     if not isinstance(url, str) or any(c.isspace() or c < " " for c in url.strip()):
-        raise ConfigError(f"{url!r} is not the address of a rosbridge: {hint}")
+        raise ConfigError(f"{url!r} is not the address of a bridge: {hint}")
     try:
         parts = urlsplit(url.strip())
         host, port = parts.hostname, parts.port
     except ValueError as error:
         raise ConfigError(
-            f"{url!r} is not the address of a rosbridge ({error}): {hint}"
+            f"{url!r} is not the address of a bridge ({error}): {hint}"
         ) from None
     if "://" not in url and _HOST.fullmatch(url.strip()):
         hint = f"did you mean 'ws://{url.strip()}'?"
     if parts.scheme not in _DEFAULT_PORT or not host or port == 0:
-        raise ConfigError(f"{url!r} is not the address of a rosbridge: {hint}")
+        raise ConfigError(f"{url!r} is not the address of a bridge: {hint}")
     if parts.username is not None or parts.fragment:
         raise ConfigError(
-            f"the address of a rosbridge holds no user name and no fragment: {hint}"
+            f"the address of a bridge holds no user name and no fragment: {hint}"
         )
     place = f"[{host}]" if ":" in host else host
     if port is not None and port != _DEFAULT_PORT[parts.scheme]:
