@@ -155,6 +155,21 @@ def test_a_program_uses_no_other_connection(west, connection):
         west.send(from_program(Take("r1"), connection))
 
 
+def move_for(page, x=1.0):
+    return from_program(commands.MoveFor("r1", page, 5, x, 2.0, 0.5))
+
+
+def test_a_program_sends_goals_for_pages_of_its_own_display_only(west):
+    west.connects(ANN, OWN)
+    message = move_for("west/c1")
+    assert west.send(message) == [message]
+    for page in ("east/c1", "c1", "west/c9"):
+        with pytest.raises(WireError, match="in the name of"):
+            west.send(move_for(page))
+    with pytest.raises(WireError, match="expected within"):
+        west.send(move_for("west/c1", x=1e9))
+
+
 @pytest.mark.parametrize(
     "command",
     [

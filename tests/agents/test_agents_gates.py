@@ -7,7 +7,7 @@ import pytest
 from webmap.agents.gates import Gates
 from webmap.base.errors import ConfigError
 from webmap.gate.display.client import GateClient
-from webmap.gate.protocol import FromPage, RobotSpec
+from webmap.gate.protocol import FromPage, FromProgram, RobotSpec, Tick
 
 AGENT = "zenoh://127.0.0.1:7447/bay3"
 
@@ -21,11 +21,13 @@ class Link:
     ready, trouble, pid = True, None, None
 
     def __init__(self, owner, lock):
-        self.texts = []
+        self.owner, self.texts, self.moved_for = owner, [], []
 
     def send(self, message):
         if isinstance(message, FromPage):
             self.texts.append(message.text)
+        elif isinstance(message, FromProgram):
+            self.moved_for.append(message.command.page)
 
 
 def spec(robot, url):
@@ -79,6 +81,14 @@ def test_a_command_reaches_the_gate_of_its_robot_alone(page):
     for op in ("take", "stop", "cancel"):
         for robot, expected in (("here", (True, False)), (THERE, (False, True))):
             assert page.send(json.dumps({"op": op, "robot": robot})) == expected
+
+
+def test_a_goal_in_the_name_of_a_page_reaches_the_gate_of_its_robot(page):
+    for link in page.links:
+        link.owner.hear(Tick(5, {}))
+    for robot in ("here", THERE):
+        page._socket.move(robot, 1.0, 2.0, 0.5)
+    assert (page.own.moved_for, page.far.moved_for) == (["c1"], ["ann.4f/c1.1"])
 
 
 @pytest.mark.parametrize(

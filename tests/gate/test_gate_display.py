@@ -372,6 +372,17 @@ class TestPages:
         page.close()
         assert gate.of(protocol.Disconnect) == [protocol.Disconnect(page.id)]
 
+    def test_a_goal_in_the_name_of_a_page_has_the_newest_tick(self, page, gate):
+        gate.deliver(protocol.Tick(9, {page.id: -1}))
+        page.move("r1", 1.0, 2.0, 0.5)
+        command = commands.MoveFor("r1", page.id, 9, 1.0, 2.0, 0.5)
+        assert gate.received[-1] == protocol.FromProgram(command)
+
+    def test_no_goal_in_the_name_of_a_page_is_sent_without_a_gate(self, page, client):
+        client.gone(protocol.GateDown("it was killed"))
+        with pytest.raises(MotionError, match="the gate is not running"):
+            page.move("r1", 1.0, 2.0, 0.5)
+
     def test_a_failing_page_callback_is_logged(self, client, gate, caplog):
         def fail(text):
             raise RuntimeError("the page is gone")

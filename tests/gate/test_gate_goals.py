@@ -56,6 +56,83 @@ def test_a_goal_needs_the_lease_the_epoch_a_new_seq_and_a_recent_tick(
     assert goals(bench) == []
 
 
+def move_for(bench, page="a", **changes):
+    fields = {"robot": "r1", "page": page, "tick": bench.tick, "x": 3.0, "y": -1.0}
+    bench.handle(
+        protocol.FromProgram(commands.MoveFor(**fields | {"yaw": 0.25} | changes))
+    )
+
+
+def test_a_program_sends_a_goal_for_the_holder_who_keeps_control(bench):
+    epoch = bench.take()
+    move_for(bench)
+    (goal,) = goals(bench)
+    assert (goal.robot, goal.x, goal.y, goal.yaw) == ("r1", 3.0, -1.0, 0.25)
+    report = bench.report()
+    assert (report.holder.connection, report.epoch) == ("a", epoch)
+    assert report.goal.by == "a"
+    assert bench.refusals() == []
+
+
+def test_a_goal_of_a_program_for_a_page_gives_the_page_control_of_a_free_robot(bench):
+    move_for(bench)
+    assert len(goals(bench)) == 1
+    assert bench.report().holder.connection == "a"
+    assert not bench.report().armed
+
+
+def test_a_goal_for_a_page_takes_control_from_nobody(bench):
+    epoch = bench.take("b")
+    move_for(bench)
+    assert bench.refusals()[-1].what == "move"
+    assert bench.refusals()[-1].why == "B has control"
+    assert (bench.report().holder.connection, bench.report().epoch) == ("b", epoch)
+    bench.send("b", op="release", robot="r1")
+    bench.handle(protocol.FromProgram(commands.Take("r1"), 1))
+    move_for(bench)
+    assert "has control" in bench.refusals()[-1].why
+    assert bench.report().holder.connection == protocol.PROGRAM
+    assert goals(bench) == []
+
+
+def test_a_goal_for_a_viewer_is_refused(bench):
+    bench.join("v", "viewer")
+    move_for(bench, "v")
+    assert "viewers" in bench.refusals("v")[-1].why
+    assert bench.state == "free"
+
+
+@pytest.mark.parametrize("page", ["nobody", protocol.PROGRAM])
+def test_a_goal_for_a_page_that_is_not_there_is_not_sent(bench, page):
+    move_for(bench, page)
+    assert goals(bench) == []
+    assert bench.state == "free"
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"tick": 1}, "too old"),
+        ({"x": float("nan")}, "finite"),
+        ({"robot": "r9"}, "'r9'"),
+    ],
+)
+def test_a_goal_for_a_page_is_checked_like_that_of_a_page(bench, changes, why):
+    bench.take()
+    bench.hold(0.1)
+    move_for(bench, **changes)
+    assert why in bench.refusals()[-1].why
+    assert goals(bench) == []
+
+
+def test_no_goal_is_sent_for_a_page_while_a_stop_is_active(bench):
+    bench.send("b", op="stop", robot="r1")
+    move_for(bench)
+    assert "STOP by B is active" in bench.refusals()[-1].why
+    assert goals(bench) == []
+    assert bench.report().holder is None
+
+
 def test_a_goal_ends_driving_and_a_held_key_moves_nothing_afterwards(bench):
     bench.drive_off()
     bench.done.clear()

@@ -5,14 +5,16 @@ import gc
 import json
 
 import pytest
-from page_loop import HELLO, make_model, objects_left, open_page, wait_for
+from page_loop import ANN, HELLO, make_model, objects_left, open_page, wait_for
 
 import webmap
+from webmap.base.errors import MotionError
 from webmap.base.scope import Removal, keep
 from webmap.core.layer import Layer
 from webmap.core.page import Viewer
 from webmap.features.layers.laser_scanner import LaserScanner, SweepMsg
 from webmap.ros.rosbridge.events import Publish
+from webmap.scene.element import Event
 from webmap.server import open_pages as host_module
 from webmap.testing.witness import WitnessRobot
 
@@ -324,3 +326,38 @@ def test_fifty_viewers_of_one_scan_share_one_decoding_and_one_drawing(
         loop.call(lambda: model.close() or True)
         loop.call(lambda: bob.destroy() or True)
         loop.wait(bridge.stop())
+
+
+def test_a_handler_sends_a_goal_in_the_name_of_the_page_that_was_clicked(loop):
+    pages, events, sent = [], [], []
+    bob = webmap.Robot("Bob")
+    bob.set_move_topic(webmap.Bridge("ws://robot:9090"), "/goal")
+    bob.motion._gate = lambda: None
+    place, turn = webmap.geometry.Vector3(1.0, 2.0), webmap.geometry.Quaternion()
+
+    def clicked(event):
+        events.append(event)
+        bob.move(place, turn, by=event.page)
+
+    def build(page):
+        pages.append(page)
+        page.element("send").on("click", clicked)
+
+    class Drive:
+        def set_speeds(self, v, w):
+            pass
+
+        def move(self, *command):
+            sent.append(command)
+
+    model = make_model(loop, build)
+    open_page(model)
+    with pytest.raises(MotionError, match="the page is not connected"):
+        bob.move(place, turn, by=pages[0])
+    model.drive_opened("page0001", ANN, Drive())
+    (page,) = pages
+    event = Event(kind="click", page=page, viewer=page.viewer)
+    loop.call(lambda: page.element("send").dispatch(event, print) or True)
+    assert events == [event]
+    assert sent == [(bob.id, 1.0, 2.0, 0.0)]
+    loop.call(lambda: [model.close(), bob.destroy()])

@@ -475,6 +475,9 @@ def _check_program(display: Display, message: FromProgram) -> None:
             raise Refusal(f"it came from {message.connection!r}")
         if not isinstance(message.command, ControlCommand):
             raise Refusal("it needs no control, so it has the form of a page's")
+        page = getattr(message.command, "page", message.connection)
+        if page not in (*display.pages, display.program):
+            raise Refusal(f"it is in the name of {page!r}")
         check(message.command)
     except Refusal as refusal:
         raise WireError(

@@ -167,7 +167,10 @@ class FarGate:
                 case _:
                     return
             if robot in self._latest:
-                self._commanded.add(message.connection)
+                by = message.connection
+                if isinstance(message, protocol.FromProgram):
+                    by = getattr(message.command, "page", by)
+                self._commanded.add(by)
             self._begin_commands()
             if self.ready:
                 if self._changed:

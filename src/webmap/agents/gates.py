@@ -62,6 +62,13 @@ class PageConnection:
                 return
         self._own.receive(text)
 
+    def move(self, robot: str, x: float, y: float, yaw: float) -> None:
+        """Send a goal in the name of the page; see :meth:`DriveConnection.move`."""
+        client = self._gates.client_of(robot)
+        urls = [url for url in self._far if self._gates.far.get(url) is client]
+        connection = self._far[urls[0]] if urls else self._own
+        connection.move(robot, x, y, yaw)
+
     def set_speeds(self, v: float, w: float) -> None:
         """Set the page's own speed limits, in m/s and rad/s."""
         self._speeds = (v, w)

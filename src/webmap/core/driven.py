@@ -5,7 +5,7 @@ import functools
 import inspect
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Concatenate, Literal, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, TypeVar
 
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Quaternion, Twist
@@ -20,6 +20,9 @@ from webmap.core.registry import Namespace
 from webmap.gate.protocol import RobotReport
 from webmap.gate.rules.goals import OVER
 from webmap.ros.bridge import Bridge
+
+if TYPE_CHECKING:
+    from webmap.core.page import Page
 
 P = ParamSpec("P")
 D = TypeVar("D", bound="Driven")
@@ -389,20 +392,32 @@ class Driven(Extendable):
         """
         self.motion.twist(Twist(x, y, rz, z, rx, ry))
 
-    def move(self, position: Position, orientation: Orientation) -> None:
+    def move(
+        self,
+        position: Position,
+        orientation: Orientation,
+        *,
+        by: "Page | None" = None,
+    ) -> None:
         """Send the robot to a goal in the plane, by its own navigation.
 
         Args:
             position: The goal of the base link, in metres on the common map; ``z`` is
                 ignored.
             orientation: The orientation at the goal; only the heading is used.
+            by: The page whose viewer has asked for this, such as ``event.page`` of a
+                press. The goal is then one of this viewer, who keeps control, or gets
+                it if the robot is free; the page shows it if the gate refuses. Without
+                it the program needs control itself.
 
         Raises:
-            NoLease: If the program does not have control.
+            NoLease: If the program does not have control, without ``by``.
+            MotionError: If the page, or the gate, is not connected.
 
         """
         o = orientation
-        self.motion.move(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
+        yaw = Quaternion(o.x, o.y, o.z, o.w).yaw
+        self.motion.move(position.x, position.y, yaw, by)
 
     def locate(self, position: Position, orientation: Orientation) -> None:
         """Send the robot its own pose, while it neither moves nor follows a goal.

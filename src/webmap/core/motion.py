@@ -37,6 +37,7 @@ from webmap.ros.names import is_agent_url, is_type
 
 if TYPE_CHECKING:
     from webmap.agents.gates import Gates
+    from webmap.core.page import Page
     from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap.robot")
@@ -362,9 +363,13 @@ class RobotMotion:
             raise MotionError(f"robot {self._name!r}: the velocity was not sent: {why}")
         gate.twist(self.id, twist)
 
-    def move(self, x: float, y: float, yaw: float) -> None:
-        """Send the gate one goal of this program."""
-        self._gate().move(self.id, x, y, yaw)
+    def move(self, x: float, y: float, yaw: float, by: "Page | None") -> None:
+        """Send the gate one goal, of this program or in the name of a page."""
+        gate = self._gate()
+        if by is None:
+            gate.move(self.id, x, y, yaw)
+        else:
+            by.move(self.id, x, y, yaw)
 
     def locate(self, x: float, y: float, yaw: float) -> None:
         """Send the gate the robot's pose, from this program."""

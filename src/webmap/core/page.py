@@ -174,6 +174,7 @@ class Page:
         self._mount = channel.mount(self.fragment, under=0)
         _pages[self.fragment.id] = self
         self.on_speeds: Callable[[float, float], None] | None = None
+        self.on_move: Callable[[str, float, float, float], None] | None = None
         self._speeds = PageSpeeds()
         self._listening: dict[Key, tuple[Listener, ...]] = {}
 
@@ -296,6 +297,11 @@ class Page:
         """Remove a module that no longer drives."""
         self._speeds.clear(module)
         self._report_speeds()
+
+    def move(self, robot: str, x: float, y: float, yaw: float) -> None:
+        """Send a goal in the name of this page; see ``Robot.move``."""
+        if self.on_move is not None:
+            self.on_move(robot, x, y, yaw)
 
     def _report_speeds(self) -> None:
         if self.on_speeds is not None:

@@ -160,6 +160,18 @@ class Goal(msgspec.Struct, frozen=True, tag_field="op", tag="goal"):
     yaw: float
 
 
+class MoveFor(msgspec.Struct, frozen=True, tag_field="op", tag="move"):
+    """A program sends the robot to a pose in the name of a page of its display."""
+
+    robot: str
+    page: str
+    """The connection of the page, whose viewer wants this."""
+    tick: int
+    x: float
+    y: float
+    yaw: float
+
+
 class Locate(msgspec.Struct, frozen=True, tag_field="op", tag="locate"):
     """The page states where the robot is: metres and radians in its goal frame."""
 
@@ -231,7 +243,7 @@ PageCommand = (
     | StopTest
 )
 
-ControlCommand = Take | Release | SetVelocity | Goal | Locate
+ControlCommand = Take | Release | SetVelocity | Goal | MoveFor | Locate
 """What a program sends to get control of a robot, to use it and to release it."""
 
 ProgramCommand = ControlCommand | Cancel | Stop | Reset
@@ -273,8 +285,11 @@ def check(command: ControlCommand) -> None:
         fields.robot()
         fields.whole("epoch")
         fields.whole("tick")
-    else:
-        parse(msgspec.json.encode(command))
+        return
+    if isinstance(command, MoveFor):
+        robot, _, tick, x, y, yaw = msgspec.structs.astuple(command)
+        command = Goal(robot, 0, 0, tick, x, y, yaw)
+    parse(msgspec.json.encode(command))
 
 
 def op_of(command: Command) -> str:

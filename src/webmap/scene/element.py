@@ -75,6 +75,9 @@ class Event:
     viewer: Any = None
     """The viewer of the page."""
 
+    page: Any = None
+    """The page of the event."""
+
     map: Any = None
     """The map of the event, or None."""
 

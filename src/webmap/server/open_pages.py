@@ -13,7 +13,7 @@ from collections.abc import Awaitable, Mapping
 from datetime import UTC, datetime
 from typing import Any, Protocol
 
-from webmap.base.errors import WireError
+from webmap.base.errors import MotionError, WireError
 from webmap.base.geometry import Affine
 from webmap.base.scope import Removal
 from webmap.base.tasks import begin
@@ -83,6 +83,9 @@ class GateConnection(Protocol):
 
     def set_speeds(self, v: float, w: float) -> None:
         """Set the page's own speed limits, in m/s and rad/s."""
+
+    def move(self, robot: str, x: float, y: float, yaw: float) -> None:
+        """Send a goal in the name of the page."""
 
     def close(self) -> None:
         """Remove the page, which has closed; the robots that it drove stop."""
@@ -218,6 +221,7 @@ class PageHost:
             kind=report.event,
             element=element,
             viewer=self.viewer,
+            page=page,
             map=next((map for map in page.maps if map.shows(report.mount)), None),
             **{name: getattr(report, name) for name in SAME},
         )
@@ -242,11 +246,17 @@ class PageHost:
         if self.drive is not None and self._page is not None:
             self.drive.set_speeds(*self._page.speeds)
 
+    def _move(self, robot: str, x: float, y: float, yaw: float) -> None:
+        if self.drive is None:
+            raise MotionError("the goal was not sent: the page is not connected")
+        self.drive.move(robot, x, y, yaw)
+
     def _open(self, sizes: Sizes) -> None:
         page = self._page = Page(
             self._entry, self._session, self.viewer, self._pages.publisher, sizes
         )
         page.on_speeds = lambda v, w: self.send_speeds()
+        page.on_move = self._move
         try:
             with page.scope.active():
                 result = self._entry.function(page)

@@ -131,6 +131,16 @@ describe("a lease that was requested without a key", () => {
   });
 });
 
+describe("a lease that this page has not requested", () => {
+  test("is kept without driving, with blocked inputs, and is released unused", () => {
+    it.inputs.set("keys", { x: 1 }, 0);
+    reportRobot("r1", MINE, 50);
+    assert.equal(it.stream.lease, null);
+    assert.equal(it.inputs.blocked, true);
+    assert.deepEqual(it.leases.unused(50, 0), ["r1"]);
+  });
+});
+
 describe("a robot whose control was requested from its operator", () => {
   beforeEach(() => {
     reportRobot("r1", ANN, 0);

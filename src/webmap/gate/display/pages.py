@@ -92,8 +92,9 @@ from typing import get_args
 
 import msgspec
 
-from webmap.base.errors import ConfigError
+from webmap.base.errors import ConfigError, MotionError
 from webmap.gate import protocol
+from webmap.gate.commands import MoveFor
 from webmap.gate.limits import Cap, Speed, offered, page_cap
 from webmap.gate.protocol import Hello, Refused, RobotGone, RobotReport, Role
 
@@ -203,6 +204,24 @@ class DriveConnection:
             self.cap = page_cap(v, w)
             self._pages.new_speeds(self, speeds)
 
+    def move(self, robot: str, x: float, y: float, yaw: float) -> None:
+        """Send a goal of the program in the name of this page.
+
+        The page keeps control of the robot, or gets it; the gate sends a refusal to the
+        page.
+
+        Args:
+            robot: The robot.
+            x: In metres in the robot's goal frame.
+            y: In metres.
+            yaw: In radians.
+
+        Raises:
+            MotionError: If the gate does not run.
+
+        """
+        self._pages.move(self.id, robot, (x, y, yaw))
+
     def close(self) -> None:
         """Remove the page, which has closed; the robots that it drove stop."""
         self._pages.drop(self)
@@ -257,6 +276,7 @@ class Pages:
         self._connections: dict[str, DriveConnection] = {}
         self._latest: dict[str, protocol.RobotReport] = {}
         self._ticks = 0
+        self._tick: int | None = None
 
     @property
     def introduction(self) -> list[protocol.ToGate]:
@@ -301,6 +321,14 @@ class Pages:
             self._keep_stop_of_page(message)
             self.send(message)
 
+    def move(self, id: str, robot: str, pose: tuple[float, float, float]) -> None:
+        """Send a goal in the name of a page; see ``DriveConnection.move``."""
+        with self._lock:
+            if self._tick is None:
+                raise MotionError("the goal was not sent: the gate is not running")
+            command = MoveFor(robot, id, self._tick, *pose)
+            self.send(protocol.FromProgram(command))
+
     def drop(self, connection: DriveConnection) -> None:
         """Remove a connection; a second call does nothing."""
         with self._lock:
@@ -320,6 +348,7 @@ class Pages:
     def on_tick(self, tick: protocol.Tick) -> None:
         """Send each page the newest tick, with its newest accepted ``seq``."""
         self._ticks += 1
+        self._tick = tick.tick
         for connection in self._all():
             ack = tick.acks.get(connection.id)
             if ack is not None and self._ticks % (TICKS // connection.ticks) == 0:
@@ -380,6 +409,7 @@ class Pages:
 
         Robots of an agent stay, and are reported as unreachable.
         """
+        self._tick = None
         if self._agent:
             return
         with self._lock:

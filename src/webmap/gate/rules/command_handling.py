@@ -14,6 +14,7 @@ from webmap.gate.commands import (
     Goal,
     Grant,
     Locate,
+    MoveFor,
     Refusal,
     Release,
     Renew,
@@ -97,6 +98,8 @@ class CommandHandler:
             case Goal(robot):
                 machine, _ = self._authorized(connection, command, now)
                 machine.driving.goal(robot, _pose(command), connection.id, now)
+            case MoveFor():
+                self._move_for(command, now)
             case Locate(robot):
                 machine, _ = self._authorized(connection, command, now)
                 machine.driving.locate(robot, _pose(command), connection.id, now)
@@ -241,6 +244,21 @@ class CommandHandler:
         if reason := machine.driving.drive(wanted, drive.neutral, drive.tick, now):
             raise Refusal(reason)
 
+    def _move_for(self, command: MoveFor, now: float) -> None:
+        """Send a goal in the name of a page, which keeps or gets control.
+
+        A program takes control from nobody, and neither does it for a page.
+        """
+        page = self._connections.find(command.page)
+        if page is None or page.program:
+            raise Refusal("the page has closed")
+        self._ticks.check(command.tick, now)
+        machine = self._machines.find(command.robot)
+        if not machine.authority.is_held_by(page.id):
+            check_take(machine.authority.lease, page.role, program=True)
+            self.take(page, command.robot, now)
+        machine.driving.goal(command.robot, _pose(command), page.id, now)
+
     def _set_velocity(
         self, connection: Connection, command: SetVelocity, now: float
     ) -> None:
@@ -269,7 +287,7 @@ class CommandHandler:
             self._take_for_program(program, message.request, command.robot, now)
             return
         self._connections.run_or_refuse(
-            program.id,
+            command.page if isinstance(command, MoveFor) else program.id,
             command.robot,
             op_of(command),
             lambda: self.handle(program, command, now),
@@ -333,7 +351,7 @@ class CommandHandler:
         self._emit(SendToDisplay(reply))
 
 
-def _pose(command: Goal | Locate) -> tuple[float, float, float]:
+def _pose(command: Goal | MoveFor | Locate) -> tuple[float, float, float]:
     pose = (command.x, command.y, command.yaw)
     if not all(map(math.isfinite, pose)):
         raise Refusal(f"expected finite numbers, got {pose}")

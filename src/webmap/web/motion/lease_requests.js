@@ -157,6 +157,10 @@ export class LeaseRequests {
       this._giveUp(now);
     } else if (handed) {
       this._handed(robot, epoch, now);
+    } else if (epoch !== null && before && !before.mine && robot !== this.robot) {
+      // For a goal, perhaps of the program in this page's name. Unused, it is released.
+      if (this._inputs.pressed) this._inputs.block(now);
+      this._leases.park(robot, now);
     }
   }
 
