@@ -13,6 +13,7 @@ from webmap.gate.commands import (
     Drive,
     Goal,
     Locate,
+    MoveFor,
     Refusal,
     Release,
     SetVelocity,
@@ -200,6 +201,7 @@ def test_a_drive_command_with_random_fields_is_refused_or_in_range(changes, miss
         SetVelocity("r1", 3, 812, (9.0, 0.0, -1.0, 0.0, 0.0, 0.0)),
         Goal("r1", 3, 0, 812, 1.0, -2.0, 9.0),
         Locate("r1", 3, 0, 812, 1.0, -2.0, 9.0),
+        MoveFor("r1", "west/c1", 812, 1.0, -2.0, 9.0),
     ],
 )
 def test_a_command_of_a_program_that_a_page_could_send_passes(command):
@@ -220,6 +222,7 @@ def test_a_command_of_a_program_that_a_page_could_send_passes(command):
         Goal("r1", 3, 0, 812, math.nan, 0.0, 0.0),
         Locate("r1", 3, -1, 812, 0.0, 0.0, 0.0),
         Locate("r1", 3, 0, 812, 0.0, 0.0, math.inf),
+        MoveFor("r1", "west/c1", 812, 1e7, 0.0, 0.0),
     ],
 )
 def test_a_command_of_a_program_that_a_page_could_not_send_is_refused(command):
