@@ -76,3 +76,10 @@ def test_no_folder_outside_the_gate_has_too_many_files(folder):
     gate_is_last = "gate" in folder.parts
     files = [file for file in folder.iterdir() if file.is_file()]
     assert gate_is_last or len(files) <= MOST_FILES, len(files)
+
+
+def test_the_style_of_tools_names_no_tool_for_fields_messages_and_drawings() -> None:
+    style = (ROOT / "src/webmap/web/style/tool.css").read_text("utf-8")
+    rules = re.sub(r"/\*.*?\*/", "", style, flags=re.S)
+    assert not re.findall(r"\.webmap-\w+-(?:word:empty|drawing\b(?! ))", rules)
+    assert not re.findall(r"\.webmap-(?!tool\b)\w+ :where\(input", rules)
