@@ -14,7 +14,6 @@ from webmap.core.layer import Layer
 from webmap.core.page import Viewer
 from webmap.features.layers.laser_scanner import LaserScanner, SweepMsg
 from webmap.ros.rosbridge.events import Publish
-from webmap.scene.element import Event
 from webmap.server import open_pages as host_module
 from webmap.testing.witness import WitnessRobot
 
@@ -351,13 +350,14 @@ def test_a_handler_sends_a_goal_in_the_name_of_the_page_that_was_clicked(loop):
             sent.append(command)
 
     model = make_model(loop, build)
-    open_page(model)
+    handle, _ = open_page(model)
     with pytest.raises(MotionError, match="the page is not connected"):
         bob.move(place, turn, by=pages[0])
     model.drive_opened("page0001", ANN, Drive())
     (page,) = pages
-    event = Event(kind="click", page=page, viewer=page.viewer)
-    loop.call(lambda: page.element("send").dispatch(event, print) or True)
-    assert events == [event]
+    press = {"op": "event", "mount": page._mount, "event": "click"}
+    handle.receive(json.dumps({**press, "element": page.element("send").id}))
+    loop.call(lambda: True)
+    assert [event.page for event in events] == [page]
     assert sent == [(bob.id, 1.0, 2.0, 0.0)]
     loop.call(lambda: [model.close(), bob.destroy()])
