@@ -104,7 +104,7 @@ WIDE_ROUTE = """async (width) => {
   const map = document.querySelector("svg.webmap");
   Object.assign(map.style, { width: `${width}px`, height: "500px" });
   const route = document.createElement("details");
-  route.className = "webmap-panel webmap-route";
+  route.className = "webmap-panel webmap-tool webmap-route";
   route.open = true;
   const [summary, row, select, option] = ["summary", "p", "select", "option"].map(
     (tag) => document.createElement(tag),
