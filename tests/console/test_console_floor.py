@@ -11,7 +11,7 @@ from PIL import Image
 
 from webmap import console
 from webmap.base.errors import ConfigError
-from webmap.base.map_file import MAX_YAML
+from webmap.base.map_file import MAX_YAML, read_map
 from webmap.console.floor import COLOURS, load_floor
 
 WALL, UNKNOWN, FREE = 0, 205, 254
@@ -55,6 +55,50 @@ def test_a_map_with_a_yaw_is_rotated_about_its_origin(tmp_path):
     assert lower_left == pytest.approx((-2.0, -1.0))
     assert lower_right == pytest.approx((-2.0, 3.0))
     assert floor.bounds == pytest.approx((-4.0, -1.0, 2.0, 4.0))
+
+
+GIVEN = """\
+image: FOLDER/g.pgm
+resolution: 0.05
+origin: [-1.0, -2.0, 0.0]
+negate: 0
+occupied_thresh: 0.65
+free_thresh: 0.196
+"""
+
+
+@pytest.mark.parametrize("negate", ["0", "0.0"])
+@pytest.mark.parametrize("mode", ["", "mode: Trinary", "mode: TRINARY"])
+def test_an_absolute_path_and_the_spellings_of_other_map_servers_are_accepted(
+    tmp_path, negate, mode
+):
+    rows = bytes(6) + bytes([UNKNOWN]) * 6 + bytes([FREE]) * 12
+    (tmp_path / "g.pgm").write_bytes(b"P5\n6 4\n255\n" + rows)
+    (tmp_path / "link").symlink_to(tmp_path, target_is_directory=True)
+    for folder in (tmp_path, tmp_path / "link", tmp_path / "link" / "link"):
+        text = GIVEN.replace("FOLDER", str(folder))
+        text = text.replace("negate: 0", f"negate: {negate}")
+        file = tmp_path / "map.yaml"
+        file.write_text(text + mode)
+        floor = load_floor(file, tmp_path)
+        assert (floor.x, floor.y) == (-1.0, -2.0)
+        assert (floor.width, floor.height) == pytest.approx((0.3, 0.2))
+        wanted = [[0] * 6, [0] * 6, [-1] * 6, [100] * 6]
+        assert read_map(file).cells.tolist() == wanted
+
+
+def test_an_absolute_path_that_leads_out_of_the_folder_is_refused(tmp_path):
+    folder = tmp_path / "maps"
+    folder.mkdir()
+    draw(tmp_path)
+    (folder / "out.png").symlink_to(tmp_path / "floor.png")
+    for image in (
+        tmp_path / "floor.png",
+        folder / ".." / "floor.png",
+        folder / "out.png",
+    ):
+        with pytest.raises(ConfigError, match="is not in the folder of the YAML"):
+            load_floor(write(folder, str(image)), tmp_path)
 
 
 def colour(image: Image.Image, at: tuple[int, int]) -> str:

@@ -39,7 +39,8 @@ MAGIC = (b"P", b"\x89PNG", b"BM", b"\xff\xd8")
 """The first bytes of files of these formats."""
 
 MODES = ("trinary", "scale", "raw")
-TRUTH = {"0": False, "1": True, "false": False, "true": True}
+TRUTH = {"0": False, "0.0": False, "1": True, "1.0": True}
+TRUTH |= {"false": False, "true": True}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,10 +146,10 @@ def _settings(file: Path) -> _Settings:
             ("free_thresh",),
             f"needs 0 <= free_thresh < occupied_thresh <= 1, got {free} and {occupied}",
         )
-    mode = table.get("mode", "trinary")
+    mode = str(table.get("mode", "trinary")).lower()
     if mode not in MODES:
         raise yaml_file.wrong(
-            ("mode",), f"mode must be {', '.join(MODES)}, got {mode!r}"
+            ("mode",), f"mode must be {', '.join(MODES)}, got {table['mode']!r}"
         )
     image = _image_path(yaml_file, table.get("image"))
     pose = Pose(x, y, yaw)
@@ -177,11 +178,11 @@ def _image_path(yaml_file: LinedYaml, name: object) -> Path:
         image = resolved(folder / name)
     except ConfigError as error:
         raise yaml_file.wrong(path, str(error)) from None
-    if Path(name).is_absolute() or not image.is_relative_to(folder):
+    if not image.is_relative_to(folder):
         raise yaml_file.wrong(
             path,
             f"the image {name!r} is not in the folder of the YAML file; put it there "
-            "and write its bare name",
+            "and write its name without a folder",
         )
     # Opening a pipe would block, and a device may have no end.
     if not image.is_file():
