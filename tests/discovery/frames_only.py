@@ -22,7 +22,10 @@ Chain = list[tuple[str, str, Pose]]
 
 @contextmanager
 def publishing(
-    received: Mapping[str, Chain], dialect: str = "ros1", extra: Mapping[str, str] = {}
+    received: Mapping[str, Chain],
+    dialect: str = "ros1",
+    extra: Mapping[str, str] = {},
+    odometry: Mapping[str, str] = {},
 ) -> Iterator[str]:
     """Publish frames on topics 20 times a second; yield the address.
 
@@ -30,6 +33,7 @@ def publishing(
         received: The transforms that are published on each topic.
         dialect: ``ros1`` or ``ros2``.
         extra: The types of further topics, by name; nothing is published on them.
+        odometry: The ``child_frame_id`` of the odometry on each further topic.
 
     """
     urls: list[str] = []
@@ -43,7 +47,8 @@ def publishing(
         node = object()
         for topic in received:
             graph.advertise(node, topic, TF, node="/robots", latch=False)
-        for topic, kind in extra.items():
+        kinds = {**extra, **dict.fromkeys(odometry, "nav_msgs/Odometry")}
+        for topic, kind in kinds.items():
             graph.advertise(node, topic, kind, node="/robots", latch=False)
         server = RosbridgeServer(graph, Encoder(schema, quirks))
         urls.append(await server.start("127.0.0.1", 0))
@@ -52,6 +57,8 @@ def publishing(
             for topic, chain in received.items():
                 message = {"transforms": [_transform(graph, topic, *t) for t in chain]}
                 graph.publish(node, topic, message)
+            for topic, frame in odometry.items():
+                graph.publish(node, topic, {"child_frame_id": frame})
             await asyncio.sleep(0.05)
         await server.stop()
 

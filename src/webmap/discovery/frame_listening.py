@@ -5,13 +5,17 @@ import weakref
 from collections.abc import Mapping
 from functools import partial
 
+import msgspec
+
 from webmap.base.errors import BridgeClosed
 from webmap.base.looking import looking
 from webmap.base.scope import no_scope
+from webmap.discovery.grouping import nearest
+from webmap.discovery.rules import ODOMETRY, VELOCITY
 from webmap.discovery.tf_robots import Trees
 from webmap.ros.bridge import Bridge, TemporaryBridge
 from webmap.ros.messages import TFMessage
-from webmap.ros.names import is_topic
+from webmap.ros.names import is_topic, is_type
 
 SECONDS = 0.8
 """How long to listen: a robot that moves sends its frames ten times a second."""
@@ -35,6 +39,24 @@ def frame_topics(topics: Mapping[str, str]) -> list[str]:
     return [f"{space}/{name}" for space in spaces for name in ("tf_static", "tf")]
 
 
+class _Moved(msgspec.Struct, frozen=True):
+    """The part of ``nav_msgs/Odometry`` that names the frame."""
+
+    child_frame_id: str = ""
+
+
+def odometry_topics(topics: Mapping[str, str]) -> list[str]:
+    """Return the topics with odometry, if some may belong to one robot.
+
+    They do not if each is in a namespace, other than the empty one, with a velocity.
+    """
+    types = {name: type.strip() for name, type in topics.items() if is_topic(name)}
+    found = sorted(name for name in types if is_type(types[name], *ODOMETRY))
+    driven = {n.rpartition("/")[0] for n in types if is_type(types[n], *VELOCITY)}
+    clear = len(found) < 2 or all(nearest(name, driven) for name in found)
+    return [] if clear else found
+
+
 class LateFrames:
     """Listens to frames for a short time, repeatedly, and keeps the results.
 
@@ -55,16 +77,17 @@ class LateFrames:
     ) -> Trees:
         """Listen for a short time, and return all frames received up to now.
 
-        While nobody looks, it does not listen: a robot that has only ``/tf`` is found
-        when a page is open.
+        While nobody looks, it does not listen to frames: a robot that has only ``/tf``
+        is found when a page is open. One message of odometry is received in any case.
 
         Args:
             topics: Types by topic, as the bridge lists them.
             seconds: How long to listen.
 
         """
-        wanted = frame_topics(topics)[:MOST_TOPICS]
-        if not wanted or not looking.somebody:
+        wanted = frame_topics(topics)[:MOST_TOPICS] if looking.somebody else []
+        unheard = sorted({*odometry_topics(topics)} - {*self.trees.odometry})
+        if not (wanted or unheard):
             return self.trees
         with no_scope():
             subscriptions = [
@@ -77,6 +100,16 @@ class LateFrames:
                 )
                 for topic in wanted
             ]
+            subscriptions += [
+                self._bridge.subscribe(
+                    topic,
+                    partial(self._receive_odometry, topic),
+                    topics[topic].strip(),
+                    throttle=1000,  # one message is enough
+                    decode=_Moved,
+                )
+                for topic in unheard[:MOST_TOPICS]
+            ]
         try:
             await asyncio.sleep(seconds)
         finally:
@@ -87,6 +120,9 @@ class LateFrames:
     def _receive(self, namespace: str, message: TFMessage) -> None:
         for each in message.transforms:
             self.trees.take(namespace, each.frame_id, each.child_frame_id)
+
+    def _receive_odometry(self, topic: str, message: _Moved) -> None:
+        self.trees.odometry[topic] = message.child_frame_id.strip().strip("/")
 
 
 _late: weakref.WeakKeyDictionary[Bridge, LateFrames] = weakref.WeakKeyDictionary()
@@ -110,7 +146,7 @@ async def receive_frames(
         seconds: How long to listen.
 
     """
-    if not frame_topics(topics):
+    if not (frame_topics(topics) or odometry_topics(topics)):
         return Trees()
     async with TemporaryBridge(url) as bridge:
         try:

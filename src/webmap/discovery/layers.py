@@ -7,7 +7,7 @@ costs bandwidth.
 
 import inspect
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, TypeAlias
@@ -38,19 +38,21 @@ def find_layers(topics: Mapping[str, str], robots: Iterable[str]) -> dict[str, L
     Args:
         topics: Types by topic, in either dialect.
         robots: The namespaces of the robots behind the bridge: ``/robot_0``, or empty
-            for a robot without one.
+            for a robot without one. A mapping has the robot of each part, too.
 
     """
+    homes = robots if isinstance(robots, Mapping) else {name: name for name in robots}
     layers = declarations()
     kinds = _kinds(layers)
     layers = _foreign_first(layers)
-    matched: dict[str, list[tuple[Order, FoundLayer]]] = {space: [] for space in robots}
+    matched: dict[str, list[tuple[Order, FoundLayer]]]
+    matched = {space: [] for space in homes.values()}
     for topic, type in topics.items():
         found = _match(topic, type, layers)
         if found is None:
             continue
         place, layer = found
-        for space in _owners(topic, kinds[layer.kind][1], matched):
+        for space in _owners(topic, kinds[layer.kind][1], homes, matched):
             order = (place, not is_own(topic, space), topic)
             matched[space].append((order, layer))
     return {space: _best(found, kinds) for space, found in matched.items()}
@@ -123,11 +125,13 @@ def _match(
     return None
 
 
-def _owners(topic: str, kind: TopicKind, spaces: Mapping[str, object]) -> list[str]:
+def _owners(
+    topic: str, kind: TopicKind, homes: Mapping[str, str], spaces: Collection[str]
+) -> list[str]:
     """Return the owners of a topic: the innermost robot's, or the only robot's."""
-    owner = nearest(topic, spaces)
+    owner = nearest(topic, homes)
     if owner is not None:
-        return [owner]
+        return [homes[owner]]
     if kind.shared or len(spaces) == 1:
         return list(spaces)
     return []

@@ -42,8 +42,12 @@ class Newcomers:
         """Process the newest findings, and return the stable news."""
         before, self._seen = self._seen, {}
         news = []
+        everyone = self._known.values()
+        taken = {g.topic for one in everyone for g in one.guesses.get("odometry", ())}
         for robot in findings.robots:
             known = self._known.get(robot.namespace)
+            if known is None and robot.topic("odometry") in taken:
+                continue  # a part of a known robot; its frames were not received again
             whole = robot if known is None else _merged(robot, known)
             roles = () if known is None else _more(whole, known)
             moved = known is not None and leads_further(robot, known)

@@ -8,9 +8,9 @@ from typing import Literal
 from urllib.parse import urlsplit
 
 from webmap.discovery.found import Findings, FoundRobot, Guess, Role
-from webmap.discovery.grouping import inside, nearest, robot_namespaces
+from webmap.discovery.grouping import inside, nearest, robot_by_frames, robot_namespaces
 from webmap.discovery.layers import drawn_otherwise, find_layers
-from webmap.discovery.rules import INNER_VELOCITY, VELOCITY, Match, match
+from webmap.discovery.rules import FUSED, INNER_VELOCITY, VELOCITY, Match, match
 from webmap.discovery.tf_robots import Base, Trees, owners
 from webmap.ros.names import agent_named, is_topic, is_type
 
@@ -49,11 +49,16 @@ def discover(
             and not (each.role in DRAWN_ONLY and each.topic in others)
         ]
     )
-    spaces = robot_namespaces(matches)
-    bases, alone = owners(trees.bases() if trees else (), spaces)
-    bases |= {base.space: base for base in alone}
+    trees = trees or Trees()
+    homes = robot_by_frames(matches, trees)
+    spaces = robot_namespaces(matches, homes)
+    bases, alone = owners(trees.bases(), spaces)
+    for base in alone:
+        bases.setdefault(homes.get(base.space, base.space), base)
     spaces = tuple(sorted({*spaces, *bases, *_with_frames(matches, spaces)}))
-    mine, twists = _owned(spaces, matches), _twists(spaces, topics)
+    homes = {part: home for part, home in homes.items() if home in spaces}
+    homes |= {space: space for space in spaces}
+    mine, twists = _owned(homes, matches), _twists(spaces, topics)
     robots = tuple(
         _robot(name, space, mine[space], twists[space], bases.get(space))
         for name, space in zip(_names(spaces, bases, host), spaces, strict=True)
@@ -62,7 +67,7 @@ def discover(
         robots,
         _dialect(topics.values()),
         _notes(topics, robots),
-        find_layers(topics, spaces),
+        find_layers(topics, homes),
     )
 
 
@@ -106,18 +111,20 @@ def _with_frames(matches: Iterable[Match], robots: Sequence[str]) -> set[str]:
     }
 
 
-def _owned(spaces: Sequence[str], matches: Iterable[Match]) -> dict[str, list[Match]]:
+def _owned(
+    homes: Mapping[str, str], matches: Iterable[Match]
+) -> dict[str, list[Match]]:
     """Return the topics of each robot, the best first."""
-    mine: dict[str, list[Match]] = {space: [] for space in spaces}
+    mine: dict[str, list[Match]] = {space: [] for space in homes.values()}
     shared = []
     for each in matches:
-        owner = nearest(each.topic, mine)
+        owner = nearest(each.topic, homes)
         if each.role in SHARED and each.namespace == "":
             shared.append(each)
         elif owner is not None:
-            mine[owner].append(each)
-        elif len(spaces) == 1:
-            mine[spaces[0]].append(each)
+            mine[homes[owner]].append(each)
+        elif len(mine) == 1:
+            mine[next(iter(mine))].append(each)
     return {
         space: sorted([*own, *shared], key=lambda each: _rank(each, space))
         for space, own in mine.items()
@@ -126,8 +133,10 @@ def _owned(spaces: Sequence[str], matches: Iterable[Match]) -> dict[str, list[Ma
 
 def _rank(each: Match, space: str) -> tuple[int, int, int, str]:
     place, parts, name = each.rank
-    # The robot's own topics come before those of its parts and shared ones.
-    strange = 0 if each.namespace == space else 1 if inside(each.topic, space) else 2
+    # The robot's own topics come before those of its parts and shared ones, but the
+    # estimate of a filter comes before the odometry that it is computed from.
+    own = each.namespace == space or each.reason == FUSED
+    strange = 0 if own else 1 if inside(each.topic, space) else 2
     return (strange, place, parts, name)
 
 
@@ -165,6 +174,10 @@ def _reason(each: Match, space: str) -> str:
     if each.namespace == space:
         return each.reason
     where = "in a part of the robot" if inside(each.topic, space) else "shared by all"
+    if each.role == "odometry" and not inside(each.topic, space):
+        where = "in a part of the robot: its child_frame_id is a frame of this robot"
+    elif each.role in ("odometry", "pose"):
+        where += f": no topic in {each.namespace or 'its namespace'} takes a velocity"
     return f"{each.reason}, {where}"
 
 

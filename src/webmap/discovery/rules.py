@@ -21,7 +21,9 @@ PARTS = (
     r"twist_mux|joy_teleop|teleop|keyboard|joystick|hardware|status|camera[^/]*|"
     r"lidar[^/]*|laser[^/]*|front[^/]*|rear[^/]*|left[^/]*|right[^/]*|"
     r"(?:global|local)_costmap|visual_slam|slam_toolbox|rtabmap|webmap|"
-    r"cmd_vel_mux|yocs_cmd_vel_mux|ekf[^/]*|odometry"
+    r"cmd_vel_mux|yocs_cmd_vel_mux|ekf[^/]*|ukf[^/]*|robot_localization|odometry|"
+    r"mavros|local_position|global_position|setpoint_velocity|vision_pose|mocap|"
+    r"fake_gps|wheel_odometry"
 )
 """Pattern of names that are parts of a robot and never a robot."""
 
@@ -43,6 +45,12 @@ A camera named after its kind, such as ``depth_camera``, has color pictures too.
 Browsers cannot show pictures compressed with zstd.
 """
 
+VISUAL = r"/(?:[^/]*camera[^/]*|zed[^/]*|t265|visual_slam|rtabmap|vins[^/]*)/"
+"""Pattern in names of odometry that is computed from pictures."""
+
+FUSED = "a filter's estimate"
+"""The reason for odometry that a filter computes from several sensors."""
+
 
 @dataclass(frozen=True, slots=True)
 class Rule:
@@ -63,17 +71,20 @@ class Rule:
 
 
 RULES: tuple[Rule, ...] = (
-    Rule("odometry", ODOMETRY, r"odom(?:etry)?/filtered", "a filter's estimate"),
-    Rule("odometry", ODOMETRY, r"odometry/(?:global|local)", "a filter's estimate"),
-    Rule("odometry", ODOMETRY, r"odom", "the usual name"),
-    Rule("odometry", ODOMETRY, r"odometry", "the usual name, written out"),
+    Rule("odometry", ODOMETRY, r"odom(?:etry)?/filtered", FUSED),
+    Rule("odometry", ODOMETRY, r"odometry/(?:global|local)", FUSED),
+    Rule("odometry", ODOMETRY, r"local_position/odom", "an autopilot's estimate"),
+    Rule("odometry", ODOMETRY, r"odom", "the usual name", VISUAL),
+    Rule("odometry", ODOMETRY, r"odometry", "the usual name, written out", VISUAL),
     Rule(
         "odometry",
         ODOMETRY,
         r"(?:[^/]*ground_truth[^/]*)(?:/[^/]+)?",
         "a simulator's ground truth, used if there is no other",
     ),
-    Rule("odometry", ODOMETRY, r"odom/sample", "the odometry of a tracking camera"),
+    Rule("odometry", ODOMETRY, r"odom(?:etry|/sample)?", "the odometry of a camera"),
+    Rule("odometry", ODOMETRY, r"global_position/local", "the position by GPS"),
+    Rule("odometry", ODOMETRY, r"odometry/(?:in|out)", "to or from an autopilot"),
     Rule("odometry", ODOMETRY, r"[^/]+", "its type alone"),
     Rule("pose", POSES[:1], r"amcl_pose", "AMCL's pose on the map"),
     Rule("pose", POSES, r"(?:robot_pose|localization_pose)", "a localiser's pose"),

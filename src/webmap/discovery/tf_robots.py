@@ -38,11 +38,14 @@ class Base:
     namespace: str = ""
     """Namespace of the topic with its frames."""
 
-    prefix: str = ""
-    """The prefix of the base's name, without the separator."""
-
     above: tuple[str, ...] = ()
     """Its parent frames, the nearest first."""
+
+    @property
+    def prefix(self) -> str:
+        """The prefix of the base's name, without the separator."""
+        found = BASE.match(self.frame)
+        return (found["prefix"] or found["space"] or "").rstrip("/_") if found else ""
 
     @property
     def space(self) -> str:
@@ -60,6 +63,9 @@ class Trees:
     parents: dict[str, dict[str, str]] = field(default_factory=dict)
     """Parents of frames, by namespace; the frame received longest ago is first."""
 
+    odometry: dict[str, str] = field(default_factory=dict)
+    """The ``child_frame_id`` of odometry, by topic."""
+
     def take(self, namespace: str, parent: str, child: str) -> None:
         """Store the parent of a frame.
 
@@ -76,7 +82,13 @@ class Trees:
 
     def copy(self) -> "Trees":
         """Return a copy, which later frames do not change."""
-        return Trees({space: dict(known) for space, known in self.parents.items()})
+        parents = {space: dict(known) for space, known in self.parents.items()}
+        return Trees(parents, dict(self.odometry))
+
+    def base_of(self, frame: str, namespace: str) -> Base:
+        """Return the base above a frame, or the frame itself; its root is not set."""
+        chain = [frame, *_above(frame, self.parents.get(namespace, {}))]
+        return Base(next(filter(BASE.match, chain[::-1]), frame), "", namespace)
 
     def bases(self) -> tuple[Base, ...]:
         """Return the robots in the trees, sorted by namespace and frame."""
@@ -94,8 +106,7 @@ def bases(parents: Parents, namespace: str = "") -> Iterable[Base]:
     A base below another base is a part of that robot, such as an arm's.
     """
     for frame in parents:
-        found = BASE.match(frame)
-        if found is None:
+        if BASE.match(frame) is None:
             continue
         chain = _above(frame, parents)
         if any(BASE.match(other) for other in chain):
@@ -104,8 +115,7 @@ def bases(parents: Parents, namespace: str = "") -> Iterable[Base]:
         odometry = [other for other in chain if ODOM.match(other)]
         if worlds or odometry:
             root = MAP if MAP in worlds else (worlds or odometry)[-1]
-            prefix = (found["prefix"] or found["space"] or "").rstrip("/_")
-            yield Base(frame, root, namespace, prefix, tuple(chain))
+            yield Base(frame, root, namespace, tuple(chain))
 
 
 def _forget_some(known: dict[str, str]) -> None:
