@@ -112,7 +112,7 @@ GATE_BESIDE := $(addprefix tests/gate/test_gate_,client.py assist_road.py machin
   tests/ros/test_ros_work.py
 WITH_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py tests/base/test_*.py tests/ros/test_*.py))
 test-gate: $(DEV)
-	$(BIN)/pytest -q $(TO_RESULTS) -n $(JOBS) $(WITH_GATE) \
+	$(BIN)/pytest -q $(TO_RESULTS) -n $(JOBS) -m "not serial" $(WITH_GATE) \
 	  --cov --cov-config=tests/gate/coverage.toml --cov-fail-under=100
 
 # The parts of pytest besides test-gate; tests that measure time are in the last three.

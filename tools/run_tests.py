@@ -63,6 +63,7 @@ class Part:
         target: The target of the Makefile.
         run_name: The run that it belongs to.
         seconds: The time that it took.
+        processor: The time of the processors that it used, in seconds.
         status: The exit status of ``make``.
         outcomes: The last outcome of each test, by its id.
         reasons: Why a test was skipped, by its id.
@@ -73,6 +74,7 @@ class Part:
     target: str
     run_name: str = "test"
     seconds: float = 0.0
+    processor: float = 0.0
     status: int = 0
     outcomes: dict[str, str] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
@@ -95,13 +97,8 @@ class Part:
 
     def run(self, *, first: bool) -> None:
         """Run the part, and print its output meanwhile if it is of the first row."""
-        command = [
-            "make",
-            "--no-print-directory",
-            self.target,
-            *VARIABLES[self.run_name],
-        ]
-        command.append(f"RESULTS={self.results}")
+        variables = (*VARIABLES[self.run_name], f"RESULTS={self.results}")
+        command = ["make", "--no-print-directory", self.target, *variables]
         if not first and shutil.which("chrt"):
             command = ["chrt", "--idle", "0", *command]
         begin = time.monotonic()
@@ -117,7 +114,9 @@ class Part:
                 if first:
                     sys.stdout.buffer.write(chunk)
                     sys.stdout.flush()
-        self.status = process.returncode
+            _, status, used = os.wait4(process.pid, 0)
+            self.status = process.returncode = os.waitstatus_to_exitcode(status)
+        self.processor = used.ru_utime + used.ru_stime
         self.seconds = time.monotonic() - begin
         if self.results.exists():
             for line in self.results.read_text(encoding="utf-8").splitlines():
@@ -183,10 +182,11 @@ def summary(parts: list[Part], seconds: float) -> str:
     total = sum(counts.values(), Counter())
     failures = [failure for part in parts for failure in part.failures]
     width = max(len(part.name) for part in parts)
-    lines = [f"{'part':{width}}  {'time':>6}  passed  failed  skipped"]
+    lines = [f"{'part':{width}}  {'time':>6}  processor  passed  failed  skipped"]
     for part in parts:
         count = counts[part.name]
         row = f"{part.name:{width}}  {minutes(part.seconds):>6}"
+        row += f"  {minutes(part.processor):>9}"
         if part.outcomes:
             row += "".join(
                 f"  {count[outcome]:{len(outcome)}}"

@@ -43,6 +43,7 @@ def run(tmp_path):
     return run
 
 
+@pytest.mark.serial
 def test_a_program_on_a_display_drives_an_agents_robot_and_sends_it_a_goal(run):
     came = run("--stops-within", "0.5")
     holder, by = came.pop("holder"), came.pop("goal by")

@@ -136,7 +136,7 @@ def test_a_place_is_found_by_name_and_a_robot_is_sent_there(open_console):
             break
         except AssertionError:
             find(page, "charging dock")
-    page.keyboard.press("Escape")
+    page.keyboard.press("Space")
     expect_state(page, "STOP active")
     reset(page)
     expect_state(page, "Free")

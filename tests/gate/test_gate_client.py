@@ -683,6 +683,7 @@ class TestInputs:
         eventually(lambda: other.robot().get("mine"), "the lease")
         other.end()
 
+    @pytest.mark.serial
     def test_a_stop_test_measures_the_command_timeout_and_keeps_the_result(
         self, client, robot_spec, fake
     ):

@@ -88,6 +88,7 @@ async def test_a_flood_is_read_within_the_budget_and_then_dropped(name):
         await until(lambda: link._transport.is_closing(), "its end")
 
 
+@pytest.mark.serial
 @in_loop
 async def test_the_event_loop_responds_while_ten_links_are_flooded():
     from webmap.testing import Sentinel

@@ -26,8 +26,8 @@ GOOD = part("test-web", ("a.test.js::a", "passed"))
 
 def test_a_run_without_failures_says_so_with_counts_and_times():
     text = summary([GOOD, part("lint")], 131.0)
-    assert "test-web    1:05       1       0        0" in text
-    assert "lint        1:05  passed" in text
+    assert "test-web    1:05       0:00       1       0        0" in text
+    assert "lint        1:05       0:00  passed" in text
     assert text.endswith("Passed in 2:11 min.\ntests: 1 passed, 0 failed, 0 skipped")
 
 
@@ -41,7 +41,7 @@ def test_each_failure_is_named_with_the_command_that_repeats_it():
 
 def test_a_part_without_tests_that_fails_is_repeated_as_a_whole():
     text = summary([GOOD, part("types", status=2)], 1.0)
-    assert "types       1:05  failed" in text
+    assert "types       1:05       0:00  failed" in text
     assert "      make types\n" in text
     assert text.endswith("tests: 1 passed, 1 failed, 0 skipped")
 

@@ -303,7 +303,7 @@ class Frames:
                 note = self.buffer.add(
                     parent,
                     child,
-                    Transform(move.translation.vector, move.rotation.quaternion),
+                    Transform(move.translation.vector, move.rotation.as_sent),
                     each.stamp,
                     static=static,
                 )

@@ -91,14 +91,16 @@ class QuaternionMsg(msgspec.Struct, frozen=True, gc=False):
     w: float
 
     @property
-    def quaternion(self) -> Quaternion:
-        """The rotation to draw; zeros, which nobody has set, are none, as in RViz.
+    def as_sent(self) -> Quaternion:
+        """The four numbers. For poses of robots and frames: zeros are refused there."""
+        return Quaternion(self.x, self.y, self.z, self.w)
 
-        The pose of a robot is not read with this: with zeros it is refused.
-        """
+    @property
+    def quaternion(self) -> Quaternion:
+        """The rotation to draw; zeros, which nobody has set, are none, as in RViz."""
         if self.x == self.y == self.z == self.w == 0.0:
             return Quaternion()
-        return Quaternion(self.x, self.y, self.z, self.w)
+        return self.as_sent
 
 
 class Unstamped(msgspec.Struct, frozen=True, gc=False):

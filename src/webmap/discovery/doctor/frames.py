@@ -30,7 +30,7 @@ class FrameListening:
                 buffer.add(
                     each.frame_id,
                     each.child_frame_id,
-                    Transform(move.translation.vector, move.rotation.quaternion),
+                    Transform(move.translation.vector, move.rotation.as_sent),
                     each.stamp,
                     static=name == "tf_static",
                     namespace=namespace,
