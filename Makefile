@@ -27,8 +27,8 @@ DEV := .venv/.installed-dev
 DOCS := .venv/.installed-docs
 NODE := node_modules/.installed
 
-# More tests with a browser at once take as long on two processors, and some of them fail.
-# Tests without a browser wait for half of their time.
+# More tests with a browser at once take as long on two processors. Tests without a
+# browser wait for half of their time or more.
 JOBS ?= 2
 WAITING_JOBS ?= 4
 ARGS ?=
@@ -124,7 +124,7 @@ WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | s
 test-browser: $(DEV) $(NODE)
 	$(PY) tools/pytest_beside.py $(JOBS) $(TO_RESULTS) -m "browser and not serial$(PICKED)" $(WITH_BROWSER)
 # Tests that measure time wait most of the time, so two files of them run in parallel on
-# any machine, the longest first. Safety tests allow for the delays of the machine and do
+# any machine, the longest first; with three, robots are stopped because the page is late. Safety tests allow for the delays of the machine and do
 # not run again; the other tests run a second time if they fail. Tests under load run alone.
 ALONE := $(wildcard tests/safety/test_*_load.py tests/safety/test_*_soak.py)
 LONG = $(ONE_LANE) $(OTHER_LANE)

@@ -27,7 +27,7 @@ FOLDER = ROOT / "test-results" / "log"
 RUNS = {
     "test": (
         ("test-motion", "test-load", "test-time", "test-browser"),
-        ("lint", "test-web", "test-plain", "types", "contracts", "test-gate"),
+        ("lint", "test-web", "test-gate", "test-plain", "types", "contracts"),
     ),
     "rest": (("test-motion", "test-time", "test-browser"), ("test-plain", "docs")),
 }
@@ -156,7 +156,7 @@ def run(name: str) -> list[Part]:
     first, second = ([Part(target, name) for target in row] for row in RUNS[name])
     names = ", ".join(part.name for part in [*first, *second])
     print(f"\nRunning {names}", flush=True)
-    beside = threading.Thread(target=_run_row, args=(second, False))
+    beside = threading.Thread(target=_run_row, args=(second, False), daemon=True)
     beside.start()
     _run_row(first, True)
     beside.join()

@@ -53,6 +53,7 @@ def test_a_program_that_released_control_cannot_move_the_robot(received, command
     assert received[f"{command} afterwards"] == "NoLease"
 
 
+@pytest.mark.serial
 def test_the_script_of_the_guide_drives_a_robot_and_waits_for_its_goal(tmp_path):
     text = SCRIPT.read_text("utf-8")
     assert text.count("ws://localhost:9090") == 1

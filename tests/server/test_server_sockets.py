@@ -476,6 +476,7 @@ def test_a_page_that_can_only_stop_connects_again_when_there_is_a_place(
     assert (code, reason) == (1013, "there is a place now: connect again")
 
 
+@pytest.mark.serial
 def test_a_viewer_who_opens_pages_too_fast_must_wait_and_others_need_not(
     rooms, server, open_socket
 ):
