@@ -36,7 +36,7 @@ that those of the first row leave."""
 
 VARIABLES = {
     "test": ("PICK=not thorough", "TRIALS=1"),
-    "rest": ("PICK=thorough or trials", "TRIALS=3"),
+    "rest": ("PICK=thorough or trials", "TRIALS=2"),
 }
 """The variables of ``make`` in each run."""
 
