@@ -121,6 +121,7 @@ class RawLink:
 async def raw_bridge(talk):
     """Serve with ``talk(link)`` for each link; yield the address."""
     writers, talks = [], []
+    closed = False
 
     async def serve(link):
         with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError):
@@ -128,19 +129,25 @@ async def raw_bridge(talk):
 
     def take(reader, writer):
         writers.append(writer)
+        if closed:  # a link that was already accepted when the server closed
+            writer.transport.abort()
+            return
         talks.append(asyncio.create_task(serve(RawLink(reader, writer))))
 
     server = await asyncio.start_server(take, "127.0.0.1", 0)
     try:
         yield f"ws://127.0.0.1:{server.sockets[0].getsockname()[1]}"
     finally:
+        closed = True
         server.close()
         for task in talks:
             task.cancel()
         for writer in writers:
             writer.transport.abort()
         await asyncio.gather(*talks, return_exceptions=True)
-        await asyncio.sleep(0.01)  # until the transports have closed
+        await asyncio.sleep(0.01)  # until links that were just accepted are here
+        closing = (writer.wait_closed() for writer in writers)
+        await asyncio.gather(*closing, return_exceptions=True)
 
 
 def frame(opcode, body=b"", *, final=True):
