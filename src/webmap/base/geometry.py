@@ -5,6 +5,7 @@ Lengths are metres and angles radians unless a name shows another unit (REP 103)
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 FARTHEST = 1e7
 """Metres: a number beyond the size of a planet is an error that no browser can draw.
@@ -247,3 +248,35 @@ class Affine:
     def values(self) -> tuple[float, float, float, float, float, float]:
         """The six components, in the order of SVG's ``matrix()``."""
         return (self.a, self.b, self.c, self.d, self.e, self.f)
+
+
+class Position(Protocol):
+    """Anything with ``x`` and ``y`` in metres."""
+
+    @property
+    def x(self) -> float:
+        """Metres along x."""
+
+    @property
+    def y(self) -> float:
+        """Metres along y."""
+
+
+class Orientation(Protocol):
+    """Anything with the components of a quaternion."""
+
+    @property
+    def x(self) -> float:
+        """The component along x."""
+
+    @property
+    def y(self) -> float:
+        """The component along y."""
+
+    @property
+    def z(self) -> float:
+        """The component along z."""
+
+    @property
+    def w(self) -> float:
+        """The real component."""

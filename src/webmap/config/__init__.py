@@ -4,5 +4,5 @@
 fleet file; each is a msgspec Struct whose annotations name the checks of its fields.
 ``checks`` reads plain values into such a Struct and collects every mistake.
 ``toml_text`` knows on which line of a file a value is. Nothing here makes a robot:
-``webmap.core.configure`` does. Open ``robot`` first.
+``webmap.core.robot`` does. Open ``robot`` first.
 """

@@ -37,7 +37,7 @@ from webmap.ros.names import is_agent_url, is_type
 
 if TYPE_CHECKING:
     from webmap.agents.gates import Gates
-    from webmap.core.page import Page
+    from webmap.core.base_page import BasePage
     from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap.robot")
@@ -363,7 +363,7 @@ class RobotMotion:
             raise MotionError(f"robot {self._name!r}: the velocity was not sent: {why}")
         gate.twist(self.id, twist)
 
-    def move(self, x: float, y: float, yaw: float, by: "Page | None") -> None:
+    def move(self, x: float, y: float, yaw: float, by: "BasePage | None") -> None:
         """Send the gate one goal, of this program or in the name of a page."""
         gate = self._gate()
         if by is None:

@@ -11,7 +11,7 @@ from typing import Protocol, TypeVar
 
 from webmap.base.errors import WebMapError
 from webmap.base.scope import Removal, keep
-from webmap.core.page import Page
+from webmap.core.base_page import BasePage
 from webmap.core.world_view import WorldView
 
 log = logging.getLogger("webmap.modules")
@@ -163,7 +163,7 @@ class Problems:
         for about in self.current:
             map.page.channel.mended(self._recurring[about].number)
 
-    def _pages(self) -> list[Page]:
+    def _pages(self) -> list[BasePage]:
         """Return the open pages of the maps, each of them once."""
         pages = dict.fromkeys(map.page for map in self.maps)
         return [page for page in pages if not page.closed]

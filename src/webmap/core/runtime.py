@@ -22,7 +22,7 @@ from webmap.base.scope import Removal
 from webmap.base.tasks import spawn
 from webmap.core.motion import RobotMotion, robot_motions
 from webmap.core.refused import refusals
-from webmap.core.robot import robots
+from webmap.core.visible_robot import robots
 from webmap.gate.protocol import (
     GateDown,
     RefusedCount,

@@ -16,9 +16,9 @@ from webmap.config.robot import MOTION, ModuleConfig, RobotConfig
 from webmap.config.secrets import readable_secret
 from webmap.config.toml_text import read_text
 from webmap.core.alignment_store import store
-from webmap.core.configure import module_call, wrong_argument
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.registry import map_modules
+from webmap.core.robot import module_call, wrong_argument
 from webmap.fleet.files import (
     check_floor,
     check_images,

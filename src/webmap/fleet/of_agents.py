@@ -34,9 +34,9 @@ from webmap.config.reading import read_part
 from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.console import Console, make_robot
 from webmap.console.fleet import draw_picture
-from webmap.core.configure import apply
 from webmap.core.motion import given_id, id_at_agent, shown_name
 from webmap.core.pictures import pictures
+from webmap.core.robot import apply_config
 from webmap.core.runtime import runtime
 from webmap.fleet.passed_on import LARGEST, accepted, received_picture
 from webmap.poses.alignment import align_bridge
@@ -316,7 +316,7 @@ class Agents:
             if shown.config != config:
                 old, shown.config = shown.config, config
                 with no_scope():
-                    mistakes = apply(shown.robot, old, config, bridges)
+                    mistakes = apply_config(shown.robot, old, config, bridges)
                 for path, message in mistakes.found:
                     log.error("%s: %s: %s", shown.robot.name, path[0], message)
             return
