@@ -6,7 +6,7 @@ import pytest
 from pose_script import CountingLoop
 
 from webmap.base.looking import RARELY, looking
-from webmap.core.state_rounds import AT_ONCE, EVERY, StateRounds
+from webmap.core.robot_state import AT_ONCE, EVERY, StateRounds
 
 
 @pytest.fixture(autouse=True)

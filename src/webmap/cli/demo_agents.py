@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from importlib.resources import as_file, files
 
-from webmap.base.child_process import child_process
 from webmap.base.echo import echo
 from webmap.base.errors import ConfigError
+from webmap.base.processes import child_process
 from webmap.cli.demo_simulator import simulator
 
 ROUTER_READY = "The router is ready at "

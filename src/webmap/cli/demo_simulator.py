@@ -6,9 +6,8 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import NoReturn
 
-from webmap.base.child_process import child_process
-from webmap.base.children import GRACE
 from webmap.base.errors import ConfigError
+from webmap.base.processes import GRACE, child_process
 
 READY = "rosbridge is ready at "
 USAGE = 2

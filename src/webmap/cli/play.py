@@ -8,9 +8,9 @@ from pathlib import Path
 import click
 
 from webmap.bags.playback import Command
-from webmap.base.child_process import child_process
 from webmap.base.echo import echo
 from webmap.base.errors import ConfigError
+from webmap.base.processes import child_process
 from webmap.cli.options import PORT, Finite, web_options
 
 

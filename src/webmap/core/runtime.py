@@ -21,7 +21,7 @@ from webmap.base.looking import looking
 from webmap.base.scope import Removal
 from webmap.base.tasks import spawn
 from webmap.core.motion import RobotMotion, robot_motions
-from webmap.core.refused import refusals
+from webmap.core.refusals import refusals
 from webmap.core.visible_robot import robots
 from webmap.gate.protocol import (
     GateDown,

@@ -19,8 +19,13 @@ from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
 from webmap.core.registry import Namespace, robot_modules
 from webmap.core.robot_model import ModelImages, checked_model
-from webmap.core.robot_state import Facts, RobotState, since_when, state_of
-from webmap.core.state_rounds import state_rounds
+from webmap.core.robot_state import (
+    Facts,
+    RobotState,
+    since_when,
+    state_of,
+    state_rounds,
+)
 from webmap.core.world_view import WorldView
 from webmap.gate.protocol import RobotReport
 from webmap.gate.rules.goals import OVER

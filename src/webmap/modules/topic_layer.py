@@ -10,8 +10,8 @@ import msgspec
 
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
-from webmap.base.loading import load_soon
 from webmap.base.looking import RARELY
+from webmap.base.processes import load_soon
 from webmap.core.problems import Owner, Refusing
 from webmap.core.registry import Namespace
 from webmap.modules.declaration import Declaration, FoundTopic, usual_options

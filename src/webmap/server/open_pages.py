@@ -20,7 +20,7 @@ from webmap.base.tasks import begin
 from webmap.core.base_page import PageEntry, Viewer
 from webmap.core.page import Page
 from webmap.core.pictures import Publisher
-from webmap.core.refused import refusals
+from webmap.core.refusals import refusals
 from webmap.core.runtime import Runtime
 from webmap.core.visible_robot import robots
 from webmap.core.world_view import Rect
