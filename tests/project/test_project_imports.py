@@ -49,7 +49,7 @@ def test_the_motion_configuration_imports_nothing_of_the_display() -> None:
         "webmap.base",
         "webmap.base.errors",
         "webmap.base.logs",
-        "webmap.base.outside_text",
+        "webmap.base.text",
         "webmap.config",
         "webmap.config.checks",
         "webmap.config.motion",

@@ -11,8 +11,8 @@ from webmap.bags.player import Player
 from webmap.bags.recording import Recording
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.logs import set_up_logging
-from webmap.base.outside_text import one_line
 from webmap.base.processes import end_with_parent, why_not_listening
+from webmap.base.text import one_line
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.server import RosbridgeServer

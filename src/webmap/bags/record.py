@@ -12,9 +12,9 @@ from webmap.bags.bag_file import new_bag
 from webmap.bags.listening import Listening
 from webmap.bags.recorder import Recorder
 from webmap.bags.types import Types
-from webmap.base.counted import counted
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeError, ConfigError, ServiceError
+from webmap.base.text import counted
 from webmap.ros.asking import ask_topics
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import split_type

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import click
 
-from webmap.base.counted import counted
 from webmap.base.echo import echo
+from webmap.base.text import counted
 from webmap.cli.options import verbose_option
 
 

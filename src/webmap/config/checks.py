@@ -10,7 +10,7 @@ from numbers import Integral, Real
 from typing import Any, TypeAlias
 
 from webmap.base.errors import ConfigError
-from webmap.base.outside_text import one_line
+from webmap.base.text import one_line
 from webmap.ros.names import normalise_topic, split_type
 
 KeyPath: TypeAlias = tuple[str | int, ...]

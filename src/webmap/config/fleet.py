@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from webmap.base.errors import ConfigError
-from webmap.base.outside_text import escaped
+from webmap.base.text import escaped
 from webmap.config import checks
 from webmap.config.checks import KeyPath, Mistakes, key_path_text, same_name, show
 from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read

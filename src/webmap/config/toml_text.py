@@ -11,8 +11,8 @@ import tomllib
 from pathlib import Path
 
 from webmap.base.errors import ConfigError
-from webmap.base.outside_text import one_line
 from webmap.base.plain_files import read_file
+from webmap.base.text import one_line
 from webmap.config.checks import KeyPath, Mistakes, key_path_text
 
 LARGEST = 1 << 19

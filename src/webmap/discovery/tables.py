@@ -1,7 +1,6 @@
 """The findings as a table for a terminal."""
 
-from webmap.base.counted import counted
-from webmap.base.outside_text import escaped
+from webmap.base.text import counted, escaped
 from webmap.discovery.found import ROLES, Findings, FoundRobot, Layers, Role
 from webmap.discovery.layers import drawing
 

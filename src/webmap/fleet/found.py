@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeClosed
-from webmap.base.outside_text import escaped
+from webmap.base.text import escaped
 from webmap.config.checks import same_name
 from webmap.config.robot import RobotConfig
 from webmap.discovery import FoundRobot

@@ -23,12 +23,12 @@ from webmap.agents.description import (
     read_beacon,
 )
 from webmap.agents.peer import peer_of
-from webmap.base.counted import counted
 from webmap.base.echo import echo, notify
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import no_scope
 from webmap.base.tasks import spawn
+from webmap.base.text import counted
 from webmap.config.fleet import MapConfig
 from webmap.config.reading import read_part
 from webmap.config.robot import PictureConfig, RobotConfig

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from webmap.base.counted import counted
+from webmap.base.text import counted
 from webmap.discovery.doctor.observed import Measurement, Observed
 from webmap.discovery.doctor.rate_rules import age_of, silence
 from webmap.discovery.found import FoundRobot, Role

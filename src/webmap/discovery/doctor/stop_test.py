@@ -17,7 +17,7 @@ import click
 
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeError, ConfigError
-from webmap.base.outside_text import escaped
+from webmap.base.text import escaped
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.robots import host_name
 from webmap.gate.display.client import GateClient

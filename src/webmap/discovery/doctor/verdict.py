@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
-from webmap.base.outside_text import one_line
+from webmap.base.text import one_line
 from webmap.discovery.doctor.bridge_rules import bridge_findings
 from webmap.discovery.doctor.observed import Observed
 from webmap.discovery.doctor.robot_rules import robot_findings
