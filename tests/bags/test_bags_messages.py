@@ -9,10 +9,9 @@ import pytest
 from rosbags.typesys import get_types_from_msg
 
 from bag_making import BEGIN, Made, types_of
-from webmap.bags.messages import Messages
 from webmap.bags.recording import Recording
 from webmap.bags.times import Stamps
-from webmap.bags.types import texts_of
+from webmap.bags.types import Messages, texts_of
 from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import Definitions, UnknownType
 from webmap.ros.rosbridge.server.dialect import Dialect

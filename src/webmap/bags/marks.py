@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from webmap.bags.playback import Mark, Marks
 from webmap.bags.recording import LOGS, Recording
-from webmap.bags.status import Mark, Marks
 from webmap.bags.times import SECOND
 from webmap.base.errors import ConfigError
 from webmap.base.text import one_line

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from webmap.bags.messages import Messages
 from webmap.bags.times import SECOND
-from webmap.bags.types import texts_of
+from webmap.bags.types import Messages, texts_of
 from webmap.base.errors import ConfigError
 from webmap.base.plain_files import refuse_special, resolved
 from webmap.ros.definitions import Definitions, UnknownType

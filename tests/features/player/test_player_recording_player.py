@@ -5,8 +5,7 @@ import math
 
 import pytest
 
-from webmap.bags.playback import Command
-from webmap.bags.status import MARKS, STATUS
+from webmap.bags.playback import MARKS, STATUS, Command
 from webmap.features.player.recording_player import RecordingPlayer, expect_jumps
 
 

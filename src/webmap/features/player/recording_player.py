@@ -6,8 +6,16 @@ from weakref import WeakKeyDictionary
 
 import msgspec
 
-from webmap.bags.playback import Command, command_of
-from webmap.bags.status import MARKS, STATUS, TYPE, Marks, Status, Text
+from webmap.bags.playback import (
+    MARKS,
+    STATUS,
+    TYPE,
+    Command,
+    Marks,
+    Status,
+    Text,
+    command_of,
+)
 from webmap.base.errors import ConfigError
 
 if TYPE_CHECKING:
