@@ -16,8 +16,8 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.config.robot import ModuleConfig, RobotConfig, is_link
-from webmap.discovery.found import FoundLayer, Layers
-from webmap.discovery.grouping import inside, nearest
+from webmap.discovery.findings import FoundLayer, Layers
+from webmap.discovery.rules import inside, nearest
 from webmap.modules.declaration import Declaration, FoundTopic, TopicKind, declarations
 from webmap.ros.names import is_topic, normalise_topic, split_type
 

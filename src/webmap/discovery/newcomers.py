@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from webmap.discovery.found import ROLES, Findings, FoundRobot, Guess, Role
+from webmap.discovery.findings import ROLES, Findings, FoundRobot, Guess, Role
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,19 @@ from dataclasses import replace
 from typing import Literal
 from urllib.parse import urlsplit
 
-from webmap.discovery.found import Findings, FoundRobot, Guess, Role
-from webmap.discovery.grouping import inside, nearest, robot_by_frames, robot_namespaces
+from webmap.discovery.findings import Findings, FoundRobot, Guess, Role
 from webmap.discovery.layers import drawn_otherwise, find_layers
-from webmap.discovery.rules import FUSED, INNER_VELOCITY, VELOCITY, Match, match
+from webmap.discovery.rules import (
+    FUSED,
+    INNER_VELOCITY,
+    VELOCITY,
+    Match,
+    inside,
+    match,
+    nearest,
+    robot_by_frames,
+    robot_namespaces,
+)
 from webmap.discovery.tf_robots import Base, Trees, owners
 from webmap.ros.names import agent_named, is_topic, is_type
 

@@ -1,7 +1,7 @@
 """The findings as a table for a terminal."""
 
 from webmap.base.text import counted, escaped
-from webmap.discovery.found import ROLES, Findings, FoundRobot, Layers, Role
+from webmap.discovery.findings import ROLES, Findings, FoundRobot, Layers, Role
 from webmap.discovery.layers import drawing
 
 DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "unknown ROS version"}

@@ -8,7 +8,7 @@ import click
 
 from webmap.discovery import Findings
 from webmap.discovery.doctor import ConfiguredRobot
-from webmap.discovery.found import ROLES, FoundRobot, Role
+from webmap.discovery.findings import ROLES, FoundRobot, Role
 from webmap.ros.names import normalise_url
 
 Configured: TypeAlias = Callable[[Findings], Sequence[ConfiguredRobot]]

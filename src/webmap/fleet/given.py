@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from webmap.base.errors import ConfigError
 from webmap.config.checks import LONGEST_NAME, is_name, same_name
 from webmap.discovery import Findings, FoundRobot, Guess
-from webmap.discovery.found import Layers, Role
+from webmap.discovery.findings import Layers, Role
 from webmap.discovery.layers import find_layers
 from webmap.discovery.rules import PARTS
 from webmap.ros.names import normalise_topic

@@ -11,7 +11,7 @@ from webmap.base.errors import ConfigError
 from webmap.config.checks import same_name
 from webmap.config.motion import MotionConfig
 from webmap.config.robot import RobotConfig, named_cameras
-from webmap.discovery.found import (
+from webmap.discovery.findings import (
     ACTIONS,
     ROLES,
     Findings,

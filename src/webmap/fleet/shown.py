@@ -17,9 +17,8 @@ from webmap.console import Console, make_robot
 from webmap.core.alignment_store import store
 from webmap.core.robot import apply_config
 from webmap.discovery import FoundRobot
-from webmap.discovery.found import FoundLayer, Role
+from webmap.discovery.findings import FoundLayer, Role, free_name
 from webmap.discovery.layers import TRAIL, drawing, topic_of, with_layers
-from webmap.discovery.naming import free_name
 from webmap.discovery.newcomers import News
 from webmap.discovery.tables import summary_line
 from webmap.fleet.given import Candidate

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from webmap.discovery.doctor import ConfiguredRobot
-from webmap.discovery.found import ACTIONS, Role
+from webmap.discovery.findings import ACTIONS, Role
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
