@@ -12,7 +12,7 @@ import pytest
 import webmap
 from bag_making import ODOMETRY, Made
 from webmap.base.processes import python_command
-from webmap.cli.demo_simulator import simulator
+from webmap.cli.demo import simulator
 from webmap.cli.play import replay
 from webmap.gate.display.supervisor import GateProcess
 from webmap.gate.protocol import Ready

@@ -1,4 +1,4 @@
-"""The command line: one file for each command, named as the command.
+"""The command line; ``COMMANDS`` names the file of each command.
 
 A command reads its options and calls another folder; robots and fleets are made in
 ``webmap.fleet``. ``options`` has the options of several commands. Open ``view`` first.
@@ -17,13 +17,13 @@ from webmap.base.errors import ConfigError, WebMapError
 
 COMMANDS = {
     "agent": "webmap.cli.agent:agent",
-    "check": "webmap.cli.check:check",
+    "check": "webmap.cli.run:check",
     "demo": "webmap.cli.demo:demo",
     "discover": "webmap.cli.discover:discover",
     "doctor": "webmap.cli.doctor:doctor",
     "play": "webmap.cli.play:play",
     "record": "webmap.cli.record:record",
-    "router": "webmap.cli.router:router",
+    "router": "webmap.cli.agent:router",
     "run": "webmap.cli.run:run",
     "sim": "webmap.cli.sim:sim",
     "view": "webmap.cli.view:view",
