@@ -12,9 +12,9 @@ from frames_only import publishing
 
 from webmap.base.geometry import Pose
 from webmap.discovery import discover
-from webmap.discovery.doctor import Measurement, Observation, is_ready, judge
+from webmap.discovery.doctor import BridgeFacts, Measurement, is_ready, judge
+from webmap.discovery.doctor.facts import Clock, FramePath
 from webmap.discovery.doctor.measure import observe
-from webmap.discovery.doctor.observation import Clock, FramePath
 from webmap.discovery.doctor.samples import (
     MOST_BYTES,
     FrameCheck,
@@ -37,7 +37,7 @@ LISTENED = {
     "/odom": Measurement(60, 3.0, 0.06, 50_000, "odom", 99.97, 100.0),
     "/scan": Measurement(30, 3.0, 0.11, 90_000, "laser", 99.95, 100.0, binary=True),
 }
-GOOD = Observation(
+GOOD = BridgeFacts(
     "ws://localhost:9090",
     link=LinkFacts("127.0.0.1", ("127.0.0.1",)),
     findings=discover(TOPICS, "bob"),
@@ -113,14 +113,14 @@ def test_the_doctor_warns_of_a_router_without_tls_on_another_computer():
     ],
 )
 def test_advice_for_an_agent_that_cannot_be_reached_fits_the_reason(trouble, advice):
-    (finding,) = judge(Observation("zenoh://h/bay3", trouble=trouble))
+    (finding,) = judge(BridgeFacts("zenoh://h/bay3", trouble=trouble))
     assert finding.level == "wrong"
     assert trouble in finding.text
     assert advice in finding.advice
 
 
 def test_an_unreachable_bridge_is_the_only_finding():
-    findings = judge(Observation("ws://bob:9090", trouble="nothing listens there"))
+    findings = judge(BridgeFacts("ws://bob:9090", trouble="nothing listens there"))
     assert [each.level for each in findings] == ["wrong"]
     assert not is_ready(findings)
 
@@ -134,7 +134,7 @@ def test_an_unreachable_bridge_is_the_only_finding():
     ],
 )
 def test_the_advice_depends_on_why_the_bridge_is_unreachable(trouble, advice):
-    (finding,) = judge(Observation("ws://bob:9090", trouble=trouble))
+    (finding,) = judge(BridgeFacts("ws://bob:9090", trouble=trouble))
     assert advice in finding.advice
 
 
@@ -361,7 +361,7 @@ def test_the_goal_status_topic_belongs_to_the_action_of_the_robot():
 
 
 def test_a_bridge_without_rosapi_is_a_warning_with_advice():
-    bare = Observation("ws://localhost:9090", unlisted="no answer")
+    bare = BridgeFacts("ws://localhost:9090", unlisted="no answer")
     assert level_of(bare, "rosapi does not list") == "warning"
     assert level_of(bare, "is not known") == "note"
 

@@ -22,7 +22,7 @@ LIMITS = {"seek": (0.0, 1e9), "rate": (SLOWEST, FASTEST)}
 """The commands with a value, and its limits: a position in seconds, or a rate."""
 
 
-class Command(NamedTuple):
+class PlaybackCommand(NamedTuple):
     """What an operator wants of a replay."""
 
     name: str
@@ -34,7 +34,7 @@ class Command(NamedTuple):
         return self.name if self.name in PLAIN else f"{self.name} {self.value!r}"
 
 
-def command_of(name: object, value: object = None) -> Command:
+def command_of(name: object, value: object = None) -> PlaybackCommand:
     """Return a command.
 
     Args:
@@ -46,7 +46,7 @@ def command_of(name: object, value: object = None) -> Command:
 
     """
     if name in PLAIN and value is None:
-        return Command(str(name))
+        return PlaybackCommand(str(name))
     if not isinstance(name, str) or name not in LIMITS:
         raise ConfigError(
             f"a command to a recording is again, play, pause, seek SECONDS or rate "
@@ -58,10 +58,10 @@ def command_of(name: object, value: object = None) -> Command:
         raise ConfigError(
             f"{name} needs a number from {least:g} to {most:g}, got {str(value)[:40]!r}"
         )
-    return Command(name, float(value))  # type: ignore[arg-type]
+    return PlaybackCommand(name, float(value))  # type: ignore[arg-type]
 
 
-def read_command(line: str) -> Command:
+def read_command(line: str) -> PlaybackCommand:
     """Return the command of a line.
 
     Raises:
@@ -146,7 +146,7 @@ class Playback:
         else:
             self._hold(at)
 
-    def obey(self, command: Command, now: int) -> None:
+    def obey(self, command: PlaybackCommand, now: int) -> None:
         """Carry out a command."""
         name, value = command
         if name == "rate":
@@ -177,7 +177,7 @@ class Playback:
 
 
 STATUS = "/webmap/recording"
-"""Topic with the newest :class:`Status`, at least twice a second."""
+"""Topic with the newest :class:`PlaybackStatus`, at least twice a second."""
 
 MARKS = "/webmap/recording/marks"
 """Topic with the newest :class:`Marks`, whenever they changed."""
@@ -186,7 +186,7 @@ TYPE = "std_msgs/String"
 """The type of both topics."""
 
 
-class Status(msgspec.Struct, frozen=True):
+class PlaybackStatus(msgspec.Struct, frozen=True):
     """Where the recording is, and how it is played."""
 
     name: str
@@ -225,12 +225,12 @@ class Marks(msgspec.Struct, frozen=True):
     """The part of the recording that was read, from 0 to 1."""
 
 
-class Text(msgspec.Struct):
+class StringMessage(msgspec.Struct):
     """A ``std_msgs/String`` with a status or marks."""
 
     data: str
 
 
-def text_of(value: Status | Marks) -> str:
+def text_of(value: PlaybackStatus | Marks) -> str:
     """Return the JSON of a status or marks."""
     return msgspec.json.encode(value).decode()

@@ -18,7 +18,7 @@ from webmap.bags.playback import (
     TYPE,
     Marks,
     Playback,
-    Status,
+    PlaybackStatus,
     read_command,
     text_of,
 )
@@ -179,7 +179,7 @@ class Replay:
         for name, message in whole.items():
             self.graph.publish(self, name, message)
 
-    def publish_status(self, status: Status) -> None:
+    def publish_status(self, status: PlaybackStatus) -> None:
         """Publish the position."""
         self.graph.publish(self, STATUS, {"data": text_of(status)})
 
@@ -277,10 +277,10 @@ class Player:
         self._shown = asyncio.Event()
 
     @property
-    def status(self) -> Status:
+    def status(self) -> PlaybackStatus:
         """The position in the recording, and how it is played."""
         playback = self._playback
-        return Status(
+        return PlaybackStatus(
             name=self._recording.name,
             at=round(playback.seconds_at(self._now()), 3),
             seconds=round(self._recording.seconds, 3),

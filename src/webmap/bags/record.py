@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from webmap.bags.playback import MARKS, STATUS
-from webmap.bags.recorder import Incoming, Recorder, new_bag
+from webmap.bags.recorder import Recorder, RecorderThread, new_bag
 from webmap.bags.types import Types
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeError, ConfigError, ServiceError
@@ -242,7 +242,7 @@ class TopicSubscriber:
         self._seen: set[str] = set()
         self._lost = 0.0
         self._was_open = False
-        self._incoming = Incoming(recorder, self._failed)
+        self._incoming = RecorderThread(recorder, self._failed)
         self._stop = asyncio.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._failure: OSError | None = None

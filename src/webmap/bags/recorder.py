@@ -285,7 +285,7 @@ class Recorder:
             raise
 
 
-class Incoming:
+class RecorderThread:
     """Decodes and writes messages in a thread, so that reading can continue.
 
     Args:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from webmap.bags.times import SECOND
-from webmap.bags.types import Messages, texts_of
+from webmap.bags.types import MessageConverter, texts_of
 from webmap.base.errors import ConfigError
 from webmap.base.plain_files import refuse_special, resolved
 from webmap.ros.definitions import Definitions, UnknownType
@@ -143,7 +143,7 @@ class Recording:
         except Exception as error:
             self.close()
             raise unreadable(self.paths, error) from None
-        self._messages = Messages(self.schema)
+        self._messages = MessageConverter(self.schema)
 
     @property
     def seconds(self) -> float:

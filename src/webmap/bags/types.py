@@ -252,10 +252,10 @@ def _octets(value: str | bytes) -> bytes:
         raise Misfit(f"no base64: {error}") from None
 
 
-Make = Callable[[Any], Any]
+Conversion = Callable[[Any], Any]
 
 
-class Messages:
+class MessageConverter:
     """Converts rosbags' objects to messages of the rosbridge server.
 
     Arrays stay arrays, and bytes become bytes; times have the field names of the
@@ -268,7 +268,7 @@ class Messages:
 
     def __init__(self, schema: Schema) -> None:
         self._schema = schema
-        self._known: dict[str, Make] = {}
+        self._known: dict[str, Conversion] = {}
 
     def message(self, type_name: str, value: object) -> dict[str, Any]:
         """Return the message of an object.
@@ -289,7 +289,7 @@ class Messages:
         made: dict[str, Any] = make(value)
         return made
 
-    def _record(self, fields: Sequence[Field]) -> Make:
+    def _record(self, fields: Sequence[Field]) -> Conversion:
         parts = [
             (field.name, _attribute(field.name), self._field(field)) for field in fields
         ]
@@ -297,7 +297,7 @@ class Messages:
             name: make(getattr(value, inner)) for name, inner, make in parts
         }
 
-    def _field(self, field: Field) -> Make:
+    def _field(self, field: Field) -> Conversion:
         if not field.is_array:
             return self._single(field)
         if field.type in OCTETS:
@@ -310,7 +310,7 @@ class Messages:
         single = self._single(field)
         return lambda values: [single(value) for value in values]
 
-    def _single(self, field: Field) -> Make:
+    def _single(self, field: Field) -> Conversion:
         if field.fields is not None:
             return self._record(field.fields)
         if field.type in TIMES:

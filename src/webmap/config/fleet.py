@@ -257,13 +257,13 @@ def _no_name_twice(robots: Sequence[RobotConfig], mistakes: Mistakes) -> None:
 SHORT = ("odometry", "twist", "move", "initial_pose", "cameras")
 """Keys whose value may be a topic alone."""
 
-Remarks = Mapping[KeyPath, str]
+RemarkTexts = Mapping[KeyPath, str]
 
 
 def dump(
     data: Mapping[str, Any],
     *,
-    remarks: Remarks | None = None,
+    remarks: RemarkTexts | None = None,
     below: Mapping[KeyPath, Sequence[str]] | None = None,
     head: str = "",
 ) -> str:
@@ -305,7 +305,7 @@ class _Writer:
     """Writes TOML tables with comments."""
 
     def __init__(
-        self, remarks: Remarks, below: Mapping[KeyPath, Sequence[str]]
+        self, remarks: RemarkTexts, below: Mapping[KeyPath, Sequence[str]]
     ) -> None:
         self._remarks = remarks
         self._below = below

@@ -86,7 +86,7 @@ class PageEntry:
     title: str
 
 
-Key = tuple[int, int, str]
+ListenerKey = tuple[int, int, str]
 """The target of a listener: a mount, one of its elements and an event."""
 
 
@@ -124,7 +124,7 @@ class BasePage:
         self.on_speeds: Callable[[float, float], None] | None = None
         self.on_move: Callable[[str, float, float, float], None] | None = None
         self._speeds = PageSpeeds()
-        self._listening: dict[Key, tuple[Listener, ...]] = {}
+        self._listening: dict[ListenerKey, tuple[Listener, ...]] = {}
 
     def element(self, id: str) -> Element:
         """Return the page's own element with this ``id``, to fill and to listen to.
@@ -270,7 +270,7 @@ class BasePage:
         scope.add(listener.removal)
         return listener.removal
 
-    def _set_listening(self, key: Key, listeners: tuple[Listener, ...]) -> None:
+    def _set_listening(self, key: ListenerKey, listeners: tuple[Listener, ...]) -> None:
         """Set the listeners of an event, and update the browser if needed."""
         flags = _flags(listeners)
         if flags != _flags(self._listening.get(key, ())):

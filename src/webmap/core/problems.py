@@ -177,7 +177,7 @@ class Problems:
 M = TypeVar("M")
 
 
-class Owner(Protocol):
+class ProblemOwner(Protocol):
     """An object that shows problems: a robot, a map or a layer."""
 
     def set_problem(self, about: object, text: str) -> None:
@@ -187,7 +187,7 @@ class Owner(Protocol):
         """Remove the problem of ``about``."""
 
 
-class Refusing:
+class MessageProblems:
     """Shows people the errors in the messages of a topic.
 
     An error is shown until a valid message arrives or the current scope ends.
@@ -198,7 +198,7 @@ class Refusing:
 
     """
 
-    def __init__(self, owner: Owner, topic: str) -> None:
+    def __init__(self, owner: ProblemOwner, topic: str) -> None:
         self._owner = owner
         self._topic = topic
         self._complaint = ""
@@ -231,8 +231,8 @@ class Refusing:
             self._owner.clear_problem(self)
 
 
-def refusing(
-    owner: Owner, topic: str, draw: Callable[[M], None]
+def draw_or_report(
+    owner: ProblemOwner, topic: str, draw: Callable[[M], None]
 ) -> Callable[[M], None]:
     """Wrap ``draw`` for a subscription: the owner shows the messages that it refuses.
 
@@ -243,4 +243,4 @@ def refusing(
             anything.
 
     """
-    return partial(Refusing(owner, topic).take, draw)
+    return partial(MessageProblems(owner, topic).take, draw)

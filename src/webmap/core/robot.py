@@ -12,8 +12,8 @@ from webmap.config.robot import (
     LINKED,
     MOTION,
     OWN_CLASSES,
-    Layer,
     ModuleConfig,
+    ModuleEntry,
     OdometryConfig,
     RobotConfig,
     TfConfig,
@@ -34,7 +34,7 @@ NONE = {"none": True}
 Link: TypeAlias = Callable[[str], Bridge]
 """Returns the bridge with a name or a URL."""
 
-Made: TypeAlias = tuple[str, tuple[Any, ...], dict[str, Any]]
+ModuleCall: TypeAlias = tuple[str, tuple[Any, ...], dict[str, Any]]
 """Name, positional and keyword arguments of an added module."""
 
 
@@ -281,7 +281,7 @@ def _set_layers(
 ) -> None:
     """Remove the modules that only the old configuration has, and add the new ones."""
     left = [layer.module for layer in old.layers()]
-    added: list[Layer] = []
+    added: list[ModuleEntry] = []
     for layer in new.layers():
         if layer.module in left:
             left.remove(layer.module)
@@ -297,7 +297,9 @@ def _set_layers(
         _add(robot, layer, link, mistakes)
 
 
-def _add(robot: VisibleRobot, layer: Layer, link: Link, mistakes: Mistakes) -> None:
+def _add(
+    robot: VisibleRobot, layer: ModuleEntry, link: Link, mistakes: Mistakes
+) -> None:
     path, module = layer
     inner = path if path[0] == "modules" else None
     try:
@@ -341,7 +343,7 @@ def _note(mistakes: Mistakes, path: KeyPath, error: WebMapError, name: str) -> N
         mistakes.add(path, str(error).removeprefix(f"robot {name!r}: "))
 
 
-def module_call(module: ModuleConfig, link: Link) -> Made:
+def module_call(module: ModuleConfig, link: Link) -> ModuleCall:
     """Return a module's name and arguments for ``add_module``."""
     args = tuple(_argument(value, link) for value in module.args)
     options = {key: _argument(value, link) for key, value in module.options.items()}

@@ -21,7 +21,7 @@ from webmap.config.robot import (
 )
 from webmap.discovery.tf_robots import MAP, WORLD
 
-Role: TypeAlias = Literal[
+TopicRole: TypeAlias = Literal[
     "odometry",
     "pose",
     "velocity",
@@ -40,7 +40,7 @@ Role: TypeAlias = Literal[
 ]
 """The purpose of a topic for a robot."""
 
-ROLES: tuple[Role, ...] = get_args(Role)
+ROLES: tuple[TopicRole, ...] = get_args(TopicRole)
 """Every role, in display order."""
 
 
@@ -94,7 +94,7 @@ class FoundRobot:
     namespace: str
     """Namespace of its topics: ``/robot_0``; empty for a robot without a prefix."""
 
-    guesses: Mapping[Role, tuple[Guess, ...]] = field(default_factory=dict)
+    guesses: Mapping[TopicRole, tuple[Guess, ...]] = field(default_factory=dict)
     """The topics that fit each role, the best first."""
 
     notes: tuple[str, ...] = ()
@@ -109,17 +109,17 @@ class FoundRobot:
     above: tuple[str, ...] = ()
     """The parent frames of its base, the nearest first."""
 
-    def first(self, role: Role) -> Guess | None:
+    def first(self, role: TopicRole) -> Guess | None:
         """Return the best guess for a role, None if no topic fits."""
         found = self.guesses.get(role, ())
         return found[0] if found else None
 
-    def topic(self, role: Role) -> str:
+    def topic(self, role: TopicRole) -> str:
         """Return the best topic for a role, empty if no topic fits."""
         found = self.first(role)
         return "" if found is None else found.topic
 
-    def type_of(self, role: Role) -> str:
+    def type_of(self, role: TopicRole) -> str:
         """Return the type of the best topic for a role, empty if unknown."""
         found = self.first(role)
         return "" if found is None else found.type

@@ -20,7 +20,7 @@ from posixpath import commonpath
 from typing import NamedTuple
 
 from webmap.base.errors import ConfigError
-from webmap.discovery.findings import Role
+from webmap.discovery.findings import TopicRole
 from webmap.discovery.tf_robots import BASE, Base, Trees
 from webmap.ros.names import split_type
 
@@ -65,7 +65,7 @@ FUSED = "a filter's estimate"
 class Rule:
     """One rule."""
 
-    role: Role
+    role: TopicRole
     types: tuple[str, ...]
     """Names of types, without a dialect."""
 
@@ -183,7 +183,7 @@ INNER_VELOCITY = re.compile(r"cmd_vel|velocity|teleop")
 class Match(NamedTuple):
     """A topic that fits a role."""
 
-    role: Role
+    role: TopicRole
     rank: tuple[int, int, str]
     """Smaller is better: the rule's place, the parts before the name, the name."""
 

@@ -1,12 +1,12 @@
 """The findings as a table for a terminal."""
 
 from webmap.base.text import counted, escaped
-from webmap.discovery.findings import ROLES, Findings, FoundRobot, Layers, Role
+from webmap.discovery.findings import ROLES, Findings, FoundRobot, Layers, TopicRole
 from webmap.discovery.layers import drawing
 
 DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "unknown ROS version"}
 
-USED: tuple[Role, ...] = (
+USED: tuple[TopicRole, ...] = (
     "odometry",
     "velocity",
     "scan",
@@ -16,7 +16,7 @@ USED: tuple[Role, ...] = (
     "map",
 )
 
-ONE: tuple[Role, ...] = (
+ONE: tuple[TopicRole, ...] = (
     "odometry",
     "pose",
     "velocity",
@@ -110,7 +110,7 @@ def drawn_table(namespace: str, layers: Layers) -> list[str]:
     return lines
 
 
-def _use(robot: FoundRobot, role: Role, place: int) -> str:
+def _use(robot: FoundRobot, role: TopicRole, place: int) -> str:
     """Return whether one of several topics of a role is used."""
     if role not in ONE or len(robot.guesses[role]) == 1:
         return ""

@@ -34,7 +34,7 @@ from webmap.config.reading import read_part
 from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.console import Console, make_robot
 from webmap.console.fleet import draw_picture
-from webmap.core.motion import given_id, id_at_agent, shown_name
+from webmap.core.motion import agent_robot_id, id_at_agent, shown_name
 from webmap.core.pictures import pictures
 from webmap.core.robot import apply_config
 from webmap.core.runtime import runtime
@@ -322,12 +322,12 @@ class Agents:
             return
         name = shown_name(config.name, agent.name)
         config = msgspec.structs.replace(config, name=name)
-        token = given_id.set(id)
+        token = agent_robot_id.set(id)
         try:
             with no_scope():
                 robot = make_robot(config, bridges)
         finally:
-            given_id.reset(token)
+            agent_robot_id.reset(token)
         agent.robots[id] = _Shown(robot, config, picture)
         console.add(robot)
         notify(f"{robot.name} is a robot of the agent {agent.name}")

@@ -17,7 +17,7 @@ from webmap.console import Console, make_robot
 from webmap.core.alignment_store import store
 from webmap.core.robot import apply_config
 from webmap.discovery import FoundRobot
-from webmap.discovery.findings import FoundLayer, Role, free_name
+from webmap.discovery.findings import FoundLayer, TopicRole, free_name
 from webmap.discovery.layers import TRAIL, drawing, topic_of, with_layers
 from webmap.discovery.newcomers import News
 from webmap.discovery.tables import summary_line
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("webmap.cli")
 
-PARTS: Mapping[Role, str] = {
+PARTS: Mapping[TopicRole, str] = {
     "odometry": "odometry",
     "pose": "odometry",
     "velocity": "twist",

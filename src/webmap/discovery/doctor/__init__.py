@@ -5,19 +5,19 @@ are plain data, so that a terminal and a page show the same. Checks of rosbridge
 are in ``webmap.ros.rosbridge``.
 """
 
-from webmap.discovery.doctor.observation import (
+from webmap.discovery.doctor.facts import (
+    BridgeFacts,
     ConfiguredRobot,
     Measurement,
-    Observation,
 )
 from webmap.discovery.doctor.verdict import is_ready, judge
 from webmap.ros.finding import Finding
 
 __all__ = [
+    "BridgeFacts",
     "ConfiguredRobot",
     "Finding",
     "Measurement",
-    "Observation",
     "is_ready",
     "judge",
 ]

@@ -13,13 +13,13 @@ from typing import Any, TypeVar
 
 from webmap.agents.present import about_agent
 from webmap.base.errors import BridgeClosed, BridgeError
-from webmap.discovery.doctor.observation import (
+from webmap.discovery.doctor.facts import (
     MOST_ROBOTS,
+    BridgeFacts,
     Clock,
     ConfiguredRobot,
     FramePath,
     Measurement,
-    Observation,
     merge_configured,
 )
 from webmap.discovery.doctor.samples import FrameCheck, listen, sample
@@ -71,7 +71,7 @@ async def observe(
     configured: Callable[[Findings], Sequence[ConfiguredRobot]] = lambda _found: (),
     waiting: Callable[[str], object] = lambda _why: None,
     progress: Callable[[str], object] = lambda _what: None,
-) -> Observation:
+) -> BridgeFacts:
     """Return the observations of a bridge and of the robots behind it.
 
     Args:
@@ -97,7 +97,7 @@ async def observe(
         found = await ask_topics(url, wait=wait, waiting=waiting)
         asked = asked if topics_given else found
     except BridgeClosed as error:
-        return Observation(url, trouble=error.why or str(error))
+        return BridgeFacts(url, trouble=error.why or str(error))
     except BridgeError as error:
         unlisted = str(error)
     async with TemporaryBridge(url) as bridge:
@@ -107,7 +107,7 @@ async def observe(
             if frame_topics(asked):
                 progress("Listening to frames for a moment.")
                 trees = await FrameCollector(bridge).listen(asked)
-            seen = Observation(
+            seen = BridgeFacts(
                 url,
                 unlisted=unlisted,
                 topics_given=topics_given,
@@ -134,9 +134,9 @@ async def observe(
             seen = await _listen(seen, bridge, seconds)
             return await _sample(seen, bridge, seconds, progress)
         except BridgeClosed as error:
-            return Observation(url, trouble=error.why or str(error))
+            return BridgeFacts(url, trouble=error.why or str(error))
         except (OSError, TimeoutError) as error:
-            return Observation(url, trouble=str(error) or type(error).__name__)
+            return BridgeFacts(url, trouble=str(error) or type(error).__name__)
 
 
 async def _look(url: str) -> dict[str, Any]:
@@ -149,7 +149,7 @@ async def _look(url: str) -> dict[str, Any]:
     return {"open_at": tuple(about.open_at)}
 
 
-async def tried(seen: Observation) -> Observation:
+async def tried(seen: BridgeFacts) -> BridgeFacts:
     """Return the observations, with a test of what a slow service call delays."""
     if is_agent_url(seen.url):
         why = "an agent lets a display offer no service"
@@ -160,8 +160,8 @@ async def tried(seen: Observation) -> Observation:
 
 
 def _with_configured(
-    seen: Observation, robots: Sequence[ConfiguredRobot]
-) -> Observation:
+    seen: BridgeFacts, robots: Sequence[ConfiguredRobot]
+) -> BridgeFacts:
     """Return the observations with the robots as a person configured them, if any."""
     if not robots:
         return seen
@@ -218,7 +218,7 @@ class _Questions:
         return min(found, key=lambda each: each.round_trip, default=None)
 
 
-async def _ask(seen: Observation, bridge: Bridge) -> Observation:
+async def _ask(seen: BridgeFacts, bridge: Bridge) -> BridgeFacts:
     robots = seen.findings.robots
     velocities = [robot.topic("velocity") for robot in robots]
     read = [
@@ -235,7 +235,7 @@ async def _ask(seen: Observation, bridge: Bridge) -> Observation:
     )
 
 
-async def _listen(seen: Observation, bridge: Bridge, seconds: float) -> Observation:
+async def _listen(seen: BridgeFacts, bridge: Bridge, seconds: float) -> BridgeFacts:
     robots = seen.findings.robots[:MOST_ROBOTS]
     topics: dict[str, Encoding] = {}
     for robot in robots:
@@ -256,8 +256,8 @@ async def _listen(seen: Observation, bridge: Bridge, seconds: float) -> Observat
 
 
 async def _sample(
-    seen: Observation, bridge: Bridge, seconds: float, progress: Callable[[str], object]
-) -> Observation:
+    seen: BridgeFacts, bridge: Bridge, seconds: float, progress: Callable[[str], object]
+) -> BridgeFacts:
     """Return the observations, with pictures, maps and plans.
 
     They are measured last, because they would delay the poses whose age is measured.

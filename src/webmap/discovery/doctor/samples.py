@@ -10,7 +10,7 @@ import msgspec
 
 from webmap.base.errors import ProtocolError
 from webmap.base.scope import no_scope
-from webmap.discovery.doctor.observation import Measurement
+from webmap.discovery.doctor.facts import Measurement
 from webmap.discovery.tf_robots import MAP
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import Header, TFMessage

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from webmap.base.text import counted
-from webmap.discovery.doctor.observation import Measurement, Observation
-from webmap.discovery.findings import FoundRobot, Guess, Role
+from webmap.discovery.doctor.facts import BridgeFacts, Measurement
+from webmap.discovery.findings import FoundRobot, Guess, TopicRole
 from webmap.ros.finding import Finding, Level
 from webmap.ros.rosbridge import advice
 
@@ -24,7 +24,7 @@ AHEAD = 0.1
 
 
 def rate_finding(
-    name: str, guess: Guess, seen: Observation, *, needed: bool
+    name: str, guess: Guess, seen: BridgeFacts, *, needed: bool
 ) -> Finding:
     """Return the rate and the age of a pose or a scan as a finding.
 
@@ -84,7 +84,7 @@ def rate_finding(
     return Finding("good", name, f"{text}{old}.")
 
 
-def rare_finding(name: str, guess: Guess, seen: Observation) -> Finding:
+def rare_finding(name: str, guess: Guess, seen: BridgeFacts) -> Finding:
     """Return a finding about a topic that may be slow, such as a battery's."""
     measured = seen.measured[guess.topic]
     if not measured.count:
@@ -115,7 +115,7 @@ def rare_finding(name: str, guess: Guess, seen: Observation) -> Finding:
 
 
 def silence(
-    name: str, topic: str, seen: Observation, bad: Level, blind: str
+    name: str, topic: str, seen: BridgeFacts, bad: Level, blind: str
 ) -> Finding:
     """Return a finding about a topic without messages, with its publishers.
 
@@ -159,7 +159,7 @@ def silence(
     )
 
 
-def age_of(measured: Measurement, seen: Observation) -> float | None:
+def age_of(measured: Measurement, seen: BridgeFacts) -> float | None:
     """Return the age of the newest message when it arrived, in seconds.
 
     None if it has no stamp, or the robot's clock is unknown.
@@ -174,7 +174,13 @@ PICTURE_AGE = 1.0
 
 CLOUD_AGE = 1.0
 
-MOST: dict[Role, int] = {"camera": 4, "cloud": 2, "costmap": 3, "map": 1, "plan": 2}
+MOST: dict[TopicRole, int] = {
+    "camera": 4,
+    "cloud": 2,
+    "costmap": 3,
+    "map": 1,
+    "plan": 2,
+}
 """Most topics of each kind that are measured, which is what is shown of a robot."""
 
 
@@ -191,7 +197,7 @@ def shown_topics(robot: FoundRobot) -> Iterator[tuple[str, str, str]]:
         yield "status", f"{name}/{tail}", f"{package}/GoalStatusArray"
 
 
-def shown_findings(robot: FoundRobot, seen: Observation) -> Iterator[Finding]:
+def shown_findings(robot: FoundRobot, seen: BridgeFacts) -> Iterator[Finding]:
     """Yield the rate and the age of each of these topics."""
     for kind, topic, _ in shown_topics(robot):
         measured = seen.measured.get(topic)
@@ -248,7 +254,7 @@ def _came(
     return Finding("good", name, f"{text}.")
 
 
-def _silent(kind: str, name: str, topic: str, seen: Observation) -> Iterator[Finding]:
+def _silent(kind: str, name: str, topic: str, seen: BridgeFacts) -> Iterator[Finding]:
     if kind == "map" and seen.publishers.get(topic) == ():
         return  # reported already: the topic has no publisher
     if kind in ("plan", "status"):
@@ -276,7 +282,7 @@ def _silent(kind: str, name: str, topic: str, seen: Observation) -> Iterator[Fin
     yield found
 
 
-def _map_advice(node: str, topic: str, seen: Observation) -> str:
+def _map_advice(node: str, topic: str, seen: BridgeFacts) -> str:
     """Return the usual reasons why a map with a publisher does not come."""
     if seen.findings.dialect == "ros1":
         return (

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from urllib.parse import urlsplit
 
 from webmap.base.text import one_line
-from webmap.discovery.doctor.observation import MOST_ROBOTS, Clock, Observation
+from webmap.discovery.doctor.facts import MOST_ROBOTS, BridgeFacts, Clock
 from webmap.discovery.doctor.robot_rules import robot_findings
 from webmap.ros.finding import BRIDGE, LEVELS, Finding, Level
 from webmap.ros.names import agent_named, is_agent_url
@@ -16,7 +16,7 @@ from webmap.ros.rosbridge.checks import is_loopback
 MARKS = {"wrong": "WRONG", "warning": "warning", "note": "note", "good": "good"}
 
 
-def judge(seen: Observation) -> list[Finding]:
+def judge(seen: BridgeFacts) -> list[Finding]:
     """Return all findings: the bridge first, then each robot, worst first."""
     groups = [list(_bridge(seen))]
     groups += [list(robot_findings(one, seen)) for one in seen.findings.robots]
@@ -73,7 +73,7 @@ GIVE_TOPICS = (
 )
 
 
-def _bridge(seen: Observation) -> Iterator[Finding]:
+def _bridge(seen: BridgeFacts) -> Iterator[Finding]:
     """Yield the findings about the connection and everything behind it."""
     by_agent = is_agent_url(seen.url)
     if seen.trouble:
@@ -102,14 +102,14 @@ def _bridge(seen: Observation) -> Iterator[Finding]:
         yield advice.compression(seen.link, _packed_scans(seen))
 
 
-def _packed_scans(seen: Observation) -> list[str]:
+def _packed_scans(seen: BridgeFacts) -> list[str]:
     robots = seen.findings.robots
     scans = {scan.topic for one in robots for scan in one.guesses.get("scan", ())}
     binary = [topic for topic, measured in seen.measured.items() if measured.binary]
     return [topic for topic in binary if topic in scans]
 
 
-def _robots(seen: Observation) -> Iterator[Finding]:
+def _robots(seen: BridgeFacts) -> Iterator[Finding]:
     robots = seen.findings.robots
     source = "The bridge lists its topics"
     if seen.topics_given:
@@ -167,7 +167,7 @@ ON_THE_ROBOT = (
 )
 
 
-def _unreachable_agent(seen: Observation) -> Finding:
+def _unreachable_agent(seen: BridgeFacts) -> Finding:
     """Return the finding that an agent or its rosbridge cannot be reached."""
     agent = agent_named(seen.url)
     if "the router at" in seen.trouble:
@@ -181,7 +181,7 @@ def _unreachable_agent(seen: Observation) -> Finding:
     )
 
 
-def _agent(seen: Observation) -> Iterator[Finding]:
+def _agent(seen: BridgeFacts) -> Iterator[Finding]:
     """Yield the findings about who else reaches the robot or reads its data."""
     if seen.open_at is None:
         yield Finding(

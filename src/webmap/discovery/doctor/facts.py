@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from webmap.base.errors import ConfigError
-from webmap.discovery.findings import Findings, FoundRobot, Guess, Role, free_name
+from webmap.discovery.findings import Findings, FoundRobot, Guess, TopicRole, free_name
 from webmap.discovery.rules import VELOCITY
 from webmap.discovery.tf_robots import MAP
 from webmap.ros.names import is_type, normalise_topic
@@ -13,7 +13,7 @@ from webmap.ros.tf import Buffer
 
 RULE = "as configured"
 
-TYPES: Mapping[Role, str] = {
+TYPES: Mapping[TopicRole, str] = {
     "odometry": "nav_msgs/Odometry",
     "velocity": VELOCITY[0],
     "scan": "sensor_msgs/LaserScan",
@@ -27,7 +27,7 @@ TYPES: Mapping[Role, str] = {
 }
 """Default types of topics, if neither the configuration nor the bridge has the type."""
 
-WHERE: tuple[Role, ...] = ("odometry", "pose")
+WHERE: tuple[TopicRole, ...] = ("odometry", "pose")
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,9 @@ class ConfiguredRobot:
     """A robot as a person configured it."""
 
     name: str
-    topics: Mapping[Role, tuple[tuple[str, str], ...]] = field(default_factory=dict)
+    topics: Mapping[TopicRole, tuple[tuple[str, str], ...]] = field(
+        default_factory=dict
+    )
     """The topics of each configured role with their types; an empty type is not stated;
     no topics if the robot has none. Other roles are as discovery found them."""
 
@@ -45,7 +47,7 @@ class ConfiguredRobot:
     map_frame: str = ""
     """The frame that the robot is drawn in; empty if it is not configured."""
 
-    elsewhere: frozenset[Role] = frozenset()
+    elsewhere: frozenset[TopicRole] = frozenset()
     """Roles on another bridge; the diagnosis of that bridge reports them."""
 
     found_as: str = ""
@@ -101,7 +103,7 @@ def _has_its_name(one: ConfiguredRobot, robot: FoundRobot) -> bool:
 
 
 def _has_its_topics(one: ConfiguredRobot, robot: FoundRobot) -> bool:
-    velocity: tuple[Role, ...] = ("velocity",)
+    velocity: tuple[TopicRole, ...] = ("velocity",)
     for alike in (WHERE, velocity):
         text = [each for role in alike for each in one.topics.get(role, ())]
         there = {each.topic for role in alike for each in robot.guesses.get(role, ())}
@@ -131,7 +133,7 @@ def _merged(
     return replace(robot, guesses=guesses, base_frame=base)
 
 
-def _type(role: Role, behind: str, text: str) -> str:
+def _type(role: TopicRole, behind: str, text: str) -> str:
     """Return the type that WebMap uses to send and to subscribe."""
     behind = behind.strip()
     if role == "velocity":
@@ -231,7 +233,7 @@ class FramePath:
 
 
 @dataclass(frozen=True, slots=True)
-class Observation:
+class BridgeFacts:
     """All observations of one bridge and the robots behind it."""
 
     url: str
