@@ -7,8 +7,8 @@ import pytest
 from frames_only import TF, publishing
 
 from webmap import Bridge
+from webmap.base.audience import audience
 from webmap.base.geometry import Pose
-from webmap.base.looking import looking
 from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.frames import FrameCollector, frame_collector
@@ -162,6 +162,6 @@ def test_no_frames_are_asked_for_while_nobody_looks(monkeypatch):
     monkeypatch.setattr(
         bridge, "subscribe", lambda topic, *_, **__: asked.append(topic)
     )
-    monkeypatch.setattr(looking, "somebody", False)
+    monkeypatch.setattr(audience, "present", False)
     trees = asyncio.run(FrameCollector(bridge).listen({"/tf": TF}))
     assert (asked, trees.parents) == ([], {})

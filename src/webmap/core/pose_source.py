@@ -165,7 +165,7 @@ class PoseSource:
             self.feed.keep_on(self._is_needed)
             self.expect_fewer()
         if self.frames is not None:
-            self.frames.looking_changed()
+            self.frames.audience_changed()
 
     def _needs_frames(self) -> bool:
         """Return whether frames are needed while nobody looks.

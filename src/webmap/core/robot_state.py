@@ -7,8 +7,8 @@ from collections.abc import Callable
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
+from webmap.base.audience import RARELY, audience
 from webmap.base.geometry import Twist
-from webmap.base.looking import RARELY, looking
 from webmap.config.robot import BATTERY_LOW
 from webmap.gate.protocol import MAY_MOVE, RobotReport
 from webmap.gate.rules.goals import BRAKES, OVER
@@ -265,7 +265,7 @@ class StateRounds:
         self._looks: deque[Callable[[], None]] = deque()
         """A function that looks at a robot, for each; the next one first."""
         self._timer: asyncio.TimerHandle | None = None
-        looking.follow(self)
+        audience.follow(self)
 
     def join(self, look: Callable[[], None]) -> bool:
         """Call ``look`` regularly in the running event loop.
@@ -295,16 +295,16 @@ class StateRounds:
             self._timer.cancel()
             self._timer = None
 
-    def looking_changed(self) -> None:
+    def audience_changed(self) -> None:
         """Look more often for who begins to look."""
         timer = self._timer
-        if looking.somebody and timer is not None and not self._loop.is_closed():
+        if audience.present and timer is not None and not self._loop.is_closed():
             timer.cancel()
             self._wait(self._loop, AT_ONCE)
 
     def _wait(self, loop: asyncio.AbstractEventLoop, count: int) -> None:
         """Set the timer, after the looks at some robots."""
-        every = EVERY if looking.somebody else RARELY / 1000
+        every = EVERY if audience.present else RARELY / 1000
         part = min(1.0, count / len(self._looks))
         self._timer = loop.call_later(every * part, self._look, loop)
 

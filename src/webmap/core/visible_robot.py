@@ -7,9 +7,9 @@ import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from webmap.base.audience import audience
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose, Quaternion, Twist, Vector3
-from webmap.base.looking import looking
 from webmap.base.scope import Removal, keep
 from webmap.config.checks import Mistakes
 from webmap.config.reading import read, read_part
@@ -92,7 +92,7 @@ class VisibleRobot(MovableRobot):
         self.fragment = Fragment(self.svg)
         self.model_images = ModelImages(self.svg)
         robots[self.id] = self
-        looking.follow(self)
+        audience.follow(self)
         keep(Removal(self.destroy))
 
     def _show_base(self, *, holonomic: bool) -> None:
@@ -167,7 +167,7 @@ class VisibleRobot(MovableRobot):
         if self._destroyed:
             return
         self._destroyed = True
-        looking.forget(self)
+        audience.forget(self)
         state_rounds.leave(self._show_state)
         for map in tuple(self.maps):
             map.remove_robot(self)
@@ -389,9 +389,9 @@ class VisibleRobot(MovableRobot):
         """
         self.pose_source.pipeline.jumps.expect(time.monotonic())
 
-    def looking_changed(self) -> None:
+    def audience_changed(self) -> None:
         """Show the pose and the state of now to who begins to look."""
-        if not looking.somebody:
+        if not audience.present:
             self.pose_source.expect_fewer()
             return
         if self.valid:
@@ -442,7 +442,7 @@ class VisibleRobot(MovableRobot):
         """
         if stamp is not None:
             self.pose_stamp = stamp
-            if looking.somebody:
+            if audience.present:
                 self._draw_age(stamp)
             if not self._is_looked_at:
                 self._show_state()
@@ -456,7 +456,7 @@ class VisibleRobot(MovableRobot):
             return
         self.position, self.orientation = pose.position, pose.orientation
         self.measured_twist = pose.twist
-        if looking.somebody:
+        if audience.present:
             self._draw_pose()
         if not self.valid:
             self.valid = True

@@ -7,8 +7,8 @@ from functools import partial
 
 import msgspec
 
+from webmap.base.audience import audience
 from webmap.base.errors import BridgeClosed
-from webmap.base.looking import looking
 from webmap.base.scope import no_scope
 from webmap.discovery.rules import ODOMETRY, VELOCITY, nearest
 from webmap.discovery.tf_robots import Trees
@@ -84,7 +84,7 @@ class FrameCollector:
             seconds: How long to listen.
 
         """
-        wanted = frame_topics(topics)[:MOST_TOPICS] if looking.somebody else []
+        wanted = frame_topics(topics)[:MOST_TOPICS] if audience.present else []
         unheard = sorted({*odometry_topics(topics)} - {*self.trees.odometry})
         if not (wanted or unheard):
             return self.trees

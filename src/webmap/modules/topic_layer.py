@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import msgspec
 
+from webmap.base.audience import RARELY
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
-from webmap.base.looking import RARELY
 from webmap.base.processes import load_soon
 from webmap.core.problems import MessageProblems, ProblemOwner
 from webmap.core.registry import Namespace
