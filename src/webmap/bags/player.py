@@ -180,11 +180,11 @@ class Replay:
             self.graph.publish(self, name, message)
 
     def publish_status(self, status: PlaybackStatus) -> None:
-        """Publish the position."""
+        """Publish the position on ``STATUS``, which keeps the newest for new pages."""
         self.graph.publish(self, STATUS, {"data": text_of(status)})
 
     def publish_marks(self, marks: Marks) -> None:
-        """Publish the marks on the time line."""
+        """Publish all marks found so far on ``MARKS``, in place of the ones before."""
         self.graph.publish(self, MARKS, {"data": text_of(marks)})
 
     def _message(self, recorded: Recorded, pace: Pace) -> dict[str, Any] | None:

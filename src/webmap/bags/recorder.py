@@ -74,7 +74,7 @@ def new_bag(path: Path, dialect: DialectName) -> BagFile:
 
 
 class Ros1Bag:
-    """A ``.bag`` file."""
+    """A bag of ROS 1: one file, which is complete only when it is closed."""
 
     def __init__(self, path: Path) -> None:
         from rosbags.rosbag1 import Writer
@@ -308,7 +308,7 @@ class RecorderThread:
         )
 
     def start(self) -> None:
-        """Start the thread."""
+        """Begin to write the queued messages."""
         self._thread.start()
 
     def put(self, topic: str, message: ReceivedMessage, time: int) -> None:

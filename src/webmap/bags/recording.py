@@ -91,7 +91,7 @@ class Recorded(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RecordedTopic:
-    """A topic of a recording."""
+    """A topic of a recording with its one type."""
 
     name: str
     type: str
@@ -147,11 +147,11 @@ class Recording:
 
     @property
     def seconds(self) -> float:
-        """Duration in seconds."""
+        """The time from the first to the last message, in seconds."""
         return (self.end - self.begin) / SECOND
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the files; a second call does nothing."""
         if not self._closed:
             self._closed = True
             self._reader.close()

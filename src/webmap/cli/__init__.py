@@ -39,11 +39,11 @@ class LazyGroup(click.Group):
     """A group whose commands are loaded when they are used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names of the commands."""
+        """Return the names in the order of the help, without loading a command."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Load a command."""
+        """Import the module of a command; None if there is no such command."""
         home = COMMANDS.get(cmd_name)
         if home is None:
             return None

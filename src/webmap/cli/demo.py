@@ -34,7 +34,7 @@ LONGEST_STALL = 10.0
 
 
 def bad_link_options(command: F) -> F:
-    """Add the options of a bad link to a command."""
+    """Add ``--delay``, ``--jitter`` and ``--stall`` to a command (decorator)."""
     for option in (
         click.option(
             "--stall",

@@ -82,7 +82,7 @@ class ButtonMistake(ConfigError):
 
 @dataclass(frozen=True, slots=True)
 class ButtonSpec:
-    """The action of one button."""
+    """What a press of one button sends to the robot, and what it shows."""
 
     label: str
     kind: ButtonKind

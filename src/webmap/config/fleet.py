@@ -34,7 +34,7 @@ def _address(value: Any) -> str:
 
 
 class BridgeConfig(Config, kw_only=True, frozen=True):
-    """A bridge of the file."""
+    """A bridge: its address, and the alignment of its robots on the common map."""
 
     url: Annotated[str, _address]
     alignment: Alignment | None = None

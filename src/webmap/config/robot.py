@@ -279,7 +279,7 @@ class RobotConfig(Config, kw_only=True, frozen=True):
         return getattr(self.motion if key in MOTION else self, key)
 
     def with_part(self, key: str, part: Any) -> "RobotConfig":
-        """Return the robot with a part replaced."""
+        """Return a copy with another part, of ``motion`` too; None removes the part."""
         if key in MOTION:
             motion = msgspec.structs.replace(self.motion, **{key: part})
             return msgspec.structs.replace(self, motion=motion)

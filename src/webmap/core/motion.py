@@ -235,7 +235,7 @@ class RobotMotion:
             self.declare()
 
     def clear_odometry(self) -> None:
-        """Clear the odometry topic."""
+        """Declare the robot to the gate without odometry, if it had one."""
         if self._odometry is not None:
             self._odometry = None
             self.declare()

@@ -48,7 +48,7 @@ class Publisher(Protocol):
 
 
 class PublishedImage(NamedTuple):
-    """An image as it is served."""
+    """The content and the type of an image, as the web thread serves them."""
 
     data: bytes
     media_type: str

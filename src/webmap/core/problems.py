@@ -184,7 +184,7 @@ class ProblemOwner(Protocol):
         """Show a problem until :meth:`clear_problem`."""
 
     def clear_problem(self, about: object) -> None:
-        """Remove the problem of ``about``."""
+        """Show the problem of ``about`` no longer; does nothing if there is none."""
 
 
 class MessageProblems:

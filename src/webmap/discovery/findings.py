@@ -88,7 +88,7 @@ class Guess:
 
 @dataclass(frozen=True, slots=True)
 class FoundRobot:
-    """A robot and its topics."""
+    """A robot with the topics of each role, and the frames that place it."""
 
     name: str
     namespace: str

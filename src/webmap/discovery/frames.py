@@ -128,7 +128,7 @@ _late: weakref.WeakKeyDictionary[Bridge, FrameCollector] = weakref.WeakKeyDictio
 
 
 def frame_collector(bridge: Bridge) -> FrameCollector:
-    """Return the listener for the frames of a bridge; each bridge has one."""
+    """Return the collector of a bridge; all callers of one bridge share it."""
     if bridge not in _late:
         _late[bridge] = FrameCollector(bridge)
     return _late[bridge]

@@ -63,7 +63,7 @@ FUSED = "a filter's estimate"
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One rule."""
+    """A role for topics of some types whose names end in some way."""
 
     role: TopicRole
     types: tuple[str, ...]

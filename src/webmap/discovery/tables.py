@@ -80,7 +80,7 @@ def robot_table(robot: FoundRobot) -> list[str]:
 
 
 def layer_table(robot: FoundRobot, findings: Findings) -> list[str]:
-    """Return the layers of a robot that was found, as a table."""
+    """Return the rows of :func:`drawn_table` for a robot of the findings."""
     return drawn_table(robot.namespace, findings.layers.get(robot.namespace, Layers()))
 
 

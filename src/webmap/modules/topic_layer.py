@@ -194,7 +194,7 @@ class TopicLayer(LayerOptions):
 
     @classmethod
     def options_for(cls, found: FoundTopic) -> dict[str, Any]:
-        """Return the options for a topic that discovery found."""
+        """Return the options with which discovery adds the layer; may be replaced."""
         return usual_options(cls, found)
 
     def build(self) -> None:

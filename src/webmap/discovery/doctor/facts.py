@@ -32,7 +32,7 @@ WHERE: tuple[TopicRole, ...] = ("odometry", "pose")
 
 @dataclass(frozen=True, slots=True)
 class ConfiguredRobot:
-    """A robot as a person configured it."""
+    """A robot of a fleet file or of options, by the roles of its topics."""
 
     name: str
     topics: Mapping[TopicRole, tuple[tuple[str, str], ...]] = field(
@@ -154,7 +154,7 @@ MOST_ROBOTS = 10
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """The measurements of one topic."""
+    """How often messages of one topic came, how large they were, and how old."""
 
     count: int = 0
     seconds: float = 0.0

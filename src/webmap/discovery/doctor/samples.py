@@ -76,11 +76,11 @@ class TopicSamples:
         )
 
     def end(self, now: float) -> dict[str, Measurement]:
-        """Return the measurements until now."""
+        """Return what was measured of each topic; ``now`` is monotonic seconds."""
         return {topic: self._sum_up(topic, now) for topic in self._measured}
 
     def end_of(self, topic: str, now: float) -> Measurement:
-        """Return the measurements of one topic until now."""
+        """Return what was measured of one topic, as :meth:`end` does."""
         return self._sum_up(topic, now)
 
     def _sum_up(self, topic: str, now: float) -> Measurement:

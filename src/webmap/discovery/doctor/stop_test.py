@@ -82,7 +82,7 @@ class StopTestClient:
             self._go_on("taking", now)
 
     def step(self, now: float) -> list[GateMessage]:
-        """Return the messages to send to the gate now."""
+        """Return what to send to the gate; called 20 times a second."""
         if now - self._since > PATIENCE and self.stage not in ("ready", "over"):
             self._end(self._why)
         report = self._report
