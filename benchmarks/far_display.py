@@ -17,7 +17,7 @@ import threading
 from webmap.agents.gates import Gates
 from webmap.agents.link import AgentLane
 from webmap.agents.peer import close_peers
-from webmap.base.loop_thread import LoopThread
+from webmap.base.tasks import LoopThread
 from webmap.gate.protocol import RobotSpec
 
 

@@ -23,7 +23,7 @@ from benchmarks.frames import odometry
 from benchmarks.harness import Comparison, Contender, Figures, compare, percentile
 from benchmarks.processes import module
 from benchmarks.stamped import Y, topics
-from webmap.base.loop_thread import LoopThread
+from webmap.base.tasks import LoopThread
 from webmap.testing import WitnessRobot
 
 POSES = 100

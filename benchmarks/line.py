@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import Literal
 
-from webmap.base.loop_thread import LoopThread
+from webmap.base.tasks import LoopThread
 
 Queue = Literal["fair", "one"]
 

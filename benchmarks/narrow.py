@@ -23,7 +23,7 @@ from benchmarks.processes import started
 from webmap import Bridge
 from webmap.agents.gates import Gates
 from webmap.agents.peer import close_peers
-from webmap.base.loop_thread import LoopThread
+from webmap.base.tasks import LoopThread
 from webmap.core.motion import id_at_agent
 from webmap.gate.protocol import RobotSpec
 from webmap.ros.messages import LaserScanMsg, OdometryMsg

@@ -17,7 +17,7 @@ from pathlib import Path
 import psutil
 
 from benchmarks.harness import Comparison, Contender, Figures, compare
-from webmap.base.looking import RARELY
+from webmap.base.audience import RARELY
 
 FLEETS = {"1,000 robots": (1000, 0), "100 robots with scans": (100, 360)}
 """The number of robots, and of the beams of their scans."""

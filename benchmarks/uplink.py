@@ -28,7 +28,7 @@ from benchmarks.harness import Comparison, Contender, Figures, compare
 from benchmarks.line import Line
 from benchmarks.processes import started, used
 from webmap.agents.peer import Peer, User
-from webmap.base.loop_thread import LoopThread
+from webmap.base.tasks import LoopThread
 
 ROBOTS = 20
 SHAPES = ((1, 1), (4, 1), (4, 50))

@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from webmap.bags.bag_file import new_bag
+from webmap.bags.recorder import new_bag
 from webmap.bags.types import Types
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.schema import Schema

@@ -25,7 +25,7 @@ from websockets.exceptions import ConnectionClosed
 
 from webmap.base.errors import ConfigError
 from webmap.base.logs import set_up_logging
-from webmap.base.outside_text import one_line
+from webmap.base.text import one_line
 from webmap.sim.process import signals_set
 
 log = logging.getLogger("webmap.sim")

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from webmap.core.map import Map
     from webmap.core.page import Page
     from webmap.core.pictures import Picture
-    from webmap.core.refused import refusals
+    from webmap.core.refusals import refusals
     from webmap.core.registry import Namespace
     from webmap.core.robot import Robot
     from webmap.modules import drawing
@@ -127,7 +127,7 @@ _HOMES = {
     "modules": "webmap.modules",
     "options": "webmap.modules.layer_options",
     "page": "webmap.server.application:page",
-    "refusals": "webmap.core.refused:refusals",
+    "refusals": "webmap.core.refusals:refusals",
     "run": "webmap.server.application:run",
     "start": "webmap.server.application:start",
     "stop": "webmap.server.application:stop",

@@ -9,10 +9,9 @@ import pytest
 from rosbags.typesys import get_types_from_msg
 
 from bag_making import BEGIN, Made, types_of
-from webmap.bags.messages import Messages
 from webmap.bags.recording import Recording
 from webmap.bags.times import Stamps
-from webmap.bags.types import texts_of
+from webmap.bags.types import MessageConverter, texts_of
 from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import Definitions, UnknownType
 from webmap.ros.rosbridge.server.dialect import Dialect
@@ -36,7 +35,7 @@ def again(made, type_name, message):
     )
     made.schema.define(texts_of(version.store, version.type_name))
     value = read(version.bytes_of(message), version.type_name)
-    return Messages(made.schema).message(type_name, value)
+    return MessageConverter(made.schema).message(type_name, value)
 
 
 def plain(value):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from webmap.bags.playback import Command, Playback, command_of, read_command
+from webmap.bags.playback import Playback, PlaybackCommand, command_of, read_command
 from webmap.bags.times import SECOND
 from webmap.base.errors import ConfigError
 
@@ -146,4 +146,4 @@ def test_an_invalid_command_is_refused_with_what_was_expected(name, value):
 @given(some.text())
 def test_any_line_is_a_command_or_refused(line):
     with contextlib.suppress(ConfigError):
-        assert isinstance(read_command(line), Command)
+        assert isinstance(read_command(line), PlaybackCommand)

@@ -7,8 +7,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 
 from bag_making import BEGIN, FRAMES, GRID, ODOMETRY, Made, types_of
-from webmap.bags.bag_file import new_bag
-from webmap.bags.recorder import Recorder
+from webmap.bags.recorder import Recorder, new_bag
 from webmap.base.errors import ConfigError
 
 RANGE = "sensor_msgs/msg/Range"

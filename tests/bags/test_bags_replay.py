@@ -10,10 +10,9 @@ from played_bag import NOW, Client, played, until, xs
 
 from bag_making import BEGIN, FRAMES, GRID, ODOMETRY, TWIST
 from webmap.bags import player as player_module
-from webmap.bags.player import Player
+from webmap.bags.playback import MARKS, STATUS
+from webmap.bags.player import REFUSED, Player
 from webmap.bags.recording import Recording
-from webmap.bags.replay import REFUSED
-from webmap.bags.status import MARKS, STATUS
 from webmap.bags.times import SECOND
 from webmap.base.errors import ConfigError
 

@@ -8,8 +8,8 @@ from played_bag import Client, played, until, xs
 
 from bag_making import BEGIN, FRAMES, GRID, ODOMETRY
 from webmap.bags import player as player_module
+from webmap.bags.playback import MARKS, STATUS
 from webmap.bags.recording import Recording
-from webmap.bags.status import MARKS, STATUS
 from webmap.base.errors import ConfigError
 
 pytestmark = pytest.mark.slow

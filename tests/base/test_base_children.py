@@ -11,8 +11,8 @@ import pytest
 
 import webmap
 from bag_making import ODOMETRY, Made
-from webmap.base.children import python_command
-from webmap.cli.demo_simulator import simulator
+from webmap.base.processes import python_command
+from webmap.cli.demo import simulator
 from webmap.cli.play import replay
 from webmap.gate.display.supervisor import GateProcess
 from webmap.gate.protocol import Ready
@@ -103,7 +103,7 @@ def test_only_one_module_of_the_package_uses_sys_executable():
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.Attribute) and node.attr == "executable"
     ]
-    assert places == ["base/children.py"]
+    assert places == ["base/processes.py"]
 
 
 def test_a_script_imports_modules_of_its_folder_but_its_children_do_not(tmp_path):
@@ -111,7 +111,7 @@ def test_a_script_imports_modules_of_its_folder_but_its_children_do_not(tmp_path
     script = tmp_path / "first.py"
     script.write_text(
         "import own, subprocess\n"
-        "from webmap.base.children import python_command\n"
+        "from webmap.base.processes import python_command\n"
         "done = subprocess.run(python_command('own'), stderr=subprocess.PIPE)\n"
         "print(own.WORD, b'No module named own' in done.stderr, flush=True)\n"
         "raise SystemExit\n"
@@ -187,7 +187,7 @@ def test_the_children_of_a_killed_parent_end(parent, bag):
 
 def test_a_child_receives_input_before_its_parent_ends() -> None:
     program = (
-        "from webmap.base.children import end_with_parent; import time\n"
+        "from webmap.base.processes import end_with_parent; import time\n"
         "print_it = lambda data: print(data.decode(), flush=True)\n"
         "end_with_parent(lambda: None, print_it, 0.0)\n"
         "time.sleep(60)"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.base.counted import counted
+from webmap.base.text import counted
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from webmap.base.loading import load, load_soon
+from webmap.base.processes import load, load_soon
 
 TEXT = "import threading\nthread = threading.current_thread()\n"
 

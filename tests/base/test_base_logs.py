@@ -20,7 +20,7 @@ from webmap.base.logs import (
     PAUSE,
     Budgets,
 )
-from webmap.base.outside_text import LONGEST, lines_of, one_line
+from webmap.base.text import LONGEST, lines_of, one_line
 
 SOURCE = Path(webmap.__file__).parent
 

@@ -8,7 +8,7 @@ import pytest
 
 LEFT_BEHIND = """
 import psutil
-from webmap.base.memory import return_large_pieces
+from webmap.base.processes import return_large_pieces
 
 if {returning}:
     return_large_pieces()

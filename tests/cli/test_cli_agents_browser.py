@@ -8,7 +8,7 @@ from playwright.sync_api import expect
 
 from camera_server import CameraServer
 from real_browser import end_stops, hold, watched_tab
-from webmap.base.loop_thread import LoopThread
+from webmap.base.tasks import LoopThread
 from webmap_process import page_of, simulator, webmap
 
 pytest.importorskip("zenoh")

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from camera_server import CameraServer
-from webmap.base.loop_thread import LoopThread
+from webmap.base.tasks import LoopThread
 from webmap_process import simulator, webmap
 
 pytest.importorskip("zenoh")

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from cli_inside import run_inside
-from webmap.cli import bad_link
+from webmap.cli import demo
 
 
 @contextmanager
@@ -41,14 +41,14 @@ def connected(url):
 
 
 def test_without_faults_the_address_is_the_one_of_the_server():
-    with bad_link.bad_link("ws://127.0.0.1:9", 0, 0, 0) as url:
+    with demo.bad_link("ws://127.0.0.1:9", 0, 0, 0) as url:
         assert url == "ws://127.0.0.1:9"
 
 
 def test_a_delay_is_added_each_way():
     with (
         echo() as server,
-        bad_link.bad_link(server, 50, 0, 0) as url,
+        demo.bad_link(server, 50, 0, 0) as url,
         connected(url) as client,
     ):
         assert seconds_for_an_answer(client) >= 0.1
@@ -57,7 +57,7 @@ def test_a_delay_is_added_each_way():
 def test_jitter_is_added_at_random():
     with (
         echo() as server,
-        bad_link.bad_link(server, 0, 40, 0) as url,
+        demo.bad_link(server, 0, 40, 0) as url,
         connected(url) as client,
     ):
         took = [seconds_for_an_answer(client) for _ in range(10)]
@@ -67,10 +67,10 @@ def test_jitter_is_added_at_random():
 
 
 def test_a_stall_holds_the_link_again_and_again(monkeypatch):
-    monkeypatch.setattr(bad_link, "STALL_EVERY", 0.5)
+    monkeypatch.setattr(demo, "STALL_EVERY", 0.5)
     with (
         echo() as server,
-        bad_link.bad_link(server, 0, 0, 0.3) as url,
+        demo.bad_link(server, 0, 0, 0.3) as url,
         connected(url) as client,
     ):
         stalls, deadline = 0, time.monotonic() + 20

@@ -8,8 +8,8 @@ import pytest
 from webmap import Bridge
 from webmap.base.errors import BridgeClosed
 from webmap.cli import demo_robots
+from webmap.cli.demo import simulator
 from webmap.cli.demo_robots import FREE, PauseErrands, demo_robot
-from webmap.cli.demo_simulator import simulator
 from webmap.discovery import discover
 from webmap.ros.asking import ask_topics
 

@@ -11,7 +11,7 @@ import pytest
 from bag_making import ODOMETRY, TWIST, Made
 from cli_inside import run_inside
 from webmap.bags import need_rosbags
-from webmap.bags.playback import Command
+from webmap.bags.playback import PlaybackCommand
 from webmap.base.errors import ConfigError
 from webmap.cli.play import replay
 
@@ -83,7 +83,7 @@ def test_a_command_to_an_ended_replay_prints_a_notice_and_raises_no_error(bag, c
         ]
         child.kill()
         psutil.wait_procs([child], timeout=10)
-        give(Command("again"))
+        give(PlaybackCommand("again"))
     assert "The replay has ended" in capfd.readouterr().err
 
 

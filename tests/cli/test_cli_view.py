@@ -16,7 +16,7 @@ from webmap import Bridge
 from webmap.console import Console, make_robot
 from webmap.core.layer import Layer
 from webmap.discovery import FoundRobot, Guess, discover
-from webmap.discovery.found import ROLES
+from webmap.discovery.findings import ROLES
 from webmap.discovery.newcomers import Newcomers, News
 from webmap.fleet.found import find_fleet
 from webmap.fleet.given import Candidate

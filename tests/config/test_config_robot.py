@@ -10,7 +10,7 @@ from webmap.config.checks import Mistakes
 from webmap.config.motion import MotionConfig, TwistConfig
 from webmap.config.reading import read
 from webmap.config.robot import CameraConfig, ModuleConfig
-from webmap.core.configure import apply
+from webmap.core.robot import apply_config
 from webmap.gate.specs import checked
 
 URL = "ws://robot:9090"
@@ -105,7 +105,7 @@ def test_goals_and_the_initial_pose_move_to_another_bridge_together():
     new = RobotConfig.from_dict({"name": "Bob", "bridge": other, **parts})
     robot = Robot.from_config(old, bridges)
     try:
-        assert apply(robot, old, new, bridges).found == []
+        assert apply_config(robot, old, new, bridges).found == []
         motion = robot.motion.config
         assert (motion.move.bridge, motion.initial_pose.bridge) == (other, other)
     finally:
@@ -117,7 +117,7 @@ def test_classes_that_a_new_configuration_leaves_out_are_removed():
     robot = Robot.from_config(old)
     robot.svg.classes.add("mine")
     try:
-        apply(robot, old, RobotConfig(name="Bob", classes=["red"]))
+        apply_config(robot, old, RobotConfig(name="Bob", classes=["red"]))
         assert {"red", "mine"} <= set(robot.svg.classes)
         assert "slow" not in robot.svg.classes
     finally:
@@ -242,7 +242,7 @@ def test_applying_a_configuration_changes_only_different_parts(bridges):
             cameras=[CameraConfig(topic="/b", name="B")],
             modules=[ModuleConfig(name="Path", args=[{"bridge": URL}, "/plan"])],
         )
-        assert apply(robot, old, new, bridges).found == []
+        assert apply_config(robot, old, new, bridges).found == []
         assert robot.modules[0] is kept
         assert modules_of(robot) == [
             ("LaserScanner", ("/front",)),
@@ -261,7 +261,7 @@ def test_a_refused_part_does_not_block_changes_of_other_parts(bridges):
     try:
         new = RobotConfig.from_dict({**old.to_dict(), "battery": "/b", "tf": True})
         broken = new.with_part("twist", TwistConfig(topic="/a b"))
-        mistakes = apply(robot, old, broken, bridges)
+        mistakes = apply_config(robot, old, broken, bridges)
         ((way, words),) = mistakes.found
         assert (way, words[:17]) == (("twist", "topic"), 'got the text "/a ')
         assert robot.tf is not None

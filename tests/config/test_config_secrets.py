@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.config.secrets import readable_secret
+from webmap.config.toml_text import readable_secret
 from webmap.fleet.made import prepare
 
 HEAD = '[bridges]\nb = "ws://robot:9090"\n[[robots]]\nname = "Bob"\nbridge = "b"\n'

@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 
 from camera_server import CameraServer
 from real_browser import Complaints, hold
-from webmap.base.loop_thread import LoopThread
+from webmap.base.tasks import LoopThread
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from webmap import Bridge
-from webmap.discovery.doctor import ConfiguredRobot, Finding, Observed
+from webmap.discovery.doctor import BridgeFacts, ConfiguredRobot, Finding
 from webmap.features.doctor.doctor_panel import Checkup, checkup_of, groups
 from webmap.ros.rosbridge.checks import LinkFacts
 
@@ -24,7 +24,7 @@ def test_only_one_check_of_a_bridge_runs_at_a_time():
         asked.append(url)
         progress("Listening for 3 s.")
         await go_on.wait()
-        return Observed(url, trouble="nothing listens there")
+        return BridgeFacts(url, trouble="nothing listens there")
 
     async def run():
         checkup = Checkup("ws://bob:9090", observe=observe)
@@ -89,7 +89,7 @@ def test_the_check_receives_the_robots_of_the_page():
 
     async def observe(url, *, seconds, configured, progress):
         asked.append(configured(None))
-        return Observed(url)
+        return BridgeFacts(url)
 
     async def run():
         checkup = Checkup("ws://bob:9090", observe=observe)
@@ -102,7 +102,7 @@ def test_the_check_receives_the_robots_of_the_page():
 
 
 async def seen_at(url, **_):
-    return Observed(url)
+    return BridgeFacts(url)
 
 
 def test_a_slow_call_test_runs_only_on_request_and_its_result_is_reported():
@@ -132,7 +132,7 @@ def test_a_slow_call_test_runs_only_on_request_and_its_result_is_reported():
 @pytest.mark.parametrize("trouble", [None, "nothing listens there"])
 def test_no_slow_call_test_runs_at_an_unchecked_or_unreachable_bridge(trouble):
     async def observe(url, **_):
-        return Observed(url, trouble=trouble)
+        return BridgeFacts(url, trouble=trouble)
 
     async def tried(seen):
         raise AssertionError

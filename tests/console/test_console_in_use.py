@@ -7,10 +7,11 @@ import pytest
 
 from webmap import Bridge, Map, Robot, RobotConfig
 from webmap.console import make_robot
-from webmap.core.page import Page, PageEntry, Viewer
+from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.page import Page
 from webmap.discovery import discover
-from webmap.discovery.doctor import Observed
-from webmap.discovery.doctor.configured import merge_configured
+from webmap.discovery.doctor import BridgeFacts
+from webmap.discovery.doctor.facts import merge_configured
 from webmap.features.doctor.doctor_panel import DoctorReports, checkup_of
 from webmap.features.doctor.in_use import in_use
 from webmap.scene.element import Event
@@ -169,7 +170,7 @@ def checkup(bridge):
 
     async def observe(url, *, seconds, configured, progress):
         checkup.asked.append(configured(None))
-        return Observed(url)
+        return BridgeFacts(url)
 
     async def tried(seen):
         checkup.asked.append("tried")

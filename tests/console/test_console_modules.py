@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from webmap import Map, Robot
-from webmap.core.page import Page, PageEntry, Viewer
+from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.page import Page
 from webmap.features.goals.goal_tool import GoalTool
 from webmap.features.stop.stop_button import StopButton
 from webmap.features.view.follow import Follow

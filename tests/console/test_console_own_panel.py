@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from webmap.core.page import Page, PageEntry, Viewer, site
+from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.page import Page, site
 from webmap.scene.wire.session import SceneSession
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "console" / "panel.py"

@@ -8,7 +8,8 @@ from typing import Any
 import pytest
 
 from webmap.base.errors import ConfigError, WireError
-from webmap.core.page import Page, PageEntry
+from webmap.core.base_page import PageEntry
+from webmap.core.page import Page
 
 
 @dataclass

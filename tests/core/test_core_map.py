@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from webmap import Map, Robot, svg
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Vector3
-from webmap.core.view import Rect, apply_operation, initial_view
+from webmap.core.world_view import Rect, apply_operation, initial_view
 
 POINTS = st.floats(-2000, 2000)
 

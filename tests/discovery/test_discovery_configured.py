@@ -8,15 +8,14 @@ from faulty_site import site
 
 from webmap.discovery import discover
 from webmap.discovery.doctor import (
+    BridgeFacts,
     ConfiguredRobot,
     Measurement,
-    Observed,
     is_ready,
     judge,
 )
-from webmap.discovery.doctor.configured import merge_configured
+from webmap.discovery.doctor.facts import Clock, FramePath, merge_configured
 from webmap.discovery.doctor.measure import observe
-from webmap.discovery.doctor.observed import Clock, FramePath
 
 pytestmark = pytest.mark.slow
 
@@ -47,7 +46,7 @@ def seen_of(*configured, topics=TOPICS, **more):
     findings, by_name = laid(*configured, topics=topics)
     known = {one.found_as for one in by_name.values()}
     others = [one.name for one in discover(topics).robots if one.name not in known]
-    seen = Observed(
+    seen = BridgeFacts(
         "ws://localhost:9090",
         types=topics,
         findings=findings,

@@ -12,12 +12,16 @@ from frames_only import publishing
 
 from webmap.base.geometry import Pose
 from webmap.discovery import discover
-from webmap.discovery.doctor import Measurement, Observed, is_ready, judge
-from webmap.discovery.doctor.frames import FrameListening
-from webmap.discovery.doctor.listening import MOST_BYTES, Listening, Sampling
+from webmap.discovery.doctor import BridgeFacts, Measurement, is_ready, judge
+from webmap.discovery.doctor.facts import Clock, FramePath
 from webmap.discovery.doctor.measure import observe
-from webmap.discovery.doctor.observed import Clock, FramePath
-from webmap.discovery.doctor.shown_rules import shown_topics
+from webmap.discovery.doctor.samples import (
+    MOST_BYTES,
+    FrameCheck,
+    Sampling,
+    TopicSamples,
+)
+from webmap.discovery.doctor.topic_rules import shown_topics
 from webmap.discovery.doctor.verdict import report
 from webmap.ros.rosbridge.checks import LinkFacts, is_loopback, listening_addresses
 from webmap.ros.rosbridge.events import Publish
@@ -33,7 +37,7 @@ LISTENED = {
     "/odom": Measurement(60, 3.0, 0.06, 50_000, "odom", 99.97, 100.0),
     "/scan": Measurement(30, 3.0, 0.11, 90_000, "laser", 99.95, 100.0, binary=True),
 }
-GOOD = Observed(
+GOOD = BridgeFacts(
     "ws://localhost:9090",
     link=LinkFacts("127.0.0.1", ("127.0.0.1",)),
     findings=discover(TOPICS, "bob"),
@@ -109,14 +113,14 @@ def test_the_doctor_warns_of_a_router_without_tls_on_another_computer():
     ],
 )
 def test_advice_for_an_agent_that_cannot_be_reached_fits_the_reason(trouble, advice):
-    (finding,) = judge(Observed("zenoh://h/bay3", trouble=trouble))
+    (finding,) = judge(BridgeFacts("zenoh://h/bay3", trouble=trouble))
     assert finding.level == "wrong"
     assert trouble in finding.text
     assert advice in finding.advice
 
 
 def test_an_unreachable_bridge_is_the_only_finding():
-    findings = judge(Observed("ws://bob:9090", trouble="nothing listens there"))
+    findings = judge(BridgeFacts("ws://bob:9090", trouble="nothing listens there"))
     assert [each.level for each in findings] == ["wrong"]
     assert not is_ready(findings)
 
@@ -130,7 +134,7 @@ def test_an_unreachable_bridge_is_the_only_finding():
     ],
 )
 def test_the_advice_depends_on_why_the_bridge_is_unreachable(trouble, advice):
-    (finding,) = judge(Observed("ws://bob:9090", trouble=trouble))
+    (finding,) = judge(BridgeFacts("ws://bob:9090", trouble=trouble))
     assert advice in finding.advice
 
 
@@ -357,7 +361,7 @@ def test_the_goal_status_topic_belongs_to_the_action_of_the_robot():
 
 
 def test_a_bridge_without_rosapi_is_a_warning_with_advice():
-    bare = Observed("ws://localhost:9090", unlisted="no answer")
+    bare = BridgeFacts("ws://localhost:9090", unlisted="no answer")
     assert level_of(bare, "rosapi does not list") == "warning"
     assert level_of(bare, "is not known") == "note"
 
@@ -580,7 +584,7 @@ def test_invalid_transforms_are_a_warning():
 
 
 def frames(*transforms, topic="/tf"):
-    listening = FrameListening()
+    listening = FrameCheck()
     seen = [
         {
             "header": {"stamp": {"sec": 5}, "frame_id": parent},
@@ -612,7 +616,7 @@ def test_each_invalid_transform_is_stored_once():
     assert len(odd) == 2
     assert "norm of 0" in odd[0]
     assert "loop" in odd[1]
-    listening = FrameListening()
+    listening = FrameCheck()
     listening.received(Publish("/tf", b'{"op":"publish","topic":"/tf","msg":[}'))
     assert "cannot be read" in listening.oddities("")[0]
 
@@ -624,7 +628,7 @@ def message(topic, stamp=(5, 250_000_000), frame="odom"):
 
 
 def test_listening_counts_messages_and_measures_the_longest_gap():
-    listening = Listening({"/odom": ""}, 10.0)
+    listening = TopicSamples({"/odom": ""}, 10.0)
     for now in (10.5, 10.6, 11.4, 11.5):
         listening.received(message("/odom"), now, now + 1000)
     listening.received(message("/other"), 11.6, 1011.6)
@@ -637,13 +641,13 @@ def test_listening_counts_messages_and_measures_the_longest_gap():
 
 
 def test_a_zero_stamp_counts_as_no_stamp():
-    listening = Listening({"/odom": ""}, 0.0)
+    listening = TopicSamples({"/odom": ""}, 0.0)
     listening.received(message("/odom", (0, 0)), 1.0, 1.0)
     assert listening.end(2.0)["/odom"].stamp is None
 
 
 def test_a_message_with_invalid_json_is_reported():
-    listening = Listening({"/odom": ""}, 0.0)
+    listening = TopicSamples({"/odom": ""}, 0.0)
     broken = Publish("/odom", b'{"op":"publish","topic":"/odom","msg":[}')
     listening.received(broken, 1.0, 1.0)
     assert "not JSON" in listening.end(2.0)["/odom"].trouble

@@ -7,11 +7,11 @@ import pytest
 from frames_only import TF, publishing
 
 from webmap import Bridge
+from webmap.base.audience import audience
 from webmap.base.geometry import Pose
-from webmap.base.looking import looking
 from webmap.console import Console
 from webmap.discovery import discover
-from webmap.discovery.frame_listening import LateFrames, late_frames
+from webmap.discovery.frames import FrameCollector, frame_collector
 from webmap.discovery.tf_robots import Trees
 from webmap.fleet.shown import ShownRobots
 from webmap.fleet.watch import LookingForLayers, LookingForRobots
@@ -39,7 +39,7 @@ def quick(monkeypatch):
     """Make discovery look again after a short time."""
     monkeypatch.setattr(LookingForRobots, "period", 0.05)
     monkeypatch.setattr(LookingForLayers, "period", 0.05)
-    monkeypatch.setitem(LateFrames.listen.__kwdefaults__, "seconds", 0.3)
+    monkeypatch.setitem(FrameCollector.listen.__kwdefaults__, "seconds", 0.3)
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
@@ -66,7 +66,7 @@ def test_a_robot_whose_frames_appear_later_is_shown_at_the_pose_from_its_frames(
             for service in (looking, drawing):
                 service.start(loop)
             try:
-                await until(lambda: late_frames(bridge).trees.parents)
+                await until(lambda: frame_collector(bridge).trees.parents)
                 received["/tf"] += chain("bob", 5.0, 3.0)
                 await until(lambda: late.robots)
                 (bob,) = late.robots
@@ -130,7 +130,7 @@ def test_a_robot_that_is_localised_later_is_drawn_in_the_map_frame(
 
 def test_a_bridge_without_frame_topics_is_not_listened_to():
     async def scenario() -> None:
-        late = late_frames(Bridge("ws://127.0.0.1:9"))
+        late = frame_collector(Bridge("ws://127.0.0.1:9"))
         began = time.monotonic()
         assert (await late.listen({"/odom": "nav_msgs/Odometry"})).parents == {}
         assert time.monotonic() - began < 0.5
@@ -146,10 +146,10 @@ def test_received_frames_are_kept_for_the_next_discovery():
             bridge.start(asyncio.get_running_loop())
             try:
                 await until(lambda: bridge.state == "open")
-                late = late_frames(bridge)
+                late = frame_collector(bridge)
                 seen = await late.listen({"/tf": TF}, seconds=0.5)
                 assert [base.space for base in seen.bases()] == ["/ann"]
-                assert late_frames(bridge).trees.bases() == seen.bases()
+                assert frame_collector(bridge).trees.bases() == seen.bases()
             finally:
                 await bridge.stop()
 
@@ -162,6 +162,6 @@ def test_no_frames_are_asked_for_while_nobody_looks(monkeypatch):
     monkeypatch.setattr(
         bridge, "subscribe", lambda topic, *_, **__: asked.append(topic)
     )
-    monkeypatch.setattr(looking, "somebody", False)
-    trees = asyncio.run(LateFrames(bridge).listen({"/tf": TF}))
+    monkeypatch.setattr(audience, "present", False)
+    trees = asyncio.run(FrameCollector(bridge).listen({"/tf": TF}))
     assert (asked, trees.parents) == ([], {})

@@ -5,7 +5,7 @@ import pytest
 from webmap import Bridge
 from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import map_modules, robot_modules
-from webmap.discovery.found import FoundLayer
+from webmap.discovery.findings import FoundLayer
 from webmap.discovery.layers import Drawing, drawing, find_layers
 from webmap.modules.declaration import declarations
 

@@ -8,9 +8,9 @@ import pytest
 from faulty_site import site
 from websockets.asyncio.server import serve
 
-from webmap.discovery.doctor import Observed, judge, measure
-from webmap.discovery.doctor.listening import ENOUGH
+from webmap.discovery.doctor import BridgeFacts, judge, measure
 from webmap.discovery.doctor.measure import observe, tried
+from webmap.discovery.doctor.samples import ENOUGH
 from webmap.ros.rosbridge.checks import LinkFacts, look
 
 pytestmark = pytest.mark.slow
@@ -305,7 +305,7 @@ def test_repeating_the_trial_call_keeps_the_other_measurements():
 
 def test_an_unreachable_bridge_resets_the_result_of_an_earlier_trial_call():
     facts = LinkFacts(calls_in_threads=False, tried=True)
-    blocking = Observed("ws://127.0.0.1:1", link=facts)
+    blocking = BridgeFacts("ws://127.0.0.1:1", link=facts)
     seen = asyncio.run(tried(blocking))
     assert (seen.link.calls_in_threads, seen.link.tried) == (None, False)
     assert level_of(judge(seen), "slow service call gave no result") == "note"

@@ -10,7 +10,7 @@ from frames_only import TF, publishing
 from cli_inside import run_inside
 from webmap.base.geometry import Pose
 from webmap.discovery import discover
-from webmap.discovery.frame_listening import odometry_topics, receive_frames
+from webmap.discovery.frames import odometry_topics, receive_frames
 from webmap.discovery.newcomers import Newcomers
 from webmap.discovery.tf_robots import Trees
 

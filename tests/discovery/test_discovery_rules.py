@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from captured_frames import CAPTURED
 from webmap.discovery import discover
-from webmap.discovery.found import ROLES
+from webmap.discovery.findings import ROLES
 from webmap.discovery.robots import host_name
 from webmap.discovery.tf_robots import Trees
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from webmap.config.checks import same_name
 from webmap.discovery import discover, rules
+from webmap.discovery.findings import unique_names
 from webmap.discovery.fleet_toml import fleet_toml
-from webmap.discovery.naming import unique_names
 from webmap.discovery.tables import report, summary_line
 from webmap.modules.declaration import declarations
 

@@ -13,7 +13,7 @@ from webmap import Bridge, Robot
 from webmap.base.geometry import Pose
 from webmap.config.robot import TfConfig
 from webmap.discovery import discover
-from webmap.discovery.frame_listening import frame_topics, receive_frames
+from webmap.discovery.frames import frame_topics, receive_frames
 from webmap.discovery.tf_robots import MOST_FRAMES, Trees, bases
 from webmap.poses.frames import frames_of
 

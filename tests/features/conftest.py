@@ -6,7 +6,8 @@ import pytest
 from module_fakes import Channel, Link, Someone
 
 from webmap import Map, Robot
-from webmap.core.page import Page, PageEntry
+from webmap.core.base_page import PageEntry
+from webmap.core.page import Page
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pytest
 
 from webmap.base.errors import ConfigError
 from webmap.discovery import discover
-from webmap.discovery.doctor.configured import merge_configured
+from webmap.discovery.doctor.facts import merge_configured
 from webmap.fleet.diagnose import bridges_of
 
 URL = "ws://127.0.0.1:9090"

@@ -15,10 +15,10 @@ from webmap.config.fleet import read_fleet
 from webmap.config.robot import RobotConfig, TfConfig
 from webmap.config.toml_text import read_text
 from webmap.console import Console
-from webmap.core.configure import apply
 from webmap.core.motion import RobotMotion
-from webmap.core.robot import robots
+from webmap.core.robot import apply_config
 from webmap.core.robot_model import element_to_dict
+from webmap.core.visible_robot import robots
 from webmap.fleet import agent, of_agents
 from webmap.fleet.held import held_in_file, moving_parts
 from webmap.fleet.made import make_bridges, make_robots
@@ -179,6 +179,6 @@ def test_an_agent_takes_over_a_frame_of_a_robot_that_it_learns_later():
     before = RobotConfig(name="Bob")
     robot = Robot("Bob")
     later = before.with_part("tf", TfConfig(base_frame="chassis", namespace="/bob"))
-    mistakes = apply(robot, moving_parts(before), moving_parts(later))
+    mistakes = apply_config(robot, moving_parts(before), moving_parts(later))
     assert (mistakes.found, robot.motion.base_frame) == ([], "bob/chassis")
     robot.destroy()

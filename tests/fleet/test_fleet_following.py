@@ -8,7 +8,7 @@ import pytest
 from webmap import Bridge
 from webmap.console import Console, make_robot
 from webmap.discovery import FoundRobot, Guess, discover
-from webmap.discovery.frame_listening import late_frames
+from webmap.discovery.frames import frame_collector
 from webmap.discovery.newcomers import Newcomers
 from webmap.discovery.tf_robots import Trees
 from webmap.fleet.given import Candidate
@@ -222,7 +222,7 @@ def test_a_robot_option_is_drawn_in_a_map_frame_that_appears_later(
     robot = make_robot(config, [bridge])
     given = [ShownRobot(*about, robot, config)]
     drawing = LookingForLayers(bridge, ShownRobots(Console()), given=given)
-    frames = late_frames(bridge)
+    frames = frame_collector(bridge)
     received = []
 
     async def listen(topics):

@@ -14,8 +14,8 @@ from websockets.sync.server import serve
 
 import webmap.cli as webmap_cli
 from webmap.base.echo import LONGEST, echo
+from webmap.discovery.findings import Findings, FoundRobot, Layers
 from webmap.discovery.fleet_toml import fleet_toml
-from webmap.discovery.found import Findings, FoundRobot, Layers
 from webmap.discovery.tables import report
 
 pytestmark = pytest.mark.slow

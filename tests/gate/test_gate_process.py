@@ -11,7 +11,7 @@ import threading
 import pytest
 from gate_robot import eventually
 
-from webmap.base.children import python_command
+from webmap.base.processes import python_command
 from webmap.gate import pipe, process
 from webmap.gate.events import Shutdown
 from webmap.gate.pipe import Outbox

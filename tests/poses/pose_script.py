@@ -26,7 +26,8 @@ from typing import Any
 from webmap import Map, Robot
 from webmap.base.errors import ProtocolError
 from webmap.base.scope import Removal, current_scope, keep, no_scope
-from webmap.core.page import Page, PageEntry
+from webmap.core.base_page import PageEntry
+from webmap.core.page import Page
 from webmap.ros.bridge import BridgeStats
 from webmap.ros.rosbridge.protocol import Protocol
 from webmap.scene.node import Added, Changed

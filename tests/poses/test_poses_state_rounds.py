@@ -5,14 +5,14 @@ import asyncio
 import pytest
 from pose_script import CountingLoop
 
-from webmap.base.looking import RARELY, looking
-from webmap.core.state_rounds import AT_ONCE, EVERY, StateRounds
+from webmap.base.audience import RARELY, audience
+from webmap.core.robot_state import AT_ONCE, EVERY, StateRounds
 
 
 @pytest.fixture(autouse=True)
 def somebody_looks():
     yield
-    looking._set(True)
+    audience._set(True)
 
 
 def run(scenario):
@@ -36,7 +36,7 @@ class Looks:
 @pytest.mark.parametrize("robots", [1, AT_ONCE, AT_ONCE + 1, 10 * AT_ONCE])
 def test_each_robot_is_looked_at_regularly_with_few_timers(somebody, every, robots):
     async def scenario():
-        looking._set(somebody)
+        audience._set(somebody)
         looks = Looks(StateRounds(), robots)
         loop = asyncio.get_running_loop()
         await asyncio.sleep(2 * every)  # the first round
@@ -52,10 +52,10 @@ def test_each_robot_is_looked_at_regularly_with_few_timers(somebody, every, robo
 
 def test_who_begins_to_look_waits_no_longer_for_the_next_round():
     async def scenario():
-        looking._set(False)
+        audience._set(False)
         looks = Looks(StateRounds(), 2)
         await asyncio.sleep(0.1)
-        looking._set(True)
+        audience._set(True)
         await asyncio.sleep(EVERY + 0.01)
         assert looks.counts == [1, 1]
 
@@ -111,6 +111,6 @@ def test_looks_go_on_in_the_next_loop_and_need_one():
         assert looks.counts == [1]
 
     run(scenario)
-    looking._set(False)
-    looking._set(True)  # the loop has ended
+    audience._set(False)
+    audience._set(True)  # the loop has ended
     run(scenario)

@@ -7,7 +7,7 @@ import pytest
 from pose_script import ODOMETRY, odometry, play, transform, transforms
 
 from webmap import Bridge, Robot
-from webmap.base.looking import RARELY, looking
+from webmap.base.audience import RARELY, audience
 from webmap.features.alerts.alert_watch import conditions
 from webmap.poses.silence import PERIODS
 
@@ -18,7 +18,7 @@ LOST_AFTER = PERIODS * RARELY / 1000
 @pytest.fixture(autouse=True)
 def somebody_looks():
     yield
-    looking._set(True)
+    audience._set(True)
 
 
 @pytest.fixture
@@ -45,14 +45,14 @@ def held(robot, **changes):
 
 
 def test_few_poses_come_while_nobody_looks(bridge, robot):
-    looking._set(False)
+    audience._set(False)
     assert throttle(bridge) == RARELY
-    looking._set(True)
+    audience._set(True)
     assert throttle(bridge) == 100
 
 
 def test_all_poses_come_while_a_program_has_control_or_sent_a_goal(bridge, robot):
-    looking._set(False)
+    audience._set(False)
     held(robot, holder=SimpleNamespace(connection="p1", name="patrol"))
     assert throttle(bridge) == 100
     held(robot)
@@ -72,7 +72,7 @@ def test_all_poses_come_to_a_module_of_the_user_but_not_for_the_trail(bridge, ro
             pass
 
     robot.add_module("Trail")
-    looking._set(False)
+    audience._set(False)
     held(robot)
     assert throttle(bridge) == RARELY
     odometer = robot.add_module(Odometer)
@@ -84,7 +84,7 @@ def test_all_poses_come_to_a_module_of_the_user_but_not_for_the_trail(bridge, ro
 
 
 def test_a_topic_set_while_nobody_looks_begins_with_few_poses(bridge):
-    looking._set(False)
+    audience._set(False)
     robot = Robot("Bob")
     robot.set_odometry_topic(bridge, "/odom", type=ODOMETRY)
     assert throttle(bridge) == RARELY
@@ -93,15 +93,15 @@ def test_a_topic_set_while_nobody_looks_begins_with_few_poses(bridge):
 
 def test_moving_frames_are_received_while_somebody_looks(bridge, robot):
     robot.set_tf(bridge)
-    looking._set(False)
+    audience._set(False)
     assert set(bridge._topics) == {"/odom", "/tf_static"}
-    looking._set(True)
+    audience._set(True)
     assert set(bridge._topics) == {"/odom", "/tf_static", "/tf"}
 
 
 def test_frames_that_alone_place_a_robot_show_that_it_is_lost(bridge, robot):
     robot.set_tf(bridge)
-    looking._set(False)
+    audience._set(False)
     robot.unsubscribe_odometry_topic()
     assert "/tf" in bridge._topics
     robot.set_odometry_topic(bridge, "/odom", type=ODOMETRY)
@@ -117,9 +117,9 @@ def test_frames_that_alone_place_a_robot_show_that_it_is_lost(bridge, robot):
 
 def test_frames_that_end_while_nobody_looks_begin_no_more(bridge, robot):
     robot.set_tf(bridge)
-    looking._set(False)
+    audience._set(False)
     robot.unset_tf()
-    looking._set(True)
+    audience._set(True)
     assert set(bridge._topics) == {"/odom"}
 
 
@@ -134,13 +134,13 @@ def test_a_robot_with_few_poses_is_not_lost(monkeypatch):
         stage.link.open()
         robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
         stage.publish("/odom", odometry(0.0, stamp=100.0))
-        looking._set(False)
+        audience._set(False)
         await stage.wait(1.0)
         for number in range(1, 4):
             stage.publish("/odom", odometry(0.1 * number, stamp=100.0 + 2.9 * number))
             await stage.wait(2.9)
         await stage.wait(2.0)
-        looking._set(True)  # the bridge has sent nothing for 4.9 s
+        audience._set(True)  # the bridge has sent nothing for 4.9 s
         assert "lost" not in conditions(robot)
         assert robot.state.name != "lost"
         assert robot.pose_age == pytest.approx(4.9)  # and the page shows that age
@@ -162,13 +162,13 @@ def test_a_robot_whose_poses_end_while_nobody_looks_is_lost_later(
         robot.remove_modules()
         stage.link.open()
         robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
-        looking._set(False)
+        audience._set(False)
         stage.publish("/odom", odometry(0.0, stamp=100.0))
         await stage.wait(LOST_AFTER - 0.1)
         assert "lost" not in conditions(robot)
         await stage.wait(0.2)
         assert "lost" in conditions(robot)
-        looking._set(True)
+        audience._set(True)
         assert "lost" in conditions(robot)
 
     assert len(names(play(script, monkeypatch))) == 1
@@ -182,14 +182,14 @@ def test_no_robot_is_lost_when_fewer_poses_come_right_after_a_pose(monkeypatch, 
         stage.link.open()
         robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
         if why == "nobody drives":
-            looking._set(False)
+            audience._set(False)
             robot.pose_source.keep_on(True)
         stage.publish("/odom", odometry(0.0, stamp=100.0))
         await stage.wait(0.1)
         if why == "nobody drives":
             robot.pose_source.keep_on(False)
         else:
-            looking._set(False)
+            audience._set(False)
         await stage.wait(4.8)
         assert "lost" not in conditions(robot)
         stage.publish("/odom", odometry(0.0, stamp=105.0))
@@ -208,7 +208,7 @@ def test_a_lost_robot_stays_lost_when_nobody_looks_any_more(monkeypatch):
         stage.publish("/odom", odometry(0.0, stamp=100.0))
         await stage.wait(3.1)
         assert "lost" in conditions(robot)
-        looking._set(False)
+        audience._set(False)
         await stage.wait(1.0)
         assert "lost" in conditions(robot)
 
@@ -221,7 +221,7 @@ def test_a_moving_robot_with_few_poses_moves_between_them(monkeypatch):
         robot.remove_modules()
         stage.link.open()
         robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
-        looking._set(False)
+        audience._set(False)
         for number in range(3):
             stage.publish("/odom", odometry(2.0 * number, stamp=100.0 + 5 * number))
             await stage.wait(5.0)
@@ -244,13 +244,13 @@ def test_paused_frames_are_no_problem_and_missing_ones_are_when_somebody_looks(
             stage.publish("/tf", transforms(transform("map", "odom", 1.0, stamp=stamp)))
             stage.publish("/odom", odometry(0.0, stamp=stamp))
             await stage.wait(0.1)
-        looking._set(False)
+        audience._set(False)
         for number in range(6):
             stage.publish("/odom", odometry(0.0, stamp=105.0 + 5 * number))
             await stage.wait(5.0)
         assert robot.problems == {}
         assert robot.position.x == 1.0  # by the last frames
-        looking._set(True)
+        audience._set(True)
         for number in range(20):
             stage.publish("/odom", odometry(0.0, stamp=135.0 + number / 10))
             await stage.wait(0.1)
@@ -270,12 +270,12 @@ def test_a_trail_stays_whole_while_nobody_looks(monkeypatch):
         trail = robot.add_module("Trail")
         stage.link.open()
         robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
-        looking._set(False)
+        audience._set(False)
         for number in range(5):
             stage.publish("/odom", odometry(3.0 * number, stamp=100.0 + 2 * number))
             await stage.wait(2.0)
         assert len(trail.points) == 1
-        looking._set(True)
+        audience._set(True)
         for number in range(2):
             place = 12.0 + 1.5 * number
             stage.publish("/odom", odometry(place, stamp=110.0 + number))
@@ -290,7 +290,7 @@ def test_few_poses_come_also_before_the_type_is_known():
         bridge = Bridge("ws://robot:9090")
         robot = Robot("Bob")
         robot.set_odometry_topic(bridge, "/odom")
-        looking._set(False)
+        audience._set(False)
         robot.feed._listen_untyped()
         assert throttle(bridge) == RARELY
         robot.destroy()
@@ -305,18 +305,18 @@ def test_a_trail_is_drawn_for_who_looks(monkeypatch):
         trail = robot.add_module("Trail", length=4.0)
         stage.link.open()
         robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
-        looking._set(False)
+        audience._set(False)
         for number in range(80):
             stage.publish("/odom", odometry(0.1 * number, stamp=100.0 + 2 * number))
             await stage.wait(2.0)
         drawn = [line.get("points") for line in trail.svg.children]
         assert drawn == [None] * len(trail.points)
-        looking._set(True)
+        audience._set(True)
         texts = [line.get("points").split() for line in trail.svg.children]
         assert [len(text) for text in texts] == [len(each) for each in trail.points]
         robot.remove_module(trail)
-        looking._set(False)
-        looking._set(True)
+        audience._set(False)
+        audience._set(True)
 
     play(script, monkeypatch)
 
@@ -328,11 +328,11 @@ def test_a_trail_that_was_cleared_while_nobody_looks_stays_so(monkeypatch):
         trail = robot.add_module("Trail")
         stage.link.open()
         robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
-        looking._set(False)
+        audience._set(False)
         for number in range(3):
             stage.publish("/odom", odometry(0.1 * number, stamp=100.0 + 2 * number))
         trail.clear()
-        looking._set(True)
+        audience._set(True)
         assert not trail.svg.children
 
     play(script, monkeypatch)
@@ -344,14 +344,14 @@ def test_who_begins_to_look_gets_the_state_of_now(monkeypatch):
         robot.remove_modules()
         stage.link.open()
         robot.set_odometry_topic(stage.link, "/odom", type=ODOMETRY)
-        looking._set(False)
+        audience._set(False)
         stage.publish("/odom", odometry(0.0, stamp=100.0))
         await stage.wait(LOST_AFTER + 0.1)
         assert robot.state.name == "lost"
         assert robot.svg.get("data-state") == "watched"  # no page is open yet
-        looking._set(True)
+        audience._set(True)
         assert robot.svg.get("data-state") == "lost"
-        looking._set(False)
+        audience._set(False)
         stage.publish("/odom", odometry(0.0, stamp=113.5))
         await stage.wait(2.1)
         assert robot.svg.get("data-state") == "watched"

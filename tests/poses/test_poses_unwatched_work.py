@@ -9,7 +9,7 @@ import pytest
 from pose_script import CountingLoop, odometry
 
 import webmap
-from webmap.base.looking import RARELY, looking
+from webmap.base.audience import RARELY, audience
 from webmap.console.fleet import make_robot
 from webmap.features.alerts.alert_watch import AlertWatch
 from webmap.features.alerts.alerts import Alerts
@@ -22,7 +22,7 @@ ROBOTS = 40
 @pytest.fixture(autouse=True)
 def somebody_looks():
     yield
-    looking._set(True)
+    audience._set(True)
 
 
 class Fleet:
@@ -79,7 +79,7 @@ def test_a_robot_at_which_nobody_looks_needs_few_timers_and_calls(monkeypatch):
         loop = asyncio.get_running_loop()
         monkeypatch.setattr(time, "monotonic", loop.time)
         fleet = Fleet(loop)
-        looking._set(False)
+        audience._set(False)
         for topic in fleet.bridge._topics.values():  # messages that were late before
             for listener in topic.listeners:
                 listener.throttle.offer("first", loop.now - 0.4 * PERIOD)
@@ -95,7 +95,7 @@ def test_a_robot_at_which_nobody_looks_needs_few_timers_and_calls(monkeypatch):
         # One timer is of this test; the log needs one to notice the end of the poses.
         assert (loop.timers - poses) / poses < 1.3
         assert calls / poses < 130
-        looking._set(True)
+        audience._set(True)
         for robot in fleet.robots:
             place = robot.svg._transform
             assert place == (robot.position.x, robot.position.y, robot.yaw)
@@ -114,9 +114,9 @@ def test_who_begins_to_look_sees_everything_where_the_robot_is_now(monkeypatch):
         fleet = Fleet(loop)
         await fleet.send(PERIOD)
         trail, mark = fleet.robots[0].modules
-        looking._set(False)
+        audience._set(False)
         await fleet.send(4 * PERIOD)
-        looking._set(True)
+        audience._set(True)
         robot = fleet.robots[0]
         drawn = [trail.svg._transform, mark.svg._transform]
         robot.pose_source.draw()

@@ -23,7 +23,7 @@ TEXTS = [
     ("docs/explanation/performance.md", r"robot stops (\d+) ms after the last command"),
     ("docs/reference/glossary.md", r"\| dead-man timeout \| .*?: ([\d.]+) s \|"),
     ("docs/howto/script.md", r"sends no other for ([\d.]+) s"),
-    ("src/webmap/core/driven.py", r"which is valid for ([\d.]+) s"),
+    ("src/webmap/core/movable_robot.py", r"which is valid for ([\d.]+) s"),
     ("src/webmap/gate/display/client.py", r"another within (\d+) ms"),
     ("src/webmap/gate/display/program.py", r"another within (\d+) ms"),
     ("src/webmap/agents/displays.py", r"a robot (\d+) ms after the last command"),

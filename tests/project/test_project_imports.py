@@ -1,10 +1,16 @@
 """The modules that an import loads: they affect the start time and what can fail."""
 
+import graphlib
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
+import grimp
 import pytest
 
+ROOT = Path(__file__).parents[2]
+BIN = Path(sys.executable).parent
 HEAVY = {"PIL", "cbor2", "click", "numpy", "starlette", "uvicorn", "yaml"}
 
 
@@ -43,7 +49,7 @@ def test_the_motion_configuration_imports_nothing_of_the_display() -> None:
         "webmap.base",
         "webmap.base.errors",
         "webmap.base.logs",
-        "webmap.base.outside_text",
+        "webmap.base.text",
         "webmap.config",
         "webmap.config.checks",
         "webmap.config.motion",
@@ -73,3 +79,59 @@ def test_the_gate_process_imports_no_module_of_the_display() -> None:
     folders = {".".join(name.split(".")[:2]) for name in loaded}
     display = {"cli", "console", "core", "modules", "scene", "server", "sim", "wire"}
     assert not folders & {f"webmap.{folder}" for folder in display}
+
+
+def refuse_circles(package: str) -> None:
+    """Raise CycleError, with the modules, if any import each other in a circle."""
+    graph = grimp.build_graph(package, cache_dir=None)
+    imports = {
+        each: graph.find_modules_directly_imported_by(each) for each in graph.modules
+    }
+    graphlib.TopologicalSorter(imports).prepare()
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    refuse_circles("webmap")
+
+
+ANNOTATIONS = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    "
+CIRCLES = {
+    "two modules": ("one", "import NAME.two", "two", "import NAME.one"),
+    "annotations": ("one", "import NAME.two", "two", f"{ANNOTATIONS}import NAME.one"),
+    "a function": ("one", "import NAME.two", "two", "def f():\n    import NAME.one"),
+    "a folder": ("in/one", "import NAME.in_.two", "in/two", "import NAME.in_.one"),
+    "its init": ("in/__init__", "import NAME.in_.one", "in/one", "import NAME.in_"),
+}
+
+
+@pytest.mark.parametrize("circle", CIRCLES)
+def test_a_circle_of_imports_is_refused(circle, tmp_path, monkeypatch) -> None:
+    name = f"package_{circle.replace(' ', '_')}"
+    (tmp_path / name / "in_").mkdir(parents=True)
+    for folder in (tmp_path / name, tmp_path / name / "in_"):
+        (folder / "__init__.py").touch()
+    files = CIRCLES[circle]
+    for file, text in zip(files[::2], files[1::2], strict=True):
+        at = tmp_path / name / f"{file.replace('in/', 'in_/')}.py"
+        at.write_text(text.replace("NAME", name), "utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(graphlib.CycleError):
+        refuse_circles(name)
+    if circle != "its init":  # the contract compares the files of a folder only
+        contracts = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+        every = contracts["tool"]["importlinter"]["contracts"]
+        (own,) = [each for each in every if each["type"] == "acyclic_siblings"]
+        assert own.keys() == {"name", "type", "ancestors"}  # without exceptions
+        (tmp_path / "contract.toml").write_text(
+            f'[tool.importlinter]\nroot_package = "{name}"\n'
+            "[[tool.importlinter.contracts]]\n"
+            f'name = "x"\ntype = "{own["type"]}"\nancestors = ["{name}"]\n'
+        )
+        done = subprocess.run(
+            [BIN / "lint-imports", "--no-cache", "--config", "contract.toml"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 1
+        assert "No cycles are allowed" in done.stdout

@@ -78,7 +78,7 @@ PROTOCOL_ROOMS = (
 )
 # These messages name rosapi, as users must start it; a replay starts it, too.
 ROSBRIDGE_TEXTS = {
-    "bags/replay.py": {"rosapi"},
+    "bags/player.py": {"rosapi"},
     "cli/doctor.py": {"rosapi"},
     "fleet/find.py": {"rosapi"},
     "cli/record.py": {"rosapi"},

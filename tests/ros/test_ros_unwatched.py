@@ -5,8 +5,8 @@ import asyncio
 import pytest
 from fake_rosbridge import bridged, until
 
+from webmap.base.audience import audience
 from webmap.base.errors import ConfigError
-from webmap.base.looking import looking
 from webmap.ros.bridge import Bridge
 from webmap.ros.subscriptions import Throttle
 
@@ -16,7 +16,7 @@ TYPE = "std_msgs/String"
 @pytest.fixture(autouse=True)
 def somebody_looks():
     yield
-    looking._set(True)
+    audience._set(True)
 
 
 def asked(server, topic):
@@ -39,9 +39,9 @@ def test_what_is_only_shown_comes_rarely_while_nobody_looks_and_else_as_before()
             bridge.subscribe("/c", print, TYPE, unwatched=5000)
             bridge.subscribe("/d", print, TYPE, throttle=9000, unwatched=5000)
             await until(lambda: len(server.ops("subscribe")) == 4)
-            looking._set(False)
+            audience._set(False)
             await until(lambda: asked(server, "/a") == [5000])
-            looking._set(True)
+            audience._set(True)
             await until(lambda: asked(server, "/a") == [100])
             assert [asked(server, topic) for topic in ("/b", "/c", "/d")] == [
                 [100],
@@ -60,14 +60,14 @@ def test_a_listener_of_the_user_gets_all_messages_beside_one_that_only_shows():
             bridge.subscribe("/a", shown.append, TYPE, throttle=20, unwatched=5000)
             bridge.subscribe("/a", mine.append, TYPE, throttle=20)
             await until(lambda: server.ops("subscribe"))
-            looking._set(False)
+            audience._set(False)
             for number in range(3):
                 await server.publish("/a", {"data": str(number)})
                 await until(lambda number=number: len(mine) == number + 1)
                 await asyncio.sleep(0.03)
             assert asked(server, "/a") == [20]
             assert [message["data"] for message in shown] == ["0"]
-            looking._set(True)  # the waiting message arrives at once
+            audience._set(True)  # the waiting message arrives at once
             await until(lambda: len(shown) == 2)
             assert shown[1]["data"] == "2"
             await server.publish("/a", {"data": "3"})
@@ -84,7 +84,7 @@ def test_a_subscription_of_a_closed_bridge_is_asked_for_as_often_as_somebody_loo
             server.received.clear()
             server.drop()
             await until(lambda: bridge.state != "open")
-            looking._set(False)
+            audience._set(False)
             await until(lambda: asked(server, "/a") == [5000])
 
     asyncio.run(scenario())
@@ -94,7 +94,7 @@ def test_a_listener_may_begin_to_need_all_messages():
     async def scenario():
         async with bridged() as (server, bridge):
             listener = bridge.subscribe("/a", print, TYPE, throttle=100, unwatched=5000)
-            looking._set(False)
+            audience._set(False)
             await until(lambda: asked(server, "/a") == [5000])
             listener.set_unwatched(0)
             await until(lambda: asked(server, "/a") == [100])

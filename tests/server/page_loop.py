@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from webmap.base.tasks import spawn
-from webmap.core.page import PageEntry, Viewer
+from webmap.core.base_page import PageEntry, Viewer
 from webmap.core.runtime import Runtime
 from webmap.server.files import Published
 from webmap.server.open_pages import OpenPages

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import httpx
 
-from webmap.core.page import Viewer
+from webmap.core.base_page import Viewer
 from webmap.server.app import WebApp
 from webmap.server.page_socket import PageSocket
 from webmap.server.runner import listen, make_server

@@ -2,7 +2,7 @@ import pytest
 from server_fakes import TOKEN
 
 from webmap.base.errors import ConfigError
-from webmap.core.page import Viewer
+from webmap.core.base_page import Viewer
 from webmap.server.access import (
     AccessControl,
     Redirect,

@@ -6,17 +6,17 @@ import pytest
 from page_loop import make_model, open_page, wait_for
 
 import webmap
-from webmap.base import looking as looking_module
-from webmap.base.looking import looking
+from webmap.base import audience as audience_module
+from webmap.base.audience import audience
 from webmap_process import simulator
 
 
 @pytest.fixture
 def grace(monkeypatch):
     """A short time until robots count as unwatched."""
-    monkeypatch.setattr(looking_module, "GRACE", 0.2)
+    monkeypatch.setattr(audience_module, "GRACE", 0.2)
     yield
-    looking.end()
+    audience.end()
 
 
 def test_few_messages_come_without_a_page_and_the_first_frames_are_fresh(loop, grace):
@@ -47,24 +47,24 @@ def test_few_messages_come_without_a_page_and_the_first_frames_are_fresh(loop, g
 
         model = make_model(loop, build)
         loop.call(lambda: bridge.start(loop.runtime._loop) or True)
-        loop.call(lambda: looking.expect_pages(loop.runtime._loop) or True)
-        wait_for(lambda: not looking.somebody and bridge.state == "open")
+        loop.call(lambda: audience.expect_pages(loop.runtime._loop) or True)
+        wait_for(lambda: not audience.present and bridge.state == "open")
         time.sleep(1.0)  # for messages that were already sent
         few = received(4.0)
         assert few <= 2 * (4 / 2 + 4 / 5) + 4  # poses and scans, and one more of each
         handle, socket = open_page(model)
         wait_for(lambda: socket.frames)
-        assert looking.somebody
+        assert audience.present
         wait_for(fresh)
         before = bridge.stats.frames
         wait_for(lambda: bridge.stats.frames > before + 10 * few)
         handle.closed()
-        wait_for(lambda: not looking.somebody)
+        wait_for(lambda: not audience.present)
         subscription = loop.call(
             lambda: bridge.subscribe("/robot_0/odom", mine.append, throttle=100)
         )
         wait_for(lambda: len(mine) > 30)  # a user's own code gets all messages
-        assert not looking.somebody
+        assert not audience.present
         loop.call(lambda: subscription.remove() or True)
         loop.call(lambda: model.close() or True)
         loop.wait(bridge.stop())

@@ -50,7 +50,7 @@ class Bench:
     def __enter__(self):
         from server_fakes import running
 
-        from webmap.core.page import Viewer
+        from webmap.core.base_page import Viewer
 
         def authenticate(scope):
             headers = dict(scope["headers"])

@@ -251,7 +251,7 @@ def gone(robot):
 
 def all_robots():
     """Every robot of the process, by name."""
-    from webmap.core.robot import robots
+    from webmap.core.visible_robot import robots
 
     return sorted(robots.values(), key=lambda robot: robot.name)
 

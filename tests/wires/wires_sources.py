@@ -46,7 +46,7 @@ from webmap.gate.specs import checked
 from webmap.server import application
 
 # Loaded here once, and not again in the process of each source.
-import webmap.cli.check  # isort: skip
+import webmap.cli.run  # isort: skip
 import webmap.cli.discover  # isort: skip
 import webmap.fleet.found  # isort: skip
 import webmap.fleet.shown  # isort: skip

@@ -20,7 +20,7 @@ from webmap.agents.allowance import Allowance
 from webmap.agents.looks import AgentClock, Look, LookAway
 from webmap.agents.peer import Peer, peer_of
 from webmap.base.errors import ConfigError, WireError
-from webmap.base.outside_text import one_line
+from webmap.base.text import one_line
 
 log = logging.getLogger("webmap.agent")
 

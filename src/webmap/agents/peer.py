@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Self
 from webmap.agents.address import ANYONE, checked_name, locator
 from webmap.agents.reach import why_not_reached
 from webmap.base.errors import ConfigError, WireError
-from webmap.base.outside_text import one_line
+from webmap.base.text import one_line
 
 if TYPE_CHECKING:
     import zenoh

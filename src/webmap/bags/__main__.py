@@ -9,11 +9,10 @@ from pathlib import Path
 from webmap.bags import need_rosbags
 from webmap.bags.player import Player
 from webmap.bags.recording import Recording
-from webmap.base.children import end_with_parent
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.logs import set_up_logging
-from webmap.base.not_listening import why_not_listening
-from webmap.base.outside_text import one_line
+from webmap.base.processes import end_with_parent, why_not_listening
+from webmap.base.text import one_line
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.server import RosbridgeServer

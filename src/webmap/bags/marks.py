@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from webmap.bags.playback import Mark, Marks
 from webmap.bags.recording import LOGS, Recording
-from webmap.bags.status import Mark, Marks
 from webmap.bags.times import SECOND
 from webmap.base.errors import ConfigError
-from webmap.base.outside_text import one_line
+from webmap.base.text import one_line
 
 MOST = 500
 """The greatest number of marks; further events are only counted."""

@@ -1,7 +1,13 @@
-"""Commands to a replay, and the position that they lead to; asks no clock."""
+"""Commands to a replay, the position that they lead to, and the status; asks no clock.
+
+The topics of status and marks carry a ``std_msgs/String`` with JSON. Only the replay
+publishes them: they are neither recorded nor played from a recording.
+"""
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple
+
+import msgspec
 
 from webmap.bags.times import SECOND, Pace
 from webmap.base.errors import ConfigError
@@ -16,7 +22,7 @@ LIMITS = {"seek": (0.0, 1e9), "rate": (SLOWEST, FASTEST)}
 """The commands with a value, and its limits: a position in seconds, or a rate."""
 
 
-class Command(NamedTuple):
+class PlaybackCommand(NamedTuple):
     """What an operator wants of a replay."""
 
     name: str
@@ -28,7 +34,7 @@ class Command(NamedTuple):
         return self.name if self.name in PLAIN else f"{self.name} {self.value!r}"
 
 
-def command_of(name: object, value: object = None) -> Command:
+def command_of(name: object, value: object = None) -> PlaybackCommand:
     """Return a command.
 
     Args:
@@ -40,7 +46,7 @@ def command_of(name: object, value: object = None) -> Command:
 
     """
     if name in PLAIN and value is None:
-        return Command(str(name))
+        return PlaybackCommand(str(name))
     if not isinstance(name, str) or name not in LIMITS:
         raise ConfigError(
             f"a command to a recording is again, play, pause, seek SECONDS or rate "
@@ -52,10 +58,10 @@ def command_of(name: object, value: object = None) -> Command:
         raise ConfigError(
             f"{name} needs a number from {least:g} to {most:g}, got {str(value)[:40]!r}"
         )
-    return Command(name, float(value))  # type: ignore[arg-type]
+    return PlaybackCommand(name, float(value))  # type: ignore[arg-type]
 
 
-def read_command(line: str) -> Command:
+def read_command(line: str) -> PlaybackCommand:
     """Return the command of a line.
 
     Raises:
@@ -140,7 +146,7 @@ class Playback:
         else:
             self._hold(at)
 
-    def obey(self, command: Command, now: int) -> None:
+    def obey(self, command: PlaybackCommand, now: int) -> None:
         """Carry out a command."""
         name, value = command
         if name == "rate":
@@ -168,3 +174,63 @@ class Playback:
     def _hold(self, at: int) -> None:
         self.turn += 1
         self._held = at
+
+
+STATUS = "/webmap/recording"
+"""Topic with the newest :class:`PlaybackStatus`, at least twice a second."""
+
+MARKS = "/webmap/recording/marks"
+"""Topic with the newest :class:`Marks`, whenever they changed."""
+
+TYPE = "std_msgs/String"
+"""The type of both topics."""
+
+
+class PlaybackStatus(msgspec.Struct, frozen=True):
+    """Where the recording is, and how it is played."""
+
+    name: str
+    at: float
+    """The position, in seconds since the begin of the recording."""
+    seconds: float
+    """The length of the recording."""
+    rate: float
+    """Seconds of the recording that are played per second."""
+    playing: bool
+    ended: bool
+    """Whether it was played to the end: playing starts again from the beginning."""
+    jumps: int
+    """How often the position has jumped, by a command or at a new round."""
+    problem: str = ""
+    """Why the rest of the recording is not played."""
+
+
+class Mark(msgspec.Struct, frozen=True):
+    """An event in a recording."""
+
+    at: float
+    """The time, in seconds since the begin of the recording."""
+    kind: Literal["stop", "goal", "result", "alarm"]
+    text: str
+
+
+class Marks(msgspec.Struct, frozen=True):
+    """The events that were found up to now."""
+
+    marks: list[Mark]
+    """In the order of their times."""
+    left_out: int = 0
+    """The number of further events, which are not listed."""
+    read: float = 1.0
+    """The part of the recording that was read, from 0 to 1."""
+
+
+class StringMessage(msgspec.Struct):
+    """A ``std_msgs/String`` with a status or marks."""
+
+    data: str
+
+
+def text_of(value: PlaybackStatus | Marks) -> str:
+    """Return the JSON of a status or marks."""
+    return msgspec.json.encode(value).decode()

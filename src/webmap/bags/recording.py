@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from webmap.bags.messages import Messages
 from webmap.bags.times import SECOND
-from webmap.bags.types import texts_of
+from webmap.bags.types import MessageConverter, texts_of
 from webmap.base.errors import ConfigError
 from webmap.base.plain_files import refuse_special, resolved
 from webmap.ros.definitions import Definitions, UnknownType
@@ -92,7 +91,7 @@ class Recorded(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RecordedTopic:
-    """A topic of a recording."""
+    """A topic of a recording with its one type."""
 
     name: str
     type: str
@@ -144,15 +143,15 @@ class Recording:
         except Exception as error:
             self.close()
             raise unreadable(self.paths, error) from None
-        self._messages = Messages(self.schema)
+        self._messages = MessageConverter(self.schema)
 
     @property
     def seconds(self) -> float:
-        """Duration in seconds."""
+        """The time from the first to the last message, in seconds."""
         return (self.end - self.begin) / SECOND
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the files; a second call does nothing."""
         if not self._closed:
             self._closed = True
             self._reader.close()

@@ -5,7 +5,7 @@ import contextlib
 import click
 
 from webmap.base.logs import budgets
-from webmap.base.outside_text import lines_of, one_line
+from webmap.base.text import lines_of, one_line
 
 LONGEST = 10_000
 """Most characters of a printed line; a list of topics may be long."""

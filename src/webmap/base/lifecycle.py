@@ -1,7 +1,7 @@
 """The life cycle of services: constructors register, :func:`webmap.start` does the I/O.
 
-A :class:`Service`, such as a bridge, adds itself to :data:`lifecycle` when it is
-created. Nothing happens until the model's event loop runs; from then on an added
+A :class:`LifecycleService`, such as a bridge, adds itself to :data:`lifecycle` when it
+is created. Nothing happens until the model's event loop runs; from then on an added
 service starts at once.
 """
 
@@ -15,7 +15,7 @@ from typing import Any, Protocol
 log = logging.getLogger("webmap")
 
 
-class Service(Protocol):
+class LifecycleService(Protocol):
     """An object with I/O of its own on the model's event loop."""
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
@@ -39,23 +39,23 @@ class Lifecycle:
         """Whether the model's event loop runs now."""
         return self.loop is not None
 
-    def add(self, service: Service) -> None:
+    def add(self, service: LifecycleService) -> None:
         """Start ``service`` with the process, or now if that has started."""
         self._services.add(service)
         if self.loop is not None:
             self.call(service.start, self.loop)
 
-    def discard(self, service: Service) -> None:
+    def discard(self, service: LifecycleService) -> None:
         """Forget ``service``, without stopping it."""
         self._services.discard(service)
 
-    def end_service(self, service: Service) -> None:
+    def end_service(self, service: LifecycleService) -> None:
         """Forget ``service`` and stop it soon, if the process has started."""
         self.discard(service)
         if self.loop is not None:
             self.call(self._begin_to_stop, service)
 
-    def _begin_to_stop(self, service: Service) -> None:
+    def _begin_to_stop(self, service: LifecycleService) -> None:
         task = asyncio.get_running_loop().create_task(_stop(service))
         self._stopping.add(task)
         task.add_done_callback(self._stopping.discard)
@@ -87,7 +87,7 @@ class Lifecycle:
         await asyncio.gather(*stopping, *self._stopping, return_exceptions=True)
 
 
-async def _stop(service: Service) -> None:
+async def _stop(service: LifecycleService) -> None:
     try:
         await service.stop()
     except Exception as error:

@@ -6,8 +6,8 @@ from typing import Any
 import yaml
 
 from webmap.base.errors import ConfigError
-from webmap.base.outside_text import one_line
 from webmap.base.plain_files import read_file
+from webmap.base.text import one_line
 
 LARGEST = 1 << 18
 """Most bytes of a file; a megabyte takes half a minute to read."""

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from webmap.base.outside_text import one_line
+from webmap.base.text import one_line
 
 LOGGERS = (
     "webmap",

@@ -1,4 +1,4 @@
-"""The command line: one file for each command, named as the command.
+"""The command line; ``COMMANDS`` names the file of each command.
 
 A command reads its options and calls another folder; robots and fleets are made in
 ``webmap.fleet``. ``options`` has the options of several commands. Open ``view`` first.
@@ -17,13 +17,13 @@ from webmap.base.errors import ConfigError, WebMapError
 
 COMMANDS = {
     "agent": "webmap.cli.agent:agent",
-    "check": "webmap.cli.check:check",
+    "check": "webmap.cli.run:check",
     "demo": "webmap.cli.demo:demo",
     "discover": "webmap.cli.discover:discover",
     "doctor": "webmap.cli.doctor:doctor",
     "play": "webmap.cli.play:play",
     "record": "webmap.cli.record:record",
-    "router": "webmap.cli.router:router",
+    "router": "webmap.cli.agent:router",
     "run": "webmap.cli.run:run",
     "sim": "webmap.cli.sim:sim",
     "view": "webmap.cli.view:view",
@@ -39,11 +39,11 @@ class LazyGroup(click.Group):
     """A group whose commands are loaded when they are used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names of the commands."""
+        """Return the names in the order of the help, without loading a command."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Load a command."""
+        """Import the module of a command; None if there is no such command."""
         home = COMMANDS.get(cmd_name)
         if home is None:
             return None

@@ -1,14 +1,203 @@
-"""``webmap demo``: runs the simulator and the console for its robots."""
+"""``webmap demo``: the simulator, a bad link or agents, and the console."""
 
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from importlib import import_module
 from importlib.resources import as_file, files
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from urllib.parse import urlsplit
 
 import click
 
-from webmap.cli.bad_link import bad_link, bad_link_options
-from webmap.cli.demo_agents import demo_of_agents
+from webmap.base.echo import echo
+from webmap.base.errors import ConfigError
+from webmap.base.processes import GRACE, child_process
 from webmap.cli.demo_robots import FREE, demo_robot
-from webmap.cli.demo_simulator import simulator
-from webmap.cli.options import PORT, simulator_options, web_options
+from webmap.cli.options import PORT, Finite, simulator_options, web_options
+
+if TYPE_CHECKING:
+    from webmap.sim.proxy import FaultProxy
+
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+STALL_EVERY = 20.0
+"""Seconds from the start of a stall to the start of the next one."""
+
+LONGEST_DELAY = 5000.0
+"""Greatest delay and greatest jitter, in milliseconds."""
+
+LONGEST_STALL = 10.0
+"""Greatest length of a stall, in seconds."""
+
+
+def bad_link_options(command: F) -> F:
+    """Add ``--delay``, ``--jitter`` and ``--stall`` to a command (decorator)."""
+    for option in (
+        click.option(
+            "--stall",
+            type=Finite(0.0, LONGEST_STALL),
+            default=0.0,
+            metavar="SECONDS",
+            help=f"Every {STALL_EVERY:g} s, let the link to the robots carry nothing "
+            f"for this long; at most {LONGEST_STALL:g}.",
+        ),
+        click.option(
+            "--jitter",
+            type=Finite(0.0, LONGEST_DELAY),
+            default=0.0,
+            metavar="MS",
+            help="Delay messages by up to this many milliseconds more, at random.",
+        ),
+        click.option(
+            "--delay",
+            type=Finite(0.0, LONGEST_DELAY),
+            default=0.0,
+            metavar="MS",
+            help="Delay the link to the robots by this many milliseconds each way.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+@contextmanager
+def bad_link(url: str, delay: float, jitter: float, stall: float) -> Iterator[str]:
+    """Yield the address of a bad link to a server; its own address without faults.
+
+    Args:
+        url: Address of the server, on the loopback address.
+        delay: Milliseconds by which every byte is delayed, each way.
+        jitter: Most milliseconds that are added to the delay at random.
+        stall: Seconds for which the link carries nothing, every ``STALL_EVERY``
+            seconds.
+
+    """
+    port = urlsplit(url).port
+    if port is None or not (delay or jitter or stall):
+        yield url
+        return
+    from webmap.sim.proxy import FaultProxy, Shape
+
+    with FaultProxy(port) as proxy:
+        proxy.shape(Shape(latency=delay / 1000, jitter=jitter / 1000))
+        with _stalls(proxy, stall):
+            yield f"ws://127.0.0.1:{proxy.port}"
+
+
+@contextmanager
+def _stalls(proxy: "FaultProxy", seconds: float) -> Iterator[None]:
+    """Stall a link every ``STALL_EVERY`` seconds until the block ends."""
+    if not seconds:
+        yield
+        return
+    ended = threading.Event()
+
+    def stall() -> None:
+        while not ended.wait(STALL_EVERY - seconds):
+            proxy.hold()
+            ended.wait(seconds)
+            proxy.release()
+
+    thread = threading.Thread(target=stall, name="stalls")
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+ROUTER_READY = "The router is ready at "
+
+
+@contextmanager
+def demo_of_agents(number: int, dialect: str, seed: int) -> Iterator[None]:
+    """Open the console for the robots of agents, with everything that they need.
+
+    Raises:
+        ConfigError: If a part does not start.
+
+    """
+    import webmap
+    from webmap import console
+    from webmap.fleet.of_agents import find_agents
+
+    with ExitStack() as running:
+        router = running.enter_context(demo_router())
+        for index in range(number):
+            options = ("--robots", 1, "--port", 0, "--seed", seed + index)
+            url = running.enter_context(simulator(*options, "--dialect", dialect))
+            agent = ("agent", url, "--router", router, "--name", f"bay{index + 1}")
+            running.enter_context(child("is ready", *agent, "--with-parent"))
+        data = running.enter_context(as_file(files("webmap.sim") / "data"))
+        floor = data / "floor.yaml"
+        other = ("view", router, "--floor", floor, "--port", 0, "--no-browser")
+        line = running.enter_context(child("is ready at", *other))
+        echo(f"A second display: {line}", err=True)
+        bridges: list[webmap.Bridge] = []
+        agents = find_agents([router], bridges)
+        opened = console.open_console(
+            bridges, [], floor=floor, title="Demo", place="demo of agents"
+        )
+        for each in agents:
+            each.show_on(opened)
+        yield
+
+
+@contextmanager
+def demo_router() -> Iterator[str]:
+    """Run a router on a free port of this computer; yield its address."""
+    options = ("router", "--listen", "tcp/127.0.0.1:0", "--with-parent")
+    with child(ROUTER_READY, *options) as line:
+        yield line.removeprefix(ROUTER_READY).strip()
+
+
+@contextmanager
+def child(ready: str, *arguments: object) -> Iterator[str]:
+    """Run a command of WebMap and yield its first line.
+
+    Raises:
+        ConfigError: If it does not start.
+
+    """
+    with child_process("webmap", *arguments) as started:
+        if ready not in started.line:
+            raise ConfigError(f"webmap {arguments[0]} has ended before it was ready")
+        yield started.line.strip()
+
+
+READY = "rosbridge is ready at "
+USAGE = 2
+"""Exit status of a command that has reported an error in one sentence."""
+
+
+def _give_up(status: int) -> NoReturn:
+    """End the command, with an error if the simulator has reported none."""
+    if status == USAGE:
+        sys.exit(USAGE)
+    raise ConfigError(f"the simulator ended with status {status} before it was ready")
+
+
+@contextmanager
+def simulator(*arguments: object) -> Iterator[str]:
+    """Run ``webmap sim`` as a child process and yield the URL of its rosbridge.
+
+    It ends with this process, however that ends, because its standard input closes.
+
+    Raises:
+        ConfigError: If it does not start.
+
+    """
+    with child_process("webmap", "sim", "--with-parent", *arguments) as started:
+        # The simulator starts meanwhile, which takes half a second as well.
+        import_module("webmap.console")
+        if not started.line.startswith(READY):
+            _give_up(started.process.wait(GRACE))
+        yield started.line.removeprefix(READY).strip()
+
 
 ROBOTS = 5
 """Number of robots, if it is not given."""

@@ -103,7 +103,7 @@ def doctor(
         sys.exit(find_out(url, stop_test, wait=wait, yes=yes))
     from webmap.agents.present import agents_behind, one_agent
     from webmap.base.errors import BridgeClosed
-    from webmap.discovery.doctor import Observed, is_ready, judge
+    from webmap.discovery.doctor import BridgeFacts, is_ready, judge
     from webmap.discovery.doctor.measure import observe
     from webmap.discovery.doctor.verdict import report
     from webmap.fleet.diagnose import Configured, bridges_of
@@ -124,7 +124,7 @@ def doctor(
         def waiting(why: str, address: str = address) -> None:
             echo(f"Waiting for the rosbridge at {address}: {why}", err=True)
 
-        seen = Observed(address, trouble=trouble)
+        seen = BridgeFacts(address, trouble=trouble)
         if not trouble:
             seen = asyncio.run(
                 observe(

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import click
 
-from webmap.bags.playback import Command
-from webmap.base.child_process import child_process
+from webmap.bags.playback import PlaybackCommand
 from webmap.base.echo import echo
 from webmap.base.errors import ConfigError
+from webmap.base.processes import child_process
 from webmap.cli.options import PORT, Finite, web_options
 
 
@@ -91,7 +91,9 @@ def play(
 
 
 @contextlib.contextmanager
-def replay(*arguments: object) -> Iterator[tuple[str, Callable[[Command], None]]]:
+def replay(
+    *arguments: object,
+) -> Iterator[tuple[str, Callable[[PlaybackCommand], None]]]:
     """Run a replay as a child process.
 
     Yields the URL of its rosbridge, and a function that gives it a command.
@@ -111,7 +113,7 @@ def replay(*arguments: object) -> Iterator[tuple[str, Callable[[Command], None]]
         if not line.startswith(READY):
             raise ConfigError("the replay did not start; its error message is above")
 
-        def give(command: Command) -> None:
+        def give(command: PlaybackCommand) -> None:
             try:  # unbuffered: a buffer would keep the line and fail again at exit
                 os.write(started.stdin.fileno(), f"{command.line}\n".encode())
             except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""``webmap run FILE``: serves a Python script's pages or a fleet file in TOML."""
+"""``webmap run FILE`` serves a script or a fleet file; ``webmap check`` checks one."""
 
 import runpy
 import sys
@@ -6,8 +6,10 @@ from pathlib import Path
 
 import click
 
+from webmap.base.echo import echo
 from webmap.base.plain_files import refuse_special
-from webmap.cli.options import web_options
+from webmap.base.text import counted
+from webmap.cli.options import verbose_option, web_options
 
 
 @click.command(short_help="Serve your own pages, or the robots of a fleet file.")
@@ -39,3 +41,22 @@ def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) 
     runpy.run_path(str(file), run_name="__main__")
     if not application.has_run:
         application.run()
+
+
+@click.command(short_help="Validate a fleet file and list its mistakes.")
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@verbose_option
+def check(file: Path) -> None:
+    """Validate a fleet file as webmap run reads it, and list its mistakes.
+
+    No connection is opened. Every mistake is shown with its line; the exit code is 2
+    if there is one.
+    """
+    from webmap.fleet.made import prepare
+
+    ready = prepare(file)
+    robots = counted(len(ready.robots), "robot")
+    if ready.agents:
+        robots += " and the robots of agents"
+    bridges = counted(len(ready.fleet.bridges), "bridge")
+    echo(f"{file}: {robots} behind {bridges}, no mistakes")

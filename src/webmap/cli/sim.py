@@ -8,8 +8,8 @@ from typing import Literal
 import click
 from click.core import ParameterSource
 
-from webmap.base.children import end_with_parent
 from webmap.base.echo import echo
+from webmap.base.processes import end_with_parent
 from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
 
 

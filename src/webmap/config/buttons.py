@@ -14,7 +14,7 @@ from webmap.ros.message_forms import checked, fields_of
 from webmap.ros.moving import moved_by_both, moved_by_name, moved_by_type
 from webmap.ros.names import normalise_topic, split_type
 
-Kind = Literal["service", "topic", "parameter"]
+ButtonKind = Literal["service", "topic", "parameter"]
 
 TIMEOUT = 10.0
 """The default time for a service to answer, in seconds."""
@@ -24,7 +24,7 @@ MAX_LABEL = 60
 MAX_BUTTONS = 100
 
 _COMMON = ("label", "confirm", "timeout", "form", "during_stop")
-_KEYS: dict[Kind, tuple[str, ...]] = {
+_KEYS: dict[ButtonKind, tuple[str, ...]] = {
     "service": (*_COMMON, "service", "type", "args"),
     "topic": (*_COMMON, "topic", "type", "message"),
     "parameter": (*_COMMON, "parameter", "node", "value"),
@@ -82,10 +82,10 @@ class ButtonMistake(ConfigError):
 
 @dataclass(frozen=True, slots=True)
 class ButtonSpec:
-    """The action of one button."""
+    """What a press of one button sends to the robot, and what it shows."""
 
     label: str
-    kind: Kind
+    kind: ButtonKind
     name: str
     """The resolved name of the service or the topic, or the parameter's name."""
 
@@ -164,7 +164,7 @@ def read_button(data: Mapping[str, Any]) -> ButtonSpec:
     """
     if not isinstance(data, Mapping):
         raise ButtonMistake("", f"got {data!r}, expected a table of keys and values")
-    kinds: list[Kind] = [kind for kind in _KEYS if kind in data]
+    kinds: list[ButtonKind] = [kind for kind in _KEYS if kind in data]
     if len(kinds) != 1:
         got = " and ".join(kinds) or "none of them"
         raise ButtonMistake(
@@ -200,7 +200,7 @@ def read_button(data: Mapping[str, Any]) -> ButtonSpec:
     return spec
 
 
-def motion_of(kind: Kind, name: str, type: str | None) -> str | None:
+def motion_of(kind: ButtonKind, name: str, type: str | None) -> str | None:
     """Return why no button may write something, or None if it may.
 
     Args:
@@ -233,7 +233,7 @@ def _label(data: Mapping[str, Any]) -> str:
     return label.strip()
 
 
-def _name(data: Mapping[str, Any], kind: Kind) -> str:
+def _name(data: Mapping[str, Any], kind: ButtonKind) -> str:
     name = data[kind]
     if kind == "parameter":
         if not isinstance(name, str) or not name.strip():
@@ -248,7 +248,7 @@ def _name(data: Mapping[str, Any], kind: Kind) -> str:
         ) from None
 
 
-def _type(data: Mapping[str, Any], kind: Kind) -> str | None:
+def _type(data: Mapping[str, Any], kind: ButtonKind) -> str | None:
     type = data.get("type")
     if type is None and kind != "topic":
         return None

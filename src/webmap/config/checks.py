@@ -10,7 +10,7 @@ from numbers import Integral, Real
 from typing import Any, TypeAlias
 
 from webmap.base.errors import ConfigError
-from webmap.base.outside_text import one_line
+from webmap.base.text import one_line
 from webmap.ros.names import normalise_topic, split_type
 
 KeyPath: TypeAlias = tuple[str | int, ...]
@@ -58,7 +58,7 @@ class Mistakes:
     ``("robots", 3, "twist")``."""
 
     def add(self, path: KeyPath, message: str) -> None:
-        """Add one mistake."""
+        """Add a mistake; beyond the greatest number it is only counted."""
         self.wrong.add(path[:3])
         if self.full:
             self.more += 1
@@ -74,7 +74,7 @@ class Mistakes:
 
     @property
     def count(self) -> int:
-        """The number of mistakes."""
+        """The number of mistakes, including those that are only counted."""
         return len(self.found) + self.more
 
     @property
@@ -258,7 +258,7 @@ def finite(expected: str) -> Check:
 
 
 def between(low: float, high: float, unit: str) -> Check:
-    """Return a check for a number from ``low`` to ``high``."""
+    """Return a check for a finite number within both limits, which are included."""
 
     def check(value: Any) -> float:
         if not _number(value) or not low <= value <= high:
@@ -269,7 +269,7 @@ def between(low: float, high: float, unit: str) -> Check:
 
 
 def whole(low: int, high: int) -> Check:
-    """Return a check for a whole number from ``low`` to ``high``."""
+    """Return a check for an integer within both limits; a boolean is none."""
 
     def check(value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, Integral):

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from webmap.base.errors import ConfigError
-from webmap.base.outside_text import escaped
+from webmap.base.text import escaped
 from webmap.config import checks
 from webmap.config.checks import KeyPath, Mistakes, key_path_text, same_name, show
 from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
@@ -34,7 +34,7 @@ def _address(value: Any) -> str:
 
 
 class BridgeConfig(Config, kw_only=True, frozen=True):
-    """A bridge of the file."""
+    """A bridge: its address, and the alignment of its robots on the common map."""
 
     url: Annotated[str, _address]
     alignment: Alignment | None = None
@@ -257,13 +257,13 @@ def _no_name_twice(robots: Sequence[RobotConfig], mistakes: Mistakes) -> None:
 SHORT = ("odometry", "twist", "move", "initial_pose", "cameras")
 """Keys whose value may be a topic alone."""
 
-Remarks = Mapping[KeyPath, str]
+RemarkTexts = Mapping[KeyPath, str]
 
 
 def dump(
     data: Mapping[str, Any],
     *,
-    remarks: Remarks | None = None,
+    remarks: RemarkTexts | None = None,
     below: Mapping[KeyPath, Sequence[str]] | None = None,
     head: str = "",
 ) -> str:
@@ -305,7 +305,7 @@ class _Writer:
     """Writes TOML tables with comments."""
 
     def __init__(
-        self, remarks: Remarks, below: Mapping[KeyPath, Sequence[str]]
+        self, remarks: RemarkTexts, below: Mapping[KeyPath, Sequence[str]]
     ) -> None:
         self._remarks = remarks
         self._below = below

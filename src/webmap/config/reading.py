@@ -157,7 +157,7 @@ def read_part(
 def unknown(
     key: object, known: Iterable[str], path: KeyPath, mistakes: Mistakes
 ) -> None:
-    """Add the mistake of an unknown key."""
+    """Add a mistake that lists the known keys, with the most similar one as a hint."""
     if mistakes.full:
         mistakes.add(path, str(key))  # only counted: a hint takes long
         return

@@ -137,7 +137,7 @@ class ModuleConfig(Config, kw_only=True, frozen=True):
     options: Annotated[dict[str, Any], checks.table] = {}
 
 
-class Layer(NamedTuple):
+class ModuleEntry(NamedTuple):
     """A module of a robot, and the configuration key that adds it."""
 
     path: KeyPath
@@ -279,7 +279,7 @@ class RobotConfig(Config, kw_only=True, frozen=True):
         return getattr(self.motion if key in MOTION else self, key)
 
     def with_part(self, key: str, part: Any) -> "RobotConfig":
-        """Return the robot with a part replaced."""
+        """Return a copy with another part, of ``motion`` too; None removes the part."""
         if key in MOTION:
             motion = msgspec.structs.replace(self.motion, **{key: part})
             return msgspec.structs.replace(self, motion=motion)
@@ -307,10 +307,10 @@ class RobotConfig(Config, kw_only=True, frozen=True):
             for path, bridge in bridges_of(module):
                 yield ("modules", index, *path), bridge
 
-    def layers(self) -> list[Layer]:
+    def layers(self) -> list[ModuleEntry]:
         """Return every module that draws or shows something of the robot, in order."""
         link = {"bridge": self.bridge}
-        layers: list[Layer] = []
+        layers: list[ModuleEntry] = []
         for number, scan in enumerate(self.scan, 1):
             options: dict[str, Any] = {"max_dots": None, "throttle": 100}
             if number > 1:
@@ -318,13 +318,13 @@ class RobotConfig(Config, kw_only=True, frozen=True):
             module = ModuleConfig(
                 name="LaserScanner", args=[link, scan], options=options
             )
-            layers.append(Layer(("scan", number - 1), module))
+            layers.append(ModuleEntry(("scan", number - 1), module))
         if self.battery:
             battery = ModuleConfig(name="Battery", args=[link, self.battery])
-            layers.append(Layer(("battery",), battery))
+            layers.append(ModuleEntry(("battery",), battery))
         if self.buttons:
             buttons = ModuleConfig(name="Buttons", args=[link, self.buttons])
-            layers.append(Layer(("buttons",), buttons))
+            layers.append(ModuleEntry(("buttons",), buttons))
         for index, camera in enumerate(named_cameras(self.cameras)):
             throttle = camera.throttle
             options = {} if throttle is None else {"throttle": throttle}
@@ -333,9 +333,11 @@ class RobotConfig(Config, kw_only=True, frozen=True):
             module = ModuleConfig(
                 name=kind, args=[*where, camera.name], options=options
             )
-            layers.append(Layer(("cameras", index), module))
+            layers.append(ModuleEntry(("cameras", index), module))
         listed = enumerate(self.modules)
-        return layers + [Layer(("modules", index), module) for index, module in listed]
+        return layers + [
+            ModuleEntry(("modules", index), module) for index, module in listed
+        ]
 
 
 def read_robot(value: Any, path: KeyPath, mistakes: Mistakes) -> RobotConfig | None:

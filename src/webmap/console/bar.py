@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from webmap import html, refusals
-from webmap.base.counted import counted
+from webmap.base.text import counted
 from webmap.console.texts import icon
 from webmap.poses.frames import frame_faults
 

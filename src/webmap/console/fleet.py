@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import webmap
 from webmap import Element, svg
 from webmap.base import geometry
-from webmap.base.looking import looking
+from webmap.base.audience import audience
 from webmap.console.texts import NEED_A_PERSON, look_of
 
 if TYPE_CHECKING:
@@ -158,19 +158,19 @@ class StateMark:
         robot.svg.insert(list(robot.svg.children).index(robot.model) + 1, self.svg)
         self.on_odometry_update()
         self.on_state()
-        looking.follow(self)
+        audience.follow(self)
 
     def destroy(self) -> None:
         """Remove badge, name and words."""
-        looking.forget(self)
+        audience.forget(self)
         self.svg.remove()
 
     def on_odometry_update(self) -> None:
         """Turn against the robot's heading, so that everything stays upright."""
-        if looking.somebody:
+        if audience.present:
             self.svg.set_pose(0.0, 0.0, -self.robot.yaw)
 
-    looking_changed = on_odometry_update
+    audience_changed = on_odometry_update
 
     def on_state(self, state: object = None) -> None:
         """Show the state."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("webmap.alignment")
 
-Numbers = tuple[float, float, float]
+AlignmentNumbers = tuple[float, float, float]
 
 
 class AlignmentStore:
@@ -39,7 +39,7 @@ class AlignmentStore:
 
     def __init__(self, folder: Path | None = None) -> None:
         self._folder = folder
-        self._stated: dict[str, Numbers | None] = {}
+        self._stated: dict[str, AlignmentNumbers | None] = {}
         """The alignment of each name that was stated before the saved one replaced
         it."""
 
@@ -137,7 +137,7 @@ def name_of(bridge: Bridge, robot: str = "") -> str:
     return f"{parts.scheme}://{host}{port}{parts.path} {robot}".strip()
 
 
-def _of(pose: Pose | None) -> Numbers | None:
+def _of(pose: Pose | None) -> AlignmentNumbers | None:
     return None if pose is None else numbers(pose)
 
 

@@ -46,7 +46,7 @@ class Map(WorldView):
         self.selected: Robot | None = None
         self.marked: list[Robot] = []
         """Robots selected in addition, for actions on several robots; never driven."""
-        self.page.maps.append(self)
+        self.page.contents.append(self)
         self.page.listen(
             self._mount, self.root, "click", lambda event: self.set_selected(None)
         )
@@ -183,7 +183,7 @@ class Map(WorldView):
         for robot in tuple(reversed(self.robots)):
             self.remove_robot(robot)
         self.unmount(self._robots)
-        self.page.maps.remove(self)
+        self.page.contents.remove(self)
         self.leave_page()
 
 

@@ -26,13 +26,10 @@ from typing import (
 )
 
 from webmap.base.errors import ConfigError
-from webmap.config.checks import did_you_mean
+from webmap.config.checks import KeyPath, did_you_mean
 from webmap.ros.names import normalise_topic
 
-KeyPath: TypeAlias = tuple[str | int, ...]
-"""Keys and indices that lead to a value."""
-
-Misfit: TypeAlias = tuple[KeyPath, Any, str]
+Mismatch: TypeAlias = tuple[KeyPath, Any, str]
 """The path of a value of the wrong type, the value, and the expected type."""
 
 _PLAIN = (str, bytes, int, float, list, tuple, dict, type(None))
@@ -70,7 +67,7 @@ def resolved(annotation: Any, owner: Callable[..., Any]) -> Any:
     return Any
 
 
-def misfit(annotation: Any, value: Any) -> Misfit | None:
+def misfit(annotation: Any, value: Any) -> Mismatch | None:
     """Return the part of a value that does not match an annotation, or None.
 
     Args:
@@ -130,7 +127,7 @@ def _unusable(value: Any) -> bool:
     return False
 
 
-def _of_several(kinds: tuple[Any, ...], value: Any) -> Misfit | None:
+def _of_several(kinds: tuple[Any, ...], value: Any) -> Mismatch | None:
     found = [misfit(kind, value) for kind in kinds]
     if None in found:
         return None
@@ -142,8 +139,8 @@ def _of_several(kinds: tuple[Any, ...], value: Any) -> Misfit | None:
 
 def _of_many(
     annotation: Any, origin: Any, inner: tuple[Any, ...], value: Any
-) -> Misfit | None:
-    wrong: Misfit = ((), value, _named(annotation))
+) -> Mismatch | None:
+    wrong: Mismatch = ((), value, _named(annotation))
     if not isinstance(origin, type):
         return None
     if issubclass(origin, Mapping):
@@ -166,7 +163,7 @@ def _of_many(
     return None if _is_one(origin, value) else wrong
 
 
-def _first(found: Iterable[tuple[Any, Misfit | None]]) -> Misfit | None:
+def _first(found: Iterable[tuple[Any, Mismatch | None]]) -> Mismatch | None:
     for key, wrong in found:
         if wrong is not None:
             deeper, value, expected = wrong

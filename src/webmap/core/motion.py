@@ -37,7 +37,7 @@ from webmap.ros.names import is_agent_url, is_type
 
 if TYPE_CHECKING:
     from webmap.agents.gates import Gates
-    from webmap.core.page import Page
+    from webmap.core.base_page import BasePage
     from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap.robot")
@@ -62,13 +62,13 @@ OF_BASE = sorted(
 )
 """The fields of a base that configuration and gate share."""
 
-Links: TypeAlias = dict[str, Bridge | None]
+PartBridges: TypeAlias = dict[str, Bridge | None]
 """The bridge of each part."""
 
 _used: Counter[str] = Counter()
 
 
-given_id: ContextVar[str | None] = ContextVar("given_id", default=None)
+agent_robot_id: ContextVar[str | None] = ContextVar("agent_robot_id", default=None)
 """The identifier of the robot that a display makes, if it is a robot of an agent."""
 
 
@@ -102,7 +102,7 @@ def _id_of(name: str) -> str:
         ConfigError: If it is that of a robot of an agent which exists already.
 
     """
-    given = given_id.get()
+    given = agent_robot_id.get()
     if given is None and RobotMotion.agent:
         given = id_at_agent(RobotMotion.agent, name)
     if given is not None:
@@ -159,7 +159,7 @@ class RobotMotion:
         """The configuration of the robot's motion; changed by :meth:`set`."""
         self.axes = PLANE
         """The axes out of the plane along which the robot moves, with their limits."""
-        self._bridges: Links = {}
+        self._bridges: PartBridges = {}
         self._odometry: tuple[Bridge, str, str | None] | None = None
         self._own_map = Pose()
         self._type_query: TypeQuery | None = None
@@ -235,7 +235,7 @@ class RobotMotion:
             self.declare()
 
     def clear_odometry(self) -> None:
-        """Clear the odometry topic."""
+        """Declare the robot to the gate without odometry, if it had one."""
         if self._odometry is not None:
             self._odometry = None
             self.declare()
@@ -262,7 +262,7 @@ class RobotMotion:
         """Return the gate's description, or None if nothing moves the robot."""
         return self._spec(self.config, self._bridges)
 
-    def _check(self, config: MotionConfig, bridges: "Links") -> None:
+    def _check(self, config: MotionConfig, bridges: "PartBridges") -> None:
         """Raise what the gate would refuse, before any of it is stored.
 
         The error is raised where the part is set, not where the gate is started.
@@ -276,7 +276,7 @@ class RobotMotion:
         if spec is not None:
             checked(spec)
 
-    def _spec(self, config: MotionConfig, bridges: "Links") -> RobotSpec | None:
+    def _spec(self, config: MotionConfig, bridges: "PartBridges") -> RobotSpec | None:
         twist, move, pose = config.twist, config.move, config.initial_pose
         first = next((key for key in WRITING if getattr(config, key) is not None), None)
         link = None if first is None else bridges[first]
@@ -363,7 +363,7 @@ class RobotMotion:
             raise MotionError(f"robot {self._name!r}: the velocity was not sent: {why}")
         gate.twist(self.id, twist)
 
-    def move(self, x: float, y: float, yaw: float, by: "Page | None") -> None:
+    def move(self, x: float, y: float, yaw: float, by: "BasePage | None") -> None:
         """Send the gate one goal, of this program or in the name of a page."""
         gate = self._gate()
         if by is None:

@@ -1,96 +1,50 @@
-"""Pages: the open browser tabs, and their interface for the rest of WebMap."""
+"""Pages: the open browser tabs, and the functions that build them."""
 
 import inspect
-import logging
 import re
-import weakref
-from collections.abc import Awaitable, Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
 from webmap.base.errors import ConfigError
 from webmap.base.plain_files import resolved
-from webmap.base.scope import Removal, Scope, current_scope
-from webmap.base.tasks import begin
-from webmap.core.pictures import Publisher
-from webmap.core.view import initial_view
-from webmap.gate.protocol import Role
-from webmap.scene.bound import BoundElement, Document
-from webmap.scene.element import Element, Event, Handler, Listener
-from webmap.scene.node import Fragment
-from webmap.scene.wire.session import SceneSession
+from webmap.core.base_page import BasePage, PageEntry
+from webmap.core.map import Map
+from webmap.core.world_view import initial_view
 
-if TYPE_CHECKING:
-    from webmap.core.map import Map
+MADE_PAGE_MODULES = ("MetreGrid", "MouseViewControl")
+"""Modules that maps get on a generated page."""
 
-log = logging.getLogger("webmap.page")
+MADE_PAGE_SCALE = 20.0
+"""Pixels per metre of such a map, unless the page function chooses a view."""
 
 
-class PageSpeeds:
-    """The greatest speeds of a page's modules, and the module with active input."""
-
-    def __init__(self) -> None:
-        self._most: dict[int, tuple[float, float]] = {}
-        self._driving: int | None = None
+class Page(BasePage):
+    """One page of one viewer; created when it opens, and removed when it closes."""
 
     @property
-    def current(self) -> tuple[float, float]:
-        """The greatest speeds that the page asks for now, in m/s and rad/s.
+    def maps(self) -> list[Map]:
+        """The maps of the page, in the order in which they were created."""
+        return [part for part in self.contents if isinstance(part, Map)]
 
-        They are those of the module with active input; without active input, the lowest
-        of all modules; zero without a module that drives.
+    def complete(self) -> None:
+        """Complete the maps of a page whose HTML WebMap generates.
+
+        Each map gets the modules of ``MADE_PAGE_MODULES`` that the page function did
+        not add, and a view if the page function set none.
         """
-        if not self._most:
-            return (0.0, 0.0)
-        if self._driving in self._most:
-            return self._most[self._driving]
-        linear, angular = zip(*self._most.values(), strict=True)
-        return (min(linear), min(angular))
-
-    def set(self, module: object, speed: float, rotation_speed: float) -> None:
-        """Set the greatest speeds of a module that drives."""
-        self._most[id(module)] = (speed, rotation_speed)
-
-    def drive(self, module: object, on: bool) -> None:
-        """Set whether a module has active input."""
-        if on:
-            self._driving = id(module)
-        elif self._driving == id(module):
-            self._driving = None
-
-    def clear(self, module: object) -> None:
-        """Remove a module that no longer drives."""
-        self._most.pop(id(module), None)
-        self.drive(module, False)
+        for map in self.maps if self.entry.html is None else ():
+            if map.world.tf == initial_view(map.canvas_width, map.canvas_height):
+                map.scale(MADE_PAGE_SCALE)
+            kinds = [kind for module in map.modules for kind in type(module).__mro__]
+            there = {kind.__name__ for kind in kinds}
+            for name in MADE_PAGE_MODULES:
+                if name not in there:
+                    map.add_module(name)
 
 
-PageFunction = Callable[["Page"], Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Viewer:
-    """One browser that has signed in; all its pages are one viewer."""
-
-    id: str
-    """Opaque; the same while the browser stays signed in."""
-
-    name: str
-    """The name shown to others when this viewer has control."""
-
-    role: Role = "operator"
-    """What the viewer may do: watch, drive, or administer."""
-
-
-@dataclass(frozen=True, slots=True)
-class PageEntry:
-    """A path, and the function that builds a page for each viewer that opens it."""
-
-    path: str
-    function: PageFunction
-    html: Path | None
-    folder: Path
-    title: str
+PageFunction: TypeAlias = Callable[[Page], Any]
+"""Builds a page for the viewer that opened it."""
 
 
 class Site:
@@ -138,284 +92,3 @@ class Site:
 
 site = Site()
 """The pages of this process."""
-
-
-MADE_PAGE_MODULES = ("MetreGrid", "MouseViewControl")
-"""Modules that maps get on a generated page."""
-
-MADE_PAGE_SCALE = 20.0
-"""Pixels per metre of such a map, unless the page function chooses a view."""
-
-Key = tuple[int, int, str]
-"""The target of a listener: a mount, one of its elements and an event."""
-
-
-class Page:
-    """One page of one viewer; created when it opens, and removed when it closes."""
-
-    def __init__(
-        self,
-        entry: PageEntry,
-        channel: SceneSession,
-        viewer: Viewer,
-        publisher: Publisher,
-        sizes: Mapping[str, tuple[float, float]],
-    ) -> None:
-        self.entry = entry
-        self.channel = channel
-        self.viewer = viewer
-        self.maps: list[Map] = []
-        self.scope = Scope(f"page {entry.path}", lambda text, _: self.notice(text))
-        self.closed = False
-        self.publisher = publisher
-        self._sizes = dict(sizes)
-        self._document = Document()
-        self.fragment = Fragment(self._document)
-        self._mount = channel.mount(self.fragment, under=0)
-        _pages[self.fragment.id] = self
-        self.on_speeds: Callable[[float, float], None] | None = None
-        self.on_move: Callable[[str, float, float, float], None] | None = None
-        self._speeds = PageSpeeds()
-        self._listening: dict[Key, tuple[Listener, ...]] = {}
-
-    def element(self, id: str) -> Element:
-        """Return the page's own element with this ``id``, to fill and to listen to.
-
-        Args:
-            id: The ``id`` in the page's HTML. If the HTML has none, the page shows an
-                error.
-
-        """
-        return self._document.bind(id)
-
-    def size_of(self, container: Element) -> tuple[float, float]:
-        """Return the size in pixels that a container had when the page opened."""
-        if isinstance(container, BoundElement):
-            return self._sizes.get(container.html_id, (0.0, 0.0))
-        return (0.0, 0.0)
-
-    def complete(self) -> None:
-        """Complete the maps of a page whose HTML WebMap generates.
-
-        Each map gets the modules of ``MADE_PAGE_MODULES`` that the page function did
-        not add, and a view if the page function set none.
-        """
-        for map in self.maps if self.entry.html is None else ():
-            if map.world.tf == initial_view(map.canvas_width, map.canvas_height):
-                map.scale(MADE_PAGE_SCALE)
-            kinds = [kind for module in map.modules for kind in type(module).__mro__]
-            there = {kind.__name__ for kind in kinds}
-            for name in MADE_PAGE_MODULES:
-                if name not in there:
-                    map.add_module(name)
-
-    @property
-    def mount(self) -> int:
-        """The mount of the page's own elements."""
-        return self._mount
-
-    def on_close(self, fn: Callable[[], object]) -> Removal:
-        """Call ``fn`` when the page is closed permanently."""
-        removal = Removal(fn)
-        self.scope.add(removal)
-        return removal
-
-    def image(self, href: str) -> str:
-        """Return a URL by which the page can load an image until the page closes.
-
-        Args:
-            href: A file in the page's folder, or an absolute path.
-
-        Raises:
-            ConfigError: If the file does not exist, lies outside the folder or is no
-                image.
-
-        """
-        return self.publish_image(href)[0]
-
-    def publish_image(self, href: str) -> tuple[str, Removal]:
-        """Return a URL of an image, and the removal that withdraws it.
-
-        Args:
-            href: A file in the page's folder, or an absolute path.
-
-        Raises:
-            ConfigError: Like :meth:`image`.
-
-        """
-        url = self.publisher.publish_image(self.image_file(href))
-
-        def undo() -> None:
-            self.scope.discard(removal)
-            self.publisher.withdraw_image(url)
-
-        removal = Removal(undo)
-        self.scope.add(removal)
-        return url, removal
-
-    def image_file(self, href: str) -> Path:
-        """Return the path of an image, which may not exist.
-
-        Args:
-            href: A file in the page's folder, or an absolute path.
-
-        Raises:
-            ConfigError: If it lies outside the folder.
-
-        """
-        file = Path(href)
-        if not file.is_absolute():
-            file = self.entry.folder / file
-            if not resolved(file).is_relative_to(self.entry.folder):
-                raise ConfigError(f"{href!r} lies outside {self.entry.folder}")
-        return file
-
-    def notice(self, text: str) -> None:
-        """Show a sentence to the viewer until it is dismissed."""
-        self.channel.error(text)
-
-    @property
-    def speeds(self) -> tuple[float, float]:
-        """The greatest speeds that the page asks for now, in m/s and rad/s.
-
-        They are those of the module with active input; without active input, the lowest
-        of all modules; zero without a module that drives.
-        """
-        return self._speeds.current
-
-    def set_speeds(self, module: object, speed: float, rotation_speed: float) -> None:
-        """Set the greatest speeds of a module of this page that drives."""
-        self._speeds.set(module, speed, rotation_speed)
-        self._report_speeds()
-
-    def set_driving(self, module: object, on: bool) -> None:
-        """Set whether a module that drives has active input."""
-        self._speeds.drive(module, on)
-        self._report_speeds()
-
-    def clear_speeds(self, module: object) -> None:
-        """Remove a module that no longer drives."""
-        self._speeds.clear(module)
-        self._report_speeds()
-
-    def move(self, robot: str, x: float, y: float, yaw: float) -> None:
-        """Send a goal in the name of this page; see ``Robot.move``."""
-        if self.on_move is not None:
-            self.on_move(robot, x, y, yaw)
-
-    def _report_speeds(self) -> None:
-        if self.on_speeds is not None:
-            self.on_speeds(*self.speeds)
-
-    def listen(
-        self,
-        mount: int,
-        element: Element,
-        event: str,
-        handler: Handler,
-        *,
-        prevent: bool = False,
-        stop: bool = False,
-    ) -> Removal:
-        """Call ``handler`` for an event of an element in this page only.
-
-        It ends with the returned removal, the current scope or the page.
-        """
-        key = (mount, element.id, event)
-        scope = current_scope()
-        if scope is None:
-            scope = self.scope
-        listener = Listener(handler, scope, prevent=prevent, stop=stop)
-        self._set_listening(key, (*self._listening.get(key, ()), listener))
-
-        def undo() -> None:
-            listener.forget()
-            known = self._listening.get(key, ())
-            self._set_listening(key, tuple(i for i in known if i is not listener))
-
-        listener.removal = Removal(undo)
-        scope.add(listener.removal)
-        return listener.removal
-
-    def _set_listening(self, key: Key, listeners: tuple[Listener, ...]) -> None:
-        """Set the listeners of an event, and update the browser if needed."""
-        flags = _flags(listeners)
-        if flags != _flags(self._listening.get(key, ())):
-            if flags is None:
-                self.channel.unlisten(*key)
-            else:
-                prevent, stop = flags
-                self.channel.listen(*key, prevent=prevent, stop=stop)
-        if listeners:
-            self._listening[key] = listeners
-        else:
-            self._listening.pop(key, None)
-
-    def forget_mount(self, mount: int) -> None:
-        """Remove all listeners of a mount."""
-        for key in [key for key in self._listening if key[0] == mount]:
-            for listener in self._listening.pop(key):
-                listener.forget()
-
-    def asset(self, file: str | Path) -> str:
-        """Return the URL of an ES module or a style sheet.
-
-        Args:
-            file: The name of a file of WebMap, such as ``"features/drive/teleop.js"``,
-                or a path.
-
-        """
-        return file if isinstance(file, str) else self.publisher.publish_file(file)
-
-    def dispatch(self, mount: int, element: Element, event: Event) -> None:
-        """Call the listeners: the element's own, then those of this page."""
-        element.dispatch(event, self._failed, self._begin)
-        for listener in self._listening.get((mount, element.id, event.kind), ()):
-            listener.call(event, self._failed, self._begin)
-
-    def _begin(self, work: Awaitable[Any]) -> None:
-        begin(work, self._failed)
-
-    def _failed(self, error: Exception) -> None:
-        log.error("a handler of %s failed", self.entry.path, exc_info=error)
-        if not self.closed:
-            self.notice(f"A handler failed: {type(error).__name__}: {error}")
-
-    def close(self) -> None:
-        """Close the page: destroy its maps and release its resources."""
-        if self.closed:
-            return
-        self.closed = True
-        for map in reversed(tuple(self.maps)):
-            map.destroy()
-        self.scope.close()
-        for mount in {mount for mount, _, _ in self._listening}:
-            self.forget_mount(mount)
-        self.channel.unmount(self._mount)
-
-
-def _flags(listeners: Sequence[Listener]) -> tuple[bool, bool] | None:
-    """Return whether any prevents and any stops; None without listeners."""
-    if not listeners:
-        return None
-    return any(i.prevent for i in listeners), any(i.stop for i in listeners)
-
-
-_pages: "weakref.WeakValueDictionary[int, Page]" = weakref.WeakValueDictionary()
-
-
-def page_of(container: Element) -> Page:
-    """Return the page that an element belongs to.
-
-    Raises:
-        ConfigError: If it is on no page.
-
-    """
-    fragment = container.fragment
-    page = None if fragment is None else _pages.get(fragment.id)
-    if page is None:
-        raise ConfigError(
-            f"{container!r} is on no page: take the container of a map from "
-            "page.element(id), or append it to such an element first"
-        )
-    return page

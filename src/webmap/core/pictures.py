@@ -47,8 +47,8 @@ class Publisher(Protocol):
         """Undo one :meth:`publish_image`."""
 
 
-class Published(NamedTuple):
-    """An image as it is served."""
+class PublishedImage(NamedTuple):
+    """The content and the type of an image, as the web thread serves them."""
 
     data: bytes
     media_type: str
@@ -61,9 +61,9 @@ class Pictures:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._images: dict[str, Published] = {}
+        self._images: dict[str, PublishedImage] = {}
         self._uses: dict[str, int] = {}
-        self._retired: dict[str, tuple[Published, float]] = {}
+        self._retired: dict[str, tuple[PublishedImage, float]] = {}
         """The image and the time of retirement for each tag, the oldest first."""
 
     def __len__(self) -> int:
@@ -78,7 +78,7 @@ class Pictures:
         found.update(data)
         tag = found.hexdigest()
         with self._lock:
-            self._images.setdefault(tag, Published(data, media_type, fleeting))
+            self._images.setdefault(tag, PublishedImage(data, media_type, fleeting))
             self._uses[tag] = self._uses.get(tag, 0) + 1
         return PREFIX + tag
 
@@ -112,7 +112,7 @@ class Pictures:
                 del self._retired[name]
                 size -= len(old.data)
 
-    def get(self, tag: str) -> Published | None:
+    def get(self, tag: str) -> PublishedImage | None:
         """Return the image whose URL ends in ``tag``; None if pages may not load it."""
         with self._lock:
             if tag in self._images:

@@ -11,7 +11,7 @@ from typing import Any
 
 from webmap.base.geometry import Affine, Pose
 from webmap.base.scope import Removal, no_scope
-from webmap.core.driven import Driven
+from webmap.core.movable_robot import MovableRobot
 from webmap.poses.alignment import HERE, alignments
 from webmap.poses.frames import Frames, frames_of
 from webmap.poses.odometry import ODOMETRY, OdometryFeed
@@ -33,7 +33,7 @@ class PoseSource:
 
     def __init__(
         self,
-        robot: Driven,
+        robot: MovableRobot,
         show_pose: Callable[[PoseReading, float | None], object],
     ) -> None:
         self.pipeline = PosePipeline()
@@ -165,7 +165,7 @@ class PoseSource:
             self.feed.keep_on(self._is_needed)
             self.expect_fewer()
         if self.frames is not None:
-            self.frames.looking_changed()
+            self.frames.audience_changed()
 
     def _needs_frames(self) -> bool:
         """Return whether frames are needed while nobody looks.

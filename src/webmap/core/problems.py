@@ -11,7 +11,7 @@ from typing import Protocol, TypeVar
 
 from webmap.base.errors import WebMapError
 from webmap.base.scope import Removal, keep
-from webmap.core.page import Page
+from webmap.core.base_page import BasePage
 from webmap.core.world_view import WorldView
 
 log = logging.getLogger("webmap.modules")
@@ -163,7 +163,7 @@ class Problems:
         for about in self.current:
             map.page.channel.mended(self._recurring[about].number)
 
-    def _pages(self) -> list[Page]:
+    def _pages(self) -> list[BasePage]:
         """Return the open pages of the maps, each of them once."""
         pages = dict.fromkeys(map.page for map in self.maps)
         return [page for page in pages if not page.closed]
@@ -177,17 +177,17 @@ class Problems:
 M = TypeVar("M")
 
 
-class Owner(Protocol):
+class ProblemOwner(Protocol):
     """An object that shows problems: a robot, a map or a layer."""
 
     def set_problem(self, about: object, text: str) -> None:
         """Show a problem until :meth:`clear_problem`."""
 
     def clear_problem(self, about: object) -> None:
-        """Remove the problem of ``about``."""
+        """Show the problem of ``about`` no longer; does nothing if there is none."""
 
 
-class Refusing:
+class MessageProblems:
     """Shows people the errors in the messages of a topic.
 
     An error is shown until a valid message arrives or the current scope ends.
@@ -198,7 +198,7 @@ class Refusing:
 
     """
 
-    def __init__(self, owner: Owner, topic: str) -> None:
+    def __init__(self, owner: ProblemOwner, topic: str) -> None:
         self._owner = owner
         self._topic = topic
         self._complaint = ""
@@ -231,8 +231,8 @@ class Refusing:
             self._owner.clear_problem(self)
 
 
-def refusing(
-    owner: Owner, topic: str, draw: Callable[[M], None]
+def draw_or_report(
+    owner: ProblemOwner, topic: str, draw: Callable[[M], None]
 ) -> Callable[[M], None]:
     """Wrap ``draw`` for a subscription: the owner shows the messages that it refuses.
 
@@ -243,4 +243,4 @@ def refusing(
             anything.
 
     """
-    return partial(Refusing(owner, topic).take, draw)
+    return partial(MessageProblems(owner, topic).take, draw)

@@ -1,49 +1,44 @@
-"""Robots: identity, pose and motion."""
+"""Robots: made from a configuration, changed by one, and converted to one."""
 
-import logging
-import math
-import time
-import weakref
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Self
+from collections.abc import Callable, Mapping
+from typing import Any, Self, TypeAlias
 
-from webmap.base.errors import ConfigError
-from webmap.base.geometry import Pose, Quaternion, Twist, Vector3
-from webmap.base.looking import looking
-from webmap.base.scope import Removal, keep
-from webmap.config.reading import read_part
-from webmap.config.robot import OdometryConfig, RobotConfig, TfConfig
-from webmap.core.driven import sets_part
-from webmap.core.listed import Listed
-from webmap.core.pose_source import PoseSource
-from webmap.core.problems import Problems
-from webmap.core.registry import Namespace, robot_modules
-from webmap.core.robot_model import ModelImages, checked_model
-from webmap.core.robot_state import Facts, RobotState, since_when, state_of
-from webmap.core.state_rounds import state_rounds
-from webmap.gate.protocol import RobotReport
-from webmap.gate.rules.goals import OVER
-from webmap.poses.alignment import alignment
-from webmap.poses.odometry import OdometryFeed
-from webmap.poses.placing import PoseReading
+import msgspec
+
+from webmap.base.errors import ConfigError, ModuleNotFound, WebMapError
+from webmap.config import checks
+from webmap.config.checks import KeyPath, Mistakes
+from webmap.config.robot import (
+    LINKED,
+    MOTION,
+    OWN_CLASSES,
+    ModuleConfig,
+    ModuleEntry,
+    OdometryConfig,
+    RobotConfig,
+    TfConfig,
+    is_link,
+)
+from webmap.core.module_arguments import WrongArgument, WrongArguments
+from webmap.core.robot_model import element_from_dict, element_to_dict
+from webmap.core.visible_robot import VisibleRobot
+from webmap.poses.alignment import numbers
+from webmap.poses.frames import frames_of
 from webmap.ros.bridge import Bridge
-from webmap.scene import svg
+from webmap.ros.tf import Buffer
 from webmap.scene.element import Element
-from webmap.scene.node import Fragment
 
-if TYPE_CHECKING:
-    from webmap.core.map import Map
+NONE = {"none": True}
+"""How ``None`` is written among the arguments of a module."""
 
-log = logging.getLogger("webmap.robot")
+Link: TypeAlias = Callable[[str], Bridge]
+"""Returns the bridge with a name or a URL."""
 
-POSE_LIMIT = 1.0
-"""Seconds after which a pose is drawn as stale."""
-
-robots: "weakref.WeakValueDictionary[str, Robot]" = weakref.WeakValueDictionary()
-"""All robots that were created and not destroyed, by their id."""
+ModuleCall: TypeAlias = tuple[str, tuple[Any, ...], dict[str, Any]]
+"""Name, positional and keyword arguments of an added module."""
 
 
-class Robot(Listed):
+class Robot(VisibleRobot):
     """One robot: its name, its pose, its drawing and its motion.
 
     A robot may be shown on any number of maps, and used without any.
@@ -60,246 +55,6 @@ class Robot(Listed):
         ConfigError: If the model is no element, or another robot's.
 
     """
-
-    def __init__(
-        self,
-        name: str,
-        model: Element | None = None,
-        *,
-        base_link: str = "base_link",
-        namespace: Namespace = robot_modules,
-    ) -> None:
-        model = checked_model(name, model, robots)
-        super().__init__(name, namespace)
-        self.base_link = self.motion.base_frame = base_link
-        self.model = model
-        self._shown_problems = Problems(log, lambda text: f"{self.name}: {text}")
-        self.problems: dict[object, str] = self._shown_problems.current
-        """Current problems, as sentences, by subject."""
-        self.maps: list[Map] = []
-        """The maps that show the robot."""
-        self.selected = False
-        self.position = Vector3()
-        self.orientation = Quaternion()
-        self.measured_twist: Twist | None = None
-        self.valid = False
-        self._state_shown: RobotState | None = None
-        self._is_looked_at = False
-        """Whether the shown state is updated regularly: a lost robot sends nothing."""
-        self.pose_stamp: float | None = None
-        """When the newest pose was sent, in seconds of ``time.monotonic()``; None
-        before the first one."""
-        self.pose_source = PoseSource(self, self.show_pose)
-        """The source of its poses, on its own map and on the common one."""
-        self.svg = svg.g(svg.title(text=self.name), self.model, class_="robot unplaced")
-        self.svg.set("data-name", self.name)
-        self.svg.set("data-robot", self.motion.id)
-        self.fragment = Fragment(self.svg)
-        self.model_images = ModelImages(self.svg)
-        robots[self.id] = self
-        looking.follow(self)
-        keep(Removal(self.destroy))
-
-    def _show_base(self, *, holonomic: bool) -> None:
-        self.svg.set("data-holonomic", "" if holonomic else None)
-
-    def __repr__(self) -> str:
-        return f"<Robot {self.name!r}>"
-
-    @property
-    def state(self) -> RobotState:
-        """What the robot is doing.
-
-        Its element in the scene has the state's name as ``data-state``.
-        """
-        feed, ended = self.feed, self.goal_ended_at
-        return state_of(
-            Facts(
-                self.report,
-                None if feed is None else feed.bridge,
-                self.pose_source.period,
-                self.silent_for,
-                self.pose_age,
-                self.motion.axes.seen(self.measured_twist),
-                None if ended is None else time.monotonic() - ended,
-                self.goal_failed,
-                self.charge,
-                self.battery_low,
-            )
-        )
-
-    @property
-    def feed(self) -> OdometryFeed | None:
-        """The feed of the odometry topic; None if none is set."""
-        return self.pose_source.feed
-
-    @property
-    def yaw(self) -> float:
-        """The heading, in radians in ``[-pi, pi]``, counter-clockwise from x."""
-        return self.orientation.yaw
-
-    @property
-    def angle(self) -> float:
-        """The heading, in degrees, counter-clockwise from x."""
-        return math.degrees(self.yaw)
-
-    @property
-    def pose(self) -> Pose:
-        """The pose in the plane: ``x`` and ``y`` in metres, ``yaw`` in radians."""
-        return Pose(self.position.x, self.position.y, self.yaw)
-
-    @property
-    def pose_age(self) -> float | None:
-        """Seconds since the newest pose was sent; None if there was none yet."""
-        stamp = self.pose_stamp
-        return None if stamp is None else time.monotonic() - stamp
-
-    @property
-    def silent_for(self) -> float | None:
-        """Seconds since the newest pose from a source that also sends at rest.
-
-        None if there was none: AMCL, for example, sends a pose only after motion.
-        """
-        received = self.pose_source.expected_at
-        return None if received is None else time.monotonic() - received
-
-    def hears_poses(self, within: float) -> bool:
-        """Return whether a pose of any age arrived in the last ``within`` seconds."""
-        return self.pose_source.received_within(within)
-
-    def destroy(self) -> None:
-        """Stop all communication, remove the modules, leave every map."""
-        if self._destroyed:
-            return
-        self._destroyed = True
-        looking.forget(self)
-        state_rounds.leave(self._show_state)
-        for map in tuple(self.maps):
-            map.remove_robot(self)
-        self.remove_modules()
-        self.pose_source.end()
-        self.motion.close()
-        robots.pop(self.id, None)
-
-    # Pose.
-
-    @sets_part("odometry")
-    def set_odometry_topic(
-        self,
-        bridge: Bridge,
-        topic: str,
-        throttle: int = 100,
-        *,
-        type: str | None = None,
-    ) -> None:
-        """Receive poses from a topic, in place of the one before.
-
-        The topic may have type ``geometry_msgs`` Pose, PoseStamped,
-        PoseWithCovarianceStamped or Pose2D, or ``nav_msgs/Odometry``. If ``type`` is
-        not given, the bridge is queried; if the bridge does not know the type, the
-        first message determines it. The connection need not be open yet.
-
-        Args:
-            bridge: The connection to the ROS system that has the topic.
-            topic: The topic.
-            throttle: The least time between two messages, in milliseconds.
-            type: The message type.
-
-        Raises:
-            ConfigError: If ``type`` has no pose, or another value is not valid.
-
-        """
-
-    def unsubscribe_odometry_topic(self) -> None:
-        """Stop receiving poses; does nothing if there is no topic."""
-        self.pose_source.unfollow()
-
-    @sets_part("tf")
-    def set_tf(
-        self,
-        bridge: Bridge,
-        *,
-        map_frame: str = "map",
-        base_frame: str | None = None,
-        namespace: str = "",
-        quiet: bool = False,
-    ) -> None:
-        """Draw the robot in the frame of the map, using ``/tf``.
-
-        A pose of the odometry topic is transformed from its own frame to ``map_frame``
-        with the transforms at its stamp. Without an odometry topic the robot is drawn
-        at the pose of its base in TF. Robots of one bridge share the subscription.
-
-        Args:
-            bridge: The connection to the ROS system that has the frames.
-            map_frame: The frame that robots are drawn in.
-            base_frame: The robot's own frame; ``base_link`` of the robot if not given.
-            namespace: ``/robot_0`` if the topics are ``/robot_0/tf`` and
-                ``/robot_0/tf_static``. It is put before the names of frames, except
-                ``map``, ``world`` and ``earth``, which all robots share.
-            quiet: Whether to show no problem when poses stay in the odometry's frame
-                because ``map_frame`` is missing in TF.
-
-        Raises:
-            ConfigError: If a value is not valid.
-
-        """
-
-    def configure(
-        self,
-        key: str,
-        values: Mapping[str, Any] | None,
-        bridge: Bridge | None = None,
-    ) -> None:
-        """Set or clear one part of the robot's configuration; see :class:`Driven`."""
-        what = f"robot {self.name!r}"
-        if key in ("odometry", "tf") and values is not None and bridge is None:
-            raise ConfigError(f"{what}: {key}: a bridge is missing")
-        match key:
-            case "odometry" if values is None:
-                self.pose_source.unfollow()
-            case "tf" if values is None:
-                self.pose_source.unplace()
-            case "odometry" if values is not None and bridge is not None:
-                pose = read_part(OdometryConfig, key, values, what)
-                self.pose_source.follow(bridge, pose.topic, pose.throttle, pose.type)
-            case "tf" if values is not None and bridge is not None:
-                tf = read_part(TfConfig, key, values, what)
-                base = tf.base_frame or self.base_link
-                self.pose_source.place(
-                    bridge, tf.map_frame, base, tf.namespace, tf.quiet
-                )
-            case _:
-                super().configure(key, values, bridge)
-
-    def unset_tf(self) -> None:
-        """Stop drawing the robot by TF; does nothing if TF is not set."""
-        self.pose_source.unplace()
-
-    @property
-    def tf(self) -> Mapping[str, Any] | None:
-        """The arguments of :meth:`set_tf`; None if it is not set."""
-        return self.pose_source.tf
-
-    def set_alignment(self, x: float, y: float, angle: float) -> None:
-        """Align the robot's own map, its poses, data and goals, on the common map.
-
-        Args:
-            x: The position of its map's origin on the common map, in metres along x.
-            y: The position, in metres along y.
-            angle: The rotation of its map in degrees, counter-clockwise.
-
-        Raises:
-            ConfigError: If a number is not valid.
-
-        """
-        self.pose_source.align(alignment(x, y, angle))
-
-    def unset_alignment(self) -> None:
-        """Use the alignment of the robot's bridge."""
-        self.pose_source.align(None)
-
-    # Plain data.
 
     @classmethod
     def from_config(
@@ -320,9 +75,24 @@ class Robot(Listed):
             ConfigError: If a value is not valid; the message lists every mistake.
 
         """
-        from webmap.core.configure import robot_of
-
-        return robot_of(cls, config, bridges, model)
+        mistakes = Mistakes()
+        if config.picture is not None and model is None:
+            text = "only the console shows a picture; give a model instead"
+            mistakes.add(("picture",), text)
+        if model is None and config.model is not None:
+            try:
+                model = element_from_dict(config.model)
+            except WebMapError as error:
+                mistakes.add(("model",), str(error))
+        robot = cls(config.name, model, base_link=config.base_link)
+        try:
+            before = RobotConfig(name=config.name)
+            mistakes.take((), apply_config(robot, before, config, bridges))
+            mistakes.refuse(f"robot {config.name!r}")
+        except BaseException:
+            robot.destroy()  # or the gate would get the robot
+            raise
+        return robot
 
     @classmethod
     def from_dict(
@@ -343,9 +113,37 @@ class Robot(Listed):
 
     def to_config(self) -> RobotConfig:
         """Return the configuration of the robot, its topics and its named modules."""
-        from webmap.core.configure import config_of
-
-        return config_of(self)
+        feed, tf, own = self.feed, self.tf, self.pose_source.own_alignment
+        odometry = frames = None
+        if feed is not None:
+            odometry = OdometryConfig(
+                topic=feed.topic,
+                type=feed.type,
+                throttle=feed.throttle,
+                bridge=feed.bridge.url,
+            )
+        if tf is not None:
+            frames = TfConfig(**{**tf, "bridge": tf["bridge"].url})
+        return RobotConfig(
+            name=self.name,
+            base_link=self.base_link or "base_link",
+            classes=[name for name in self.svg.classes if name not in OWN_CLASSES],
+            model=element_to_dict(self.model, self.model_images.names),
+            odometry=odometry,
+            tf=frames,
+            alignment=None if own is None else numbers(own),
+            battery_low=self.battery_low,
+            tags=list(self.tags),
+            motion=self.motion.config,
+            modules=[
+                ModuleConfig(
+                    name=name,
+                    args=[_plain(value) for value in args],
+                    options={key: _plain(value) for key, value in options.items()},
+                )
+                for name, args, options in self.module_arguments()
+            ],
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the robot, its topics and its named modules as plain data.
@@ -357,139 +155,209 @@ class Robot(Listed):
             ConfigError: If an argument of a module has no form in such a file.
 
         """
-        from webmap.core.configure import robot_to_dict
+        try:
+            return self.to_config().to_dict()
+        except TypeError as error:  # an argument of a module has no form in a file
+            raise ConfigError(
+                f"robot {self.name!r} is not plain data: {error}"
+            ) from error
 
-        return robot_to_dict(self)
 
-    # Display.
+def apply_config(
+    robot: VisibleRobot,
+    old: RobotConfig,
+    new: RobotConfig,
+    bridges: Mapping[str, Bridge] | None = None,
+) -> Mistakes:
+    """Apply the differences between two configurations to a robot.
 
-    def report_error(self, text: str) -> None:
-        """Log a failure and show it on every page that has the robot."""
-        self._shown_problems.report(text)
+    Parts that both have in common stay, and so does everything that neither has, such
+    as modules that a program added. Name and model are never changed. New bridges and
+    modules belong to the scope in which this is called.
 
-    def set_problem(self, about: object, text: str) -> None:
-        """Show a problem until :meth:`clear_problem`, also to pages opened later.
+    Args:
+        robot: The robot.
+        old: The configuration until now.
+        new: The configuration to apply.
+        bridges: Bridges by name or URL; others are created.
 
-        Args:
-            about: The subject of the problem; a new sentence replaces the old one.
-            text: A sentence for people.
+    Returns:
+        The mistakes found; each part without a mistake was changed.
 
-        """
-        self._shown_problems.set(about, text)
+    """
+    links = dict(bridges or {})
 
-    def clear_problem(self, about: object) -> None:
-        """Remove the problem of ``about``; does nothing if there is none."""
-        self._shown_problems.clear(about)
+    def link(name: str) -> Bridge:
+        if not name:
+            raise ConfigError('the key "bridge" is missing')
+        if name not in links:
+            links[name] = Bridge(name)
+        return links[name]
 
-    def on_map(self, map: "Map", shown: bool) -> None:
-        """Set whether a map shows this robot, and fire ``on_map``."""
-        if shown:
-            self.model_images.show(map.page)
-            self.maps.append(map)
-            self._shown_problems.join(map)
+    mistakes = Mistakes()
+    for name in old.classes:
+        if name not in new.classes:
+            robot.svg.classes.remove(name)
+    for name in new.classes:
+        robot.svg.classes.add(name)
+    if old.base_link != new.base_link:
+        robot.base_link = robot.motion.base_frame = new.base_link
+        robot.motion.declare()
+        if new.tf is not None:  # it may name no other base
+            old = old.with_part("tf", None)
+    if old.tags != new.tags:
+        robot.set_tags(new.tags)
+    if old.battery_low != new.battery_low:
+        robot.set_battery_low(new.battery_low)
+    if _changes_bridge_of_goals(old.resolved(), new.resolved()):
+        robot.configure("initial_pose", None)  # both must always use the same bridge
+    for key in ("odometry", "tf", "alignment", *MOTION):
+        before, after = old.resolved().part(key), new.resolved().part(key)
+        if before == after:
+            continue
+        try:
+            _set(robot, key, after, link)
+        except WebMapError as error:
+            _note(mistakes, (key,), error, robot.name)
+    _set_layers(robot, old, new, link, mistakes)
+    return mistakes
+
+
+def _changes_bridge_of_goals(old: RobotConfig, new: RobotConfig) -> bool:
+    """Return whether goals and the initial pose both change to another bridge."""
+    parts = [(config.motion.move, config.motion.initial_pose) for config in (old, new)]
+    bridges = [part.bridge for pair in parts for part in pair if part is not None]
+    return len(bridges) == 4 and bridges[:2] != bridges[2:]
+
+
+def _set(robot: VisibleRobot, key: str, part: Any, link: Link) -> None:
+    """Set or clear a part that is not a module."""
+    if key == "alignment":
+        robot.unset_alignment() if part is None else robot.set_alignment(*part)
+    elif part is None:
+        robot.configure(key, None)
+    elif key == "tf":
+        _place(robot, part, link(part.bridge))
+    else:
+        values = msgspec.to_builtins(part)
+        over = values.pop("bridge", None)
+        robot.configure(key, values, link(over or "") if key in LINKED else None)
+
+
+def _place(robot: VisibleRobot, tf: TfConfig, bridge: Bridge) -> None:
+    """Place a robot by TF, and move the layers of its map into the same frame."""
+    before = robot.tf
+    options = {**msgspec.structs.asdict(tf), "bridge": bridge}
+    if before == {**options, **_names(robot, tf)}:
+        return
+    # Keep the received frames until the new subscription is made.
+    held = frames_of(bridge, tf.namespace).join(lambda: None)
+    try:
+        robot.set_tf(**options)
+    finally:
+        held.remove()
+    frame = (robot.tf or {})["map_frame"]
+    for module in list(robot.modules):
+        made = robot.arguments_of(module)
+        if made is not None and made[2].get("map_frame", frame) != frame:
+            name, args, options = made
+            robot.remove_module(module)
+            robot.add_module(name, *args, **{**options, "map_frame": frame})
+
+
+def _names(robot: VisibleRobot, tf: TfConfig) -> dict[str, str]:
+    """Return the full names of the frames that would place a robot."""
+    base, name = tf.base_frame or robot.base_link, Buffer().name
+    space = tf.namespace
+    return {"map_frame": name(tf.map_frame, space), "base_frame": name(base, space)}
+
+
+def _set_layers(
+    robot: VisibleRobot,
+    old: RobotConfig,
+    new: RobotConfig,
+    link: Link,
+    mistakes: Mistakes,
+) -> None:
+    """Remove the modules that only the old configuration has, and add the new ones."""
+    left = [layer.module for layer in old.layers()]
+    added: list[ModuleEntry] = []
+    for layer in new.layers():
+        if layer.module in left:
+            left.remove(layer.module)
         else:
-            self.maps.remove(map)
-            self._shown_problems.leave(map)
-            if not self.maps:
-                self.model_images.end()
-        self.update_selected()
-        self.notify_modules("on_map", map, shown)
+            added.append(layer)
+    for module in left:
+        made = module_call(module, link)
+        for each in list(robot.modules):
+            if robot.arguments_of(each) == made:
+                robot.remove_module(each)
+                break
+    for layer in added:
+        _add(robot, layer, link, mistakes)
 
-    def update_selected(self) -> None:
-        """Update whether any map has the robot selected, and fire ``on_select``."""
-        selected = any(map.selected is self for map in self.maps)
-        if selected != self.selected:
-            self.selected = selected
-            self.notify_modules("on_select", selected)
 
-    def on_gate_report(self, report: RobotReport) -> None:
-        """Store the gate's report on this robot and fire ``on_report``."""
-        super().on_gate_report(report)
-        self._show_state()
+def _add(
+    robot: VisibleRobot, layer: ModuleEntry, link: Link, mistakes: Mistakes
+) -> None:
+    path, module = layer
+    inner = path if path[0] == "modules" else None
+    try:
+        name, args, options = module_call(module, link)
+        made = robot.add_module(name, *args, **options)
+        if path[0] == "scan":
+            robot.svg.insert(1, made.svg)  # after the title, under the body
+    except ModuleNotFound as error:
+        mistakes.add((*path, "name"), str(error))
+    except WrongArguments as error:
+        for wrong in error.wrong:
+            place = wrong.path if inner else ()
+            mistakes.add((*path, *place), wrong_argument(module, wrong))
+    except WebMapError as error:
+        # The error of a module begins with the name of the argument.
+        key = str(error).partition(" ")[0].rstrip(":")
+        place = ("options", key) if inner and key in module.options else ()
+        text = f"{module.name}: {error}" if inner else str(error)
+        mistakes.add((*path, *place), text)
+    except Exception as error:  # a module from elsewhere may raise anything
+        text = f"{type(error).__name__}: {error}"
+        mistakes.add(path, f"{module.name} refused its arguments: {text}")
 
-    def expect_jump(self) -> None:
-        """Accept that the robot's pose jumps: an operator or a program set it.
 
-        A jump of its poses within the next seconds is then no problem.
-        """
-        self.pose_source.pipeline.jumps.expect(time.monotonic())
+def wrong_argument(module: ModuleConfig, wrong: WrongArgument) -> str:
+    """Return the error message for a wrong argument, with the expected value."""
+    if not wrong.got:
+        return f"{module.name}: {wrong.text}"
+    expected = wrong.text
+    if expected == "a Bridge":
+        expected = 'a bridge, such as { bridge = "hall" }'
+    of = f", for {wrong.name} of {module.name}"
+    return f"got {checks.show(wrong.got[0])}, expected {expected}{of}"
 
-    def looking_changed(self) -> None:
-        """Show the pose and the state of now to who begins to look."""
-        if not looking.somebody:
-            self.pose_source.expect_fewer()
-            return
-        if self.valid:
-            self._draw_pose()
-        if self.pose_stamp is not None:
-            self._draw_age(self.pose_stamp)
-            self._show_state()
-        self.pose_source.draw()
 
-    def _show_state(self) -> None:
-        self.pose_source.keep_on(self._needs_poses())
-        state, shown = self.state, self._state_shown
-        if state == shown:
-            return
-        if shown is not None and shown.name == state.name == "gone":
-            return  # since the same time, however it is rounded
-        self._state_shown = state
-        self.svg.set("data-state", state.name)
-        since = since_when(self.silent_for) if state.name == "gone" else None
-        self.svg.set("data-since", since)
-        self.notify_modules("on_state", state)
+def _note(mistakes: Mistakes, path: KeyPath, error: WebMapError, name: str) -> None:
+    """Add the mistakes of a part, each with its path."""
+    if isinstance(error, checks.WrongConfig):
+        mistakes.take((), error.mistakes)
+    else:
+        mistakes.add(path, str(error).removeprefix(f"robot {name!r}: "))
 
-    def _needs_poses(self) -> bool:
-        """Return whether somebody needs all poses also while no page is open.
 
-        That is who has control of the robot, such as a program, and a module of the
-        user that gets each pose.
-        """
-        report = self.report
-        if report is not None:
-            goes = report.goal is not None and report.goal.state not in OVER
-            if goes or report.holder is not None:
-                return True
-        for module in self.modules:
-            own = type(module).__module__.startswith("webmap.")
-            if not own and hasattr(module, "on_odometry_update"):
-                return True
-        return False
+def module_call(module: ModuleConfig, link: Link) -> ModuleCall:
+    """Return a module's name and arguments for ``add_module``."""
+    args = tuple(_argument(value, link) for value in module.args)
+    options = {key: _argument(value, link) for key, value in module.options.items()}
+    return module.name, args, options
 
-    def show_pose(self, pose: PoseReading, stamp: float | None = None) -> None:
-        """Draw the robot at a pose on the common map, and fire ``on_odometry_update``.
 
-        Args:
-            pose: The pose; nothing fires if it is the same as before.
-            stamp: When it was sent, in seconds of :func:`time.monotonic`; None if the
-                robot's map was moved and no pose arrived.
+def _argument(value: Any, link: Link) -> Any:
+    """Return the value of a module's argument, with bridges resolved."""
+    if is_link(value):
+        return link(value["bridge"])
+    return None if value == NONE else value
 
-        """
-        if stamp is not None:
-            self.pose_stamp = stamp
-            if looking.somebody:
-                self._draw_age(stamp)
-            if not self._is_looked_at:
-                self._show_state()
-                self._is_looked_at = state_rounds.join(self._show_state)
-        if (
-            self.valid
-            and pose.position == self.position
-            and pose.orientation == self.orientation
-            and pose.twist == self.measured_twist
-        ):
-            return
-        self.position, self.orientation = pose.position, pose.orientation
-        self.measured_twist = pose.twist
-        if looking.somebody:
-            self._draw_pose()
-        if not self.valid:
-            self.valid = True
-            self.svg.classes.remove("unplaced")
-        self.notify_modules("on_odometry_update")
 
-    def _draw_age(self, stamp: float) -> None:
-        self.svg.set_age(time.monotonic() - stamp, limit=POSE_LIMIT)
-
-    def _draw_pose(self) -> None:
-        self.svg.set_pose(self.position.x, self.position.y, self.yaw)
+def _plain(value: Any) -> Any:
+    if value is None:
+        return dict(NONE)
+    return {"bridge": value.url} if isinstance(value, Bridge) else value

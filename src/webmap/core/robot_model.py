@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from webmap.base.errors import ConfigError
-from webmap.core.page import Page
+from webmap.core.base_page import BasePage
 from webmap.core.pictures import Publisher
 from webmap.scene import svg
 from webmap.scene.element import Element
@@ -85,7 +85,7 @@ class ModelImages:
             if image.get("href") == shown.url
         }
 
-    def show(self, page: Page) -> None:
+    def show(self, page: BasePage) -> None:
         """Publish the images for a page; names that are no file of its folder stay."""
         for image in self._images():
             shown = self._shown.get(image)
@@ -118,7 +118,7 @@ class ModelImages:
             if isinstance(node, Element) and node.tag == "image":
                 yield node
 
-    def _publish(self, page: Page, file: Path) -> str:
+    def _publish(self, page: BasePage, file: Path) -> str:
         key = (page.publisher, file)
         if key not in self._published:
             self._published[key] = page.publisher.publish_image(file)

@@ -15,14 +15,14 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Protocol
 
 from webmap.agents.peer import close_peers
+from webmap.base.audience import audience
 from webmap.base.geometry import Quaternion, Twist
 from webmap.base.lifecycle import lifecycle
-from webmap.base.looking import looking
 from webmap.base.scope import Removal
 from webmap.base.tasks import spawn
 from webmap.core.motion import RobotMotion, robot_motions
-from webmap.core.refused import refusals
-from webmap.core.robot import robots
+from webmap.core.refusals import refusals
+from webmap.core.visible_robot import robots
 from webmap.gate.protocol import (
     GateDown,
     RefusedCount,
@@ -155,7 +155,7 @@ class Runtime:
         """Receive what is only shown less often while no page is open."""
         self._serves_pages = True
         if self._loop is not None:
-            self.call(looking.expect_pages, self._loop)
+            self.call(audience.expect_pages, self._loop)
 
     def on_stop(self, fn: Callable[[], None]) -> None:
         """Call ``fn`` in the model's thread whenever the thread is about to end."""
@@ -165,7 +165,7 @@ class Runtime:
         """Tick ``watcher`` until the removal; called in the model's thread."""
         self._watchers[id(watcher)] = watcher
         self._has_watchers.set()
-        opened = looking.page_opened()
+        opened = audience.page_opened()
 
         def undo() -> None:
             opened.remove()
@@ -203,7 +203,7 @@ class Runtime:
         try:
             lifecycle.begin(loop)
             if self._serves_pages:
-                looking.expect_pages(loop)
+                audience.expect_pages(loop)
             RobotMotion.gate = gate
             for motion in list(robot_motions):
                 motion.declare_or_complain()
@@ -214,7 +214,7 @@ class Runtime:
         finally:
             for fn in self._on_stop:
                 fn()
-            looking.end()
+            audience.end()
             RobotMotion.gate = None
             await asyncio.to_thread(gate.stop)
             self.gate = None

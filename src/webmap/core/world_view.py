@@ -2,18 +2,19 @@
 
 import itertools
 import logging
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine
 from webmap.base.scope import Removal, keep
+from webmap.core.base_page import BasePage, page_of
 from webmap.core.extendable import Extendable
-from webmap.core.page import Page, page_of
 from webmap.core.pictures import pixels_across
 from webmap.core.registry import Namespace
-from webmap.core.view import Rect, apply_operation, initial_view
 from webmap.scene import svg
 from webmap.scene.element import Element, Handler
 from webmap.scene.node import Fragment
@@ -23,12 +24,77 @@ log = logging.getLogger("webmap.map")
 _numbers = itertools.count(1)
 
 
+@dataclass(frozen=True, slots=True)
+class Rect:
+    """A rectangle in pixels, with the names of the browser's ``DOMRect``."""
+
+    left: float = 0.0
+    top: float = 0.0
+    width: float = 0.0
+    height: float = 0.0
+
+    @property
+    def right(self) -> float:
+        """The right edge, in pixels."""
+        return self.left + self.width
+
+    @property
+    def bottom(self) -> float:
+        """The lower edge, in pixels."""
+        return self.top + self.height
+
+
+def initial_view(width: float, height: float) -> Affine:
+    """Return the view with the world's origin in the centre, one pixel per metre.
+
+    World y points up and screen y down (REP 103), so the view mirrors.
+    """
+    return Affine(1.0, 0.0, 0.0, -1.0, width / 2, height / 2)
+
+
+def apply_operation(
+    view: Affine, rect: Rect, operation: str, args: tuple[float, ...]
+) -> Affine:
+    """Return the view after an operation that is sent to the browser.
+
+    The browser owns the view; this keeps Python's copy correct until the browser
+    reports. ``follow`` changes nothing here, as only the browser then moves the view.
+    """
+    if operation == "translate":
+        return Affine.translation(*args) @ view
+    if operation == "scale":
+        return Affine.scaling(*args) @ view
+    if operation == "rotate":
+        angle, x, y = args
+        return Affine.rotation(-math.radians(angle), x, y) @ view
+    if operation == "set":
+        return Affine(*args)
+    if operation == "fit":
+        return fit_view(rect, *args)
+    return view
+
+
+def fit_view(rect: Rect, x0: float, y0: float, x1: float, y1: float) -> Affine:
+    """Return the unrotated view in which a rectangle of the world fills the canvas."""
+    across, up = max(abs(x1 - x0), 1e-6), max(abs(y1 - y0), 1e-6)
+    factor = min(max(rect.width, 1) / across, max(rect.height, 1) / up)
+    x, y = (x0 + x1) / 2, (y0 + y1) / 2
+    return Affine(
+        factor,
+        0.0,
+        0.0,
+        -factor,
+        rect.width / 2 - factor * x,
+        rect.height / 2 + factor * y,
+    )
+
+
 class BrowserPart:
     """An ES module in one page that belongs to one module of one map."""
 
     def __init__(
         self,
-        page: Page,
+        page: BasePage,
         map_element: int,
         module: Any,
         script: str | Path,
@@ -95,7 +161,7 @@ class WorldView(Extendable):
         namespace: Namespace,
     ) -> None:
         super().__init__(namespace)
-        self.page: Page = page_of(container)
+        self.page: BasePage = page_of(container)
         if self.page.closed:  # the map would never be destroyed
             raise ConfigError(
                 f"page {self.page.entry.path!r} of {self.page.viewer.name} was closed, "
@@ -103,6 +169,8 @@ class WorldView(Extendable):
                 "in a task that may end after the viewer has left"
             )
         self.container = container
+        self.selected: object = None
+        """The robot that the viewer selected; only :class:`webmap.Map` has robots."""
         width, height = self.page.size_of(container)
         self._rect = Rect(0.0, 0.0, canvas_width or width, canvas_height or height)
         self.images = svg.g(class_="images")
@@ -179,6 +247,9 @@ class WorldView(Extendable):
         published = self._published.pop(img, None)
         if published is not None:
             published.remove()
+
+    def remove_robot(self, robot: Any) -> None:
+        """Remove a robot; only :class:`webmap.Map` has robots."""
 
     def mount(
         self, fragment: Fragment, *, order: float, into: Fragment | None = None

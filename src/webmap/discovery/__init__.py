@@ -5,7 +5,7 @@ The rules are plain functions of names and types, without I/O; open ``rules`` fi
 in ``webmap.fleet``.
 """
 
-from webmap.discovery.found import Findings, FoundRobot, Guess
+from webmap.discovery.findings import Findings, FoundRobot, Guess
 from webmap.discovery.robots import discover
 
 __all__ = ["Findings", "FoundRobot", "Guess", "discover"]

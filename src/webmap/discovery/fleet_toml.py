@@ -6,7 +6,7 @@ from typing import Any
 from webmap.config.checks import KeyPath
 from webmap.config.fleet import BridgeConfig, FleetConfig, MapConfig, dump
 from webmap.config.robot import ModuleConfig, RobotConfig
-from webmap.discovery.found import Findings, FoundRobot, Layers
+from webmap.discovery.findings import Findings, FoundRobot, Layers
 from webmap.discovery.layers import TRAIL, drawing, topic_of, with_layers
 
 HEAD = """\

@@ -16,8 +16,8 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.config.robot import ModuleConfig, RobotConfig, is_link
-from webmap.discovery.found import FoundLayer, Layers
-from webmap.discovery.grouping import inside, nearest
+from webmap.discovery.findings import FoundLayer, Layers
+from webmap.discovery.rules import inside, nearest
 from webmap.modules.declaration import Declaration, FoundTopic, TopicKind, declarations
 from webmap.ros.names import is_topic, normalise_topic, split_type
 
@@ -25,10 +25,10 @@ TRAIL = ModuleConfig(name="Trail", options={"length": 10.0})
 """The path of a robot in the past, drawn for every robot."""
 
 
-Place: TypeAlias = tuple[float, int, int, int]
+RulePlace: TypeAlias = tuple[float, int, int, int]
 """The rank of a layer, and the indices of its kind, of the kind's type and pattern."""
 
-Order: TypeAlias = tuple[Place, bool, str]
+RuleOrder: TypeAlias = tuple[RulePlace, bool, str]
 """The place of a rule, whether the topic is shared by robots, and the topic."""
 
 
@@ -45,7 +45,7 @@ def find_layers(topics: Mapping[str, str], robots: Iterable[str]) -> dict[str, L
     layers = declarations()
     kinds = _kinds(layers)
     layers = _foreign_first(layers)
-    matched: dict[str, list[tuple[Order, FoundLayer]]]
+    matched: dict[str, list[tuple[RuleOrder, FoundLayer]]]
     matched = {space: [] for space in homes.values()}
     for topic, type in topics.items():
         found = _match(topic, type, layers)
@@ -107,7 +107,7 @@ def _foreign_first(layers: Iterable[Declaration]) -> list[Declaration]:
 
 def _match(
     topic: str, type: str, layers: Iterable[Declaration]
-) -> tuple[Place, FoundLayer] | None:
+) -> tuple[RulePlace, FoundLayer] | None:
     if not is_topic(topic):
         return None
     try:
@@ -138,7 +138,7 @@ def _owners(
 
 
 def _best(
-    found: list[tuple[Order, FoundLayer]],
+    found: list[tuple[RuleOrder, FoundLayer]],
     kinds: Mapping[str, tuple[Declaration, TopicKind]],
 ) -> Layers:
     best: list[FoundLayer] = []

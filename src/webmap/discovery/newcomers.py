@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from webmap.discovery.found import ROLES, Findings, FoundRobot, Guess, Role
+from webmap.discovery.findings import ROLES, Findings, FoundRobot, Guess, TopicRole
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,7 +13,7 @@ class News:
     robot: FoundRobot
     """All that is known of it: topics in use stay, new ones are added."""
 
-    roles: tuple[Role, ...] = ()
+    roles: tuple[TopicRole, ...] = ()
     """Its additional roles; empty for a new robot."""
 
     moved: bool = False
@@ -100,7 +100,7 @@ def with_frames_of(robot: FoundRobot, known: FoundRobot) -> FoundRobot:
     )
 
 
-def _more(robot: FoundRobot, known: FoundRobot) -> tuple[Role, ...]:
+def _more(robot: FoundRobot, known: FoundRobot) -> tuple[TopicRole, ...]:
     new = {role for role in robot.guesses if role not in known.guesses}
     if len(robot.guesses.get("camera", ())) > len(known.guesses.get("camera", ())):
         new.add("camera")

@@ -7,17 +7,26 @@ from dataclasses import replace
 from typing import Literal
 from urllib.parse import urlsplit
 
-from webmap.discovery.found import Findings, FoundRobot, Guess, Role
-from webmap.discovery.grouping import inside, nearest, robot_by_frames, robot_namespaces
+from webmap.discovery.findings import Findings, FoundRobot, Guess, TopicRole
 from webmap.discovery.layers import drawn_otherwise, find_layers
-from webmap.discovery.rules import FUSED, INNER_VELOCITY, VELOCITY, Match, match
+from webmap.discovery.rules import (
+    FUSED,
+    INNER_VELOCITY,
+    VELOCITY,
+    Match,
+    inside,
+    match,
+    nearest,
+    robot_by_frames,
+    robot_namespaces,
+)
 from webmap.discovery.tf_robots import Base, Trees, owners
 from webmap.ros.names import agent_named, is_topic, is_type
 
-SHARED: tuple[Role, ...] = ("map", "tf")
+SHARED: tuple[TopicRole, ...] = ("map", "tf")
 """Roles that a topic without a namespace fills for every robot."""
 
-DRAWN_ONLY: tuple[Role, ...] = ("scan", "plan", "map", "costmap", "cloud")
+DRAWN_ONLY: tuple[TopicRole, ...] = ("scan", "plan", "map", "costmap", "cloud")
 """Roles of topics that are only drawn, so that a layer may take them."""
 
 DIRECTION = (
@@ -158,7 +167,7 @@ def _robot(
     twists: Sequence[str],
     base: Base | None,
 ) -> FoundRobot:
-    guesses: dict[Role, tuple[Guess, ...]] = {}
+    guesses: dict[TopicRole, tuple[Guess, ...]] = {}
     for each in matches:
         guess = Guess(each.topic, each.type, _reason(each, space))
         guesses[each.role] = (*guesses.get(each.role, ()), guess)

@@ -1,18 +1,27 @@
-"""The rules: which types and names of topics fit which role.
+"""The rules: which topics fit which role, and which namespaces are robots.
 
 A rule has a pattern for the end of a topic's name. The part before the end is the
 robot's namespace. Between the two there may be names of parts of a robot, such as a
 controller's, which are no robots. Rules of one role are in order: the first match
 determines the rank of the topic.
+
+A robot is a namespace with a topic for the pose or for the velocity. A namespace with
+only one of the two inside another robot's namespace is a part of that robot: a camera
+with its own odometry, or an input of a velocity mux. So is a namespace anywhere that
+has odometry with a ``child_frame_id`` of that robot and no topic for the velocity.
 """
 
 import re
+from collections import Counter
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from posixpath import commonpath
 from typing import NamedTuple
 
 from webmap.base.errors import ConfigError
-from webmap.discovery.found import Role
+from webmap.discovery.findings import TopicRole
+from webmap.discovery.tf_robots import BASE, Base, Trees
 from webmap.ros.names import split_type
 
 PARTS = (
@@ -54,9 +63,9 @@ FUSED = "a filter's estimate"
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One rule."""
+    """A role for topics of some types whose names end in some way."""
 
-    role: Role
+    role: TopicRole
     types: tuple[str, ...]
     """Names of types, without a dialect."""
 
@@ -174,7 +183,7 @@ INNER_VELOCITY = re.compile(r"cmd_vel|velocity|teleop")
 class Match(NamedTuple):
     """A topic that fits a role."""
 
-    role: Role
+    role: TopicRole
     rank: tuple[int, int, str]
     """Smaller is better: the rule's place, the parts before the name, the name."""
 
@@ -206,3 +215,88 @@ def _pattern(tail: str) -> re.Pattern[str]:
     """Return the pattern of topics, compiled at its first use: it takes long."""
     # The shortest namespace matches, so that parts of a robot do not count as robots.
     return re.compile(rf"(?P<ns>(?:/[^/]+)*?)/(?P<parts>(?:(?:{PARTS})/)*)(?:{tail})\Z")
+
+
+MOVING = ("odometry", "pose", "velocity")
+"""Roles that make a namespace a robot."""
+
+
+def robot_by_frames(matches: Sequence[Match], trees: Trees) -> dict[str, str]:
+    """Return the robot's namespace of each namespace with odometry of a known base."""
+    roles: dict[str, set[str]] = {}
+    for each in matches:
+        roles.setdefault(each.role, set()).add(each.namespace)
+    driven = roles.get("velocity", set())
+    groups: dict[Base, set[str]] = {}
+    for each in matches:
+        child = trees.odometry.get(each.topic)
+        if child:
+            frames = nearest(each.topic, roles.get("tf", ())) or ""
+            base = trees.base_of(child, frames)
+            group = groups.setdefault(base, set())
+            group.add(each.namespace)
+            if BASE.match(base.frame) and (base.space or "" in driven):
+                group.add(base.space)
+    robots: dict[str, str] = {}
+    for base, group in groups.items():
+        # Frames without a prefix may belong to several robots that are driven.
+        found = group & driven or group & {base.space}
+        if len(found) == 1 or (not found and len(group) > 1):
+            outer = commonpath([f"{space}/" for space in group]).rstrip("/")
+            robots |= dict.fromkeys(group, min(found, default=outer))
+    return robots | {robot: robot for robot in robots.values()}
+
+
+def robot_namespaces(
+    matches: Iterable[Match], by_frames: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Return the namespaces that are robots, sorted; one may be empty.
+
+    Args:
+        matches: The topics that fit a role.
+        by_frames: The robots that are known by their frames.
+
+    """
+    halves: dict[str, set[str]] = {}
+    for each in matches:
+        if each.role in MOVING:
+            half = "velocity" if each.role == "velocity" else "place"
+            space = by_frames.get(each.namespace, each.namespace)
+            halves.setdefault(space, set()).add(half)
+    outer = {space: nearest(space, halves) for space in halves}
+    # Counts the namespaces in the same robot with exactly the same half.
+    alike = Counter((outer[space], *sorted(has)) for space, has in halves.items())
+    kept = set(halves)
+    # The inputs of a robot are first: it is whole with them, whatever their names are.
+    order = sorted(halves, key=lambda space: ("place" in halves[space], -_depth(space)))
+    for space in order:
+        around, has = outer[space], halves[space]
+        if around is None or len(has) == 2 or space in by_frames:
+            continue
+        alone = alike[(around, *sorted(has))] == 1
+        # Several in a whole robot are inputs or sensors; several others may be a fleet.
+        if alone or len(halves[around]) == 2:
+            kept.discard(space)
+            halves[around] |= has
+    return tuple(sorted(kept))
+
+
+def nearest(name: str, namespaces: Container[str]) -> str | None:
+    """Return the innermost of the namespaces that contain a name, None if none.
+
+    All names are in the empty namespace, except the empty one itself.
+    """
+    while name:
+        name = name.rpartition("/")[0]
+        if name in namespaces:
+            return name
+    return None
+
+
+def inside(name: str, namespace: str) -> bool:
+    """Return whether a name is in a namespace; all names are in the empty one."""
+    return name.startswith(namespace + "/")
+
+
+def _depth(namespace: str) -> int:
+    return namespace.count("/")

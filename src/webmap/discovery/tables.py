@@ -1,13 +1,12 @@
 """The findings as a table for a terminal."""
 
-from webmap.base.counted import counted
-from webmap.base.outside_text import escaped
-from webmap.discovery.found import ROLES, Findings, FoundRobot, Layers, Role
+from webmap.base.text import counted, escaped
+from webmap.discovery.findings import ROLES, Findings, FoundRobot, Layers, TopicRole
 from webmap.discovery.layers import drawing
 
 DIALECTS = {"ros1": "ROS 1", "ros2": "ROS 2", None: "unknown ROS version"}
 
-USED: tuple[Role, ...] = (
+USED: tuple[TopicRole, ...] = (
     "odometry",
     "velocity",
     "scan",
@@ -17,7 +16,7 @@ USED: tuple[Role, ...] = (
     "map",
 )
 
-ONE: tuple[Role, ...] = (
+ONE: tuple[TopicRole, ...] = (
     "odometry",
     "pose",
     "velocity",
@@ -81,7 +80,7 @@ def robot_table(robot: FoundRobot) -> list[str]:
 
 
 def layer_table(robot: FoundRobot, findings: Findings) -> list[str]:
-    """Return the layers of a robot that was found, as a table."""
+    """Return the rows of :func:`drawn_table` for a robot of the findings."""
     return drawn_table(robot.namespace, findings.layers.get(robot.namespace, Layers()))
 
 
@@ -111,7 +110,7 @@ def drawn_table(namespace: str, layers: Layers) -> list[str]:
     return lines
 
 
-def _use(robot: FoundRobot, role: Role, place: int) -> str:
+def _use(robot: FoundRobot, role: TopicRole, place: int) -> str:
     """Return whether one of several topics of a role is used."""
     if role not in ONE or len(robot.guesses[role]) == 1:
         return ""

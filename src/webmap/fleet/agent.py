@@ -31,10 +31,9 @@ from webmap.agents.displays import MOST_SAMPLE, MOST_USERS
 from webmap.agents.peer import MOST_CHANGES_BYTES, Peer, peer_of
 from webmap.agents.samples import MAX_BYTES
 from webmap.agents.scans import lean_scan
-from webmap.base.children import python_command
 from webmap.base.errors import BridgeError, ConfigError, WireError
 from webmap.base.lifecycle import lifecycle
-from webmap.base.loading import load_soon
+from webmap.base.processes import load_soon, python_command
 from webmap.base.tasks import spawn
 from webmap.core.runtime import runtime
 from webmap.fleet.held import Held, open_at, warn_of_open_bridge

@@ -8,7 +8,7 @@ import click
 
 from webmap.discovery import Findings
 from webmap.discovery.doctor import ConfiguredRobot
-from webmap.discovery.found import ROLES, FoundRobot, Role
+from webmap.discovery.findings import ROLES, FoundRobot, TopicRole
 from webmap.ros.names import normalise_url
 
 Configured: TypeAlias = Callable[[Findings], Sequence[ConfiguredRobot]]
@@ -108,7 +108,7 @@ def _from_given(robot: FoundRobot) -> ConfiguredRobot:
     """Return a robot of ``--robot``; its other roles are as discovery found them."""
     from webmap.fleet.overrides import SETTABLE_ROLES
 
-    roles: list[Role] = ["pose", *SETTABLE_ROLES]
+    roles: list[TopicRole] = ["pose", *SETTABLE_ROLES]
     if not robot.topic("odometry"):
         roles.append("tf")  # drawn by frames only if odometry names the frame
     return ConfiguredRobot(robot.name, _topics(robot, roles))
@@ -122,8 +122,8 @@ def _of_found(robot: FoundRobot, there: FoundRobot) -> ConfiguredRobot:
 
 
 def _topics(
-    robot: FoundRobot, roles: Iterable[Role]
-) -> dict[Role, tuple[tuple[str, str], ...]]:
+    robot: FoundRobot, roles: Iterable[TopicRole]
+) -> dict[TopicRole, tuple[tuple[str, str], ...]]:
     return {
         role: tuple((each.topic, each.type) for each in robot.guesses.get(role, ()))
         for role in roles

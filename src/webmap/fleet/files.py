@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from webmap.base.errors import ConfigError
-from webmap.base.local_plane import LocalPlane
+from webmap.base.geometry import LocalPlane
 from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.fleet import ImageConfig, TilesConfig
 from webmap.config.robot import PictureConfig

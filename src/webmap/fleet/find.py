@@ -8,8 +8,8 @@ from urllib.parse import urlsplit
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.discovery import Findings, discover
-from webmap.discovery.frame_listening import receive_frames
-from webmap.discovery.naming import free_name, unique_names
+from webmap.discovery.findings import free_name, unique_names
+from webmap.discovery.frames import receive_frames
 from webmap.discovery.robots import host_name
 from webmap.ros.asking import ask_topics
 from webmap.ros.names import agent_named

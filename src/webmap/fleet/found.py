@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeClosed
-from webmap.base.outside_text import escaped
+from webmap.base.text import escaped
 from webmap.config.checks import same_name
 from webmap.config.robot import RobotConfig
 from webmap.discovery import FoundRobot
-from webmap.discovery.naming import free_name
+from webmap.discovery.findings import free_name
 from webmap.discovery.rules import VELOCITY
 from webmap.discovery.tables import OVERRULE, drawn_table, robot_table, summary_line
 from webmap.fleet.find import Found, find

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from webmap.base.errors import ConfigError
 from webmap.config.checks import LONGEST_NAME, is_name, same_name
 from webmap.discovery import Findings, FoundRobot, Guess
-from webmap.discovery.found import Layers, Role
+from webmap.discovery.findings import Layers, TopicRole
 from webmap.discovery.layers import find_layers
 from webmap.discovery.rules import PARTS
 from webmap.ros.names import normalise_topic
@@ -20,10 +20,10 @@ FORM = "NAME:ODOM:CMD_VEL:SCAN, as in Bob:/odom:/cmd_vel:/scan"
 
 APART = "names must differ by more than case and Unicode form"
 
-GIVEN_ROLES: tuple[Role, ...] = ("odometry", "velocity", "scan")
+GIVEN_ROLES: tuple[TopicRole, ...] = ("odometry", "velocity", "scan")
 """The roles in a value of ``--robot``."""
 
-WHERE: tuple[Role, ...] = ("odometry", "pose")
+WHERE: tuple[TopicRole, ...] = ("odometry", "pose")
 
 _PART = re.compile(PARTS)
 
@@ -204,7 +204,7 @@ def _where(robot: FoundRobot) -> str:
     return robot.topic("odometry") or robot.topic("pose")
 
 
-def _has(robot: FoundRobot, roles: tuple[Role, ...], topic: str) -> bool:
+def _has(robot: FoundRobot, roles: tuple[TopicRole, ...], topic: str) -> bool:
     plain = _plain(topic) if topic else ""
     return plain != "" and any(
         guess.topic == plain for role in roles for guess in robot.guesses.get(role, ())

@@ -10,8 +10,7 @@ import webmap
 from webmap.config.checks import Mistakes
 from webmap.config.fleet import read_fleet
 from webmap.config.robot import RobotConfig
-from webmap.config.secrets import readable_secret
-from webmap.config.toml_text import read_text
+from webmap.config.toml_text import read_text, readable_secret
 from webmap.console import Console, make_robot
 from webmap.fleet.found import find_fleet
 from webmap.fleet.given import given_robots

@@ -13,12 +13,11 @@ from webmap.base.map_file import read_map
 from webmap.config.checks import KeyPath, Mistakes, WrongConfig
 from webmap.config.fleet import FleetConfig, read_fleet
 from webmap.config.robot import MOTION, ModuleConfig, RobotConfig
-from webmap.config.secrets import readable_secret
-from webmap.config.toml_text import read_text
+from webmap.config.toml_text import read_text, readable_secret
 from webmap.core.alignment_store import store
-from webmap.core.configure import module_call, wrong_argument
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.registry import map_modules
+from webmap.core.robot import module_call, wrong_argument
 from webmap.fleet.files import (
     check_floor,
     check_images,

@@ -23,20 +23,20 @@ from webmap.agents.description import (
     read_beacon,
 )
 from webmap.agents.peer import peer_of
-from webmap.base.counted import counted
 from webmap.base.echo import echo, notify
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import no_scope
 from webmap.base.tasks import spawn
+from webmap.base.text import counted
 from webmap.config.fleet import MapConfig
 from webmap.config.reading import read_part
 from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.console import Console, make_robot
 from webmap.console.fleet import draw_picture
-from webmap.core.configure import apply
-from webmap.core.motion import given_id, id_at_agent, shown_name
+from webmap.core.motion import agent_robot_id, id_at_agent, shown_name
 from webmap.core.pictures import pictures
+from webmap.core.robot import apply_config
 from webmap.core.runtime import runtime
 from webmap.fleet.passed_on import LARGEST, accepted, received_picture
 from webmap.poses.alignment import align_bridge
@@ -316,18 +316,18 @@ class Agents:
             if shown.config != config:
                 old, shown.config = shown.config, config
                 with no_scope():
-                    mistakes = apply(shown.robot, old, config, bridges)
+                    mistakes = apply_config(shown.robot, old, config, bridges)
                 for path, message in mistakes.found:
                     log.error("%s: %s: %s", shown.robot.name, path[0], message)
             return
         name = shown_name(config.name, agent.name)
         config = msgspec.structs.replace(config, name=name)
-        token = given_id.set(id)
+        token = agent_robot_id.set(id)
         try:
             with no_scope():
                 robot = make_robot(config, bridges)
         finally:
-            given_id.reset(token)
+            agent_robot_id.reset(token)
         agent.robots[id] = _Shown(robot, config, picture)
         console.add(robot)
         notify(f"{robot.name} is a robot of the agent {agent.name}")

@@ -11,14 +11,14 @@ from webmap.base.errors import ConfigError
 from webmap.config.checks import same_name
 from webmap.config.motion import MotionConfig
 from webmap.config.robot import RobotConfig, named_cameras
-from webmap.discovery.found import (
+from webmap.discovery.findings import (
     ACTIONS,
     ROLES,
     Findings,
     FoundRobot,
     Guess,
     Layers,
-    Role,
+    TopicRole,
 )
 from webmap.discovery.layers import is_own, role_of
 from webmap.discovery.robots import host_name
@@ -41,7 +41,7 @@ OTHER_KEYS = ("name", "base", "velocity_type")
 """Keys of settings that are no topics: the robot's name, the frame of its base, and
 the type of its velocity topic."""
 
-SETTABLE_ROLES: tuple[Role, ...] = (
+SETTABLE_ROLES: tuple[TopicRole, ...] = (
     "odometry",
     "velocity",
     "scan",
@@ -53,7 +53,7 @@ SETTABLE_ROLES: tuple[Role, ...] = (
 )
 """Roles that a robot of ``--robot`` can have."""
 
-MOTION: tuple[Role, ...] = ("velocity", "goal", "action", "cancel", "initialpose")
+MOTION: tuple[TopicRole, ...] = ("velocity", "goal", "action", "cancel", "initialpose")
 """Roles by which a robot receives something."""
 
 MOST_CAMERAS = 4
@@ -354,7 +354,7 @@ def _dialect(robot: FoundRobot) -> str:
 
 
 def _guesses(
-    role: Role,
+    role: TopicRole,
     topics: Sequence[str],
     found: Sequence[Guess],
     dialect: str | None,

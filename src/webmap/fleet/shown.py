@@ -15,11 +15,10 @@ from webmap.config.checks import Mistakes, same_name
 from webmap.config.robot import RobotConfig, TfConfig
 from webmap.console import Console, make_robot
 from webmap.core.alignment_store import store
-from webmap.core.configure import apply
+from webmap.core.robot import apply_config
 from webmap.discovery import FoundRobot
-from webmap.discovery.found import FoundLayer, Role
+from webmap.discovery.findings import FoundLayer, TopicRole, free_name
 from webmap.discovery.layers import TRAIL, drawing, topic_of, with_layers
-from webmap.discovery.naming import free_name
 from webmap.discovery.newcomers import News
 from webmap.discovery.tables import summary_line
 from webmap.fleet.given import Candidate
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("webmap.cli")
 
-PARTS: Mapping[Role, str] = {
+PARTS: Mapping[TopicRole, str] = {
     "odometry": "odometry",
     "pose": "odometry",
     "velocity": "twist",
@@ -72,7 +71,7 @@ class ShownRobot:
         old, self.config = self.made_of(self.config), config
         with no_scope():
             new = self.made_of(config)
-            return apply(self.robot, old, new, {self.bridge.url: self.bridge})
+            return apply_config(self.robot, old, new, {self.bridge.url: self.bridge})
 
     def use(self, config: RobotConfig) -> set[Any]:
         """Change the robot, and log and return the keys that cannot be used."""

@@ -12,8 +12,8 @@ from webmap.base.echo import notify
 from webmap.base.errors import BridgeError
 from webmap.base.lifecycle import lifecycle
 from webmap.discovery import Findings, FoundRobot, discover
-from webmap.discovery.found import Layers
-from webmap.discovery.frame_listening import late_frames
+from webmap.discovery.findings import Layers
+from webmap.discovery.frames import frame_collector
 from webmap.discovery.layers import role_of
 from webmap.discovery.newcomers import Newcomers, News, leads_further
 from webmap.discovery.robots import host_name
@@ -139,7 +139,7 @@ class LookingForRobots(Looking):
 
     async def take(self, topics: dict[str, str]) -> None:
         """Report new robots and new topics of robots."""
-        trees = await late_frames(self.bridge).listen(topics)
+        trees = await frame_collector(self.bridge).listen(topics)
         found = await self._discover(topics, trees)
         for news in self._newcomers.look(found):
             try:
@@ -184,7 +184,7 @@ class LookingForLayers(Looking):
 
     async def take(self, topics: dict[str, str]) -> None:
         """Draw the new topics behind the bridge."""
-        frames = late_frames(self.bridge)
+        frames = frame_collector(self.bridge)
         if self._given:  # robots drawn by frames receive them anyway
             await frames.listen(topics)
         url, overrides = self.bridge.url, self._shown.overrides

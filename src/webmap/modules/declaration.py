@@ -96,7 +96,7 @@ class Declaration:
 
     @property
     def name(self) -> str:
-        """The name of the module."""
+        """The name by which ``add_module`` adds the layer: that of its class."""
         return self.layer.__name__
 
     @property

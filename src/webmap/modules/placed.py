@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from webmap.base.audience import audience
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine, Pose, Vector3
-from webmap.base.looking import looking
 from webmap.base.scope import Removal, keep
 from webmap.modules.sighting import Sighting, Sightings
 from webmap.poses.frames import lasting
@@ -166,7 +166,7 @@ class Placed:
 
     def _on_poses(self) -> None:
         if self._settled:
-            if looking.somebody and (not self._on_robot or self._upright):
+            if audience.present and (not self._on_robot or self._upright):
                 self._put()
             return
         try:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import msgspec
 
+from webmap.base.audience import RARELY
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
-from webmap.base.loading import load_soon
-from webmap.base.looking import RARELY
-from webmap.core.problems import Owner, Refusing
+from webmap.base.processes import load_soon
+from webmap.core.problems import MessageProblems, ProblemOwner
 from webmap.core.registry import Namespace
 from webmap.modules.declaration import Declaration, FoundTopic, usual_options
 from webmap.modules.layer_options import LayerOptions
@@ -56,7 +56,7 @@ class MissingField(ProtocolError, AttributeError):
     """A message lacks a field."""
 
 
-class Message:
+class LayerMessage:
     """A message whose fields are attributes; fields that cannot be drawn are refused.
 
     Args:
@@ -77,7 +77,7 @@ class Message:
         """
         lists = (each for each in self._fields.values() if isinstance(each, list))
         firsts = (each[0] for each in lists if each and isinstance(each[0], dict))
-        frames = (Message(each).frame_id for each in firsts if "header" in each)
+        frames = (LayerMessage(each).frame_id for each in firsts if "header" in each)
         return self._header.frame_id or next(filter(None, frames), "")
 
     @property
@@ -106,7 +106,7 @@ class Message:
 def _usable(value: Any, name: str) -> Any:
     """Return a field that can be drawn; its own fields are attributes."""
     if isinstance(value, dict):
-        return Message(value)
+        return LayerMessage(value)
     if isinstance(value, list):
         return [_usable(item, name) for item in value]
     check_numbers(value, name)
@@ -194,7 +194,7 @@ class TopicLayer(LayerOptions):
 
     @classmethod
     def options_for(cls, found: FoundTopic) -> dict[str, Any]:
-        """Return the options for a topic that discovery found."""
+        """Return the options with which discovery adds the layer; may be replaced."""
         return usual_options(cls, found)
 
     def build(self) -> None:
@@ -251,9 +251,9 @@ class TopicLayer(LayerOptions):
         """Show an error in a message that is drawn nevertheless."""
         self._refusing.complain(text)
 
-    def _subscribe(self, owner: Owner) -> None:
+    def _subscribe(self, owner: ProblemOwner) -> None:
         """Draw the messages of the topic; ``owner`` shows their errors."""
-        self._refusing = Refusing(owner, self.topic)
+        self._refusing = MessageProblems(owner, self.topic)
         load_soon("numpy")  # most layers need it for their first message
         type = self.type or self.declared.types[0]
         view = self.declared.view_of(type)
@@ -270,4 +270,4 @@ class TopicLayer(LayerOptions):
         )
 
     def _take_plain(self, message: Mapping[str, Any]) -> None:
-        self.take(Message(message))
+        self.take(LayerMessage(message))

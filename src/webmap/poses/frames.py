@@ -8,8 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
+from webmap.base.audience import audience
 from webmap.base.errors import ProtocolError
-from webmap.base.looking import looking
 from webmap.base.scope import Removal, no_scope
 from webmap.poses.lasting import Lasting
 from webmap.ros.bridge import Bridge
@@ -157,7 +157,7 @@ class Frames:
             self._open_removal = bridge.on_open(self._opened)
             self._moving: Subscription | None = self._subscribe("tf")
             self._static = self._subscribe("tf_static")
-        looking.follow(self)
+        audience.follow(self)
 
     def _subscribe(self, topic: str) -> Subscription:
         return self.bridge.subscribe(
@@ -185,24 +185,24 @@ class Frames:
         """
         key = id(listener)
         self._listeners[key], self._needs[key] = listener, needs
-        self.looking_changed()
+        self.audience_changed()
 
         def leave() -> None:
             del self._listeners[key], self._needs[key]
             self._raised = {raised for raised in self._raised if raised[0] != key}
             if self._listeners:
-                self.looking_changed()
+                self.audience_changed()
             else:
                 self._end()
 
         return Removal(leave)
 
-    def looking_changed(self) -> None:
+    def audience_changed(self) -> None:
         """Receive frames that move while somebody looks, or a listener needs them.
 
         A throttle would lose messages of some of the nodes that share the topic.
         """
-        needed = looking.somebody or any(needs() for needs in self._needs.values())
+        needed = audience.present or any(needs() for needs in self._needs.values())
         if needed and self._moving is None:
             self._since = time.monotonic()
             with no_scope():
@@ -285,7 +285,7 @@ class Frames:
     def _end(self) -> None:
         _shared_frames.pop((self.bridge, self.namespace), None)
         self._open_removal.remove()
-        looking.forget(self)
+        audience.forget(self)
         for subscription in (self._static, self._moving):
             if subscription is not None:
                 subscription.remove()

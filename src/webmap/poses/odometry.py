@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from typing import Any
 
+from webmap.base.audience import RARELY
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
-from webmap.base.looking import RARELY
 from webmap.base.scope import Removable, Scope, no_scope
 from webmap.poses.placing import PoseReading
 from webmap.poses.type_query import TypeQuery

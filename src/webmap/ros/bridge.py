@@ -12,9 +12,9 @@ from typing import Any, Self
 
 import msgspec
 
+from webmap.base.audience import audience
 from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.base.lifecycle import lifecycle
-from webmap.base.looking import looking
 from webmap.base.scope import Removal, keep, no_scope
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.definitions import Definitions
@@ -96,7 +96,7 @@ class Bridge:
 
     def _enlist(self) -> None:
         lifecycle.add(self)
-        looking.follow(self)
+        audience.follow(self)
         keep(Removal(self._end))
 
     def __repr__(self) -> str:
@@ -385,7 +385,7 @@ class Bridge:
         """
         return await self._graph.set_parameter(name, value, timeout)
 
-    def looking_changed(self) -> None:
+    def audience_changed(self) -> None:
         """Subscribe to what is only shown as often as somebody looks."""
         for topic in list(self._topics.values()):
             topic.change_pace()

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple, cast
 
 import msgspec
 
-from webmap.base.children import python_command
 from webmap.base.errors import ProtocolError
+from webmap.base.processes import python_command
 from webmap.ros.arrays import dec_hook
 from webmap.ros.decoding import Unreadable, convert
 from webmap.ros.limits import LARGE, MAX_FRAME, TooLarge

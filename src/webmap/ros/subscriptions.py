@@ -8,8 +8,8 @@ from typing import Any, Generic, Literal, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
 
+from webmap.base.audience import audience
 from webmap.base.errors import BridgeError, ConfigError, ProtocolError
-from webmap.base.looking import looking
 from webmap.base.scope import Scope, current_scope
 from webmap.ros.callbacks import Callback
 from webmap.ros.limits import GENERAL, LARGE, TooLarge, check_size, limit_of
@@ -59,7 +59,7 @@ class SubscriptionOptions(NamedTuple):
     @property
     def least(self) -> int:
         """The least time between two messages now, in milliseconds."""
-        if looking.somebody or not self.throttle:
+        if audience.present or not self.throttle:
             return self.throttle
         return max(self.throttle, self.unwatched)
 

@@ -19,7 +19,7 @@ from typing import Any, BinaryIO, get_args, get_type_hints
 import msgspec
 
 from webmap.base.errors import ProtocolError
-from webmap.base.memory import return_large_pieces
+from webmap.base.processes import return_large_pieces
 from webmap.ros.arrays import Numbers
 from webmap.ros.limits import check_items
 

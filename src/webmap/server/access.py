@@ -7,7 +7,7 @@ from urllib.parse import parse_qsl, quote, urlencode
 
 from starlette.types import Scope
 
-from webmap.core.page import Viewer
+from webmap.core.base_page import Viewer
 from webmap.server.auth import Attempts, Codes, Token, new_token
 from webmap.server.origins import Hosts, same_origin
 

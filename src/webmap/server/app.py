@@ -14,7 +14,8 @@ from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
-from webmap.core.page import PageEntry, Site
+from webmap.core.base_page import PageEntry
+from webmap.core.page import Site
 from webmap.server.access import Settings
 from webmap.server.drive_socket import ConnectToGate, DriveSockets
 from webmap.server.files import FILES, IMAGES, File, NoSuchFile, Published, read_below

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from starlette.websockets import WebSocket
 
-from webmap.core.page import Viewer
+from webmap.core.base_page import Viewer
 from webmap.gate.commands import Refusal as InvalidCommand
 from webmap.gate.commands import begins_like_stop, op_of, parse, stop_in
 from webmap.gate.display.pages import refused_text

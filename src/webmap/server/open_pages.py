@@ -17,12 +17,13 @@ from webmap.base.errors import MotionError, WireError
 from webmap.base.geometry import Affine
 from webmap.base.scope import Removal
 from webmap.base.tasks import begin
-from webmap.core.page import Page, PageEntry, Viewer
+from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.page import Page
 from webmap.core.pictures import Publisher
-from webmap.core.refused import refusals
-from webmap.core.robot import robots
+from webmap.core.refusals import refusals
 from webmap.core.runtime import Runtime
-from webmap.core.view import Rect
+from webmap.core.visible_robot import robots
+from webmap.core.world_view import Rect
 from webmap.scene.element import Event
 from webmap.scene.wire.messages import (
     ElementEvent,

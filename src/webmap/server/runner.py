@@ -10,8 +10,7 @@ from types import FrameType
 import uvicorn
 
 from webmap.base.errors import ConfigError, WebMapError
-from webmap.base.memory import return_large_pieces
-from webmap.base.not_listening import why_not_listening
+from webmap.base.processes import return_large_pieces, why_not_listening
 from webmap.server.app import WebApp
 from webmap.server.connections import protocols
 from webmap.server.origins import WILDCARD, is_loopback

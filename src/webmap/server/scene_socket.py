@@ -9,7 +9,8 @@ import time
 
 from starlette.websockets import WebSocket
 
-from webmap.core.page import PageEntry, Site, Viewer
+from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.page import Site
 from webmap.server.open_pages import OpenPages
 from webmap.server.outbox import BatchedCallsByLoop, FrameQueue
 from webmap.server.page_socket import (

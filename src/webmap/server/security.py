@@ -10,7 +10,7 @@ from http import HTTPStatus
 from starlette.responses import PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from webmap.core.page import Viewer
+from webmap.core.base_page import Viewer
 from webmap.server.access import (
     AccessControl,
     Redirect,

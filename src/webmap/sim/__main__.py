@@ -7,7 +7,7 @@ from typing import Any
 
 from webmap.base.errors import WebMapError
 from webmap.base.logs import set_up_logging
-from webmap.base.outside_text import one_line
+from webmap.base.text import one_line
 from webmap.sim.process import end_with_stdin, run_simulator
 
 

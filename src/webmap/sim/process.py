@@ -9,9 +9,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from webmap.base.children import end_with_parent
 from webmap.base.errors import ConfigError
-from webmap.base.not_listening import why_not_listening
+from webmap.base.processes import end_with_parent, why_not_listening
 
 if TYPE_CHECKING:
     from webmap.sim.node import RobotsNode

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 from weakref import WeakSet
 
-from webmap.base.loop_thread import LoopThread
+from webmap.base.tasks import LoopThread
 
 Way = Literal["up", "down", "both"]
 """``up``: from the client to the server behind the proxy; ``down``: the opposite."""

@@ -12,7 +12,7 @@ from websockets.asyncio.server import Server, ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
 from webmap.base.geometry import Pose, Twist
-from webmap.base.loop_thread import LoopThread
+from webmap.base.tasks import LoopThread
 from webmap.sim.robot import BaseOptions, Robot
 from webmap.testing.log import ClientMessage, Moved, ReceivedTwist, WitnessLog
 

@@ -7,7 +7,8 @@ from module_fakes import Channel, Someone
 
 import webmap
 from webmap import Map
-from webmap.core.page import Page, PageEntry
+from webmap.core.base_page import PageEntry
+from webmap.core.page import Page
 from webmap.features.alerts.alert_panel import AlertPanel
 from webmap.features.alerts.alerts import MOST, Alerts
 

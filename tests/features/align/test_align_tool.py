@@ -13,7 +13,8 @@ from webmap import Map, Robot
 from webmap.base.geometry import Pose
 from webmap.core import alignment_store
 from webmap.core.alignment_store import AlignmentStore, name_of
-from webmap.core.page import Page, PageEntry
+from webmap.core.base_page import PageEntry
+from webmap.core.page import Page
 from webmap.poses.alignment import align_bridge, alignments
 
 NAME = "ws://test:9090 Bob"

@@ -14,7 +14,8 @@ from button_robot import robot_node
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
 from webmap.config.buttons import ButtonMistake, read_button
-from webmap.core.page import Page, PageEntry
+from webmap.core.base_page import PageEntry
+from webmap.core.page import Page
 from webmap.scene.element import Event
 from webmap_process import simulator
 

@@ -9,7 +9,8 @@ from module_fakes import Channel, Someone
 
 from webmap import Bridge, Map, Robot
 from webmap.console.card_parts import GOALS, GoalLine, figures
-from webmap.core.page import Page, PageEntry
+from webmap.core.base_page import PageEntry
+from webmap.core.page import Page
 from webmap.gate.protocol import GoalReport
 
 

@@ -8,7 +8,8 @@ import pytest
 
 from webmap import Map
 from webmap.base.errors import ConfigError
-from webmap.core.page import Page, PageEntry
+from webmap.core.base_page import PageEntry
+from webmap.core.page import Page
 
 DESK = {"name": "Desk", "x": 1.0, "y": 2.0, "icon": "desk"}
 

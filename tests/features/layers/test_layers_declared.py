@@ -204,12 +204,11 @@ def test_draw_gets_the_frame_and_the_stamp_of_the_message(robot, link):
 
 PRIVATE = {
     # Layers that draw more than one topic, or in several frames at once.
-    "Diagnostics": {"refusing", "Removal", "keep", "robot_modules"},
+    "Diagnostics": {"draw_or_report", "Removal", "keep", "robot_modules"},
     "Markers": {"LayerFrames", "TransformError", "not_known", "Removal", "keep"},
-    "OccupancyGrid": {"Refusing", "spawn"},
+    "OccupancyGrid": {"MessageProblems", "spawn"},
     # Names that only these layers use.
     "LaserScanner": {"Rays", "scan_name"},
-    "NavSatFix": {"LocalPlane"},
     "Polygon": {"check_items"},
 }
 PUBLIC_MODULES = ("drawing", "geometry", "html", "messages", "options", "svg")

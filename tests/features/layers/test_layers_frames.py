@@ -10,7 +10,7 @@ from test_layers_poses import sonar
 from test_layers_ways import in_world, near, path
 
 from webmap.base.geometry import Affine
-from webmap.modules.topic_layer import Message
+from webmap.modules.topic_layer import LayerMessage
 from webmap.poses.frames import _shared_frames
 
 
@@ -95,9 +95,9 @@ def test_a_path_with_poses_of_two_frames_is_drawn_in_one_and_reported(link, robo
 def test_a_message_without_a_frame_has_the_frame_of_the_first_of_its_parts():
     parts = [{"header": header("camera")}, {"header": header("laser")}]
     fields = {"header": header(""), "words": ["a"], "none": [], "boxes": parts}
-    assert Message(fields).frame_id == "camera"
-    assert Message({**fields, "header": header("map")}).frame_id == "map"
-    assert Message({"points": [{"x": 1.0}]}).frame_id == ""
+    assert LayerMessage(fields).frame_id == "camera"
+    assert LayerMessage({**fields, "header": header("map")}).frame_id == "map"
+    assert LayerMessage({"points": [{"x": 1.0}]}).frame_id == ""
 
 
 def test_a_frame_is_looked_up_at_the_stamp_of_the_message(link, robot):

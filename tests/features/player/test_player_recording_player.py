@@ -5,8 +5,7 @@ import math
 
 import pytest
 
-from webmap.bags.playback import Command
-from webmap.bags.status import MARKS, STATUS
+from webmap.bags.playback import MARKS, STATUS, PlaybackCommand
 from webmap.features.player.recording_player import RecordingPlayer, expect_jumps
 
 
@@ -75,10 +74,10 @@ def test_another_text_on_the_topics_is_ignored(player, link, text):
 @pytest.mark.parametrize(
     ("message", "command"),
     [
-        ({"command": "play"}, Command("play")),
-        ({"command": "pause"}, Command("pause")),
-        ({"command": "seek", "value": 12}, Command("seek", 12.0)),
-        ({"command": "rate", "value": 0.25}, Command("rate", 0.25)),
+        ({"command": "play"}, PlaybackCommand("play")),
+        ({"command": "pause"}, PlaybackCommand("pause")),
+        ({"command": "seek", "value": 12}, PlaybackCommand("seek", 12.0)),
+        ({"command": "rate", "value": 0.25}, PlaybackCommand("rate", 0.25)),
     ],
 )
 def test_a_command_of_the_page_is_given_to_the_replay(player, given, message, command):
@@ -112,7 +111,7 @@ def test_the_first_page_begins_the_recording_anew_and_later_ones_do_not(
 ):
     publish(link, STATUS, status(jumps=0))
     publish(link, STATUS, status(jumps=1))
-    assert given == [Command("again")]
+    assert given == [PlaybackCommand("again")]
 
 
 def test_a_later_page_does_not_begin_the_recording_anew(player, link, given):

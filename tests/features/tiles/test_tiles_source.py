@@ -11,8 +11,7 @@ import pytest
 from PIL import Image
 
 from webmap.base.errors import ConfigError
-from webmap.base.geometry import Affine
-from webmap.base.local_plane import LocalPlane
+from webmap.base.geometry import Affine, LocalPlane
 from webmap.features.tiles.tile_grid import Tile, TileGrid
 from webmap.features.tiles.tile_source import FolderTiles, MBTiles, open_tiles, plain
 

@@ -5,9 +5,19 @@ are plain data, so that a terminal and a page show the same. Checks of rosbridge
 are in ``webmap.ros.rosbridge``.
 """
 
-from webmap.discovery.doctor.configured import ConfiguredRobot
-from webmap.discovery.doctor.observed import Measurement, Observed
+from webmap.discovery.doctor.facts import (
+    BridgeFacts,
+    ConfiguredRobot,
+    Measurement,
+)
 from webmap.discovery.doctor.verdict import is_ready, judge
 from webmap.ros.finding import Finding
 
-__all__ = ["ConfiguredRobot", "Finding", "Measurement", "Observed", "is_ready", "judge"]
+__all__ = [
+    "BridgeFacts",
+    "ConfiguredRobot",
+    "Finding",
+    "Measurement",
+    "is_ready",
+    "judge",
+]

@@ -13,19 +13,19 @@ from typing import Any, TypeVar
 
 from webmap.agents.present import about_agent
 from webmap.base.errors import BridgeClosed, BridgeError
-from webmap.discovery.doctor.configured import ConfiguredRobot, merge_configured
-from webmap.discovery.doctor.frames import FrameListening
-from webmap.discovery.doctor.listening import listen, sample
-from webmap.discovery.doctor.observed import (
+from webmap.discovery.doctor.facts import (
     MOST_ROBOTS,
+    BridgeFacts,
     Clock,
+    ConfiguredRobot,
     FramePath,
     Measurement,
-    Observed,
+    merge_configured,
 )
-from webmap.discovery.doctor.shown_rules import shown_topics
-from webmap.discovery.found import Findings, FoundRobot
-from webmap.discovery.frame_listening import LateFrames, frame_topics
+from webmap.discovery.doctor.samples import FrameCheck, listen, sample
+from webmap.discovery.doctor.topic_rules import shown_topics
+from webmap.discovery.findings import Findings, FoundRobot
+from webmap.discovery.frames import FrameCollector, frame_topics
 from webmap.discovery.robots import discover, host_name
 from webmap.ros.asking import ask_topics
 from webmap.ros.bridge import Bridge, TemporaryBridge
@@ -71,7 +71,7 @@ async def observe(
     configured: Callable[[Findings], Sequence[ConfiguredRobot]] = lambda _found: (),
     waiting: Callable[[str], object] = lambda _why: None,
     progress: Callable[[str], object] = lambda _what: None,
-) -> Observed:
+) -> BridgeFacts:
     """Return the observations of a bridge and of the robots behind it.
 
     Args:
@@ -97,7 +97,7 @@ async def observe(
         found = await ask_topics(url, wait=wait, waiting=waiting)
         asked = asked if topics_given else found
     except BridgeClosed as error:
-        return Observed(url, trouble=error.why or str(error))
+        return BridgeFacts(url, trouble=error.why or str(error))
     except BridgeError as error:
         unlisted = str(error)
     async with TemporaryBridge(url) as bridge:
@@ -106,8 +106,8 @@ async def observe(
             trees = None
             if frame_topics(asked):
                 progress("Listening to frames for a moment.")
-                trees = await LateFrames(bridge).listen(asked)
-            seen = Observed(
+                trees = await FrameCollector(bridge).listen(asked)
+            seen = BridgeFacts(
                 url,
                 unlisted=unlisted,
                 topics_given=topics_given,
@@ -134,9 +134,9 @@ async def observe(
             seen = await _listen(seen, bridge, seconds)
             return await _sample(seen, bridge, seconds, progress)
         except BridgeClosed as error:
-            return Observed(url, trouble=error.why or str(error))
+            return BridgeFacts(url, trouble=error.why or str(error))
         except (OSError, TimeoutError) as error:
-            return Observed(url, trouble=str(error) or type(error).__name__)
+            return BridgeFacts(url, trouble=str(error) or type(error).__name__)
 
 
 async def _look(url: str) -> dict[str, Any]:
@@ -149,7 +149,7 @@ async def _look(url: str) -> dict[str, Any]:
     return {"open_at": tuple(about.open_at)}
 
 
-async def tried(seen: Observed) -> Observed:
+async def tried(seen: BridgeFacts) -> BridgeFacts:
     """Return the observations, with a test of what a slow service call delays."""
     if is_agent_url(seen.url):
         why = "an agent lets a display offer no service"
@@ -159,7 +159,9 @@ async def tried(seen: Observed) -> Observed:
     return replace(seen, link=await checks.tried_a_call(seen.link, seen.url))
 
 
-def _with_configured(seen: Observed, robots: Sequence[ConfiguredRobot]) -> Observed:
+def _with_configured(
+    seen: BridgeFacts, robots: Sequence[ConfiguredRobot]
+) -> BridgeFacts:
     """Return the observations with the robots as a person configured them, if any."""
     if not robots:
         return seen
@@ -216,7 +218,7 @@ class _Questions:
         return min(found, key=lambda each: each.round_trip, default=None)
 
 
-async def _ask(seen: Observed, bridge: Bridge) -> Observed:
+async def _ask(seen: BridgeFacts, bridge: Bridge) -> BridgeFacts:
     robots = seen.findings.robots
     velocities = [robot.topic("velocity") for robot in robots]
     read = [
@@ -233,7 +235,7 @@ async def _ask(seen: Observed, bridge: Bridge) -> Observed:
     )
 
 
-async def _listen(seen: Observed, bridge: Bridge, seconds: float) -> Observed:
+async def _listen(seen: BridgeFacts, bridge: Bridge, seconds: float) -> BridgeFacts:
     robots = seen.findings.robots[:MOST_ROBOTS]
     topics: dict[str, Encoding] = {}
     for robot in robots:
@@ -242,7 +244,7 @@ async def _listen(seen: Observed, bridge: Bridge, seconds: float) -> Observed:
     topics.pop("", None)
     spaces = sorted({each.tf_namespace for each in robots} - {None})  # type: ignore[type-var]
     tf = [f"{space}/{name}" for space in spaces for name in ("tf", "tf_static")]
-    frames = FrameListening()
+    frames = FrameCheck()
     measured = await listen(bridge, topics, seconds, tf, frames)
     frame_paths = {}
     for robot in robots:
@@ -254,8 +256,8 @@ async def _listen(seen: Observed, bridge: Bridge, seconds: float) -> Observed:
 
 
 async def _sample(
-    seen: Observed, bridge: Bridge, seconds: float, progress: Callable[[str], object]
-) -> Observed:
+    seen: BridgeFacts, bridge: Bridge, seconds: float, progress: Callable[[str], object]
+) -> BridgeFacts:
     """Return the observations, with pictures, maps and plans.
 
     They are measured last, because they would delay the poses whose age is measured.
@@ -314,7 +316,7 @@ def place_of(robot: FoundRobot) -> str:
 def _frame_path(
     robot: FoundRobot,
     measured: Mapping[str, Measurement],
-    frames: FrameListening,
+    frames: FrameCheck,
     start: str,
 ) -> FramePath | None:
     """Return the frames of a robot whose odometry names its frame.

@@ -2,11 +2,13 @@
 
 from collections.abc import Iterator
 
-from webmap.discovery.doctor.configured import ConfiguredRobot
-from webmap.discovery.doctor.observed import FramePath, Observed
-from webmap.discovery.doctor.rate_rules import rare_finding, rate_finding
-from webmap.discovery.doctor.shown_rules import shown_findings
-from webmap.discovery.found import FoundRobot, Guess
+from webmap.discovery.doctor.facts import BridgeFacts, ConfiguredRobot, FramePath
+from webmap.discovery.doctor.topic_rules import (
+    rare_finding,
+    rate_finding,
+    shown_findings,
+)
+from webmap.discovery.findings import FoundRobot, Guess
 from webmap.ros.finding import Finding
 from webmap.ros.names import is_agent_url, is_type, same_type
 from webmap.ros.rosbridge import advice
@@ -15,7 +17,7 @@ from webmap.ros.rosbridge.graph import is_client_node
 MOST_ODDITIES = 3
 
 
-def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+def robot_findings(robot: FoundRobot, seen: BridgeFacts) -> Iterator[Finding]:
     """Yield the findings about one robot."""
     one = seen.configured.get(robot.name, ConfiguredRobot(robot.name))
     if "velocity" not in one.elsewhere:
@@ -47,7 +49,7 @@ def robot_findings(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         )
 
 
-def _place(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+def _place(robot: FoundRobot, seen: BridgeFacts) -> Iterator[Finding]:
     """Yield the findings about the topic with a robot's pose."""
     where = robot.first("odometry") or robot.first("pose")
     if robot.tf_alone:
@@ -63,7 +65,7 @@ def _place(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         yield rate_finding(robot.name, where, seen, needed=True)
 
 
-def _map(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+def _map(robot: FoundRobot, seen: BridgeFacts) -> Iterator[Finding]:
     grid = robot.first("map")
     if grid is not None and seen.publishers.get(grid.topic) == ():
         yield Finding(
@@ -74,7 +76,7 @@ def _map(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         )
 
 
-def _drawn_by_frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+def _drawn_by_frames(robot: FoundRobot, seen: BridgeFacts) -> Iterator[Finding]:
     """Yield whether frames locate a robot that has no other source of its pose."""
     topic, path = robot.topic("tf"), seen.frame_paths.get(robot.name)
     if path is not None and not path.missing:
@@ -96,12 +98,12 @@ def _drawn_by_frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         )
 
 
-def _often(topic: str, seen: Observed) -> str:
+def _often(topic: str, seen: BridgeFacts) -> str:
     rate = seen.measured[topic].rate if topic in seen.measured else 0.0
     return f" ({topic}: {rate:.1f} messages a second)" if rate else ""
 
 
-def _frames(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+def _frames(robot: FoundRobot, seen: BridgeFacts) -> Iterator[Finding]:
     path = seen.frame_paths.get(robot.name)
     if path is None:
         return
@@ -157,7 +159,7 @@ def _inner_frames(name: str, path: FramePath) -> Iterator[Finding]:
         )
 
 
-def _velocity(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
+def _velocity(robot: FoundRobot, seen: BridgeFacts) -> Iterator[Finding]:
     velocity = robot.first("velocity")
     configured = seen.configured.get(robot.name)
     if velocity is None and configured is not None and "velocity" in configured.topics:
@@ -188,7 +190,7 @@ def _velocity(robot: FoundRobot, seen: Observed) -> Iterator[Finding]:
         )
 
 
-def _type(robot: FoundRobot, velocity: Guess, seen: Observed) -> Finding:
+def _type(robot: FoundRobot, velocity: Guess, seen: BridgeFacts) -> Finding:
     """Return whether the topic has the type that WebMap sends."""
     short = velocity.type.rpartition("/")[2]
     takes = seen.types.get(velocity.topic, "").strip()
@@ -214,7 +216,7 @@ def _type(robot: FoundRobot, velocity: Guess, seen: Observed) -> Finding:
     )
 
 
-def _has_client(velocity: Guess, seen: Observed) -> bool:
+def _has_client(velocity: Guess, seen: BridgeFacts) -> bool:
     """Return whether a client of a rosbridge publishes or subscribes to a topic."""
     nodes = [
         *(seen.publishers.get(velocity.topic) or ()),
@@ -223,7 +225,9 @@ def _has_client(velocity: Guess, seen: Observed) -> bool:
     return any(map(is_client_node, nodes))
 
 
-def _writers(robot: FoundRobot, velocity: Guess, seen: Observed) -> Iterator[Finding]:
+def _writers(
+    robot: FoundRobot, velocity: Guess, seen: BridgeFacts
+) -> Iterator[Finding]:
     writers = seen.publishers.get(velocity.topic)
     if writers is None:
         yield Finding(

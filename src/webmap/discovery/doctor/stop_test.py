@@ -17,7 +17,7 @@ import click
 
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeError, ConfigError
-from webmap.base.outside_text import escaped
+from webmap.base.text import escaped
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.robots import host_name
 from webmap.gate.display.client import GateClient
@@ -38,7 +38,7 @@ PATIENCE = 10.0
 ROBOT = "r1"
 STOPS, GOES_ON, UNKNOWN = 0, 1, 2
 
-Message: TypeAlias = dict[str, Any]
+GateMessage: TypeAlias = dict[str, Any]
 
 
 class StopTestClient:
@@ -58,11 +58,11 @@ class StopTestClient:
         self._why = "the gate has not answered"
         self._since = now
         self._asked_at = float("-inf")
-        self._report: Message | None = None
+        self._report: GateMessage | None = None
         self._tick: int | None = None
         self._seq = 0
 
-    def receive(self, message: Message, now: float) -> None:
+    def receive(self, message: GateMessage, now: float) -> None:
         """Process a message of the gate."""
         match message["op"]:
             case "tick":
@@ -81,8 +81,8 @@ class StopTestClient:
         if self.stage == "ready":
             self._go_on("taking", now)
 
-    def step(self, now: float) -> list[Message]:
-        """Return the messages to send to the gate now."""
+    def step(self, now: float) -> list[GateMessage]:
+        """Return what to send to the gate; called 20 times a second."""
         if now - self._since > PATIENCE and self.stage not in ("ready", "over"):
             self._end(self._why)
         report = self._report
@@ -90,20 +90,20 @@ class StopTestClient:
             return []
         if not report["mine"]:
             return [{"op": "take", "robot": ROBOT}] if self._may_ask(now) else []
-        messages: list[Message] = []
+        messages: list[GateMessage] = []
         if self._tick is not None:
             messages.append(self._released(report["epoch"], self._tick))
         if self.stage == "taking" and report["armed"] and self._may_ask(now):
             messages.append({"op": "stop-test", "robot": ROBOT})
         return messages
 
-    def _released(self, epoch: int, tick: int) -> Message:
+    def _released(self, epoch: int, tick: int) -> GateMessage:
         self._seq += 1
         axes = {"x": 0.0, "y": 0.0, "turn": 0.0}
         state = {"epoch": epoch, "seq": self._seq, "tick": tick, **axes}
         return {"op": "drive", "robot": ROBOT, **state}
 
-    def _receive_robot(self, report: Message, now: float) -> None:
+    def _receive_robot(self, report: GateMessage, now: float) -> None:
         before, self._report = self._report, report
         if self.stage == "coming" and report["armable"]:
             self._go_on("ready", now)
@@ -125,7 +125,7 @@ class StopTestClient:
         elif concluded and _is_result(report, test["text"]):
             self._conclude(report)
 
-    def _conclude(self, report: Message) -> None:
+    def _conclude(self, report: GateMessage) -> None:
         seconds, day = report["stop_time"], report["stop_date"]
         self.stage = "over"
         if seconds is None:
@@ -155,7 +155,7 @@ class StopTestClient:
             self.news.append(f"The stop test gave no result: {why}.")
 
 
-def _is_result(report: Message, text: str) -> bool:
+def _is_result(report: GateMessage, text: str) -> bool:
     """Return whether a report belongs to this test and not to an earlier one."""
     today = datetime.now().astimezone().date().isoformat()
     if report["stop_source"] != "tested" or report["stop_date"] != today:

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
+from webmap.base.audience import RARELY, audience
 from webmap.base.lifecycle import lifecycle
-from webmap.base.looking import RARELY, looking
 from webmap.features.alerts.alerts import KINDS, Alerts
 from webmap.gate.protocol import MAY_MOVE
 from webmap.poses.silence import PERIODS
@@ -135,4 +135,4 @@ class AlertWatch:
                 self.look(time.time())
             except Exception:
                 log.exception("the alerts were not updated")
-            await asyncio.sleep(PERIOD if looking.somebody else RARELY / 1000)
+            await asyncio.sleep(PERIOD if audience.present else RARELY / 1000)

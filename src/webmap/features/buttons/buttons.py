@@ -10,7 +10,7 @@ from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.scope import Removable, Removal, Scope, keep
 from webmap.base.tasks import spawn
 from webmap.config.buttons import read_buttons
-from webmap.core.page import page_of
+from webmap.core.base_page import page_of
 from webmap.core.registry import robot_modules
 from webmap.features.buttons.robot_button import RobotButton, declared_motion, values_of
 from webmap.ros.bridge import Bridge

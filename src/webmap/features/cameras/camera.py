@@ -10,7 +10,7 @@ import msgspec
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.scope import Scope, no_scope
 from webmap.base.tasks import spawn
-from webmap.core.problems import refusing
+from webmap.core.problems import draw_or_report
 from webmap.core.registry import robot_modules
 from webmap.features.cameras.camera_feed import CameraFeed
 from webmap.ros.bridge import Bridge
@@ -123,7 +123,7 @@ class Camera(CameraFeed):
         with no_scope(), self._scope.active():
             self._bridge.subscribe(
                 self.topic,
-                refusing(self.robot, self.topic, self.on_picture),
+                draw_or_report(self.robot, self.topic, self.on_picture),
                 self.type,
                 throttle=self._throttle,
                 decode=VIEWS[self.type],

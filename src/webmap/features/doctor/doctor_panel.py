@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from webmap import html, svg
-from webmap.discovery.doctor import ConfiguredRobot, Finding, Observed, judge
+from webmap.discovery.doctor import BridgeFacts, ConfiguredRobot, Finding, judge
 from webmap.discovery.doctor.measure import TRYING, observe, tried
 from webmap.discovery.doctor.verdict import report as report_text
 from webmap.features.doctor.in_use import in_use
@@ -203,7 +203,7 @@ SECONDS = 3.0
 
 PLURAL = {"wrong": "wrong", "warning": "warnings", "note": "notes", "good": "good"}
 
-Observe = Callable[..., Awaitable[Observed]]
+Observe = Callable[..., Awaitable[BridgeFacts]]
 
 
 class Checkup:
@@ -232,7 +232,7 @@ class Checkup:
         """Last time of listening to topics, on the monotonic clock; None if never."""
         self._observe = observe
         self._tried = tried
-        self._seen: Observed | None = None
+        self._seen: BridgeFacts | None = None
         self._task: asyncio.Task[None] | None = None
 
     @property
@@ -283,11 +283,11 @@ class Checkup:
         if self._seen is not None and self.can_try:
             self._begin(self._try(self._seen))
 
-    def _begin(self, work: Coroutine[None, None, Observed]) -> None:
+    def _begin(self, work: Coroutine[None, None, BridgeFacts]) -> None:
         self._show_progress("Starting.")
         self._task = asyncio.get_running_loop().create_task(self._run(work))
 
-    async def _look(self, robots: Sequence[ConfiguredRobot]) -> Observed:
+    async def _look(self, robots: Sequence[ConfiguredRobot]) -> BridgeFacts:
         try:
             return await self._observe(
                 self.url,
@@ -298,11 +298,11 @@ class Checkup:
         finally:
             self.ended = time.monotonic()
 
-    async def _try(self, seen: Observed) -> Observed:
+    async def _try(self, seen: BridgeFacts) -> BridgeFacts:
         self._show_progress(TRYING)
         return await self._tried(seen)
 
-    async def _run(self, work: Coroutine[None, None, Observed]) -> None:
+    async def _run(self, work: Coroutine[None, None, BridgeFacts]) -> None:
         try:
             self._seen = await work
             self.findings = judge(self._seen)

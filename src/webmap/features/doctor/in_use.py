@@ -5,12 +5,12 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from webmap.discovery.doctor import ConfiguredRobot
-from webmap.discovery.found import ACTIONS, Role
+from webmap.discovery.findings import ACTIONS, TopicRole
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
 
-DRAWN: Mapping[str, Role] = {
+DRAWN: Mapping[str, TopicRole] = {
     "Battery": "battery",
     "Camera": "camera",
     "LaserScanner": "scan",
@@ -19,12 +19,12 @@ DRAWN: Mapping[str, Role] = {
 }
 """The role of a topic for a robot, by the module that reads it."""
 
-GRIDS: tuple[Role, ...] = ("map", "costmap")
+GRIDS: tuple[TopicRole, ...] = ("map", "costmap")
 
 Made: TypeAlias = tuple[str, tuple[Any, ...], dict[str, Any]]
 """The name and the arguments of a module, as ``module_arguments()`` returns them."""
 
-Topics: TypeAlias = dict[Role, tuple[tuple[str, str], ...]]
+Topics: TypeAlias = dict[TopicRole, tuple[tuple[str, str], ...]]
 
 
 def in_use(
@@ -49,7 +49,7 @@ def _in_use(
     twist, goals = motion.config.twist, motion.config.move
     frames = robot.tf
     topics: Topics = {"odometry": (), "pose": (), "velocity": (), "action": ()}
-    elsewhere: set[Role] = set()
+    elsewhere: set[TopicRole] = set()
     if feed is not None and feed.bridge is bridge:
         topics["odometry"] = ((feed.topic, feed.type or ""),)
     elif feed is not None:
@@ -79,7 +79,7 @@ def _in_use(
 
 def _drawn(robot: "Robot", bridge: "Bridge", maps: Iterable[Made]) -> Topics:
     """Return the topics drawn for a robot, including the maps that show it."""
-    roles: tuple[Role, ...] = (*DRAWN.values(), *GRIDS)
+    roles: tuple[TopicRole, ...] = (*DRAWN.values(), *GRIDS)
     topics: Topics = dict.fromkeys(roles, ())
     grids = list(maps)
     for name, args, options in robot.module_arguments():
@@ -107,10 +107,10 @@ def _grid(
     name: str,
     args: tuple[Any, ...],
     options: dict[str, Any],
-) -> tuple[Role, str]:
+) -> tuple[TopicRole, str]:
     """Return a grid's role and topic; no topic if the robot is not on the grid."""
     arguments = {**dict(zip(("bridge", "topic"), args, strict=False)), **options}
-    role: Role = "costmap" if arguments.get("palette") == "costmap" else "map"
+    role: TopicRole = "costmap" if arguments.get("palette") == "costmap" else "map"
     mine = arguments.get("bridge") is bridge and arguments.get("robot") in (None, robot)
     if name != "OccupancyGrid" or not mine:
         return role, ""

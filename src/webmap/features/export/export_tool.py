@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from webmap.base.counted import counted
+from webmap.base.text import counted
 from webmap.core.registry import map_modules
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ import math
 import time
 from typing import TYPE_CHECKING
 
-from webmap.base.looking import RARELY
+from webmap.base.audience import RARELY
 from webmap.base.scope import Removal, keep
 from webmap.core.registry import robot_modules
 from webmap.ros.bridge import Bridge

@@ -11,7 +11,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.scope import Removal, keep
-from webmap.core.problems import refusing
+from webmap.core.problems import draw_or_report
 from webmap.core.registry import robot_modules
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.ros.bridge import Bridge
@@ -263,7 +263,7 @@ class Diagnostics:
         self._bridge = bridge
         bridge.subscribe(
             topic,
-            refusing(robot, topic, self.on_array),
+            draw_or_report(robot, topic, self.on_array),
             "diagnostic_msgs/DiagnosticArray",
             throttle=throttle,
             decode=DiagnosticArrayMsg,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Affine, Pose
-from webmap.base.loading import load_soon
+from webmap.base.processes import load_soon
 from webmap.base.scope import Removal, keep, no_scope
 from webmap.base.tasks import spawn
 from webmap.core.pictures import Picture

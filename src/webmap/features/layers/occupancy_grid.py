@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST
 from webmap.base.tasks import spawn
-from webmap.core.problems import Refusing
+from webmap.core.problems import MessageProblems
 from webmap.features.layers.grid_picture import Palette, check_palette
 from webmap.features.layers.grid_tiles import MOST, SMALL, GridTiles
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
@@ -192,7 +192,7 @@ class OccupancyGrid(MapLayer):
         """Make the tiles, and subscribe to the grid and to its updates."""
         super().start()
         updates = self.topic.rstrip("/") + "_updates"
-        self._refusing_updates = Refusing(self, updates)
+        self._refusing_updates = MessageProblems(self, updates)
         # Every update counts, so none may be delayed or replaced by the next.
         self.bridge.subscribe(
             updates,

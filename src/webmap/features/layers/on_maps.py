@@ -8,8 +8,8 @@ from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import map_modules, robot_modules
 
 if TYPE_CHECKING:
-    from webmap.core.map import Map
     from webmap.core.robot import Robot
+    from webmap.core.world_view import WorldView
 
 
 @robot_modules.register
@@ -42,7 +42,7 @@ class OnMaps:
         self.robot = robot
         self.module = module
         self._arguments = (args, options)
-        self._made: dict[Map, Any] = {}
+        self._made: dict[WorldView, Any] = {}
         for map in robot.maps:
             self.on_map(map, True)
 
@@ -51,7 +51,7 @@ class OnMaps:
         for map in list(self._made):
             self.on_map(map, False)
 
-    def on_map(self, map: "Map", shown: bool) -> None:
+    def on_map(self, map: "WorldView", shown: bool) -> None:
         """Add the module to a map that shows the robot now, or remove it."""
         if not shown:
             module = self._made.pop(map, None)

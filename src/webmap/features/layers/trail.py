@@ -4,8 +4,8 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING
 
+from webmap.base.audience import audience
 from webmap.base.errors import ConfigError
-from webmap.base.looking import looking
 from webmap.core.registry import robot_modules
 from webmap.modules.drawing import rounded
 from webmap.modules.placed import Placed
@@ -65,7 +65,7 @@ class Trail:
         self.svg = self._placed.svg
         self._undrawn: dict[_Piece, None] = {}
         """The pieces that changed while nobody looked."""
-        looking.follow(self)
+        audience.follow(self)
         if robot.valid:
             self.on_odometry_update()
 
@@ -76,16 +76,16 @@ class Trail:
 
     def destroy(self) -> None:
         """Draw no more."""
-        looking.forget(self)
+        audience.forget(self)
 
-    def looking_changed(self) -> None:
+    def audience_changed(self) -> None:
         """Draw what changed while nobody looked."""
         undrawn, self._undrawn = self._undrawn, {}
         for piece in undrawn:
             piece.draw()
 
     def _draw(self, piece: "_Piece") -> None:
-        if looking.somebody:
+        if audience.present:
             piece.draw()
         else:
             self._undrawn[piece] = None

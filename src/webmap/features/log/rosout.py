@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from webmap.base.errors import ConfigError
 from webmap.base.scope import Removal, keep
-from webmap.core.problems import refusing
+from webmap.core.problems import draw_or_report
 from webmap.core.registry import robot_modules
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_log import LEVELS, LogMsg
@@ -81,7 +81,10 @@ class Rosout:
         self._lists: list[Element] = []
         # The type depends on the dialect, and the topic always exists.
         bridge.subscribe(
-            topic, refusing(robot, topic, self.on_log), decode=LogMsg, queue_length=100
+            topic,
+            draw_or_report(robot, topic, self.on_log),
+            decode=LogMsg,
+            queue_length=100,
         )
 
     def show_in(self, element: Element) -> None:

@@ -6,8 +6,16 @@ from weakref import WeakKeyDictionary
 
 import msgspec
 
-from webmap.bags.playback import Command, command_of
-from webmap.bags.status import MARKS, STATUS, TYPE, Marks, Status, Text
+from webmap.bags.playback import (
+    MARKS,
+    STATUS,
+    TYPE,
+    Marks,
+    PlaybackCommand,
+    PlaybackStatus,
+    StringMessage,
+    command_of,
+)
 from webmap.base.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -34,19 +42,19 @@ class RecordingPlayer:
     """
 
     def __init__(
-        self, map: "Map", bridge: "Bridge", give: Callable[[Command], object]
+        self, map: "Map", bridge: "Bridge", give: Callable[[PlaybackCommand], object]
     ) -> None:
         self.map = map
         self._give = give
-        self._status: Status | None = None
+        self._status: PlaybackStatus | None = None
         self._bridge = bridge
         self.browser_part = map.add_browser_part(
             self,
             "features/player/player_bar.js",
             style="features/player/player_bar.css",
         )
-        bridge.subscribe(STATUS, self._on_status, TYPE, decode=Text)
-        bridge.subscribe(MARKS, self._on_marks, TYPE, decode=Text)
+        bridge.subscribe(STATUS, self._on_status, TYPE, decode=StringMessage)
+        bridge.subscribe(MARKS, self._on_marks, TYPE, decode=StringMessage)
 
     def on_ready(self) -> None:
         """Send the newest status to a page that was loaded."""
@@ -65,22 +73,24 @@ class RecordingPlayer:
             return
         self._give(command)
 
-    def _on_status(self, text: Text) -> None:
-        status = _read(text, Status)
+    def _on_status(self, text: StringMessage) -> None:
+        status = _read(text, PlaybackStatus)
         if status is None:
             return
         before, self._status = self._status, status
         self._send("status", status)
         if before is None and status.jumps == 0:
-            self._give(Command("again"))  # the first page sees it from its beginning
+            self._give(
+                PlaybackCommand("again")
+            )  # the first page sees it from its beginning
 
-    def _on_marks(self, text: Text) -> None:
+    def _on_marks(self, text: StringMessage) -> None:
         marks = _read(text, Marks)
         if marks is not None:
             _found[self._bridge] = marks
             self._send("marks", marks)
 
-    def _send(self, kind: str, value: Status | Marks) -> None:
+    def _send(self, kind: str, value: PlaybackStatus | Marks) -> None:
         self.browser_part.send({kind: msgspec.to_builtins(value)})
 
 
@@ -93,9 +103,9 @@ def expect_jumps(bridge: "Bridge", robots: Callable[[], Iterable["Robot"]]) -> N
     """
     known: int | None = None
 
-    def on_status(text: Text) -> None:
+    def on_status(text: StringMessage) -> None:
         nonlocal known
-        status = _read(text, Status)
+        status = _read(text, PlaybackStatus)
         if status is None or status.jumps == known:
             return
         known = status.jumps
@@ -103,10 +113,10 @@ def expect_jumps(bridge: "Bridge", robots: Callable[[], Iterable["Robot"]]) -> N
             robot.expect_jump()
             robot.notify_modules("on_seek")
 
-    bridge.subscribe(STATUS, on_status, TYPE, decode=Text)
+    bridge.subscribe(STATUS, on_status, TYPE, decode=StringMessage)
 
 
-def _read(text: Text, type_: type[T]) -> T | None:
+def _read(text: StringMessage, type_: type[T]) -> T | None:
     """Return the content of a message; None if another program has sent it."""
     try:
         return msgspec.json.decode(text.data, type=type_)

@@ -8,8 +8,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from webmap.base.geometry import Affine
-from webmap.base.local_plane import REACH, LocalPlane
+from webmap.base.geometry import PLANE_RADIUS, Affine, LocalPlane
 
 MAX_ZOOM = 24
 WORLD = 40_075_016.686
@@ -137,8 +136,8 @@ class TileGrid:
     def _number(self, z: int, x: float, y: float) -> tuple[float, float]:
         """Return a point of the plane in tiles of a level, from north-west."""
         away = math.hypot(x, y)
-        if away > REACH:  # the area beyond is not drawn
-            x, y = x * REACH / away, y * REACH / away
+        if away > PLANE_RADIUS:  # the area beyond is not drawn
+            x, y = x * PLANE_RADIUS / away, y * PLANE_RADIUS / away
         latitude, longitude = self.plane.to_globe(x, y)
         lat = math.radians(max(-85.0511, min(85.0511, latitude)))
         row = (1 - math.asinh(math.tan(lat)) / math.pi) / 2 * 2**z

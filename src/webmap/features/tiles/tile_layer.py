@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from webmap.base.errors import ConfigError
-from webmap.base.local_plane import LocalPlane
+from webmap.base.geometry import LocalPlane
 from webmap.base.scope import Removal, keep
 from webmap.base.tasks import spawn
 from webmap.core.pictures import pictures

@@ -13,9 +13,9 @@ from typing import Protocol
 
 import msgspec
 
-from webmap.base.children import python_command
 from webmap.base.errors import WireError
-from webmap.base.outside_text import one_line
+from webmap.base.processes import python_command
+from webmap.base.text import one_line
 from webmap.gate import pipe, protocol
 from webmap.gate.protocol import FromGate
 

@@ -11,7 +11,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from webmap.base.errors import BridgeClosed
-from webmap.base.loading import load
+from webmap.base.processes import load
 from webmap.ros.backoff import Backoff
 from webmap.ros.limits import MAX_FRAME
 from webmap.ros.received import LinkState

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from webmap.base.errors import BridgeClosed, BridgeError, ProtocolError
 from webmap.base.identifiers import generate_id
-from webmap.base.outside_text import one_line
+from webmap.base.text import one_line
 from webmap.ros.definitions import Definitions
 from webmap.ros.names import split_type
 from webmap.ros.received import BridgeStats, ReceivedMessage

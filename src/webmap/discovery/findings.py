@@ -1,9 +1,11 @@
-"""The results of discovery: robots, their topics, and the rules that chose them."""
+"""The results of discovery: robots, their names, topics, and why each was chosen."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple, TypeAlias, get_args
 
+from webmap.config.checks import same_name
 from webmap.config.motion import (
     InitialPoseConfig,
     MotionConfig,
@@ -19,7 +21,7 @@ from webmap.config.robot import (
 )
 from webmap.discovery.tf_robots import MAP, WORLD
 
-Role: TypeAlias = Literal[
+TopicRole: TypeAlias = Literal[
     "odometry",
     "pose",
     "velocity",
@@ -38,7 +40,7 @@ Role: TypeAlias = Literal[
 ]
 """The purpose of a topic for a robot."""
 
-ROLES: tuple[Role, ...] = get_args(Role)
+ROLES: tuple[TopicRole, ...] = get_args(TopicRole)
 """Every role, in display order."""
 
 
@@ -86,13 +88,13 @@ class Guess:
 
 @dataclass(frozen=True, slots=True)
 class FoundRobot:
-    """A robot and its topics."""
+    """A robot with the topics of each role, and the frames that place it."""
 
     name: str
     namespace: str
     """Namespace of its topics: ``/robot_0``; empty for a robot without a prefix."""
 
-    guesses: Mapping[Role, tuple[Guess, ...]] = field(default_factory=dict)
+    guesses: Mapping[TopicRole, tuple[Guess, ...]] = field(default_factory=dict)
     """The topics that fit each role, the best first."""
 
     notes: tuple[str, ...] = ()
@@ -107,17 +109,17 @@ class FoundRobot:
     above: tuple[str, ...] = ()
     """The parent frames of its base, the nearest first."""
 
-    def first(self, role: Role) -> Guess | None:
+    def first(self, role: TopicRole) -> Guess | None:
         """Return the best guess for a role, None if no topic fits."""
         found = self.guesses.get(role, ())
         return found[0] if found else None
 
-    def topic(self, role: Role) -> str:
+    def topic(self, role: TopicRole) -> str:
         """Return the best topic for a role, empty if no topic fits."""
         found = self.first(role)
         return "" if found is None else found.topic
 
-    def type_of(self, role: Role) -> str:
+    def type_of(self, role: TopicRole) -> str:
         """Return the type of the best topic for a role, empty if unknown."""
         found = self.first(role)
         return "" if found is None else found.type
@@ -224,3 +226,44 @@ class Findings:
 
     layers: Mapping[str, Layers] = field(default_factory=dict)
     """The layers drawn and left out of each robot, by its namespace."""
+
+
+def unique_names(
+    found: Sequence[tuple[str, Findings]],
+) -> list[Findings]:
+    """Return the findings, with a bridge's name added to names that are not unique.
+
+    Args:
+        found: The name and the findings of each bridge.
+
+    """
+    often = Counter(
+        same_name(robot.name) for _, findings in found for robot in findings.robots
+    )
+    taken: set[str] = set()
+    result = []
+    for bridge, findings in found:
+        robots = []
+        for robot in findings.robots:
+            name = robot.name
+            if often[same_name(name)] > 1:
+                name = f"{name} ({bridge})"
+            robots.append(replace(robot, name=free_name(name, taken)))
+        result.append(replace(findings, robots=tuple(robots)))
+    return result
+
+
+def free_name(wanted: str, taken: set[str]) -> str:
+    """Return a name that is not taken, and add it to the taken ones.
+
+    Args:
+        wanted: The name; a number is appended if it is taken.
+        taken: The taken names, as :func:`same_name` returns them.
+
+    """
+    name, number = wanted, 1
+    while same_name(name) in taken:
+        number += 1
+        name = f"{wanted} {number}"
+    taken.add(same_name(name))
+    return name

@@ -1,4 +1,4 @@
-"""Text from outside, for a terminal or a log: on one line, and of limited length.
+"""Text for people: what comes from outside is on one line and of limited length.
 
 Robots, bridges, browsers and files choose this text. A line break in it would forge a
 line of the log, and an escape sequence would control the terminal.
@@ -47,3 +47,14 @@ def lines_of(text: object, longest: int = LONGEST) -> str:
 
 def _escape(character: str) -> str:
     return character.encode("unicode_escape").decode("ascii")
+
+
+def counted(number: int, thing: str) -> str:
+    """Return a count with its noun, such as "1 robot" and "2 robots".
+
+    Args:
+        number: How many there are.
+        thing: The noun in the singular; its plural ends in "s".
+
+    """
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"

@@ -6,7 +6,7 @@ import pytest
 
 from webmap import Robot, RobotConfig
 from webmap.base.errors import ConfigError
-from webmap.core.configure import apply
+from webmap.core.robot import apply_config
 
 
 @pytest.fixture
@@ -29,9 +29,9 @@ def test_tags_and_the_limit_of_the_battery_are_set_in_python_and_in_plain_data(r
 def test_a_new_configuration_changes_tags_and_the_limit_of_the_battery(robot):
     old = RobotConfig(name="Bob")
     new = RobotConfig(name="Bob", tags=["bay 3"], battery_low=0.5)
-    assert apply(robot, old, new).count == 0
+    assert apply_config(robot, old, new).count == 0
     assert (robot.tags, robot.battery_low) == (("bay 3",), 0.5)
-    apply(robot, new, old)
+    apply_config(robot, new, old)
     assert (robot.tags, robot.battery_low) == ((), 0.2)
 
 

@@ -1,6 +1,6 @@
 """Robots are watched while pages are open, and for a short time afterwards."""
 
-from webmap.base.looking import GRACE, Looking
+from webmap.base.audience import GRACE, Audience
 
 
 class Timer:
@@ -33,84 +33,84 @@ class Clock:
 
 
 class Follower:
-    def __init__(self, looking, fails=False):
-        self.looking, self.fails = looking, fails
+    def __init__(self, audience, fails=False):
+        self.audience, self.fails = audience, fails
         self.found = []
-        looking.follow(self)
+        audience.follow(self)
 
-    def looking_changed(self):
-        self.found.append(self.looking.somebody)
+    def audience_changed(self):
+        self.found.append(self.audience.present)
         if self.fails:
             raise ValueError("I cannot")
 
 
 def test_somebody_looks_where_no_pages_are_served():
-    looking = Looking()
-    page = looking.page_opened()
+    audience = Audience()
+    page = audience.page_opened()
     page.remove()
-    assert looking.somebody
+    assert audience.present
 
 
 def test_nobody_looks_some_time_after_the_last_page_was_closed():
-    looking, clock = Looking(), Clock()
-    looking.expect_pages(clock)
-    first, second = looking.page_opened(), looking.page_opened()
+    audience, clock = Audience(), Clock()
+    audience.expect_pages(clock)
+    first, second = audience.page_opened(), audience.page_opened()
     clock.pass_on()
-    assert looking.somebody
+    assert audience.present
     first.remove()
     first.remove()
     clock.pass_on()
-    assert looking.somebody
+    assert audience.present
     second.remove()
-    assert looking.somebody
+    assert audience.present
     clock.pass_on()
-    assert not looking.somebody
+    assert not audience.present
 
 
 def test_nobody_looks_some_time_after_the_start_without_a_page():
-    looking, clock = Looking(), Clock()
-    looking.expect_pages(clock)
+    audience, clock = Audience(), Clock()
+    audience.expect_pages(clock)
     clock.pass_on()
-    assert not looking.somebody
+    assert not audience.present
 
 
 def test_pages_that_were_open_before_they_are_expected_count():
-    looking, clock = Looking(), Clock()
-    looking.page_opened()
-    looking.expect_pages(clock)
+    audience, clock = Audience(), Clock()
+    audience.page_opened()
+    audience.expect_pages(clock)
     clock.pass_on()
-    assert looking.somebody
+    assert audience.present
 
 
 def test_a_page_that_is_loaded_again_changes_nothing():
-    looking, clock = Looking(), Clock()
-    looking.expect_pages(clock)
-    follower = Follower(looking)
-    looking.page_opened().remove()
-    looking.page_opened()
+    audience, clock = Audience(), Clock()
+    audience.expect_pages(clock)
+    follower = Follower(audience)
+    audience.page_opened().remove()
+    audience.page_opened()
     clock.pass_on()
     assert follower.found == []
 
 
 def test_followers_hear_each_change_once_also_if_another_one_fails(caplog):
-    looking, clock = Looking(), Clock()
-    looking.expect_pages(clock)
-    fails, well, gone = Follower(looking, fails=True), Follower(looking), None
-    gone = Follower(looking)
-    looking.forget(gone)
+    audience, clock = Audience(), Clock()
+    audience.expect_pages(clock)
+    fails, well, gone = Follower(audience, fails=True), Follower(audience), None
+    gone = Follower(audience)
+    audience.forget(gone)
     clock.pass_on()
-    looking.page_opened()
-    looking.page_opened()
+    audience.page_opened()
+    audience.page_opened()
     assert (fails.found, well.found) == ([False, True], [False, True])
     assert gone.found == []
     assert caplog.text.count("did not adapt to who looks") == 2
 
 
 def test_somebody_looks_after_the_end():
-    looking, clock = Looking(), Clock()
-    looking.expect_pages(clock)
+    audience, clock = Audience(), Clock()
+    audience.expect_pages(clock)
     clock.pass_on()
-    looking.end()
-    looking.page_opened().remove()
+    audience.end()
+    audience.page_opened().remove()
     clock.pass_on()
-    assert looking.somebody
+    assert audience.present

@@ -1,4 +1,4 @@
-"""Listens to frames for a short time: before a robot is shown, and repeatedly later."""
+"""The frames behind a bridge, received for a short time, and repeatedly later."""
 
 import asyncio
 import weakref
@@ -7,11 +7,10 @@ from functools import partial
 
 import msgspec
 
+from webmap.base.audience import audience
 from webmap.base.errors import BridgeClosed
-from webmap.base.looking import looking
 from webmap.base.scope import no_scope
-from webmap.discovery.grouping import nearest
-from webmap.discovery.rules import ODOMETRY, VELOCITY
+from webmap.discovery.rules import ODOMETRY, VELOCITY, nearest
 from webmap.discovery.tf_robots import Trees
 from webmap.ros.bridge import Bridge, TemporaryBridge
 from webmap.ros.messages import TFMessage
@@ -57,7 +56,7 @@ def odometry_topics(topics: Mapping[str, str]) -> list[str]:
     return [] if clear else found
 
 
-class LateFrames:
+class FrameCollector:
     """Listens to frames for a short time, repeatedly, and keeps the results.
 
     This finds a robot that has only ``/tf`` when it appears, at a fraction of the cost
@@ -85,7 +84,7 @@ class LateFrames:
             seconds: How long to listen.
 
         """
-        wanted = frame_topics(topics)[:MOST_TOPICS] if looking.somebody else []
+        wanted = frame_topics(topics)[:MOST_TOPICS] if audience.present else []
         unheard = sorted({*odometry_topics(topics)} - {*self.trees.odometry})
         if not (wanted or unheard):
             return self.trees
@@ -125,13 +124,13 @@ class LateFrames:
         self.trees.odometry[topic] = message.child_frame_id.strip().strip("/")
 
 
-_late: weakref.WeakKeyDictionary[Bridge, LateFrames] = weakref.WeakKeyDictionary()
+_late: weakref.WeakKeyDictionary[Bridge, FrameCollector] = weakref.WeakKeyDictionary()
 
 
-def late_frames(bridge: Bridge) -> LateFrames:
-    """Return the listener for the frames of a bridge; each bridge has one."""
+def frame_collector(bridge: Bridge) -> FrameCollector:
+    """Return the collector of a bridge; all callers of one bridge share it."""
     if bridge not in _late:
-        _late[bridge] = LateFrames(bridge)
+        _late[bridge] = FrameCollector(bridge)
     return _late[bridge]
 
 
@@ -154,4 +153,4 @@ async def receive_frames(
         except BridgeClosed:
             # It answered a moment ago; the next connection reports that it is gone.
             return Trees()
-        return await LateFrames(bridge).listen(topics, seconds=seconds)
+        return await FrameCollector(bridge).listen(topics, seconds=seconds)

@@ -24,11 +24,11 @@ RARELY = 5000
 class Follower(Protocol):
     """An object that receives less while nobody looks."""
 
-    def looking_changed(self) -> None:
-        """Adapt to :attr:`Looking.somebody`."""
+    def audience_changed(self) -> None:
+        """Adapt to :attr:`Audience.present`."""
 
 
-class Looking:
+class Audience:
     """Counts the open pages; used in the model's thread.
 
     A process without pages, such as a program that only drives, always counts as one at
@@ -36,7 +36,7 @@ class Looking:
     """
 
     def __init__(self) -> None:
-        self.somebody = True
+        self.present = True
         """Whether a page is open, was open in the last moments, or none is served."""
         self._pages = 0
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -57,7 +57,7 @@ class Looking:
         return Removal(self._page_closed)
 
     def follow(self, follower: Follower) -> None:
-        """Call ``follower`` whenever :attr:`somebody` changes, while it exists."""
+        """Call ``follower`` whenever :attr:`present` changes, while it exists."""
         self._followers.add(follower)
 
     def forget(self, follower: Follower) -> None:
@@ -81,12 +81,12 @@ class Looking:
             self._timer = self._loop.call_later(GRACE, self._set, False)
 
     def _set(self, somebody: bool) -> None:
-        if somebody == self.somebody:
+        if somebody == self.present:
             return
-        self.somebody = somebody
+        self.present = somebody
         for follower in list(self._followers):
             try:
-                follower.looking_changed()
+                follower.audience_changed()
             except Exception:
                 log.exception("%r did not adapt to who looks", follower)
 
@@ -96,5 +96,5 @@ class Looking:
             self._timer = None
 
 
-looking = Looking()
+audience = Audience()
 """The pages of this process."""

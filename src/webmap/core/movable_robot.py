@@ -8,12 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, TypeVar
 
 from webmap.base.errors import ConfigError, MotionError
-from webmap.base.geometry import Quaternion, Twist
+from webmap.base.geometry import Orientation, Position, Quaternion, Twist
 from webmap.base.scope import no_scope
 from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE
 from webmap.config.robot import LINKED, MOTION
 from webmap.core.extendable import Extendable
-from webmap.core.given_pose import Orientation, Position
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.motion import RobotMotion
 from webmap.core.registry import Namespace
@@ -22,10 +21,10 @@ from webmap.gate.rules.goals import OVER
 from webmap.ros.bridge import Bridge
 
 if TYPE_CHECKING:
-    from webmap.core.page import Page
+    from webmap.core.base_page import BasePage
 
 P = ParamSpec("P")
-D = TypeVar("D", bound="Driven")
+D = TypeVar("D", bound="MovableRobot")
 Method = Callable[Concatenate[D, P], None]
 
 
@@ -65,7 +64,7 @@ def sets_part(key: str) -> Callable[[Method[D, P]], Method[D, P]]:
     return decorate
 
 
-class Driven(Extendable):
+class MovableRobot(Extendable):
     """An extendable object that moves through the gate; base class of every robot.
 
     It configures the topics for velocity and goals and passes commands to the gate. It
@@ -397,7 +396,7 @@ class Driven(Extendable):
         position: Position,
         orientation: Orientation,
         *,
-        by: "Page | None" = None,
+        by: "BasePage | None" = None,
     ) -> None:
         """Send the robot to a goal in the plane, by its own navigation.
 

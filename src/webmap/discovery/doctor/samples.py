@@ -1,4 +1,4 @@
-"""Listens to topics: counts the messages of each and measures their age."""
+"""Listens to topics: the count and age of their messages, and where frames lead."""
 
 import asyncio
 import contextlib
@@ -10,12 +10,13 @@ import msgspec
 
 from webmap.base.errors import ProtocolError
 from webmap.base.scope import no_scope
-from webmap.discovery.doctor.frames import FrameListening
-from webmap.discovery.doctor.observed import Measurement
+from webmap.discovery.doctor.facts import Measurement
+from webmap.discovery.tf_robots import MAP
 from webmap.ros.bridge import Bridge
-from webmap.ros.messages import Header
+from webmap.ros.messages import Header, TFMessage
 from webmap.ros.received import ReceivedMessage
 from webmap.ros.subscriptions import Encoding
+from webmap.ros.tf import Buffer, Transform, TransformError
 
 ENOUGH = 4
 """Messages after which a topic is unsubscribed: they give three intervals."""
@@ -35,7 +36,7 @@ class _Stamped(msgspec.Struct, frozen=True):
     child_frame_id: str = ""
 
 
-class Listening:
+class TopicSamples:
     """Counts the messages of topics.
 
     Args:
@@ -75,11 +76,11 @@ class Listening:
         )
 
     def end(self, now: float) -> dict[str, Measurement]:
-        """Return the measurements until now."""
+        """Return what was measured of each topic; ``now`` is monotonic seconds."""
         return {topic: self._sum_up(topic, now) for topic in self._measured}
 
     def end_of(self, topic: str, now: float) -> Measurement:
-        """Return the measurements of one topic until now."""
+        """Return what was measured of one topic, as :meth:`end` does."""
         return self._sum_up(topic, now)
 
     def _sum_up(self, topic: str, now: float) -> Measurement:
@@ -109,6 +110,65 @@ class Listening:
         )
 
 
+class FrameCheck:
+    """Collects the messages on the topics with frames, of all namespaces."""
+
+    def __init__(self) -> None:
+        self._buffers: dict[str, Buffer] = {}
+        self._refused: dict[str, list[str]] = {}
+
+    def received(self, message: ReceivedMessage) -> None:
+        """Process a message of ``tf`` or ``tf_static``."""
+        namespace, _, name = message.topic.rpartition("/")
+        buffer = self._buffers.setdefault(namespace, Buffer())
+        refused = self._refused.setdefault(namespace, [])
+        try:
+            transforms = message.decode(TFMessage).transforms
+        except ProtocolError as error:
+            refused.append(f"{message.topic} cannot be read: {error}")
+            return
+        for each in transforms:
+            move = each.transform
+            try:
+                buffer.add(
+                    each.frame_id,
+                    each.child_frame_id,
+                    Transform(move.translation.vector, move.rotation.as_sent),
+                    each.stamp,
+                    static=name == "tf_static",
+                    namespace=namespace,
+                )
+            except (TransformError, ProtocolError) as error:
+                refused.append(str(error))
+
+    def oddities(self, namespace: str) -> tuple[str, ...]:
+        """Return the oddities in the frames of a namespace, each once."""
+        buffer = self._buffers.get(namespace)
+        notes = [] if buffer is None else list(buffer.notes)
+        return tuple(dict.fromkeys([*self._refused.get(namespace, ()), *notes]))
+
+    def missing(self, namespace: str, frame: str, start: str = MAP) -> str:
+        """Return why no transform leads from one frame to another; empty if one does.
+
+        Args:
+            namespace: Namespace of the topic with the frames.
+            frame: The frame at the end.
+            start: The frame at the start.
+
+        """
+        buffer = self._buffers.get(namespace)
+        if buffer is None:
+            return f"no message was received on {namespace}/tf"
+        name, start = buffer.name(frame, namespace), buffer.name(start, namespace)
+        if name == start:
+            return ""
+        try:
+            buffer.lookup(start, name)
+        except TransformError as error:
+            return str(error)
+        return ""
+
+
 class Sampling:
     """Listens to topics until each has sent enough messages.
 
@@ -124,7 +184,7 @@ class Sampling:
     ) -> None:
         self._enough = enough
         self._topics = tuple(topics)
-        self._listening = Listening(self._topics, now)
+        self._listening = TopicSamples(self._topics, now)
         self._bytes = dict.fromkeys(self._topics, 0)
         self._came: dict[str, list[float]] = {topic: [] for topic in self._topics}
         self._left: dict[str, Measurement] = {}
@@ -175,7 +235,7 @@ async def listen(
     topics: Mapping[str, Encoding],
     seconds: float,
     tf: Sequence[str] = (),
-    frames: FrameListening | None = None,
+    frames: FrameCheck | None = None,
 ) -> dict[str, Measurement]:
     """Listen to topics for a time.
 
@@ -192,7 +252,7 @@ async def listen(
     """
     if not (topics or tf):
         return {}
-    listening = Listening([*topics, *tf], time.monotonic())
+    listening = TopicSamples([*topics, *tf], time.monotonic())
 
     def received(message: ReceivedMessage) -> None:
         if frames is not None and message.topic in tf:

@@ -14,7 +14,7 @@ MOST = 50
 
 
 @dataclass(frozen=True, slots=True)
-class Refused:
+class RefusedMessages:
     """The refused messages of one person's pages."""
 
     by: str
@@ -36,10 +36,10 @@ class Refusals:
     def __init__(self) -> None:
         self.total = 0
         """The number of messages refused since WebMap started."""
-        self._rows: OrderedDict[str, Refused] = OrderedDict()
+        self._rows: OrderedDict[str, RefusedMessages] = OrderedDict()
 
     @property
-    def rows(self) -> Sequence[Refused]:
+    def rows(self) -> Sequence[RefusedMessages]:
         """One entry for each person, the latest refusal first."""
         return tuple(reversed(self._rows.values()))
 
@@ -49,7 +49,7 @@ class Refusals:
         before = self._rows.pop(by, None)
         if before is not None:
             count += before.count
-        self._rows[by] = Refused(by, count, last, at)
+        self._rows[by] = RefusedMessages(by, count, last, at)
         if len(self._rows) > MOST:
             self._rows.popitem(last=False)
 

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from webmap.bags import listening, recorder
-from webmap.bags.listening import Listening
-from webmap.bags.replay import STATUS
+from webmap.bags import record, recorder
+from webmap.bags.player import STATUS
+from webmap.bags.record import TopicSubscriber
 from webmap.base.errors import BridgeClosed
 from webmap.ros.bridge import Bridge
 from webmap.ros.offload import LARGE
@@ -80,7 +80,7 @@ class FakeRecorder:
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(listening, "LOOK", 0.001)
+    monkeypatch.setattr(record, "LOOK", 0.001)
 
 
 class Story:
@@ -89,7 +89,7 @@ class Story:
     def __init__(self, topics, **options):
         self.bridge, self.recorder = FakeBridge(topics), FakeRecorder()
         self.reported, self.stop = [], asyncio.Event()
-        self.listening = Listening(
+        self.listening = TopicSubscriber(
             self.bridge, self.recorder, report=self.reported.append, **options
         )
 
@@ -202,7 +202,7 @@ def test_a_full_disk_ends_recording_with_an_error():
 
 
 def test_a_link_that_never_opens_is_reported_with_the_reason(monkeypatch):
-    monkeypatch.setattr(listening, "OPEN_WITHIN", 0.001)
+    monkeypatch.setattr(record, "OPEN_WITHIN", 0.001)
     story = Story({"/odom": ODOMETRY})
     story.bridge.opens, story.bridge.trouble = False, "nothing listens there"
 

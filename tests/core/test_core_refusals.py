@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime
 
-from webmap.core.refused import MOST, Refusals
+from webmap.core.refusals import MOST, Refusals
 
 AT = datetime(2026, 11, 21, 17, 0, tzinfo=UTC)
 
