@@ -8,7 +8,12 @@ import msgspec
 import pytest
 
 from webmap import Robot
-from webmap.agents.description import DEEPEST, MOST_OF_ROBOT, MOST_ROBOTS, About
+from webmap.agents.announcements import (
+    DEEPEST,
+    MOST_OF_ROBOT,
+    MOST_ROBOTS,
+    About,
+)
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
 from webmap.console import Console

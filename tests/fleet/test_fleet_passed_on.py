@@ -6,7 +6,7 @@ import msgspec
 import pytest
 from PIL import Image
 
-from webmap.agents.far_camera import FarCamera
+from webmap.agents.remote_camera import RemoteCamera
 from webmap.base.errors import ConfigError, WireError
 from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.core.registry import map_modules, robot_modules
@@ -171,7 +171,7 @@ def test_a_display_takes_the_cameras_of_an_agent_through_the_agent():
     given = {"name": "Bob", "bridge": "b", "cameras": [URL, "/cam"]}
     config, _ = accepted(RobotConfig.from_dict(given), AGENT, "r1", {"b"})
     http, topic = config.cameras
-    assert FarCamera.parse(http.url)[:3] == (AGENT, "r1", "Camera 1")
+    assert RemoteCamera.parse(http.url)[:3] == (AGENT, "r1", "Camera 1")
     assert topic.topic == "/cam"
 
 

@@ -2,8 +2,8 @@
 
 import msgspec
 
-from webmap.agents.description import PROTOCOL, Beacon
-from webmap.agents.peer import User
+from webmap.agents.announcements import PROTOCOL, Beacon
+from webmap.agents.router_access import RouterUser
 from webmap.base.lifecycle import lifecycle
 from webmap.console import Console
 from webmap.fleet import of_agents
@@ -14,7 +14,7 @@ class FakePeer:
     """A router that may be unreachable, and the signs of its agents."""
 
     def __init__(self):
-        self.user = User()
+        self.user = RouterUser()
         self.trouble = "cannot reach the router: nothing listens there"
 
     def listen(self, key, fn):

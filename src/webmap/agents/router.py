@@ -13,8 +13,14 @@ from typing import Any
 
 import msgspec
 
-from webmap.agents.address import EVERY, checked_name, gate_in, here, locator
-from webmap.agents.displays import MOST_SAMPLE
+from webmap.agents.address import (
+    EVERY,
+    beacon,
+    checked_name,
+    gate_in,
+    locator,
+)
+from webmap.agents.gate_messages import MOST_SAMPLE
 from webmap.agents.peer import MOST_BYTES
 from webmap.base.errors import ConfigError
 
@@ -167,7 +173,7 @@ def access_rules(users: Mapping[str, UserEntry]) -> dict[str, Any]:
             sends = [key for each in agents for key in _keys_of_display(each, user)]
             gets = [key for each in agents for key in _keys_for_display(each, user)]
             asks, answers = [f"webmap/{each}/about/**" for each in agents], []
-            names = [*gets, here(EVERY)]  # it finds only those that it reaches
+            names = [*gets, beacon(EVERY)]  # it finds only those that it reaches
         found = [
             _rule(f"{user}-sends", ["put"], ["ingress"], sends),
             _rule(f"{user}-gets", ["put"], ["egress"], gets),

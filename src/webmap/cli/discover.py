@@ -36,7 +36,7 @@ def discover(
     webmap discover ws://robot:9090 --toml > fleet.toml
     ros2 topic list -t | webmap discover ws://robot:9090 --topics -
     """
-    from webmap.agents.present import agents_behind
+    from webmap.agents.announcements import agents_behind
     from webmap.base.errors import BridgeClosed
     from webmap.discovery.fleet_toml import fleet_toml
     from webmap.discovery.tables import report

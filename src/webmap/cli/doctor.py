@@ -101,7 +101,7 @@ def doctor(
         from webmap.discovery.doctor.stop_test import find_out
 
         sys.exit(find_out(url, stop_test, wait=wait, yes=yes))
-    from webmap.agents.present import agents_behind, one_agent
+    from webmap.agents.announcements import agents_behind, one_agent
     from webmap.base.errors import BridgeClosed
     from webmap.discovery.doctor import Observed, is_ready, judge
     from webmap.discovery.doctor.measure import observe

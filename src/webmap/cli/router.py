@@ -56,8 +56,8 @@ def router(
     from pathlib import Path
 
     from webmap.agents.address import url
-    from webmap.agents.peer import zenoh_config
     from webmap.agents.router import read_users, router_settings
+    from webmap.agents.router_access import zenoh_config
     from webmap.base.errors import ConfigError
 
     known = None if users is None else read_users(Path(users))

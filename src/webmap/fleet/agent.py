@@ -15,22 +15,17 @@ from typing import Any
 
 import msgspec
 
-from webmap.agents import address, clients, data
+from webmap.agents import address, bridge_proxy, data_messages
 from webmap.agents.address import Sender, sender_of
-from webmap.agents.agent_gate import AgentGate
+from webmap.agents.agent_cameras import AgentCameras
 from webmap.agents.allowance import Allowance
-from webmap.agents.cameras import AgentCameras
-from webmap.agents.clients import Call, Clients
-from webmap.agents.description import (
-    PROTOCOL,
-    About,
-    Beacon,
-    read_beacon,
-)
-from webmap.agents.displays import MOST_SAMPLE, MOST_USERS
+from webmap.agents.announcements import PROTOCOL, About, Beacon, read_beacon
+from webmap.agents.bridge_proxy import BridgeProxy, Call
+from webmap.agents.data_messages import lean_scan
+from webmap.agents.displays import MOST_USERS
+from webmap.agents.gate_messages import MAX_BYTES, MOST_SAMPLE
+from webmap.agents.gates import AgentGate
 from webmap.agents.peer import MOST_CHANGES_BYTES, Peer, peer_of
-from webmap.agents.samples import MAX_BYTES
-from webmap.agents.scans import lean_scan
 from webmap.base.children import python_command
 from webmap.base.errors import BridgeError, ConfigError, WireError
 from webmap.base.lifecycle import lifecycle
@@ -113,7 +108,7 @@ class Agent:
             )
         )
         self._allowance = Allowance("messages")
-        self._clients = Clients(
+        self._clients = BridgeProxy(
             upstream=self._upstream,
             reply=self._reply,
             note=self._note,
@@ -173,7 +168,7 @@ class Agent:
     async def _run(self) -> None:
         peer, name = self._peer, self.name
         load_soon("numpy")  # for scans
-        peer.listen(address.here(name), self._heard_of, back=True)
+        peer.listen(address.beacon(name), self._heard_of, back=True)
         await self._wait_for_own_name()
         everybody = address.EVERY
         peer.answer(address.about(name), lambda: self._about)
@@ -184,7 +179,7 @@ class Agent:
         gate_in = address.gate_in(name, everybody, everybody)
         peer.listen(gate_in, self._sample, gate=True, most=MOST_SAMPLE)
         data_in = address.data_in(name, everybody, everybody, everybody)
-        peer.listen(data_in, self._piece, most=data.MOST_OF_DISPLAY + 1)
+        peer.listen(data_in, self._piece, most=data_messages.MOST_OF_DISPLAY + 1)
         typing = spawn(self._learn_types())
         self._cameras.start(asyncio.get_running_loop())
         self._serving = True
@@ -200,10 +195,10 @@ class Agent:
             beacon = Beacon(
                 PROTOCOL, self._session, hashlib.sha256(self._about).hexdigest()[:16]
             )
-            peer.put_data(address.here(name), msgspec.json.encode(beacon))
+            peer.put_data(address.beacon(name), msgspec.json.encode(beacon))
             self._note_unheard()
-            self._clients.look(time.monotonic())
-            self._cameras.look(time.monotonic())
+            self._clients.check(time.monotonic())
+            self._cameras.check(time.monotonic())
             await asyncio.sleep(BEACON)
 
     async def _wait_for_own_name(self) -> None:
@@ -255,7 +250,7 @@ class Agent:
             msgspec.Raw(msgspec.json.encode(passed_on(each.config).to_dict()))
             for each in held
         ]
-        self._cameras.hold(held)
+        self._cameras.set_cameras(held)
         names = sorted({self.url, self._held.bridge.name})
         grids = list(self._held.grids().items())
         pose = alignments.of(self._held.bridge)
@@ -306,7 +301,7 @@ class Agent:
             key = address.topic_key(self.name, event.topic)
             type = self._clients.type_of(event.topic)
             frame = self._lean(event.topic, type, event.frame)
-            piece = data.pack_frame(frame)
+            piece = data_messages.pack_frame(frame)
             if each_counts(event.topic, type):
                 self._peer.put_data(key, piece, all=True, size=MOST_CHANGES_BYTES)
             else:
@@ -327,10 +322,10 @@ class Agent:
             return frame
 
     def _reply(self, client: Sender, frame: bytes) -> None:
-        self._put(client, data.pack_frame(frame))
+        self._put(client, data_messages.pack_frame(frame))
 
-    def _note(self, client: Sender, pong: data.Pong) -> None:
-        self._put(client, data.pack_note(pong))
+    def _note(self, client: Sender, pong: data_messages.Pong) -> None:
+        self._put(client, data_messages.pack_note(pong))
 
     def _put(self, client: Sender, piece: bytes) -> None:
         key = address.data_out(self.name, *client)
@@ -360,13 +355,13 @@ class Agent:
 
     async def _answer(self, call: Call) -> None:
         try:
-            args: Any = clients.args_of(call)
+            args: Any = bridge_proxy.args_of(call)
             check_parameters(call.service, args, self._buttons)
             calls = self._calls_of(call.client.user)
             values = await calls.call(call.service, args, call.type, 30.0)
-            frame = clients.answered(call, values)
+            frame = bridge_proxy.answered(call, values)
         except (BridgeError, WireError, ValueError, TypeError) as error:
-            frame = clients.answered(call, str(error), well=False)
+            frame = bridge_proxy.answered(call, str(error), well=False)
         finally:
             self._clients.returned(call)
         self._reply(call.client, frame)

@@ -14,7 +14,7 @@ import msgspec
 
 import webmap
 from webmap.agents import address
-from webmap.agents.description import (
+from webmap.agents.announcements import (
     MOST_GRIDS,
     MOST_OF_ABOUT,
     PROTOCOL,
@@ -138,7 +138,7 @@ class Agents:
         """When the last sign of each agent came, on the monotonic clock."""
         self._task: asyncio.Task[None] | None = None
         self._peer = peer_of(router)
-        self._peer.listen(address.here(self.only or address.EVERY), self._heard)
+        self._peer.listen(address.beacon(self.only or address.EVERY), self._heard)
         if self.only is not None:
             self._get(self.only, Beacon(PROTOCOL, "", ""))
         lifecycle.add(self)

@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from webmap.agents.far_camera import FarCamera
+from webmap.agents.remote_camera import RemoteCamera
 from webmap.base.errors import ConfigError, WireError
 from webmap.config.buttons import read_buttons
 from webmap.config.checks import KeyPath, Mistakes
@@ -223,7 +223,9 @@ def accepted(
     if picture is not None and not is_served(picture.file):
         raise ConfigError(f"{picture.file!r} is not a picture of the agent")
     cameras = [
-        msgspec.structs.replace(each, url=FarCamera(agent, id, each.name, each.url).url)
+        msgspec.structs.replace(
+            each, url=RemoteCamera(agent, id, each.name, each.url).url
+        )
         if each.url
         else each
         for each in named_cameras(config.cameras)
