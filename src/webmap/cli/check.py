@@ -18,7 +18,7 @@ def check(file: Path) -> None:
     No connection is opened. Every mistake is shown with its line; the exit code is 2
     if there is one.
     """
-    from webmap.fleet.made import prepare
+    from webmap.fleet.fleet_file import prepare
 
     ready = prepare(file)
     robots = counted(len(ready.robots), "robot")

@@ -106,7 +106,7 @@ def doctor(
     from webmap.discovery.doctor import Observed, is_ready, judge
     from webmap.discovery.doctor.measure import observe
     from webmap.discovery.doctor.verdict import report
-    from webmap.fleet.diagnose import Configured, bridges_of
+    from webmap.fleet.doctor import Configured, bridges_of
 
     if len(url) == 1 and (robots or settings) and is_agent_url(url[0]):
         url = (one_agent(url[0], wait=wait, waiting=waiting_for(url[0])),)

@@ -23,7 +23,7 @@ def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) 
     from webmap.server import application
 
     if file.suffix.lower() == ".toml":
-        from webmap.fleet.made import open_fleet, prepare
+        from webmap.fleet.fleet_file import open_fleet, prepare
 
         open_fleet(prepare(file))
         application.run(

@@ -32,8 +32,16 @@ from webmap.base.lifecycle import lifecycle
 from webmap.base.loading import load_soon
 from webmap.base.tasks import spawn
 from webmap.core.runtime import runtime
-from webmap.fleet.held import Held, open_at, warn_of_open_bridge
-from webmap.fleet.passed_on import actions, check_parameters, passed_on
+from webmap.fleet.agent_robots import (
+    AgentRobots,
+    open_addresses,
+    warn_of_open_bridge,
+)
+from webmap.fleet.robot_files import (
+    button_actions,
+    check_parameters,
+    config_for_displays,
+)
 from webmap.gate.protocol import Role
 from webmap.poses.alignment import alignments
 from webmap.ros.names import is_type, normalise_topic
@@ -60,12 +68,12 @@ LISTEN = 2.0
 
 
 class Agent:
-    """Holds the gate of the robots behind one rosbridge, and serves displays.
+    """Runs the gate of the robots behind one rosbridge, and serves displays.
 
     Args:
         name: The name of the agent.
         router: The address of the Zenoh router.
-        held: Its robots.
+        robots: Its robots.
         roles: What the pages of each user may do at most.
         throttles: The least milliseconds between two messages, by topic.
         beams: The greatest number of beams of a scan, by topic.
@@ -76,15 +84,15 @@ class Agent:
         self,
         name: str,
         router: str,
-        held: Held,
+        robots: AgentRobots,
         *,
         roles: Mapping[str, Role] | None = None,
         throttles: Mapping[str, int] | None = None,
         beams: Mapping[str, int] | None = None,
     ) -> None:
         self.name = address.checked_name(name)
-        self.url = url = held.bridge.url
-        self._held = held
+        self.url = url = robots.bridge.url
+        self._robots = robots
         self._session = secrets.token_hex(8)
         self._buttons: list[dict[str, str]] = []
         self._about = b""
@@ -108,7 +116,7 @@ class Agent:
             )
         )
         self._allowance = Allowance("messages")
-        self._clients = BridgeProxy(
+        self._proxy = BridgeProxy(
             upstream=self._upstream,
             reply=self._reply,
             note=self._note,
@@ -129,8 +137,8 @@ class Agent:
             url,
             opened=self._bridge_opened,
             received=self._received,
-            closed=self._clients.closed,
-            failed=lambda error: self._clients.closed(error.why or str(error)),
+            closed=self._proxy.closed,
+            failed=lambda error: self._proxy.closed(error.why or str(error)),
         )
         self._task: asyncio.Task[None] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -168,11 +176,11 @@ class Agent:
     async def _run(self) -> None:
         peer, name = self._peer, self.name
         load_soon("numpy")  # for scans
-        peer.listen(address.beacon(name), self._heard_of, back=True)
+        peer.listen(address.beacon(name), self._note_beacon, back=True)
         await self._wait_for_own_name()
         everybody = address.EVERY
         peer.answer(address.about(name), lambda: self._about)
-        pictures = self._held.pictures
+        pictures = self._robots.pictures
         for picture in pictures:
             key = address.about_picture(name, picture)
             peer.answer(key, partial(pictures.__getitem__, picture))
@@ -197,7 +205,7 @@ class Agent:
             )
             peer.put_data(address.beacon(name), msgspec.json.encode(beacon))
             self._note_unheard()
-            self._clients.check(time.monotonic())
+            self._proxy.check(time.monotonic())
             self._cameras.check(time.monotonic())
             await asyncio.sleep(BEACON)
 
@@ -219,7 +227,7 @@ class Agent:
                     )
                 complained = True
 
-    def _heard_of(self, _key: str, piece: bytes) -> None:
+    def _note_beacon(self, _key: str, piece: bytes) -> None:
         beacon = read_beacon(piece)
         if beacon is None:
             return
@@ -245,19 +253,19 @@ class Agent:
             )
 
     def _describe(self) -> None:
-        held = self._held.robots()
-        robots = [
-            msgspec.Raw(msgspec.json.encode(passed_on(each.config).to_dict()))
-            for each in held
+        robots = self._robots.robots()
+        configs = [
+            msgspec.Raw(msgspec.json.encode(config_for_displays(each.config).to_dict()))
+            for each in robots
         ]
-        self._cameras.set_cameras(held)
-        names = sorted({self.url, self._held.bridge.name})
-        grids = list(self._held.grids().items())
-        pose = alignments.of(self._held.bridge)
+        self._cameras.set_cameras(robots)
+        names = sorted({self.url, self._robots.bridge.name})
+        grids = list(self._robots.grids().items())
+        pose = alignments.of(self._robots.bridge)
         placed = (pose.x, pose.y, math.degrees(pose.yaw))
-        about = About(names, robots, grids, placed, self._open_at)
+        about = About(names, configs, grids, placed, self._open_at)
         self._about = msgspec.json.encode(about)
-        self._buttons = [each for one in held for each in actions(one.config)]
+        self._buttons = [each for one in robots for each in button_actions(one.config)]
 
     def _sample(self, key: str, sample: bytes) -> None:
         if self.gate is not None:
@@ -276,17 +284,17 @@ class Agent:
 
     def _take(self, client: Sender, piece: bytes) -> None:
         try:
-            self._clients.receive(client, piece, time.monotonic())
+            self._proxy.receive(client, piece, time.monotonic())
         except (WireError, BridgeError) as error:
             log.warning("display %s: %s", client.display, error)
 
     def _bridge_opened(self) -> None:
         log.info("%s: the connection is open", self.url)
-        places, self._open_at = self._open_at, open_at(self.url)
+        places, self._open_at = self._open_at, open_addresses(self.url)
         if self._open_at and self._open_at != places:
             warn_of_open_bridge(self.url, self._open_at)
         self._protocol = Protocol()
-        self._clients.opened(secrets.token_hex(8), time.monotonic())
+        self._proxy.opened(secrets.token_hex(8), time.monotonic())
 
     def _upstream(self, frame: bytes) -> None:
         if self._lane.state == "open":
@@ -295,11 +303,11 @@ class Agent:
     def _received(self, frame: bytes | bytearray) -> None:
         now = time.monotonic()
         event = self._protocol.receive(frame, now)
-        if isinstance(event, Publish) and self._clients.message(
+        if isinstance(event, Publish) and self._proxy.message(
             event.topic, event.frame, now, in_parts=event.in_parts
         ):
             key = address.topic_key(self.name, event.topic)
-            type = self._clients.type_of(event.topic)
+            type = self._proxy.type_of(event.topic)
             frame = self._lean(event.topic, type, event.frame)
             piece = data_messages.pack_frame(frame)
             if each_counts(event.topic, type):
@@ -335,12 +343,12 @@ class Agent:
         """Ask the rosbridge for the types of topics that displays subscribe to."""
         while True:
             await asyncio.sleep(BEACON)
-            if self._clients.asks_types:
+            if self._proxy.asks_types:
                 try:
                     types = await self._graph.topics()
                 except BridgeError:
                     types = {}
-                self._clients.typed(types, time.monotonic())
+                self._proxy.typed(types, time.monotonic())
                 await asyncio.sleep(TYPES)
 
     def _calls_of(self, user: str) -> Calls:
@@ -363,7 +371,7 @@ class Agent:
         except (BridgeError, WireError, ValueError, TypeError) as error:
             frame = bridge_proxy.answered(call, str(error), well=False)
         finally:
-            self._clients.returned(call)
+            self._proxy.returned(call)
         self._reply(call.client, frame)
 
 
