@@ -16,8 +16,7 @@ from typing import NamedTuple, TypeAlias
 import msgspec
 
 from webmap.agents import address, camera_messages
-from webmap.agents.address import Sender, sender_of
-from webmap.agents.allowance import Allowance
+from webmap.agents.address import Sender
 from webmap.agents.camera_messages import (
     CameraPicture,
     CameraRelease,
@@ -25,6 +24,7 @@ from webmap.agents.camera_messages import (
     CameraRequest,
 )
 from webmap.agents.peer import Peer
+from webmap.agents.rate_limit import Receiver
 from webmap.base.errors import ProtocolError, WireError
 from webmap.config.robot import RobotConfig, named_cameras
 from webmap.ros.image_address import parse_address
@@ -221,7 +221,7 @@ class AgentCameras:
         self._peer = peer
         self._loop: asyncio.AbstractEventLoop | None = None
         self._pulls: dict[Name, Pull] = {}
-        self._allowance = Allowance("camera requests")
+        self._receiver = Receiver("camera requests", self._receive)
         self._cameras = CameraRelay(
             begin=self._begin, end=self._end, send=self._send, answer=self._answer
         )
@@ -229,10 +229,11 @@ class AgentCameras:
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Begin to listen to displays; called in the loop's thread."""
         self._loop = loop
+        self._receiver.start(loop)
         every = address.EVERY
         self._peer.listen(
             address.camera_in(self._agent, every, every),
-            self._arrived,
+            self._receiver.receive,
             most=camera_messages.MOST_REQUEST,
         )
 
@@ -249,22 +250,8 @@ class AgentCameras:
         """End the cameras that no display shows any more."""
         self._cameras.check(now)
 
-    def _arrived(self, key: str, piece: bytes) -> None:
-        client = sender_of(key)
-        if (
-            self._loop is not None
-            and not self._loop.is_closed()
-            and self._allowance.admits(client.user, len(piece), time.monotonic())
-        ):
-            self._loop.call_soon_threadsafe(self._take, client, piece)
-
-    def _take(self, client: Sender, piece: bytes) -> None:
-        try:
-            self._cameras.receive(
-                client, camera_messages.read_request(piece), time.monotonic()
-            )
-        except WireError as error:
-            log.warning("display %s: %s", client.display, error)
+    def _receive(self, client: Sender, piece: bytes, now: float) -> None:
+        self._cameras.receive(client, camera_messages.read_request(piece), now)
 
     def _begin(self, name: Name, camera: CameraSource) -> None:
         assert self._loop is not None

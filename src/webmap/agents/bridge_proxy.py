@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 import msgspec
 
 from webmap.agents.address import Sender
-from webmap.agents.allowance import Allowance
 from webmap.agents.data_messages import (
     MOST_OF_DISPLAY,
     Bye,
@@ -26,6 +25,7 @@ from webmap.agents.data_messages import (
     read_op,
     unpack,
 )
+from webmap.agents.rate_limit import RateLimit
 from webmap.base.errors import WireError
 from webmap.ros.names import is_type, same_type, split_type
 from webmap.ros.rosbridge import ops
@@ -178,7 +178,7 @@ class BridgeProxy:
         """The subscriptions of each user."""
         self._calling: Counter[str] = Counter()
         """The calls that are not answered, of each user and of each display."""
-        self._catching_up = Allowance("subscriptions", size=4 << 20)
+        self._catching_up = RateLimit("subscriptions", size=4 << 20)
         self._advertised: dict[str, set[Sender]] = {}
         self._numbers = 0
         self.session = ""

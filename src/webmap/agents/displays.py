@@ -30,7 +30,7 @@ from webmap.agents.gate_messages import (
 )
 from webmap.base.errors import WireError
 from webmap.gate.commands import ControlCommand, Refusal, Stop, check, stop_in
-from webmap.gate.lanes.budget import FRAMES, Budget
+from webmap.gate.lanes.budget import BYTES, FRAMES, Budget
 from webmap.gate.protocol import (
     PROGRAM,
     Connect,
@@ -105,7 +105,7 @@ class UserDisplays:
 
     def __init__(self) -> None:
         self.displays: dict[str, Display] = {}
-        self.budget = Budget()
+        self.budget = Budget(FRAMES // OF_USER, BYTES // OF_USER)
         self.stops: deque[tuple[str, int, int]] = deque(maxlen=100)
         """The newest STOPs that were obeyed: display, session and number of each."""
         self.stopped_at: dict[str | None, float] = {}
@@ -121,7 +121,7 @@ class Display:
         self.program = f"{name}/{PROGRAM}"
         """The connection of its program."""
         self.order = Order()
-        self.budget = Budget()
+        self.budget = Budget(FRAMES // OF_DISPLAY, BYTES // OF_DISPLAY)
         self.alive_at = float("-inf")
         """When it was alive for certain."""
         self.pages: dict[str, list[Connect | Speeds]] = {}
@@ -130,8 +130,8 @@ class Display:
 
     def spend(self, count: int, size: int, now: float) -> None:
         """Count messages of this display, with their bytes."""
-        self.user.budget.spend(OF_USER * count, OF_USER * size, 0.0, now)
-        self.budget.spend(OF_DISPLAY * count, OF_DISPLAY * size, 0.0, now)
+        for budget in (self.user.budget, self.budget):
+            budget.spend(count, size, 0.0, now)
 
 
 class Displays:

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from typing import Any
 
 from webmap.agents import address, data_messages
-from webmap.agents.allowance import Allowance
 from webmap.agents.peer import Handler, Peer, peer_of
+from webmap.agents.rate_limit import RateLimit
 from webmap.base.errors import BridgeClosed, WireError
 from webmap.ros.bridge import LINKS
 from webmap.ros.rosbridge.connection import CLOSED_HERE, Lane, Liveness
@@ -134,7 +134,7 @@ class AgentLane(Lane):
         self._trouble = ""
         self._listening: int | None = None
         self._topics: dict[str, ThrottledTopic] = {}
-        self._allowance = Allowance("messages", pieces=PIECES, size=BYTES)
+        self._allowance = RateLimit("messages", pieces=PIECES, size=BYTES)
 
     def send(self, frame: bytes) -> None:
         """Send an operation, now.

@@ -18,7 +18,6 @@ import msgspec
 from webmap.agents import address, bridge_proxy, data_messages
 from webmap.agents.address import Sender, sender_of
 from webmap.agents.agent_cameras import AgentCameras
-from webmap.agents.allowance import Allowance
 from webmap.agents.announcements import PROTOCOL, About, Beacon, read_beacon
 from webmap.agents.bridge_proxy import BridgeProxy, Call
 from webmap.agents.data_messages import lean_scan
@@ -26,6 +25,7 @@ from webmap.agents.displays import MOST_USERS
 from webmap.agents.gate_messages import MAX_BYTES, MOST_SAMPLE
 from webmap.agents.gates import AgentGate
 from webmap.agents.peer import MOST_CHANGES_BYTES, Peer, peer_of
+from webmap.agents.rate_limit import Receiver
 from webmap.base.children import python_command
 from webmap.base.errors import BridgeError, ConfigError, WireError
 from webmap.base.lifecycle import lifecycle
@@ -115,7 +115,6 @@ class Agent:
                 service, args, None, timeout
             )
         )
-        self._allowance = Allowance("messages")
         self._proxy = BridgeProxy(
             upstream=self._upstream,
             reply=self._reply,
@@ -130,6 +129,7 @@ class Agent:
             details=lambda: _each("type", self._buttons) - {""},
             throttles=throttles,
         )
+        self._receiver = Receiver("messages", self._proxy.receive)
         self._beams = dict(beams or {})
         self._whole: set[str] = set()
         """The topics whose messages could not be read as scans."""
@@ -141,7 +141,6 @@ class Agent:
             failed=lambda error: self._proxy.closed(error.why or str(error)),
         )
         self._task: asyncio.Task[None] | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
         self._roles = roles
         self.gate: AgentGate | None = None
         lifecycle.add(self)
@@ -157,7 +156,7 @@ class Agent:
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Connect to the rosbridge and serve displays."""
-        self._loop = loop
+        self._receiver.start(loop)
         self._task = loop.create_task(self._run())
         self._lane.start(loop)
 
@@ -187,7 +186,9 @@ class Agent:
         gate_in = address.gate_in(name, everybody, everybody)
         peer.listen(gate_in, self._sample, gate=True, most=MOST_SAMPLE)
         data_in = address.data_in(name, everybody, everybody, everybody)
-        peer.listen(data_in, self._piece, most=data_messages.MOST_OF_DISPLAY + 1)
+        peer.listen(
+            data_in, self._receiver.receive, most=data_messages.MOST_OF_DISPLAY + 1
+        )
         typing = spawn(self._learn_types())
         self._cameras.start(asyncio.get_running_loop())
         self._serving = True
@@ -272,21 +273,6 @@ class Agent:
             self.gate.take_sample(sender_of(key).display, sample)
 
     # Data.
-
-    def _piece(self, key: str, piece: bytes) -> None:
-        client = sender_of(key)
-        if (
-            self._loop is not None
-            and not self._loop.is_closed()
-            and self._allowance.admits(client.user, len(piece), time.monotonic())
-        ):
-            self._loop.call_soon_threadsafe(self._take, client, piece)
-
-    def _take(self, client: Sender, piece: bytes) -> None:
-        try:
-            self._proxy.receive(client, piece, time.monotonic())
-        except (WireError, BridgeError) as error:
-            log.warning("display %s: %s", client.display, error)
 
     def _bridge_opened(self) -> None:
         log.info("%s: the connection is open", self.url)
