@@ -186,11 +186,11 @@ class Lane:
         elif link is not None:
             link.abort(why)
 
-    def spend(self, ears: SocketHandlers) -> Socket:
+    def spend(self, handlers: SocketHandlers) -> Socket:
         """Hand the open socket over to other handlers and connect again."""
         link = self._socket
         assert link is not None  # it has just been written to
-        link.ears = ears
+        link.handlers = handlers
         self._trouble = None
         self._drop()
         return link
@@ -227,8 +227,8 @@ class Lane:
         attempts, loop = Attempts(), asyncio.get_running_loop()
         while True:
             try:
-                ears = SocketHandlers(self._text, self._on_pong, self._lost)
-                link = await open_socket(self.url, ears, self._budget)
+                handlers = SocketHandlers(self._text, self._on_pong, self._lost)
+                link = await open_socket(self.url, handlers, self._budget)
             except BridgeClosed as error:
                 if attempts.is_new(str(error)):
                     log.warning("no connection: %s", error)

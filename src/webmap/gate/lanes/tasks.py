@@ -119,10 +119,10 @@ class Calls:
             reason = readable(f"no answer: connection lost: {why}")
             outcomes.put_nowait(reason)
 
-        ears = SocketHandlers(text=on_text, pong=lambda _: None, lost=lost)
+        handlers = SocketHandlers(text=on_text, pong=lambda _: None, lost=lost)
         try:
             async with asyncio.timeout(CALL_TIMEOUT):
-                link = await open_socket(self._url, ears, self._budget)
+                link = await open_socket(self._url, handlers, self._budget)
                 try:
                     link.send(request)
                     return await outcomes.get()
