@@ -17,9 +17,9 @@ from webmap.agents.agent_cameras import (
 )
 from webmap.agents.camera_messages import (
     AgentClock,
-    CameraPicture,
     CameraRelease,
     CameraRequest,
+    PictureMessage,
 )
 from webmap.agents.remote_camera import RemoteCamera
 from webmap.base.errors import ConfigError, WireError
@@ -199,7 +199,7 @@ def test_messages_about_cameras_are_read_as_they_were_written():
     assert camera_messages.read_request(msgspec.json.encode(look)) == look
     away = CameraRelease("r1", "Front")
     assert camera_messages.read_request(msgspec.json.encode(away)) == away
-    picture = CameraPicture(7, 1.5, b"data")
+    picture = PictureMessage(7, 1.5, b"data")
     assert (
         camera_messages.read_picture(camera_messages.pack_picture(picture)) == picture
     )

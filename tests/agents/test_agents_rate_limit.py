@@ -5,14 +5,14 @@ import asyncio
 import pytest
 
 from webmap.agents.address import data_in
-from webmap.agents.rate_limit import RateLimit, Receiver
+from webmap.agents.rate_limit import Receiver, UserRateLimit
 from webmap.base.errors import BridgeClosed, WireError
 
 KEY = data_in("bay3", "ann", "4f", "1")
 
 
 def test_a_user_that_sends_too_much_is_left_out_and_others_are_not():
-    limit = RateLimit("messages", pieces=100, size=1000)
+    limit = UserRateLimit("messages", pieces=100, size=1000)
     flood = [limit.admits("ann", 1, 0.0) for _ in range(2000)]
     assert flood.count(True) == pytest.approx(1000, abs=1)
     assert limit.admits("ben", 1, 0.0)

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from webmap.agents import data_messages
-from webmap.agents.link import AgentLane, ThrottledTopic
+from webmap.agents.link import AgentConnection, ThrottledTopic
 from webmap.ros.rosbridge import ops
 
 
@@ -131,7 +131,7 @@ class Peer:
 
 def test_a_connection_listens_to_a_topic_until_its_last_subscription_ends(clock):
     taken = []
-    lane = AgentLane(
+    lane = AgentConnection(
         "zenoh://router/bay3",
         opened=print,
         received=taken.append,
@@ -171,7 +171,7 @@ def test_a_new_agent_is_noticed_though_a_ping_to_the_old_one_has_no_answer(
         clock.now += seconds
         lane._take(data_messages.pack_frame(b"{}"))  # of what another display shows
 
-    lane = AgentLane(
+    lane = AgentConnection(
         "zenoh://router/bay3",
         opened=lambda: None,
         received=lambda frame: None,

@@ -15,7 +15,7 @@ import pytest
 
 from webmap.agents import address
 from webmap.agents.announcements import PROTOCOL, Beacon
-from webmap.agents.link import AgentLane
+from webmap.agents.link import AgentConnection
 from webmap.agents.peer import Peer, close_peers, peer_of
 from webmap.agents.router_access import RouterUser
 from webmap.ros.rosbridge import ops
@@ -162,7 +162,7 @@ class Poses:
 
     def __init__(self, url):
         self.at = 0.0
-        self.lane = AgentLane(
+        self.lane = AgentConnection(
             url, opened=self.subscribe, received=self.take, closed=str, failed=str
         )
         self.lane.start(asyncio.get_running_loop())

@@ -18,10 +18,10 @@ import msgspec
 from webmap.agents import address, camera_messages
 from webmap.agents.address import Sender
 from webmap.agents.camera_messages import (
-    CameraPicture,
     CameraRelease,
     CameraReply,
     CameraRequest,
+    PictureMessage,
 )
 from webmap.agents.peer import Peer
 from webmap.agents.rate_limit import Receiver
@@ -102,7 +102,7 @@ class CameraRelay:
         *,
         begin: Callable[[Name, CameraSource], None],
         end: Callable[[Name], None],
-        send: Callable[[Name, CameraPicture], None],
+        send: Callable[[Name, PictureMessage], None],
         answer: Callable[[Sender, CameraReply], None],
     ) -> None:
         self._begin = begin
@@ -204,7 +204,7 @@ class CameraRelay:
         watched.newest = None
         self._numbers += 1
         flying.append((self._numbers, now))
-        self._send(name, CameraPicture(self._numbers, came, data))
+        self._send(name, PictureMessage(self._numbers, came, data))
 
 
 class AgentCameras:
@@ -266,7 +266,7 @@ class AgentCameras:
     def _end(self, name: Name) -> None:
         self._pulls.pop(name).hang_up()
 
-    def _send(self, name: Name, picture: CameraPicture) -> None:
+    def _send(self, name: Name, picture: PictureMessage) -> None:
         key = address.camera_key(self._agent, *name)
         self._peer.put_data(key, camera_messages.pack_picture(picture))
 

@@ -25,7 +25,7 @@ from webmap.agents.data_messages import (
     read_op,
     unpack,
 )
-from webmap.agents.rate_limit import RateLimit
+from webmap.agents.rate_limit import UserRateLimit
 from webmap.base.errors import WireError
 from webmap.ros.names import is_type, same_type, split_type
 from webmap.ros.rosbridge import ops
@@ -178,7 +178,7 @@ class BridgeProxy:
         """The subscriptions of each user."""
         self._calling: Counter[str] = Counter()
         """The calls that are not answered, of each user and of each display."""
-        self._catching_up = RateLimit("subscriptions", size=4 << 20)
+        self._catching_up = UserRateLimit("subscriptions", size=4 << 20)
         self._advertised: dict[str, set[Sender]] = {}
         self._numbers = 0
         self.session = ""

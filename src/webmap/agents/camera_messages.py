@@ -54,7 +54,7 @@ class CameraReply(msgspec.Struct, frozen=True):
     """Why no pictures come from the camera."""
 
 
-class CameraPicture(NamedTuple):
+class PictureMessage(NamedTuple):
     """A picture of a camera."""
 
     number: int
@@ -97,12 +97,12 @@ def read_reply(piece: bytes) -> CameraReply:
     return reply
 
 
-def pack_picture(picture: CameraPicture) -> bytes:
+def pack_picture(picture: PictureMessage) -> bytes:
     """Return the message with a picture."""
     return _head.pack(picture.number, picture.clock) + picture.data
 
 
-def read_picture(piece: bytes) -> CameraPicture:
+def read_picture(piece: bytes) -> PictureMessage:
     """Return the picture in a message.
 
     Raises:
@@ -112,7 +112,7 @@ def read_picture(piece: bytes) -> CameraPicture:
     if len(piece) <= _head.size:
         raise WireError(f"got a picture of {len(piece)} bytes")
     number, clock = _head.unpack_from(piece)
-    return CameraPicture(number, clock, piece[_head.size :])
+    return PictureMessage(number, clock, piece[_head.size :])
 
 
 class AgentClock:

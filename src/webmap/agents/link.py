@@ -11,10 +11,10 @@ from typing import Any
 
 from webmap.agents import address, data_messages
 from webmap.agents.peer import Handler, Peer, peer_of
-from webmap.agents.rate_limit import RateLimit
+from webmap.agents.rate_limit import UserRateLimit
 from webmap.base.errors import BridgeClosed, WireError
 from webmap.ros.bridge import LINKS
-from webmap.ros.rosbridge.connection import CLOSED_HERE, Lane, Liveness
+from webmap.ros.rosbridge.connection import CLOSED_HERE, BridgeConnection, Liveness
 from webmap.ros.rosbridge.link import RosbridgeLink
 
 log = logging.getLogger("webmap.agent")
@@ -115,12 +115,12 @@ class ThrottledTopic:
             self.release()
 
 
-class AgentLane(Lane):
+class AgentConnection(BridgeConnection):
     """A connection to the rosbridge of an agent.
 
     Args:
         url: The address of the agent, ``zenoh://host:7447/name``.
-        options: The other arguments of ``Lane``.
+        options: The other arguments of ``BridgeConnection``.
 
     """
 
@@ -134,7 +134,7 @@ class AgentLane(Lane):
         self._trouble = ""
         self._listening: int | None = None
         self._topics: dict[str, ThrottledTopic] = {}
-        self._allowance = RateLimit("messages", pieces=PIECES, size=BYTES)
+        self._allowance = UserRateLimit("messages", pieces=PIECES, size=BYTES)
 
     def send(self, frame: bytes) -> None:
         """Send an operation, now.
@@ -320,7 +320,7 @@ def _not_reached(url: str, why: str) -> BridgeClosed:
 class AgentLink(RosbridgeLink):
     """Topics and services of a robot's rosbridge, through its agent."""
 
-    lane_type = AgentLane
+    lane_type = AgentConnection
 
 
 for scheme in address.SCHEMES:

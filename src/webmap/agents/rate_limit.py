@@ -22,7 +22,7 @@ MOST_USERS = 1000
 """Users that are remembered; only a router without users has so many names."""
 
 
-class RateLimit:
+class UserRateLimit:
     """Limits what each user of a router may send; may be used in several threads.
 
     Args:
@@ -70,7 +70,7 @@ class Receiver:
     def __init__(
         self, what: str, process: Callable[[Sender, bytes, float], None]
     ) -> None:
-        self._limit = RateLimit(what)
+        self._limit = UserRateLimit(what)
         self._process = process
         self._loop: asyncio.AbstractEventLoop | None = None
 

@@ -22,7 +22,7 @@ from webmap.agents.camera_messages import (
     CameraRequest,
 )
 from webmap.agents.peer import Peer, peer_of
-from webmap.agents.rate_limit import RateLimit
+from webmap.agents.rate_limit import UserRateLimit
 from webmap.base.errors import ConfigError, WireError
 from webmap.base.outside_text import one_line
 
@@ -105,7 +105,7 @@ class RemoteCameraPull:
         self._show = show
         self._complain = complain
         self._clock = AgentClock()
-        self._allowance = RateLimit("pictures", pieces=200, size=32 << 20)
+        self._allowance = UserRateLimit("pictures", pieces=200, size=32 << 20)
         self._newest = 0
         self._answered_at = 0.0
         self._peer: Peer | None = None

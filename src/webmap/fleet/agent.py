@@ -46,9 +46,9 @@ from webmap.gate.protocol import Role
 from webmap.poses.alignment import alignments
 from webmap.ros.names import is_type, normalise_topic
 from webmap.ros.rosbridge.calls import Calls
-from webmap.ros.rosbridge.connection import Lane
+from webmap.ros.rosbridge.connection import BridgeConnection
 from webmap.ros.rosbridge.events import Publish
-from webmap.ros.rosbridge.graph import Graph
+from webmap.ros.rosbridge.graph import BridgeGraph
 from webmap.ros.rosbridge.protocol import Protocol
 from webmap.ros.subscriptions import each_counts
 
@@ -110,7 +110,7 @@ class Agent:
         self._protocol = Protocol()
         self._calls: dict[str, Calls] = {}
         """The calls of each user: one that hangs delays no other user's."""
-        self._graph = Graph(
+        self._graph = BridgeGraph(
             lambda service, args=None, timeout=TYPES: self._calls_of("").call(
                 service, args, None, timeout
             )
@@ -133,7 +133,7 @@ class Agent:
         self._beams = dict(beams or {})
         self._whole: set[str] = set()
         """The topics whose messages could not be read as scans."""
-        self._lane = Lane(
+        self._lane = BridgeConnection(
             url,
             opened=self._bridge_opened,
             received=self._received,

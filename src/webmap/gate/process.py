@@ -25,7 +25,7 @@ from webmap.gate.clock import now
 from webmap.gate.disk import Disk, Records
 from webmap.gate.lanes.links import Links
 from webmap.gate.locks import Locks, keep_private, state_folder
-from webmap.gate.pipe import BackgroundHandler, Outbox
+from webmap.gate.pipe import BackgroundHandler, PipeWriter
 from webmap.gate.rules.gate import Gate
 from webmap.gate.rules.motion import ZERO
 
@@ -60,7 +60,7 @@ class Shell:
 
     """
 
-    def __init__(self, outbox: Outbox, locks: Locks, disk: Disk) -> None:
+    def __init__(self, outbox: PipeWriter, locks: Locks, disk: Disk) -> None:
         self.failed = False
         self._gate = Gate()
         self._outbox = outbox
@@ -220,14 +220,14 @@ def main() -> int:
     handler.setFormatter(logging.Formatter("%(levelname)s %(name)s: %(message)s"))
     background = BackgroundHandler(handler)
     set_up_logging(handler=background)
-    outbox = Outbox(pipe_out)
+    outbox = PipeWriter(pipe_out)
     code = asyncio.run(_serve(pipe_in, outbox))
     outbox.close(0.2)
     background.drain(0.2)
     return code
 
 
-async def _serve(pipe_in: int, outbox: Outbox) -> int:
+async def _serve(pipe_in: int, outbox: PipeWriter) -> int:
     loop = asyncio.get_running_loop()
     folder = state_folder()
     keep_private(folder)

@@ -39,7 +39,7 @@ MOST_TROUBLES = 20
 """How many different errors are logged before a link is steady again."""
 
 
-class Attempts:
+class ReconnectWaits:
     """Decides how long to wait before each attempt, and which errors are logged."""
 
     def __init__(self) -> None:
@@ -224,7 +224,7 @@ class Lane:
             self._pong(number)
 
     async def _run(self) -> None:
-        attempts, loop = Attempts(), asyncio.get_running_loop()
+        attempts, loop = ReconnectWaits(), asyncio.get_running_loop()
         while True:
             try:
                 handlers = SocketHandlers(self._text, self._on_pong, self._lost)

@@ -25,7 +25,7 @@ from webmap.gate.rules.health import (
     Video,
 )
 from webmap.gate.rules.motion import DeadMan, Motion
-from webmap.gate.rules.speeds import Speeds
+from webmap.gate.rules.speeds import MachineSpeeds
 from webmap.gate.rules.stop import StopLatch
 
 
@@ -195,7 +195,7 @@ class Authority:
         robots: Aliases,
         conditions: MotionConditions,
         motion: Motion,
-        speeds: Speeds,
+        speeds: MachineSpeeds,
         epochs: Epochs,
         halt: Callable[[str, float], None],
         changed: Callable[[float], None],
