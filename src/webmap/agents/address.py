@@ -92,7 +92,7 @@ class Sender(NamedTuple):
 
     @property
     def display(self) -> str:
-        """The name of the display."""
+        """The name of the display, such as ``anna.5f3c01aa``."""
         return f"{self.user}.{self.instance}"
 
 

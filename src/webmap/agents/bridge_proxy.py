@@ -125,7 +125,7 @@ class SharedTopic:
 
 
 class Call(NamedTuple):
-    """A service that a display calls."""
+    """A service call of a display, until the rosbridge answers it."""
 
     client: Sender
     id: str | None
@@ -193,7 +193,7 @@ class BridgeProxy:
 
     @property
     def asks_types(self) -> bool:
-        """Whether to ask the rosbridge for the types of its topics."""
+        """Whether a display needs a topic whose type is not known yet."""
         return bool(self.session and self._topics.keys() - self._types.keys())
 
     def typed(self, types: Mapping[str, str], now: float) -> None:

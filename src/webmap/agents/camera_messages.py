@@ -44,7 +44,7 @@ class CameraRelease(msgspec.Struct, frozen=True, tag="away"):
 
 
 class CameraReply(msgspec.Struct, frozen=True):
-    """The answer to a request."""
+    """The agent's answer to a :class:`CameraRequest`, sent to its display alone."""
 
     number: int
     """The number of the request."""
@@ -55,7 +55,7 @@ class CameraReply(msgspec.Struct, frozen=True):
 
 
 class PictureMessage(NamedTuple):
-    """A picture of a camera."""
+    """A picture as the camera sent it; it goes to all displays at once."""
 
     number: int
     clock: float
@@ -98,7 +98,7 @@ def read_reply(piece: bytes) -> CameraReply:
 
 
 def pack_picture(picture: PictureMessage) -> bytes:
-    """Return the message with a picture."""
+    """Return number and clock in 16 bytes, and then the picture as it came."""
     return _head.pack(picture.number, picture.clock) + picture.data
 
 

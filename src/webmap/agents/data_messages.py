@@ -72,7 +72,7 @@ _note = msgspec.json.Decoder(Note).decode
 
 
 def pack_note(note: Note) -> bytes:
-    """Return the piece with a note."""
+    """Return the piece with a note, as JSON."""
     return NOTE + msgspec.json.encode(note)
 
 

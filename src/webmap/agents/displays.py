@@ -101,7 +101,7 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 class UserDisplays:
-    """A user of the router, and the displays of this user."""
+    """The displays of one user of the router, and what limits them together."""
 
     def __init__(self) -> None:
         self.displays: dict[str, Display] = {}

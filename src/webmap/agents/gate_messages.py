@@ -49,7 +49,7 @@ def head_of(sample: bytes) -> tuple[int, int]:
 
 
 class Numbering:
-    """Numbers the samples of one sender."""
+    """Numbers the samples of one sender, from 1 in each session."""
 
     def __init__(self, session: int | None = None) -> None:
         self.session = secrets.randbits(64) if session is None else session
@@ -58,7 +58,7 @@ class Numbering:
         """The number of the newest sample; 0 before the first."""
 
     def next(self, body: bytes) -> bytes:
-        """Return the next sample, with this body."""
+        """Return the sample that carries ``body``: 16 bytes more."""
         self.sent += 1
         return _head.pack(self.session, self.sent) + body
 

@@ -400,7 +400,7 @@ def peer_of(router: str, most: int = MOST_BYTES) -> Peer:
 
 
 def close_peers() -> None:
-    """Close the peers of this process."""
+    """Close the peers of this process; called at its end, may take some seconds."""
     with _peers_lock:
         for peer in _peers.values():
             peer.close()

@@ -70,13 +70,13 @@ class RemoteCamera(NamedTuple):
 
     @property
     def url(self) -> str:
-        """The camera in one address."""
+        """All fields in one address, which :meth:`parse` reads."""
         fields = {"robot": self.robot, "camera": self.camera, "place": self.place}
         return f"{self.agent}?{urlencode(fields)}"
 
     @property
     def name(self) -> str:
-        """The name of the agent."""
+        """The name of the agent, without its router."""
         return urlsplit(self.agent).path.strip("/")
 
     @property

@@ -123,7 +123,7 @@ class RemoteGate:
 
     @property
     def connection(self) -> str:
-        """The connection of the program of this display."""
+        """The identity at the agent's gate of this display's program."""
         return f"{self.display}/{protocol.PROGRAM}"
 
     def send(self, message: protocol.ToGate) -> None:

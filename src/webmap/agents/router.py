@@ -31,7 +31,7 @@ LOOPBACK = ("127.0.0.1", "[::1]", "localhost")
 
 
 class UserEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """A user in the file of users."""
+    """One user: an agent, or a display with the agents that it reaches."""
 
     password: str
     agent: str = ""
@@ -161,7 +161,7 @@ def _dictionary(users: Mapping[str, UserEntry]) -> str:
 
 
 def access_rules(users: Mapping[str, UserEntry]) -> dict[str, Any]:
-    """Return the access rules of a router for its users."""
+    """Return Zenoh's ``access_control``; what no rule allows is denied."""
     rules: list[dict[str, Any]] = []
     policies: list[dict[str, Any]] = []
     for user, entry in users.items():

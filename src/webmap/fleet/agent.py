@@ -161,7 +161,7 @@ class Agent:
         self._lane.start(loop)
 
     async def stop(self) -> None:
-        """Close the connections."""
+        """Close the rosbridge's connections; the gate ends with the runtime."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait([self._task])

@@ -38,7 +38,7 @@ log = logging.getLogger("webmap.cli")
 
 
 class MapModule(NamedTuple):
-    """A module of the map, with its arguments."""
+    """A module of the key ``modules``, with the arguments of its constructor."""
 
     name: str
     args: tuple[Any, ...]

@@ -63,7 +63,7 @@ them."""
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One setting of a robot."""
+    """One value of ``--set``."""
 
     text: str
     """The setting as written."""

@@ -68,11 +68,11 @@ class PeriodicSearch(ABC):
         """Process the types by topic."""
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Start the queries."""
+        """Start to query the bridge each time that :attr:`period` has passed."""
         self._task = loop.create_task(self._keep_searching())
 
     async def stop(self) -> None:
-        """Stop the queries."""
+        """Stop the queries; a query that runs is cancelled."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait([self._task])

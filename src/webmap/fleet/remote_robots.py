@@ -149,7 +149,7 @@ class RemoteAgents:
 
     @property
     def has_agents(self) -> bool:
-        """Whether a sign of an agent came."""
+        """Whether any agent of the router was there since the start."""
         return bool(self._news)
 
     @property
@@ -190,7 +190,7 @@ class RemoteAgents:
         self._task = loop.create_task(self._keep_checking())
 
     async def stop(self) -> None:
-        """Stop to show changes."""
+        """Stop to follow the agents; their robots stay on the console."""
         tasks = [self._task]
         for agent in self._known.values():
             tasks += [agent.describing, agent.drawing]

@@ -136,7 +136,7 @@ def _differ(robot: Candidate, other: Candidate, text: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class DrawableTopics:
-    """The drawable topics of a robot of ``--robot``."""
+    """What discovery adds to a robot of ``--robot``: its other topics."""
 
     found: FoundRobot | None
     """The same robot as discovery found it, if it did."""

@@ -47,7 +47,7 @@ PARTS: Mapping[Role, str] = {
 
 
 def whole(config: RobotConfig) -> RobotConfig:
-    """Return a configuration as it is."""
+    """Return ``config``: a robot with a page is made of all its parts."""
     return config
 
 
@@ -147,7 +147,7 @@ class ViewRobots:
 
     @property
     def robots(self) -> "list[Robot]":
-        """The robots that were made."""
+        """The robots on the console, in the order in which they were found."""
         return [shown.robot for shown in self._places.values()]
 
     @property

@@ -141,7 +141,7 @@ class Lane:
 
     @property
     def wanted(self) -> bool:
-        """Whether the lane is held."""
+        """Whether anything is announced, so that the socket has to be open."""
         return bool(self._holds)
 
     def hold(self, id: str, hello: bytes = b"", goodbye: bytes = b"") -> None:
@@ -196,7 +196,7 @@ class Lane:
         return link
 
     def close(self) -> None:
-        """Close the lane permanently."""
+        """Close the socket, and open none again."""
         self._task.cancel()
         link, self._socket = self._socket, None
         if link is not None:

@@ -344,7 +344,7 @@ def hook_topics(spec: RobotSpec) -> list[Topic]:
 
 
 def goal_topics(spec: RobotSpec) -> list[Topic]:
-    """Return the topics of a robot's goals."""
+    """Return the topics of a robot's goals, cancels and poses, with their types."""
     topics = []
     if spec.goal_topic is not None:
         topics.append((spec.goal_topic, spec.goal_type))

@@ -162,7 +162,7 @@ class Handover:
         return who
 
     def withdraw(self, connection: str) -> None:
-        """Withdraw the request of this connection."""
+        """End the request, or the handover, of a connection that is gone."""
         for who in (self.asker, self.successor):
             if who is not None and who.id == connection:
                 self.end()
