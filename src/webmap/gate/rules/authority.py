@@ -162,7 +162,7 @@ class Handover:
         return who
 
     def withdraw(self, connection: str) -> None:
-        """End the request, or the handover, of a connection that is gone."""
+        """End the request of a connection, or the handover to it, if it has one."""
         for who in (self.asker, self.successor):
             if who is not None and who.id == connection:
                 self.end()
